@@ -1,0 +1,3 @@
+"""eitskin: electrical impedance tomography skins, from a skin's description to touches."""
+
+__version__ = "0.1.0"

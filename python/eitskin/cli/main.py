@@ -1,0 +1,46 @@
+"""The command line: ``eitskin COMMAND``. One file a command beside this one; each imports what it needs only when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+from eitskin import __version__
+from eitskin.errors import EitskinError
+
+COMMANDS = ("demo", "model", "reconstruct", "import", "doctor", "compare", "bench")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole parser; each module ``cmd_NAME`` has ``add_parser(subparsers)``, which sets ``run``."""
+    parser = argparse.ArgumentParser(prog="eitskin", description="Electrical impedance tomography skins, from model to touches.")
+    parser.add_argument("--version", action="version", version=f"eitskin {__version__}")
+    parser.add_argument("--traceback", action="store_true", help="on an error, show where in the code it arose")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name in COMMANDS:
+        importlib.import_module(f"eitskin.cli.cmd_{name}").add_parser(subparsers)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code (docs/error-codes.md) and prints errors as one line on stderr."""
+    options = build_parser().parse_args(arguments)
+    try:
+        return int(options.run(options) or 0)
+    except EitskinError as error:
+        if options.traceback:
+            raise
+        print(f"eitskin: {error}", file=sys.stderr)
+        return error.exit_code
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except KeyboardInterrupt:
+        print("eitskin: stopped", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,105 @@
+"""TOML tables to dataclasses, strictly: an unknown key is an error that names the nearest known one."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from eitskin.errors import ConfigError
+from eitskin.fileio import read_bytes
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+def load_toml(path: str | Path, what: str) -> dict[str, Any]:
+    """Parse the TOML file ``path``; ``what`` names its kind in errors.
+
+    Raises:
+        FileError: it cannot be read.
+        ConfigError: it is not UTF-8 or not TOML.
+    """
+    try:
+        return tomllib.loads(read_bytes(path, what).decode("utf-8"))
+    except UnicodeDecodeError:
+        raise ConfigError(f"{path}: not UTF-8 text, so not a {what}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A remedy for the unknown ``name``: the nearest of ``known``, or all of them where none is near."""
+    choices = sorted(known)
+    close = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
+    return f"did you mean {close[0]!r}?" if close else f"known are: {', '.join(choices)}"
+
+
+def check_keys(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
+    """Refuse keys of ``table`` that are not ``known``; ``where`` says file and table.
+
+    Raises:
+        ConfigError: naming the key and the nearest known one.
+    """
+    allowed = set(known)
+    for key in table:
+        if key not in allowed:
+            raise ConfigError(f"{where}: unknown key {key!r}; {nearest(key, allowed)}")
+
+
+def number(
+    table: Mapping[str, Any],
+    key: str,
+    default: float | None,
+    where: str,
+    *,
+    low: float = float("-inf"),
+    high: float = float("inf"),
+    open_low: bool = False,
+) -> float:
+    """The number at ``key``, or ``default`` (None: required), within [low, high] ((low, high] with ``open_low``).
+
+    Raises:
+        ConfigError: it is absent and required, no number, not finite, or out of range.
+    """
+    value = table.get(key, default)
+    if value is None:
+        raise ConfigError(f"{where}: the key {key!r} is required")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ConfigError(f"{where}: {key} must be a number, not {value!r}")
+    if not (low <= value <= high) or (open_low and value == low):
+        bracket = "above" if open_low else "at least"
+        bound = f"{bracket} {low:g}" + (f" and at most {high:g}" if high != float("inf") else "")
+        raise ConfigError(f"{where}: {key} = {value!r} is out of range; it must be {bound}")
+    return float(value)
+
+
+def integer(table: Mapping[str, Any], key: str, default: int | None, where: str, *, low: int, high: int) -> int:
+    """The whole number at ``key``, or ``default`` (None: required), within [low, high].
+
+    Raises:
+        ConfigError: it is absent and required, no whole number, or out of range.
+    """
+    value = number(table, key, default, where, low=low, high=high)
+    if value != int(value):
+        raise ConfigError(f"{where}: {key} = {value!r} must be a whole number")
+    return int(value)
+
+
+def choice(table: Mapping[str, Any], key: str, default: str | None, known: Iterable[str], where: str) -> str:
+    """The word at ``key``, or ``default`` (None: required), one of ``known``.
+
+    Raises:
+        ConfigError: it is absent and required, or not one of ``known``.
+    """
+    options = list(known)
+    value = table.get(key, default)
+    if value is None:
+        raise ConfigError(f"{where}: the key {key!r} is required; one of {', '.join(options)}")
+    if not isinstance(value, str) or value not in options:
+        raise ConfigError(f"{where}: {key} = {value!r} is not known; {nearest(str(value), options)}")
+    return value

@@ -1,0 +1,71 @@
+"""Everything that eitskin refuses, one class a kind, each with the exit code that the command line returns.
+
+An error's text is one line that says what was wrong, where, and what to do about it. docs/error-codes.md lists the codes.
+"""
+
+from __future__ import annotations
+
+
+class EitskinError(Exception):
+    """Base of all errors that a user can cause or mend; ``exit_code`` is the command line's status."""
+
+    exit_code = 1
+
+
+class UsageError(EitskinError):
+    """An option or argument is out of range or contradicts another."""
+
+    exit_code = 2
+
+
+class FileError(EitskinError):
+    """A file is missing, unreadable, or cannot be written."""
+
+    exit_code = 3
+
+
+class ConfigError(EitskinError):
+    """A TOML description has an unknown key, a wrong type or a value out of range."""
+
+    exit_code = 4
+
+
+class GeometryError(EitskinError):
+    """An outline or its electrodes cannot be: self-intersecting, overlapping, too small; or meshing failed."""
+
+    exit_code = 5
+
+
+class ModelError(EitskinError):
+    """An .eitm model is truncated, corrupted, newer, foreign, or fails its self-test."""
+
+    exit_code = 6
+
+
+class ProtocolError(EitskinError):
+    """A protocol table is invalid, or frames and model were made with different protocols."""
+
+    exit_code = 7
+
+
+class FrameError(EitskinError):
+    """Boundary voltages cannot be used: wrong length, not finite, all zero, saturated."""
+
+    exit_code = 8
+
+
+class MissingExtraError(EitskinError):
+    """An optional dependency is not installed; the text gives the pip command."""
+
+    exit_code = 9
+
+
+class VerificationError(EitskinError):
+    """A self-check ran and its result is outside the stated bound."""
+
+    exit_code = 10
+
+
+def missing_extra(extra: str, package: str) -> MissingExtraError:
+    """The error for an absent optional ``package`` that the extra named ``extra`` brings."""
+    return MissingExtraError(f"this needs {package}, which is not installed: run  pip install 'eitskin[{extra}]'")

@@ -1,0 +1,61 @@
+"""Reading and writing files so that nothing is lost: written beside, then renamed."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from eitskin.errors import FileError
+
+
+@contextmanager
+def write_beside(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path in the folder of ``path``; rename it to ``path`` if the block succeeds, else remove it.
+
+    Raises:
+        FileError: the folder does not exist or cannot be written.
+    """
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent)
+        os.close(handle)
+    except OSError as error:
+        raise FileError(f"{target}: cannot write there ({error.strerror}); name a file in an existing folder") from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(target)
+    except OSError as error:
+        raise FileError(f"{target}: cannot write it ({error.strerror})") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write ``content`` to ``path`` whole or not at all.
+
+    Raises:
+        FileError: the folder does not exist or cannot be written.
+    """
+    with write_beside(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def read_bytes(path: str | Path, what: str) -> bytes:
+    """The content of ``path``; ``what`` names its kind in the error ("model", "frames file").
+
+    Raises:
+        FileError: it does not exist or cannot be read.
+    """
+    try:
+        return Path(path).read_bytes()
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such {what}; check the path") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot read this {what} ({error.strerror})") from error
