@@ -1,0 +1,1 @@
+"""What a skin is: its outline, its electrodes, and the order in which they are driven and measured."""

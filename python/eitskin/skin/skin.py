@@ -1,0 +1,199 @@
+"""A skin: outline, electrodes, sheet. Read from TOML and written back as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.config import check_keys, choice, integer, load_toml, number
+from eitskin.errors import ConfigError, GeometryError
+from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT, Electrodes
+from eitskin.skin.outline import MAX_SIZE_MM, MIN_SIZE_MM, Outline, disk, polygon
+from eitskin.skin.protocol import Protocol, protocol_from_table
+
+FloatArray = npt.NDArray[np.float64]
+
+SKIN_KEYS = ("name", "diameter_mm", "polygon_mm", "thickness_mm", "conductivity_s_per_m")
+ELECTRODE_KEYS = ("count", "width_mm", "start_angle_deg", "direction", "positions_mm", "contact_impedance_ohm_m2")
+MIN_GAP_PER_WIDTH = 0.05
+
+
+@dataclass(frozen=True)
+class Skin:
+    """A conductive sheet of one thickness with electrodes at its rim.
+
+    Raises:
+        GeometryError: electrodes overlap, nearly touch (a gap below 5 % of their width) or are wider than the rim, or
+            the sheet's conductivity or thickness is not above 0.
+    """
+
+    name: str
+    outline: Outline
+    electrodes: Electrodes
+    conductivity_s_per_m: float = 0.01
+    thickness_mm: float = 12.0
+
+    def __post_init__(self) -> None:
+        for key in ("conductivity_s_per_m", "thickness_mm"):
+            value = getattr(self, key)
+            if not (isfinite(value) and value > 0):
+                raise GeometryError(f"skin {self.name!r}: {key} = {value:g} must be above 0")
+        _refuse_overlap(self)
+
+    def electrode_spans_mm(self) -> FloatArray:
+        """Arc length (counterclockwise) where each electrode starts and ends, (count, 2).
+
+        Starts lie in [0, perimeter); an end may lie beyond the perimeter, where the electrode straddles arc length 0.
+        """
+        perimeter, half = self.outline.perimeter_mm, self.electrodes.width_mm / 2
+        starts = np.mod(self._centre_arc_lengths_mm() - half, perimeter)
+        return np.column_stack([starts, starts + self.electrodes.width_mm])
+
+    def electrode_centres_mm(self) -> FloatArray:
+        """The rim's point in the middle of each electrode, (count, 2)."""
+        return self.outline.points_at(self._centre_arc_lengths_mm())
+
+    def _centre_arc_lengths_mm(self) -> FloatArray:
+        electrodes, perimeter = self.electrodes, self.outline.perimeter_mm
+        if electrodes.positions_mm is None:
+            along = np.arange(electrodes.count) * (perimeter / electrodes.count)
+        else:
+            along = np.array(electrodes.positions_mm, dtype=np.float64)
+        start = self.outline.arc_length_at_angle(electrodes.start_angle_deg)
+        return np.asarray(np.mod(start - along if electrodes.clockwise else start + along, perimeter))
+
+
+def _refuse_overlap(skin: Skin) -> None:
+    count, width, perimeter = skin.electrodes.count, skin.electrodes.width_mm, skin.outline.perimeter_mm
+    least = MIN_GAP_PER_WIDTH * width
+    if count * (width + least) > perimeter:
+        raise GeometryError(
+            f"skin {skin.name!r}: {count} electrodes of {width:g} mm do not fit on a rim of {perimeter:g} mm; "
+            "use fewer or narrower ones"
+        )
+    starts = skin.electrode_spans_mm()[:, 0]
+    order = np.argsort(starts, kind="stable")
+    gaps = np.diff(np.append(starts[order], starts[order[0]] + perimeter)) - width
+    worst = int(np.argmin(gaps))
+    if gaps[worst] < least * (1 - 1e-9):
+        first, second = sorted((int(order[worst]), int(order[(worst + 1) % count])))
+        raise GeometryError(
+            f"skin {skin.name!r}: electrodes {first} and {second} (from 0) overlap or nearly touch "
+            f"(gap {gaps[worst]:.3g} mm, at least {least:.3g} mm is needed); move them apart or make them narrower"
+        )
+
+
+def paper_skin() -> Skin:
+    """The hydrogel skin of the paper: a disk of 194 mm, 12 mm thick, 16 electrodes of 4 mm, 0.01 S/m."""
+    return Skin("paper", disk(194.0), Electrodes())
+
+
+def skin_from_table(table: Mapping[str, Any], where: str) -> Skin:
+    """The skin in a parsed TOML ``table`` with [skin] and [electrodes]; ``where`` names its source in errors.
+
+    Raises:
+        ConfigError: an unknown key, a wrong type or a value out of range.
+        GeometryError: outline or electrodes cannot be.
+    """
+    check_keys(table, ("skin", "electrodes", "protocol"), where)
+    sheet, place = _subtable(table, "skin", where, required=True), f"{where} [skin]"
+    check_keys(sheet, SKIN_KEYS, place)
+    name = sheet.get("name", "skin")
+    if not isinstance(name, str) or not name:
+        raise ConfigError(f"{place}: name must be a word in quotes, not {name!r}")
+    try:
+        return Skin(
+            name=name,
+            outline=_outline_from_table(sheet, place),
+            electrodes=_electrodes_from_table(_subtable(table, "electrodes", where), f"{where} [electrodes]"),
+            conductivity_s_per_m=number(sheet, "conductivity_s_per_m", 0.01, place, low=0, high=1e8, open_low=True),
+            thickness_mm=number(sheet, "thickness_mm", 12.0, place, low=0, high=1e4, open_low=True),
+        )
+    except GeometryError as error:
+        raise GeometryError(f"{where}: {error}") from None
+
+
+def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
+    """The skin and the protocol in the TOML file ``path``; without [protocol], adjacent drive and measurement.
+
+    Raises:
+        FileError: the file cannot be read.
+        ConfigError, GeometryError, ProtocolError: what it describes cannot be.
+    """
+    table, where = load_toml(path, "skin description"), str(path)
+    skin = skin_from_table(table, where)
+    return skin, protocol_from_table(_subtable(table, "protocol", where), skin.electrodes.count, f"{where} [protocol]")
+
+
+def skin_to_table(skin: Skin) -> dict[str, Any]:
+    """The table from which ``skin_from_table`` makes an equal skin."""
+    outline, electrodes = skin.outline, skin.electrodes
+    sheet: dict[str, Any] = {"name": skin.name}
+    if outline.diameter_mm is not None:
+        sheet["diameter_mm"] = outline.diameter_mm
+    else:
+        sheet["polygon_mm"] = [[x, y] for x, y in outline.vertices_mm]
+    sheet |= {"thickness_mm": skin.thickness_mm, "conductivity_s_per_m": skin.conductivity_s_per_m}
+    contacts: dict[str, Any] = {
+        "count": electrodes.count,
+        "width_mm": electrodes.width_mm,
+        "start_angle_deg": electrodes.start_angle_deg,
+        "direction": "clockwise" if electrodes.clockwise else "counterclockwise",
+    }
+    if electrodes.positions_mm is not None:
+        contacts["positions_mm"] = list(electrodes.positions_mm)
+    contacts["contact_impedance_ohm_m2"] = electrodes.contact_impedance_ohm_m2
+    return {"skin": sheet, "electrodes": contacts}
+
+
+def _subtable(table: Mapping[str, Any], key: str, where: str, *, required: bool = False) -> Mapping[str, Any]:
+    value = table.get(key)
+    if value is None and not required:
+        return {}
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"{where}: a table [{key}] is needed" + ("" if value is None else f", not {key} = {value!r}"))
+    return value
+
+
+def _outline_from_table(sheet: Mapping[str, Any], where: str) -> Outline:
+    if ("diameter_mm" in sheet) == ("polygon_mm" in sheet):
+        raise ConfigError(f"{where}: give either diameter_mm or polygon_mm")
+    if "diameter_mm" in sheet:
+        return disk(number(sheet, "diameter_mm", None, where, low=MIN_SIZE_MM, high=MAX_SIZE_MM))
+    points = sheet["polygon_mm"]
+    if not isinstance(points, list):
+        raise ConfigError(f"{where}: polygon_mm must be a list of [x, y] points")
+    for k, point in enumerate(points):
+        if not isinstance(point, list) or len(point) != 2 or not all(_is_number(value) for value in point):
+            raise ConfigError(f"{where}: polygon_mm entry {k} (from 0) must be [x, y], not {point!r}")
+    return polygon(points)
+
+
+def _electrodes_from_table(table: Mapping[str, Any], where: str) -> Electrodes:
+    check_keys(table, ELECTRODE_KEYS, where)
+    positions = table.get("positions_mm")
+    if positions is not None and not (isinstance(positions, list) and all(_is_number(value) for value in positions)):
+        raise ConfigError(f"{where}: positions_mm must be a list of numbers")
+    default = Electrodes()
+    impedance = default.contact_impedance_ohm_m2
+    direction = choice(table, "direction", "counterclockwise", ("clockwise", "counterclockwise"), where)
+    return Electrodes(
+        count=integer(table, "count", default.count, where, low=MIN_COUNT, high=MAX_COUNT),
+        width_mm=number(table, "width_mm", default.width_mm, where, low=0, high=MAX_SIZE_MM, open_low=True),
+        start_angle_deg=number(table, "start_angle_deg", default.start_angle_deg, where, low=-360, high=360),
+        clockwise=direction == "clockwise",
+        positions_mm=None if positions is None else tuple(float(value) for value in positions),
+        contact_impedance_ohm_m2=number(table, "contact_impedance_ohm_m2", impedance, where, low=0, high=1e6),
+    )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
