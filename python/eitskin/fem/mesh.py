@@ -1,0 +1,242 @@
+"""Triangle meshes of a skin, refined at its electrodes. Netgen makes them in a process of its own (mesh_worker.py)."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import cached_property
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import eitskin
+from eitskin.errors import GeometryError, UsageError, missing_extra
+from eitskin.skin.skin import Skin
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+MIN_ELEMENTS = 200
+MAX_ELEMENTS = 200_000
+COUNT_TOLERANCE = 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Linear triangles: ``nodes_mm`` (N, 2), ``triangles`` (E, 3) counterclockwise.
+
+    ``electrode_edges`` holds for each electrode the rim edges under it as (k, 2) nodes, in order counterclockwise; an
+    electrode's two ends are nodes. Arrays are read-only.
+    """
+
+    nodes_mm: FloatArray
+    triangles: IntArray
+    electrode_edges: tuple[IntArray, ...]
+
+    @property
+    def n_nodes(self) -> int:
+        """The number of nodes, N."""
+        return len(self.nodes_mm)
+
+    @property
+    def n_elements(self) -> int:
+        """The number of triangles, E."""
+        return len(self.triangles)
+
+    @cached_property
+    def areas_mm2(self) -> FloatArray:
+        """Each triangle's area, (E,)."""
+        u, v = (self.nodes_mm[self.triangles[:, k]] - self.nodes_mm[self.triangles[:, 0]] for k in (1, 2))
+        return np.asarray((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)
+
+    def centroids_mm(self) -> FloatArray:
+        """Each triangle's centre of area, (E, 2)."""
+        return np.asarray(self.nodes_mm[self.triangles].mean(axis=1))
+
+    def least_angle_deg(self) -> float:
+        """The smallest angle of any triangle: a measure of the mesh's quality (60 at best)."""
+        p = self.nodes_mm[self.triangles]
+        sides = np.roll(p, -1, axis=1) - p
+        lengths = np.hypot(sides[..., 0], sides[..., 1])
+        sines = 2 * self.areas_mm2[:, None] / (lengths * np.roll(lengths, 1, axis=1))
+        return float(np.degrees(np.arcsin(np.clip(sines, 0, 1)).min()))
+
+
+def build_mesh(
+    skin: Skin, *, max_size_mm: float, electrode_size_mm: float | None = None, timeout_s: float = 60.0
+) -> Mesh:
+    """Mesh ``skin`` with edges up to about ``max_size_mm``, ``electrode_size_mm`` on electrodes (their width / 4).
+
+    A disk's rim nodes lie on the circle. The same arguments give the same mesh.
+
+    Raises:
+        GeometryError: the mesher failed or took longer than ``timeout_s`` (it is then killed).
+        UsageError: a size is not above 0, or so small that the mesh would be enormous.
+        MissingExtraError: netgen is not installed.
+    """
+    size = electrode_size_mm if electrode_size_mm is not None else min(max_size_mm, skin.electrodes.width_mm / 4)
+    if not (0 < max_size_mm < float("inf") and 0 < size < float("inf")):
+        raise UsageError(f"mesh: sizes of {max_size_mm:g} and {size:g} mm; both must be above 0")
+    if skin.outline.area_mm2 / max_size_mm**2 > MAX_ELEMENTS or skin.outline.perimeter_mm / size > MAX_ELEMENTS:
+        raise UsageError(
+            f"mesh: sizes of {max_size_mm:g} and {size:g} mm would give over {MAX_ELEMENTS} elements; use larger ones"
+        )
+    pieces, owner = _rim_pieces(skin, max_size_mm, min(size, max_size_mm))
+    arrays = run_mesher({"max_size": max_size_mm, "pieces": pieces}, timeout_s, skin.name)
+    return _checked_mesh(skin, arrays, owner)
+
+
+def mesh_for_elements(skin: Skin, elements: int = 3000, *, timeout_s: float = 60.0) -> Mesh:
+    """A mesh of about ``elements`` triangles: within 15 %, or the nearest of four tries where the electrodes need more.
+
+    Raises:
+        UsageError: ``elements`` is not within 200 to 200,000.
+        GeometryError, MissingExtraError: as ``build_mesh``.
+    """
+    if not MIN_ELEMENTS <= elements <= MAX_ELEMENTS:
+        raise UsageError(f"mesh: {elements} elements is out of range; use {MIN_ELEMENTS} to {MAX_ELEMENTS}")
+    aim, best = float(elements), None
+    for _ in range(4):
+        max_size_mm = _size_for(skin, aim)
+        mesh = build_mesh(
+            skin, max_size_mm=max_size_mm, electrode_size_mm=_electrode_size(skin, max_size_mm), timeout_s=timeout_s
+        )
+        if best is None or abs(mesh.n_elements - elements) < abs(best.n_elements - elements):
+            best = mesh
+        if abs(mesh.n_elements - elements) <= COUNT_TOLERANCE * elements:
+            return mesh
+        aim *= elements / mesh.n_elements
+    assert best is not None
+    return best
+
+
+def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[npt.NDArray[Any]]:
+    """Run mesh_worker.py on ``request``, killing it after ``timeout_s``; returns its four arrays. ``name``: the skin.
+
+    Raises:
+        GeometryError: it failed or was killed.
+        MissingExtraError: netgen is not installed.
+    """
+    if importlib.util.find_spec("netgen") is None:
+        raise missing_extra("model", "netgen-mesher")
+    package_root = str(Path(eitskin.__file__).parents[1])
+    path = os.pathsep.join(filter(None, [package_root, os.environ.get("PYTHONPATH")]))
+    with tempfile.TemporaryDirectory(prefix="eitskin-mesh-") as folder:
+        reply = Path(folder) / "mesh"
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", "eitskin.fem.mesh_worker", str(reply)],
+                input=json.dumps(request).encode(),
+                capture_output=True,
+                timeout=timeout_s,
+                cwd=folder,
+                env={**os.environ, "PYTHONPATH": path},
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise GeometryError(
+                f"skin {name!r}: meshing took longer than {timeout_s:g} s and was stopped; simplify the outline, "
+                "use a larger element size or allow more time"
+            ) from None
+        if done.returncode != 0:
+            lines = done.stderr.decode(errors="replace").strip().splitlines() or [f"exit status {done.returncode}"]
+            raise GeometryError(f"skin {name!r}: the mesher failed ({lines[-1]}); simplify the outline")
+        with reply.open("rb") as arrays:
+            return [np.load(arrays) for _ in range(4)]
+
+
+def _rim_pieces(skin: Skin, max_size_mm: float, electrode_size_mm: float) -> tuple[list[list[Any]], IntArray]:
+    """The rim cut at electrode ends and corners, as mesh_worker.py wants it; each piece's electrode or -1, (k,)."""
+    outline, perimeter = skin.outline, skin.outline.perimeter_mm
+    spans = skin.electrode_spans_mm()
+    corners = outline.corner_arc_lengths_mm()
+    cuts = np.mod(spans.ravel(), perimeter)
+    if len(corners):
+        # An electrode's end within a thousandth of its width of a corner is put on the corner.
+        away = np.mod(cuts[:, None] - corners[None, :] + perimeter / 2, perimeter) - perimeter / 2
+        nearest = np.argmin(np.abs(away), axis=1)
+        snapped = np.abs(away[np.arange(len(cuts)), nearest]) < 1e-3 * skin.electrodes.width_mm
+        cuts = np.unique(np.concatenate([corners, cuts[~snapped]]))
+    else:
+        cuts = np.unique(cuts)
+    ends = np.append(cuts[1:], cuts[0] + perimeter)
+    middles = (cuts + ends) / 2
+    inside = np.mod(middles[:, None] - spans[None, :, 0], perimeter) < skin.electrodes.width_mm
+    owner = np.where(inside.any(axis=1), inside.argmax(axis=1), -1)
+    points = outline.points_at(cuts)
+    controls: list[list[float] | None] = [None] * len(cuts)
+    if outline.diameter_mm is not None:
+        radius = outline.diameter_mm / 2
+        stretch = 1 / np.cos((ends - cuts) / (2 * radius))
+        controls = (outline.points_at(middles) * stretch[:, None]).tolist()
+    sizes = np.where(owner >= 0, electrode_size_mm, max_size_mm)
+    return [[x, y, c, s] for (x, y), c, s in zip(points.tolist(), controls, sizes.tolist(), strict=True)], owner
+
+
+def _checked_mesh(skin: Skin, arrays: list[npt.NDArray[Any]], owner: IntArray) -> Mesh:
+    nodes, triangles, edges, piece = arrays
+    electrode = owner[piece]
+    electrode_edges = tuple(_chained(edges[electrode == k]) for k in range(skin.electrodes.count))
+    for array in (nodes, triangles, *electrode_edges):
+        array.flags.writeable = False
+    mesh = Mesh(nodes, triangles, electrode_edges)
+    area = float(mesh.areas_mm2.sum())
+    if not (len(triangles) and mesh.areas_mm2.min() > 0 and abs(area / skin.outline.area_mm2 - 1) < 0.05):
+        raise GeometryError(
+            f"skin {skin.name!r}: the mesh does not fill the outline ({area:g} of {skin.outline.area_mm2:g} mm2); "
+            "use a smaller element size"
+        )
+    if len(np.unique(triangles)) != len(nodes) or min(len(e) for e in electrode_edges) < 1:
+        raise GeometryError(f"skin {skin.name!r}: the mesh has loose nodes or bare electrodes; use a smaller size")
+    return mesh
+
+
+def _chained(edges: IntArray) -> IntArray:
+    """``edges`` (k, 2) put in order, so that each begins where the one before ends."""
+    follower = {int(a): int(b) for a, b in edges}
+    node = next(iter(set(follower) - set(follower.values())), None)
+    chain = []
+    while node in follower:
+        chain.append((node, follower[node]))
+        node = follower.pop(node)
+    return np.array(chain, dtype=np.int64).reshape(-1, 2)
+
+
+def _electrode_size(skin: Skin, max_size_mm: float) -> float:
+    """A quarter of an electrode's width, less where the mesh is fine all over, more where it is very coarse."""
+    coarse = sqrt(skin.outline.area_mm2) / 24
+    return min(skin.electrodes.width_mm / 4 * max(1.0, max_size_mm / coarse), max_size_mm / 3)
+
+
+def _expected_elements(skin: Skin, max_size_mm: float) -> float:
+    """Netgen's element count: the integral of 1 / size^2, where the size grows with the distance from an electrode.
+
+    It is taken over one electrode's share of the skin, as a rectangle on the rim. Slope and density are fitted.
+    """
+    growth, density, points = 0.3, 2.2, 40
+    along = skin.outline.perimeter_mm / skin.electrodes.count / 2
+    deep = skin.outline.area_mm2 / skin.outline.perimeter_mm
+    u = (np.arange(points) + 0.5) / points
+    weight = 3 * u**2 / points
+    beyond = np.maximum(along * u**3 - skin.electrodes.width_mm / 2, 0.0)
+    size = _electrode_size(skin, max_size_mm) + growth * np.hypot(beyond[:, None], deep * u[None, :] ** 3)
+    per_area = weight @ np.minimum(size, max_size_mm) ** -2.0 @ weight
+    return density * skin.outline.area_mm2 * float(per_area)
+
+
+def _size_for(skin: Skin, elements: float) -> float:
+    """The maximum size for which ``elements`` are expected, by bisection."""
+    low = sqrt(skin.outline.area_mm2 / elements) / 10
+    high = sqrt(skin.outline.area_mm2)
+    for _ in range(24):
+        middle = sqrt(low * high)
+        low, high = (middle, high) if _expected_elements(skin, middle) > elements else (low, middle)
+    return high
