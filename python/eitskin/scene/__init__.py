@@ -1,0 +1,1 @@
+"""Touches and the frames they would give."""

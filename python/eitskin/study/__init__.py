@@ -1,0 +1,1 @@
+"""Judging and comparing: metrics, the comparison of methods."""

@@ -1,0 +1,185 @@
+"""MIoU by hand, by masks and by counts; the curve over the threshold and its best value."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from eitskin.errors import UsageError
+from eitskin.fem.grid import grid_for
+from eitskin.skin.outline import disk, polygon
+from eitskin.study import metrics
+
+SQUARE = polygon([(0, 0), (30, 0), (30, 30), (0, 30)])
+
+
+def test_iou_of_masks_worked_by_hand() -> None:
+    truth = np.array([1, 1, 1, 0, 0, 0, 0, 0, 0, 0], dtype=bool)
+    estimate = np.array([0, 1, 1, 1, 0, 0, 0, 0, 0, 0], dtype=bool)
+    assert metrics.iou(estimate, truth) == pytest.approx(2 / 4)
+    assert metrics.iou(~estimate, ~truth) == pytest.approx(6 / 8)
+    assert metrics.miou(estimate, truth) == pytest.approx((2 / 4 + 6 / 8) / 2)
+    assert metrics.miou(truth, truth) == 1.0
+
+
+def test_empty_masks_agree_and_a_false_touch_does_not() -> None:
+    none, one = np.zeros(10, dtype=bool), np.eye(1, 10, dtype=bool)[0]
+    assert metrics.miou(none, none) == 1.0
+    assert metrics.miou(one, none) == pytest.approx((0 + 9 / 10) / 2)
+    assert metrics.miou(none, one) == pytest.approx((0 + 9 / 10) / 2)
+
+
+def test_overlap_of_two_discs_matches_the_lens_formula() -> None:
+    """Two circles of radius r at distance d share 2 r^2 acos(d/2r) - d/2 sqrt(4r^2 - d^2)."""
+    raster = metrics.raster_inside(disk(100.0), 0.25)
+    radius, apart = 12.0, 9.0
+    a = metrics.disc_mask(raster.points_mm, [[-apart / 2, 3.0]], [radius])
+    b = metrics.disc_mask(raster.points_mm, [[apart / 2, 3.0]], [radius])
+    lens = 2 * radius**2 * math.acos(apart / (2 * radius)) - apart / 2 * math.sqrt(4 * radius**2 - apart**2)
+    union = 2 * math.pi * radius**2 - lens
+    whole = math.pi * 50.0**2
+    touch, rest = lens / union, (whole - union) / (whole - lens)
+    assert metrics.iou(a, b) == pytest.approx(touch, abs=2e-3)
+    assert metrics.miou(a, b) == pytest.approx((touch + rest) / 2, abs=2e-3)
+
+
+def test_raster_has_the_area_of_the_skin_and_stays_inside() -> None:
+    raster = metrics.raster_inside(disk(194.0))
+    assert raster.spacing_mm == 1.5
+    assert len(raster.points_mm) * 1.5**2 == pytest.approx(math.pi * 97.0**2, rel=2e-3)
+    assert np.hypot(*raster.points_mm.T).max() <= 97.0
+    assert len(metrics.raster_inside(SQUARE, 3.0).points_mm) == 100
+
+
+def test_bad_rasters_are_refused() -> None:
+    with pytest.raises(UsageError, match="above 0"):
+        metrics.raster_inside(SQUARE, 0.0)
+    with pytest.raises(UsageError, match="no cell inside"):
+        metrics.raster_inside(SQUARE, 100.0)
+
+
+def test_mask_lookup_keeps_the_lowest_row_below() -> None:
+    mask = np.array([[1, 0], [0, 0]], dtype=bool)
+    points = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [-1.5, -0.5]])
+    assert metrics.mask_on_points(points, mask, (-1, -1, 1, 1)).tolist() == [True, False, False, False, False]
+
+
+def test_nearest_lookup_shows_the_containing_pixel_or_the_next_at_the_rim() -> None:
+    grid = grid_for(disk(194.0))
+    raster = metrics.raster_inside(disk(194.0))
+    lookup = metrics.lookup_for(raster.points_mm, grid, "nearest")
+    assert lookup.pixel.shape == (len(raster.points_mm), 1) and (lookup.weight == 1).all()
+    containing = grid.locate(raster.points_mm)
+    at_edge = np.abs((raster.points_mm - grid.origin_mm) / grid.pixel_mm % 1 - 0.5).max(axis=1) > 0.5 - 1e-9
+    clear = (containing >= 0) & ~at_edge
+    assert np.count_nonzero(clear) > 0.9 * len(clear)
+    assert (lookup.pixel[clear, 0] == containing[clear]).all()
+    gap = np.hypot(*(raster.points_mm - grid.centres_mm()[lookup.pixel[:, 0]]).T)
+    assert gap.max() < 1.5 * grid.pixel_mm
+
+
+def test_bilinear_lookup_is_exact_for_a_plane_and_for_a_constant() -> None:
+    grid = grid_for(disk(194.0))
+    raster = metrics.raster_inside(disk(194.0))
+    lookup = metrics.lookup_for(raster.points_mm, grid, "bilinear")
+    assert lookup.show(np.full(grid.n_pixels, 3.5)) == pytest.approx(3.5)
+    x, y = grid.centres_mm().T
+    inner = np.hypot(*raster.points_mm.T) < 85
+    plane = lookup.show(2 * x - 3 * y + 1)[inner]
+    assert plane == pytest.approx((raster.points_mm @ [2, -3] + 1)[inner], abs=1e-9)
+    assert ((lookup.weight >= 0).all(), lookup.weight.sum(axis=1)) == (True, pytest.approx(1.0))
+    both = lookup.show(np.stack([x, y]))
+    assert both.shape == (2, len(raster.points_mm))
+
+
+def test_unknown_lookup_is_refused() -> None:
+    with pytest.raises(UsageError, match="nearest, bilinear"):
+        metrics.lookup_for(np.zeros((1, 2)), grid_for(SQUARE, 4), "cubic")
+
+
+def test_touch_mask_is_strict_and_signed() -> None:
+    values = np.array([0.0, 0.5, 1.0, -2.0])
+    assert metrics.touch_mask(values, 0.5).tolist() == [False, False, True, False]
+    assert metrics.touch_mask(values, 0.49).tolist() == [False, True, True, False]
+    assert metrics.touch_mask(values, 0.5, sign=-1).tolist() == [False, False, False, True]
+    assert not metrics.touch_mask(np.zeros(4), 0.5).any()
+    assert not metrics.touch_mask(-np.ones(4), 0.0).any()
+
+
+@pytest.mark.parametrize("lookup", metrics.LOOKUPS)
+def test_curves_equal_masks_on_the_raster(lookup: str) -> None:
+    outline = disk(60.0)
+    grid = grid_for(outline, 12)
+    judge = metrics.judge_for(outline, grid, 1.0, lookup)
+    generator = np.random.default_rng(5)
+    images = generator.normal(size=(7, grid.n_pixels))
+    images[5] = -np.abs(images[5])
+    images[6] = 0.0
+    centres = generator.uniform(-20, 20, size=(7, 2))
+    truths = np.stack([metrics.disc_mask(judge.raster.points_mm, [c], [6.0]) for c in centres])
+    truths[4] = False
+    thresholds = [0.0, 0.3, 0.8, 1.0]
+    for sign in (1, -1):
+        curves = judge.curves(images, truths, thresholds, sign)
+        for k in range(7):
+            top = (sign * images[k]).max()
+            for j, t in enumerate(thresholds):
+                shown = (sign * judge.lookup.show(images[k]) > t * top) & (top > 0)
+                assert curves[k, j] == pytest.approx(metrics.miou(shown, truths[k]), abs=1e-12)
+
+
+def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
+    grid = grid_for(SQUARE, 6)
+    judge = metrics.judge_for(SQUARE, grid, 1.0)
+    image = np.random.default_rng(2).uniform(size=36)
+    truth = metrics.disc_mask(judge.raster.points_mm, [[12, 17]], [6])
+    mask = metrics.touch_mask(image, 0.6)[judge.lookup.pixel[:, 0]]
+    assert judge.curves(image[None], truth[None], [0.6])[0, 0] == pytest.approx(metrics.miou(mask, truth))
+
+
+def test_covered_part_is_exact_in_area() -> None:
+    grid = grid_for(disk(194.0))
+    part = metrics.covered_part(grid, [[-40, 11], [20, 30]], [9, 7])
+    assert part.sum() * grid.pixel_area_mm2 == pytest.approx(math.pi * (81 + 49), rel=5e-3)
+    assert part.min() == 0 and part.max() == 1
+
+
+def test_a_perfect_image_is_limited_by_its_pixels_only() -> None:
+    """The ceiling that a 32-pixel image has, and none where pixels are cells."""
+    outline = disk(194.0)
+    grid = grid_for(outline)
+    raster = metrics.raster_inside(outline)
+    discs = [([[x, y]], [9.0]) for x in (-40.0, 3.0, 33.0) for y in (-21.0, 11.0)]
+    truths = np.stack([metrics.disc_mask(raster.points_mm, *d) for d in discs])
+    perfect = np.stack([metrics.covered_part(grid, *d) for d in discs])
+    score = {}
+    for kind in metrics.LOOKUPS:
+        curves = metrics.judge_for(outline, grid, lookup=kind).curves(perfect, truths)
+        score[kind] = curves.mean(axis=0).max()
+    assert 0.83 < score["nearest"] < 0.90
+    assert 0.95 < score["bilinear"] < 0.99
+    fine = grid_for(SQUARE, 20)
+    judge = metrics.judge_for(SQUARE, fine)
+    truth = metrics.disc_mask(judge.raster.points_mm, [[12, 17]], [6])[None]
+    assert judge.curves(truth.astype(float), truth, [0.5])[0, 0] == 1.0
+
+
+def test_curves_refuse_what_they_cannot_judge() -> None:
+    judge = metrics.judge_for(SQUARE, grid_for(SQUARE, 6))
+    truths = np.zeros((2, len(judge.raster.points_mm)), dtype=bool)
+    with pytest.raises(UsageError, match=r"\(2, 36\)"):
+        judge.curves(np.zeros((2, 35)), truths)
+    with pytest.raises(UsageError, match="ascend"):
+        judge.curves(np.zeros((2, 36)), truths, [0.5, 0.4])
+    broken = np.zeros((2, 36))
+    broken[1, 3] = np.nan
+    with pytest.raises(UsageError, match="image 1"):
+        judge.curves(broken, truths)
+
+
+def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals() -> None:
+    curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
+    assert metrics.best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
+    assert metrics.THRESHOLDS[0] == 0.02 and metrics.THRESHOLDS[-1] == 0.98 and len(metrics.THRESHOLDS) == 49
