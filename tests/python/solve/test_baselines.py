@@ -1,0 +1,146 @@
+"""Baselines against closed forms solved densely, and FISTA against another solver's optimum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.errors import FrameError, UsageError
+from eitskin.solve import baselines
+
+GENERATOR = np.random.default_rng(11)
+J = GENERATOR.normal(size=(20, 35)) @ np.diag(np.geomspace(1, 0.05, 35))
+DV = GENERATOR.normal(size=(4, 20))
+
+
+def test_back_projection_divides_by_the_sensitivity() -> None:
+    image = baselines.back_projection(J).reconstruct(DV)
+    expected = [[sum(J[i, j] * dv[i] for i in range(20)) / sum(abs(J[:, j])) for j in range(35)] for dv in DV]
+    assert image == pytest.approx(np.array(expected))
+    blind = J.copy()
+    blind[:, 3] = 0
+    assert (baselines.back_projection(blind).reconstruct(DV)[:, 3] == 0).all()
+
+
+@pytest.mark.parametrize("strength", [1e-4, 1e-2, 1.0])
+def test_gauss_newton_solves_the_normal_equations(strength: float) -> None:
+    a = strength * np.linalg.eigvalsh(J.T @ J).max()
+    expected = np.linalg.solve(J.T @ J + a * np.eye(35), J.T @ DV.T).T
+    assert baselines.gauss_newton(J, strength).reconstruct(DV) == pytest.approx(expected, rel=1e-8, abs=1e-10)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0])
+def test_noser_solves_the_weighted_normal_equations(exponent: float) -> None:
+    prior = np.diag(J.T @ J) ** exponent
+    a = 0.01 * np.linalg.eigvalsh(J.T @ J).max()
+    expected = np.linalg.solve(J.T @ J + a * np.diag(prior / prior.mean()), J.T @ DV.T).T
+    assert baselines.noser(J, 0.01, exponent).reconstruct(DV) == pytest.approx(expected, rel=1e-8, abs=1e-10)
+
+
+def test_noser_without_exponent_is_gauss_newton() -> None:
+    assert baselines.noser(J, 0.1, 0.0).matrix == pytest.approx(baselines.gauss_newton(J, 0.1).matrix)
+
+
+def test_strength_is_free_of_units() -> None:
+    one = baselines.noser(J, 0.01).reconstruct(DV)
+    assert 1e6 * baselines.noser(J * 1e6, 0.01).reconstruct(DV) == pytest.approx(one, rel=1e-7, abs=1e-10)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 5])
+def test_conjugate_gradient_minimises_over_the_krylov_space(steps: int) -> None:
+    """After k steps CGLS has the least |J x - dv| over span{(J'J)^i J'dv, i < k}."""
+    image = baselines.ConjugateGradient(J, steps).reconstruct(DV)
+    for dv, x in zip(DV, image, strict=True):
+        basis = [J.T @ dv]
+        for _ in range(steps - 1):
+            basis.append(J.T @ (J @ basis[-1]))
+        space, _ = np.linalg.qr(np.array(basis).T)
+        best = space @ np.linalg.lstsq(J @ space, dv, rcond=None)[0]
+        assert x == pytest.approx(best, abs=1e-7)
+
+
+def test_conjugate_gradient_ends_at_the_solution_and_stays() -> None:
+    tall = J[:, :8]
+    exact = np.linalg.lstsq(tall, DV.T, rcond=None)[0].T
+    for steps in (8, 40):
+        assert baselines.ConjugateGradient(tall, steps).reconstruct(DV) == pytest.approx(exact, abs=1e-8)
+    assert (baselines.ConjugateGradient(J, 5).reconstruct(np.zeros((1, 20))) == 0).all()
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_fista_reaches_the_optimum_of_another_solver(signed: bool) -> None:
+    linear_model = pytest.importorskip("sklearn.linear_model")
+    method = baselines.PlainFista(J, 6000, 0.1, signed)
+    images, lambdas = method.reconstruct(DV), method.lambdas(DV)
+    for dv, x, lam in zip(DV, images, lambdas, strict=True):
+        lasso = linear_model.Lasso(alpha=lam / 20, fit_intercept=False, positive=not signed, tol=1e-12, max_iter=10**6)
+        best = lasso.fit(J, dv).coef_
+
+        def value(z: np.ndarray, dv: np.ndarray = dv, lam: float = lam) -> float:
+            return 0.5 * float(((J @ z - dv) ** 2).sum()) + lam * float(np.abs(z).sum())
+
+        assert value(x) == pytest.approx(value(best), rel=1e-8)
+        assert x == pytest.approx(best, abs=1e-4)
+        assert 0 < np.count_nonzero(best) < 20
+
+
+def test_fista_optimality_and_lambda_max() -> None:
+    method = baselines.PlainFista(J, 8000, 0.3)
+    x = method.reconstruct(DV)
+    slope = (DV - x @ J.T) @ J
+    lam = method.lambdas(DV)[:, None]
+    assert (x >= 0).all()
+    assert (slope <= lam * (1 + 1e-5)).all()
+    assert np.abs((slope - lam) * (x > 1e-9)).max() < 1e-5 * lam.max()
+    almost = baselines.PlainFista(J, 200, 0.9999)
+    assert all(np.count_nonzero(row) <= 1 for row in almost.reconstruct(DV))
+
+
+def test_fista_iterations_follow_the_paper() -> None:
+    """Two iterations written out: x1 from 0; momentum (t1 - 1) / t2 is 0 at first, (t2 - 1) / t3 then."""
+    dv = DV[:1]
+    step, lam = 1 / np.linalg.norm(J, 2) ** 2, baselines.PlainFista(J, 1, 0.1).lambdas(dv)[0]
+
+    def prox(y: np.ndarray) -> np.ndarray:
+        return np.maximum(y - step * ((y @ J.T - dv) @ J) - step * lam, 0)
+
+    x0 = np.zeros((1, 35))
+    x1 = prox(x0)
+    x2 = prox(x1)
+    t2 = (1 + 5**0.5) / 2
+    t3 = (1 + (1 + 4 * t2**2) ** 0.5) / 2
+    x3 = prox(x2 + (t2 - 1) / t3 * (x2 - x1))
+    for k, x in enumerate((x1, x2, x3), start=1):
+        assert baselines.PlainFista(J, k, 0.1).reconstruct(dv) == pytest.approx(x, abs=1e-13)
+
+
+def test_frame_of_nothing_gives_an_image_of_nothing() -> None:
+    for method in (
+        baselines.back_projection(J), baselines.gauss_newton(J, 0.1), baselines.noser(J, 0.1),
+        baselines.ConjugateGradient(J, 5), baselines.PlainFista(J, 5, 0.1), baselines.PlainFista(J, 5, 0.1, True),
+    ):
+        assert (method.reconstruct(np.zeros(20)) == np.zeros((1, 35))).all(), method.name
+
+
+def test_many_frames_are_as_one_by_one() -> None:
+    for method in (baselines.ConjugateGradient(J, 4), baselines.PlainFista(J, 30, 0.05), baselines.noser(J, 0.1)):
+        together = method.reconstruct(DV)
+        assert together == pytest.approx(np.concatenate([method.reconstruct(dv) for dv in DV]), abs=1e-12)
+
+
+def test_bad_frames_and_parameters_are_refused() -> None:
+    method = baselines.gauss_newton(J, 0.1)
+    with pytest.raises(FrameError, match="20 rows"):
+        method.reconstruct(np.zeros((2, 19)))
+    broken = DV.copy()
+    broken[2, 0] = np.inf
+    with pytest.raises(FrameError, match="frame 2"):
+        method.reconstruct(broken)
+    with pytest.raises(UsageError, match="above 0"):
+        baselines.gauss_newton(J, 0.0)
+    with pytest.raises(UsageError, match="ratio"):
+        baselines.PlainFista(J, 10, 1.5)
+    blind = J.copy()
+    blind[:, 3] = 0
+    with pytest.raises(UsageError, match="pixel 3"):
+        baselines.noser(blind, 0.1)
