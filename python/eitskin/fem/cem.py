@@ -1,0 +1,235 @@
+"""The complete electrode model on linear triangles (Somersalo, Cheney and Isaacson, SIAM J. Appl. Math. 52, 1992).
+
+A sheet of thickness t carries currents in its plane only. With potential phi inside and U_l on electrode l, weakly
+
+    sum_e sigma_e t int grad phi . grad v  +  sum_l (t / z_l) int_{E_l} (phi - U_l)(v - V_l)  =  sum_l I_l V_l .
+
+An electrode without contact impedance is an ideal shunt: its nodes and U_l are one unknown. The last electrode's U is
+fixed at 0, which leaves the matrix symmetric positive definite; potentials are then shifted to zero electrode mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import ProtocolError, UsageError, missing_extra
+from eitskin.fem.mesh import Mesh
+from eitskin.fem.patterns import Patterns, patterns_for
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+
+try:
+    from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
+    from scipy.sparse.linalg import splu
+except ModuleNotFoundError as error:
+    raise missing_extra("model", "scipy") from error
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass
+class Counters:
+    """What a forward model has done: sparsity patterns made, factorisations, right-hand sides solved."""
+
+    patterns: int = 0
+    factorisations: int = 0
+    solves: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Potentials in V per A of each solved pattern (``ForwardModel.patterns``), zero mean over the electrodes.
+
+    ``nodes`` is (N, P), ``electrodes`` (L, P).
+    """
+
+    nodes: FloatArray
+    electrodes: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The matrix's sparsity pattern for one choice of shunted electrodes, and the maps that fill it.
+
+    ``unknown`` (N + L,) numbers the unknown of each node and then electrode; ``size`` itself is the grounded one.
+    The stored values are ``filling`` (nnz, E + L) times the conductivities and then the electrodes' admittances 1 / z.
+    """
+
+    shunted: BoolArray
+    unknown: IntArray
+    size: int
+    indices: npt.NDArray[np.int32]
+    indptr: npt.NDArray[np.int32]
+    filling: csr_matrix
+
+    def matrix(self, conductivity: FloatArray, impedance: FloatArray) -> csc_matrix:
+        """The symmetric positive definite matrix, (size, size) in S."""
+        admittance = np.divide(1.0, impedance, out=np.zeros_like(impedance), where=~self.shunted)
+        values = self.filling @ np.concatenate([conductivity, admittance])
+        return csc_matrix((values, self.indices, self.indptr), shape=(self.size, self.size))
+
+
+class ForwardModel:
+    """Boundary voltages of a skin for any conductivity of the mesh's elements; the sparsity pattern is made only once.
+
+    ``contact_impedance_ohm_m2`` is one number or (L,); None takes the skin's. ``counters`` tells the work done.
+
+    Raises:
+        ProtocolError: the protocol has another number of electrodes than the skin.
+        UsageError: a contact impedance is negative or not finite, or there is not one for each electrode.
+    """
+
+    def __init__(
+        self, mesh: Mesh, skin: Skin, protocol: Protocol, contact_impedance_ohm_m2: npt.ArrayLike | None = None
+    ) -> None:
+        count = skin.electrodes.count
+        if protocol.n_electrodes != count:
+            raise ProtocolError(
+                f"protocol for {protocol.n_electrodes} electrodes, but skin {skin.name!r} has {count}; make them agree"
+            )
+        self.mesh, self.skin, self.protocol = mesh, skin, protocol
+        self.patterns: Patterns = patterns_for(protocol)
+        self.counters = Counters()
+        self.thickness_m = skin.thickness_mm * 1e-3
+        self.gradients_per_m = shape_gradients(mesh)
+        if contact_impedance_ohm_m2 is None:
+            contact_impedance_ohm_m2 = skin.electrodes.contact_impedance_ohm_m2
+        self._impedance = _checked_impedance(contact_impedance_ohm_m2, count)
+        self._system = self._make_system(self._impedance == 0)
+
+    def solve(
+        self, conductivity_s_per_m: npt.ArrayLike, contact_impedance_ohm_m2: npt.ArrayLike | None = None
+    ) -> Solution:
+        """Solve every pattern for conductivities (E,), or one for all elements, with a single factorisation.
+
+        ``contact_impedance_ohm_m2`` replaces the model's for this call; changing which are 0 makes a new pattern.
+
+        Raises:
+            UsageError: a shape is wrong, or a value not finite and above 0 (impedances may be 0).
+        """
+        conductivity = self._checked_conductivity(conductivity_s_per_m)
+        impedance = self._impedance
+        if contact_impedance_ohm_m2 is not None:
+            impedance = _checked_impedance(contact_impedance_ohm_m2, len(impedance))
+        if not np.array_equal(impedance == 0, self._system.shunted):
+            self._system = self._make_system(impedance == 0)
+        system, n_nodes = self._system, self.mesh.n_nodes
+        currents = self.patterns.right_hand_sides(len(impedance))
+        loads = np.zeros((system.size + 1, currents.shape[1]))
+        loads[system.unknown[n_nodes:]] = currents
+        factors = splu(
+            system.matrix(conductivity, impedance),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        potentials = np.zeros_like(loads)
+        potentials[: system.size] = factors.solve(loads[: system.size])
+        self.counters.factorisations += 1
+        self.counters.solves += loads.shape[1]
+        electrodes = potentials[system.unknown[n_nodes:]]
+        shift = electrodes.mean(axis=0)
+        return Solution(potentials[system.unknown[:n_nodes]] - shift, electrodes - shift)
+
+    def voltages_of(self, solution: Solution) -> FloatArray:
+        """The boundary voltages (m,) in V that the protocol reads off ``solution``, at the protocol's current."""
+        return self.patterns.voltages(solution.electrodes) * self.protocol.current_a
+
+    def voltages(
+        self, conductivity_s_per_m: npt.ArrayLike, contact_impedance_ohm_m2: npt.ArrayLike | None = None
+    ) -> FloatArray:
+        """The boundary voltages (m,) in V; arguments and errors as ``solve``."""
+        return self.voltages_of(self.solve(conductivity_s_per_m, contact_impedance_ohm_m2))
+
+    def _checked_conductivity(self, given: npt.ArrayLike) -> FloatArray:
+        conductivity = np.asarray(given, dtype=np.float64)
+        if conductivity.ndim == 0:
+            conductivity = np.full(self.mesh.n_elements, float(conductivity))
+        if conductivity.shape != (self.mesh.n_elements,):
+            raise UsageError(
+                f"forward model: conductivity of shape {conductivity.shape} for {self.mesh.n_elements} elements; "
+                "give one value for each element or one for all"
+            )
+        if not (conductivity.min() > 0 and conductivity.max() < np.inf):
+            raise UsageError("forward model: every conductivity must be finite and above 0 S/m")
+        return conductivity
+
+    def _make_system(self, shunted: BoolArray) -> System:
+        self.counters.patterns += 1
+        volumes_m3 = self.mesh.areas_mm2 * (1e-6 * self.thickness_m)
+        return _system(self.mesh, shunted, _stiffness(self.gradients_per_m, volumes_m3), self.thickness_m)
+
+
+def shape_gradients(mesh: Mesh) -> FloatArray:
+    """The gradients of each triangle's three hat functions, (E, 3, 2) in 1/m."""
+    corners = mesh.nodes_mm[mesh.triangles]
+    opposite = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
+    turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
+    return np.asarray(turned * (1e3 / (2 * mesh.areas_mm2))[:, None, None])
+
+
+def _checked_impedance(given: npt.ArrayLike, count: int) -> FloatArray:
+    impedance = np.asarray(given, dtype=np.float64)
+    if impedance.ndim == 0:
+        impedance = np.full(count, float(impedance))
+    if impedance.shape != (count,):
+        raise UsageError(f"forward model: contact impedance of shape {impedance.shape} for {count} electrodes")
+    if not (impedance.min() >= 0 and impedance.max() < np.inf):
+        raise UsageError("forward model: every contact impedance must be finite and at least 0 ohm m2")
+    return impedance.copy()
+
+
+def _stiffness(gradients_per_m: FloatArray, volumes_m3: FloatArray) -> FloatArray:
+    """Each element's matrix per unit of conductivity, (E, 3, 3) in m."""
+    return np.asarray((gradients_per_m @ gradients_per_m.transpose(0, 2, 1)) * volumes_m3[:, None, None])
+
+
+def _number_unknowns(mesh: Mesh, shunted: BoolArray) -> tuple[IntArray, int]:
+    """The unknown of each node and then electrode, (N + L,), and how many there are; that number is the ground's."""
+    count = len(shunted)
+    leader = np.arange(mesh.n_nodes + count)
+    for k in np.flatnonzero(shunted):
+        leader[mesh.electrode_edges[k].ravel()] = mesh.n_nodes + k
+    is_unknown = leader == np.arange(len(leader))
+    is_unknown[-1] = False
+    number = np.cumsum(is_unknown) - 1
+    number[-1] = size = int(np.count_nonzero(is_unknown))
+    return number[leader], size
+
+
+def _contact_terms(mesh: Mesh, shunted: BoolArray, thickness_m: float) -> tuple[IntArray, IntArray, FloatArray]:
+    """Rim edges' matrices on (node, node, electrode): places (B, 3), electrodes (B,), values (B, 3, 3) m2 per 1/z."""
+    touching = np.flatnonzero(~shunted)
+    owner = np.repeat(touching, [len(mesh.electrode_edges[k]) for k in touching])
+    edges = np.concatenate([np.zeros((0, 2), np.int64), *(mesh.electrode_edges[k] for k in touching)])
+    steps = mesh.nodes_mm[edges[:, 1]] - mesh.nodes_mm[edges[:, 0]]
+    area_m2 = np.hypot(steps[:, 0], steps[:, 1]) * 1e-3 * thickness_m
+    one = np.array([[2, 1, -3], [1, 2, -3], [-3, -3, 6]]) / 6
+    return np.column_stack([edges, mesh.n_nodes + owner]), owner, area_m2[:, None, None] * one
+
+
+def _system(mesh: Mesh, shunted: BoolArray, stiffness: FloatArray, thickness_m: float) -> System:
+    unknown, size = _number_unknowns(mesh, shunted)
+    contact_places, contact_owner, contact_values = _contact_terms(mesh, shunted, thickness_m)
+    places = unknown[np.concatenate([mesh.triangles, contact_places])]
+    rows, columns = np.repeat(places, 3, axis=1).ravel(), np.tile(places, (1, 3)).ravel()
+    owners = np.repeat(np.concatenate([np.arange(mesh.n_elements), mesh.n_elements + contact_owner]), 9)
+    values = np.concatenate([stiffness.ravel(), contact_values.ravel()])
+    kept = (rows < size) & (columns < size)
+    keys, slots = np.unique((columns * size + rows)[kept], return_inverse=True)
+    column_of, row_of = np.divmod(keys, size)
+    shape = (len(keys), mesh.n_elements + len(shunted))
+    filling = coo_matrix((values[kept], (slots, owners[kept])), shape=shape).tocsr()
+    return System(
+        shunted=shunted,
+        unknown=unknown,
+        size=size,
+        indices=row_of.astype(np.int32),
+        indptr=np.searchsorted(column_of, np.arange(size + 1)).astype(np.int32),
+        filling=filling,
+    )

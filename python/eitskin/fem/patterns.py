@@ -1,0 +1,68 @@
+"""Which current patterns a protocol needs solved, and how its rows are read off them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.skin.protocol import Protocol
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Patterns:
+    """P solved patterns and the Q different pairs of a protocol's m rows, drives and measurements alike.
+
+    A pattern drives 1 A into ``solved[p, 0]`` and out of ``solved[p, 1]``. Pair q is the sum of patterns weighted by
+    ``mix[q]`` (Q, P). Row r drives ``drive_sign[r]`` times pair ``drive[r]``, and measures ``measure_sign[r]`` times
+    pair ``measure[r]``; ``voltage_pairs`` (m, 2) are its electrodes V+ and V-. All is per ampere.
+    """
+
+    solved: IntArray
+    mix: FloatArray
+    drive: IntArray
+    drive_sign: FloatArray
+    measure: IntArray
+    measure_sign: FloatArray
+    voltage_pairs: IntArray
+
+    @property
+    def mixes(self) -> bool:
+        """Whether a pair is more than just one solved pattern."""
+        return len(self.mix) != len(self.solved) or not np.array_equal(self.mix, np.eye(len(self.mix)))
+
+    def right_hand_sides(self, n_electrodes: int) -> FloatArray:
+        """The currents in A into each electrode, (L, P)."""
+        currents = np.zeros((n_electrodes, len(self.solved)))
+        columns = np.arange(len(self.solved))
+        currents[self.solved[:, 0], columns] += 1.0
+        currents[self.solved[:, 1], columns] -= 1.0
+        return currents
+
+    def voltages(self, electrodes: FloatArray) -> FloatArray:
+        """Boundary voltages (m,) in V per A from the patterns' electrode potentials (L, P)."""
+        potentials = electrodes @ self.mix.T if self.mixes else electrodes
+        plus, minus = self.voltage_pairs[:, 0], self.voltage_pairs[:, 1]
+        return np.asarray((potentials[plus, self.drive] - potentials[minus, self.drive]) * self.drive_sign)
+
+
+def patterns_for(protocol: Protocol) -> Patterns:
+    """Each different pair is one pattern; where those outnumber the electrodes, neighbours' pairs make them up."""
+    rows = protocol.drive_measure.astype(np.int64)
+    m, n = len(rows), protocol.n_electrodes
+    pairs = rows.reshape(-1, 2)
+    ordered = np.sort(pairs, axis=1)
+    distinct, number = np.unique(ordered, axis=0, return_inverse=True)
+    sign = np.where(pairs[:, 0] == ordered[:, 0], 1.0, -1.0).reshape(m, 2)
+    number = number.reshape(m, 2)
+    if len(distinct) <= n:
+        solved, mix = distinct, np.eye(len(distinct))
+    else:
+        k = np.arange(n - 1)
+        solved = np.column_stack([k, k + 1])
+        mix = ((distinct[:, :1] <= k) & (k < distinct[:, 1:])).astype(np.float64)
+    return Patterns(solved, mix, number[:, 0], sign[:, 0], number[:, 1], sign[:, 1], rows[:, 2:])
