@@ -1,7 +1,7 @@
 """The reconstructions that others use, done properly: what this project's solver is compared with.
 
-All take the sensitivity J (m, n), V per (S/m), and turn difference frames dv (k, m) in V into images (k, n) of the change
-of conductivity. None is a straw man: each has its regularisation chosen on training scenes (``eitskin.study.compare``),
+All take the sensitivity J (m, n), V per (S/m), and turn difference frames dv (k, m) in V into images (k, n) of the
+change of conductivity. None is a straw man: each has its regularisation chosen on training scenes (compare.py),
 and FISTA has the exact Lipschitz constant. Strengths are relative, so that they do not depend on units.
 
     linear back projection   x = J' dv, each pixel over the sum of its sensitivities

@@ -245,7 +245,7 @@ def judge_for(region: Region, grid: Grid, spacing_mm: float = RASTER_MM, lookup:
     return Judge(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)
 
 
-def covered_part(grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16) -> FloatArray:
+def pixel_cover(grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16) -> FloatArray:
     """The part of each pixel that discs cover, from ``samples`` squared points a pixel: (n,). A perfect pixel image."""
     steps = ((np.arange(samples) + 0.5) / samples - 0.5) * grid.pixel_mm
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)

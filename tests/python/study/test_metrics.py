@@ -139,9 +139,9 @@ def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
     assert judge.curves(image[None], truth[None], [0.6])[0, 0] == pytest.approx(metrics.miou(mask, truth))
 
 
-def test_covered_part_is_exact_in_area() -> None:
+def test_pixel_cover_is_exact_in_area() -> None:
     grid = grid_for(disk(194.0))
-    part = metrics.covered_part(grid, [[-40, 11], [20, 30]], [9, 7])
+    part = metrics.pixel_cover(grid, [[-40, 11], [20, 30]], [9, 7])
     assert part.sum() * grid.pixel_area_mm2 == pytest.approx(math.pi * (81 + 49), rel=5e-3)
     assert part.min() == 0 and part.max() == 1
 
@@ -153,7 +153,7 @@ def test_a_perfect_image_is_limited_by_its_pixels_only() -> None:
     raster = metrics.raster_inside(outline)
     discs = [([[x, y]], [9.0]) for x in (-40.0, 3.0, 33.0) for y in (-21.0, 11.0)]
     truths = np.stack([metrics.disc_mask(raster.points_mm, *d) for d in discs])
-    perfect = np.stack([metrics.covered_part(grid, *d) for d in discs])
+    perfect = np.stack([metrics.pixel_cover(grid, *d) for d in discs])
     score = {}
     for kind in metrics.LOOKUPS:
         curves = metrics.judge_for(outline, grid, lookup=kind).curves(perfect, truths)

@@ -1,0 +1,236 @@
+"""Frames that touches would give: every scene solved nonlinearly on a fine mesh, then measured imperfectly.
+
+The mesh is not the one that is reconstructed on, or the comparison would be rigged (an "inverse crime"). What is
+imperfect is named in :class:`Measurement`, and each source of it has its own random stream (``eitskin.scene.streams``):
+turning one off leaves the samples of the others as they were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import UsageError
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.mesh import Mesh, mesh_for_elements
+from eitskin.frames.frames import Frames
+from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.streams import stream
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+
+FloatArray = npt.NDArray[np.float64]
+
+ELEMENTS = 11_000
+SUBDIVISION = 8
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What stands between the voltages and the numbers; None or 0 turns a part off.
+
+    Attributes:
+        snr_db: 20 log10(rms(V0) / sigma) of white noise, sigma the same on every channel and V0 the noise-free frame of
+            the untouched skin, rms over its m channels.
+        adc_bits: resolution of the converter.
+        adc_headroom: the converter spans +- adc_headroom max|V0|; beyond that it clips.
+        contact_spread: each electrode's contact impedance is the skin's times 1 + uniform(-s, s), drawn once for
+            quiet and touched frames.
+        quiet_frames: frames of the untouched skin; their mean is the reference, their scatter shows the noise.
+    """
+
+    snr_db: float | None = 60.0
+    adc_bits: int | None = 12
+    adc_headroom: float = 1.25
+    contact_spread: float = 0.2
+    quiet_frames: int = 64
+
+    def __post_init__(self) -> None:
+        if not (self.adc_headroom > 0 and 0 <= self.contact_spread < 1 and self.quiet_frames >= 1):
+            raise UsageError(
+                "measurement: adc_headroom must be above 0, contact_spread within 0 to below 1, quiet_frames at least 1"
+            )
+        if self.adc_bits is not None and not 1 <= self.adc_bits <= 32:
+            raise UsageError(f"measurement: adc_bits = {self.adc_bits} is out of range; use 1 to 32, or none")
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A session: one skin with its contacts, quiet frames, then one frame a scene; all in V.
+
+    Attributes:
+        skin, protocol, touches, measurement, seed: what was simulated; ``seed`` is that of contacts and noise.
+        frames_v: (k, m) measured, one a scene.
+        quiet_v: (q, m) measured without touches.
+        exact_v: (k, m) the same scenes without noise and converter.
+        exact_quiet_v: (m,) the same of the untouched skin; rms(V0) refers to it.
+        contact_impedance_ohm_m2: (L,) as drawn.
+        noise_v: sigma of the noise, 0 for none.
+        lsb_v: a step of the converter, 0 for none.
+        clipped: how many of the measured values met the converter's end.
+        mesh_nodes, mesh_elements: size of the mesh that was solved on.
+    """
+
+    skin: Skin
+    protocol: Protocol
+    touches: TouchSet
+    measurement: Measurement
+    seed: int
+    frames_v: FloatArray
+    quiet_v: FloatArray
+    exact_v: FloatArray
+    exact_quiet_v: FloatArray
+    contact_impedance_ohm_m2: FloatArray
+    noise_v: float
+    lsb_v: float
+    clipped: int
+    mesh_nodes: int
+    mesh_elements: int
+
+    @property
+    def reference_v(self) -> FloatArray:
+        """The mean quiet frame (m,)."""
+        return np.asarray(self.quiet_v.mean(axis=0))
+
+    def differences_v(self) -> FloatArray:
+        """Touched frames minus the reference: (k, m)."""
+        return self.frames_v - self.reference_v
+
+    def as_frames(self) -> Frames:
+        """The session as frames with truth, to be saved or reconstructed like measured ones."""
+        flat = [(k, touch) for k, scene in enumerate(self.touches.scenes) for touch in scene.touches]
+        contrast = np.array([touch.contrast for _, touch in flat])
+        return Frames(
+            protocol=self.protocol,
+            voltage_v=self.frames_v,
+            reference_voltage_v=self.quiet_v,
+            frame_name=tuple(scene.name for scene in self.touches.scenes),
+            touch_frame=np.array([k for k, _ in flat], dtype=np.int64),
+            touch_xy_mm=np.array([(touch.x_mm, touch.y_mm) for _, touch in flat]).reshape(-1, 2),
+            touch_radius_mm=np.array([touch.radius_mm for _, touch in flat]),
+            touch_strength=contrast - 1.0,
+            touch_sign=np.where(contrast >= 1, 1, -1).astype(np.int8),
+            meta={
+                "made_by": "simulated on a mesh",
+                "touches": self.touches.name,
+                "seed": self.seed,
+                "snr_db": self.measurement.snr_db,
+                "noise_v": self.noise_v,
+                "lsb_v": self.lsb_v,
+                "contact_spread": self.measurement.contact_spread,
+                "mesh_elements": self.mesh_elements,
+            },
+        )
+
+
+def element_cover(mesh: Mesh, touch: Touch, subdivision: int = SUBDIVISION) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Which elements a touch meets (e,), and what part of each it covers (e,), in (0, 1].
+
+    Each element near the disc is split into ``subdivision`` squared equal triangles, whose centres are looked at.
+    """
+    centre = np.array([touch.x_mm, touch.y_mm])
+    middles = mesh.centroids_mm()
+    reach = np.linalg.norm(mesh.nodes_mm[mesh.triangles] - middles[:, None], axis=2).max(axis=1)
+    near = np.flatnonzero(np.linalg.norm(middles - centre, axis=1) <= touch.radius_mm + reach)
+    points = _sub_triangle_weights(subdivision) @ mesh.nodes_mm[mesh.triangles[near]]
+    part = (((points - centre) ** 2).sum(axis=2) <= touch.radius_mm**2).mean(axis=1)
+    met = part > 0
+    return near[met], part[met]
+
+
+def _sub_triangle_weights(subdivision: int) -> FloatArray:
+    """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a triangle's sides."""
+    s = subdivision
+    upright = [(3 * i + 1, 3 * j + 1) for i in range(s) for j in range(s - i)]
+    turned = [(3 * i + 2, 3 * j + 2) for i in range(s - 1) for j in range(s - 1 - i)]
+    first = np.array(upright + turned, dtype=np.float64) / (3 * s)
+    return np.column_stack([first, 1.0 - first.sum(axis=1)])
+
+
+def conductivity_with(mesh: Mesh, touches: Iterable[Touch], sheet_s_per_m: float) -> FloatArray:
+    """Conductivity (E,) in S/m of a sheet with touches: each element's mean over its area.
+
+    Touches are taken to lie apart; where they overlap, their changes add (never below a thousandth of the sheet's).
+    """
+    change = np.zeros(mesh.n_elements)
+    for touch in touches:
+        elements, part = element_cover(mesh, touch)
+        change[elements] += part * (touch.contrast - 1.0)
+    return np.asarray(sheet_s_per_m * np.maximum(1.0 + change, 1e-3))
+
+
+def simulate(
+    skin: Skin,
+    protocol: Protocol,
+    touches: TouchSet,
+    *,
+    measurement: Measurement | None = None,
+    seed: int | None = None,
+    mesh: Mesh | None = None,
+    progress: Callable[[Sequence[Scene]], Iterable[Scene]] | None = None,
+) -> Simulated:
+    """Simulate a session with ``touches``.
+
+    Args:
+        skin, protocol: what is touched and scanned.
+        touches: one frame each.
+        measurement: imperfections; None takes the defaults.
+        seed: of contacts and noise; None takes that of ``touches``. Streams are named after its role too, so that
+            training and test sessions of a seed share nothing.
+        mesh: to solve on; None makes one of about 11,000 elements.
+        progress: wraps the scenes, to show how far it is.
+
+    Raises:
+        UsageError, GeometryError, ProtocolError, MissingExtraError: from meshing and the forward model.
+    """
+    how = Measurement() if measurement is None else measurement
+    solved_on = mesh_for_elements(skin, ELEMENTS) if mesh is None else mesh
+    own_seed = touches.seed if seed is None else seed
+    role = touches.role
+    spread = stream(own_seed, f"contact {role}").uniform(-1.0, 1.0, skin.electrodes.count) * how.contact_spread
+    contact = skin.electrodes.contact_impedance_ohm_m2 * (1.0 + spread)
+    forward = ForwardModel(solved_on, skin, protocol, contact)
+    sheet = skin.conductivity_s_per_m
+    quiet = forward.voltages(np.full(solved_on.n_elements, sheet))
+    scenes: Iterable[Scene] = touches.scenes if progress is None else progress(touches.scenes)
+    exact = np.array([forward.voltages(conductivity_with(solved_on, scene.touches, sheet)) for scene in scenes])
+
+    noise_v = 0.0 if how.snr_db is None else float(np.sqrt((quiet**2).mean()) / 10 ** (how.snr_db / 20))
+    span_v = how.adc_headroom * float(np.abs(quiet).max())
+    lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
+    converter = (noise_v, lsb_v, span_v, own_seed)
+    quiet_v, quiet_clipped = _measure(np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}")
+    frames_v, clipped = _measure(exact, *converter, f"frame {role}")
+    return Simulated(
+        skin=skin,
+        protocol=protocol,
+        touches=touches,
+        measurement=how,
+        seed=own_seed,
+        frames_v=frames_v,
+        quiet_v=quiet_v,
+        exact_v=exact,
+        exact_quiet_v=quiet,
+        contact_impedance_ohm_m2=np.asarray(contact),
+        noise_v=noise_v,
+        lsb_v=lsb_v,
+        clipped=clipped + quiet_clipped,
+        mesh_nodes=solved_on.n_nodes,
+        mesh_elements=solved_on.n_elements,
+    )
+
+
+def _measure(
+    exact_v: FloatArray, noise_v: float, lsb_v: float, span_v: float, seed: int, name: str
+) -> tuple[FloatArray, int]:
+    """Noise, then the converter: measured frames and how many values clipped. Each frame has its own stream."""
+    rows = [stream(seed, f"noise {name}", k).standard_normal(exact_v.shape[1]) for k in range(len(exact_v))]
+    noisy = exact_v + noise_v * np.array(rows)
+    if not lsb_v:
+        return noisy, 0
+    top = span_v - lsb_v
+    clipped = int(np.count_nonzero((noisy < -span_v) | (noisy > top)))
+    return np.clip(np.round(noisy / lsb_v) * lsb_v, -span_v, top), clipped

@@ -1,0 +1,97 @@
+"""Random scenes: seeds, independence, and the rules they keep."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.errors import GeometryError, UsageError
+from eitskin.scene.random_touches import TouchRules, random_touches, rim_distance_mm, spaced_touches
+from eitskin.scene.streams import stream
+from eitskin.skin.outline import disk, polygon
+
+PAPER = disk(194.0)
+ELL = polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)])
+
+
+def test_streams_are_keyed_by_seed_name_and_index() -> None:
+    draws = {
+        key: tuple(stream(*key).integers(0, 2**62, 4))
+        for key in [(1, "noise", 0), (1, "noise", 1), (1, "contact", 0), (2, "noise", 0)]
+    }
+    assert len(set(draws.values())) == 4
+    assert draws[1, "noise", 0] == tuple(stream(1, "noise").integers(0, 2**62, 4))
+    with pytest.raises(UsageError, match="0 or above"):
+        stream(-1, "noise")
+
+
+def test_stream_values_never_change() -> None:
+    """A pinned draw: published numbers rest on it."""
+    assert stream(7, "noise", 3).integers(0, 10**9, 3).tolist() == PINNED
+
+
+PINNED = [737924335, 781653816, 288842614]
+
+
+@pytest.mark.parametrize("outline", [PAPER, ELL])
+def test_touches_keep_the_rules(outline: object) -> None:
+    rules = TouchRules()
+    scenes = random_touches(outline, 4, 60).scenes  # type: ignore[arg-type]
+    assert {len(s.touches) for s in scenes} == {1, 2, 3}
+    for scene in scenes:
+        xy, radii = scene.centres_mm(), scene.radii_mm()
+        assert ((radii >= 6) & (radii <= 12)).all()
+        assert all(3 <= t.contrast <= 10 for t in scene.touches)
+        assert (rim_distance_mm(outline, xy) - radii >= rules.rim_margin_mm - 1e-9).all()  # type: ignore[arg-type]
+        for i in range(len(xy)):
+            for j in range(i):
+                assert np.hypot(*(xy[i] - xy[j])) >= radii[i] + radii[j] + rules.gap_mm - 1e-9
+
+
+def test_the_same_seed_gives_the_same_set_and_a_shorter_one_is_its_start() -> None:
+    one = random_touches(PAPER, 9, 30)
+    assert one == random_touches(PAPER, 9, 30)
+    assert random_touches(PAPER, 9, 10).scenes == one.scenes[:10]
+    assert one.name == "test-s9-n30"
+
+
+def test_seeds_and_roles_are_independent() -> None:
+    sets = [random_touches(PAPER, s, 20, r) for s in (9, 10) for r in ("train", "test")]
+    touches = [t for one in sets for scene in one.scenes for t in scene.touches]
+    assert len(set(touches)) == len(touches)
+
+
+def test_places_are_uniform_over_the_skin() -> None:
+    """Of single small touches half lie within radius R / sqrt(2), by area."""
+    rules = TouchRules(count=(1, 1), radius_mm=(1.0, 1.0), rim_margin_mm=0.0)
+    xy = np.concatenate([s.centres_mm() for s in random_touches(PAPER, 0, 600, rules=rules).scenes])
+    inside = np.count_nonzero(np.hypot(*xy.T) < 96 / np.sqrt(2)) / 600
+    assert inside == pytest.approx(0.5, abs=0.06)
+    assert np.abs(xy.mean(axis=0)).max() < 6
+
+
+def test_spaced_touches_have_the_count_and_the_spacing() -> None:
+    drawn = spaced_touches(PAPER, 3, 8, touches=7, spacing_radii=4.0)
+    assert drawn.name == "7 at 4 radii-s3-n8"
+    for scene in drawn.scenes:
+        xy = scene.centres_mm()
+        gaps = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))[np.triu_indices(7, 1)]
+        assert len(xy) == 7 and gaps.min() >= 36.0
+        assert {(t.radius_mm, t.contrast) for t in scene.touches} == {(9.0, 5.0)}
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    with pytest.raises(GeometryError, match="do not fit"):
+        spaced_touches(disk(40.0), 0, 1, touches=5)
+    with pytest.raises(UsageError, match="overlap"):
+        spaced_touches(PAPER, 0, 1, touches=2, spacing_radii=1.5)
+    with pytest.raises(UsageError, match="at least 1 scene"):
+        random_touches(PAPER, 0, 0)
+    with pytest.raises(UsageError, match="radius_mm"):
+        TouchRules(radius_mm=(12.0, 6.0))
+
+
+def test_rim_distance_of_an_ell() -> None:
+    points = [[10, 10], [60, 45], [60, 60], [25, 100], [50, 50.1]]
+    assert rim_distance_mm(ELL, points) == pytest.approx([10, 5, -10, 20, 0], abs=0.11)
+    assert rim_distance_mm(PAPER, [[90, 0], [0, 0]]) == pytest.approx([7, 97])

@@ -1,0 +1,175 @@
+"""Simulated sessions: areas, noise, converter, and the independence of their sources."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("netgen")
+
+from eitskin.errors import UsageError
+from eitskin.fem.mesh import Mesh, mesh_for_elements
+from eitskin.scene.random_touches import Scene, Touch, TouchSet, random_touches
+from eitskin.scene.simulate import Measurement, Simulated, conductivity_with, element_cover, simulate
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+
+SKIN, PROTOCOL = paper_skin(), adjacent(16)
+TOUCHES = random_touches(SKIN.outline, 5, 4)
+CLEAN = Measurement(snr_db=None, adc_bits=None, contact_spread=0.0, quiet_frames=2)
+
+
+@pytest.fixture(scope="module")
+def mesh() -> Mesh:
+    return mesh_for_elements(SKIN, 1500)
+
+
+@pytest.fixture(scope="module")
+def session(mesh: Mesh) -> Simulated:
+    return simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
+
+
+@pytest.mark.parametrize("touch", [Touch(0, 0, 9, 5), Touch(40.3, -51.7, 6, 3), Touch(2, 80, 12, 8)])
+def test_a_touch_covers_its_area(mesh: Mesh, touch: Touch) -> None:
+    elements, part = element_cover(mesh, touch)
+    assert part.min() > 0 and 0.5 < part.max() <= 1.0
+    assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(math.pi * touch.radius_mm**2, rel=0.01)
+
+
+def test_a_touch_smaller_than_an_element_is_not_lost(mesh: Mesh) -> None:
+    elements, part = element_cover(mesh, Touch(10.0, 3.0, 1.0, 5.0), subdivision=32)
+    assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(math.pi, rel=0.1)
+    assert part.max() < 0.5
+
+
+def test_conductivity_is_the_mean_over_the_element(mesh: Mesh) -> None:
+    touch = Touch(20, 10, 9, 5.0)
+    sigma = conductivity_with(mesh, [touch], 0.01)
+    elements, part = element_cover(mesh, touch)
+    assert sigma[elements] == pytest.approx(0.01 * (1 + 4 * part))
+    assert (np.delete(sigma, elements) == 0.01).all()
+    both = conductivity_with(mesh, [Touch(20, 10, 12, 5.0), Touch(-40, 0, 12, 0.2)], 0.01)
+    assert both.min() == pytest.approx(0.002) and both.max() == pytest.approx(0.05)
+    assert (conductivity_with(mesh, [], 0.02) == 0.02).all()
+
+
+def test_a_touch_without_contrast_changes_nothing(mesh: Mesh) -> None:
+    touches = TouchSet("none", 0, (Scene("same", (Touch(10, 10, 9, 1.0),)), Scene("empty", ())))
+    clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
+    assert np.abs(clean.differences_v()).max() < 1e-12 * np.abs(clean.exact_quiet_v).max()
+    assert (clean.noise_v, clean.lsb_v, clean.clipped) == (0.0, 0.0, 0)
+    assert (clean.contact_impedance_ohm_m2 == 0.01).all()
+
+
+def test_conductive_touches_lower_the_voltages_that_drive(mesh: Mesh) -> None:
+    """The power that a current source puts in falls when conductivity rises; adjacent rows sum to a drop across."""
+    touches = TouchSet("one", 0, (Scene("one", (Touch(0, 60, 10, 8.0),)), Scene("hole", (Touch(0, 60, 10, 0.1),))))
+    clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
+    across = np.array([np.abs(v.reshape(16, 13).sum(axis=1)).sum() for v in (clean.exact_quiet_v, *clean.exact_v)])
+    assert across[1] < across[0] < across[2]
+
+
+def test_noise_has_the_stated_ratio(mesh: Mesh) -> None:
+    how = Measurement(snr_db=50.0, adc_bits=None, quiet_frames=64)
+    noisy = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
+    noise = np.concatenate([noisy.frames_v - noisy.exact_v, noisy.quiet_v - noisy.exact_quiet_v])
+    rms = np.sqrt((noisy.exact_quiet_v**2).mean())
+    assert noisy.noise_v == pytest.approx(rms / 10**2.5)
+    assert noise.std() == pytest.approx(noisy.noise_v, rel=0.02)
+    assert abs(noise.mean()) < 4 * noisy.noise_v / np.sqrt(noise.size)
+    assert 20 * np.log10(rms / noise.std()) == pytest.approx(50.0, abs=0.2)
+
+
+def test_converter_steps_are_whole_and_as_stated(session: Simulated) -> None:
+    span = 1.25 * np.abs(session.exact_quiet_v).max()
+    assert session.lsb_v == pytest.approx(2 * span / 4096)
+    steps = session.frames_v / session.lsb_v
+    assert np.abs(steps - np.round(steps)).max() < 1e-6
+    assert session.clipped == 0
+    assert np.abs(session.quiet_v - session.exact_quiet_v).max() < 5 * session.noise_v + session.lsb_v
+
+
+def test_a_small_converter_clips_and_says_so(mesh: Mesh) -> None:
+    how = replace(CLEAN, adc_bits=12, adc_headroom=0.5)
+    tight = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
+    span = 0.5 * np.abs(tight.exact_quiet_v).max()
+    beyond = [np.count_nonzero(np.abs(v) > span) for v in (*tight.exact_v, tight.exact_quiet_v, tight.exact_quiet_v)]
+    assert tight.clipped == sum(beyond) > 0
+    assert tight.frames_v.min() >= -span and tight.frames_v.max() < span
+
+
+def test_contacts_are_spread_within_bounds_and_shared(session: Simulated) -> None:
+    ratio = session.contact_impedance_ohm_m2 / 0.01
+    assert (np.abs(ratio - 1) <= 0.2).all() and ratio.std() > 0.05
+    assert len(set(ratio)) == 16
+
+
+def test_sessions_repeat_and_are_independent_of_their_length(session: Simulated, mesh: Mesh) -> None:
+    again = simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
+    assert (again.frames_v == session.frames_v).all() and (again.quiet_v == session.quiet_v).all()
+    short = simulate(SKIN, PROTOCOL, random_touches(SKIN.outline, 5, 2), mesh=mesh)
+    assert (short.frames_v == session.frames_v[:2]).all()
+
+
+def test_sources_do_not_disturb_each_other(session: Simulated, mesh: Mesh) -> None:
+    def noise_of(one: Simulated) -> np.ndarray:
+        return np.asarray((one.frames_v - one.exact_v) / one.noise_v)
+
+    analog = replace(session.measurement, adc_bits=None)
+    with_contacts = simulate(SKIN, PROTOCOL, TOUCHES, measurement=analog, mesh=mesh)
+    without = simulate(SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, contact_spread=0.0), mesh=mesh)
+    louder = simulate(SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, snr_db=40.0, quiet_frames=3), mesh=mesh)
+    assert noise_of(without) == pytest.approx(noise_of(with_contacts), abs=1e-6)
+    assert noise_of(louder) == pytest.approx(noise_of(with_contacts), abs=1e-6)
+    assert (louder.contact_impedance_ohm_m2 == session.contact_impedance_ohm_m2).all()
+    other = simulate(SKIN, PROTOCOL, TOUCHES, measurement=analog, seed=6, mesh=mesh)
+    assert abs(np.corrcoef(noise_of(other).ravel(), noise_of(without).ravel())[0, 1]) < 0.15
+    assert (other.contact_impedance_ohm_m2 != session.contact_impedance_ohm_m2).all()
+    quiet = (with_contacts.quiet_v[:4] - with_contacts.exact_quiet_v) / with_contacts.noise_v
+    assert abs(np.corrcoef(quiet.ravel(), noise_of(with_contacts).ravel())[0, 1]) < 0.15
+
+
+def test_training_and_test_share_nothing(session: Simulated, mesh: Mesh) -> None:
+    train = simulate(SKIN, PROTOCOL, random_touches(SKIN.outline, 5, 4, "train"), mesh=mesh)
+    assert (train.contact_impedance_ohm_m2 != session.contact_impedance_ohm_m2).all()
+    assert not set(train.touches.scenes[0].touches) & set(session.touches.scenes[0].touches)
+
+
+def test_reference_is_the_mean_quiet_frame(session: Simulated) -> None:
+    assert session.quiet_v.shape == (64, 208)
+    assert session.differences_v() == pytest.approx(session.frames_v - session.quiet_v.sum(axis=0) / 64)
+
+
+def test_as_frames_carries_the_truth(session: Simulated) -> None:
+    frames = session.as_frames()
+    assert (frames.voltage_v == session.frames_v).all()
+    assert frames.reference_voltage_v.shape == (64, 208)
+    assert frames.frame_name[1] == "test-s5-1"
+    assert frames.touch_frame is not None and frames.touch_strength is not None and frames.touch_xy_mm is not None
+    assert frames.touch_frame.tolist() == [k for k, s in enumerate(TOUCHES.scenes) for _ in s.touches]
+    first = TOUCHES.scenes[0].touches[0]
+    assert frames.touch_strength[0] == first.contrast - 1
+    assert frames.touch_xy_mm[0].tolist() == [first.x_mm, first.y_mm]
+
+
+def test_progress_sees_every_scene(mesh: Mesh) -> None:
+    seen: list[Scene] = []
+
+    def watch(scenes: object) -> object:
+        for scene in scenes:  # type: ignore[attr-defined]
+            seen.append(scene)
+            yield scene
+
+    simulate(SKIN, PROTOCOL, TOUCHES, measurement=CLEAN, mesh=mesh, progress=watch)  # type: ignore[arg-type]
+    assert tuple(seen) == TOUCHES.scenes
+
+
+def test_impossible_measurements_are_refused() -> None:
+    with pytest.raises(UsageError, match="contact_spread"):
+        Measurement(contact_spread=1.0)
+    with pytest.raises(UsageError, match="adc_bits"):
+        Measurement(adc_bits=0)
