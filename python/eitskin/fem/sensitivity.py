@@ -15,14 +15,17 @@ from eitskin.errors import missing_extra
 from eitskin.fem.cem import ForwardModel, Solution
 from eitskin.fem.grid import Grid
 from eitskin.fem.mesh import Mesh
+from eitskin.fem.patterns import Patterns
 
 try:
-    from scipy.sparse import csr_matrix
+    from scipy.sparse import csc_matrix, csr_matrix
 except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+PIXELS_AT_ONCE = 64  # keeps a block's gradients and products in cache
 
 
 def element_to_pixel(mesh: Mesh, grid: Grid) -> csr_matrix:
@@ -54,11 +57,15 @@ def sensitivity(
     """
     solution = forward.solve(conductivity_s_per_m)
     chosen = np.arange(forward.protocol.n_rows) if rows is None else np.asarray(rows, dtype=np.int64)
-    if weights is None:
-        weights = element_to_pixel(forward.mesh, grid)
-    products = _field_products(forward, solution, weights)
-    jacobian = _rows_of_products(forward, products, chosen)
-    jacobian *= -forward.protocol.current_a * forward.thickness_m
+    by_pixel = (element_to_pixel(forward.mesh, grid) if weights is None else weights).tocsc()
+    by_pixel.data *= forward.mesh.areas_mm2[by_pixel.indices] * 1e-6
+    fields = element_fields(forward, solution)
+    jacobian = np.empty((len(chosen), grid.n_pixels))
+    for begin in range(0, grid.n_pixels, PIXELS_AT_ONCE):
+        block = slice(begin, min(begin + PIXELS_AT_ONCE, grid.n_pixels))
+        jacobian[:, block] = _rows_of_products(forward.patterns, _field_products(fields, by_pixel, block), chosen)
+    sign = (forward.patterns.drive_sign * forward.patterns.measure_sign)[chosen]
+    jacobian *= (-forward.protocol.current_a * forward.thickness_m * sign)[:, None]
     return jacobian, forward.voltages_of(solution)[chosen]
 
 
@@ -71,38 +78,33 @@ def element_fields(forward: ForwardModel, solution: Solution) -> FloatArray:
     return np.asarray(fields)
 
 
-def _field_products(forward: ForwardModel, solution: Solution, weights: csr_matrix) -> FloatArray:
-    """The integral over each pixel of grad u_p . grad u_q for all solved patterns, (n, P, P)."""
-    fields = element_fields(forward, solution)
-    by_pixel = weights.tocsc()
-    elements = by_pixel.indices
-    area_m2 = by_pixel.data * forward.mesh.areas_mm2[elements] * 1e-6
+def _field_products(fields: FloatArray, by_pixel: csc_matrix, block: slice) -> FloatArray:
+    """The integral of grad u_p . grad u_q over each pixel of ``block`` for all patterns, (b, P, P).
+
+    ``by_pixel`` (E, n) holds the areas in m2 that elements and pixels share.
+    """
+    bounds = by_pixel.indptr[block.start : block.stop + 1]
+    mine = slice(bounds[0], bounds[-1])
     n_patterns = fields.shape[2]
-    plain = fields[elements]
-    weighted = (plain * area_m2[:, None, None]).reshape(-1, n_patterns)
+    plain = fields[by_pixel.indices[mine]]
+    weighted = (plain * by_pixel.data[mine, None, None]).reshape(-1, n_patterns)
     plain = plain.reshape(-1, n_patterns)
-    bounds = (by_pixel.indptr * 2).tolist()
-    products = np.empty((by_pixel.shape[1], n_patterns, n_patterns))
-    for pixel, (begin, end) in enumerate(pairwise(bounds)):
-        np.dot(plain[begin:end].T, weighted[begin:end], out=products[pixel])
+    products = np.empty((len(bounds) - 1, n_patterns, n_patterns))
+    for product, (begin, end) in zip(products, pairwise((2 * (bounds - bounds[0])).tolist()), strict=True):
+        np.dot(plain[begin:end].T, weighted[begin:end], out=product)
     return products
 
 
-def _rows_of_products(forward: ForwardModel, products: FloatArray, rows: IntArray) -> FloatArray:
-    """The protocol's ``rows`` of products (n, P, P), with their signs, (k, n)."""
-    patterns = forward.patterns
+def _rows_of_products(patterns: Patterns, products: FloatArray, rows: IntArray) -> FloatArray:
+    """The products (b, P, P) that belong to the protocol's ``rows``, without their signs, (k, b)."""
     drive, measure = patterns.drive[rows], patterns.measure[rows]
-    sign = (patterns.drive_sign * patterns.measure_sign)[rows]
-    n_pixels, n_patterns = products.shape[:2]
     if not patterns.mixes:
-        picked = products.reshape(n_pixels, -1)[:, drive * n_patterns + measure]
-        return np.ascontiguousarray(picked.T) * sign[:, None]
-    jacobian = np.empty((len(rows), n_pixels))
+        return np.asarray(products.reshape(len(products), -1)[:, drive * products.shape[1] + measure].T)
+    picked = np.empty((len(rows), len(products)))
     for pair in np.unique(drive):
         mine = np.flatnonzero(drive == pair)
-        driven = np.tensordot(products, patterns.mix[pair], axes=(1, 0))
-        jacobian[mine] = sign[mine, None] * (patterns.mix[measure[mine]] @ driven.T)
-    return jacobian
+        picked[mine] = patterns.mix[measure[mine]] @ (patterns.mix[pair] @ products).T
+    return picked
 
 
 def _candidates(mesh: Mesh, grid: Grid) -> tuple[IntArray, IntArray]:
