@@ -1,0 +1,164 @@
+"""Protocols: their rows, reciprocity found from any table, and a hash that must never change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eitskin.errors import ProtocolError
+from eitskin.skin.protocol import (
+    Protocol,
+    adjacent,
+    opposite,
+    protocol_from_table,
+    protocol_to_table,
+    skip,
+    table,
+)
+
+
+@pytest.mark.parametrize(("n", "rows"), [(4, 4), (8, 40), (16, 208), (32, 928)])
+def test_adjacent_rows(n: int, rows: int) -> None:
+    protocol = adjacent(n)
+    assert protocol.n_rows == rows == n * (n - 3)
+    drive, measure = protocol.drive_measure[:, :2], protocol.drive_measure[:, 2:]
+    assert ((drive[:, 1] - drive[:, 0].astype(int)) % n == 1).all()
+    assert ((measure[:, 1] - measure[:, 0].astype(int)) % n == 1).all()
+    assert (drive[:, :, None] != measure[:, None, :]).all()
+    assert (np.diff(drive[:, 0].astype(int)) >= 0).all()
+    reciprocity = protocol.reciprocal_pairs()
+    assert len(reciprocity.first) == rows // 2
+    assert (reciprocity.second >= 0).all()
+    assert sorted([*reciprocity.first, *reciprocity.second]) == list(range(rows))
+
+
+def test_adjacent_order_is_fixed() -> None:
+    rows = adjacent(16).drive_measure.tolist()
+    assert rows[:2] == [[0, 1, 2, 3], [0, 1, 3, 4]]
+    assert rows[12] == [0, 1, 14, 15]
+    assert rows[13] == [1, 2, 3, 4]
+    assert rows[25] == [1, 2, 15, 0]
+    assert rows[26:28] == [[2, 3, 0, 1], [2, 3, 4, 5]]
+
+
+def test_adjacent_is_kit4s_table(shared_data: Path) -> None:
+    with np.load(shared_data / "kit4_dev.npz") as data:
+        assert np.array_equal(adjacent(16).drive_measure, data["drive_measure"])
+
+
+def test_opposite_and_skip() -> None:
+    across = opposite(16)
+    assert across.n_rows == 16 * 12
+    assert across.drive_measure[0].tolist() == [0, 8, 1, 2]
+    folded = across.reciprocal_pairs()
+    assert len(folded.first) == 96
+    assert (folded.sign == -1).all()
+    assert np.array_equal(skip(16, 0).drive_measure, adjacent(16).drive_measure)
+    third = skip(16, 2)
+    assert third.drive_measure[0].tolist() == [0, 3, 1, 4]
+    assert third.n_rows == 208
+    assert len(third.reciprocal_pairs().first) == 104
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: adjacent(3), "out of range"),
+        (lambda: adjacent(256), "out of range"),
+        (lambda: opposite(15), "even number"),
+        (lambda: opposite(4), "even number"),
+        (lambda: skip(16, 7), "use 0 to 6"),
+        (lambda: skip(16, -1), "use 0 to 6"),
+        (lambda: table(16, []), "shape"),
+        (lambda: table(16, [[0, 1, 2]]), "shape"),
+        (lambda: table(16, [[0, 1, 2, 3], [0, 1]]), "rows differ in length"),
+        (lambda: table(16, [[0, 1, 2, 3], [1, 2, 3, 16]]), r"row 1 \(from 0\).*0 to 15; count from 0"),
+        (lambda: table(16, [[0, 1, 2, -1]]), r"row 0 \(from 0\)"),
+        (lambda: table(16, [[0, 1, 2, 300]]), r"row 0 \(from 0\)"),
+        (lambda: table(16, [[0, 0, 2, 3]]), "two different electrodes"),
+        (lambda: table(16, [[0, 1, 3, 3]]), "two different electrodes"),
+        (lambda: table(16, [[0.5, 1, 2, 3]]), "whole numbers"),
+        (lambda: table(16, [[0, 1, 2, 3], [2, 3, 0, 1], [1, 0, 2, 3]]), r"rows 0, 1, 2 \(from 0\)"),
+        (lambda: Protocol(16, adjacent(16).drive_measure, 0.0), "current_a"),
+        (lambda: Protocol(16, adjacent(16).drive_measure, float("nan")), "current_a"),
+    ],
+)
+def test_refused(make: Any, message: str) -> None:
+    with pytest.raises(ProtocolError, match=message) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+def test_rows_are_read_only_and_a_copy() -> None:
+    rows = np.array([[0, 1, 2, 3]])
+    protocol = table(4, rows)
+    rows[0, 0] = 3
+    assert protocol.drive_measure.tolist() == [[0, 1, 2, 3]]
+    assert protocol.drive_measure.dtype == np.uint8
+    with pytest.raises(ValueError, match="read-only"):
+        protocol.drive_measure[0, 0] = 1
+
+
+def test_hash_is_fnv_1a_of_the_documented_bytes() -> None:
+    """The firmware computes the same; these values must never change."""
+    value = 0xCBF29CE484222325
+    for byte in [4, 0, 1, 0, 0, 1, 2, 3]:
+        value = (value ^ byte) * 0x100000001B3 % 2**64
+    assert table(4, [[0, 1, 2, 3]]).hash == value
+    assert adjacent(16).hash == 0x73AA164087184D25
+    assert adjacent(16, current_a=5e-3).hash == adjacent(16).hash
+    assert adjacent(16).hash != skip(16, 1).hash != opposite(16).hash
+
+
+def test_reciprocity_with_flips() -> None:
+    rows = [[0, 1, 4, 5], [5, 4, 0, 1], [7, 6, 2, 3], [2, 3, 7, 6], [8, 9, 10, 11], [1, 2, 6, 5], [2, 1, 6, 5]]
+    pairs = table(16, rows).reciprocal_pairs()
+    assert pairs.first.tolist() == [0, 2, 4, 5]
+    assert pairs.second.tolist() == [1, 3, -1, 6]
+    assert pairs.sign.tolist() == [-1, 1, 1, -1]
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(5, 20), st.integers(0, 2**32 - 1))
+def test_reciprocity_of_shuffled_and_flipped_tables(n: int, seed: int) -> None:
+    """Fold an adjacent table whose rows were shuffled and whose pairs were flipped and swapped at random."""
+    rng = np.random.default_rng(seed)
+    rows = adjacent(n).drive_measure.astype(int)
+    rows = rows[rng.permutation(len(rows))]
+    for pair in (slice(0, 2), slice(2, 4)):
+        flip = rng.random(len(rows)) < 0.5
+        rows[flip, pair] = rows[flip, pair][:, ::-1]
+    protocol = table(n, rows)
+    # A made-up reciprocal quantity: symmetric in the pairs and odd in each.
+    potential = rng.normal(size=(n, n))
+    potential = potential + potential.T
+    a, b, c, d = protocol.drive_measure.T
+    voltage = potential[c, a] - potential[d, a] - potential[c, b] + potential[d, b]
+    pairs = protocol.reciprocal_pairs()
+    assert len(pairs.first) == len(rows) // 2
+    np.testing.assert_allclose(voltage[pairs.first], pairs.sign * voltage[pairs.second], atol=1e-12)
+    assert sorted([*pairs.first, *pairs.second]) == list(range(len(rows)))
+
+
+@pytest.mark.parametrize(
+    ("protocol", "kind"),
+    [
+        (adjacent(16), {"kind": "adjacent"}),
+        (adjacent(5, 2e-3), {"kind": "adjacent"}),
+        (opposite(8), {"kind": "opposite"}),
+        (skip(16, 3), {"kind": "skip", "skip": 3}),
+        (table(6, [[0, 1, 2, 3], [3, 2, 5, 4]]), {"kind": "table", "table": [[0, 1, 2, 3], [3, 2, 5, 4]]}),
+    ],
+)
+def test_table_round_trip(protocol: Protocol, kind: dict[str, Any]) -> None:
+    made = protocol_to_table(protocol)
+    assert made == {**kind, "current_a": protocol.current_a}
+    again = protocol_from_table(made, protocol.n_electrodes, "here")
+    assert again.hash == protocol.hash
+    assert np.array_equal(again.drive_measure, protocol.drive_measure)
+    assert again.current_a == protocol.current_a

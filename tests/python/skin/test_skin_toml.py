@@ -1,0 +1,214 @@
+"""Skins: where electrodes lie, which cannot be, and TOML there and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, ProtocolError
+from eitskin.skin.electrodes import Electrodes
+from eitskin.skin.outline import disk, polygon
+from eitskin.skin.protocol import adjacent, opposite
+from eitskin.skin.skin import Skin, load_skin, paper_skin, skin_from_table, skin_to_table
+
+RECTANGLE = polygon([(0, 0), (200, 0), (200, 100), (0, 100)])
+
+
+def _angles(skin: Skin) -> np.ndarray[Any, Any]:
+    x, y = skin.electrode_centres_mm().T
+    return np.degrees(np.arctan2(y, x)) % 360
+
+
+def test_paper_skin() -> None:
+    skin = paper_skin()
+    assert (skin.outline.diameter_mm, skin.thickness_mm, skin.conductivity_s_per_m) == (194, 12, 0.01)
+    assert (skin.electrodes.count, skin.electrodes.width_mm) == (16, 4)
+    np.testing.assert_allclose(_angles(skin), (90 + np.arange(16) * 22.5) % 360, atol=1e-9)
+    spans = skin.electrode_spans_mm()
+    np.testing.assert_allclose(spans[:, 1] - spans[:, 0], 4, rtol=1e-12)
+    assert (spans[:, 0] >= 0).all() and (spans[:, 0] < skin.outline.perimeter_mm).all()
+
+
+def test_clockwise_numbering_and_start() -> None:
+    skin = Skin("tank", disk(280), Electrodes(16, 25, start_angle_deg=90, clockwise=True))
+    np.testing.assert_allclose(_angles(skin), (90 - np.arange(16) * 22.5) % 360, atol=1e-9)
+    skin = Skin("tank", disk(280), Electrodes(8, 25, start_angle_deg=-450))
+    np.testing.assert_allclose(_angles(skin), (270 + np.arange(8) * 45) % 360, atol=1e-9)
+
+
+def test_kit4_angles(shared_data: Path) -> None:
+    with np.load(shared_data / "kit4_dev.npz") as data:
+        angles = data["electrode_angle_deg"] % 360
+    skin = Skin("kit4", disk(280), Electrodes(16, 25, start_angle_deg=90, clockwise=True))
+    np.testing.assert_allclose(_angles(skin), angles, atol=1e-9)
+
+
+def test_positions_along_the_rim() -> None:
+    skin = Skin("r", RECTANGLE, Electrodes(4, 5, start_angle_deg=270, positions_mm=(0.0, 50.0, 150.0, 350.0)))
+    np.testing.assert_allclose(skin.electrode_centres_mm(), [(100, 0), (150, 0), (200, 50), (50, 100)])
+    skin = Skin("r", RECTANGLE, Electrodes(4, 5, 270, True, (0.0, 50.0, 150.0, 350.0)))
+    np.testing.assert_allclose(skin.electrode_centres_mm(), [(100, 0), (50, 0), (0, 50), (150, 100)])
+
+
+def test_evenly_by_arc_length_on_a_polygon() -> None:
+    skin = Skin("r", RECTANGLE, Electrodes(12, 5, start_angle_deg=0))
+    np.testing.assert_allclose(skin.electrode_centres_mm()[:4], [(200, 50), (200, 100), (150, 100), (100, 100)])
+    spans = skin.electrode_spans_mm()
+    assert sorted(np.round(np.diff(np.sort(spans[:, 0])), 9).tolist()) == [50.0] * 11
+
+
+@pytest.mark.parametrize(
+    ("electrodes", "message"),
+    [
+        (Electrodes(16, 40), "16 electrodes of 40 mm do not fit"),
+        (Electrodes(4, 10, positions_mm=(0.0, 100.0, 105.0, 300.0)), r"electrodes 1 and 2 \(from 0\) overlap"),
+        (Electrodes(4, 10, positions_mm=(0.0, 100.0, 200.0, 605.0)), r"electrodes 0 and 3 \(from 0\) overlap"),
+        (Electrodes(4, 10, positions_mm=(0.0, 100.0, 110.2, 300.0)), "gap 0.2 mm, at least 0.5 mm"),
+        (Electrodes(4, 1000), "do not fit"),
+    ],
+)
+def test_overlap_is_refused(electrodes: Electrodes, message: str) -> None:
+    with pytest.raises(GeometryError, match=message):
+        Skin("s", disk(194), electrodes)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"count": 3},
+        {"count": 300},
+        {"width_mm": 0.0},
+        {"width_mm": float("nan")},
+        {"start_angle_deg": float("inf")},
+        {"contact_impedance_ohm_m2": -1.0},
+        {"count": 4, "positions_mm": (0.0, 1.0, 2.0)},
+        {"count": 4, "positions_mm": (0.0, 2.0, 1.0, 3.0)},
+        {"count": 4, "positions_mm": (0.0, 2.0, float("nan"), 3.0)},
+    ],
+)
+def test_refused_electrodes(arguments: dict[str, Any]) -> None:
+    with pytest.raises(GeometryError, match="electrodes: "):
+        Electrodes(**arguments)
+
+
+@pytest.mark.parametrize("key", ["conductivity_s_per_m", "thickness_mm"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+def test_refused_sheet(key: str, value: float) -> None:
+    with pytest.raises(GeometryError, match=key):
+        Skin("s", disk(194), Electrodes(), **{key: value})
+
+
+@pytest.mark.parametrize(
+    "skin",
+    [
+        paper_skin(),
+        Skin("tank", disk(280), Electrodes(16, 25, 90, True, None, 0.0), 0.3, 70.0),
+        Skin("pad", RECTANGLE, Electrodes(5, 3.5, -12.5, False, (0.0, 9.0, 33.3, 77.0, 400.0), 0.5)),
+        Skin("l", polygon([(0, 0), (0, 100), (30, 100), (30, 30), (100, 30), (100, 0)]), Electrodes(8)),
+    ],
+    ids=lambda skin: skin.name,
+)
+def test_table_round_trip(skin: Skin) -> None:
+    assert skin_from_table(skin_to_table(skin), "here") == skin
+
+
+def _write(folder: Path, text: str) -> Path:
+    path = folder / "skin.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_load_the_documented_file(tmp_path: Path) -> None:
+    path = _write(
+        tmp_path,
+        """
+[skin]
+name = "paper"
+diameter_mm = 194.0
+thickness_mm = 12.0
+conductivity_s_per_m = 0.01
+[electrodes]
+count = 16
+width_mm = 4.0
+start_angle_deg = 90.0
+direction = "counterclockwise"
+contact_impedance_ohm_m2 = 0.01
+[protocol]
+kind = "adjacent"
+current_a = 0.001
+""",
+    )
+    skin, protocol = load_skin(path)
+    assert skin == paper_skin()
+    assert protocol.hash == adjacent(16).hash
+    assert protocol.current_a == 1e-3
+
+
+def test_load_with_defaults_and_a_polygon(tmp_path: Path) -> None:
+    path = _write(
+        tmp_path,
+        """
+[skin]
+polygon_mm = [[0, 0], [0, 100], [200, 100], [200, 0]]
+[protocol]
+kind = "opposite"
+current_a = 0.002
+""",
+    )
+    skin, protocol = load_skin(path)
+    assert skin.electrodes == Electrodes()
+    assert skin.outline.area_mm2 == pytest.approx(20000)
+    assert protocol.hash == opposite(16).hash
+    assert protocol.current_a == 0.002
+
+
+DISK = "[skin]\ndiameter_mm = 194\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "message"),
+    [
+        ("[skin]\ndiametre_mm = 3\n", ConfigError, r"\[skin\]: unknown key 'diametre_mm'; did you mean 'diameter_mm'"),
+        (DISK + "[electrode]\n", ConfigError, "unknown key 'electrode'; did you mean 'electrodes'"),
+        (DISK + "[electrodes]\nwidth = 3\n", ConfigError, "did you mean 'width_mm'"),
+        (DISK + "[protocol]\nknd = 'adjacent'\n", ConfigError, "did you mean 'kind'"),
+        (DISK + "[protocol]\nkind = 'adjacant'\n", ConfigError, "did you mean 'adjacent'"),
+        (DISK + "[electrodes]\ndirection = 'left'\n", ConfigError, "direction = 'left' is not known"),
+        ("[skin]\ndiameter_mm = '194'\n", ConfigError, "diameter_mm must be a number"),
+        ("[skin]\ndiameter_mm = -1\n", ConfigError, "out of range"),
+        (DISK + "thickness_mm = 0\n", ConfigError, "thickness_mm = 0 is out of range"),
+        (DISK + "name = 3\n", ConfigError, "name must be a word"),
+        ("[skin]\nname = 'x'\n", ConfigError, "either diameter_mm or polygon_mm"),
+        (DISK + "polygon_mm = []\n", ConfigError, "either diameter_mm or polygon_mm"),
+        ("[skin]\npolygon_mm = 3\n", ConfigError, "must be a list"),
+        ("[skin]\npolygon_mm = [[0, 0], [1]]\n", ConfigError, r"entry 1 \(from 0\)"),
+        ("[skin]\npolygon_mm = [[0, 0], [5, 5], [5, 0], [0, 5]]\n", GeometryError, r"skin\.toml: outline: it crosses"),
+        ("[skin]\ndiameter_mm = 20\n", GeometryError, r"skin\.toml: skin 'skin': 16 electrodes .* do not fit"),
+        (DISK + "[electrodes]\ncount = 16.5\n", ConfigError, "whole number"),
+        (DISK + "[electrodes]\npositions_mm = [1, 'a']\n", ConfigError, "list of numbers"),
+        (DISK + "[electrodes]\npositions_mm = [1, 2]\n", GeometryError, "2 entries for 16"),
+        (DISK + "[protocol]\nkind = 'skip'\n", ConfigError, "'skip' is required"),
+        (DISK + "[protocol]\nskip = 2\n", ConfigError, 'skip goes with kind = "skip"'),
+        (DISK + "[protocol]\nkind = 'skip'\nskip = 9\n", ProtocolError, r"\[protocol\].*use 0 to 6"),
+        (DISK + "[protocol]\nkind = 'table'\n", ConfigError, "needs table ="),
+        (DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2]]\n", ConfigError, "row 0"),
+        (DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2, 16]]\n", ProtocolError, "0 to 15"),
+        (DISK + "[protocol]\ncurrent_a = 0\n", ConfigError, "current_a = 0 is out of range"),
+        ("skin = 3\n", ConfigError, r"a table \[skin\] is needed"),
+        ("", ConfigError, r"a table \[skin\] is needed"),
+        ("[skin\n", ConfigError, "not valid TOML"),
+    ],
+)
+def test_refused_files(tmp_path: Path, text: str, error: type[EitskinError], message: str) -> None:
+    with pytest.raises(error, match=message) as caught:
+        load_skin(_write(tmp_path, text))
+    assert "\n" not in str(caught.value)
+    assert "skin.toml" in str(caught.value)
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no such skin description"):
+        load_skin(tmp_path / "none.toml")
