@@ -1,0 +1,32 @@
+# eitskin_add_core(NAME [DOUBLE]): the C core as a static library, in single or double width.
+#
+# Contraction and re-association stay off: kernels say fma where they mean it, and the bits must not depend on the target.
+
+set(EITSKIN_CORE_SOURCES
+    types.c model.c kernels.c kernels_portable.c context.c stages.c baseline.c frame.c solve.c
+    disc.c touch.c track.c self_test.c)
+
+set(EITSKIN_WARNINGS -Wall -Wextra -Wconversion -Wdouble-promotion -Werror)
+set(EITSKIN_ARITHMETIC -ffp-contract=off -fno-math-errno -fno-fast-math)
+
+function(eitskin_add_core name)
+    cmake_parse_arguments(CORE "DOUBLE" "" "" ${ARGN})
+    set(root ${PROJECT_SOURCE_DIR}/csrc)
+    list(TRANSFORM EITSKIN_CORE_SOURCES PREPEND ${root}/src/ OUTPUT_VARIABLE sources)
+    add_library(${name} STATIC ${sources})
+    target_include_directories(${name} PUBLIC ${root}/include PRIVATE ${root}/src)
+    target_compile_features(${name} PUBLIC c_std_11)
+    target_compile_options(${name} PRIVATE ${EITSKIN_WARNINGS} ${EITSKIN_ARITHMETIC})
+    set_target_properties(${name} PROPERTIES C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
+    if(CORE_DOUBLE)
+        target_compile_definitions(${name} PUBLIC EITS_DOUBLE)
+    endif()
+    if(EITSKIN_AVX2)
+        target_sources(${name} PRIVATE ${root}/src/kernels_avx2.c)
+        set_source_files_properties(${root}/src/kernels_avx2.c PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma")
+        target_compile_definitions(${name} PRIVATE EITS_BUILD_AVX2)
+    endif()
+    if(UNIX AND NOT CMAKE_SYSTEM_NAME STREQUAL "Generic")
+        target_link_libraries(${name} PUBLIC m)
+    endif()
+endfunction()

@@ -1,0 +1,170 @@
+/* eitskin: one reconstruction context in memory that the caller owns.
+ *
+ * Order of calls: eits_model_open, eits_init, a reference frame (eits_baseline_*), then eits_reconstruct and, if touches
+ * are wanted, eits_find_touches for each frame. Contexts share nothing; one context is used by one thread at a time.
+ */
+#ifndef EITSKIN_CONTEXT_H
+#define EITSKIN_CONTEXT_H
+
+#include "eitskin/model.h"
+#include "eitskin/types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define EITS_MAX_TOUCHES 16
+
+/* Which conductivity changes are looked for. */
+typedef enum eits_sign {
+    EITS_SIGN_INCREASE = 0, /* x >= 0: touches by something that conducts better */
+    EITS_SIGN_DECREASE = 1, /* x <= 0 */
+    EITS_SIGN_BOTH = 2
+} eits_sign;
+
+typedef struct eits_options {
+    uint32_t iterations;   /* at most so many; exactly so many where gap_rel is 0 */
+    uint32_t gap_every;    /* iterations between checks of the duality gap and of divergence; at least 1 */
+    uint32_t max_touches;  /* at most EITS_MAX_TOUCHES */
+    uint32_t max_masked;   /* a frame with more unusable rows than this is refused */
+    eits_sign sign;
+    uint32_t warm_start;       /* 1: start from the last frame's coefficients, momentum reset */
+    uint32_t project_baseline; /* 1: ignore changes along the reference frame, that is drift of the gain */
+    eits_real lambda_abs;      /* > 0: this lambda, in the units of S'y; 0: by the rule below */
+    eits_real lambda_rel;      /* lambda = max(lambda_rel lambda_max, lambda_noise_factor lambda_noise) */
+    eits_real lambda_noise_factor;
+    eits_real gate_factor;  /* no touch where lambda_max < gate_factor lambda_noise; 0: no gate */
+    eits_real gap_rel;      /* > 0: stop once gap <= gap_rel |y|^2 / 2 */
+    eits_real saturation_v; /* > 0: a channel at or beyond +-saturation_v is unusable */
+    eits_real touch_threshold; /* a local maximum below this share of the greatest starts no touch */
+    eits_real touch_share;     /* a touch that explains less than this share of |y|^2 beside the others is dropped */
+    eits_real touch_min_radius_mm, touch_max_radius_mm, touch_seed_radius_mm;
+    eits_real touch_change_s_per_m; /* expected conductivity change under a touch: tells radius from strength; 0: unknown */
+    uint32_t touch_sweeps; /* sweeps of the off-grid fit over all touches; 0: peaks with their strengths only */
+    eits_real follow_mm;   /* a touch that moved at most so far since the last frame keeps its id */
+} eits_options;
+
+/* Why the solver stopped. */
+typedef enum eits_stop {
+    EITS_STOP_ITERATIONS = 0, /* the given number of iterations was done */
+    EITS_STOP_GAP = 1,        /* the duality gap was small enough */
+    EITS_STOP_GATE = 2,       /* lambda_max lies within the noise: no touch, the image is zero */
+    EITS_STOP_ZERO = 3,       /* lambda >= lambda_max: zero is the exact optimum */
+    EITS_STOP_DIVERGED = 4    /* the objective rose although the step was halved again and again; the image is zero */
+} eits_stop;
+
+/* What a reconstruction cost and how it ended. */
+typedef struct eits_info {
+    uint32_t iterations;
+    eits_stop stop;
+    uint32_t nonzeros; /* coefficients that are not zero */
+    uint32_t masked;   /* protocol rows that were left out of this frame */
+    uint32_t step_halvings;
+    uint32_t touches;         /* set by eits_find_touches */
+    uint64_t macs;            /* multiply-accumulates with a stored matrix or a basis vector; vector sums not counted */
+    uint64_t touch_macs;      /* the same for eits_find_touches */
+    eits_real lambda;
+    eits_real lambda_max;
+    eits_real lambda_noise;
+    eits_real gap;        /* duality gap at the result, absolute */
+    eits_real gap_rel;    /* gap / (|y|^2 / 2) */
+    eits_real residual;   /* |y - S x| */
+    eits_real data_norm;  /* |y| */
+} eits_info;
+
+typedef struct eits_touch {
+    uint32_t id; /* counts up from 1; follows a finger from frame to frame */
+    eits_real x_mm, y_mm;
+    eits_real radius_mm;
+    eits_real strength_s_per_m_mm2; /* conductivity change integrated over the touch: S/m mm^2 */
+    eits_real confidence;           /* share of |y|^2 that leaving this touch out would leave unexplained: 0 to 1 */
+} eits_touch;
+
+struct eits_kernels; /* matrix products, chosen at start-up among builds that give the same bits */
+
+/* Learned from quiet frames. */
+typedef struct eits_baseline {
+    eits_real *v0;       /* n_rows: mean of the quiet frames, V */
+    eits_real *m2;       /* n_rows: sum of squared deviations, V^2 */
+    uint32_t wanted, count;
+    uint32_t ready;
+    eits_real v0_rms;       /* rms of v0 over the rows in use, V */
+    eits_real gain;         /* model volts per measured volt: rms(v_ref) / rms(v0), negative where correlation is */
+    eits_real correlation;  /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
+    eits_real noise_v;      /* rms over rows of the quiet frames' deviation, V; 0 if unknown */
+    eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames; 0 if unknown */
+} eits_baseline;
+
+typedef struct eits_context {
+    const eits_model *model;
+    const struct eits_kernels *kernels;
+    eits_options options;
+    eits_baseline baseline;
+    uint8_t *bad;            /* n_rows: masked by the caller */
+    uint8_t *unusable;       /* n_rows: masked in this frame */
+    uint8_t *basis_for;      /* n_folded: the folded rows that the basis below leaves out */
+    eits_real *d;            /* n_folded: data of this frame */
+    eits_real *y;            /* stride: reduced data, projected */
+    eits_real *basis;        /* rank x stride: orthonormal directions to ignore */
+    uint32_t basis_count;
+    uint32_t basis_stale;
+    eits_real *residual;     /* stride */
+    eits_real *sx, *sx_next, *sz; /* stride each */
+    eits_real *slope[3];     /* stride each: a touch's response by x, y and radius */
+    eits_real *x, *x_next, *z;    /* n_pixels each: coefficients, and the extrapolated point */
+    eits_real *gradient;     /* n_pixels */
+    eits_real *list_value;   /* max(n_pixels, n_folded): numbers to multiply columns by, scales included */
+    uint32_t *list_index;    /* as many: those columns */
+    eits_real *image;        /* n_pixels: S/m */
+    eits_real *atoms;        /* EITS_MAX_TOUCHES x stride: responses of the touches */
+    uint16_t *cell;          /* ny x nx: which kept pixel a cell of the image is; EITS_NO_PIXEL for none */
+    eits_real *panels;       /* S again, in panels of EITS_PANEL columns; NULL: not prepared */
+    eits_touch last[EITS_MAX_TOUCHES];
+    uint32_t last_count, next_id;
+    uint32_t warm; /* x holds the last frame's coefficients */
+    eits_info info; /* of the last frame */
+} eits_context;
+
+#define EITS_PANEL 32u
+#define EITS_NO_PIXEL 0xFFFFu
+#define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
+#define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
+#define EITS_REALS(count) EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
+#define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
+#define EITS_PANEL_COLUMNS(n_pixels) (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
+
+/* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep a second, panel-wise copy of S
+ * (hosts), else 0. */
+#define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
+    (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + EITS_REALS(n_folded) +                   \
+     (8 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
+     EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
+     EITS_ALIGN16((size_t)(n_cells) * 2u) + ((prepared) ? EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) : 0u))
+
+/* The same number for an open model, as a function. Returns 0 for a null model. */
+size_t eits_workspace_size(const eits_model *model, int prepared);
+
+/* The model's defaults as options. Errors: EITS_E_ARGUMENT. */
+eits_status eits_options_default(const eits_model *model, eits_options *options);
+
+/* Lay out `ctx` in `workspace`, set the model's default options. With room for it (see `prepared` above) S is also copied
+ * into panels, which is faster where memory is plentiful and gives the same bits.
+ * Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than eits_workspace_size(model, 0), or not aligned to 16 bytes). */
+eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspace, size_t size);
+
+/* Replace the options. Errors: EITS_E_ARGUMENT for one that is out of range or not finite; then nothing is changed. */
+eits_status eits_set_options(eits_context *ctx, const eits_options *options);
+
+/* Use the portable matrix products (1) or the fastest that this processor has (0, the default). Same bits. */
+eits_status eits_use_portable_kernels(eits_context *ctx, int portable);
+
+/* "portable", "avx2"... of the kernels in use. */
+const char *eits_kernels_name(const eits_context *ctx);
+
+/* Forget the warm start and the touches that were followed. */
+void eits_forget(eits_context *ctx);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

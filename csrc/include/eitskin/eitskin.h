@@ -1,0 +1,12 @@
+/* eitskin: everything, in the order of the data's way. */
+#ifndef EITSKIN_H
+#define EITSKIN_H
+
+#include "eitskin/types.h"
+#include "eitskin/model.h"
+#include "eitskin/context.h"
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+
+#endif

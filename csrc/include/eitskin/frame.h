@@ -1,0 +1,39 @@
+/* eitskin: from boundary voltages to the solver's data.
+ *
+ * A frame is n_rows voltages in the order of the model's protocol table. The stages: unusable channels are found, the
+ * difference to the reference frame is taken (eits_data_kind), reciprocal rows are folded into their mean, P whitens, and
+ * directions that carry no news (rows left out, drift of the gain) are projected away: leaving a row out is the same as
+ * minimising over its value, which in reduced space removes the span of its column of P.
+ */
+#ifndef EITSKIN_FRAME_H
+#define EITSKIN_FRAME_H
+
+#include "eitskin/context.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Take one frame as the reference; noise and lambda_noise stay unknown (0), so nothing is gated.
+ * Errors: EITS_E_ARGUMENT, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO. The old reference then stays. */
+eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t length);
+
+/* Learn reference and noise from `count` >= 4 quiet frames: begin, add each, finish. The first half gives a first mean; the
+ * second half also gives lambda_noise, the greatest max(S'y) that a quiet frame showed; the mean of all is the reference.
+ * Until finish returns EITS_OK there is no reference. Errors as above; EITS_E_BASELINE_SHORT if frames are missing. A frame
+ * that is refused does not count. */
+eits_status eits_baseline_begin(eits_context *ctx, uint32_t count);
+eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length);
+eits_status eits_baseline_finish(eits_context *ctx);
+
+/* Leave row `row` of the protocol out of every frame (bad = 1) or use it again (0). Errors: EITS_E_ARGUMENT. */
+eits_status eits_mask_row(eits_context *ctx, uint32_t row, int bad);
+
+/* The frame stage alone: fills ctx->d, ctx->y, ctx->basis, ctx->unusable and returns the number of rows left out in
+ * `masked`. Errors: EITS_E_NO_BASELINE, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_NOT_FINITE. */
+eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t length, uint32_t *masked, uint64_t *macs);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

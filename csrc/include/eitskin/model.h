@@ -1,0 +1,121 @@
+/* eitskin: a view of an .eitm model, read in place (docs/eitm-format.md specifies the bytes).
+ *
+ * Nothing is copied: the view points into the blob, which must stay where it is, unchanged, as long as the view is used.
+ */
+#ifndef EITSKIN_MODEL_H
+#define EITSKIN_MODEL_H
+
+#include "eitskin/types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define EITS_MODEL_MAJOR 1
+#define EITS_MODEL_MINOR 0
+#define EITS_MODEL_ALIGNMENT 16
+#define EITS_MAX_RANK 1024
+#define EITS_MAX_PIXELS 65534
+#define EITS_MAX_ROWS 65535
+
+/* How the reduced Jacobian is stored. Integer types carry one scale per column. */
+typedef enum eits_storage { EITS_STORAGE_F32 = 0, EITS_STORAGE_F16 = 1, EITS_STORAGE_I16 = 2, EITS_STORAGE_I8 = 3 } eits_storage;
+
+/* What the solver's data are, from a frame v and the reference frame v0. */
+typedef enum eits_data_kind {
+    EITS_DATA_DIFFERENCE = 0, /* v - v0, in volts of the model */
+    EITS_DATA_NORMALISED = 1, /* (v - v0) / v0: for channels that have gains of their own */
+    EITS_DATA_LOG_RATIO = 2   /* v0 log(v / v0): the same sensitivity as a difference, straighter for strong touches */
+} eits_data_kind;
+
+/* A matrix of `cols` columns of `rows` numbers each, column after column, `stride` numbers apart. */
+typedef struct eits_matrix {
+    const void *data;
+    const float *scale; /* one per column for integer storage, else NULL */
+    uint32_t rows;
+    uint32_t cols;
+    uint32_t stride;
+    eits_storage storage;
+} eits_matrix;
+
+/* One folded row: the mean of row `first` and, with `sign`, of its reciprocal `second`. */
+typedef struct eits_fold {
+    uint16_t first;
+    uint16_t second; /* EITS_FOLD_NONE where the table has no reciprocal */
+    int16_t sign;    /* +1 or -1 */
+    uint16_t reserved;
+} eits_fold;
+#define EITS_FOLD_NONE 0xFFFFu
+
+/* Column and row of a kept pixel in the nx x ny image; row 0 is the lowest y. */
+typedef struct eits_pixel {
+    uint16_t ix;
+    uint16_t iy;
+} eits_pixel;
+
+/* Defaults that the model's maker chose; eits_options_default() starts from them. */
+typedef struct eits_defaults {
+    uint32_t iterations;
+    uint32_t max_touches;
+    float lambda_rel;          /* lambda >= lambda_rel * lambda_max */
+    float lambda_noise_factor; /* lambda >= lambda_noise_factor * lambda_noise */
+    float gate_factor;         /* no touch where lambda_max < gate_factor * lambda_noise */
+    float mask_threshold;      /* t of the mask x > t max(x), chosen on training scenes */
+    float touch_threshold;     /* see eits_options for this and the following */
+    float touch_share;
+    float touch_min_radius_mm;
+    float touch_max_radius_mm;
+    float touch_seed_radius_mm;
+    float touch_change_s_per_m;
+    float follow_mm;
+    float reserved[3];
+} eits_defaults;
+
+/* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */
+typedef struct eits_golden {
+    const float *reference; /* n_rows, V */
+    const float *frame;     /* n_rows, V */
+    const float *image;     /* n_pixels, S/m, bits as the float32 core gives them */
+} eits_golden;
+
+typedef struct eits_model {
+    uint32_t n_electrodes;
+    uint32_t n_rows;   /* rows of the protocol table: voltages in a frame */
+    uint32_t n_folded; /* after the reciprocity fold */
+    uint32_t rank;     /* rows of the reduced Jacobian */
+    uint32_t n_pixels;
+    uint32_t nx, ny;
+    eits_data_kind data_kind;
+    float pixel_mm;
+    float origin_x_mm, origin_y_mm; /* lower left corner of pixel (0, 0) */
+    float current_a;
+    float lipschitz;  /* at least the greatest eigenvalue of S'S as stored */
+    float noise_gain; /* max over pixels of the deviation of (S'P n)_j for unit white noise n on the folded rows */
+    uint64_t protocol_hash;
+    const uint8_t *protocol;   /* n_rows x 4: I+, I-, V+, V- */
+    const eits_fold *fold;     /* n_folded */
+    const float *v_ref;        /* n_folded: boundary voltage of the untouched skin as modelled, V */
+    eits_matrix reduction;     /* P: rank x n_folded, whitened data y = P d; always f32 */
+    eits_matrix sensitivity;   /* S: rank x n_pixels, the reduced Jacobian */
+    const float *column_weight; /* n_pixels: image_j = coefficient_j * column_weight_j, in S/m */
+    const eits_pixel *pixel;   /* n_pixels, ordered by iy, then ix */
+    const eits_defaults *defaults;
+    eits_golden golden;
+    const char *meta; /* JSON, not terminated by 0; NULL if absent */
+    uint32_t meta_size;
+} eits_model;
+
+/* Check `blob` wholly and fill `model` with pointers into it.
+ * Errors: EITS_E_ARGUMENT, EITS_E_MODEL_*; `model` is untouched then. */
+eits_status eits_model_open(eits_model *model, const void *blob, size_t size);
+
+/* FNV-1a, 64 bits, over n_electrodes and n_rows as little-endian u16 and the table's bytes. */
+uint64_t eits_protocol_hash(uint32_t n_electrodes, uint32_t n_rows, const uint8_t *table);
+
+/* CRC-32 (reflected 0xEDB88320, as in zlib) of `size` bytes, continuing from `crc` (0 to start). */
+uint32_t eits_crc32(uint32_t crc, const void *bytes, size_t size);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,32 @@
+/* eitskin: FISTA on the stored reduced Jacobian.
+ *
+ *     minimise  |y - S x|^2 / 2 + lambda |x|_1     over x >= 0, x <= 0 or all x
+ *
+ * Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183-202, doi 10.1137/080716542. The rows of S are whitened and its columns
+ * scaled beforehand, so that the step is known and few iterations do (docs/eitm-format.md, "Reduction").
+ */
+#ifndef EITSKIN_SOLVE_H
+#define EITSKIN_SOLVE_H
+
+#include "eitskin/context.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* One frame to an image: frame stage, gate, FISTA. `image` (n_pixels, S/m) and `info` may be NULL; both are in ctx as well.
+ * On an error the image is cleared, never NaN. Errors: those of eits_frame_stage, EITS_E_NOT_FINITE. */
+eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length, eits_real *image, eits_info *info);
+
+/* The solver alone on reduced data ctx->y (as eits_frame_stage leaves it). Fills ctx->x, ctx->image, ctx->info. */
+eits_status eits_solve(eits_context *ctx);
+
+/* Run the model's golden frame with default options: the image must have the bits that the model states (float32), or be
+ * within `*difference` of it, relative to its peak (reported in either width). The context must be fresh from eits_init;
+ * its baseline is the golden reference afterwards. Errors as eits_reconstruct. */
+eits_status eits_self_test(eits_context *ctx, eits_real *difference);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,174 @@
+/* The reference frame and its noise, from one frame or learned from many quiet ones. */
+#include "eitskin/frame.h"
+
+#include "kernels.h"
+#include "stages.h"
+#include "vec.h"
+
+enum { MIN_QUIET_FRAMES = 4 };
+
+/* A quiet frame must be whole: rows that cannot be used are to be masked first. */
+static eits_status check_quiet(const eits_context *ctx, const eits_real *frame, size_t length)
+{
+    if (length != ctx->model->n_rows)
+        return EITS_E_FRAME_LENGTH;
+    const eits_real limit = ctx->options.saturation_v;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (!ctx->bad[i] && (!eits_is_finite(frame[i]) || (limit > 0 && eits_fabs(frame[i]) >= limit)))
+            return EITS_E_FRAME_CHANNELS;
+    }
+    return EITS_OK;
+}
+
+/* The reference on one folded row: the mean of both sides in use; 0 where neither is. */
+static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
+{
+    const eits_real *v0 = ctx->baseline.v0;
+    const int first = !ctx->bad[fold.first];
+    const int second = fold.second != EITS_FOLD_NONE && !ctx->bad[fold.second];
+    const eits_real turned = second ? (eits_real)fold.sign * v0[fold.second] : 0;
+    return first && second ? R(0.5) * (v0[fold.first] + turned) : (first ? v0[fold.first] : turned);
+}
+
+/* Set gain, correlation and v0_rms from v0; a scale is taken out first so that squares neither overflow nor vanish. */
+static eits_status fit_to_model(eits_context *ctx)
+{
+    const eits_model *model = ctx->model;
+    eits_baseline *b = &ctx->baseline;
+    eits_real largest = 0, largest_ref = 0;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const eits_real v = eits_fabs(folded_reference(ctx, model->fold[k])), r = eits_fabs((eits_real)model->v_ref[k]);
+        largest = v > largest ? v : largest;
+        largest_ref = r > largest_ref ? r : largest_ref;
+    }
+    if (!(largest > 0) || !(largest_ref > 0) || !eits_is_finite(1 / largest) || !eits_is_finite(1 / largest_ref))
+        return EITS_E_FRAME_ZERO;
+    eits_real vv = 0, rr = 0, vr = 0;
+    uint32_t used = 0;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const eits_fold fold = model->fold[k];
+        if (ctx->bad[fold.first] && (fold.second == EITS_FOLD_NONE || ctx->bad[fold.second]))
+            continue;
+        const eits_real v = folded_reference(ctx, fold) / largest, r = (eits_real)model->v_ref[k] / largest_ref;
+        vv = eits_fma(v, v, vv);
+        rr = eits_fma(r, r, rr);
+        vr = eits_fma(v, r, vr);
+        ++used;
+    }
+    if (!(vv > 0) || !(rr > 0))
+        return EITS_E_FRAME_ZERO;
+    b->correlation = vr / (eits_sqrt(vv) * eits_sqrt(rr));
+    b->v0_rms = largest * eits_sqrt(vv / (eits_real)used);
+    b->gain = largest_ref / largest * (eits_sqrt(rr) / eits_sqrt(vv));
+    if (b->correlation < 0)
+        b->gain = -b->gain;
+    ctx->basis_stale = 1;
+    ctx->warm = 0;
+    return eits_is_finite(b->gain) && b->gain != 0 ? EITS_OK : EITS_E_FRAME_ZERO;
+}
+
+eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t length)
+{
+    if (ctx == NULL || frame == NULL)
+        return EITS_E_ARGUMENT;
+    eits_status status = check_quiet(ctx, frame, length);
+    if (status != EITS_OK)
+        return status;
+    eits_baseline *b = &ctx->baseline;
+    eits_real *old = b->m2; /* keeps the old reference until the new one is known to be good */
+    eits_copy(old, b->v0, length);
+    eits_copy(b->v0, frame, length);
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (ctx->bad[i])
+            b->v0[i] = 0;
+    }
+    status = fit_to_model(ctx);
+    if (status != EITS_OK) {
+        eits_copy(b->v0, old, length);
+        if (b->ready)
+            (void)fit_to_model(ctx);
+    } else {
+        b->ready = 1;
+        b->count = 1;
+        b->noise_v = 0;
+        b->lambda_noise = 0;
+    }
+    eits_zero(b->m2, length);
+    return status;
+}
+
+eits_status eits_baseline_begin(eits_context *ctx, uint32_t count)
+{
+    if (ctx == NULL || count < MIN_QUIET_FRAMES)
+        return EITS_E_ARGUMENT;
+    eits_baseline *b = &ctx->baseline;
+    eits_zero(b->v0, ctx->model->n_rows);
+    eits_zero(b->m2, ctx->model->n_rows);
+    b->wanted = count;
+    b->count = 0;
+    b->ready = 0;
+    b->lambda_noise = 0;
+    b->noise_v = 0;
+    return EITS_OK;
+}
+
+/* How far a quiet frame reaches above nothing: max |S'y| against the mean so far. */
+static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
+{
+    uint32_t masked;
+    uint64_t macs;
+    const eits_status status = eits_frame_data(ctx, frame, &masked, &macs);
+    if (status != EITS_OK)
+        return status;
+    eits_apply_t(ctx, ctx->y, ctx->gradient);
+    const eits_real seen = eits_greatest(ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH);
+    if (seen > ctx->baseline.lambda_noise)
+        ctx->baseline.lambda_noise = seen;
+    return EITS_OK;
+}
+
+eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length)
+{
+    if (ctx == NULL || frame == NULL || ctx->baseline.count >= ctx->baseline.wanted)
+        return EITS_E_ARGUMENT;
+    eits_baseline *b = &ctx->baseline;
+    eits_status status = check_quiet(ctx, frame, length);
+    if (status == EITS_OK && b->count == b->wanted / 2)
+        status = fit_to_model(ctx);
+    if (status == EITS_OK && b->count >= b->wanted / 2)
+        status = learn_lambda_noise(ctx, frame);
+    if (status != EITS_OK)
+        return status;
+    ++b->count;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* Welford, Technometrics 4 (1962) 419 */
+        if (ctx->bad[i])
+            continue;
+        const eits_real delta = frame[i] - b->v0[i];
+        b->v0[i] += delta / (eits_real)b->count;
+        b->m2[i] = eits_fma(delta, frame[i] - b->v0[i], b->m2[i]);
+    }
+    return EITS_OK;
+}
+
+eits_status eits_baseline_finish(eits_context *ctx)
+{
+    if (ctx == NULL)
+        return EITS_E_ARGUMENT;
+    eits_baseline *b = &ctx->baseline;
+    if (b->count < MIN_QUIET_FRAMES || b->count != b->wanted)
+        return EITS_E_BASELINE_SHORT;
+    const eits_status status = fit_to_model(ctx);
+    if (status != EITS_OK)
+        return status;
+    eits_real sum = 0;
+    uint32_t used = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (!ctx->bad[i]) {
+            sum += b->m2[i];
+            ++used;
+        }
+    }
+    b->noise_v = used > 0 ? eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
+    b->ready = 1;
+    return EITS_OK;
+}

@@ -1,0 +1,83 @@
+#include "disc.h"
+
+#include "kernels.h"
+#include "stages.h"
+#include "vec.h"
+
+/* The kept pixels that the disc covers: their numbers into list_index, their covers and the covers' derivative by distance. */
+typedef struct covered {
+    uint32_t count;
+    const uint32_t *index;
+    eits_real *cover;  /* over the column weight, times the column scale */
+    eits_real *ramp;   /* minus the derivative by distance, likewise */
+    eits_real *toward_x, *toward_y; /* unit vector from centre to pixel; later the derivatives */
+} covered;
+
+/* Cells from first to last, clipped to 0 .. count - 1, whose centres may lie within `reach` of `at`; all in pixels. */
+static void cell_range(eits_real at, eits_real reach, uint32_t count, uint32_t *first, uint32_t *last)
+{
+    const eits_real low = at - reach - R(0.5), high = at + reach - R(0.5), top = (eits_real)(count - 1);
+    *first = low > 0 ? (low < top ? (uint32_t)low : count) : 0;
+    *last = high < 0 ? 0 : (high < top ? (uint32_t)high + 1 : count - 1);
+}
+
+static eits_real column_factor(const eits_model *model, uint32_t j)
+{
+    const eits_real scale = model->sensitivity.scale != NULL ? (eits_real)model->sensitivity.scale[j] : 1;
+    return scale / (eits_real)model->column_weight[j];
+}
+
+static covered cover(eits_context *ctx, const eits_disc *disc)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm;
+    const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / pixel;
+    const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / pixel;
+    const eits_real radius = disc->radius_mm / pixel, reach = radius + R(0.5);
+    covered c = {0, ctx->list_index, ctx->list_value, ctx->gradient, ctx->z, ctx->x_next};
+    uint32_t x0, x1, y0, y1;
+    cell_range(x, reach, model->nx, &x0, &x1);
+    cell_range(y, reach, model->ny, &y0, &y1);
+    for (uint32_t iy = y0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x0; ix <= x1 && ix < model->nx; ++ix) {
+            const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+            if (j == EITS_NO_PIXEL || model->column_weight[j] == 0.0f)
+                continue;
+            const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y;
+            const eits_real distance = eits_sqrt(eits_fma(dx, dx, dy * dy));
+            const eits_real share = R(0.5) + (radius - distance);
+            if (!(share > 0))
+                continue;
+            const eits_real factor = column_factor(model, j), from = distance > R(1e-6) ? 1 / distance : 0;
+            ctx->list_index[c.count] = j;
+            c.cover[c.count] = share < 1 ? share * factor : factor;
+            c.ramp[c.count] = share < 1 ? factor / pixel : 0;
+            c.toward_x[c.count] = dx * from;
+            c.toward_y[c.count] = dy * from;
+            ++c.count;
+        }
+    }
+    return c;
+}
+
+static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *value, eits_real *out)
+{
+    ctx->kernels->mul(&ctx->model->sensitivity, c->index, value, c->count, out);
+    return (uint64_t)c->count * ctx->model->rank + eits_project(ctx, out);
+}
+
+uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom, eits_real *const *slope)
+{
+    const covered c = cover(ctx, disc);
+    uint64_t macs = respond(ctx, &c, c.cover, atom);
+    if (slope == NULL)
+        return macs;
+    for (uint32_t k = 0; k < c.count; ++k) {
+        c.toward_x[k] *= c.ramp[k];
+        c.toward_y[k] *= c.ramp[k];
+    }
+    macs += respond(ctx, &c, c.toward_x, slope[0]);
+    macs += respond(ctx, &c, c.toward_y, slope[1]);
+    macs += respond(ctx, &c, c.ramp, slope[2]);
+    return macs;
+}

@@ -1,0 +1,19 @@
+/* Discs of changed conductivity, placed off the grid, and what the skin answers to them in reduced space. */
+#ifndef EITSKIN_DISC_H
+#define EITSKIN_DISC_H
+
+#include "eitskin/context.h"
+
+typedef struct eits_disc {
+    eits_real x_mm, y_mm, radius_mm;
+    eits_real change;   /* S/m, uniform within the disc */
+    eits_real polarity; /* +1 or -1: the sign that `change` must keep */
+} eits_disc;
+
+/* A pixel is covered by clamp(1/2 + (radius - distance) / pixel): exact for a straight edge that crosses it squarely.
+ * `atom` (stride numbers) gets Q S w, w the covers over the column weights, that is the answer to a change of 1 S/m; with
+ * `slope` not NULL, its three arrays get the derivatives by x, y and radius. Uses z, x_next and gradient as scratch.
+ * Returns the multiply-accumulates. */
+uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom, eits_real *const *slope);
+
+#endif

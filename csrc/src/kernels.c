@@ -1,0 +1,76 @@
+/* What the kernels' builds share: choosing one, listing non-zeros, reading columns, making panels. */
+#include "kernels.h"
+
+#include "half.h"
+#include "vec.h"
+
+#ifdef EITS_BUILD_AVX2
+extern const eits_kernels eits_kernels_avx2;
+#endif
+
+const eits_kernels *eits_kernels_best(void)
+{
+#ifdef EITS_BUILD_AVX2
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return &eits_kernels_avx2;
+#endif
+    return &eits_kernels_portable;
+}
+
+static eits_real read_entry(const eits_matrix *matrix, size_t at)
+{
+    switch (matrix->storage) {
+    case EITS_STORAGE_F32: return (eits_real)((const float *)matrix->data)[at];
+    case EITS_STORAGE_F16: return (eits_real)eits_half_to_float(((const uint16_t *)matrix->data)[at]);
+    case EITS_STORAGE_I16: return (eits_real)((const int16_t *)matrix->data)[at];
+    case EITS_STORAGE_I8: return (eits_real)((const int8_t *)matrix->data)[at];
+    }
+    return 0;
+}
+
+void eits_read_column(const eits_matrix *matrix, uint32_t column, eits_real *out)
+{
+    for (uint32_t i = 0; i < matrix->rows; ++i)
+        out[i] = read_entry(matrix, (size_t)matrix->stride * column + i);
+}
+
+uint32_t eits_list_nonzeros(const eits_matrix *matrix, const eits_real *x, uint32_t *index, eits_real *value)
+{
+    uint32_t count = 0;
+    for (uint32_t j = 0; j < matrix->cols; ++j) {
+        index[count] = j;
+        value[count] = x[j];
+        count += x[j] != 0; /* without a branch that would be guessed wrong */
+    }
+    if (matrix->scale != NULL) {
+        for (uint32_t k = 0; k < count; ++k)
+            value[k] *= (eits_real)matrix->scale[index[k]];
+    }
+    return count;
+}
+
+void eits_apply_t(const eits_context *ctx, const eits_real *v, eits_real *out)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    if (ctx->panels != NULL)
+        ctx->kernels->mul_t_panels(s, ctx->panels, v, out);
+    else
+        ctx->kernels->mul_t(s, v, out);
+}
+
+uint32_t eits_apply(const eits_context *ctx, const eits_real *x, eits_real *out)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    const uint32_t count = eits_list_nonzeros(s, x, ctx->list_index, ctx->list_value);
+    ctx->kernels->mul(s, ctx->list_index, ctx->list_value, count, out);
+    return count;
+}
+
+void eits_make_panels(const eits_matrix *matrix, eits_real *panels)
+{
+    for (uint32_t j = 0; j < EITS_PANEL_COLUMNS(matrix->cols); ++j) {
+        eits_real *lane = panels + (size_t)(j / EITS_PANEL) * EITS_PANEL * matrix->rows + j % EITS_PANEL;
+        for (uint32_t i = 0; i < matrix->rows; ++i)
+            lane[(size_t)i * EITS_PANEL] = j < matrix->cols ? read_entry(matrix, (size_t)matrix->stride * j + i) : 0;
+    }
+}

@@ -1,0 +1,151 @@
+/* The matrix products, included once for each processor that they are built for (kernels_portable.c, kernels_avx2.c).
+ * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this:
+ *     sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the EITS_PANEL lanes l */
+#include "half.h"
+#include "kernels.h"
+#include "vec.h"
+
+/* One function for each storage type, from one text. */
+#define DEFINE_PRODUCTS(TAG, TYPE, READ)                                                                                   \
+    static void NAME(mul_##TAG)(const eits_matrix *matrix, const uint32_t *index, const eits_real *value, uint32_t count, \
+                                eits_real *out)                                                                           \
+    {                                                                                                                      \
+        const TYPE *data = matrix->data;                                                                                   \
+        const size_t stride = matrix->stride;                                                                              \
+        for (size_t row = 0; row < stride; row += 8) {                                                                     \
+            eits_real a0 = 0, a1 = 0, a2 = 0, a3 = 0, a4 = 0, a5 = 0, a6 = 0, a7 = 0;                                      \
+            for (uint32_t k = 0; k < count; ++k) {                                                                         \
+                const TYPE *c = data + stride * index[k] + row;                                                            \
+                const eits_real v = value[k];                                                                              \
+                a0 = eits_fma(READ(c[0]), v, a0);                                                                          \
+                a1 = eits_fma(READ(c[1]), v, a1);                                                                          \
+                a2 = eits_fma(READ(c[2]), v, a2);                                                                          \
+                a3 = eits_fma(READ(c[3]), v, a3);                                                                          \
+                a4 = eits_fma(READ(c[4]), v, a4);                                                                          \
+                a5 = eits_fma(READ(c[5]), v, a5);                                                                          \
+                a6 = eits_fma(READ(c[6]), v, a6);                                                                          \
+                a7 = eits_fma(READ(c[7]), v, a7);                                                                          \
+            }                                                                                                              \
+            eits_real *o = out + row;                                                                                      \
+            o[0] = a0, o[1] = a1, o[2] = a2, o[3] = a3, o[4] = a4, o[5] = a5, o[6] = a6, o[7] = a7;                        \
+        }                                                                                                                  \
+    }                                                                                                                      \
+    static void NAME(mul_t_##TAG)(const eits_matrix *matrix, const eits_real *v, eits_real *out)                           \
+    {                                                                                                                      \
+        const TYPE *data = matrix->data;                                                                                   \
+        const size_t stride = matrix->stride;                                                                              \
+        uint32_t j = 0;                                                                                                    \
+        for (; j + 4 <= matrix->cols; j += 4) { /* four chains at a time hide the latency of one */                        \
+            const TYPE *c0 = data + stride * j, *c1 = c0 + stride, *c2 = c1 + stride, *c3 = c2 + stride;                    \
+            eits_real a0 = 0, a1 = 0, a2 = 0, a3 = 0;                                                                      \
+            for (uint32_t i = 0; i < matrix->rows; ++i) {                                                                  \
+                const eits_real w = v[i];                                                                                  \
+                a0 = eits_fma(READ(c0[i]), w, a0);                                                                         \
+                a1 = eits_fma(READ(c1[i]), w, a1);                                                                         \
+                a2 = eits_fma(READ(c2[i]), w, a2);                                                                         \
+                a3 = eits_fma(READ(c3[i]), w, a3);                                                                         \
+            }                                                                                                              \
+            out[j] = a0, out[j + 1] = a1, out[j + 2] = a2, out[j + 3] = a3;                                                \
+        }                                                                                                                  \
+        for (; j < matrix->cols; ++j) {                                                                                    \
+            const TYPE *c = data + stride * j;                                                                             \
+            eits_real a = 0;                                                                                               \
+            for (uint32_t i = 0; i < matrix->rows; ++i)                                                                    \
+                a = eits_fma(READ(c[i]), v[i], a);                                                                         \
+            out[j] = a;                                                                                                    \
+        }                                                                                                                  \
+    }
+
+#define READ_PLAIN(x) ((eits_real)(x))
+#define READ_HALF(x) ((eits_real)eits_half_to_float(x))
+DEFINE_PRODUCTS(f32, float, READ_PLAIN)
+DEFINE_PRODUCTS(f16, uint16_t, READ_HALF)
+DEFINE_PRODUCTS(i16, int16_t, READ_PLAIN)
+DEFINE_PRODUCTS(i8, int8_t, READ_PLAIN)
+#undef READ_PLAIN
+#undef READ_HALF
+#undef DEFINE_PRODUCTS
+
+static void NAME(scale)(const eits_matrix *matrix, eits_real *out)
+{
+    if (matrix->scale == NULL)
+        return;
+    for (uint32_t j = 0; j < matrix->cols; ++j)
+        out[j] *= (eits_real)matrix->scale[j];
+}
+
+static void NAME(mul)(const eits_matrix *matrix, const uint32_t *index, const eits_real *value, uint32_t count, eits_real *out)
+{
+    switch (matrix->storage) {
+    case EITS_STORAGE_F32: NAME(mul_f32)(matrix, index, value, count, out); break;
+    case EITS_STORAGE_F16: NAME(mul_f16)(matrix, index, value, count, out); break;
+    case EITS_STORAGE_I16: NAME(mul_i16)(matrix, index, value, count, out); break;
+    case EITS_STORAGE_I8: NAME(mul_i8)(matrix, index, value, count, out); break;
+    }
+}
+
+static void NAME(mul_t)(const eits_matrix *matrix, const eits_real *v, eits_real *out)
+{
+    switch (matrix->storage) {
+    case EITS_STORAGE_F32: NAME(mul_t_f32)(matrix, v, out); break;
+    case EITS_STORAGE_F16: NAME(mul_t_f16)(matrix, v, out); break;
+    case EITS_STORAGE_I16: NAME(mul_t_i16)(matrix, v, out); break;
+    case EITS_STORAGE_I8: NAME(mul_t_i8)(matrix, v, out); break;
+    }
+    NAME(scale)(matrix, out);
+}
+
+static void NAME(mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const eits_real *v, eits_real *out)
+{
+    for (uint32_t j = 0; j < matrix->cols; j += EITS_PANEL) {
+        const eits_real *panel = panels + (size_t)j * matrix->rows;
+        const uint32_t lanes = matrix->cols - j < EITS_PANEL ? matrix->cols - j : EITS_PANEL;
+        eits_real sum[EITS_PANEL];
+        NAME(sum_panel)(panel, v, matrix->rows, sum);
+        for (uint32_t l = 0; l < lanes; ++l)
+            out[j + l] = sum[l];
+    }
+    NAME(scale)(matrix, out);
+}
+
+static eits_real NAME(dot)(const eits_real *a, const eits_real *b, size_t count)
+{
+    eits_real lane[8] = {0};
+    size_t i = 0;
+    for (; i + 8 <= count; i += 8) {
+        for (size_t l = 0; l < 8; ++l)
+            lane[l] = eits_fma(a[i + l], b[i + l], lane[l]);
+    }
+    for (size_t l = 0; i + l < count; ++l)
+        lane[l] = eits_fma(a[i + l], b[i + l], lane[l]);
+    return eits_tree8(lane);
+}
+
+static void NAME(axpy)(eits_real *out, eits_real factor, const eits_real *a, size_t count)
+{
+    for (size_t i = 0; i < count; ++i)
+        out[i] = eits_fma(factor, a[i], out[i]);
+}
+
+/* The proximal step of threshold |x|_1. With both signs allowed, one of the two halves is zero; with one sign, the other
+ * half is multiplied away, so that one loop without branches serves all. */
+static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restrict gradient, const eits_real *restrict x,
+                       eits_real *restrict next, eits_real *restrict z)
+{
+    const eits_real step = how->step, t = how->threshold, beta = how->beta;
+    const eits_real allow_up = how->sign != EITS_SIGN_DECREASE, allow_down = how->sign != EITS_SIGN_INCREASE;
+    for (uint32_t j = 0; j < n; ++j) {
+        const eits_real v = eits_fma(step, gradient[j], z[j]);
+        const eits_real up = v > t ? v - t : 0, down = v < -t ? v + t : 0;
+        const eits_real moved = allow_up * up + allow_down * down;
+        next[j] = moved;
+        z[j] = eits_fma(beta, moved - x[j], moved);
+    }
+}
+
+/* This build's table. */
+#define KERNELS_TABLE(TEXT)                                                                                                \
+    {                                                                                                                      \
+        .name = TEXT, .mul = NAME(mul), .mul_t = NAME(mul_t), .mul_t_panels = NAME(mul_t_panels), .dot = NAME(dot),        \
+        .axpy = NAME(axpy), .prox = NAME(prox)                                                                             \
+    }

@@ -1,0 +1,19 @@
+/* What the stages (baseline, frame, solve, touch) share inside the library. */
+#ifndef EITSKIN_STAGES_H
+#define EITSKIN_STAGES_H
+
+#include "eitskin/context.h"
+
+/* Take the basis' directions out of v (stride numbers); returns the multiply-accumulates. */
+uint64_t eits_project(const eits_context *ctx, eits_real *v);
+
+/* eits_frame_stage without its checks; the baseline need not be finished. */
+eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t *masked, uint64_t *macs);
+
+/* The greatest of the coefficients' correlations g under the sign rule: max g, max -g or max |g|; not below 0. */
+eits_real eits_greatest(const eits_real *g, uint32_t count, eits_sign sign);
+
+/* 1 where each of the values is finite. */
+int eits_all_finite(const eits_real *values, size_t count);
+
+#endif

@@ -1,0 +1,1 @@
+"""The stored model: reduction, the .eitm file, and how one is built."""

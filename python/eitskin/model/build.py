@@ -1,0 +1,170 @@
+"""From a skin's description to a model: mesh, forward model, Jacobian, reduction, storage, golden frame."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin import __version__
+from eitskin.errors import UsageError
+from eitskin.fem.grid import Grid, grid_for
+from eitskin.model.eitm import encode_model
+from eitskin.model.model import DATA_KINDS, Defaults, Golden, Model
+from eitskin.model.reduction import (
+    DEFAULT_COLUMN_POWER,
+    DEFAULT_FLOOR,
+    fold_rows,
+    noise_gain,
+    reduce_jacobian,
+    spectral_norm_squared,
+)
+from eitskin.model.storage import STORAGES, store
+from eitskin.skin.protocol import Protocol, protocol_to_table
+from eitskin.skin.skin import Skin, skin_to_table
+from eitskin.solve.core import CoreEngine
+
+FloatArray = npt.NDArray[np.float64]
+
+LIPSCHITZ_MARGIN = 1e-4
+PAPER_DIAMETER_MM = 194.0
+# a disc of contrast c in a sheet of conductivity s answers as a linear change of 2 (c - 1) / (c + 1) s; c = 3 to 10 give 1.0 to 1.64
+TOUCH_CHANGE_RATIO = 1.35
+
+
+@dataclass(frozen=True)
+class BuildSettings:
+    """What a model is built with; ``rank`` 0 takes as many as there are folded rows, at most 64."""
+
+    rank: int = 0
+    pixels_across: int = 32
+    storage: str = "f32"
+    data_kind: str = "difference"
+    floor: float = DEFAULT_FLOOR
+    column_power: float = DEFAULT_COLUMN_POWER
+    elements: int = 3000
+    touch_change_ratio: float = TOUCH_CHANGE_RATIO
+    defaults: Defaults | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """The skin's linear answer: ``jacobian`` (m, n) V per S/m on ``grid``, ``v0_v`` (m,), and the mesh's element count."""
+
+    grid: Grid
+    jacobian: FloatArray
+    v0_v: FloatArray
+    elements: int
+
+
+def linearise(skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elements: int = 3000) -> Linearisation:
+    """Mesh ``skin`` and take the Jacobian of its boundary voltages at its own conductivity.
+
+    Raises:
+        GeometryError: the skin cannot be meshed.
+        ProtocolError: skin and protocol have different numbers of electrodes.
+        MissingExtraError: scipy or netgen is not installed.
+    """
+    from eitskin.fem.cem import ForwardModel
+    from eitskin.fem.mesh import mesh_for_elements
+    from eitskin.fem.sensitivity import sensitivity
+
+    grid = grid_for(skin.outline, pixels_across)
+    mesh = mesh_for_elements(skin, elements)
+    forward = ForwardModel(mesh, skin, protocol)
+    jacobian, v0 = sensitivity(forward, skin.conductivity_s_per_m, grid)
+    return Linearisation(grid, jacobian, v0, mesh.n_elements)
+
+
+def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings) -> Model:
+    """Reduce and store a linearisation; the golden image comes from the float32 C core.
+
+    Raises:
+        UsageError: a setting is out of range, or the C core is not built.
+    """
+    if settings.storage not in STORAGES or settings.data_kind not in DATA_KINDS:
+        raise UsageError(f"model: storage must be one of {', '.join(STORAGES)}; data one of {', '.join(DATA_KINDS)}")
+    fold = protocol.reciprocal_pairs()
+    v_ref, jacobian = fold_rows(linear.v0_v, fold), fold_rows(linear.jacobian, fold)
+    if settings.data_kind == "normalised":
+        jacobian = jacobian / v_ref[:, None]
+    rank = settings.rank or min(64, *jacobian.shape)
+    reduction = reduce_jacobian(jacobian, rank, floor=settings.floor, column_power=settings.column_power)
+    projection = reduction.projection.astype(np.float32)
+    stored = store(reduction.sensitivity, settings.storage)
+    decoded = stored.decode(rank)
+    empty = np.zeros(linear.grid.n_pixels, dtype=np.float32)
+    reference = linear.v0_v.astype(np.float32)
+    model = Model(
+        protocol=protocol,
+        fold=fold,
+        grid=linear.grid,
+        data_kind=settings.data_kind,
+        rank=rank,
+        v_ref_v=v_ref.astype(np.float32),
+        projection=projection,
+        stored=stored,
+        column_weight=reduction.column_weight.astype(np.float32),
+        lipschitz=float(np.float32(spectral_norm_squared(decoded) * (1 + LIPSCHITZ_MARGIN))),
+        noise_gain=float(np.float32(noise_gain(projection, decoded))),
+        defaults=settings.defaults or scaled_defaults(skin, settings.touch_change_ratio),
+        golden=Golden(reference, _golden_frame(skin, linear), empty),
+        meta=_meta(skin, protocol, linear, settings, rank),
+    )
+    return replace(model, golden=replace(model.golden, image=_golden_image(model)))
+
+
+def scaled_defaults(skin: Skin, touch_change_ratio: float = TOUCH_CHANGE_RATIO) -> Defaults:
+    """Defaults for ``skin``: lengths in proportion to its size, the expected change to its conductivity."""
+    paper = Defaults()
+    scale = 2 * float(np.sqrt(skin.outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
+    return replace(
+        paper,
+        touch_min_radius_mm=_round(paper.touch_min_radius_mm * scale),
+        touch_max_radius_mm=_round(paper.touch_max_radius_mm * scale),
+        touch_seed_radius_mm=_round(paper.touch_seed_radius_mm * scale),
+        touch_change_s_per_m=_round(touch_change_ratio * skin.conductivity_s_per_m),
+        follow_mm=_round(paper.follow_mm * scale),
+    )
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def build_model(skin: Skin, protocol: Protocol, settings: BuildSettings | None = None) -> Model:
+    """The whole way from ``skin`` to a model; raises what ``linearise`` and ``make_model`` raise."""
+    chosen = settings or BuildSettings()
+    linear = linearise(skin, protocol, pixels_across=chosen.pixels_across, elements=chosen.elements)
+    return make_model(skin, protocol, linear, chosen)
+
+
+def _golden_frame(skin: Skin, linear: Linearisation) -> npt.NDArray[np.float32]:
+    """Two discs, as the linear model sees them: reproducible from the model's own Jacobian, with no random number."""
+    centres = linear.grid.centres_mm()
+    middle, size = centres.mean(axis=0), np.ptp(centres, axis=0).min()
+    change = np.zeros(len(centres))
+    for offset, radius, contrast in (((0.22, 0.13), 0.06, 3.0), ((-0.25, -0.09), 0.05, 2.0)):
+        inside = np.linalg.norm(centres - middle - size * np.array(offset), axis=1) <= max(radius * size, linear.grid.pixel_mm)
+        change[inside] = contrast * skin.conductivity_s_per_m
+    return np.asarray(linear.v0_v + linear.jacobian @ change, dtype=np.float32)
+
+
+def _golden_image(model: Model) -> npt.NDArray[np.float32]:
+    core = CoreEngine(encode_model(model), "float32")
+    core.set_baseline(model.golden.reference_v[None].astype(np.float64))
+    return np.asarray(core.reconstruct(model.golden.frame_v, touches=False).image, dtype=np.float32)
+
+
+def _meta(skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings, rank: int) -> dict[str, Any]:
+    settings_table = {**asdict(settings), "rank": rank}
+    settings_table.pop("defaults")
+    return {
+        "made_by": f"eitskin {__version__}",
+        "skin": skin_to_table(skin),
+        "protocol": protocol_to_table(protocol),
+        "build": settings_table,
+        "mesh_elements": linear.elements,
+    }

@@ -1,0 +1,84 @@
+"""The stored model as Python sees it: everything from a frame's rows to the image's pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.grid import Grid
+from eitskin.model.storage import StoredMatrix
+from eitskin.skin.protocol import Protocol, Reciprocity
+from eitskin.skin.skin import Skin, skin_from_table
+
+DATA_KINDS = ("difference", "normalised", "log-ratio")
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """What the model's maker chose, in the file's order; csrc/include/eitskin/context.h says what each does.
+
+    Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t max(x).
+    """
+
+    iterations: int = 40
+    max_touches: int = 12
+    lambda_rel: float = 0.03
+    lambda_noise_factor: float = 0.3
+    gate_factor: float = 1.2
+    mask_threshold: float = 0.3
+    touch_threshold: float = 0.15
+    touch_share: float = 0.003
+    touch_min_radius_mm: float = 3.0
+    touch_max_radius_mm: float = 30.0
+    touch_seed_radius_mm: float = 9.0
+    touch_change_s_per_m: float = 0.0135
+    follow_mm: float = 25.0
+
+
+@dataclass(frozen=True, eq=False)
+class Golden:
+    """The self-test: ``reference_v`` and ``frame_v`` (m,), and the float32 core's ``image`` (n,) S/m, all float32."""
+
+    reference_v: npt.NDArray[np.float32]
+    frame_v: npt.NDArray[np.float32]
+    image: npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P (r, k) float32;
+    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made.
+    """
+
+    protocol: Protocol
+    fold: Reciprocity
+    grid: Grid
+    data_kind: str
+    rank: int
+    v_ref_v: npt.NDArray[np.float32]
+    projection: npt.NDArray[np.float32]
+    stored: StoredMatrix
+    column_weight: npt.NDArray[np.float32]
+    lipschitz: float
+    noise_gain: float
+    defaults: Defaults
+    golden: Golden
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def sensitivity(self) -> npt.NDArray[np.float64]:
+        """S (r, n) as stored, decoded."""
+        return self.stored.decode(self.rank)
+
+    @cached_property
+    def skin(self) -> Skin:
+        """The skin that the model was made for.
+
+        Raises:
+            ConfigError: the model carries no description of it.
+        """
+        return skin_from_table(self.meta.get("skin", {}), "the model's own description")

@@ -1,0 +1,91 @@
+"""The reduction: a Jacobian folded by reciprocity, scaled by columns, whitened by rows and cut to a rank.
+
+With A = J D, D = diag(|j_k|^-p), and its singular value decomposition A = U diag(s) V':
+
+    P = diag((s_i^2 + mu s_1^2)^-1/2) U'      whitens the data: y = P d
+    S = P A = diag(s_i / sqrt(s_i^2 + mu s_1^2)) V'      the stored matrix; its greatest eigenvalue S S' is 1 / (1 + mu)
+
+so that |P d - S g|^2 is the misfit of J D g in a metric that lets weak directions speak up to the floor mu, and a
+first-order solver with step 1 needs few iterations. It is Tikhonov-floored whitening, a preconditioner on the data side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import UsageError
+from eitskin.skin.protocol import Reciprocity
+
+FloatArray = npt.NDArray[np.float64]
+
+DEFAULT_FLOOR = 1e-2
+DEFAULT_COLUMN_POWER = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """What the reduction of a folded Jacobian (k, n) to rank r gives.
+
+    ``projection`` P (r, k); ``sensitivity`` S (r, n); ``column_weight`` D's diagonal (n,), S/m per coefficient;
+    ``singular_values`` of A, all of them, descending.
+    """
+
+    projection: FloatArray
+    sensitivity: FloatArray
+    column_weight: FloatArray
+    singular_values: FloatArray
+
+
+def fold_rows(values: npt.ArrayLike, fold: Reciprocity) -> FloatArray:
+    """The mean of each row and its reciprocal, with its sign: (m, ...) to (k, ...)."""
+    rows = np.asarray(values, dtype=np.float64)
+    sign = fold.sign.reshape(-1, *[1] * (rows.ndim - 1))
+    paired = (fold.second >= 0).reshape(sign.shape)
+    return np.where(paired, 0.5 * (rows[fold.first] + sign * rows[fold.second]), rows[fold.first])
+
+
+def reduce_jacobian(
+    jacobian: npt.ArrayLike, rank: int, *, floor: float = DEFAULT_FLOOR, column_power: float = DEFAULT_COLUMN_POWER
+) -> Reduction:
+    """Reduce a folded Jacobian (k, n) to ``rank`` rows (``floor`` is mu, ``column_power`` is p; both without unit).
+
+    Raises:
+        UsageError: the rank is not within 1 to min(k, n), the Jacobian is zero or not finite, mu or p out of range.
+    """
+    j = np.asarray(jacobian, dtype=np.float64)
+    if j.ndim != 2 or not np.isfinite(j).all():
+        raise UsageError("reduction: the Jacobian must be a finite matrix; check the skin's conductivity and mesh")
+    if not 1 <= rank <= min(j.shape):
+        raise UsageError(f"reduction: rank = {rank} is out of range; use 1 to {min(j.shape)}")
+    if not (floor >= 0 and 0 <= column_power <= 1):
+        raise UsageError("reduction: the floor must be at least 0 and the column power within 0 to 1")
+    norm = np.linalg.norm(j, axis=0)
+    if not norm.max() > 0:
+        raise UsageError("reduction: the Jacobian is zero; no pixel would be seen")
+    # a pixel that no row sees keeps a finite weight: its coefficient stays zero in any case
+    weight = np.maximum(norm, 1e-6 * norm.max()) ** -column_power
+    u, s, vt = np.linalg.svd(j * weight, full_matrices=False)
+    denominator = np.sqrt(s[:rank] ** 2 + floor * s[0] ** 2)
+    if not denominator.min() > 0:
+        raise UsageError(f"reduction: rank = {rank} exceeds the Jacobian's own with a floor of 0; lower it or raise the floor")
+    return Reduction(
+        projection=u[:, :rank].T / denominator[:, None],
+        sensitivity=(s[:rank] / denominator)[:, None] * vt[:rank],
+        column_weight=weight,
+        singular_values=s,
+    )
+
+
+def spectral_norm_squared(sensitivity: npt.ArrayLike) -> float:
+    """The greatest eigenvalue of S S' (S (r, n)): the gradient's Lipschitz constant."""
+    s = np.asarray(sensitivity, dtype=np.float64)
+    return float(np.linalg.eigvalsh(s @ s.T)[-1])
+
+
+def noise_gain(projection: npt.ArrayLike, sensitivity: npt.ArrayLike) -> float:
+    """The greatest deviation over pixels of S' P n for unit white noise n on the folded rows (P (r, k), S (r, n))."""
+    through = np.asarray(projection, dtype=np.float64).T @ np.asarray(sensitivity, dtype=np.float64)
+    return float(np.linalg.norm(through, axis=0).max())

@@ -1,0 +1,54 @@
+"""Storage of the reduced Jacobian: f32, f16, or i16 and i8 with a scale per column."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+STORAGES = ("f32", "f16", "i16", "i8")
+DTYPES: dict[str, np.dtype[Any]] = {
+    "f32": np.dtype("<f4"),
+    "f16": np.dtype("<f2"),
+    "i16": np.dtype("<i2"),
+    "i8": np.dtype("i1"),
+}
+
+
+def stride_for(rank: int) -> int:
+    """Numbers from one column to the next: the rank rounded up to a multiple of 8."""
+    return (rank + 7) // 8 * 8
+
+
+@dataclass(frozen=True, eq=False)
+class StoredMatrix:
+    """Columns (n, stride) in the storage's own type, padded with zeros; ``scale`` (n,) float32 for integers, else None."""
+
+    storage: str
+    columns: npt.NDArray[Any]
+    scale: npt.NDArray[np.float32] | None
+
+    def decode(self, rank: int) -> npt.NDArray[np.float64]:
+        """The matrix (rank, n) that the stored numbers stand for."""
+        wide = self.columns[:, :rank].astype(np.float64)
+        if self.scale is not None:
+            wide *= self.scale[:, None].astype(np.float64)
+        return np.ascontiguousarray(wide.T)
+
+
+def store(matrix: npt.ArrayLike, storage: str) -> StoredMatrix:
+    """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest of their column's steps."""
+    wide = np.asarray(matrix, dtype=np.float64)
+    rank, n = wide.shape
+    padded = np.zeros((n, stride_for(rank)))
+    padded[:, :rank] = wide.T
+    dtype = DTYPES[storage]
+    if dtype.kind == "f":
+        return StoredMatrix(storage, padded.astype(dtype), None)
+    top = float(np.iinfo(dtype).max)
+    peak = np.abs(padded).max(axis=1)
+    scale = np.where(peak > 0, peak / top, 1.0).astype("<f4")
+    levels = np.clip(np.rint(padded / scale[:, None].astype(np.float64)), -top, top)
+    return StoredMatrix(storage, levels.astype(dtype), scale)

@@ -1,0 +1,179 @@
+"""The C core through cffi, in either width: what the microcontroller runs, on the host."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
+from eitskin.solve.results import SIGNS, STOPS, Baseline, Info, Options, Reconstruction, Touch
+
+WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
+
+
+def load_core(width: str) -> Any:
+    """The compiled module of ``width`` ("float32" or "float64").
+
+    Raises:
+        UsageError: it was not built.
+    """
+    try:
+        return importlib.import_module(f"eitskin.solve.{WIDTHS[width]}")
+    except ImportError as error:
+        raise UsageError(f"the C core is not built ({error}); install with  pip install .  in the project's root") from None
+
+
+def _aligned(size: int) -> npt.NDArray[np.uint8]:
+    """``size`` zeroed bytes that start at a 64-byte boundary."""
+    whole = np.zeros(size + 64, dtype=np.uint8)
+    start = -whole.ctypes.data % 64
+    return whole[start : start + size]
+
+
+class CoreEngine:
+    """One context of the C core. ``prepared`` keeps a second copy of S in panels (faster, same bits); ``portable``
+    forbids processor-specific kernels (slower, same bits).
+
+    Raises:
+        ModelError: the core refuses the model.
+        UsageError: the core is not built.
+    """
+
+    def __init__(self, blob: bytes, width: str = "float32", *, prepared: bool = True, portable: bool = False) -> None:
+        module = load_core(width)
+        self._lib, self._ffi = module.lib, module.ffi
+        self.dtype = np.dtype(np.float32 if width == "float32" else np.float64)
+        self._blob = _aligned(len(blob))
+        self._blob[:] = np.frombuffer(blob, dtype=np.uint8)
+        self._model = self._ffi.new("eits_model *")
+        self._check(self._lib.eits_model_open(self._model, self._ffi.from_buffer(self._blob), len(blob)), "model", ModelError)
+        self.workspace_bytes = int(self._lib.eits_workspace_size(self._model, int(prepared)))
+        self._workspace = _aligned(self.workspace_bytes)
+        self._context = self._ffi.new("eits_context *")
+        status = self._lib.eits_init(self._context, self._model, self._ffi.from_buffer(self._workspace), self.workspace_bytes)
+        self._check(status, "workspace", UsageError)
+        self._lib.eits_use_portable_kernels(self._context, int(portable))
+        self.n_rows, self.n_pixels = int(self._model.n_rows), int(self._model.n_pixels)
+        # buffers and their pointers are made once: casting anew at each call would cost more than the call
+        self._frame = np.zeros(self.n_rows, dtype=self.dtype)
+        self._frame_pointer = self._ffi.from_buffer("eits_real[]", self._frame)
+        self._image = self._view(self._context.image, self.n_pixels)
+        self._coefficients_count = self.n_pixels
+        self._info = self._ffi.addressof(self._context, "info")
+        self._touches = self._ffi.new("eits_touch[]", int(self._lib.EITS_MAX_TOUCHES))
+        self._touch_count = self._ffi.new("uint32_t *")
+        self._null = self._ffi.NULL
+
+    @property
+    def kernels(self) -> str:
+        """The name of the matrix products in use."""
+        return str(self._ffi.string(self._lib.eits_kernels_name(self._context)).decode())
+
+    def _view(self, pointer: Any, count: int) -> npt.NDArray[Any]:
+        """An array over ``count`` reals of the context's memory, not a copy."""
+        return np.frombuffer(self._ffi.buffer(pointer, count * self.dtype.itemsize), dtype=self.dtype)
+
+    def _check(self, status: int, what: str, kind: type[EitskinError]) -> None:
+        if status != 0:
+            text = self._ffi.string(self._lib.eits_status_text(status)).decode()
+            raise kind(f"{what}: {text} (C core, status {int(status)})")
+
+    def set_options(self, options: Options) -> None:
+        """Replace the options.
+
+        Raises:
+            UsageError: one is out of its range; the old ones stay.
+        """
+        values = asdict(options)
+        try:
+            values["sign"] = SIGNS.index(options.sign)
+            given = self._ffi.new("eits_options *", {name: _plain(value) for name, value in values.items()})
+        except (ValueError, TypeError, OverflowError) as error:
+            raise UsageError(f"options: {error}") from None
+        self._check(self._lib.eits_set_options(self._context, given), "options", UsageError)
+
+    def set_baseline(self, frames: npt.NDArray[np.float64]) -> Baseline:
+        """Take the reference from quiet ``frames`` (k, m) volts: one as it is, four or more also for the noise.
+
+        Raises:
+            FrameError: a frame cannot be used.
+        """
+        if len(frames) < 4:
+            self._frame[:] = frames.mean(axis=0)
+            self._check_frame(self._lib.eits_baseline_set(self._context, self._frame_pointer, self.n_rows), "reference frame")
+        else:
+            self._check_frame(self._lib.eits_baseline_begin(self._context, len(frames)), "reference frames")
+            for number, frame in enumerate(frames):
+                self._frame[:] = frame
+                status = self._lib.eits_baseline_add(self._context, self._frame_pointer, self.n_rows)
+                self._check_frame(status, f"reference frame {number} (from 0)")
+            self._check_frame(self._lib.eits_baseline_finish(self._context), "reference frames")
+        b = self._context.baseline
+        return Baseline(int(b.count), b.correlation, b.gain, b.v0_rms, b.noise_v, b.lambda_noise)
+
+    def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
+        """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
+        for row in range(self.n_rows):
+            self._check(self._lib.eits_mask_row(self._context, row, int(rows[row])), "mask", UsageError)
+
+    def forget(self) -> None:
+        """Forget the warm start and the touches that were followed."""
+        self._lib.eits_forget(self._context)
+
+    def _check_frame(self, status: int, what: str) -> None:
+        if status != 0:
+            self._check(status, what, FrameError)
+
+    def solve_frame(self, frame: npt.NDArray[np.floating[Any]]) -> int:
+        """Frame stage and solver alone, results left in the core; returns the status. For benchmarks."""
+        self._frame[:] = frame
+        return int(self._lib.eits_reconstruct(self._context, self._frame_pointer, self.n_rows, self._null, self._null))
+
+    def reduced_data(self) -> npt.NDArray[Any]:
+        """y of the last frame as the solver saw it, projected, (stride,)."""
+        return self._view(self._context.y, (int(self._model.rank) + 7) // 8 * 8).copy()
+
+    def reconstruct(self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True) -> Reconstruction:
+        """One frame (m,) volts to image and touches.
+
+        Raises:
+            FrameError: the frame cannot be used.
+        """
+        if frame.shape != (self.n_rows,):
+            raise FrameError(f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows")
+        self._check_frame(self.solve_frame(frame), "frame")
+        found: tuple[Touch, ...] = ()
+        if touches:
+            self._lib.eits_find_touches(self._context, self._touches, len(self._touches), self._touch_count)
+            found = tuple(_touch(self._touches[k]) for k in range(self._touch_count[0]))
+        coefficients = self._view(self._context.x, self.n_pixels).copy()
+        return Reconstruction(self._image.copy(), coefficients, found, self._read_info())
+
+    def _read_info(self) -> Info:
+        i = self._info
+        return Info(
+            i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs, i.touch_macs,
+            getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual, i.data_norm,
+        )  # fmt: skip
+
+    def self_test(self) -> float:
+        """Run the model's golden frame; the greatest difference to its image, relative to the peak.
+
+        Raises:
+            FrameError: the golden frame does not even run.
+        """
+        difference = self._ffi.new("eits_real *")
+        self._check_frame(self._lib.eits_self_test(self._context, difference), "golden frame")
+        return float(difference[0])
+
+
+def _plain(value: Any) -> Any:
+    return int(value) if isinstance(value, bool) else value
+
+
+def _touch(t: Any) -> Touch:
+    return Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence)

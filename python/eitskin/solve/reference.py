@@ -1,0 +1,278 @@
+"""The numpy reference: the same mathematics as the C core, in float64, written for reading; the core is judged against it.
+
+minimise |y - S g|^2 / 2 + lambda |g|_1 by FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183, doi 10.1137/080716542).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FrameError
+from eitskin.model.model import Model
+from eitskin.solve.reference_touches import find_touches
+from eitskin.solve.results import Baseline, Info, Options, Reconstruction, Touch, default_options
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+BASIS_TOLERANCE = 1e-6
+MAX_STEP_HALVINGS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class FistaResult:
+    """Coefficients ``x`` (n,), S x (r,), and how it went; ``gap`` is the absolute duality gap at ``x``."""
+
+    x: FloatArray
+    sx: FloatArray
+    iterations: int
+    stop: str
+    gap: float
+    residual: float
+    step_halvings: int
+
+
+def shrink(v: FloatArray, threshold: float, sign: str) -> FloatArray:
+    """The proximal step of threshold |x|_1 under the sign rule."""
+    up, down = np.maximum(v - threshold, 0.0), np.minimum(v + threshold, 0.0)
+    if sign == "increase":
+        return up
+    return down if sign == "decrease" else up + down
+
+
+def greatest(g: FloatArray, sign: str) -> float:
+    """The greatest correlation under the sign rule, not below 0."""
+    value = {"increase": g.max(), "decrease": -g.min(), "both": np.abs(g).max()}[sign]
+    return max(0.0, float(value))
+
+
+def certify(
+    s: FloatArray, y: FloatArray, x: FloatArray, sx: FloatArray, lam: float, sign: str, basis: FloatArray
+) -> tuple[float, float, float]:
+    """Duality gap, objective and |residual| at ``x``; the formula is in csrc/src/solve.c."""
+    residual = project(y - sx, basis)
+    correlation = s.T @ residual
+    largest = greatest(correlation, sign)
+    scale = lam / largest if largest > lam else 1.0
+    slack = np.maximum(lam * np.abs(x) - scale * x * correlation, 0.0)
+    squared = float(residual @ residual)
+    return 0.5 * (1 - scale) ** 2 * squared + float(slack.sum()), 0.5 * squared + lam * float(np.abs(x).sum()), squared**0.5
+
+
+def fista(
+    s: FloatArray, y: FloatArray, lam: float, lipschitz: float, options: Options, basis: FloatArray, start: FloatArray | None = None
+) -> FistaResult:
+    """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the misfit."""
+    sign, step, t, halvings = options.sign, 1.0 / lipschitz, 1.0, 0
+    x = np.zeros(s.shape[1]) if start is None else start.copy()
+    sx = s @ x
+    z, sz = x.copy(), sx.copy()
+    scale = 0.5 * float(y @ y)
+    stop, gap, residual, k = "iterations", 0.0, float(np.linalg.norm(y)), 0
+    for k in range(1, options.iterations + 1):
+        gradient = s.T @ project(y - sz, basis)
+        x_next = shrink(z + step * gradient, step * lam, sign)
+        t_next = 0.5 * (1 + np.sqrt(1 + 4 * t * t))
+        beta = (t - 1) / t_next
+        sx_next = s @ x_next
+        z, sz = x_next + beta * (x_next - x), sx_next + beta * (sx_next - sx)
+        x, sx, t = x_next, sx_next, t_next
+        last = k == options.iterations
+        if not last and k % options.gap_every:
+            continue
+        if not last and options.gap_rel == 0 and float(sx @ sx) <= 8 * scale:
+            continue
+        gap, objective, residual = certify(s, y, x, sx, lam, sign, basis)
+        if not objective <= scale * (1 + 1e-3):
+            if halvings == MAX_STEP_HALVINGS or last:
+                stop = "diverged"
+                break
+            halvings, step, t = halvings + 1, step / 2, 1.0
+            x, sx = np.zeros_like(x), np.zeros_like(sx)
+            z, sz = x.copy(), sx.copy()
+            continue
+        if 0 < options.gap_rel and gap <= options.gap_rel * scale:
+            stop = "gap"
+            break
+    return FistaResult(x, sx, k, stop, gap, residual, halvings)
+
+
+def project(v: FloatArray, basis: FloatArray) -> FloatArray:
+    """``v`` (r,) without its part in the span of the orthonormal rows of ``basis`` (k, r)."""
+    return v - basis.T @ (basis @ v)
+
+
+def orthonormal(candidates: list[FloatArray], rank: int) -> FloatArray:
+    """An orthonormal basis (k, r) of the span of ``candidates`` (each (r,)), in their order."""
+    rows = np.zeros((0, rank))
+    for candidate in candidates:
+        before = float(candidate @ candidate)
+        v = project(project(candidate, rows), rows)
+        after = float(v @ v)
+        if len(rows) < rank and before > 0 and after > BASIS_TOLERANCE * before:
+            rows = np.vstack([rows, v / np.sqrt(after)])
+    return rows
+
+
+class ReferenceEngine:
+    """The numpy engine: one model's frames to images and touches. Slow, and plain."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.options = default_options(model)
+        self._s, self._p = model.sensitivity, model.projection.astype(np.float64)
+        self._v_ref = model.v_ref_v.astype(np.float64)
+        self._bad = np.zeros(model.protocol.n_rows, dtype=bool)
+        self._v0: FloatArray | None = None
+        self._gain = 1.0
+        self._v0_rms = 0.0
+        self._lambda_noise = 0.0
+        self._warm: FloatArray | None = None
+        self._last: tuple[Touch, ...] = ()
+        self._next_id = 1
+
+    def set_options(self, options: Options) -> None:
+        """Replace the options."""
+        if options.sign != self.options.sign:
+            self._warm = None
+        self.options = options
+
+    def mask_rows(self, rows: BoolArray) -> None:
+        """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
+        self._bad = rows.copy()
+
+    def forget(self) -> None:
+        """Forget the warm start and the touches that were followed."""
+        self._warm, self._last = None, ()
+
+    def _fold_reference(self, v0: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Folded reference (k,) and where it is known."""
+        fold, usable = self.model.fold, ~self._bad
+        first = usable[fold.first]
+        second = (fold.second >= 0) & usable[fold.second]
+        total = np.where(first, v0[fold.first], 0) + np.where(second, fold.sign * v0[fold.second], 0)
+        count = first.astype(int) + second
+        return total / np.maximum(count, 1), count > 0
+
+    def _fit_to_model(self, v0: FloatArray) -> float:
+        folded, known = self._fold_reference(v0)
+        v, r = folded[known], self._v_ref[known]
+        if not np.abs(v).max(initial=0.0) > 0:
+            raise FrameError("reference frame: the reference frame is all zero")
+        correlation = float(v @ r / np.sqrt((v @ v) * (r @ r)))
+        self._gain = float(np.sqrt((r @ r) / (v @ v))) * (-1 if correlation < 0 else 1)
+        self._v0, self._v0_rms = v0, float(np.sqrt(np.mean(v**2)))
+        self._warm = None
+        return correlation
+
+    def set_baseline(self, frames: FloatArray) -> Baseline:
+        """Take the reference from quiet ``frames`` (k, m) volts, as CoreEngine.set_baseline does.
+
+        Raises:
+            FrameError: a frame cannot be used.
+        """
+        frames = np.where(self._bad, 0.0, frames)
+        limit = self.options.saturation_v
+        if not np.isfinite(frames).all() or (limit > 0 and np.abs(frames).max() >= limit):
+            raise FrameError("reference frames: a channel is not finite or saturated; mask it or measure again")
+        self._lambda_noise, noise = 0.0, 0.0
+        if len(frames) >= 4:
+            for k in range(len(frames) // 2, len(frames)):
+                if k == len(frames) // 2:
+                    self._fit_to_model(frames[:k].mean(axis=0))
+                self._v0 = frames[:k].mean(axis=0)
+                y, _, _ = self.frame_stage(frames[k])
+                self._lambda_noise = max(self._lambda_noise, greatest(self._s.T @ y, "both"))
+            noise = float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
+        correlation = self._fit_to_model(frames.mean(axis=0))
+        return Baseline(len(frames), correlation, self._gain, self._v0_rms, noise, self._lambda_noise)
+
+    def _datum(self, frame: FloatArray, v0: FloatArray) -> FloatArray:
+        kind = self.model.data_kind
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if kind == "normalised":
+                return (frame - v0) / v0
+            if kind == "log-ratio":
+                return self._gain * v0 * np.log(np.clip(frame / v0, 1 / 16, 16))
+        return self._gain * (frame - v0)
+
+    def frame_stage(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+        """Reduced projected data y (r,), the basis (k, r) of what is ignored, and how many rows were left out.
+
+        Raises:
+            FrameError: no reference, or too many unusable channels.
+        """
+        if self._v0 is None:
+            raise FrameError("frame: no reference frame has been set")
+        fold, kind, limit = self.model.fold, self.model.data_kind, self.options.saturation_v
+        unusable = self._bad | ~np.isfinite(frame)
+        if limit > 0:
+            unusable |= np.abs(np.nan_to_num(frame)) >= limit
+        if int(unusable.sum()) > self.options.max_masked:
+            raise FrameError("frame: too many channels of the frame are unusable")
+        out = unusable | ((kind != "difference") & (np.abs(self._v0) < 1e-6 * self._v0_rms))
+        value = np.where(out, 0.0, self._datum(np.where(out, self._v0, frame), self._v0))
+        sign = np.ones_like(fold.sign) if kind == "normalised" else fold.sign
+        first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
+        count = first.astype(int) + second
+        d = (value[fold.first] + np.where(second, sign * value[fold.second], 0.0)) / np.maximum(count, 1)
+        basis = orthonormal(self._directions(unusable, count == 0), self.model.rank)
+        return project(self._p @ np.where(count > 0, d, 0.0), basis), basis, int(unusable.sum())
+
+    def _directions(self, unusable: BoolArray, left_out: BoolArray) -> list[FloatArray]:
+        """What the misfit ignores: P's columns of rows left out, and the drift of the gain."""
+        directions = [self._p[:, k] for k in np.flatnonzero(left_out)]
+        if self.options.project_baseline and self._v0 is not None:
+            fold = self.model.fold
+            other = unusable[fold.first] & (fold.second >= 0)
+            along = self._gain * np.where(other, fold.sign * self._v0[fold.second], self._v0[fold.first])
+            along = np.ones_like(along) if self.model.data_kind == "normalised" else along
+            directions.append(self._p @ np.where(left_out, 0.0, along))
+        return directions
+
+    def reconstruct(self, frame: FloatArray, *, touches: bool = True) -> Reconstruction:
+        """One frame (m,) volts to image and touches.
+
+        Raises:
+            FrameError: the frame cannot be used.
+        """
+        if frame.shape != (self.model.protocol.n_rows,):
+            raise FrameError(f"frame: has shape {frame.shape}, but the model's protocol has {self.model.protocol.n_rows} rows")
+        y, basis, masked = self.frame_stage(np.asarray(frame, dtype=np.float64))
+        o, norm = self.options, float(np.linalg.norm(y))
+        lambda_max = greatest(self._s.T @ y, o.sign)
+        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * self._lambda_noise)
+        n = self.model.grid.n_pixels
+        zero = FistaResult(np.zeros(n), np.zeros_like(y), 0, "zero", 0.0, norm, 0)
+        if o.gate_factor > 0 and lambda_max < o.gate_factor * self._lambda_noise:
+            result = FistaResult(zero.x, zero.sx, 0, "gate", 0.0, norm, 0)
+        elif not lambda_max > lam:
+            result = zero
+        else:
+            result = fista(self._s, y, lam, self.model.lipschitz, o, basis, self._start(y, lam, basis))
+            if result.stop == "diverged":
+                result = FistaResult(zero.x, zero.sx, result.iterations, "diverged", 0.0, norm, result.step_halvings)
+        self._warm = result.x if result.stop in ("iterations", "gap") else None
+        image = result.x * self.model.column_weight.astype(np.float64)
+        found: tuple[Touch, ...] = ()
+        if touches:
+            found, self._next_id = find_touches(
+                self.model, image, y, basis, o, self._lambda_noise, self._last, self._next_id
+            )
+            self._last = found
+        info = Info(
+            result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,
+            lam, lambda_max, self._lambda_noise, result.gap, result.gap / max(0.5 * norm**2, 1e-300), result.residual, norm,
+        )  # fmt: skip
+        return Reconstruction(image, result.x, found, info)
+
+    def _start(self, y: FloatArray, lam: float, basis: FloatArray) -> FloatArray | None:
+        """The last frame's coefficients, unless zero is the better start."""
+        if not self.options.warm_start or self._warm is None:
+            return None
+        residual = project(y - self._s @ self._warm, basis)
+        worse = residual @ residual + 2 * lam * np.abs(self._warm).sum() >= y @ y
+        return None if worse else self._warm

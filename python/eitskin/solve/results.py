@@ -1,0 +1,124 @@
+"""What goes into a reconstruction and what comes out, whichever engine does it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.model.model import Model
+
+SIGNS = ("increase", "decrease", "both")
+STOPS = ("iterations", "gap", "gate", "zero", "diverged")
+
+
+@dataclass(frozen=True)
+class Options:
+    """The solver's options; csrc/include/eitskin/context.h documents each. Lambdas in the units of S'y.
+
+    ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both".
+    """
+
+    iterations: int
+    max_touches: int
+    max_masked: int
+    lambda_rel: float
+    lambda_noise_factor: float
+    gate_factor: float
+    touch_threshold: float
+    touch_share: float
+    touch_min_radius_mm: float
+    touch_max_radius_mm: float
+    touch_seed_radius_mm: float
+    touch_change_s_per_m: float
+    follow_mm: float
+    gap_every: int = 10
+    sign: str = "increase"
+    warm_start: bool = False
+    project_baseline: bool = True
+    lambda_abs: float = 0.0
+    gap_rel: float = 0.0
+    saturation_v: float = 0.0
+    touch_sweeps: int = 6
+
+
+def default_options(model: Model) -> Options:
+    """The model's own defaults."""
+    d = model.defaults
+    return Options(
+        iterations=d.iterations,
+        max_touches=min(d.max_touches, 16),
+        max_masked=model.protocol.n_rows // 2,
+        lambda_rel=d.lambda_rel,
+        lambda_noise_factor=d.lambda_noise_factor,
+        gate_factor=d.gate_factor,
+        touch_threshold=d.touch_threshold,
+        touch_share=d.touch_share,
+        touch_min_radius_mm=d.touch_min_radius_mm,
+        touch_max_radius_mm=d.touch_max_radius_mm,
+        touch_seed_radius_mm=d.touch_seed_radius_mm,
+        touch_change_s_per_m=d.touch_change_s_per_m,
+        follow_mm=d.follow_mm,
+    )
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The reference as learned: ``correlation`` with the model's own, ``gain`` in model volts per measured volt,
+    ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was given."""
+
+    frames: int
+    correlation: float
+    gain: float
+    v0_rms_v: float
+    noise_v: float
+    lambda_noise: float
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame."""
+
+    id: int
+    x_mm: float
+    y_mm: float
+    radius_mm: float
+    strength_s_per_m_mm2: float
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Info:
+    """What a frame cost and how its solve ended (eits_info in csrc/include/eitskin/context.h)."""
+
+    iterations: int
+    stop: str
+    nonzeros: int
+    masked: int
+    step_halvings: int
+    touches: int
+    macs: int
+    touch_macs: int
+    lambda_: float
+    lambda_max: float
+    lambda_noise: float
+    gap: float
+    gap_rel: float
+    residual: float
+    data_norm: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: the same names, without the underscore of ``lambda_``."""
+        return {key.rstrip("_"): value for key, value in asdict(self).items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """One frame's result: ``image`` (n,) S/m on the model's pixels, ``coefficients`` (n,), touches strongest first, info."""
+
+    image: npt.NDArray[np.floating[Any]]
+    coefficients: npt.NDArray[np.floating[Any]]
+    touches: tuple[Touch, ...]
+    info: Info
