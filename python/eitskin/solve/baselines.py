@@ -4,7 +4,7 @@ All take the sensitivity J (m, n), V per (S/m), and turn difference frames dv (k
 change of conductivity. None is a straw man: each has its regularisation chosen on training scenes (compare.py),
 and FISTA has the exact Lipschitz constant. Strengths are relative, so that they do not depend on units.
 
-    linear back projection   x = J' dv, each pixel over the sum of its sensitivities
+    linear back projection   x = J' dv, each pixel over the norm of its sensitivities
     Gauss-Newton, one step   x = (J'J + a s_1^2 I)^-1 J' dv                        (Tikhonov)
     NOSER                    x = (J'J + a s_1^2 R / mean(R))^-1 J' dv,  R = diag(J'J)^p, p = 1/2
     conjugate gradient       CGLS, stopped after a few steps: the stop is the regularisation
@@ -59,13 +59,14 @@ class LinearMethod:
         return np.asarray(difference_frames(dv, self.matrix.shape[1]) @ self.matrix.T)
 
 
-def back_projection(jacobian: FloatArray) -> LinearMethod:
-    """Linear back projection with normalised sensitivity: x_j = sum_i J_ij dv_i / sum_i |J_ij|; its scale is arbitrary.
+def back_projection(jacobian: FloatArray, norm: float = 1.0) -> LinearMethod:
+    """Linear back projection with normalised sensitivity: x_j = sum_i J_ij dv_i / |J_.j|; its scale is arbitrary.
 
-    C. G. Xie et al., IEE Proc. G 139 (1992) 89-98, gives the form; a pixel without sensitivity stays 0.
+    With ``norm`` 1 (C. G. Xie et al., IEE Proc. G 139 (1992) 89-98) a pixel is divided by the sum of its sensitivities,
+    with 2 by their Euclidean length, which makes it a matched filter. A pixel without sensitivity stays 0.
     """
-    total = np.abs(jacobian).sum(axis=0)
-    return LinearMethod("linear back projection", (jacobian / np.where(total > 0, total, 1.0)).T)
+    length = np.linalg.norm(jacobian, ord=norm, axis=0)
+    return LinearMethod("linear back projection", (jacobian / np.where(length > 0, length, 1.0)).T)
 
 
 def gauss_newton(jacobian: FloatArray, strength: float) -> LinearMethod:

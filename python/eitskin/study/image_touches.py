@@ -64,12 +64,13 @@ def best_touch_threshold(
     centres_mm: FloatArray,
     thresholds: Sequence[float],
     sign: int = 1,
+    gate_mm: float = GATE_MM,
 ) -> float:
     """The threshold that counts most training scenes exactly; of equals, more hits less false ones, then the lowest."""
     best, best_score = thresholds[0], (-1, 0)
     for threshold in thresholds:
         founds = [touches_in_image(image, index, centres_mm, threshold, sign) for image in images]
-        matchings = match_all(truths_mm, founds)
+        matchings = match_all(truths_mm, founds, gate_mm)
         score = (sum(m.exact for m in matchings), sum(m.hits - m.false_touches for m in matchings))
         if score > best_score:
             best, best_score = threshold, score

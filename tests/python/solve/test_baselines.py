@@ -17,6 +17,8 @@ def test_back_projection_divides_by_the_sensitivity() -> None:
     image = baselines.back_projection(J).reconstruct(DV)
     expected = [[sum(J[i, j] * dv[i] for i in range(20)) / sum(abs(J[:, j])) for j in range(35)] for dv in DV]
     assert image == pytest.approx(np.array(expected))
+    matched = [[float(J[:, j] @ dv / np.sqrt(J[:, j] @ J[:, j])) for j in range(35)] for dv in DV]
+    assert baselines.back_projection(J, 2).reconstruct(DV) == pytest.approx(np.array(matched))
     blind = J.copy()
     blind[:, 3] = 0
     assert (baselines.back_projection(blind).reconstruct(DV)[:, 3] == 0).all()

@@ -1,0 +1,270 @@
+"""Pictures of frames: the skin with its electrodes, the image, the touches that were there and those that were found.
+
+x to the right, y up, seen from above, mm. Red is more conductive than the untouched skin, blue less, white no change.
+matplotlib is imported when a picture is drawn, and needs no display.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import missing_extra
+from eitskin.fem.grid import Grid
+from eitskin.fileio import write_beside
+from eitskin.skin.skin import Skin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK = "#1b1b1b"
+RIM = "#4a4a4a"
+ELECTRODE = "#b8860b"
+TRUE = "#111111"
+FOUND = "#00796b"
+COLOURS = "RdBu_r"
+DPI = 150
+STYLE = {
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "axes.titlesize": 10.0,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A touch in a picture: its centre, its radius where known, its change of conductivity where known."""
+
+    x_mm: float
+    y_mm: float
+    radius_mm: float | None = None
+    change: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One skin in a picture.
+
+    Attributes:
+        title: above it.
+        values: (n,) pixel values, or None for none.
+        truth: touches that were there: circles, filled with their change where ``fill_truth``.
+        found: touches that were found: crosses, and dashed circles where the radius is known.
+        fill_truth: show the truth as an image would.
+    """
+
+    title: str
+    values: npt.NDArray[Any] | None = None
+    truth: tuple[Mark, ...] = ()
+    found: tuple[Mark, ...] = ()
+    fill_truth: bool = False
+
+
+def load_matplotlib() -> Any:
+    """matplotlib, set to draw without a display.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    try:
+        import matplotlib
+        import matplotlib.backends.backend_agg
+        import matplotlib.figure
+        import matplotlib.ticker
+    except ImportError:
+        raise missing_extra("plot", "matplotlib") from None
+    return matplotlib
+
+
+def draw_frame(
+    path: str | Path,
+    skin: Skin,
+    grid: Grid,
+    values: npt.ArrayLike,
+    *,
+    truth: Sequence[Mark] = (),
+    found: Sequence[Mark] = (),
+    title: str = "",
+    unit: str = "S/m",
+) -> None:
+    """One frame as a PNG: truth (where given) | image | touches, with axes in mm and a colour bar in ``unit``.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    image = np.asarray(values, dtype=np.float64)
+    panels = [Panel("image", image), Panel("touches", None, tuple(truth), tuple(found))]
+    if truth:
+        panels.insert(0, Panel("truth", None, tuple(truth), fill_truth=True))
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(3.9 * len(panels) + 0.4, 5.2), layout="compressed")
+        figure.get_layout_engine().set(h_pad=0.08)
+        for k, panel in enumerate(panels):
+            axes = figure.add_subplot(1, len(panels), k + 1)
+            limit = _limit(image) if panel.values is not None else _limit([m.change or 0.0 for m in panel.truth])
+            coloured = draw_panel(axes, skin, grid, panel, limit=limit)
+            if k == 0:
+                axes.set_ylabel("y (mm)")
+            bar = figure.colorbar(coloured, ax=axes, location="bottom", shrink=0.85, aspect=32, pad=0.02)
+            if panel.values is not None or panel.fill_truth:
+                bar.set_label(f"change of conductivity ({unit})")
+                bar.locator = matplotlib.ticker.MaxNLocator(5)
+            else:
+                bar.ax.clear()
+                bar.ax.set_axis_off()
+                _legend(bar.ax, panel)
+        if title:
+            figure.suptitle(title, fontsize=11, fontweight="bold", color=INK)
+        save_png(figure, path)
+
+
+def draw_panels(
+    path: str | Path, skin: Skin, grid: Grid, panels: Sequence[Panel], columns: int, *, title: str = "", note: str = ""
+) -> None:
+    """Many small frames as a PNG, row by row, each coloured by its own largest change; ``note`` stands below.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    matplotlib = load_matplotlib()
+    rows = math.ceil(len(panels) / columns)
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(1.75 * columns + 0.7, 1.95 * rows + 0.9), layout="compressed")
+        axes_of_bar, coloured = [], None
+        for k, panel in enumerate(panels):
+            axes = figure.add_subplot(rows, columns, k + 1)
+            coloured = draw_panel(axes, skin, grid, panel, small=True)
+            axes_of_bar.append(axes)
+        if coloured is not None:
+            bar = figure.colorbar(coloured, ax=axes_of_bar, location="right", shrink=0.5, aspect=30, pad=0.02)
+            bar.set_label("change of conductivity / its largest size in the panel")
+        if title:
+            figure.suptitle(title, fontsize=11, fontweight="bold", color=INK)
+        if note:
+            figure.supxlabel(note, fontsize=8, color=INK)
+        save_png(figure, path)
+
+
+def draw_panel(
+    axes: Axes, skin: Skin, grid: Grid, panel: Panel, *, limit: float | None = None, small: bool = False
+) -> Any:
+    """Draw one panel on ``axes`` and return what a colour bar needs.
+
+    Colours reach from -``limit`` to ``limit``; with None values are divided by the largest of them.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.patches import Polygon
+    from matplotlib.patheffects import withStroke
+
+    scale = 1.0 if limit is None else limit
+    colour_map = colormaps[COLOURS]
+    colours = ScalarMappable(Normalize(-scale, scale), COLOURS)
+    colours.set_array([])
+    rim = skin.outline.points_at(np.linspace(0, skin.outline.perimeter_mm, 721)[:-1])
+    if skin.outline.diameter_mm is None:
+        rim = np.asarray(skin.outline.vertices_mm)
+    sheet = Polygon(rim, closed=True, facecolor=colour_map(0.5), edgecolor="none", zorder=0)
+    axes.add_patch(sheet)
+    if panel.values is not None:
+        values = np.asarray(panel.values, dtype=np.float64)
+        x0, y0 = grid.origin_mm
+        extent = (x0, x0 + grid.nx * grid.pixel_mm, y0, y0 + grid.ny * grid.pixel_mm)
+        shown = grid.image(values / _limit(values) if limit is None else values)
+        colour: dict[str, Any] = {"cmap": COLOURS, "vmin": -scale, "vmax": scale, "interpolation": "nearest"}
+        picture = axes.imshow(shown, origin="lower", extent=extent, zorder=1, **colour)
+        picture.set_clip_path(sheet)
+    largest = _limit([m.change or 0.0 for m in panel.truth])
+    for mark in panel.truth:
+        face: Any = "none"
+        if panel.fill_truth and mark.change is not None:
+            part = mark.change / largest if limit is None else mark.change / limit
+            face = colour_map(0.5 + 0.5 * part)
+        _circle(axes, mark, mark.radius_mm or 2.0, facecolor=face, edgecolor=TRUE, linewidth=0.9, zorder=3)
+    size, width = (3.5, 0.9) if small else (8.0, 1.6)
+    halo = [withStroke(linewidth=width + 1.6, foreground="white")]
+    for mark in panel.found:
+        style: dict[str, Any] = {"markersize": size, "markeredgewidth": width, "path_effects": halo}
+        axes.plot(mark.x_mm, mark.y_mm, "x", color=FOUND, zorder=4, **style)
+        if mark.radius_mm is not None:
+            dashes = {"linestyle": (0, (3, 2)), "linewidth": width, "path_effects": halo}
+            _circle(axes, mark, mark.radius_mm, facecolor="none", edgecolor=FOUND, zorder=4, **dashes)
+    width = 0.7 if small else 1.2
+    axes.add_patch(Polygon(rim, closed=True, facecolor="none", edgecolor=RIM, linewidth=width, zorder=2))
+    _draw_electrodes(axes, skin, small)
+    axes.set_title(panel.title, fontsize=8 if small else 10)
+    return colours
+
+
+def _circle(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
+    from matplotlib.patches import Circle
+
+    axes.add_patch(Circle((mark.x_mm, mark.y_mm), radius_mm, **style))
+
+
+def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:
+    """Electrodes as bars on the rim, numbered from 0 outside it where there is room; axes to match."""
+    outline = skin.outline
+    x0, y0, x1, y1 = outline.bounding_box_mm
+    size = max(x1 - x0, y1 - y0)
+    margin = 0.03 if small else 0.10
+    for k, (start, end) in enumerate(skin.electrode_spans_mm()):
+        along = outline.points_at(np.linspace(start, end, 9))
+        axes.plot(along[:, 0], along[:, 1], color=ELECTRODE, linewidth=1.6 if small else 4.0, zorder=5)
+        if not small:
+            outward = np.array([along[5, 1] - along[3, 1], along[3, 0] - along[5, 0]])
+            x, y = along[4] + 0.055 * size * outward / max(float(np.hypot(*outward)), 1e-9)
+            axes.text(x, y, str(k), ha="center", va="center", fontsize=8, color=INK, zorder=6)
+    axes.set_xlim(x0 - margin * size, x1 + margin * size)
+    axes.set_ylim(y0 - margin * size, y1 + margin * size)
+    axes.set_aspect("equal")
+    if small:
+        axes.set_axis_off()
+    else:
+        axes.set_xlabel("x (mm)")
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+
+
+def _legend(axes: Axes, panel: Panel) -> None:
+    """In place of a colour bar, which keeps panels in line: what circles and crosses mean."""
+    from matplotlib.lines import Line2D
+
+    handles = []
+    if panel.truth:
+        circle: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": TRUE, "markersize": 10}
+        handles.append(Line2D([], [], marker="o", color="none", label="true touch", **circle))
+    if panel.found:
+        cross: dict[str, Any] = {"markeredgecolor": FOUND, "markersize": 8, "markeredgewidth": 1.6}
+        handles.append(Line2D([], [], marker="x", color="none", label="found touch", **cross))
+    if handles:
+        axes.legend(handles=handles, loc="center", ncols=2, frameon=False)
+
+
+def _limit(values: npt.ArrayLike) -> float:
+    """The largest size of ``values``, 1 where all are 0 or there are none."""
+    sizes = np.abs(np.asarray(values, dtype=np.float64))
+    return float(sizes.max()) if sizes.size and sizes.max() > 0 else 1.0
+
+
+def save_png(figure: Figure, path: str | Path) -> None:
+    """Write a PNG whole or not at all, without the date and versions that would make two runs differ."""
+    with write_beside(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})

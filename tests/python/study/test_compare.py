@@ -1,0 +1,208 @@
+"""The comparison: fixed on training scenes, judged on test scenes, the same for every method, the same every time."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("netgen")
+
+from eitskin.errors import UsageError
+from eitskin.scene.random_touches import random_touches
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.solve import baselines
+from eitskin.study import metrics
+from eitskin.study.compare import Comparison, Settings, compare, truth_masks
+from eitskin.study.compare_table import CSV_COLUMNS, header, to_csv, to_json, to_text
+from eitskin.study.methods import Family, FindsTouches, Learns, Setup, baseline_methods
+
+SKIN, PROTOCOL = paper_skin(), adjacent(16)
+SMALL = Settings(scenes=8, train_scenes=6, seed=3, elements=1500, simulated_elements=2500)
+
+
+def quick(setup: Setup) -> tuple[Family, ...]:
+    return (
+        Family("", (0.0,), lambda _: baselines.back_projection(setup.jacobian)),
+        Family("strength", (1e-5, 1e-2), lambda a: baselines.noser(setup.jacobian, a)),
+    )
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return compare(SKIN, PROTOCOL, SMALL, families=quick)
+
+
+def test_results_are_what_their_parts_give(comparison: Comparison) -> None:
+    """Thresholds, parameter and MIoU of the second method, worked out again from frames and truth."""
+    setup, result = comparison.setup, comparison.results[1]
+    judge = metrics.judge_for(SKIN.outline, setup.grid)
+
+    def curves(strength: float, of: str) -> np.ndarray:
+        session = getattr(comparison, of)
+        images = baselines.noser(setup.jacobian, strength).reconstruct(session.frames_v - session.quiet_v.mean(axis=0))
+        return judge.curves(images, truth_masks(session.touches, judge.raster.points_mm))
+
+    best = max((1e-5, 1e-2), key=lambda a: curves(a, "train").mean(axis=0).max())
+    assert result.value == best
+    at = int(np.argmax(curves(best, "train").mean(axis=0)))
+    assert result.threshold == metrics.THRESHOLDS[at]
+    assert result.train_miou == pytest.approx(curves(best, "train").mean(axis=0)[at])
+    assert result.miou == pytest.approx(curves(best, "test")[:, at])
+    assert result.curve == pytest.approx(curves(best, "test").mean(axis=0))
+    assert result.miou_summary.mean == pytest.approx(result.curve[at])
+    assert 0.6 < result.miou_summary.mean < comparison.ceiling
+    assert result.miou_summary.mean > comparison.results[0].miou_summary.mean
+
+
+def test_both_methods_saw_the_same_scenes(comparison: Comparison) -> None:
+    assert comparison.test.touches == random_touches(SKIN.outline, 3, 8, "test")
+    assert comparison.train.touches == random_touches(SKIN.outline, 3, 6, "train")
+    assert all(len(r.miou) == len(r.matchings) == len(r.found_mm) == 8 for r in comparison.results)
+    assert comparison.test.mesh_elements > comparison.setup.mesh_elements
+    assert 0.83 < comparison.ceiling < 0.9
+
+
+def test_counts_add_up(comparison: Comparison) -> None:
+    touches = sum(len(scene.touches) for scene in comparison.test.touches.scenes)
+    for result in comparison.results:
+        assert sum(m.hits + m.misses for m in result.matchings) == touches
+        assert result.hit_share == sum(m.hits for m in result.matchings) / touches
+        assert result.exact_count == sum(m.misses + m.false_touches == 0 for m in result.matchings) / 8
+        assert sum(m.hits + m.false_touches for m in result.matchings) == sum(map(len, result.found_mm))
+        assert result.position_summary.count == sum(m.hits for m in result.matchings)
+
+
+def test_the_same_arguments_give_the_same_numbers(comparison: Comparison) -> None:
+    again = compare(SKIN, PROTOCOL, SMALL, families=quick)
+    assert to_json(again) == to_json(comparison)
+    assert to_csv(again) == to_csv(comparison)
+    assert to_text(again) == to_text(comparison)
+
+
+def test_training_does_not_see_the_test_set(comparison: Comparison) -> None:
+    fewer = compare(SKIN, PROTOCOL, replace(SMALL, scenes=3), families=quick)
+    for short, full in zip(fewer.results, comparison.results, strict=True):
+        assert (short.value, short.threshold) == (full.value, full.threshold)
+        assert short.touch_threshold == full.touch_threshold
+        assert short.miou == pytest.approx(full.miou[:3])
+
+
+def test_bilinear_lookup_changes_the_numbers_and_says_so(comparison: Comparison) -> None:
+    other = compare(SKIN, PROTOCOL, replace(SMALL, lookup="bilinear"), families=quick)
+    assert other.ceiling > 0.94
+    assert "bilinear" in dict(header(other))["MIoU"] and "nearest" in dict(header(comparison))["MIoU"]
+    assert (other.results[1].images == comparison.results[1].images).all()
+
+
+@dataclass
+class Oracle:
+    """Knows the truth; finds it by the difference frame it is asked about."""
+
+    grid: object
+    known: dict[bytes, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    learned: list[np.ndarray] = field(default_factory=list)
+    name: str = "oracle"
+
+    def learn(self, quiet_v: np.ndarray) -> None:
+        self.learned.append(quiet_v)
+
+    def reconstruct(self, dv: np.ndarray) -> np.ndarray:
+        sets = {6: "train", 8: "test"}
+        scenes = random_touches(SKIN.outline, 3, len(dv), sets[len(dv)]).scenes
+        return np.array([metrics.pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes])  # type: ignore[arg-type]
+
+    def touches(self, dv: np.ndarray) -> Sequence[np.ndarray]:
+        return [scene.centres_mm() for scene in random_touches(SKIN.outline, 3, len(dv), "test").scenes]
+
+
+def test_a_method_may_learn_and_may_find_touches_itself() -> None:
+    made: list[Oracle] = []
+
+    def families(setup: Setup) -> tuple[Family, ...]:
+        made.append(Oracle(setup.grid))
+        assert isinstance(made[0], Learns) and isinstance(made[0], FindsTouches)
+        return (Family("", (0.0,), lambda _: made[0]),)
+
+    outcome = compare(SKIN, PROTOCOL, SMALL, families=families)
+    result = outcome.results[0]
+    assert result.exact_count == 1.0 and result.position_summary.p95 == 0.0 and result.hit_share == 1.0
+    assert result.touch_threshold is None
+    assert outcome.ceiling - 0.03 < result.miou_summary.mean <= outcome.ceiling + 1e-12
+    assert [len(quiet) for quiet in made[0].learned] == [64, 64]
+    assert (made[0].learned[0] == outcome.train.quiet_v).all() and (made[0].learned[1] == outcome.test.quiet_v).all()
+    assert "own touches" in dict(header(outcome))["positions"]
+
+
+def test_baselines_do_not_have_those_abilities() -> None:
+    jacobian = np.random.default_rng(0).normal(size=(10, 20))
+    families = baseline_methods(jacobian)
+    made = [family.make(family.values[0]) for family in families]
+    assert not any(isinstance(method, (Learns, FindsTouches)) for method in made)
+    assert [method.name for method in made] == [
+        "linear back projection",
+        "Gauss-Newton (Tikhonov)",
+        "NOSER",
+        "conjugate gradient",
+        "plain FISTA 30, signed",
+        "plain FISTA 300, signed",
+        "plain FISTA 30, non-negative",
+        "plain FISTA 300, non-negative",
+    ]
+    assert all(method.reconstruct(np.ones((2, 10))).shape == (2, 20) for method in made)
+
+
+def test_text_names_every_condition(comparison: Comparison) -> None:
+    text = to_text(comparison)
+    for part in (
+        "test-s3-n8 (seed 3)", "train-s3-n6 (seed 3)", "60 dB", "20 log10(rms(V0) / sigma)", "12-bit", "+-20 %",
+        f"{comparison.test.mesh_elements} elements", f"{comparison.setup.mesh_elements} elements", "1.5 mm",
+        "x > t max(x)", "training scenes", "812 pixels", "within 10 mm",
+    ):  # fmt: skip
+        assert part in text, part
+    lines = text.splitlines()
+    assert lines[-4].split(" | ")[0].strip() == "method"
+    assert lines[-1].startswith("NOSER")
+    assert f"{comparison.results[1].miou_summary.mean:.3f}" in lines[-1]
+
+
+def test_json_is_json_and_csv_is_csv(comparison: Comparison) -> None:
+    values = json.loads(json.dumps(to_json(comparison), allow_nan=False))
+    assert values["settings"]["seed"] == 3 and values["pixels"] == 812
+    assert len(values["methods"][0]["miou_over_threshold"]) == len(values["thresholds"]) == 49
+    assert values["methods"][1]["miou"]["mean"] == comparison.results[1].miou_summary.mean
+    lines = [line for line in to_csv(comparison).splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    assert tuple(rows[0]) == CSV_COLUMNS and len(rows) == 16
+    noser = [float(row["miou"]) for row in rows if row["method"] == "NOSER"]
+    assert noser == pytest.approx(comparison.results[1].miou, abs=1e-6)
+
+
+def test_noise_free_frames_do_no_worse(comparison: Comparison) -> None:
+    clean = compare(SKIN, PROTOCOL, replace(SMALL, measurement=replace(SMALL.measurement, snr_db=None)), families=quick)
+    assert clean.results[1].miou_summary.mean > comparison.results[1].miou_summary.mean - 0.01
+    assert "no noise" in dict(header(clean))["SNR"]
+
+
+def test_progress_is_told_all_work() -> None:
+    told: list[tuple[str, int]] = []
+
+    def watch(items: Sequence[object], what: str) -> Sequence[object]:
+        told.append((what, len(items)))
+        return items
+
+    compare(SKIN, PROTOCOL, replace(SMALL, scenes=2, train_scenes=1), families=quick, progress=watch)
+    assert told == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
+
+
+def test_impossible_settings_are_refused() -> None:
+    with pytest.raises(UsageError, match="at least 1 scene"):
+        Settings(scenes=0)
+    with pytest.raises(UsageError, match="nearest, bilinear"):
+        Settings(lookup="cubic")

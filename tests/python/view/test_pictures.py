@@ -1,0 +1,97 @@
+"""Pictures: that they are drawn, repeat byte for byte, and show what they are given."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.errors import FileError, MissingExtraError
+from eitskin.fem.grid import Grid, grid_for
+from eitskin.skin.electrodes import Electrodes
+from eitskin.skin.outline import polygon
+from eitskin.skin.skin import Skin, paper_skin
+
+pytest.importorskip("matplotlib")
+
+from eitskin.view import pictures
+from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels
+
+SKIN = paper_skin()
+GRID = grid_for(SKIN.outline)
+
+
+def read(path: Path) -> np.ndarray:
+    from matplotlib.image import imread
+
+    return np.asarray(imread(path)[..., :3])
+
+
+def blob(grid: Grid, x: float, y: float) -> np.ndarray:
+    return np.exp(-((grid.centres_mm() - (x, y)) ** 2).sum(axis=1) / 150)
+
+
+def test_a_frame_is_drawn_and_repeats_byte_for_byte(tmp_path: Path) -> None:
+    files = [tmp_path / "a.png", tmp_path / "b.png"]
+    for file in files:
+        truth, found = [Mark(30, 20, 9, 0.05)], [Mark(31, 20)]
+        draw_frame(file, SKIN, GRID, blob(GRID, 30, 20), truth=truth, found=found, title="one touch")
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert files[0].read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    height, width, _ = read(files[0]).shape
+    assert width > 2 * height > 800
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+
+
+def test_red_is_where_the_change_is(tmp_path: Path) -> None:
+    """The image panel drawn alone: the reddest place has the blob's coordinates, the bluest those of its negative."""
+    matplotlib = pictures.load_matplotlib()
+    for sign, channel in ((1, 0), (-1, 2)):
+        figure = matplotlib.figure.Figure(figsize=(4, 4), dpi=100)
+        axes = figure.add_axes((0, 0, 1, 1))
+        pictures.draw_panel(axes, SKIN, GRID, Panel("", sign * blob(GRID, -40, 55)))
+        pictures.save_png(figure, tmp_path / "one.png")
+        pixels = read(tmp_path / "one.png")[::-1]
+        excess = pixels[..., channel] - np.delete(pixels, channel, axis=2).max(axis=2)
+        strong = np.argwhere(excess > 0.5 * excess.max()) / pixels.shape[:2]
+        x0, x1 = axes.get_xlim()
+        y0, y1 = axes.get_ylim()
+        y, x = strong.mean(axis=0)
+        assert (x0 + x * (x1 - x0), y0 + y * (y1 - y0)) == pytest.approx((-40, 55), abs=4)
+
+
+def test_electrodes_are_numbered_from_0_outside_the_rim() -> None:
+    skin = Skin("ell", polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)]), Electrodes(count=12))
+    axes = pictures.load_matplotlib().figure.Figure().add_subplot()
+    pictures.draw_panel(axes, skin, grid_for(skin.outline), Panel("ell"))
+    texts = {text.get_text(): text.get_position() for text in axes.texts}
+    assert sorted(texts, key=int) == [str(k) for k in range(12)]
+    places = np.array([texts[str(k)] for k in range(12)])
+    assert not skin.outline.contains(places).any()
+    assert np.hypot(*(places - skin.electrode_centres_mm()).T) == pytest.approx(0.055 * 120)
+
+
+def test_frame_without_truth_has_two_panels_and_units(tmp_path: Path) -> None:
+    draw_frame(tmp_path / "two.png", SKIN, GRID, np.zeros(GRID.n_pixels), unit="mS/m")
+    draw_frame(tmp_path / "three.png", SKIN, GRID, np.zeros(GRID.n_pixels), truth=[Mark(0, 0, 9, 1.0)])
+    assert read(tmp_path / "three.png").shape[1] > 1.3 * read(tmp_path / "two.png").shape[1]
+
+
+def test_many_panels(tmp_path: Path) -> None:
+    panels = [Panel(str(k), blob(GRID, 10 * k, 0), (Mark(10 * k, 0, 9),), (Mark(10 * k, 1, 8),)) for k in range(5)]
+    draw_panels(tmp_path / "many.png", SKIN, GRID, panels, 3, title="five", note="a note")
+    height, width, _ = read(tmp_path / "many.png").shape
+    assert height / width == pytest.approx((1.95 * 2 + 0.9) / (1.75 * 3 + 0.7), rel=0.01)
+
+
+def test_a_folder_that_is_not_there_is_a_file_error(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="existing folder"):
+        draw_frame(tmp_path / "none" / "a.png", SKIN, GRID, np.zeros(GRID.n_pixels))
+
+
+def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtraError, match=r"eitskin\[plot\]"):
+        pictures.load_matplotlib()
