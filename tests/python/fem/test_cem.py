@@ -225,8 +225,7 @@ def test_refused_protocol(paper_mesh: Mesh) -> None:
 
 
 def test_kit4_reference_frame(shared_data: Path) -> None:
-        under = np.tile(potentials.electrodes[k], (len(edges), 1))
-        assert np.array_equal(potentials.nodes[edges[:, 0]], under)
+    """The tank's measured saline frame: the voltages' shape, scale left free as the conductivity is not stated."""
     with np.load(shared_data / "kit4_dev.npz") as data:
         measured, rows = data["reference_voltage"], data["drive_measure"]
     skin = Skin("kit4", disk(280.0), Electrodes(16, 25.0, start_angle_deg=90, clockwise=True), 0.03, 70.0)
