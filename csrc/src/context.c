@@ -38,6 +38,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_seed_radius_mm = (eits_real)d->touch_seed_radius_mm,
         .touch_change_s_per_m = (eits_real)d->touch_change_s_per_m,
         .touch_sweeps = 6,
+        .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
     };
     *options = chosen;
@@ -136,6 +137,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
                       in_range(o->lambda_noise_factor, 0, huge) && in_range(o->gate_factor, 0, huge) &&
                       in_range(o->gap_rel, 0, 1) && in_range(o->saturation_v, 0, huge) && in_range(o->touch_threshold, 0, 1) &&
                       in_range(o->touch_share, 0, 1) && in_range(o->touch_change_s_per_m, 0, huge) &&
+                      in_range(o->touch_radius_weight, 0, huge) &&
                       in_range(o->touch_min_radius_mm, R(1e-6), huge) &&
                       in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
                       in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&

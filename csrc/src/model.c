@@ -248,11 +248,11 @@ static eits_status check_numbers(const eits_model *model)
         (s->storage == EITS_STORAGE_F16 && !halves_finite(s->data, stored)))
         return EITS_E_MODEL_VALUE;
     const eits_defaults *d = model->defaults;
-    if (!all_finite(&d->lambda_rel, 11) || d->lambda_rel < 0.0f || d->lambda_noise_factor < 0.0f || d->gate_factor < 0.0f ||
+    if (!all_finite(&d->lambda_rel, 12) || d->lambda_rel < 0.0f || d->lambda_noise_factor < 0.0f || d->gate_factor < 0.0f ||
         d->touch_min_radius_mm <= 0.0f || d->touch_max_radius_mm < d->touch_min_radius_mm ||
         d->touch_seed_radius_mm < d->touch_min_radius_mm || d->touch_seed_radius_mm > d->touch_max_radius_mm ||
         d->lambda_rel > 1.0f || d->touch_threshold < 0.0f || d->touch_threshold > 1.0f || d->touch_share < 0.0f ||
-        d->touch_share > 1.0f || d->touch_change_s_per_m < 0.0f || d->follow_mm < 0.0f || d->iterations == 0)
+        d->touch_share > 1.0f || d->touch_change_s_per_m < 0.0f || d->follow_mm < 0.0f || d->touch_radius_weight < 0.0f || d->iterations == 0)
         return EITS_E_MODEL_VALUE;
     return EITS_OK;
 }

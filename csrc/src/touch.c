@@ -9,13 +9,12 @@
 
 enum { STRENGTH_PASSES = 10, DROP_SWEEPS = 3 };
 
-/* Weight of the radius that strength suggests, relative to the touch's own energy, and its relative deviation: contrasts of
- * 3 to 10 make 2 (c - 1) / (c + 1) = 1.0 to 1.6, so that the root of strength tells the radius to about 12 %. */
-static const eits_real RADIUS_WEIGHT = R(1e-3);
+/* Relative deviation of the radius that strength suggests: contrasts of 3 to 10 make 2 (c - 1) / (c + 1) = 1.0 to 1.6, so
+ * that the root of strength tells the radius to about 12 %. */
 static const eits_real RADIUS_DEVIATION = R(0.12);
 static const eits_real DAMPING = R(1e-3);
-static const eits_real SETTLED_MM = R(0.02);
-static const eits_real MOST_RADIUS_STEP_MM = R(2.0);
+static const eits_real SETTLED_PIXELS = R(1.0 / 256.0);
+static const eits_real MOST_RADIUS_STEP_PIXELS = R(0.5);
 static const eits_real PI = R(3.14159265358979323846);
 
 typedef struct fit {
@@ -187,7 +186,7 @@ static eits_real move_disc(eits_context *ctx, fit *f, uint32_t k)
         left[i] = eits_fma(-disc->change, atom[i], target[i]);
     const eits_real energy = disc->change * disc->change * eits_dot(ctx, atom, atom, rank);
     const eits_real expected = expected_radius(o, disc), deviation = RADIUS_DEVIATION * expected;
-    const eits_real weight = RADIUS_WEIGHT * energy / (deviation * deviation);
+    const eits_real weight = o->touch_radius_weight * energy / (deviation * deviation);
     const eits_real *column[4] = {ctx->slope[0], ctx->slope[1], ctx->slope[2], atom};
     eits_real h[4][4], g[4], step[4];
     for (int i = 0; i < 4; ++i) {
@@ -200,15 +199,16 @@ static eits_real move_disc(eits_context *ctx, fit *f, uint32_t k)
     g[2] = eits_fma(weight, expected - disc->radius_mm, g[2]);
     f->macs += 17u * rank;
     damped_step((const eits_real(*)[4])h, g, step);
-    const eits_real reach = (eits_real)ctx->model->pixel_mm, off = disc->radius_mm - expected;
+    const eits_real reach = (eits_real)ctx->model->pixel_mm, radius_reach = MOST_RADIUS_STEP_PIXELS * reach;
+    const eits_real off = disc->radius_mm - expected;
     const eits_real cost = eits_dot(ctx, left, left, rank) + weight * off * off;
     eits_real moved = 0, share = 1;
     for (int attempt = 0; attempt < 3; ++attempt, share *= R(0.5)) {
         eits_disc trial = *disc;
         trial.x_mm += share * clamp(step[0], -reach, reach);
         trial.y_mm += share * clamp(step[1], -reach, reach);
-        trial.radius_mm = clamp(disc->radius_mm + share * clamp(step[2], -MOST_RADIUS_STEP_MM, MOST_RADIUS_STEP_MM),
-                                o->touch_min_radius_mm, o->touch_max_radius_mm);
+        trial.radius_mm = clamp(disc->radius_mm + share * clamp(step[2], -radius_reach, radius_reach), o->touch_min_radius_mm,
+                                o->touch_max_radius_mm);
         f->macs += eits_disc_atom(ctx, &trial, trial_atom, NULL) + 3u * rank;
         trial.change = best_change(ctx, &trial, trial_atom, target);
         const eits_real trial_off = trial.radius_mm - expected;
@@ -234,7 +234,7 @@ static void move_all(eits_context *ctx, fit *f, uint32_t sweeps)
             const eits_real moved = move_disc(ctx, f, k);
             farthest = moved > farthest ? moved : farthest;
         }
-        if (farthest < SETTLED_MM)
+        if (farthest < SETTLED_PIXELS * (eits_real)ctx->model->pixel_mm)
             break;
     }
 }
@@ -357,6 +357,11 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     if (ctx->info.stop <= EITS_STOP_GAP) {
         seed(ctx, &f);
         fit_strengths(ctx, &f);
+        if (ctx->options.touch_change_s_per_m > 0) {
+            for (uint32_t k = 0; k < f.count; ++k)
+                f.disc[k].radius_mm = expected_radius(&ctx->options, &f.disc[k]);
+            fit_strengths(ctx, &f);
+        }
         move_all(ctx, &f, ctx->options.touch_sweeps);
         keep_real(ctx, &f);
     }

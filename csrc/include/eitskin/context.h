@@ -40,6 +40,7 @@ typedef struct eits_options {
     eits_real touch_share;     /* a touch that explains less than this share of |y|^2 beside the others is dropped */
     eits_real touch_min_radius_mm, touch_max_radius_mm, touch_seed_radius_mm;
     eits_real touch_change_s_per_m; /* expected conductivity change under a touch: tells radius from strength; 0: unknown */
+    eits_real touch_radius_weight; /* how much the radius so told counts against the data, relative to the touch's energy */
     uint32_t touch_sweeps; /* sweeps of the off-grid fit over all touches; 0: peaks with their strengths only */
     eits_real follow_mm;   /* a touch that moved at most so far since the last frame keeps its id */
 } eits_options;

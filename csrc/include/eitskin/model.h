@@ -68,7 +68,8 @@ typedef struct eits_defaults {
     float touch_seed_radius_mm;
     float touch_change_s_per_m;
     float follow_mm;
-    float reserved[3];
+    float touch_radius_weight;
+    float reserved[2];
 } eits_defaults;
 
 /* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */

@@ -32,6 +32,8 @@ LIPSCHITZ_MARGIN = 1e-4
 PAPER_DIAMETER_MM = 194.0
 # a disc of contrast c in a sheet of conductivity s answers as a linear change of 2 (c - 1) / (c + 1) s; c = 3 to 10 give 1.0 to 1.64
 TOUCH_CHANGE_RATIO = 1.35
+# the logarithm draws strong touches together, so that their data say little of the radius and strength must
+LOG_RADIUS_WEIGHT = 1.0
 
 
 @dataclass(frozen=True)
@@ -109,14 +111,14 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
         column_weight=reduction.column_weight.astype(np.float32),
         lipschitz=float(np.float32(spectral_norm_squared(decoded) * (1 + LIPSCHITZ_MARGIN))),
         noise_gain=float(np.float32(noise_gain(projection, decoded))),
-        defaults=settings.defaults or scaled_defaults(skin, settings.touch_change_ratio),
+        defaults=settings.defaults or scaled_defaults(skin, settings.data_kind, settings.touch_change_ratio),
         golden=Golden(reference, _golden_frame(skin, linear), empty),
         meta=_meta(skin, protocol, linear, settings, rank),
     )
     return replace(model, golden=replace(model.golden, image=_golden_image(model)))
 
 
-def scaled_defaults(skin: Skin, touch_change_ratio: float = TOUCH_CHANGE_RATIO) -> Defaults:
+def scaled_defaults(skin: Skin, data_kind: str, touch_change_ratio: float = TOUCH_CHANGE_RATIO) -> Defaults:
     """Defaults for ``skin``: lengths in proportion to its size, the expected change to its conductivity."""
     paper = Defaults()
     scale = 2 * float(np.sqrt(skin.outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
@@ -127,6 +129,7 @@ def scaled_defaults(skin: Skin, touch_change_ratio: float = TOUCH_CHANGE_RATIO) 
         touch_seed_radius_mm=_round(paper.touch_seed_radius_mm * scale),
         touch_change_s_per_m=_round(touch_change_ratio * skin.conductivity_s_per_m),
         follow_mm=_round(paper.follow_mm * scale),
+        touch_radius_weight=LOG_RADIUS_WEIGHT if data_kind == "log-ratio" else paper.touch_radius_weight,
     )
 
 

@@ -24,7 +24,7 @@ MAJOR, MINOR = 1, 0
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
-DEFAULTS = struct.Struct("<2I11f3f")
+DEFAULTS = struct.Struct("<2I12f2f")
 REQUIRED = ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD")
 FOLD_DTYPE = np.dtype([("first", "<u2"), ("second", "<u2"), ("sign", "<i2"), ("reserved", "<u2")])
 FOLD_NONE = 0xFFFF
@@ -52,7 +52,7 @@ def encode_model(model: Model) -> bytes:
         "SENS": stored.columns.tobytes(),
         "COLW": model.column_weight.astype("<f4").tobytes(),
         "GRID": model.grid.index.astype("<u2").tobytes(),
-        "DEFS": DEFAULTS.pack(*astuple(model.defaults), *[0.0] * 3),
+        "DEFS": DEFAULTS.pack(*astuple(model.defaults), *[0.0] * 2),
         "GOLD": np.concatenate([golden.reference_v, golden.frame_v, golden.image]).astype("<f4").tobytes(),
         "META": json.dumps(model.meta, sort_keys=True).encode("utf-8"),
     }

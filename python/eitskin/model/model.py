@@ -24,12 +24,12 @@ class Defaults:
     Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t max(x).
     """
 
-    iterations: int = 40
+    iterations: int = 60
     max_touches: int = 12
     lambda_rel: float = 0.03
     lambda_noise_factor: float = 0.3
     gate_factor: float = 1.2
-    mask_threshold: float = 0.3
+    mask_threshold: float = 0.26
     touch_threshold: float = 0.15
     touch_share: float = 0.003
     touch_min_radius_mm: float = 3.0
@@ -37,6 +37,7 @@ class Defaults:
     touch_seed_radius_mm: float = 9.0
     touch_change_s_per_m: float = 0.0135
     follow_mm: float = 25.0
+    touch_radius_weight: float = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

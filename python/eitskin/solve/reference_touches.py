@@ -14,11 +14,10 @@ FloatArray = npt.NDArray[np.float64]
 
 STRENGTH_PASSES = 10
 DROP_SWEEPS = 3
-RADIUS_WEIGHT = 1e-3
 RADIUS_DEVIATION = 0.12
 DAMPING = 1e-3
-SETTLED_MM = 0.02
-MOST_RADIUS_STEP_MM = 2.0
+SETTLED_PIXELS = 1 / 256
+MOST_RADIUS_STEP_PIXELS = 0.5
 
 
 @dataclass(frozen=True)
@@ -92,6 +91,7 @@ class Fit:
     def fit_strengths(self) -> None:
         """All strengths at once by coordinate descent."""
         atoms = [self.answers(disc)[0] for disc in self.discs]
+        self.discs = [replace(disc, change=0.0) for disc in self.discs]
         left = self.y.copy()
         for _ in range(STRENGTH_PASSES):
             for k, atom in enumerate(atoms):
@@ -99,7 +99,8 @@ class Fit:
                 self.discs[k] = replace(self.discs[k], change=self.best_change(self.discs[k], atom, left))
                 left -= self.discs[k].change * atom
 
-    def _expected_radius(self, disc: Disc) -> float:
+    def expected_radius(self, disc: Disc) -> float:
+        """What strength suggests where the change is known, else the seed's."""
         o = self.options
         if o.touch_change_s_per_m <= 0:
             return o.touch_seed_radius_mm
@@ -113,15 +114,16 @@ class Fit:
         disc = replace(self.discs[k], change=self.best_change(self.discs[k], atom, target))
         self.discs[k] = disc
         left = target - disc.change * atom
-        expected = self._expected_radius(disc)
-        weight = RADIUS_WEIGHT * disc.change**2 * float(atom @ atom) / (RADIUS_DEVIATION * expected) ** 2
+        expected = self.expected_radius(disc)
+        weight = o.touch_radius_weight * disc.change**2 * float(atom @ atom) / (RADIUS_DEVIATION * expected) ** 2
         columns = disc.change * np.vstack([slope, atom])
         h, g = columns @ columns.T, columns @ left
         h[2, 2] += weight
         g[2] += weight * (expected - disc.radius_mm)
         step = damped_step(h, g)
         reach = self.model.grid.pixel_mm
-        step = np.clip(step[:3], [-reach, -reach, -MOST_RADIUS_STEP_MM], [reach, reach, MOST_RADIUS_STEP_MM])
+        limit = reach * np.array([1.0, 1.0, MOST_RADIUS_STEP_PIXELS])
+        step = np.clip(step[:3], -limit, limit)
         cost = float(left @ left) + weight * (disc.radius_mm - expected) ** 2
         for share in (1.0, 0.5, 0.25):
             radius = float(np.clip(disc.radius_mm + share * step[2], o.touch_min_radius_mm, o.touch_max_radius_mm))
@@ -137,7 +139,7 @@ class Fit:
     def move_all(self, sweeps: int) -> None:
         """Sweeps over all discs until they settle."""
         for _ in range(sweeps):
-            if max((self.move(k) for k in range(len(self.discs))), default=0.0) < SETTLED_MM:
+            if max((self.move(k) for k in range(len(self.discs))), default=0.0) < SETTLED_PIXELS * self.model.grid.pixel_mm:
                 break
 
     def explained(self) -> FloatArray:
@@ -196,6 +198,9 @@ def find_touches(
         fit.seed(image)
     if fit.discs:
         fit.fit_strengths()
+        if options.touch_change_s_per_m > 0:
+            fit.discs = [replace(disc, radius_mm=fit.expected_radius(disc)) for disc in fit.discs]
+            fit.fit_strengths()
         fit.move_all(options.touch_sweeps)
     explained = fit.keep_real()
     found = [

@@ -33,6 +33,7 @@ class Options:
     touch_max_radius_mm: float
     touch_seed_radius_mm: float
     touch_change_s_per_m: float
+    touch_radius_weight: float
     follow_mm: float
     gap_every: int = 10
     sign: str = "increase"
@@ -60,6 +61,7 @@ def default_options(model: Model) -> Options:
         touch_max_radius_mm=d.touch_max_radius_mm,
         touch_seed_radius_mm=d.touch_seed_radius_mm,
         touch_change_s_per_m=d.touch_change_s_per_m,
+        touch_radius_weight=d.touch_radius_weight,
         follow_mm=d.follow_mm,
     )
 

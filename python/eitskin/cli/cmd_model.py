@@ -1,0 +1,165 @@
+"""``eitskin model build | info | verify``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.errors import UsageError, VerificationError
+
+if TYPE_CHECKING:
+    from eitskin.model.model import Model
+
+NUMPY_BOUND = 1e-4
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``model`` and its own subcommands."""
+    parser = subparsers.add_parser("model", help="build, describe or verify an .eitm model")
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
+    build.add_argument("skin", nargs="?", type=Path, metavar="SKIN.toml", help="skin description")
+    build.add_argument("--paper", action="store_true", help="the paper's 194 mm disk instead of a file")
+    build.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL.eitm")
+    build.add_argument("--rank", type=int, default=0, help="rows of the reduced Jacobian (default: 64, or all if fewer)")
+    build.add_argument("--pixels", type=int, default=32, help="pixels along the longer side (default: %(default)s)")
+    build.add_argument("--storage", choices=("f32", "f16", "i16", "i8"), default="f32")
+    build.add_argument(
+        "--data",
+        choices=("difference", "normalised", "log-ratio"),
+        default="difference",
+        help="what is solved for: v - v0; (v - v0)/v0, where channels have gains of their own; or v0 log(v/v0)",
+    )
+    build.add_argument("--elements", type=int, default=3000, help="about how many the mesh has (default: %(default)s)")
+    build.add_argument("--floor", type=float, default=0.01, help="mu of the whitening (default: %(default)g)")
+    build.add_argument(
+        "--touch-change",
+        type=float,
+        default=1.35,
+        metavar="RATIO",
+        help="expected change under a touch over the skin's conductivity: 1.35 for contrasts 3 to 10, 2 for metal, "
+        "0 for unknown (default: %(default)g)",
+    )
+    build.add_argument("--json", action="store_true")
+    build.set_defaults(run=run_build)
+    info = actions.add_parser("info", help="what is in a model")
+    info.add_argument("model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one")
+    info.add_argument("--json", action="store_true")
+    info.set_defaults(run=run_info)
+    verify = actions.add_parser("verify", help="run the golden frame through the C core in both widths and through numpy")
+    verify.add_argument("model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one")
+    verify.add_argument("--json", action="store_true")
+    verify.set_defaults(run=run_verify)
+
+
+def load_or_prebuilt(path: Path | None) -> tuple[Model, bytes, str]:
+    """The model at ``path`` or the prebuilt one, its bytes, and its name for messages."""
+    from eitskin.model.eitm import load_model
+    from eitskin.model.prebuilt import load_prebuilt
+
+    if path is None:
+        return *load_prebuilt(), "prebuilt paper skin"
+    return *load_model(path), str(path)
+
+
+def run_build(options: argparse.Namespace) -> int:
+    """Build and write a model."""
+    from eitskin.model.build import BuildSettings, build_model
+    from eitskin.model.eitm import save_model
+    from eitskin.skin.protocol import adjacent
+    from eitskin.skin.skin import load_skin, paper_skin
+
+    if (options.skin is None) == (not options.paper):
+        raise UsageError("model build: name a SKIN.toml, or give --paper, not both")
+    if not options.output.parent.is_dir():
+        raise UsageError(f"model build: the folder {options.output.parent} does not exist; make it first")
+    if not 100 <= options.elements <= 500_000:
+        raise UsageError(f"model build: --elements {options.elements} is out of range; use 100 to 500000")
+    if not 0 <= options.touch_change <= 100:
+        raise UsageError(f"model build: --touch-change {options.touch_change:g} is out of range; use 0 to 100")
+    skin, protocol = (paper_skin(), adjacent(16)) if options.paper else load_skin(options.skin)
+    settings = BuildSettings(
+        rank=options.rank,
+        pixels_across=options.pixels,
+        storage=options.storage,
+        data_kind=options.data,
+        floor=options.floor,
+        elements=options.elements,
+        touch_change_ratio=options.touch_change,
+    )
+    model = build_model(skin, protocol, settings)
+    size = save_model(options.output, model)
+    _print_info(model, size, str(options.output), options.json)
+    return 0
+
+
+def run_info(options: argparse.Namespace) -> int:
+    """Print what is in a model."""
+    model, blob, name = load_or_prebuilt(options.model)
+    _print_info(model, len(blob), name, options.json)
+    return 0
+
+
+def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    facts: dict[str, Any] = {
+        "model": name,
+        "bytes": size,
+        "made_by": model.meta.get("made_by", "unknown"),
+        "skin": model.meta.get("skin", {}).get("skin", {}).get("name", "unknown"),
+        "electrodes": model.protocol.n_electrodes,
+        "protocol_rows": model.protocol.n_rows,
+        "protocol_hash": f"{model.protocol.hash:016x}",
+        "folded_rows": len(model.fold.first),
+        "rank": model.rank,
+        "pixels": model.grid.n_pixels,
+        "pixel_mm": round(model.grid.pixel_mm, 4),
+        "storage": model.stored.storage,
+        "data": model.data_kind,
+        "lipschitz": model.lipschitz,
+        "mesh_elements": model.meta.get("mesh_elements"),
+        "defaults": asdict(model.defaults),
+    }
+    if as_json:
+        print(json.dumps(facts, indent=2))
+        return
+    defaults = facts.pop("defaults")
+    for key, value in facts.items():
+        print(f"{key.replace('_', ' '):16} {value}")
+    print("defaults         " + ", ".join(f"{key} {value:g}" for key, value in defaults.items()))
+
+
+def run_verify(options: argparse.Namespace) -> int:
+    """Run the golden frame; the float32 core must give the stored bits."""
+    import numpy as np
+
+    from eitskin.solve.core import CoreEngine
+    from eitskin.solve.reconstructor import Reconstructor
+
+    model, blob, name = load_or_prebuilt(options.model)
+    reference = Reconstructor(model, engine="numpy")
+    reference.tare(model.golden.reference_v)
+    image = reference.reconstruct(model.golden.frame_v, touches=False).image
+    peak = float(np.abs(model.golden.image).max()) or 1.0
+    differences = {
+        "C float32": CoreEngine(blob, "float32").self_test(),
+        "C float32, portable": CoreEngine(blob, "float32", prepared=False, portable=True).self_test(),
+        "C float64": CoreEngine(blob, "float64").self_test(),
+        "numpy float64": float(np.abs(image - model.golden.image).max()) / peak,
+    }
+    same_bits = differences["C float32"] == 0 and differences["C float32, portable"] == 0
+    within = max(differences.values()) <= NUMPY_BOUND
+    if options.json:
+        print(json.dumps({"model": name, "difference_to_golden_over_peak": differences, "ok": same_bits and within}, indent=2))
+    else:
+        print(f"{name}: golden frame, greatest difference to the stored image over its peak")
+        for engine, difference in differences.items():
+            print(f"  {engine:20} {'the same bits' if difference == 0 else f'{difference:.2e}'}")
+    if not same_bits:
+        raise VerificationError(f"{name}: the C core does not give the golden image's bits; rebuild the model with this version")
+    if not within:
+        raise VerificationError(f"{name}: an engine is further than {NUMPY_BOUND:g} from the golden image; report this")
+    return 0

@@ -1,0 +1,206 @@
+"""``eitskin reconstruct FRAMES``: images and touches of recorded frames."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.errors import EitskinError, FileError, FrameError, UsageError
+
+if TYPE_CHECKING:
+    from eitskin.frames.frames import Frames
+    from eitskin.solve.reconstructor import Reconstructor
+    from eitskin.solve.results import Reconstruction
+    from eitskin.study.score import FrameScore
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``reconstruct``."""
+    parser = subparsers.add_parser(
+        "reconstruct",
+        help="touches and images of the frames in a file",
+        description="Turn frames into touches in millimetres and images. Where the frames carry the truth, the touches are "
+        "held against it.",
+    )
+    parser.add_argument("frames", type=Path, metavar="FRAMES.npz", help="a frames file (eitskin import makes one)")
+    parser.add_argument("--model", type=Path, metavar="MODEL.eitm", help="default: the prebuilt model of the paper's skin")
+    parser.add_argument("--engine", choices=("c", "c64", "numpy"), default="c", help="default: %(default)s, float32 as on the board")
+    parser.add_argument("--sign", choices=("increase", "decrease", "both"), default="increase", help="which changes to look for")
+    parser.add_argument("--iterations", type=int, metavar="N", help="of FISTA, at most (default: the model's)")
+    parser.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
+    parser.add_argument("--warm", action="store_true", help="start each frame from the last one's result")
+    parser.add_argument("--saturation-v", type=float, metavar="V", help="leave channels at or beyond +-V out")
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT.npz", help="write images, touches and solver info")
+    parser.add_argument("--picture", type=Path, metavar="PNG", help="draw all frames, with the truth where known")
+    parser.add_argument("--json", action="store_true")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Reconstruct all frames; those that cannot be used are named, and the others are still done."""
+    from eitskin.cli.cmd_model import load_or_prebuilt
+    from eitskin.frames.frames import load_frames
+    from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
+
+    for path in (options.output, options.picture):
+        if path is not None and not path.parent.is_dir():
+            raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
+    frames = load_frames(options.frames, allow_nonfinite=True)
+    model, blob, name = load_or_prebuilt(options.model)
+    reconstructor = Reconstructor(model, engine=options.engine, blob=blob)
+    try:
+        reconstructor.check_protocol(frames.protocol)
+    except EitskinError as error:
+        raise type(error)(f"{options.frames} and {name}: {error}") from None
+    _apply(options, reconstructor)
+    baseline = reconstructor.tare(frames.reference_voltage_v)
+    if baseline.correlation < MIN_CORRELATION:
+        print(
+            f"eitskin: warning: the reference correlates with the model by {baseline.correlation:.3f} only; "
+            f"run  eitskin doctor {options.frames}",
+            file=sys.stderr,
+        )
+    results, refused = _reconstruct_all(reconstructor, frames, options.warm)
+    scores = _scores(reconstructor, frames, results, options.sign)
+    if options.output is not None:
+        from eitskin.frames.results_file import save_results
+
+        save_results(options.output, model, frames, results)
+    if options.picture is not None:
+        from eitskin.view.frame_pictures import draw_results
+
+        draw_results(options.picture, model, frames, results, scores)
+    if options.json:
+        print(json.dumps(_as_json(frames, results, scores, refused, name, options.engine), indent=2))
+    else:
+        _print(frames, results, scores, refused)
+    for number, reason in refused.items():
+        print(f"eitskin: {options.frames}: frame {number} ({frames.frame_name[number]}) refused: {reason}", file=sys.stderr)
+    return FrameError.exit_code if refused else 0
+
+
+def _apply(options: argparse.Namespace, reconstructor: Reconstructor) -> None:
+    changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
+    if options.iterations is not None:
+        if not 1 <= options.iterations <= 1_000_000:
+            raise UsageError(f"--iterations {options.iterations} is out of range; use 1 to 1000000")
+        changes["iterations"] = options.iterations
+    if options.gap is not None:
+        if not 0 < options.gap <= 1:
+            raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
+        changes["gap_rel"] = options.gap
+    if options.saturation_v is not None:
+        if not options.saturation_v > 0:
+            raise UsageError(f"--saturation-v {options.saturation_v:g} must be above 0")
+        changes["saturation_v"] = options.saturation_v
+    reconstructor.with_options(**changes)
+
+
+def _reconstruct_all(
+    reconstructor: Reconstructor, frames: Frames, warm: bool
+) -> tuple[dict[int, Reconstruction], dict[int, str]]:
+    from tqdm import tqdm
+
+    results: dict[int, Reconstruction] = {}
+    refused: dict[int, str] = {}
+    for number in tqdm(range(frames.n_frames), desc="frames", leave=False, disable=not sys.stderr.isatty()):
+        if not warm:
+            reconstructor.forget()
+        try:
+            results[number] = reconstructor.reconstruct(frames.voltage_v[number])
+        except FrameError as error:
+            refused[number] = str(error)
+    return results, refused
+
+
+def _scores(
+    reconstructor: Reconstructor, frames: Frames, results: dict[int, Reconstruction], sign: str
+) -> dict[int, FrameScore]:
+    if frames.touch_frame is None and frames.truth_mask is None:
+        return {}
+    from eitskin.study.score import scorer_for
+
+    scorer = scorer_for(reconstructor.model)
+    scored = {number: scorer.score(frames, number, result, sign) for number, result in results.items()}
+    return {number: score for number, score in scored.items() if score is not None}
+
+
+def _print(
+    frames: Frames, results: dict[int, Reconstruction], scores: dict[int, FrameScore], refused: dict[int, str]
+) -> None:
+    import numpy as np
+
+    print("frame       touch    x mm     y mm  radius mm  strength S/m mm2   error mm")
+    for number, result in results.items():
+        score = scores.get(number)
+        errors = {} if score is None else {found: d for (_, found), d in zip(score.matching.pairs, score.matching.distances_mm, strict=True)}
+        label = frames.frame_name[number][:11]
+        if not result.touches:
+            print(f"{label:11} none ({'no change above the noise' if result.info.stop == 'gate' else result.info.stop})")
+        for k, touch in enumerate(result.touches):
+            error = f"{errors[k]:10.2f}" if k in errors else ("     false" if score is not None else "")
+            print(
+                f"{label if k == 0 else '':11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f} {touch.radius_mm:9.2f} "
+                f"{touch.strength_s_per_m_mm2:16.3f}  {error}"
+            )
+    macs = [result.info.macs + result.info.touch_macs for result in results.values()]
+    print(f"{len(results)} frames, {len(refused)} refused" + (f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""))
+    if scores:
+        facts = summary(scores)
+        print(
+            f"against the truth of {facts['frames']} frames: {facts['found']} of {facts['true']} touches found, "
+            f"{facts['false']} false; position error median {facts['position_median_mm']:.2f} mm, "
+            f"worst {facts['position_worst_mm']:.2f} mm; "
+            f"MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
+        )
+
+
+def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
+    """The scores of all frames in a few numbers; positions are NaN where nothing was found."""
+    import numpy as np
+
+    distances = [d for score in scores.values() for d in score.matching.distances_mm]
+    hits = sum(score.matching.hits for score in scores.values())
+    return {
+        "frames": len(scores),
+        "found": hits,
+        "true": hits + sum(score.matching.misses for score in scores.values()),
+        "false": sum(score.matching.false_touches for score in scores.values()),
+        "position_median_mm": float(np.median(distances)) if distances else float("nan"),
+        "position_worst_mm": float(np.max(distances)) if distances else float("nan"),
+        "miou_image": float(np.mean([score.miou_image for score in scores.values()])),
+        "miou_touches": float(np.mean([score.miou_touches for score in scores.values()])),
+    }
+
+
+def _as_json(
+    frames: Frames,
+    results: dict[int, Reconstruction],
+    scores: dict[int, FrameScore],
+    refused: dict[int, str],
+    model: str,
+    engine: str,
+) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    listed = []
+    for number in range(frames.n_frames):
+        entry: dict[str, Any] = {"frame": number, "name": frames.frame_name[number]}
+        if number in refused:
+            entry["refused"] = refused[number]
+        else:
+            result = results[number]
+            entry["touches"] = [asdict(touch) for touch in result.touches]
+            entry["info"] = result.info.as_dict()
+        if number in scores:
+            score = scores[number]
+            entry["miou_image"], entry["miou_touches"] = score.miou_image, score.miou_touches
+            entry["position_errors_mm"] = list(score.matching.distances_mm)
+        listed.append(entry)
+    whole: dict[str, Any] = {"model": model, "engine": engine, "frames": listed}
+    if scores:
+        whole["summary"] = {key: None if value != value else value for key, value in summary(scores).items()}
+    return whole

@@ -1,0 +1,47 @@
+"""Results as a file: images, touches and solver info of each frame, named and with units (docs/frames-format.md)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eitskin.fileio import write_beside
+from eitskin.frames.frames import Frames
+from eitskin.model.model import Model
+from eitskin.solve.results import Reconstruction
+
+FORMAT = "eitskin-results"
+VERSION = 1
+
+
+def save_results(path: str | Path, model: Model, frames: Frames, results: dict[int, Reconstruction]) -> None:
+    """Write the ``results`` by frame number to ``path`` (.npz), whole or not at all.
+
+    Raises:
+        FileError: the folder does not exist or cannot be written.
+    """
+    numbers = sorted(results)
+    touches = [(number, touch) for number in numbers for touch in results[number].touches]
+    grid = model.grid
+    images = [grid.image(results[number].image) for number in numbers]
+    fields: dict[str, Any] = {
+        "format": np.array(FORMAT),
+        "version": np.array(VERSION, dtype=np.int32),
+        "frame": np.array(numbers, dtype=np.int64),
+        "frame_name": np.array([frames.frame_name[number] for number in numbers], dtype=np.str_),
+        "image_s_per_m": np.array(images).reshape(len(numbers), grid.ny, grid.nx),
+        "pixel_mm": np.array(grid.pixel_mm),
+        "image_origin_mm": np.array(grid.origin_mm),
+        "touch_frame": np.array([number for number, _ in touches], dtype=np.int64),
+        "touch_id": np.array([touch.id for _, touch in touches], dtype=np.int64),
+        "touch_xy_mm": np.array([(touch.x_mm, touch.y_mm) for _, touch in touches]).reshape(-1, 2),
+        "touch_radius_mm": np.array([touch.radius_mm for _, touch in touches]),
+        "touch_strength_s_per_m_mm2": np.array([touch.strength_s_per_m_mm2 for _, touch in touches]),
+        "touch_confidence": np.array([touch.confidence for _, touch in touches]),
+        "info": np.array(json.dumps([results[number].info.as_dict() for number in numbers])),
+    }
+    with write_beside(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **fields)

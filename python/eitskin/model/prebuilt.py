@@ -1,0 +1,27 @@
+"""The prebuilt model of the paper's skin that ships with the package, so that reconstruction needs neither scipy nor netgen.
+
+Made by ``eitskin model build --paper -o python/eitskin/model/paper.eitm``; a test builds it again and compares.
+"""
+
+from __future__ import annotations
+
+from importlib import resources
+
+from eitskin.errors import FileError
+from eitskin.model.eitm import decode_model
+from eitskin.model.model import Model
+
+NAME = "paper.eitm"
+
+
+def load_prebuilt() -> tuple[Model, bytes]:
+    """The model of the paper's skin, and its bytes.
+
+    Raises:
+        FileError: the package was installed without it.
+    """
+    try:
+        blob = resources.files("eitskin.model").joinpath(NAME).read_bytes()
+    except OSError:
+        raise FileError(f"the prebuilt model {NAME} is missing from this installation; install eitskin again") from None
+    return decode_model(blob, f"the prebuilt model {NAME}"), blob

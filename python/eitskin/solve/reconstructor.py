@@ -1,0 +1,120 @@
+"""Frames to images and touches with one signature, whichever engine does it: the C core or the numpy reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FrameError, ProtocolError, UsageError
+from eitskin.model.eitm import encode_model, load_model
+from eitskin.model.model import Model
+from eitskin.skin.protocol import Protocol
+from eitskin.solve.core import CoreEngine
+from eitskin.solve.reference import ReferenceEngine
+from eitskin.solve.results import Baseline, Options, Reconstruction, default_options
+
+FloatArray = npt.NDArray[np.float64]
+
+ENGINES = ("c", "c64", "numpy")
+MIN_CORRELATION = 0.9
+
+
+class Reconstructor:
+    """One skin's reconstruction: tare on quiet frames, then turn frames into images and touches.
+
+    ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or "numpy" (the reference).
+
+    Raises:
+        ModelError: the C core refuses the model.
+        UsageError: an unknown engine, an option out of range, or the core is not built.
+    """
+
+    def __init__(self, model: Model, *, engine: str = "c", options: Options | None = None, blob: bytes | None = None) -> None:
+        if engine not in ENGINES:
+            raise UsageError(f"engine {engine!r} is not known; use one of {', '.join(ENGINES)}")
+        self.model, self.engine = model, engine
+        self._engine: CoreEngine | ReferenceEngine
+        if engine == "numpy":
+            self._engine = ReferenceEngine(model)
+        else:
+            self._engine = CoreEngine(blob or encode_model(model), "float32" if engine == "c" else "float64")
+        self._options = default_options(model)
+        self.set_options(options or self._options)
+
+    @classmethod
+    def from_file(cls, path: str | Path, *, engine: str = "c", options: Options | None = None) -> Reconstructor:
+        """With the model in the file ``path``; raises what ``load_model`` raises besides."""
+        model, blob = load_model(path)
+        return cls(model, engine=engine, options=options, blob=blob)
+
+    @property
+    def options(self) -> Options:
+        """The options in force."""
+        return self._options
+
+    def set_options(self, options: Options) -> None:
+        """Replace the options.
+
+        Raises:
+            UsageError: one is out of its range; the old ones stay.
+        """
+        self._engine.set_options(options)
+        self._options = options
+
+    def with_options(self, **changes: Any) -> None:
+        """Change some options by name; raises as ``set_options``."""
+        self.set_options(replace(self._options, **changes))
+
+    def check_protocol(self, protocol: Protocol) -> None:
+        """Refuse frames that were scanned with another protocol than the model's.
+
+        Raises:
+            ProtocolError: the tables differ.
+        """
+        if protocol.hash != self.model.protocol.hash:
+            own = self.model.protocol
+            raise ProtocolError(
+                f"frames scanned with protocol {protocol.hash:016x} ({protocol.n_electrodes} electrodes, {protocol.n_rows} rows) "
+                f"do not match the model's {own.hash:016x} ({own.n_electrodes} electrodes, {own.n_rows} rows); "
+                "import the frames in the model's order, or build a model with their protocol"
+            )
+
+    def tare(self, quiet_v: npt.ArrayLike) -> Baseline:
+        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the noise.
+
+        Raises:
+            FrameError: a frame has the wrong length or cannot be used.
+        """
+        return self._engine.set_baseline(self._shaped(np.atleast_2d(np.asarray(quiet_v, dtype=np.float64)), "reference"))
+
+    def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
+        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before ``tare``."""
+        self._engine.mask_rows(rows)
+
+    def reconstruct(self, frame_v: npt.ArrayLike, *, touches: bool = True) -> Reconstruction:
+        """One frame (m,) in V.
+
+        Raises:
+            FrameError: the frame cannot be used, or no reference has been taken.
+        """
+        return self._engine.reconstruct(np.asarray(frame_v, dtype=np.float64), touches=touches)
+
+    def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
+        """One after another; ids follow touches from frame to frame."""
+        for frame in frames_v:
+            yield self.reconstruct(frame)
+
+    def forget(self) -> None:
+        """Forget the warm start and the touches that were followed: the next frame has nothing to do with the last."""
+        self._engine.forget()
+
+    def _shaped(self, frames: FloatArray, what: str) -> FloatArray:
+        rows = self.model.protocol.n_rows
+        if frames.ndim != 2 or frames.shape[1] != rows or not len(frames):
+            raise FrameError(f"{what}: has shape {frames.shape}, but the model's protocol has {rows} rows")
+        return frames
