@@ -55,9 +55,10 @@ def patterns_for(protocol: Protocol) -> Patterns:
     rows = protocol.drive_measure.astype(np.int64)
     m, n = len(rows), protocol.n_electrodes
     pairs = rows.reshape(-1, 2)
-    ordered = np.sort(pairs, axis=1)
-    distinct, number = np.unique(ordered, axis=0, return_inverse=True)
-    sign = np.where(pairs[:, 0] == ordered[:, 0], 1.0, -1.0).reshape(m, 2)
+    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    keys, number = np.unique(low * n + high, return_inverse=True)
+    distinct = np.column_stack(np.divmod(keys, n))
+    sign = np.where(pairs[:, 0] == low, 1.0, -1.0).reshape(m, 2)
     number = number.reshape(m, 2)
     if len(distinct) <= n:
         solved, mix = distinct, np.eye(len(distinct))

@@ -31,9 +31,14 @@ PIXELS_AT_ONCE = 64  # keeps a block's gradients and products in cache
 def element_to_pixel(mesh: Mesh, grid: Grid) -> csr_matrix:
     """The fraction of each element's area that lies in each pixel, (E, n), exact to rounding; rows sum to at most 1."""
     elements, pixels = _candidates(mesh, grid)
-    corner_mm = np.asarray(grid.origin_mm) + grid.index[pixels] * grid.pixel_mm
-    corners = mesh.nodes_mm[mesh.triangles[elements]] - corner_mm[:, None, :]
-    share = _area_in_square(corners, grid.pixel_mm) / mesh.areas_mm2[elements]
+    alone = np.bincount(elements)[elements] == 1
+    elements, pixels, alone = (values[pixels >= 0] for values in (elements, pixels, alone))
+    share = np.ones(len(elements))
+    cut = np.flatnonzero(~alone)
+    corners = mesh.triangles.T[:, elements[cut]]
+    low = grid.index[pixels[cut]].T * grid.pixel_mm
+    x, y = (mesh.nodes_mm[:, axis][corners] - (grid.origin_mm[axis] + low[axis]) for axis in (0, 1))
+    share[cut] = _area_in_square(x, y, grid.pixel_mm) / mesh.areas_mm2[elements[cut]]
     kept = share > 1e-12
     indptr = np.concatenate([[0], np.cumsum(np.bincount(elements[kept], minlength=mesh.n_elements))])
     return csr_matrix((share[kept], pixels[kept], indptr), shape=(mesh.n_elements, grid.n_pixels))
@@ -108,34 +113,32 @@ def _rows_of_products(patterns: Patterns, products: FloatArray, rows: IntArray) 
 
 
 def _candidates(mesh: Mesh, grid: Grid) -> tuple[IntArray, IntArray]:
-    """Elements and kept pixels whose bounding boxes meet, (k,) each, by element and then pixel."""
-    corners = (mesh.nodes_mm[mesh.triangles] - grid.origin_mm) / grid.pixel_mm
-    last = np.array([grid.nx, grid.ny]) - 1
-    low = np.clip(np.floor(corners.min(axis=1)).astype(np.int64), 0, last)
-    high = np.clip(np.floor(corners.max(axis=1)).astype(np.int64), 0, last)
+    """Elements and the pixels whose squares meet their bounding boxes, (k,) each, by element; -1 for cells not kept."""
+    cell = np.floor((mesh.nodes_mm - grid.origin_mm) / grid.pixel_mm).astype(np.int64)
+    a, b, c = np.clip(cell, 0, np.array([grid.nx, grid.ny]) - 1)[mesh.triangles.T]
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     width, height = (high - low + 1).T
     count = width * height
     elements = np.repeat(np.arange(mesh.n_elements), count)
     place = np.arange(len(elements)) - np.repeat(np.cumsum(count) - count, count)
     row, column = np.divmod(place, width[elements])
-    pixels = grid.number[low[elements, 1] + row, low[elements, 0] + column]
-    kept = pixels >= 0
-    return elements[kept], pixels[kept]
+    return elements, grid.number[low[elements, 1] + row, low[elements, 0] + column]
 
 
-def _area_in_square(corners: FloatArray, side: float) -> FloatArray:
-    """The area of each counterclockwise triangle (k, 3, 2) within the square [0, side]^2, (k,).
+def _area_in_square(x: FloatArray, y: FloatArray, side: float) -> FloatArray:
+    """The area of each counterclockwise triangle (corners x and y, (3, k)) within the square [0, side]^2, (k,).
 
     By Green's theorem it is the integral of clip(x, 0, side) dy around the triangle, over the parts with y in
     [0, side]; on a straight edge the clipped x has a closed integral.
     """
-    begin, end = corners, np.roll(corners, -1, axis=1)
-    rise = end[..., 1] - begin[..., 1]
-    low, high = np.clip(begin[..., 1], 0, side), np.clip(end[..., 1], 0, side)
-    slope = np.divide(end[..., 0] - begin[..., 0], rise, out=np.zeros_like(rise), where=rise != 0)
-    x0, x1 = (begin[..., 0] + slope * (y - begin[..., 1]) for y in (low, high))
-    c0, c1 = np.clip(x0, 0, side), np.clip(x1, 0, side)
-    past = np.maximum(x1 - side, 0) - np.maximum(x0 - side, 0)
-    integral = (c1 - c0) * (c0 + c1) / 2 + side * past
-    mean = np.divide(integral, x1 - x0, out=c0.copy(), where=x1 != x0)
-    return np.asarray((mean * (high - low)).sum(axis=1))
+    area = np.zeros(x.shape[1])
+    for begin, end in ((0, 1), (1, 2), (2, 0)):
+        rise = y[end] - y[begin]
+        low, high = np.clip(y[begin], 0, side), np.clip(y[end], 0, side)
+        slope = np.divide(x[end] - x[begin], rise, out=np.zeros_like(rise), where=rise != 0)
+        x0, x1 = (x[begin] + slope * (level - y[begin]) for level in (low, high))
+        c0, c1 = np.clip(x0, 0, side), np.clip(x1, 0, side)
+        past = np.maximum(x1 - side, 0) - np.maximum(x0 - side, 0)
+        integral = (c1 - c0) * (c0 + c1) / 2 + side * past
+        area += np.divide(integral, x1 - x0, out=c0.copy(), where=x1 != x0) * (high - low)
+    return area

@@ -1,0 +1,40 @@
+"""The Jacobian benchmark: that both sides compute the same thing, and what it says where pyEIT is absent."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+
+import pytest
+
+from eitskin.errors import MissingExtraError, UsageError
+from eitskin.study import bench_jacobian
+
+
+def test_both_compute_the_same_jacobian() -> None:
+    pytest.importorskip("pyeit")
+    result = bench_jacobian.run(elements=(800, 1600), rounds=1, model_elements=800)
+    assert json.loads(json.dumps(result)) == result
+    for case, asked in zip(result["jacobian"], (800, 1600), strict=True):
+        assert abs(case["elements"] / asked - 1) < 0.2
+        assert case["cosine"] > 0.97  # pyEIT's electrodes are points
+        for name in ("first", "again"):
+            median, least, most = case["eitskin_s"][name]
+            assert 0 < least <= median <= most
+            assert case["ratio"][name] == pytest.approx(case["pyeit_s"][name][0] / median)
+    shown = bench_jacobian.text(result)
+    assert "whole model" in shown
+    assert shown.count("the mesh") == shown.count("kept parts") == 2
+    assert f"pyeit {result['versions']['pyeit']}" in shown
+
+
+def test_without_pyeit(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pyeit" else found(name))
+    with pytest.raises(MissingExtraError, match=r"pyeit.*eitskin\[peers\]"):
+        bench_jacobian.run()
+
+
+def test_refused_rounds() -> None:
+    with pytest.raises(UsageError, match="at least 1"):
+        bench_jacobian.run(rounds=0)
