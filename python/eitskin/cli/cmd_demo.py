@@ -27,6 +27,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--snr-db", type=float, default=60.0, metavar="DB", help="20 log10(rms(V0)/sigma) (default: %(default)g)")
     parser.add_argument("--seed", type=int, default=1, help="of noise and contacts (default: %(default)s)")
     parser.add_argument("--picture", type=Path, default=Path("demo.png"), metavar="PNG", help="default: %(default)s")
+    parser.add_argument("--frames", type=Path, metavar="NPZ", help="also write the simulated frames, with their truth")
     parser.add_argument("--json", action="store_true")
     parser.set_defaults(run=run)
 
@@ -44,6 +45,7 @@ def run(options: argparse.Namespace) -> int:
 
     import numpy as np
 
+    from eitskin.frames.frames import save_frames
     from eitskin.model.prebuilt import load_prebuilt
     from eitskin.scene.simulate import Measurement, simulate
     from eitskin.skin.protocol import adjacent
@@ -54,8 +56,9 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.view.frame_pictures import found_marks
     from eitskin.view.pictures import Mark, draw_frame
 
-    if not options.picture.parent.is_dir():
-        raise FileError(f"{options.picture}: the folder {options.picture.parent} does not exist; make it first")
+    for path in (options.picture, options.frames):
+        if path is not None and not path.parent.is_dir():
+            raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
     if not -20 <= options.snr_db <= 200 or options.seed < 0:
         raise UsageError("demo: --snr-db must be -20 to 200 and --seed at least 0")
     skin = paper_skin()
@@ -63,6 +66,8 @@ def run(options: argparse.Namespace) -> int:
     simulated = simulate(skin, adjacent(16), touches, measurement=Measurement(snr_db=options.snr_db))
     model, blob = load_prebuilt()
     frames = simulated.as_frames()
+    if options.frames is not None:
+        save_frames(options.frames, frames)
     results = {}
     for engine in ("c", "c64", "numpy"):
         reconstructor = Reconstructor(model, engine=engine, blob=blob)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -62,7 +63,6 @@ class CoreEngine:
         self._frame = np.zeros(self.n_rows, dtype=self.dtype)
         self._frame_pointer = self._ffi.from_buffer("eits_real[]", self._frame)
         self._image = self._view(self._context.image, self.n_pixels)
-        self._coefficients_count = self.n_pixels
         self._info = self._ffi.addressof(self._context, "info")
         self._touches = self._ffi.new("eits_touch[]", int(self._lib.EITS_MAX_TOUCHES))
         self._touch_count = self._ffi.new("uint32_t *")
@@ -132,6 +132,15 @@ class CoreEngine:
         """Frame stage and solver alone, results left in the core; returns the status. For benchmarks."""
         self._frame[:] = frame
         return int(self._lib.eits_reconstruct(self._context, self._frame_pointer, self.n_rows, self._null, self._null))
+
+    def bare_calls(self, frame: npt.NDArray[np.floating[Any]]) -> tuple[Callable[[], Any], Callable[[], Any]]:
+        """The two C calls for ``frame``, solve and touches, with nothing of Python around them. For benchmarks."""
+        self._frame[:] = frame
+        lib, context, null = self._lib, self._context, self._null
+        return (
+            lambda: lib.eits_reconstruct(context, self._frame_pointer, self.n_rows, null, null),
+            lambda: lib.eits_find_touches(context, self._touches, len(self._touches), self._touch_count),
+        )
 
     def reduced_data(self) -> npt.NDArray[Any]:
         """y of the last frame as the solver saw it, projected, (stride,)."""

@@ -1,0 +1,107 @@
+"""One frame through cffi: how long, how much of it outside C, and beside the numpy reference. Interleaved runs, ratios."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.solve.core import CoreEngine
+from eitskin.solve.reconstructor import Reconstructor
+
+SEED = 20240918
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """Microseconds, median and 99th percentile of each kind of call; ``macs`` of the solve and of the touches."""
+
+    p50_us: dict[str, float]
+    p99_us: dict[str, float]
+    macs: int
+    touch_macs: int
+    iterations: int
+    kernels: str
+    runs: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {**self.__dict__, "outside_c_share": self.outside_c_share, "machine": machine()}
+
+    @property
+    def outside_c_share(self) -> float:
+        """The part of a whole Python call, at the median, that is not spent in C."""
+        return 1 - (self.p50_us["C: solve"] + self.p50_us["C: touches"]) / self.p50_us["Python: frame to touches"]
+
+
+def machine() -> str:
+    """Processor and Python, for a benchmark's first line."""
+    return f"{platform.machine()} {platform.system()}, Python {platform.python_version()}, numpy {np.__version__}"
+
+
+def golden_session() -> tuple[CoreEngine, CoreEngine, Reconstructor, np.ndarray[Any, Any]]:
+    """The core, the portable core, the numpy reference, tared; and 32 noisy golden frames (60 dB)."""
+    model, blob = load_prebuilt()
+    rng = np.random.default_rng(SEED)
+    reference = model.golden.reference_v.astype(np.float64)
+    noise = np.sqrt(np.mean(reference**2)) * 1e-3
+    quiet = reference + noise * rng.standard_normal((64, len(reference)))
+    frames = model.golden.frame_v + noise * rng.standard_normal((32, len(reference)))
+    core, portable = CoreEngine(blob), CoreEngine(blob, prepared=False, portable=True)
+    numpy_engine = Reconstructor(model, engine="numpy")
+    for engine in (core, portable):
+        engine.set_baseline(quiet)
+    numpy_engine.tare(quiet)
+    return core, portable, numpy_engine, frames
+
+
+def run(runs: int = 2000) -> FrameTimes:
+    """Time ``runs`` frames of the core, and a hundredth as many of the slow engines among them."""
+    core, portable, reference, frames = golden_session()
+    samples: dict[str, list[float]] = {}
+
+    def clock(name: str, call: Any) -> None:
+        start = perf_counter_ns()
+        call()
+        samples.setdefault(name, []).append((perf_counter_ns() - start) / 1000)
+
+    for k in range(-20, runs):
+        frame = frames[k % len(frames)]
+        solve, touches = core.bare_calls(frame)
+        if k < 0:
+            solve()
+            continue
+        clock("C: solve", solve)
+        clock("C: touches", touches)
+        clock("Python: frame to touches", lambda f=frame: core.reconstruct(f))
+        if k % 100 == 0:
+            clock("C, portable kernels: frame to touches", lambda f=frame: portable.reconstruct(f))
+            clock("numpy: image only", lambda f=frame: reference.reconstruct(f, touches=False))
+    info = core.reconstruct(frames[0]).info
+    return FrameTimes(
+        {name: float(np.median(values)) for name, values in samples.items()},
+        {name: float(np.percentile(values, 99)) for name, values in samples.items()},
+        info.macs,
+        info.touch_macs,
+        info.iterations,
+        core.kernels,
+        runs,
+    )
+
+
+def to_text(times: FrameTimes) -> str:
+    """A table."""
+    whole = times.p50_us["Python: frame to touches"]
+    lines = [
+        f"one frame, prebuilt model, defaults: {times.iterations} iterations, {times.macs / 1e6:.2f} + {times.touch_macs / 1e6:.2f} "
+        f"million MACs, {times.kernels} kernels; {times.runs} interleaved runs; {machine()}",
+        f"{'':40} p50 us   p99 us  ratio of p50",
+    ]
+    for name, p50 in times.p50_us.items():
+        lines.append(f"{name:38} {p50:8.1f} {times.p99_us[name]:8.1f} {p50 / whole:10.2f}")
+    lines.append(f"outside C: {100 * times.outside_c_share:.1f} % of a Python call from frame to touches (median)")
+    return "\n".join(lines)

@@ -1,0 +1,65 @@
+# Sourced by scripts/demo and scripts/test: Debian packages and a virtual environment, each only if missing.
+
+root=$(CDPATH= cd -- "$(dirname -- "$0")/.." && pwd)
+venv=${EITSKIN_VENV:-$root/.venv}
+
+say() { printf '%s\n' "== $*"; }
+
+# debian COMMAND-OR-FILE PACKAGE...: install the packages unless the first word is there; as root by apt, else say how.
+debian() {
+    wanted=$1
+    shift
+    command -v "$wanted" >/dev/null 2>&1 && return 0
+    [ -e "$wanted" ] && return 0
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
+        say "installing $* with apt-get"
+        { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"; } >/dev/null && return 0
+        say "apt-get could not install $*; install it and start again"
+        exit 1
+    fi
+    say "missing: $wanted. Run this, then start again:"
+    printf '   sudo apt-get install -y %s\n' "$*"
+    exit 1
+}
+
+# The first Python from 3.10 on, and its headers.
+find_python() {
+    debian python3 python3
+    for python in python3 python3.14 python3.13 python3.12 python3.11 python3.10; do
+        command -v "$python" >/dev/null 2>&1 || continue
+        "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' && break
+        python=
+    done
+    if [ -z "$python" ]; then
+        say "Python 3.10 or later is needed; install it and start again"
+        exit 1
+    fi
+    debian cc gcc libc6-dev
+    header=$("$python" -c 'import sysconfig; print(sysconfig.get_path("include") + "/Python.h")')
+    debian "$header" python3-dev
+    "$python" -c 'import ensurepip, venv' 2>/dev/null || debian "no-ensurepip" python3-venv
+}
+
+# The newest time at which something that the package is built from changed, as a stamp's name would not tell.
+changed_since() {
+    [ -e "$1" ] || return 0
+    [ -n "$(find "$root/python" "$root/csrc" "$root/cmake" "$root/CMakeLists.txt" "$root/pyproject.toml" \
+        \( -name __pycache__ -prune \) -o -newer "$1" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
+}
+
+# install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since.
+install_package() {
+    stamp=$venv/installed-$(printf '%s' "$1" | tr ',' '-')
+    if [ ! -x "$venv/bin/python" ]; then
+        find_python
+        say "making a virtual environment"
+        "$python" -m venv "$venv"
+    fi
+    if changed_since "$stamp"; then
+        find_python
+        say "installing eitskin[$1]"
+        touch "$stamp.next"
+        "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "$root[$1]"
+        mv "$stamp.next" "$stamp"
+    fi
+}
