@@ -103,8 +103,14 @@ def setup_for(skin: Skin, protocol: Scan, *, elements: int, pixels_across: int =
 
 
 def methods(setup: Setup) -> tuple[Family, ...]:
-    """All that ``eitskin compare`` compares, in the order of its table."""
-    return baseline_methods(setup.jacobian)
+    """All that ``eitskin compare`` compares, in the order of its table.
+
+    Raises:
+        UsageError: the C core is not built.
+    """
+    from eitskin.study.core_method import core_methods
+
+    return (*baseline_methods(setup.jacobian), *core_methods(setup))
 
 
 def baseline_methods(jacobian: FloatArray) -> tuple[Family, ...]:
