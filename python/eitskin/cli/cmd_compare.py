@@ -28,7 +28,9 @@ def add_parser(subparsers: Any) -> None:
         "--snr-db", metavar="DB", type=float, default=60.0, help="20 log10(rms(V0)/sigma) (default: %(default)g)"
     )
     parser.add_argument(
-        "--lookup", choices=("nearest", "bilinear"), help="what a cell of MIoU's raster shows of the image"
+        "--lookup",
+        choices=("nearest", "bilinear"),
+        help="what a cell of MIoU's raster shows: the nearest pixel, or one interpolated (default: nearest)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, with the curves over the threshold")
     parser.add_argument("--csv", metavar="FILE", type=Path, help="write the numbers of every scene")

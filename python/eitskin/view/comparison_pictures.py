@@ -36,7 +36,7 @@ def chosen_scenes(comparison: Comparison, count: int) -> list[int]:
 
 
 def draw_scenes(path: str | Path, comparison: Comparison, scenes: Sequence[int] | None = None) -> None:
-    """A row a scene (six by default), a column a method, truth first, as a PNG.
+    """A row a scene (three by default), a column a method, truth first, as a PNG.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -46,7 +46,7 @@ def draw_scenes(path: str | Path, comparison: Comparison, scenes: Sequence[int] 
     snr_db = test.measurement.snr_db
     noise = "no noise" if snr_db is None else f"SNR {snr_db:g} dB"
     panels = []
-    for k in chosen_scenes(comparison, 6) if scenes is None else scenes:
+    for k in chosen_scenes(comparison, 3) if scenes is None else scenes:
         marks = truth_marks(test.touches.scenes[k], setup.skin.conductivity_s_per_m)
         panels.append(Panel(f"truth\nscene {k}", None, marks, fill_truth=True))
         for result in comparison.results:

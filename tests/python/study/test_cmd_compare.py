@@ -27,7 +27,8 @@ def run(*arguments: str) -> int:
 def test_table_files_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     files = [tmp_path / name for name in ("scenes.png", "curves.png", "numbers.csv")]
-    status = run(*FEW, "--picture", str(files[0]), "--curves", str(files[1]), "--csv", str(files[2]), "--snr-db", "50")
+    drawn = ["--picture", str(files[0]), "--curves", str(files[1]), "--csv", str(files[2])]
+    status = run(*FEW, *drawn, "--snr-db", "50", "--lookup", "nearest")
     shown = capsys.readouterr()
     assert status == 0 and shown.err == ""
     assert "test-s4-n3 (seed 4)" in shown.out and "50 dB" in shown.out and "nearest" in shown.out

@@ -24,7 +24,7 @@ from eitskin.study.compare_table import CSV_COLUMNS, header, to_csv, to_json, to
 from eitskin.study.methods import Family, FindsTouches, Learns, Setup, baseline_methods
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
-SMALL = Settings(scenes=8, train_scenes=6, seed=3, elements=1500, simulated_elements=2500)
+SMALL = Settings(scenes=8, train_scenes=6, seed=3, elements=1500, simulated_elements=2500, lookup="nearest")
 
 
 def quick(setup: Setup) -> tuple[Family, ...]:
@@ -42,7 +42,7 @@ def comparison() -> Comparison:
 def test_results_are_what_their_parts_give(comparison: Comparison) -> None:
     """Thresholds, parameter and MIoU of the second method, worked out again from frames and truth."""
     setup, result = comparison.setup, comparison.results[1]
-    judge = metrics.judge_for(SKIN.outline, setup.grid)
+    judge = metrics.judge_for(SKIN.outline, setup.grid, lookup="nearest")
 
     def curves(strength: float, of: str) -> np.ndarray:
         session = getattr(comparison, of)

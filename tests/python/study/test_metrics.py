@@ -132,7 +132,7 @@ def test_curves_equal_masks_on_the_raster(lookup: str) -> None:
 
 def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
     grid = grid_for(SQUARE, 6)
-    judge = metrics.judge_for(SQUARE, grid, 1.0)
+    judge = metrics.judge_for(SQUARE, grid, 1.0, "nearest")
     image = np.random.default_rng(2).uniform(size=36)
     truth = metrics.disc_mask(judge.raster.points_mm, [[12, 17]], [6])
     mask = metrics.touch_mask(image, 0.6)[judge.lookup.pixel[:, 0]]
@@ -161,7 +161,7 @@ def test_a_perfect_image_is_limited_by_its_pixels_only() -> None:
     assert 0.83 < score["nearest"] < 0.90
     assert 0.95 < score["bilinear"] < 0.99
     fine = grid_for(SQUARE, 20)
-    judge = metrics.judge_for(SQUARE, fine)
+    judge = metrics.judge_for(SQUARE, fine, lookup="nearest")
     truth = metrics.disc_mask(judge.raster.points_mm, [[12, 17]], [6])[None]
     assert judge.curves(truth.astype(float), truth, [0.5])[0, 0] == 1.0
 
