@@ -38,5 +38,5 @@ def run_jacobian(options: argparse.Namespace) -> int:
     from eitskin.study import bench_jacobian
 
     times = bench_jacobian.run()
-    print(json.dumps(times, indent=2) if options.json else bench_jacobian.to_text(times))
+    print(json.dumps(times, indent=2) if options.json else bench_jacobian.text(times))
     return 0

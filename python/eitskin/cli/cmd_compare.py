@@ -30,7 +30,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--lookup",
         choices=("nearest", "bilinear"),
-        help="what a cell of MIoU's raster shows: the nearest pixel, or one interpolated (default: nearest)",
+        help="what a cell of MIoU's raster shows: the nearest pixel, or one interpolated (default: bilinear)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, with the curves over the threshold")
     parser.add_argument("--csv", metavar="FILE", type=Path, help="write the numbers of every scene")

@@ -25,7 +25,7 @@ IntArray = npt.NDArray[np.int64]
 
 RASTER_MM = 1.5
 LOOKUPS = ("nearest", "bilinear")
-LOOKUP = "nearest"
+LOOKUP = "bilinear"
 THRESHOLDS: tuple[float, ...] = tuple(round(0.02 * k, 2) for k in range(1, 50))
 
 

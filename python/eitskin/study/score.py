@@ -18,7 +18,6 @@ BoolArray = npt.NDArray[np.bool_]
 
 PAPER_DIAMETER_MM = 194.0
 WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
-LOOKUP = "bilinear"
 
 
 @dataclass(frozen=True)
@@ -93,5 +92,5 @@ def scorer_for(model: Model) -> Scorer:
     """
     outline = model.skin.outline
     scale = 2 * float(np.sqrt(outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
-    judge = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale, LOOKUP)
+    judge = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale)
     return Scorer(model, judge, GATE_MM * scale)

@@ -1,0 +1,44 @@
+"""Every shell and Python block of the README and of the tutorial runs, in order, in one folder a page."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGES = ("README.md", "docs/tutorial.md")
+BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SET_UP = {"scripts/demo", "scripts/test"}
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """Language and text of each block of ``page``."""
+    return BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_blocks_run(page: str, tmp_path: Path) -> None:
+    ran = 0
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    for language, text in blocks(page):
+        if set(text.split("\n")) & SET_UP:
+            for command in SET_UP & set(text.split("\n")):
+                assert os.access(ROOT / command, os.X_OK), f"{page} names {command}, which cannot be run"
+            continue
+        command = ["sh", "-e", "-c", text] if language == "sh" else [sys.executable, "-c", text]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == 0, f"{page}:\n{text}\n{done.stdout}\n{done.stderr}"
+        ran += 1
+    assert ran >= 2
+
+
+def test_pages_link_to_files_that_exist() -> None:
+    for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]:
+        for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
+            if "://" not in target:
+                assert (page.parent / target).exists(), f"{page.relative_to(ROOT)} links to {target}, which is not there"
