@@ -119,7 +119,7 @@ def rewritten(path: Path, **changes: Any) -> Path:
     [
         ({"format": None}, "not an eitskin frames file .*voltage_v.*eitskin import"),
         ({"format": np.array("other")}, "eitskin import"),
-        ({"version": np.array(2)}, "version 2, this eitskin reads 1"),
+        ({"version": np.array(2)}, "version 2; this eitskin reads 1"),
         ({"version": np.array("x")}, "'version'"),
         ({"voltage_v": None}, "'voltage_v' is missing"),
         ({"extra": np.zeros(2)}, "unknown field 'extra'"),

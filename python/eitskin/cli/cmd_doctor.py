@@ -1,0 +1,100 @@
+"""``eitskin doctor``: what is wrong with frames, before any image is made of them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from eitskin.cli.import_options import add_import_options, floats, read_options, read_protocol
+from eitskin.errors import UsageError
+
+if TYPE_CHECKING:
+    from eitskin.frames.doctor.subject import Subject
+    from eitskin.frames.frames import Frames
+
+TOUCH_RADIUS_PER_SIZE = 0.05
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "doctor",
+        help="say what is wrong with measured frames: order, sign, wiring, noise, gains",
+        description="Say what is wrong with measured frames before an image is made of them: channel order, sign, "
+        "numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains, noise and drift. Takes a "
+        "frames file, or any source that import reads. Exit code 0: nothing must be mended; 11: something must.",
+    )
+    parser.add_argument("source", type=Path, help="frames file, or CSV, NPZ, MAT as for import")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+    parser.add_argument("--picture", type=Path, metavar="PNG", help="draw what was measured (needs matplotlib)")
+    parser.add_argument(
+        "--touch",
+        action="append",
+        default=[],
+        metavar="X,Y[,R]",
+        help="a touch at a known place in mm, to check the numbering; write --touch=-10,5 where X is negative",
+    )
+    parser.add_argument("--touch-in", metavar="FRAME", help="the frame with these touches; else the largest change")
+    add_import_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read, examine, say."""
+    from eitskin.frames.doctor.examine import examine_case
+    from eitskin.frames.doctor.subject import subject_from_source
+
+    protocol, skin, n_electrodes = read_protocol(options)
+    subject = subject_from_source(options.source, read_options(options), protocol, skin, n_electrodes)
+    if options.touch:
+        subject = _with_touches(subject, options.touch, options.touch_in)
+    report, case = examine_case(subject)
+    if options.picture is not None:
+        from eitskin.frames.doctor.picture import draw
+
+        draw(options.picture, report, case)
+    if options.json:
+        print(json.dumps(report.as_table()))
+    else:
+        print("\n".join(report.lines()))
+    return report.exit_code
+
+
+def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subject:
+    if subject.skin is None:
+        raise UsageError("--touch needs --skin FILE, which says where the electrodes are")
+    low_x, low_y, high_x, high_y = subject.skin.outline.bounding_box_mm
+    touches = []
+    for text in given:
+        values = floats(text, "--touch")
+        if len(values) not in (2, 3):
+            raise UsageError(f"--touch {text}: must be X,Y or X,Y,RADIUS in mm")
+        radius = values[2] if len(values) == 3 else TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
+        touches.append((values[0], values[1], radius))
+    if not subject.skin.outline.contains([touch[:2] for touch in touches]).all():
+        raise UsageError("--touch: a touch lies outside the skin; give millimetres from the outline's centre")
+    readings = tuple((order, _touched(frames, touches, name)) for order, frames in subject.readings)
+    return replace(subject, readings=readings)
+
+
+def _touched(frames: Frames, touches: list[tuple[float, float, float]], name: str | None) -> Frames:
+    import numpy as np
+
+    if not frames.n_frames:
+        raise UsageError("--touch: there is no frame besides the quiet ones")
+    if name is not None and name not in frames.frame_name:
+        raise UsageError(f"--touch-in {name}: no such frame; frames are {', '.join(frames.frame_name[:20])}")
+    change = np.nan_to_num(np.abs(frames.voltage_v - frames.reference_v)).sum(axis=1)
+    frame = int(np.argmax(change)) if name is None else frames.frame_name.index(name)
+    given = np.array(touches)
+    return replace(
+        frames,
+        touch_frame=np.full(len(given), frame),
+        touch_xy_mm=given[:, :2],
+        touch_radius_mm=given[:, 2],
+        touch_strength=None,
+        touch_sign=np.ones(len(given), dtype=np.int8),
+    )

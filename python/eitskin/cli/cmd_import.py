@@ -1,0 +1,55 @@
+"""``eitskin import``: somebody else's measured frames to a frames file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from eitskin.cli.import_options import add_import_options, read_options, read_protocol
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "import",
+        help="turn a CSV, NPZ or MAT file of measured voltages into a frames file",
+        description="Turn a CSV, NPZ or MAT file of measured voltages into a frames file, in the protocol's order, "
+        "signed, in volts. Run  eitskin doctor SOURCE  first to learn which options it needs.",
+    )
+    parser.add_argument("source", type=Path, help="CSV or other text table, NPZ, MAT, or a frames file to mend")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.npz", help="frames file to write")
+    parser.add_argument("--json", action="store_true", help="say what was written as JSON")
+    add_import_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read, mend, write."""
+    from eitskin.frames.frames import save_frames
+    from eitskin.frames.importer import import_frames
+
+    protocol, skin, n_electrodes = read_protocol(options)
+    frames = import_frames(options.source, read_options(options), protocol, skin, n_electrodes)
+    save_frames(options.output, frames)
+    said: dict[str, Any] = {
+        "written": str(options.output),
+        "frames": frames.n_frames,
+        "quiet_frames": len(frames.reference_voltage_v),
+        "channels": frames.protocol.n_rows,
+        "electrodes": frames.protocol.n_electrodes,
+        "protocol_hash": f"{frames.protocol.hash:016x}",
+        "touches": 0 if frames.touch_frame is None else len(frames.touch_frame),
+        "masks": frames.truth_mask is not None,
+        "unit": frames.meta["unit"],
+    }
+    if options.json:
+        print(json.dumps(said))
+        return 0
+    print(
+        f"{options.output}: {said['frames']} frame(s) of {said['channels']} channels, {said['quiet_frames']} quiet, "
+        f"{said['electrodes']} electrodes, {said['touches']} known touches; unit {said['unit']}"
+    )
+    print(f"next: eitskin doctor {options.output}" + (f" --skin {options.skin}" if options.skin is not None else ""))
+    return 0

@@ -1,0 +1,200 @@
+"""The options that say what somebody else's frames are; ``import`` and ``doctor`` share them."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.errors import UsageError
+
+if TYPE_CHECKING:
+    from eitskin.frames.importer import ImportOptions
+    from eitskin.skin.protocol import Protocol
+    from eitskin.skin.skin import Skin
+
+ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all", "table")
+
+
+def add_import_options(parser: argparse.ArgumentParser) -> None:
+    """Add all of them to ``parser``; defaults change nothing."""
+    _add_protocol(parser.add_argument_group("protocol: the order of the result"))
+    _add_place(parser.add_argument_group("where the frames are in the source"))
+    _add_mending(parser.add_argument_group("what differs in the source, and what to mend"))
+    _add_truth(parser.add_argument_group("truth that an NPZ or MAT source brings along"))
+
+
+def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | None, int | None]:
+    """The wanted protocol (None: the source's own table), the skin where one is given, the number of electrodes.
+
+    Raises:
+        UsageError: options that contradict each other.
+        EitskinError: the skin file cannot be read.
+    """
+    from eitskin.skin.protocol import adjacent, opposite, skip
+    from eitskin.skin.skin import load_skin
+
+    skin, protocol = load_skin(options.skin) if options.skin is not None else (None, None)
+    count = options.electrodes if skin is None else skin.electrodes.count
+    if skin is not None and options.electrodes not in (None, count):
+        raise UsageError(f"--electrodes {options.electrodes}: the skin {options.skin} has {count}; leave it out")
+    if options.skip is not None and options.protocol != "skip":
+        raise UsageError("--skip goes with --protocol skip")
+    if options.protocol is None or options.protocol == "table":
+        return protocol, skin, count
+    if count is None:
+        raise UsageError(f"--protocol {options.protocol} needs --electrodes N or --skin FILE")
+    if options.protocol == "skip":
+        if options.skip is None:
+            raise UsageError("--protocol skip needs --skip K")
+        protocol = skip(count, options.skip)
+    else:
+        protocol = {"adjacent": adjacent, "opposite": opposite}[options.protocol](count)
+    return protocol, skin, count
+
+
+def read_options(options: argparse.Namespace) -> ImportOptions:
+    """The import options of a command line.
+
+    Raises:
+        UsageError: a list or pair cannot be read.
+    """
+    from eitskin.frames.importer import ImportOptions
+    from eitskin.frames.source import SourceOptions
+    from eitskin.frames.truth import TruthOptions
+
+    named = vars(options)
+    source = SourceOptions(**{f.name: named[f.name] for f in fields(SourceOptions)})
+    extent = options.truth_mask_extent
+    truth = TruthOptions(
+        touch_frame=options.truth_frame,
+        touch_xy=options.truth_xy,
+        touch_radius=options.truth_radius,
+        touch_strength=options.truth_strength,
+        touch_sign=options.truth_sign,
+        touch_unit_mm=options.truth_unit_mm,
+        mask=options.truth_mask,
+        mask_extent_mm=None if extent is None else _four(extent),
+        mask_top_first=options.truth_mask_top_first,
+    )
+    same = ("order", "table_file", "sign", "rotate", "equalise", "current_a")
+    own: dict[str, Any] = {name: named[name] for name in same}
+    for name in ("flip_channels", "impute_channels", "drop_channels", "drop_electrodes"):
+        own[name] = whole_numbers(named[name], f"--{name.replace('_', '-')}")
+    return ImportOptions(
+        source=source,
+        truth=truth,
+        keep_table=options.protocol == "table",
+        mirror=options.mirror,
+        clockwise=options.clockwise,
+        swaps=tuple(_pair(text) for text in options.swap),
+        **own,
+    )
+
+
+def whole_numbers(text: str | None, option: str) -> tuple[int, ...]:
+    """ "3,17,20:24" as numbers (a range without its end), empty for None.
+
+    Raises:
+        UsageError: it is no such list; ``option`` is named.
+    """
+    numbers: list[int] = []
+    for part in () if text is None else text.split(","):
+        first, colon, last = part.partition(":")
+        try:
+            start = int(first)
+            numbers.extend(range(start, int(last)) if colon else [start])
+        except ValueError:
+            raise UsageError(f"{option} {text}: {part!r} is no whole number or range a:b") from None
+    return tuple(dict.fromkeys(numbers))
+
+
+def floats(text: str, option: str) -> tuple[float, ...]:
+    """ "1.5,-2" as numbers.
+
+    Raises:
+        UsageError: it is no list of finite numbers; ``option`` is named.
+    """
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = (float("nan"),)
+    if not all(abs(value) < float("inf") for value in values):
+        raise UsageError(f"{option} {text}: must be numbers separated by commas")
+    return values
+
+
+def _pair(text: str) -> tuple[int, int]:
+    numbers = whole_numbers(text, "--swap")
+    if len(numbers) != 2:
+        raise UsageError(f"--swap {text}: name two electrodes, as in --swap 3,9")
+    return numbers[0], numbers[1]
+
+
+def _four(text: str) -> tuple[float, float, float, float]:
+    values = floats(text, "--truth-mask-extent")
+    if len(values) != 4:
+        raise UsageError(f"--truth-mask-extent {text}: must be XMIN,YMIN,XMAX,YMAX in mm")
+    return values[0], values[1], values[2], values[3]
+
+
+def _add_protocol(group: Any) -> None:
+    add = group.add_argument
+    add("--skin", type=Path, metavar="FILE", help="skin description (TOML) with its protocol")
+    add("--protocol", choices=("adjacent", "opposite", "skip", "table"), help="table: keep the source's own")
+    add("--skip", type=int, metavar="K", help="electrodes skipped, with --protocol skip")
+    add("--electrodes", type=int, metavar="N", help="number of electrodes, where no skin says so")
+    add("--current-a", type=float, metavar="A", help="drive current in A, instead of the protocol's")
+
+
+def _add_place(group: Any) -> None:
+    add = group.add_argument
+    add("--voltage", metavar="KEY", help="NPZ, MAT: array of the frames")
+    add("--reference", metavar="KEY", help="NPZ, MAT: array of the quiet frame or frames")
+    add("--columns", metavar="LIST", help="text: columns of the voltages, from 0 or by name: 2 or 1:209")
+    add("--reference-columns", metavar="LIST", help="text: columns of the quiet frames")
+    add("--reference-frames", metavar="LIST", help="which of the frames are the quiet ones, as in 0:20")
+    add("--names", metavar="KEY", help="NPZ, MAT: array of the frames' names")
+    add("--time", metavar="KEY", help="array or column of the frames' times in s")
+    layouts = ("auto", "frames-in-rows", "channels-in-rows")
+    add("--layout", choices=layouts, default="auto", help="needed only where both sides fit")
+    parts = ("real", "imag", "abs", "in-phase")
+    add("--complex-part", choices=parts, help="of complex numbers; in text, of column pairs re,im")
+    add("--scale", type=float, metavar="FACTOR", help="times the source's numbers gives volts; 1 for volts")
+    add("--delimiter", metavar="WORD", help="comma, semicolon, tab, bar, space, a character; else found")
+    add("--header-rows", type=int, metavar="N", help="rows before the numbers; else found")
+
+
+def _add_mending(group: Any) -> None:
+    add = group.add_argument
+    add("--order", choices=ORDERS, default="fixed", help="how the source lists its channels")
+    add("--table-file", metavar="FILE", help="text table of the source's rows: I+, I-, V+, V-")
+    add("--protocol-table", metavar="KEY", help="NPZ, MAT: array with that table")
+    add("--table-base", type=int, default=0, metavar="N", help="the table's number of the first electrode")
+    signs = ("signed", "reversed", "magnitude")
+    add("--sign", choices=signs, default="signed", help="magnitude: signs from the homogeneous prediction")
+    add("--rotate", type=int, default=0, metavar="K", help="the source's first electrode is electrode K")
+    turned = group.add_mutually_exclusive_group()
+    turned.add_argument("--mirror", action="store_true", help="the source numbers its electrodes the other way round")
+    text = "the source numbers clockwise: mirror it unless the skin does"
+    turned.add_argument("--clockwise", action="store_true", help=text)
+    add("--swap", action="append", default=[], metavar="I,J", help="wires of these electrodes are exchanged")
+    add("--flip-channels", metavar="LIST", help="change the sign of these channels (numbers in our order)")
+    add("--impute-channels", metavar="LIST", help="fill these channels from their reciprocals")
+    add("--drop-channels", metavar="LIST", help="leave these channels out (the result is a table protocol)")
+    add("--drop-electrodes", metavar="LIST", help="leave out all channels of these electrodes")
+    add("--equalise", action="store_true", help="give each channel the gain of the homogeneous prediction")
+
+
+def _add_truth(group: Any) -> None:
+    add = group.add_argument
+    add("--truth-frame", metavar="KEY", help="touches: frame of each, as a number from 0 or a name")
+    add("--truth-xy", metavar="KEY", help="touches: centres (t, 2)")
+    add("--truth-radius", metavar="KEY", help="touches: radii (t,)")
+    add("--truth-sign", metavar="KEY", help="touches: true or above 0 where more conductive")
+    add("--truth-strength", metavar="KEY", help="touches: relative conductivity change")
+    add("--truth-unit-mm", type=float, default=1.0, metavar="MM", help="mm in a unit of centres and radii")
+    add("--truth-mask", metavar="KEY", help="masks (frames, rows, columns) of +1, -1, 0")
+    add("--truth-mask-extent", metavar="X,Y,X,Y", help="the masks' box in mm; else the skin's")
+    add("--truth-mask-top-first", action="store_true", help="row 0 of a mask is the top, not the bottom")

@@ -1,0 +1,73 @@
+"""Named arrays of .npz and .mat files, and picking one of them with an error that lists what is there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eitskin.errors import FileError, FrameError, missing_extra
+from eitskin.frames.frames import read_npz
+
+LISTED = 40
+
+
+def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
+    """All arrays of an .npz or .mat file by name; a MATLAB struct's fields as "struct.field".
+
+    Raises:
+        FileError: it cannot be read.
+        MissingExtraError: a .mat file without scipy.
+    """
+    return read_npz(path, "file of arrays") if Path(path).suffix.lower() == ".npz" else _read_mat(path)
+
+
+def pick(arrays: Mapping[str, NDArray[Any]], key: str, option: str, where: str) -> NDArray[Any]:
+    """The array ``key``; ``option`` is the option that named it.
+
+    Raises:
+        FrameError: it is not there; the text lists the arrays that are.
+    """
+    if key not in arrays:
+        raise FrameError(f"{where}: no array {key!r} for {option}; it holds {listing(arrays)}")
+    return arrays[key]
+
+
+def listing(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Names and shapes on one line."""
+    shown = [f"{name} {array.shape}" for name, array in sorted(arrays.items())][:LISTED]
+    return ", ".join(shown) + (" ..." if len(arrays) > LISTED else "") if shown else "no arrays"
+
+
+def _read_mat(path: str | Path) -> dict[str, NDArray[Any]]:
+    try:
+        from scipy.io import loadmat
+        from scipy.io.matlab import MatReadError
+    except ImportError:
+        raise missing_extra("model", "scipy") from None
+    try:
+        content = loadmat(str(path), simplify_cells=True, appendmat=False)
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such MAT file; check the path") from None
+    except NotImplementedError:
+        raise FileError(f"{path}: a MATLAB 7.3 file (HDF5); save it with  save('-v7', ...)") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot read this MAT file ({error.strerror or error})") from None
+    except (MatReadError, ValueError, TypeError, KeyError, IndexError, EOFError, OverflowError, MemoryError):
+        raise FileError(f"{path}: not a readable MAT file: damaged, cut short, or another kind of file") from None
+    arrays: dict[str, NDArray[Any]] = {}
+    _flatten({name: value for name, value in content.items() if not name.startswith("__")}, "", arrays)
+    return arrays
+
+
+def _flatten(content: Mapping[str, Any], prefix: str, arrays: dict[str, NDArray[Any]]) -> None:
+    for name, value in content.items():
+        if isinstance(value, Mapping):
+            _flatten(value, f"{prefix}{name}.", arrays)
+            continue
+        array = np.asarray(value)
+        if array.dtype != object:
+            arrays[f"{prefix}{name}"] = array

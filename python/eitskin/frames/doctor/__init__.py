@@ -1,0 +1,7 @@
+"""The doctor: what is wrong with frames, said before any image is made of them. One file a check."""
+
+from eitskin.frames.doctor.examine import examine
+from eitskin.frames.doctor.report import Finding, Report
+from eitskin.frames.doctor.subject import Subject, subject_from_frames, subject_from_source
+
+__all__ = ["Finding", "Report", "Subject", "examine", "subject_from_frames", "subject_from_source"]

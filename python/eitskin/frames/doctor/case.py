@@ -1,0 +1,131 @@
+"""The case before the checks: frames in one order, the prediction to hold them against, which channels to trust."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eitskin.frames.frames import Frames
+from eitskin.frames.homogeneous import Homogeneous, voltages_of
+from eitskin.skin.skin import Skin
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+GROUP = 12
+SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """``frames`` (voltages may be NaN) against ``transfer_ohm`` (n, n), for the electrodes that ``rows`` (m, 4) name.
+
+    ``trusted`` (m,): channels that no earlier check has found unusable. ``magnitude``: signs are not known.
+    ``prediction`` is the healthy skin's; ``transfer_ohm`` differs from its own where electrodes are joined.
+    """
+
+    frames: Frames
+    skin: Skin | None
+    prediction: Homogeneous
+    transfer_ohm: FloatArray
+    rows: IntArray
+    trusted: BoolArray
+    magnitude: bool = False
+
+    @property
+    def n_electrodes(self) -> int:
+        """The number of electrodes."""
+        return self.frames.protocol.n_electrodes
+
+    @property
+    def reference(self) -> FloatArray:
+        """The mean quiet frame (m,), 0 where it is not finite."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return np.asarray(np.nan_to_num(self.frames.reference_voltage_v.mean(axis=0), posinf=0.0, neginf=0.0))
+
+    @property
+    def predicted(self) -> FloatArray:
+        """The homogeneous frame (m,) per ampere."""
+        return voltages_of(self.transfer_ohm, self.rows)
+
+    @property
+    def joined(self) -> bool:
+        """Whether two electrodes were found joined, so that single channels are known only roughly."""
+        return self.transfer_ohm is not self.prediction.transfer_ohm
+
+    def expected(self) -> FloatArray:
+        """The homogeneous frame (m,) as these channels would measure it, in volts: see ``calibrated``."""
+        return calibrated(self.reference, self.predicted, self.trusted)
+
+    def channel(self, number: int) -> str:
+        """"channel 17 [1, 2, 8, 9]"."""
+        return f"channel {number} {self.rows[number].tolist()}"
+
+
+def strength_groups(size: FloatArray, usable: BoolArray) -> list[IntArray]:
+    """The ``usable`` channels (m,) sorted by ``size`` (m,) in groups of at least GROUP, never parting equal sizes.
+
+    On a round skin a group is made of channels that symmetry makes equal.
+    """
+    order = np.flatnonzero(usable)[np.argsort(size[usable], kind="stable")]
+    cuts = [0]
+    for k in range(1, len(order)):
+        apart = size[order[k]] > size[order[k - 1]] * (1 + SAME)
+        if k - cuts[-1] >= GROUP and len(order) - k >= GROUP and apart:
+            cuts.append(k)
+    return [order[a:b] for a, b in pairwise([*cuts, len(order)]) if b > a]
+
+
+def calibrated(measured: FloatArray, predicted: FloatArray, trusted: BoolArray) -> FloatArray:
+    """``predicted`` (m,) scaled to ``measured`` (m,) by robust ratios, so that only single channels stand out.
+
+    The ratio of a group of like channels (``strength_groups``) is its median of measured / predicted over ``trusted``
+    channels; between groups it is interpolated over log |predicted|. It takes up what a real tank does to near and far.
+    """
+    size = np.abs(predicted)
+    usable = trusted & (size > SAME * size.max(initial=0.0))
+    if usable.sum() < GROUP:
+        usable = size > 0
+    groups = strength_groups(size, usable)
+    if not groups:
+        return np.zeros_like(predicted)
+    middles = [float(np.median(np.log(size[group]))) for group in groups]
+    ratios = [float(np.median(measured[group] / predicted[group])) for group in groups]
+    return np.asarray(predicted * np.interp(np.log(np.maximum(size, 1e-300)), middles, ratios))
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square; 0 for none."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
+
+
+def robust_spread(values: FloatArray) -> float:
+    """1.4826 times the median distance from the median: the standard deviation where the values are normal."""
+    return float(1.4826 * np.median(np.abs(values - np.median(values)))) if values.size else 0.0
+
+
+def cosine(a: FloatArray, b: FloatArray) -> float:
+    """Cosine between two frames; 0 where one is all zero."""
+    norm = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / norm if norm > 0 else 0.0
+
+
+def correlation(a: FloatArray, b: FloatArray) -> float:
+    """Pearson's correlation; 0 where one is constant."""
+    return cosine(a - a.mean(), b - b.mean()) if a.size else 0.0
+
+
+def short_list(channels: Any, most: int = 8) -> str:
+    """Channel numbers for a sentence, cut after ``most``."""
+    shown = numbers(channels)
+    return ", ".join(map(str, shown[:most])) + (", ..." if len(shown) > most else "")
+
+
+def numbers(array: Any) -> list[int]:
+    """Channel numbers as plain integers, for evidence."""
+    return [int(value) for value in np.asarray(array).ravel()]

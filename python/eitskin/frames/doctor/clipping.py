@@ -1,0 +1,90 @@
+"""Saturated channels (many readings exactly at the greatest value) and stuck ones (quiet frames that never change)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from eitskin.frames.doctor.case import BoolArray, Case, FloatArray, numbers
+from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+
+LEAST_TIES = 4
+TIES_PER_USUAL = 4.0
+SAME = 1e-9
+LEAST_QUIET = 4
+
+
+def check_clipping(case: Case) -> tuple[Case, Outcome]:
+    """Name channels at a rail, in quiet frames or others, and channels that are stuck."""
+    frames = np.vstack([case.frames.reference_voltage_v, case.frames.voltage_v])
+    railed = at_rail(np.where(np.isfinite(frames), frames, 0.0))
+    quiet = len(case.frames.reference_voltage_v)
+    findings, trusted = [], case.trusted
+    channels = np.flatnonzero(railed.any(axis=0))
+    if len(channels):
+        names = [case.frames.frame_name[k] for k in np.flatnonzero(railed[quiet:].any(axis=1))]
+        levels = sorted({float(value) for value in frames[railed]})
+        findings.append(
+            Finding(
+                "saturated",
+                FAULT,
+                f"{len(channels)} channel(s) stand at a rail: lower the gain or the current",
+                {
+                    "channels": numbers(channels),
+                    "rail_v": [levels[0]] if levels[-1] - levels[0] < 1e-6 else [levels[0], levels[-1]],
+                    "readings": int(railed.sum()),
+                    "in_quiet_frames": int(railed[:quiet].sum()),
+                    "frames": names,
+                },
+                channel_remedy(case, channels),
+            )
+        )
+        trusted = trusted & ~railed[:quiet].any(axis=0)
+    stuck = _stuck(case.frames.reference_voltage_v) & ~railed.any(axis=0)
+    if stuck.any():
+        findings.append(
+            Finding(
+                "stuck",
+                FAULT,
+                f"{int(stuck.sum())} channel(s) read exactly the same in all {quiet} quiet frames while others vary",
+                {"channels": numbers(np.flatnonzero(stuck))},
+                channel_remedy(case, np.flatnonzero(stuck)),
+            )
+        )
+        trusted = trusted & ~stuck
+    return replace(case, trusted=trusted), Outcome(tuple(findings))
+
+
+def at_rail(frames: FloatArray) -> BoolArray:
+    """Which readings (f, m) stand exactly at the greatest or the least value, where far more do than at any other.
+
+    A rail is a value in the outer half of the range of magnitudes that at least LEAST_TIES readings share, and
+    TIES_PER_USUAL times as many as share a usual value of that half; equal readings of a noiseless or coarsely
+    digitised frame are no rail.
+    """
+    found = np.zeros(frames.shape, dtype=bool)
+    top = float(np.abs(frames).max(initial=0.0))
+    if top == 0:
+        return found
+    for side in (1.0, -1.0):
+        values = side * frames
+        limit = float(values.max())
+        if limit < top / 2:
+            continue
+        hits = values >= limit - SAME * top
+        rest = values[(values > top / 2) & ~hits]
+        usual = rest.size / max(len(np.unique(np.round(rest / (SAME * top)))), 1) if rest.size else 1.0
+        channels = int(hits.any(axis=0).sum())
+        if hits.sum() >= max(LEAST_TIES, TIES_PER_USUAL * usual) and (rest.size or channels < frames.shape[1]):
+            found |= hits
+    return found
+
+
+def _stuck(quiet: FloatArray) -> BoolArray:
+    """Channels (m,) without any change over at least LEAST_QUIET quiet frames, where most channels do change."""
+    if len(quiet) < LEAST_QUIET:
+        return np.zeros(quiet.shape[1], dtype=bool)
+    still = np.ptp(np.nan_to_num(quiet), axis=0) == 0
+    return still if still.mean() < 0.5 else np.zeros_like(still)

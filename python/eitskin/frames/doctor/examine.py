@@ -1,0 +1,104 @@
+"""The examination: every check in its turn, each relying only on channels that the earlier ones left trusted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from eitskin.frames.doctor.case import Case
+from eitskin.frames.doctor.clipping import check_clipping
+from eitskin.frames.doctor.finite import check_finite
+from eitskin.frames.doctor.gain import check_gain, check_resemblance, check_unit
+from eitskin.frames.doctor.noise import check_noise
+from eitskin.frames.doctor.numbering import check_numbering
+from eitskin.frames.doctor.order import check_flips, check_frames, check_sign, choose_order
+from eitskin.frames.doctor.orientation import check_orientation
+from eitskin.frames.doctor.reciprocity import check_reciprocity
+from eitskin.frames.doctor.remedy import combined_remedy, names_numbers
+from eitskin.frames.doctor.report import Outcome, Report
+from eitskin.frames.doctor.subject import Subject
+from eitskin.frames.doctor.swaps import check_swaps
+from eitskin.frames.doctor.wiring import check_lost, check_wiring
+from eitskin.frames.frames import Frames
+from eitskin.frames.homogeneous import homogeneous
+
+RENUMBER_FIRST = (
+    "how to mend what has an electrode's or a channel's number here: renumber by import first, then examine again"
+)
+
+
+def examine(subject: Subject) -> Report:
+    """What is wrong with ``subject``, with evidence and remedy; see docs/import-and-doctor.md for every check.
+
+    Raises:
+        UsageError: the skin has another number of electrodes than the frames.
+        MissingExtraError: the skin is no disk and the extra ``model`` is not installed.
+    """
+    return examine_case(subject)[0]
+
+
+def examine_case(subject: Subject) -> tuple[Report, Case]:
+    """As ``examine``, with the case as the checks left it (for the picture)."""
+    cases: list[Case] = []
+    finite = Outcome()
+    for _, frames in subject.readings:
+        case, outcome = check_finite(_case(frames, subject))
+        finite = finite if cases else outcome
+        cases.append(case)
+    outcomes = [finite]
+    orders = tuple(order for order, _ in subject.readings)
+    if finite.findings and finite.findings[-1].name == "no-signal":
+        return _report(subject, cases[0], outcomes), cases[0]
+    chosen = choose_order(orders, tuple(cases), subject.given)
+    case, numbering = check_numbering(cases[chosen.best])
+    case, swaps = check_swaps(case)
+    outcomes += [chosen.outcome, replace(numbering, untold=()), swaps, check_frames(case)]
+    case, sign = check_sign(case)
+    case, clipping = check_clipping(case)
+    case, wiring = check_wiring(case)
+    if case.joined:
+        untold = Outcome(untold=("gains, single channels and numbering: part the joined electrodes first",))
+        outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case), untold]
+        return _report(subject, case, outcomes), case
+    resemblance = check_resemblance(case)
+    if resemblance.findings:
+        outcomes += [clipping, resemblance, check_reciprocity(case), check_noise(case)]
+        return _report(subject, case, outcomes), case
+    case, flips = check_flips(case)
+    lost = check_lost(case)
+    case, gain = check_gain(case)
+    outcomes += [sign, clipping, wiring, lost, flips, gain, resemblance, check_reciprocity(case), check_noise(case)]
+    outcomes += [check_orientation(case, numbering.untold), check_unit(case, subject.unit_known)]
+    return _report(subject, case, outcomes), case
+
+
+def _case(frames: Frames, subject: Subject) -> Case:
+    rows = np.asarray(frames.protocol.drive_measure, dtype=np.int64)
+    prediction = homogeneous(subject.skin, frames.protocol.n_electrodes)
+    return Case(frames, subject.skin, prediction, prediction.transfer_ohm, rows, np.ones(len(rows), dtype=bool))
+
+
+def _report(subject: Subject, case: Case, outcomes: list[Outcome]) -> Report:
+    findings = tuple(finding for outcome in outcomes for finding in outcome.findings)
+    untold = (*subject.remarks, *(text for outcome in outcomes for text in outcome.untold))
+    if any(finding.name == "numbering" for finding in findings):
+        if any(names_numbers(finding.mend) for finding in findings):
+            untold = (*untold, RENUMBER_FIRST)
+        findings = tuple(replace(f, mend="") if names_numbers(f.mend) else f for f in findings)
+    frames = case.frames
+    described = (
+        f"{frames.n_frames} frame(s) of {len(case.rows)} channels, {len(frames.reference_voltage_v)} quiet, "
+        f"{frames.protocol.n_electrodes} electrodes; held against {case.prediction.source}"
+    )
+    measured: dict[str, object] = {}
+    for outcome in outcomes:
+        measured |= outcome.measured
+    return Report(
+        source=subject.source,
+        subject=described,
+        findings=findings,
+        untold=untold,
+        measured=measured,
+        mend=combined_remedy(case, (finding.mend for finding in findings if finding.mend)),
+    )

@@ -1,0 +1,39 @@
+"""Are all voltages numbers, and is there a signal at all?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from eitskin.frames.doctor.case import Case, numbers, rms
+from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+
+
+def check_finite(case: Case) -> tuple[Case, Outcome]:
+    """NaN and Inf by channel and frame, and a reference that is all zero; such channels are no longer trusted."""
+    quiet, frames = case.frames.reference_voltage_v, case.frames.voltage_v
+    bad_quiet, bad = ~np.isfinite(quiet), ~np.isfinite(frames)
+    channels = np.flatnonzero(bad_quiet.any(axis=0) | bad.any(axis=0))
+    findings = []
+    if len(channels):
+        names = [case.frames.frame_name[k] for k in np.flatnonzero(bad.any(axis=1))]
+        findings.append(
+            Finding(
+                "not-finite",
+                FAULT,
+                f"{int(bad_quiet.sum() + bad.sum())} voltages are NaN or Inf, in {len(channels)} channel(s)",
+                {
+                    "channels": numbers(channels),
+                    "frames": names,
+                    "quiet_frames": numbers(np.flatnonzero(bad_quiet.any(axis=1))),
+                },
+                channel_remedy(case, channels) if len(channels) <= len(case.rows) // 4 else "",
+            )
+        )
+    trusted = case.trusted & ~bad_quiet.any(axis=0)
+    if rms(case.reference[trusted]) == 0:
+        text = "the reference frame is zero everywhere: no current, or a wrong array"
+        findings.append(Finding("no-signal", FAULT, text))
+    return replace(case, trusted=trusted), Outcome(tuple(findings))

@@ -1,0 +1,161 @@
+"""The gain of each channel: how the reference compares with the homogeneous frame, by channel and by pair."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from eitskin.frames.doctor.case import (
+    BoolArray,
+    Case,
+    FloatArray,
+    correlation,
+    numbers,
+    rms,
+    robust_spread,
+    short_list,
+)
+from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
+
+WEAK_PER_RMS = 0.02
+OUTLIER = 0.25
+OUTLIER_SPREADS = 6.0
+SPREAD_NOTE = 0.035
+SPREAD_FAULT = 0.08
+PAIR_NOTE = 0.06
+PAIR_FAULT = 0.15
+PAIR_AGREE = 0.75
+PAIR_SPREADS = 3.0
+MANY = 0.5
+FOREIGN_BELOW = 0.9
+UNIT_OFF = 30.0
+
+
+def channel_gains(case: Case) -> tuple[FloatArray, BoolArray]:
+    """Reference over expected (m,), and which channels (m,) are trusted and strong enough for it to mean anything."""
+    expected = case.expected()
+    strong = case.trusted & (np.abs(expected) > WEAK_PER_RMS * rms(expected))
+    return np.divide(case.reference, expected, out=np.ones_like(expected), where=strong), strong
+
+
+def outliers(case: Case) -> BoolArray:
+    """Channels (m,) whose gain is off by more than OUTLIER, or OUTLIER_SPREADS times the usual spread."""
+    gain, strong = channel_gains(case)
+    limit = max(OUTLIER, OUTLIER_SPREADS * robust_spread(gain[strong]))
+    return np.asarray(strong & (np.abs(gain - 1) > limit))
+
+
+def check_resemblance(case: Case) -> Outcome:
+    """Whether the reference looks like a homogeneous skin at all."""
+    measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
+    reached = correlation(np.abs(measured), np.abs(predicted))
+    numbers_ = {"reference_correlation": round(reached, 4)}
+    if reached >= FOREIGN_BELOW or rms(measured) == 0:
+        return Outcome(measured=numbers_)
+    finding = Finding(
+        "unlike-a-homogeneous-skin",
+        FAULT,
+        "the reference does not look like a homogeneous skin in any order known here: another protocol, outline or "
+        "wiring, or the frame was not quiet; if the source has a table of its rows, import it with that",
+        {"correlation": round(reached, 4), "least": FOREIGN_BELOW},
+    )
+    return Outcome((finding,), measured=numbers_)
+
+
+def check_gain(case: Case) -> tuple[Case, Outcome]:
+    """Single channels that are off, drive or measuring pairs that are off, and the spread of all.
+
+    The gain of a channel is its reference over the expected homogeneous value; the spread is 1.4826 times the median
+    distance from the median.
+    """
+    gain, strong = channel_gains(case)
+    if strong.sum() < 4:
+        return case, Outcome(untold=("gains: too few channels are left",))
+    spread = robust_spread(gain[strong])
+    measured = {"gain_spread": round(spread, 4)}
+    findings = _pair_findings(case, gain, strong, spread)
+    off = outliers(case)
+    off_alone = off & ~_of_pairs(case, findings)
+    if off_alone.any() and off_alone.sum() < MANY * strong.sum():
+        channels = np.flatnonzero(off_alone)
+        worst = int(channels[np.argmax(np.abs(gain[channels] - 1))])
+        findings.append(
+            Finding(
+                "channel-gain",
+                FAULT,
+                f"{len(channels)} channel(s) are far off: {short_list(channels)}; worst {case.channel(worst)}",
+                {"channels": numbers(channels), "worst_gain": round(float(gain[worst]), 4), "spread": round(spread, 4)},
+                channel_remedy(case, channels),
+            )
+        )
+    if spread >= SPREAD_NOTE:
+        fault = spread >= SPREAD_FAULT
+        findings.append(
+            Finding(
+                "gain-spread",
+                FAULT if fault else NOTE,
+                f"channels have gains of their own, spread {100 * spread:.1f} %: "
+                + ("normalised differences are needed" if fault else "normalised differences may help"),
+                {"spread": round(spread, 4), "note_from": SPREAD_NOTE, "fault_from": SPREAD_FAULT},
+                "--equalise" if fault else "",
+            )
+        )
+    return replace(case, trusted=case.trusted & ~off), Outcome(tuple(findings), measured=measured)
+
+
+def check_unit(case: Case, unit_known: bool) -> Outcome:
+    """Whether the numbers can be volts, where the skin's conductivity and the current are known."""
+    scale = float(np.median(np.abs(case.reference[case.trusted]))) if case.trusted.any() else 0.0
+    predicted = float(np.median(np.abs(case.predicted[case.trusted]))) * case.frames.protocol.current_a
+    if case.skin is None:
+        return Outcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
+    if scale == 0 or predicted == 0:
+        return Outcome()
+    ratio = scale / predicted
+    measured = {"reference_per_predicted": float(f"{ratio:.4g}")}
+    if 1 / UNIT_OFF < ratio < UNIT_OFF:
+        return Outcome(measured=measured)
+    said = "the numbers are said to be volts" if unit_known else "the source's unit is not known"
+    text = (
+        f"the reference is {ratio:.3g} times what skin {case.skin.name!r} gives at "
+        f"{case.frames.protocol.current_a:g} A; {said}: check unit, gain, current and conductivity"
+    )
+    return Outcome((Finding("unit", NOTE, text, measured, ""),), measured=measured)
+
+
+def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: float) -> list[Finding]:
+    """Drive and measuring pairs whose median gain is off while most of their channels agree about it."""
+    findings = []
+    for name, said, columns in (("drive", "driven by", [0, 1]), ("measure", "measured by", [2, 3])):
+        pairs = case.rows[:, columns]
+        for pair in np.unique(pairs, axis=0):
+            using = (pairs == pair).all(axis=1) & strong
+            if using.sum() < 4:
+                continue
+            middle = float(np.median(gain[using]))
+            if abs(middle - 1) < PAIR_NOTE or robust_spread(gain[using]) > PAIR_AGREE * abs(middle - 1):
+                continue
+            if abs(middle - 1) < PAIR_SPREADS * spread / np.sqrt(np.count_nonzero(using)):
+                continue
+            fault = abs(middle - 1) >= max(PAIR_FAULT, PAIR_SPREADS * spread)
+            findings.append(
+                Finding(
+                    f"{name}-pair-gain",
+                    FAULT if fault else NOTE,
+                    f"channels {said} pair {pair.tolist()} read {middle:.3g} of what the others do",
+                    {"pair": numbers(pair), "gain": round(middle, 4), "channels": numbers(np.flatnonzero(using))},
+                    "--equalise" if fault else "",
+                )
+            )
+    return findings
+
+
+def _of_pairs(case: Case, findings: list[Finding]) -> BoolArray:
+    """The channels (m,) that pair findings explain already."""
+    explained: Any = np.zeros(len(case.rows), dtype=bool)
+    for finding in findings:
+        explained[finding.evidence["channels"]] = True
+    return np.asarray(explained)

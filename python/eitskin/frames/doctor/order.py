@@ -1,0 +1,173 @@
+"""In which order do the channels stand, and with which sign? Each hypothesis is held against the homogeneous frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from eitskin.frames.doctor.case import Case, FloatArray, cosine, numbers, rms
+from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.doctor.subject import AS_GIVEN
+from eitskin.frames.doctor.swaps import likeness
+
+BETTER_BY = 0.1
+LIKELY = 0.9
+OPPOSITE_PER_RMS = 0.03
+MIXED_SHARE = 0.1
+UNLIKE = 0.5
+
+
+@dataclass(frozen=True)
+class OrderChoice:
+    """The order whose magnitudes follow the prediction best, and what the others reach."""
+
+    best: int
+    outcome: Outcome
+
+
+def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -> OrderChoice:
+    """Compare one case an order, by the correlation of |reference| with |homogeneous prediction| (signs left aside).
+
+    Where none reaches LIKELY, exchanged wires or a dead electrode may hide it: then what is reached without those is
+    compared. Another order than ``given`` is found where it is better by more than BETTER_BY and at least LIKELY.
+    """
+    reached = [likeness(case, allow_fault=False) for case in cases]
+    if max(reached) < LIKELY:
+        reached = [likeness(case, allow_fault=True) for case in cases]
+    best = int(np.argmax(reached))
+    evidence: dict[str, Any] = {name: round(value, 4) for name, value in zip(orders, reached, strict=True)}
+    measured: dict[str, Any] = {"order_correlation": evidence}
+    said = orders.index(given) if given in orders else -1
+    if said >= 0 and (best == said or reached[best] < max(reached[said] + BETTER_BY, LIKELY)):
+        return OrderChoice(said, Outcome(measured=measured))
+    why = "by their number" if said < 0 else "by correlation with the homogeneous frame"
+    named = "the order given" if given == AS_GIVEN else f"{given}"
+    finding = Finding(
+        "order",
+        FAULT,
+        f"{why} the channels stand in {orders[best]} order, not in {named}",
+        {"correlation": evidence},
+        f"--order {orders[best]}",
+    )
+    return OrderChoice(best, Outcome((finding,), measured=measured))
+
+
+def check_frames(case: Case) -> Outcome:
+    """Frames that are no small change of the reference: another quantity (imaginary parts, times), or another unit."""
+    likeness = np.array([cosine(frame[case.trusted], case.reference[case.trusted]) for frame in _finite_frames(case)])
+    odd = np.flatnonzero(likeness < UNLIKE)
+    if not len(odd):
+        return Outcome()
+    names = [case.frames.frame_name[k] for k in odd]
+    finding = Finding(
+        "frames-unlike-the-reference",
+        FAULT,
+        f"{len(odd)} frame(s) are nothing like the reference, first {names[0]!r}: imaginary parts or another quantity "
+        "among the columns? Choose with --columns and --complex-part, or --voltage",
+        {"frames": names, "cosine": [round(float(v), 4) for v in likeness[odd]]},
+    )
+    return Outcome((finding,))
+
+
+def check_sign(case: Case) -> tuple[Case, Outcome]:
+    """Reversed polarity, or magnitudes only; the case comes back with the signs mended.
+
+    Where the homogeneous frame has both signs, magnitudes show by having one. Where it has only one (adjacent
+    patterns), data of the other sign are reversed, or magnitudes; only a channel that crosses zero tells which.
+    """
+    measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
+    level = rms(measured)
+    if level == 0:
+        return case, Outcome()
+    limit = OPPOSITE_PER_RMS * level
+    energy = float((predicted**2).sum())
+    positive_share = float((predicted[predicted > 0] ** 2).sum()) / max(energy, 1e-300)
+    mixed = MIXED_SHARE < positive_share < 1 - MIXED_SHARE
+    alike = [frame for frame in _finite_frames(case)[:, case.trusted] if cosine(frame, measured) >= UNLIKE]
+    everything = np.concatenate([measured, *alike])
+    some_negative = bool((everything < -limit).any())
+    evidence: dict[str, Any] = {
+        "cosine_with_prediction": round(cosine(measured, predicted), 4),
+        "least_v": float(np.min(everything)),
+        "greatest_v": float(np.max(everything)),
+    }
+    if mixed and not (measured < -limit).any():
+        text = "all voltages are above 0 where the homogeneous frame has both signs: these are magnitudes"
+        finding = Finding("magnitude", FAULT, text, evidence, "--sign magnitude")
+        return signed_as_predicted(case), Outcome((finding,))
+    if cosine(measured, predicted) < 0:
+        if some_negative or mixed:
+            text = "every channel has the opposite sign: V+ and V- (or I+ and I-) are exchanged"
+            finding = Finding("reversed", FAULT, text, evidence, "--sign reversed")
+        else:
+            text = (
+                "all voltages are above 0 where the homogeneous frame is below 0: reversed polarity or magnitudes; no "
+                "channel crosses 0, so they cannot be told apart, and both options mend it alike"
+            )
+            finding = Finding("reversed-or-magnitude", FAULT, text, evidence, "--sign reversed")
+        return _negated(case), Outcome((finding,))
+    if not mixed and positive_share > 0.5 and not some_negative:
+        return case, Outcome(untold=("whether these are magnitudes: the homogeneous frame is above 0 everywhere, too",))
+    return case, Outcome()
+
+
+def check_flips(case: Case) -> tuple[Case, Outcome]:
+    """Single channels of the wrong sign, where the prediction is above a fifth of its rms."""
+    predicted, expected = case.predicted, case.expected()
+    ratio = np.divide(case.reference, expected, out=np.ones_like(expected), where=expected != 0)
+    wrong = case.trusted & (np.abs(predicted) > 0.2 * rms(predicted)) & (ratio < -0.5)
+    channels = numbers(np.flatnonzero(wrong))
+    if not channels or case.magnitude:
+        return case, Outcome()
+    drives = _whole_pairs(case, wrong, (0, 1)) | _whole_pairs(case, wrong, (2, 3))
+    about = f"; all of {', '.join(sorted(drives))}" if drives else ""
+    finding = Finding(
+        "flipped-channels",
+        FAULT,
+        f"{len(channels)} channel(s) have the wrong sign{about}",
+        {"channels": channels, "ratio_to_expected": round(float(np.median(ratio[channels])), 3)},
+        f"--flip-channels {','.join(map(str, channels))}",
+    )
+    sign = np.where(wrong, -1.0, 1.0)
+    frames = replace(
+        case.frames,
+        voltage_v=case.frames.voltage_v * sign,
+        reference_voltage_v=case.frames.reference_voltage_v * sign,
+    )
+    return replace(case, frames=frames), Outcome((finding,))
+
+
+def _finite_frames(case: Case) -> FloatArray:
+    return np.where(np.isfinite(case.frames.voltage_v), case.frames.voltage_v, 0.0)
+
+
+def _whole_pairs(case: Case, wrong: np.ndarray[Any, Any], columns: tuple[int, int]) -> set[str]:
+    """Names of the drive (or measuring) pairs whose every trusted channel is ``wrong``."""
+    what = "drive" if columns[0] == 0 else "measuring pair"
+    pairs = case.rows[:, columns]
+    found = set()
+    for pair in np.unique(pairs[wrong], axis=0):
+        using = (pairs == pair).all(axis=1) & case.trusted
+        if wrong[using].mean() > 0.8 and using.sum() > 2:
+            found.add(f"{what} {pair.tolist()}")
+    return found
+
+
+def _negated(case: Case) -> Case:
+    frames = replace(
+        case.frames, voltage_v=-case.frames.voltage_v, reference_voltage_v=-case.frames.reference_voltage_v
+    )
+    return replace(case, frames=frames)
+
+
+def signed_as_predicted(case: Case) -> Case:
+    """The case with magnitudes of its voltages under the signs of the prediction."""
+    sign = np.where(case.predicted < 0, -1.0, 1.0)
+    frames = replace(
+        case.frames,
+        voltage_v=np.abs(case.frames.voltage_v) * sign,
+        reference_voltage_v=np.abs(case.frames.reference_voltage_v) * sign,
+    )
+    return replace(case, frames=frames, magnitude=True)

@@ -1,0 +1,108 @@
+"""The doctor's picture: reference against expectation, gains by pair, reciprocity, noise. Needs matplotlib."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eitskin.errors import FileError, missing_extra
+from eitskin.fileio import write_beside
+from eitskin.frames.doctor.case import Case
+from eitskin.frames.doctor.gain import channel_gains
+from eitskin.frames.doctor.noise import LEAST_QUIET, channel_noise
+from eitskin.frames.doctor.report import FAULT, Report
+
+MEASURED, EXPECTED, BAD = "#1f5f99", "#b0b7bd", "#c2410c"
+GAIN_SPAN = 0.3
+
+
+def draw(path: str | Path, report: Report, case: Case) -> None:
+    """Write the picture of an examined ``case`` to ``path`` (.png, .pdf, .svg).
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written, or its suffix is no picture's.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise missing_extra("plot", "matplotlib") from None
+    figure = Figure(figsize=(11, 7.5), layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    if Path(path).suffix.lower().lstrip(".") not in canvas.get_supported_filetypes():
+        raise FileError(f"{path}: not a picture's suffix; use .png, .pdf or .svg")
+    axes = figure.subplots(2, 2)
+    _reference(axes[0, 0], case)
+    _gains(figure, axes[0, 1], case)
+    _reciprocity(axes[1, 0], case)
+    _noise_or_change(axes[1, 1], case)
+    for panel in axes.ravel():
+        panel.spines[["top", "right"]].set_visible(False)
+    faults = [finding.name for finding in report.findings if finding.severity == FAULT]
+    verdict = "nothing must be mended" if not faults else "to mend: " + ", ".join(dict.fromkeys(faults))
+    figure.suptitle(f"{Path(report.source).name}: {verdict}", x=0.01, ha="left", fontsize=11)
+    with write_beside(path) as temporary:
+        figure.savefig(temporary, dpi=110)
+
+
+def _reference(panel: Any, case: Case) -> None:
+    channels = np.arange(len(case.rows))
+    off = ~case.trusted
+    panel.plot(channels, 1e3 * case.expected(), color=EXPECTED, linewidth=2.5, label="expected of a homogeneous skin")
+    panel.plot(channels, 1e3 * case.reference, color=MEASURED, linewidth=0.9, label="measured")
+    if off.any():
+        panel.plot(channels[off], 1e3 * case.reference[off], ".", color=BAD, markersize=6, label="not trusted")
+    panel.set(xlabel="channel (order and sign mended)", ylabel="mV", title="Mean quiet frame")
+    low, high = panel.get_ylim()
+    panel.set_ylim(low, high + 0.2 * (high - low))
+    panel.legend(frameon=False, fontsize=8, loc="upper right", ncols=2)
+
+
+def _gains(figure: Any, panel: Any, case: Case) -> None:
+    gain, strong = channel_gains(case)
+    drives, drive = np.unique(case.rows[:, :2], axis=0, return_inverse=True)
+    pairs, pair = np.unique(case.rows[:, 2:], axis=0, return_inverse=True)
+    grid = np.full((len(drives), len(pairs)), np.nan)
+    grid[drive.ravel(), pair.ravel()] = np.where(strong, gain - 1, np.nan)
+    left_out = np.full(grid.shape, np.nan)
+    left_out[drive.ravel(), pair.ravel()] = np.where(case.trusted, np.nan, 1.0)
+    shown = panel.imshow(100 * grid, cmap="RdBu_r", vmin=-100 * GAIN_SPAN, vmax=100 * GAIN_SPAN, origin="lower")
+    panel.imshow(left_out, cmap="Greys", vmin=0, vmax=2, origin="lower")
+    step = max(1, len(drives) // 8)
+    panel.set_yticks(range(0, len(drives), step), [f"{a},{b}" for a, b in drives[::step]], fontsize=8)
+    step = max(1, len(pairs) // 8)
+    panel.set_xticks(range(0, len(pairs), step), [f"{a},{b}" for a, b in pairs[::step]], fontsize=8)
+    panel.set(xlabel="measuring pair", ylabel="drive pair", title="Gain of each channel (grey: not trusted)")
+    figure.colorbar(shown, ax=panel, label="% from expected")
+
+
+def _reciprocity(panel: Any, case: Case) -> None:
+    pairs = case.frames.protocol.reciprocal_pairs()
+    both = pairs.second >= 0
+    first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
+    panel.set(xlabel="voltage of a channel, mV", ylabel="mV", title="Reciprocity: difference within each pair")
+    if not len(first):
+        panel.text(0.5, 0.5, "no reciprocal channels", transform=panel.transAxes, ha="center")
+        return
+    reference = 1e3 * case.reference
+    difference = reference[first] - sign * reference[second]
+    good = case.trusted[first] & case.trusted[second]
+    panel.axhline(0, color=EXPECTED, linewidth=1)
+    panel.plot(reference[first][good], difference[good], ".", color=MEASURED, markersize=5)
+    panel.plot(reference[first][~good], difference[~good], ".", color=BAD, markersize=6)
+
+
+def _noise_or_change(panel: Any, case: Case) -> None:
+    quiet = case.frames.reference_voltage_v
+    if len(quiet) >= LEAST_QUIET:
+        noise = 1e6 * channel_noise(np.nan_to_num(quiet))
+        panel.semilogy(np.maximum(noise, 1e-6), ".", color=MEASURED, markersize=4)
+        panel.axhline(float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0, color=EXPECTED)
+        panel.set(xlabel="channel", ylabel="µV", title=f"Noise over {len(quiet)} quiet frames (line: median)")
+        return
+    panel.set(xlabel="channel", ylabel="mV", title="Change of each frame from the quiet one")
+    for frame in case.frames.voltage_v[:20]:
+        panel.plot(1e3 * (frame - case.reference), linewidth=0.7)

@@ -1,0 +1,74 @@
+"""Reciprocity: exchanging the drive and the measuring pair must not change the voltage, whatever is inside the skin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eitskin.frames.doctor.case import Case, rms, short_list
+from eitskin.frames.doctor.gain import channel_gains
+from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
+
+PAIR_FLOOR_PER_RMS = 0.1
+PAIR_OFF = 0.25
+PAIR_TIMES_USUAL = 6.0
+RMS_NOTE = 0.05
+RMS_FAULT = 0.08
+WORST = 5
+
+
+def check_reciprocity(case: Case) -> Outcome:
+    """Reciprocity error of each pair |Vi - s Vj| / max(mean(|Vi|, |Vj|), 0.1 rms), and of all: rms(Vi - s Vj) / rms(V).
+
+    The channel of a bad pair whose gain is farther from 1 is named, where the prediction can tell.
+    """
+    pairs = case.frames.protocol.reciprocal_pairs()
+    both = (pairs.second >= 0) & case.trusted[pairs.first] & case.trusted[np.maximum(pairs.second, 0)]
+    first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
+    if not len(first):
+        return Outcome(untold=("reciprocity: the protocol has no two channels of one voltage",))
+    reference = case.reference
+    level = rms(reference[case.trusted])
+    if level == 0:
+        return Outcome()
+    difference = reference[first] - sign * reference[second]
+    size = (np.abs(reference[first]) + np.abs(reference[second])) / 2
+    error = np.abs(difference) / np.maximum(size, PAIR_FLOOR_PER_RMS * level)
+    overall, usual = rms(difference) / level, float(np.median(error))
+    order = np.argsort(-error, kind="stable")
+    gain, _ = channel_gains(case)
+    worst = {f"{first[k]}/{second[k]}": round(float(error[k]), 4) for k in order[:WORST]}
+    measured = {
+        "reciprocity_rms": round(overall, 4),
+        "reciprocity_median": round(usual, 4),
+        "reciprocity_worst": round(float(error[order[0]]), 4),
+    }
+    bad = [k for k in order if error[k] > max(PAIR_OFF, PAIR_TIMES_USUAL * usual)]
+    findings = []
+    if bad:
+        off = [int(first[k] if abs(gain[first[k]] - 1) > abs(gain[second[k]] - 1) else second[k]) for k in bad]
+        findings.append(
+            Finding(
+                "reciprocity-pairs",
+                FAULT,
+                f"{len(bad)} pair(s) of channels that must agree do not; off in each is channel {short_list(off)}",
+                {
+                    "errors": {f"{first[k]}/{second[k]}": round(float(error[k]), 4) for k in bad},
+                    "off": off,
+                    "median_of_all": round(usual, 4),
+                },
+                channel_remedy(case, off),
+            )
+        )
+    if overall >= RMS_NOTE:
+        fault = overall >= RMS_FAULT
+        findings.append(
+            Finding(
+                "reciprocity",
+                FAULT if fault else NOTE,
+                f"reciprocal channels differ by {100 * overall:.1f} % of the rms voltage"
+                + ("; measured at different times, gains or currents" if fault else ""),
+                {"rms": round(overall, 4), "worst_pairs": worst, "note_from": RMS_NOTE, "fault_from": RMS_FAULT},
+            )
+        )
+    return Outcome(tuple(findings), measured=measured)

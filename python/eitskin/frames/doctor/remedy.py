@@ -1,0 +1,55 @@
+"""Which options of ``eitskin import`` mend bad channels, and how the remedies of several findings become one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from eitskin.frames.doctor.case import Case, numbers
+from eitskin.frames.mend import partners
+
+CHANNEL_LISTS = ("--flip-channels", "--impute-channels", "--drop-channels", "--drop-electrodes")
+
+
+def channel_remedy(case: Case, channels: Any) -> str:
+    """Fill ``channels`` from their reciprocals where those are trusted, and leave out the others."""
+    bad = set(numbers(channels))
+    partner = partners(case.rows, case.n_electrodes)
+    fill = sorted(k for k in bad if k in partner and partner[k][0] not in bad and case.trusted[partner[k][0]])
+    leave = sorted(bad - set(fill))
+    return _joined({"--impute-channels": fill, "--drop-channels": leave})
+
+
+def names_numbers(remedy: str) -> bool:
+    """Whether ``remedy`` names channels or electrodes, which another numbering would change."""
+    return any(option in remedy for option in (*CHANNEL_LISTS, "--swap"))
+
+
+def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
+    """One set of options from those of several findings: lists are united, and no channel is filled from a bad one."""
+    lists: dict[str, set[int]] = {option: set() for option in CHANNEL_LISTS}
+    others: list[str] = []
+    for remedy in remedies:
+        words = remedy.split()
+        while words:
+            option = words.pop(0)
+            value = words.pop(0) if words and not words[0].startswith("--") else ""
+            if option in lists:
+                lists[option] |= {int(number) for number in value.split(",")}
+            elif (said := f"{option} {value}".strip()) not in others:
+                others.append(said)
+    gone = {
+        row for row, electrodes in enumerate(case.rows.tolist()) if lists["--drop-electrodes"].intersection(electrodes)
+    }
+    lists["--drop-channels"] -= gone
+    lists["--impute-channels"] -= gone | lists["--drop-channels"]
+    partner, bad = partners(case.rows, case.n_electrodes), lists["--impute-channels"] | lists["--drop-channels"]
+    hopeless = {k for k in lists["--impute-channels"] if partner.get(k, (k, 1))[0] in bad}
+    lists["--drop-channels"] |= hopeless
+    lists["--impute-channels"] -= hopeless
+    listed = _joined({option: sorted(values) for option, values in lists.items()})
+    return " ".join([*others, *([listed] if listed else [])])
+
+
+def _joined(lists: dict[str, list[int]]) -> str:
+    return " ".join(f"{option} {','.join(map(str, values))}" for option, values in lists.items() if values)

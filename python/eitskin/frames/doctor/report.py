@@ -1,0 +1,113 @@
+"""What the doctor says: findings with evidence and remedy, what could not be told, and the numbers measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+FAULT = "fault"
+NOTE = "note"
+EXIT_FAULT = 11
+SHOWN = 8
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found. ``name`` is stable for programs; ``severity`` FAULT must be mended, NOTE need not.
+
+    ``evidence`` holds the numbers that it rests on, ``mend`` the options of ``eitskin import`` that mend it ("" where
+    only the hardware can be mended).
+    """
+
+    name: str
+    severity: str
+    text: str
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+    mend: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one check returns: ``findings``, ``untold`` what it could not tell and why, ``measured`` numbers by name."""
+
+    findings: tuple[Finding, ...] = ()
+    untold: tuple[str, ...] = ()
+    measured: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Report:
+    """The whole examination of ``source``; ``subject`` says in words what was examined.
+
+    ``mend``: the options of ``eitskin import`` that together mend all that can be mended.
+    """
+
+    source: str
+    subject: str
+    findings: tuple[Finding, ...]
+    untold: tuple[str, ...]
+    measured: Mapping[str, Any]
+    mend: str = ""
+
+    @property
+    def healthy(self) -> bool:
+        """Whether nothing must be mended."""
+        return not any(finding.severity == FAULT for finding in self.findings)
+
+    @property
+    def exit_code(self) -> int:
+        """0 where healthy, else EXIT_FAULT."""
+        return 0 if self.healthy else EXIT_FAULT
+
+    def as_table(self) -> dict[str, Any]:
+        """The report as JSON values."""
+        return {
+            "source": self.source,
+            "subject": self.subject,
+            "healthy": self.healthy,
+            "findings": [
+                {
+                    "name": finding.name,
+                    "severity": finding.severity,
+                    "text": finding.text,
+                    "evidence": dict(finding.evidence),
+                    "mend": finding.mend,
+                }
+                for finding in self.findings
+            ],
+            "untold": list(self.untold),
+            "measured": dict(self.measured),
+            "mend": self.mend,
+        }
+
+    def lines(self) -> list[str]:
+        """The report as lines of text."""
+        lines = [f"{self.source}: {self.subject}"]
+        for finding in self.findings:
+            lines.append(f"  {finding.severity.upper():5} {finding.name}: {finding.text}")
+            if finding.evidence:
+                lines.append("        evidence: " + ", ".join(f"{k} {_shown(v)}" for k, v in finding.evidence.items()))
+            if finding.mend:
+                lines.append(f"        mend: eitskin import ... {finding.mend}")
+        lines.extend(f"  not told: {text}" for text in self.untold)
+        if self.measured:
+            lines.append("  measured: " + ", ".join(f"{k} {_shown(v)}" for k, v in self.measured.items()))
+        faults = sum(finding.severity == FAULT for finding in self.findings)
+        notes = len(self.findings) - faults
+        counted = f"{faults} fault{'s' * (faults != 1)}, {notes} note{'s' * (notes != 1)}"
+        lines.append(f"  {counted}: " + ("nothing must be mended" if self.healthy else "mend these before imaging"))
+        if self.mend:
+            lines.append(f"  all in one: eitskin import {self.source} -o OUT.npz ... {self.mend}")
+        return lines
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, Mapping):
+        return "(" + ", ".join(f"{k} {_shown(v)}" for k, v in list(value.items())[:SHOWN]) + ")"
+    if isinstance(value, (list, tuple)):
+        shown = ", ".join(_shown(entry) for entry in value[:SHOWN])
+        return f"[{shown}{', ...' if len(value) > SHOWN else ''}]"
+    return str(value)

@@ -1,0 +1,85 @@
+"""What the doctor examines: a frames file, or a source read under each order that its channels could stand in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from eitskin.errors import EitskinError, FrameError, UsageError
+from eitskin.frames.frames import Frames, load_frames
+from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.orders import ORDERS, match_rows, source_table
+from eitskin.frames.source import is_frames_file
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+
+AS_GIVEN = "as given"
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """``readings``: (order, frames), the channels in the protocol's order if the source stands in that order.
+
+    ``given``: the order that was said. ``remarks``: what had to be assumed to read it. ``unit_known``: whether the
+    numbers are said to be volts.
+    """
+
+    source: str
+    given: str
+    readings: tuple[tuple[str, Frames], ...]
+    skin: Skin | None
+    remarks: tuple[str, ...] = ()
+    unit_known: bool = True
+
+
+def subject_from_frames(frames: Frames, skin: Skin | None, source: str = "frames") -> Subject:
+    """``frames`` as they are, and as they would be if their channels really stood in rotating order."""
+    readings = [(AS_GIVEN, frames)]
+    wanted = np.asarray(frames.protocol.drive_measure, dtype=np.int64)
+    rotating = source_table("rotating", frames.protocol)
+    if not np.array_equal(rotating, wanted):
+        index = match_rows(rotating, wanted).index
+        moved = replace(
+            frames, voltage_v=frames.voltage_v[:, index], reference_voltage_v=frames.reference_voltage_v[:, index]
+        )
+        readings.append(("rotating", moved))
+    unit_known = str(frames.meta.get("unit", "V")) == "V"
+    return Subject(source, AS_GIVEN, tuple(readings), skin, (), unit_known)
+
+
+def subject_from_source(
+    path: str | Path,
+    options: ImportOptions,
+    protocol: Protocol | None,
+    skin: Skin | None,
+    n_electrodes: int | None = None,
+) -> Subject:
+    """Any file that ``import`` reads, mended as ``options`` say, and a frames file as ``load_frames`` reads it.
+
+    Unlike import, NaN and Inf pass, and where no quiet frames are named the first frame is taken.
+
+    Raises:
+        EitskinError: as ``import_frames``.
+    """
+    if is_frames_file(path) and options == ImportOptions():
+        return subject_from_frames(load_frames(path, allow_nonfinite=True), skin, str(path))
+    readings: list[tuple[str, Frames]] = []
+    refused: EitskinError | None = None
+    own_table = options.source.protocol_table is not None or options.table_file is not None
+    for order in dict.fromkeys((options.order, *(() if own_table else ORDERS))):
+        try:
+            frames = import_frames(path, replace(options, order=order), protocol, skin, n_electrodes, lenient=True)
+        except (FrameError, UsageError) as error:
+            if order == options.order and isinstance(error, UsageError):
+                raise
+            refused = refused or error
+            continue
+        readings.append((order, frames))
+    if not readings:
+        raise refused if refused is not None else FrameError(f"{path}: no order fits")
+    remarks = []
+    if "assumed" in readings[0][1].meta:
+        remarks.append(str(readings[0][1].meta["assumed"]))
+    return Subject(str(path), options.order, tuple(readings), skin, tuple(remarks), options.source.scale is not None)

@@ -1,0 +1,100 @@
+"""Exchanged wires: which renaming of electrodes makes the reference look like a homogeneous frame?
+
+Exchanges are tried pair by pair by the misfit of magnitudes, the best one kept, again and again. The whole is accepted
+only if it leaves little, at most half of what there was, and less than any short circuit leaves. Three electrodes in a
+ring (each in the place of the next) may be too far from the start for this search.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from eitskin.frames.doctor.case import Case
+from eitskin.frames.doctor.misfit import best_joined, misfit, misfits
+from eitskin.frames.doctor.numbering import best_likeness
+from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.homogeneous import voltages_of
+from eitskin.frames.orders import relabel, swap_map, touching
+
+WORTH_TRYING = 0.05
+STEP = 0.97
+GOOD = 0.2
+BETTER_TIMES = 2.0
+MOST_SWAPS = 6
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """``pairs`` of electrodes exchanged one after the other, and the misfit ``before`` and ``after``."""
+
+    pairs: tuple[tuple[int, int], ...]
+    before: float
+    after: float
+
+    @property
+    def convincing(self) -> bool:
+        """Whether the exchange explains the frame."""
+        return bool(self.pairs) and self.after <= GOOD and self.after * BETTER_TIMES <= self.before
+
+
+def best_exchange(case: Case) -> Exchange:
+    """The exchange that greedy search finds for ``case``; signs do not enter."""
+
+    n, use = case.n_electrodes, case.trusted
+    tried = np.array(list(combinations(sorted(set(case.rows.ravel().tolist())), 2)))
+    exchanged = np.array([swap_map(n, [pair]) for pair in tried])
+    rows = case.rows
+    pairs: list[tuple[int, int]] = []
+    before = best = misfit(case, use, True)
+    while best > WORTH_TRYING and len(pairs) < MOST_SWAPS:
+        left = misfits(case.reference, voltages_of(case.transfer_ohm, exchanged[:, rows]), use, True)
+        k = int(np.argmin(left))
+        if left[k] > STEP * best:
+            break
+        best, rows = float(left[k]), exchanged[k][rows]
+        pairs.append((int(tried[k, 0]), int(tried[k, 1])))
+    return Exchange(tuple(pairs), before, best)
+
+
+def check_swaps(case: Case) -> tuple[Case, Outcome]:
+    """Name exchanged electrodes; the case comes back with its rows renamed."""
+    exchange = best_exchange(case)
+    if not exchange.convincing:
+        return case, Outcome()
+    if best_joined(case, magnitude=True).misfit < exchange.after:
+        return case, Outcome()
+    named = " and then ".join(f"{i} and {j}" for i, j in exchange.pairs)
+    finding = Finding(
+        "swapped-electrodes",
+        FAULT,
+        f"the wires of electrodes {named} (from 0) are exchanged",
+        {
+            "pairs": [list(pair) for pair in exchange.pairs],
+            "misfit": round(exchange.after, 4),
+            "misfit_without": round(exchange.before, 4),
+        },
+        " ".join(f"--swap {i},{j}" for i, j in exchange.pairs),
+    )
+    return renamed(case, exchange), Outcome((finding,))
+
+
+def renamed(case: Case, exchange: Exchange) -> Case:
+    """The case with its rows named as after ``exchange``."""
+    return replace(case, rows=relabel(case.rows, swap_map(case.n_electrodes, exchange.pairs)))
+
+
+def likeness(case: Case, *, allow_fault: bool) -> float:
+    """Correlation of |reference| with |prediction|, in any numbering.
+
+    With ``allow_fault`` the best that is reached after undoing a convincing exchange, or without any one electrode.
+    """
+    if not allow_fault:
+        return best_likeness(case)
+    exchange = best_exchange(case)
+    if exchange.convincing:
+        return best_likeness(renamed(case, exchange))
+    used = set(case.rows.ravel().tolist())
+    return max(best_likeness(replace(case, trusted=case.trusted & ~touching(case.rows, [e]))) for e in used)

@@ -1,0 +1,238 @@
+"""Import: somebody else's file to frames in this project's order, sign and units; every step is recorded in ``meta``.
+
+The steps, in this order: read; number the electrodes as the skin does; put the rows in the protocol's order; undo a
+swap of wires; set the sign; negate channels, fill channels from their reciprocals; leave channels out; equalise gains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eitskin import __version__
+from eitskin.errors import FrameError, ProtocolError, UsageError
+from eitskin.frames.frames import Frames, load_frames
+from eitskin.frames.homogeneous import homogeneous
+from eitskin.frames.mend import equalising_gains, flipped, imputed, kept_channels, signed
+from eitskin.frames.orders import electrode_map, match_rows, relabel, source_table, swap_map
+from eitskin.frames.source import (
+    RawFrames,
+    SourceOptions,
+    electrode_table,
+    is_frames_file,
+    read_source,
+    refuse_nonfinite,
+)
+from eitskin.frames.tables import read_table
+from eitskin.frames.truth import TruthOptions, truth_fields
+from eitskin.skin.protocol import Protocol, table
+from eitskin.skin.skin import Skin
+
+IntArray = NDArray[np.int64]
+
+
+ASSUMED_QUIET = "no quiet frames were named; the first frame is taken for one"
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """How to mend a source; the defaults change nothing.
+
+    ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns). ``keep_table``: keep the source's own
+    table. ``sign``: "reversed" negates, "magnitude" takes each channel's sign from the homogeneous prediction.
+    ``rotate``, ``mirror``: our number of source electrode 0, and whether counting then goes down. ``clockwise``: the
+    source counts clockwise, so mirror if the skin does not. ``swaps``: pairs of our electrodes whose wires were
+    exchanged. ``flip_channels``, ``impute_channels``, ``drop_channels``: channels of the protocol's order to negate, to
+    fill from their reciprocals, and to leave out; ``drop_electrodes``: every channel that uses them. ``equalise``: give
+    each channel the gain that makes the reference the homogeneous prediction. ``current_a``: instead of the protocol's.
+    """
+
+    source: SourceOptions = field(default_factory=SourceOptions)
+    order: str = "fixed"
+    table_file: str | None = None
+    keep_table: bool = False
+    sign: str = "signed"
+    rotate: int = 0
+    mirror: bool = False
+    clockwise: bool = False
+    swaps: tuple[tuple[int, int], ...] = ()
+    flip_channels: tuple[int, ...] = ()
+    impute_channels: tuple[int, ...] = ()
+    drop_channels: tuple[int, ...] = ()
+    drop_electrodes: tuple[int, ...] = ()
+    equalise: bool = False
+    current_a: float | None = None
+    truth: TruthOptions = field(default_factory=TruthOptions)
+
+
+def import_frames(
+    path: str | Path,
+    options: ImportOptions,
+    protocol: Protocol | None,
+    skin: Skin | None,
+    n_electrodes: int | None = None,
+    *,
+    lenient: bool = False,
+) -> Frames:
+    """Read ``path`` and mend it as ``options`` say.
+
+    ``protocol`` is the wanted order (None, or ``keep_table``: the source's own table is kept, with ``n_electrodes``);
+    ``skin`` gives numbering direction and prediction where known. An eitskin frames file may be mended again.
+    ``lenient`` is for examination: NaN and Inf pass, and where no quiet frames are named the first frame is taken.
+
+    Raises:
+        EitskinError: each of its kinds, for what cannot be read or does not fit.
+    """
+    raw, base, protocol = _read(path, options, protocol, n_electrodes)
+    if not (lenient or options.impute_channels or options.drop_channels or options.drop_electrodes):
+        refuse_nonfinite(raw, str(path))
+    quiet = raw.reference
+    if quiet is None:
+        if not lenient:
+            raise UsageError(
+                f"{path}: say which frames are quiet: --reference KEY, --reference-columns LIST, --reference-frames A:B"
+            )
+        quiet = raw.voltage[:1]
+    rows, index, sign = _placed(raw, options, protocol, skin, n_electrodes, str(path))
+    voltage, reference = raw.voltage[:, index] * sign, quiet[:, index] * sign
+    n = _count(protocol, n_electrodes)
+    rows = relabel(rows, swap_map(n, options.swaps))
+    prediction = homogeneous(skin, n).voltages(rows) if options.sign == "magnitude" or options.equalise else None
+    keep = kept_channels(rows, n, options.drop_channels, options.drop_electrodes)
+    voltage, reference = (
+        imputed(
+            flipped(signed(values, options.sign, prediction), options.flip_channels), rows, n, options.impute_channels
+        )[:, keep]
+        for values in (voltage, reference)
+    )
+    if options.equalise and prediction is not None:
+        gain = equalising_gains(reference.mean(axis=0), prediction[keep])
+        voltage, reference = voltage * gain, reference * gain
+    if base is None:
+        names = raw.names or tuple(str(k) for k in range(len(voltage)))
+        box = None if skin is None else skin.outline.bounding_box_mm
+        carried = {"time_s": raw.time_s, **truth_fields(raw.arrays, options.truth, names, box, str(path))}
+    else:
+        names, carried = base.frame_name, {}
+    current_a = options.current_a or (protocol.current_a if protocol is not None else 1e-3)
+    fields = {
+        "protocol": table(n, rows[keep], current_a),
+        "voltage_v": voltage,
+        "reference_voltage_v": reference,
+        "frame_name": names,
+        "meta": _meta(path, options, base, skin) | ({} if raw.reference is not None else {"assumed": ASSUMED_QUIET}),
+        "allow_nonfinite": lenient,
+        **carried,
+    }
+    try:
+        return Frames(**fields) if base is None else replace(base, **fields)
+    except (FrameError, ProtocolError) as error:
+        raise type(error)(f"{path}: {error}") from None
+
+
+def _read(
+    path: str | Path, options: ImportOptions, protocol: Protocol | None, n_electrodes: int | None
+) -> tuple[RawFrames, Frames | None, Protocol | None]:
+    """The raw frames; where ``path`` already is a frames file also that, and its own protocol."""
+    if is_frames_file(path):
+        if options.source != SourceOptions() or options.table_file is not None or options.truth != TruthOptions():
+            raise UsageError(f"{path}: a frames file already; options that say where its arrays are do not go with it")
+        frames = load_frames(path, allow_nonfinite=True)
+        _check_protocol(path, frames, protocol)
+        return RawFrames(frames.voltage_v, frames.reference_voltage_v), frames, frames.protocol
+    counts, asked = accepted_counts(options, protocol)
+    return read_source(path, options.source, counts, asked), None, protocol
+
+
+def _check_protocol(path: str | Path, frames: Frames, protocol: Protocol | None) -> None:
+    if protocol is not None and protocol.hash != frames.protocol.hash:
+        raise ProtocolError(f"{path}: was made with another protocol than the one given; leave those options out")
+
+
+def accepted_counts(options: ImportOptions, protocol: Protocol | None) -> tuple[tuple[int, ...], str]:
+    """How many rows a source frame may have, and the words that say why.
+
+    Raises:
+        UsageError: neither a protocol nor a table is given.
+    """
+    if options.source.protocol_table is not None:
+        return (), "its table"
+    if options.table_file is not None:
+        rows = read_table(options.table_file).cells
+        return (len(rows),), f"the table {options.table_file}"
+    if protocol is None:
+        raise UsageError("say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table")
+    if options.order == "table":
+        raise UsageError("--order table needs --table-file FILE, or --protocol-table KEY of the source's own table")
+    rows_of_order = len(source_table(options.order, protocol))
+    return (rows_of_order,), f"{protocol.n_electrodes} electrodes, --order {options.order}"
+
+
+def _placed(
+    raw: RawFrames,
+    options: ImportOptions,
+    protocol: Protocol | None,
+    skin: Skin | None,
+    n_electrodes: int | None,
+    where: str,
+) -> tuple[IntArray, IntArray, IntArray]:
+    """The result's rows (m, 4), and where each comes from: source index and sign (m,)."""
+    n = _count(protocol, n_electrodes)
+    given = raw.table
+    if options.table_file is not None:
+        text = read_table(options.table_file)
+        if text.n_columns != 4:
+            raise FrameError(f"{options.table_file}: has {text.n_columns} columns; a table has four: I+, I-, V+, V-")
+        given = electrode_table(text.numbers(range(4)), options.source.table_base, options.table_file)
+    if given is None:
+        if protocol is None:
+            raise UsageError("say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table")
+        given = source_table(options.order, protocol)
+    elif given.min(initial=0) < 0 or given.max(initial=0) >= n:
+        raise FrameError(
+            f"{where}: the table names electrodes {given.min()} to {given.max()}, but they are 0 to {n - 1}; "
+            "if it counts from 1 say --table-base 1"
+        )
+    flipped = options.mirror or (options.clockwise and not (skin is not None and skin.electrodes.clockwise))
+    ours = relabel(given, electrode_map(n, options.rotate, flipped))
+    if protocol is None or options.keep_table:
+        return ours, np.arange(len(ours)), np.ones(len(ours), dtype=np.int64)
+    wanted = np.asarray(protocol.drive_measure, dtype=np.int64)
+    match = match_rows(ours, wanted)
+    return wanted, match.index, match.sign
+
+
+def _count(protocol: Protocol | None, n_electrodes: int | None) -> int:
+    if protocol is not None:
+        return protocol.n_electrodes
+    if n_electrodes is None:
+        raise UsageError("say how many electrodes there are: --electrodes N")
+    return n_electrodes
+
+
+def _meta(path: str | Path, options: ImportOptions, base: Frames | None, skin: Skin | None) -> dict[str, Any]:
+    changed: dict[str, Any] = {}
+    for group in (options, options.source, options.truth):
+        defaults = type(group)()
+        for name, value in asdict(group).items():
+            if name not in ("source", "truth") and value != getattr(defaults, name):
+                changed[name] = list(value) if isinstance(value, tuple) else value
+    unit = "V" if options.source.scale is not None else "unknown, taken as V"
+    if base is not None:
+        unit = str(base.meta.get("unit", "V"))
+    meta: dict[str, Any] = {
+        "made_by": f"eitskin {__version__} import",
+        "source": Path(path).name,
+        "options": changed,
+        "unit": unit,
+    }
+    if skin is not None:
+        meta["skin"] = skin.name
+    if base is not None:
+        meta["before"] = dict(base.meta)
+    return meta
+

@@ -1,0 +1,113 @@
+"""What import does to channels: their sign, filling them from reciprocals, leaving them out, making gains equal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eitskin.errors import FrameError, UsageError
+from eitskin.frames.orders import touching
+from eitskin.skin.protocol import table
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SIGNS = ("signed", "reversed", "magnitude")
+LEAST_GAIN = 0.05
+
+
+def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> FloatArray:
+    """``values`` (n, m) as they are, negated, or their magnitudes with the signs of ``prediction`` (m,).
+
+    Raises:
+        UsageError: an unknown sign.
+    """
+    if sign not in SIGNS:
+        raise UsageError(f"--sign {sign}: use one of {', '.join(SIGNS)}")
+    if sign == "magnitude" and prediction is not None:
+        return np.asarray(np.abs(values) * np.where(prediction < 0, -1.0, 1.0))
+    return -values if sign == "reversed" else values
+
+
+def flipped(values: FloatArray, channels: Sequence[int]) -> FloatArray:
+    """``values`` (n, m) with the sign of ``channels`` changed.
+
+    Raises:
+        UsageError: a channel is out of range.
+    """
+    _check_range(channels, values.shape[1], "--flip-channels")
+    sign = np.ones(values.shape[1])
+    sign[list(channels)] = -1.0
+    return values * sign
+
+
+def partners(rows: IntArray, n_electrodes: int) -> dict[int, tuple[int, int]]:
+    """For each channel that has a reciprocal one in ``rows`` (m, 4): that channel and the sign between them."""
+    pairs = table(n_electrodes, rows).reciprocal_pairs()
+    partner: dict[int, tuple[int, int]] = {}
+    for first, second, sign in zip(pairs.first.tolist(), pairs.second.tolist(), pairs.sign.tolist(), strict=True):
+        if second >= 0:
+            partner |= {first: (second, sign), second: (first, sign)}
+    return partner
+
+
+def kept_channels(
+    rows: IntArray, n_electrodes: int, drop_channels: Sequence[int], drop_electrodes: Sequence[int]
+) -> NDArray[np.bool_]:
+    """Which channels (m,) stay when ``drop_channels`` and all channels that use ``drop_electrodes`` go.
+
+    Raises:
+        UsageError: a number is out of range, or nothing stays.
+    """
+    _check_range(drop_electrodes, n_electrodes, "--drop-electrodes")
+    _check_range(drop_channels, len(rows), "--drop-channels")
+    keep = ~touching(rows, drop_electrodes)
+    keep[list(drop_channels)] = False
+    if not keep.any():
+        raise UsageError("nothing is left after leaving out these channels and electrodes")
+    return np.asarray(keep)
+
+
+def imputed(values: FloatArray, rows: IntArray, n_electrodes: int, channels: Sequence[int]) -> FloatArray:
+    """``values`` (n, m) with ``channels`` replaced by their reciprocal channels of ``rows`` (m, 4).
+
+    Raises:
+        UsageError: a channel is out of range, or its reciprocal is absent or to be replaced, too.
+    """
+    _check_range(channels, len(rows), "--impute-channels")
+    if not channels:
+        return values
+    filled, partner = values.copy(), partners(rows, n_electrodes)
+    for channel in channels:
+        if channel not in partner or partner[channel][0] in channels:
+            raise UsageError(
+                f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use --drop-channels"
+            )
+        other, sign = partner[channel]
+        filled[:, channel] = sign * values[:, other]
+    return filled
+
+
+def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArray:
+    """Gains (m,), of median 1, that make ``reference`` (m,) a multiple of ``prediction`` (m,).
+
+    Raises:
+        FrameError: a channel has less than 5 % of what is predicted, or the opposite sign.
+    """
+    ratio = reference / prediction
+    relative = ratio / np.median(ratio)
+    weak = np.flatnonzero(~(relative > LEAST_GAIN))
+    if len(weak):
+        raise FrameError(
+            f"channel {weak[0]} has {relative[weak[0]]:.3g} of its predicted reference ({len(weak)} such): equalising "
+            "would only raise noise; leave such channels out first (--drop-channels, --drop-electrodes)"
+        )
+    return np.asarray(1 / relative)
+
+
+def _check_range(numbers: Iterable[int], count: int, option: str) -> None:
+    for number in numbers:
+        if not 0 <= number < count:
+            raise UsageError(f"{option} {number}: out of range; there are 0 to {count - 1}")

@@ -1,0 +1,185 @@
+"""The commands: what the doctor advises, import takes, and then the doctor is content."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from injected import as_if_electrodes, healthy_frames, permuted, quiet_only, times
+
+from eitskin.cli import cmd_doctor, cmd_import
+from eitskin.errors import EitskinError, UsageError
+from eitskin.frames.frames import Frames, load_frames, save_frames
+from eitskin.frames.orders import electrode_map, match_rows, source_table, swap_map
+from eitskin.skin.protocol import adjacent, opposite
+
+ROWS = adjacent(16).drive_measure.astype(np.int64)
+NPZ = ("--voltage", "v", "--reference", "r", "--scale", "1")
+SKIN = """
+[skin]
+name = "paper"
+diameter_mm = 194.0
+[electrodes]
+count = 16
+[protocol]
+kind = "adjacent"
+"""
+
+
+def run(*words: object) -> int:
+    parser = argparse.ArgumentParser()
+    subparsers = parser.add_subparsers(required=True)
+    for command in (cmd_import, cmd_doctor):
+        command.add_parser(subparsers)
+    options = parser.parse_args([str(word) for word in words])
+    return int(options.run(options))
+
+
+def write(path: Path, frames: Frames) -> Path:
+    np.savez(path, v=frames.voltage_v, r=frames.reference_voltage_v)
+    return path
+
+
+def rotating(frames: Frames) -> Frames:
+    protocol = frames.protocol
+    return permuted(frames, match_rows(protocol.drive_measure, source_table("rotating", protocol)).index)
+
+
+def one_off(frames: Frames, channels: list[int], gain: float) -> Frames:
+    gains = np.ones(frames.protocol.n_rows)
+    gains[channels] = gain
+    return times(frames, gains)
+
+
+def dead(frames: Frames, electrode: int) -> Frames:
+    return times(frames, np.where((electrode == ROWS).any(axis=1), 1e-3, 1.0))
+
+
+FAULTS: dict[str, Callable[[], Frames]] = {
+    "rotating": lambda: rotating(healthy_frames(1)),
+    "reversed": lambda: times(healthy_frames(2), np.float64(-1)),
+    "rotating and reversed": lambda: times(rotating(healthy_frames(3)), np.float64(-1)),
+    "swapped": lambda: as_if_electrodes(healthy_frames(4), swap_map(16, [(2, 7)]), seed=4),
+    "swapped twice, rotating": lambda: rotating(
+        as_if_electrodes(healthy_frames(5), swap_map(16, [(3, 9), (1, 14)]), seed=5)
+    ),
+    "dead": lambda: dead(healthy_frames(6), 11),
+    "dead, rotating, reversed": lambda: times(rotating(dead(healthy_frames(7), 4)), np.float64(-1)),
+    "one channel": lambda: one_off(healthy_frames(8), [40], 1.5),
+    "both of a pair": lambda: one_off(healthy_frames(9), [0, 26], 1.5),
+    "flipped": lambda: one_off(healthy_frames(10), [17, 90], -1.0),
+    "own gains": lambda: times(healthy_frames(11), np.random.default_rng(11).uniform(0.8, 1.2, 208)),
+    "one drive": lambda: times(healthy_frames(12), np.where((ROWS[:, :2] == [3, 4]).all(axis=1), 0.7, 1.0)),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_advice_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
+    path, mended = write(tmp_path / "s.npz", FAULTS[fault]()), tmp_path / "mended.npz"
+    protocol = ("--protocol", "adjacent", "--electrodes", "16")
+    assert run("doctor", path, *NPZ, *protocol, "--json") == 11
+    advice = json.loads(capsys.readouterr().out)["mend"].split()
+    assert advice
+    assert run("import", path, "-o", mended, *NPZ, *protocol, *advice) == 0
+    assert run("doctor", mended, "--json") == 0, capsys.readouterr().out
+
+
+def test_numbering_is_advised_by_known_touches_and_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "skin.toml").write_text(SKIN)
+    turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
+    path, mended = write(tmp_path / "s.npz", one_off(turned, [40], 1.5)), tmp_path / "mended.npz"
+    touch = ("--skin", tmp_path / "skin.toml", "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in", "0")
+    assert run("doctor", path, *NPZ, *touch, "--json") == 11
+    report = json.loads(capsys.readouterr().out)
+    assert report["mend"] == "--rotate 5 --mirror"
+    assert any("renumber by import first" in text for text in report["untold"])
+    assert run("import", path, "-o", mended, *NPZ, "--skin", tmp_path / "skin.toml", *report["mend"].split()) == 0
+    capsys.readouterr()
+    assert run("doctor", mended, *touch, "--json") == 11
+    again = json.loads(capsys.readouterr().out)
+    assert [finding["name"] for finding in again["findings"]] == ["channel-gain"]
+    assert run("import", mended, "-o", tmp_path / "m2.npz", *again["mend"].split()) == 0
+    assert run("doctor", tmp_path / "m2.npz", *touch) == 0
+
+
+def test_import_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path / "s.npz", healthy_frames(14))
+    words = ("import", path, "-o", tmp_path / "o.npz", *NPZ, "--protocol", "adjacent", "--electrodes", 16)
+    assert run(*words, "--current-a", "0.002", "--json") == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["frames"], said["quiet_frames"], said["channels"], said["unit"]) == (1, 12, 208, "V")
+    frames = load_frames(tmp_path / "o.npz")
+    assert frames.protocol.current_a == 2e-3 and said["protocol_hash"] == f"{frames.protocol.hash:016x}"
+    assert frames.meta["source"] == "s.npz"
+    assert run(*words) == 0
+    assert "next: eitskin doctor" in capsys.readouterr().out
+
+
+def test_the_doctor_examines_frames_files_and_prints_evidence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "f.npz"
+    save_frames(path, rotating(quiet_only(healthy_frames(15))))
+    assert run("doctor", path) == 11
+    text = capsys.readouterr().out
+    assert "FAULT order" in text and "rotating 0.9" in text and "mend: eitskin import ... --order rotating" in text
+    save_frames(path, quiet_only(healthy_frames(15, opposite(16))))
+    assert run("doctor", path) == 0
+    assert "0 faults, 0 notes: nothing must be mended" in capsys.readouterr().out
+
+
+def test_sources_with_all_pairs_are_recognised_by_their_number(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frames = quiet_only(healthy_frames(16))
+    rows = source_table("rotating-all", frames.protocol)
+    values = np.full((len(rows), 2), 0.5)
+    measured = ~(rows[:, :2, None] == rows[:, None, 2:]).any(axis=(1, 2))
+    index = match_rows(frames.protocol.drive_measure, rows[measured]).index
+    values[measured] = np.column_stack([frames.reference_v, frames.voltage_v[0]])[index]
+    np.savetxt(tmp_path / "all.csv", values, delimiter=",")
+    words = (tmp_path / "all.csv", "--protocol", "adjacent", "--electrodes", "16", "--reference-columns", "0")
+    assert run("doctor", *words, "--json") == 11
+    report = json.loads(capsys.readouterr().out)
+    assert [finding["name"] for finding in report["findings"]] == ["order"]
+    assert report["mend"] == "--order rotating-all"
+
+
+def test_the_picture_is_drawn(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    path = tmp_path / "f.npz"
+    save_frames(path, dead(quiet_only(healthy_frames(17)), 3))
+    assert run("doctor", path, "--picture", tmp_path / "p.png") == 11
+    assert (tmp_path / "p.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    with pytest.raises(EitskinError, match=r"not a picture's suffix; use \.png"):
+        run("doctor", path, "--picture", tmp_path / "p.xyz")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--protocol", "adjacent"), "needs --electrodes N or --skin FILE"),
+        (("--protocol", "skip", "--electrodes", "16"), "--protocol skip needs --skip K"),
+        (("--skip", "2"), "--skip goes with --protocol skip"),
+        (("--skin", "SKIN", "--electrodes", "8"), "--electrodes 8: the skin .* has 16"),
+        (("--skin", "SKIN", "--swap", "3"), "--swap 3: name two electrodes"),
+        (("--skin", "SKIN", "--drop-channels", "3,x"), "'x' is no whole number or range"),
+        (("--skin", "SKIN", "--truth-mask", "v", "--truth-mask-extent", "1,2"), "XMIN,YMIN,XMAX,YMAX"),
+        (("--skin", "SKIN", "--touch", "1"), "X,Y or X,Y,RADIUS"),
+        (("--skin", "SKIN", "--touch", "500,0"), "outside the skin"),
+        (("--skin", "SKIN", "--touch", "5,0", "--touch-in", "zz"), "--touch-in zz: no such frame; frames are 0"),
+        (("--protocol", "adjacent", "--electrodes", "16", "--touch", "5,0"), "--touch needs --skin FILE"),
+    ],
+)
+def test_bad_words_are_refused_in_one_line(tmp_path: Path, words: tuple[Any, ...], said: str) -> None:
+    (tmp_path / "skin.toml").write_text(SKIN)
+    path = write(tmp_path / "s.npz", healthy_frames(18))
+    given = [tmp_path / "skin.toml" if word == "SKIN" else word for word in words]
+    with pytest.raises(UsageError, match=said) as caught:
+        run("doctor", path, *NPZ, *given)
+    assert "\n" not in str(caught.value)

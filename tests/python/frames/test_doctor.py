@@ -1,0 +1,351 @@
+"""The doctor on frames from the closed form: healthy ones give no finding, each injected fault is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from injected import (
+    FloatArray,
+    as_if_electrodes,
+    changed,
+    healthy_frames,
+    permuted,
+    quiet_only,
+    times,
+)
+
+from eitskin.frames.doctor import Finding, Report, examine, subject_from_frames
+from eitskin.frames.frames import Frames
+from eitskin.frames.homogeneous import homogeneous, shorted
+from eitskin.frames.orders import electrode_map, match_rows, source_table, swap_map
+from eitskin.skin.electrodes import Electrodes
+from eitskin.skin.outline import polygon
+from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
+from eitskin.skin.skin import Skin, paper_skin
+
+ROWS = adjacent(16).drive_measure.astype(np.int64)
+PAPER = paper_skin()
+PROTOCOLS = {"adjacent": adjacent(16), "opposite": opposite(16), "skip2": skip(16, 2), "adjacent8": adjacent(8)}
+by_protocol = pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=PROTOCOLS.keys())
+
+
+def skin_for(protocol: Protocol) -> Skin:
+    return replace(PAPER, electrodes=replace(PAPER.electrodes, count=protocol.n_electrodes))
+
+
+def report_of(frames: Frames, skin: Skin | None = PAPER) -> Report:
+    return examine(subject_from_frames(frames, skin))
+
+
+def named(report: Report) -> list[tuple[str, str]]:
+    return [(finding.name, finding.severity) for finding in report.findings]
+
+
+def only(frames: Frames, name: str, severity: str = "fault", skin: Skin | None = PAPER) -> Finding:
+    """The single finding of ``frames``, which must have this name."""
+    report = report_of(frames, skin)
+    assert named(report) == [(name, severity)], report.lines()
+    assert report.exit_code == (11 if severity == "fault" else 0)
+    return report.findings[0]
+
+
+def rms(frames: Frames) -> float:
+    return float(np.sqrt(np.mean(frames.reference_voltage_v**2)))
+
+
+def with_reference(frames: Frames, reference: FloatArray) -> Frames:
+    return changed(frames, reference, frames.voltage_v)
+
+
+@by_protocol
+def test_fifty_healthy_frames_raise_no_alarm(protocol: Protocol) -> None:
+    skin = skin_for(protocol)
+    for seed in range(50):
+        report = report_of(healthy_frames(seed, protocol, skin), skin)
+        assert named(report) == [], (seed, report.lines())
+        assert report.exit_code == 0
+        assert report.measured["snr_db"] == pytest.approx(60, abs=1.5)
+        assert report.measured["gain_spread"] == pytest.approx(0.02, abs=0.012)
+
+
+def test_noiseless_and_digitised_frames_raise_no_alarm() -> None:
+    assert named(report_of(healthy_frames(1, gain=0, snr_db=300))) == []
+    frames = healthy_frames(2)
+    step = 2 * np.abs(frames.reference_voltage_v).max() / 4096
+    reference, voltage = (np.round(v / step) * step for v in (frames.reference_voltage_v, frames.voltage_v))
+    assert named(report_of(changed(frames, reference, voltage))) == []
+
+
+def test_finite_element_frames_with_uneven_contacts_raise_no_alarm() -> None:
+    pytest.importorskip("scipy")
+    from eitskin.fem.cem import ForwardModel
+    from eitskin.fem.mesh import mesh_for_elements
+
+    mesh = mesh_for_elements(PAPER, 3000)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        clean = ForwardModel(mesh, PAPER, adjacent(16), 0.01 * rng.uniform(0.8, 1.2, 16)).voltages(0.01)
+        quiet = clean * (1 + 0.02 * rng.normal(size=208)) + 1e-3 * np.std(clean) * rng.normal(size=(8, 208))
+        assert named(report_of(Frames(adjacent(16), quiet[:1], quiet))) == []
+
+
+@by_protocol
+def test_rotating_order_is_recognised(protocol: Protocol) -> None:
+    skin = skin_for(protocol)
+    index = match_rows(protocol.drive_measure, source_table("rotating", protocol)).index
+    finding = only(permuted(healthy_frames(3, protocol, skin), index), "order", skin=skin)
+    assert finding.mend == "--order rotating"
+    reached = finding.evidence["correlation"]
+    assert reached["rotating"] > 0.99 and reached["as given"] < 0.5
+
+
+@by_protocol
+def test_reversed_polarity_is_recognised(protocol: Protocol) -> None:
+    skin = skin_for(protocol)
+    frames = times(healthy_frames(4, protocol, skin), np.float64(-1))
+    one_sign = protocol.drive_measure[:, :2].tolist() != protocol.drive_measure[:, 2:].tolist() and (
+        len(set(np.sign(frames.reference_v))) == 1
+    )
+    finding = only(frames, "reversed-or-magnitude" if one_sign else "reversed", skin=skin)
+    assert finding.mend == "--sign reversed"
+
+
+def test_reversed_polarity_is_certain_once_a_channel_crosses_zero() -> None:
+    frames = healthy_frames(4)
+    voltage = -frames.voltage_v.copy()
+    voltage[0, 6] = -0.2 * rms(frames)
+    assert only(quiet_only(changed(frames, -frames.reference_voltage_v, voltage)), "reversed").mend == "--sign reversed"
+
+
+@pytest.mark.parametrize("protocol", (opposite(16), skip(16, 2)), ids=("opposite", "skip2"))
+def test_magnitudes_are_recognised_where_signs_differ(protocol: Protocol) -> None:
+    frames = healthy_frames(5, protocol)
+    magnitudes = changed(frames, np.abs(frames.reference_voltage_v), np.abs(frames.voltage_v))
+    assert only(magnitudes, "magnitude").mend == "--sign magnitude"
+
+
+def test_magnitudes_of_adjacent_patterns_cannot_be_told_from_reversed() -> None:
+    frames = healthy_frames(5)
+    magnitudes = changed(frames, np.abs(frames.reference_voltage_v), np.abs(frames.voltage_v))
+    finding = only(magnitudes, "reversed-or-magnitude")
+    assert "cannot be told apart" in finding.text
+
+
+@pytest.mark.parametrize(
+    ("rotate", "mirror", "option"), [(3, False, "--rotate 3"), (0, True, "--mirror"), (5, True, "--rotate 5 --mirror")]
+)
+def test_numbering_is_told_by_two_known_touches(rotate: int, mirror: bool, option: str) -> None:
+    frames = as_if_electrodes(healthy_frames(6), electrode_map(16, rotate, mirror), seed=6)
+    finding = only(frames, "numbering")
+    assert finding.mend == option
+    assert finding.evidence[option] > 0.98 > finding.evidence["as given"] + 0.05
+
+
+def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch() -> None:
+    frames = as_if_electrodes(healthy_frames(6), electrode_map(16, 5, True), seed=6)
+    report = report_of(quiet_only(frames))
+    assert named(report) == []
+    assert any("which way the numbers run" in text and "--touch X,Y" in text for text in report.untold)
+    unknown_places = report_of(frames, None)
+    assert any("which way the numbers run" in text and "--skin" in text for text in unknown_places.untold)
+
+
+def test_one_touch_leaves_its_mirror_image_and_says_so() -> None:
+    report = report_of(healthy_frames(7, touches_mm=((0.0, 60.0),)))
+    assert named(report) == []
+    assert any("fits as given, but --mirror too" in text for text in report.untold)
+
+
+def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame() -> None:
+    pytest.importorskip("scipy")
+    corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
+    skin = Skin("odd", polygon(corners), Electrodes(count=8))
+    transfer = homogeneous(skin, 8).transfer_ohm
+    healthy = quiet_only(healthy_frames(8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=transfer))
+    assert named(report_of(healthy, skin)) == []
+    for rotate, mirror, option in ((3, False, "--rotate 3"), (1, True, "--rotate 1 --mirror")):
+        moved = electrode_map(8, rotate, mirror)
+        turned = quiet_only(
+            healthy_frames(8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=transfer[np.ix_(moved, moved)])
+        )
+        assert only(turned, "numbering", skin=skin).mend == option
+
+
+def test_every_pair_of_exchanged_wires_is_named() -> None:
+    frames = healthy_frames(9)
+    for i, j in combinations(range(16), 2):
+        exchanged = as_if_electrodes(frames, swap_map(16, [(i, j)]), seed=16 * i + j)
+        assert only(exchanged, "swapped-electrodes").mend == f"--swap {i},{j}"
+
+
+def test_two_exchanges_in_rotating_order_and_reversed_are_untangled() -> None:
+    swapped = as_if_electrodes(healthy_frames(10), swap_map(16, [(3, 9), (1, 14)]), seed=10)
+    index = match_rows(ROWS, source_table("rotating", adjacent(16))).index
+    report = report_of(times(permuted(swapped, index), np.float64(-1)))
+    assert named(report) == [("order", "fault"), ("swapped-electrodes", "fault"), ("reversed", "fault")]
+    assert report.mend == "--order rotating --swap 3,9 --swap 1,14 --sign reversed"
+
+
+@pytest.mark.parametrize(("width_mm", "known"), [(4.0, True), (20.0, True), (1.5, False)])
+def test_joined_electrodes_are_named_whatever_their_width(width_mm: float, known: bool) -> None:
+    skin = replace(PAPER, electrodes=replace(PAPER.electrodes, width_mm=width_mm))
+    transfer = homogeneous(skin, 16).transfer_ohm
+    for i, j in combinations(range(16), 2):
+        if i not in (0, 5):
+            continue
+        joined = quiet_only(healthy_frames(16 * i + j, transfer_ohm=shorted(transfer, i, j)))
+        finding = only(joined, "shorted-electrodes", skin=PAPER if known else None)
+        assert finding.evidence["electrodes"] == [i, j] and finding.mend == ""
+
+
+@pytest.mark.parametrize(("driving", "measuring"), [(True, True), (True, False), (False, True)])
+def test_every_dead_electrode_is_named_with_its_side(driving: bool, measuring: bool) -> None:
+    for electrode in range(16):
+        rng = np.random.default_rng(electrode)
+        frames = healthy_frames(electrode)
+        reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
+        drives, measures = ((ROWS[:, columns] == electrode).any(axis=1) for columns in ([0, 1], [2, 3]))
+        floating = rng.uniform(-1, 1, 208) * np.abs(reference).max()
+        for values in (reference, voltage):
+            noise = 1e-3 * rms(frames) * rng.normal(size=values.shape)
+            if measuring:
+                values[:, measures] = (floating + 20 * noise)[:, measures]
+            if driving:
+                values[:, drives] = noise[:, drives]
+        finding = only(changed(frames, reference, voltage), "dead-electrode")
+        assert finding.mend == f"--drop-electrodes {electrode}"
+        assert ("driving" in finding.text, "measuring" in finding.text) == (driving, measuring)
+
+
+def test_an_electrode_lost_in_a_frame_is_named() -> None:
+    frames = quiet_only(healthy_frames(11))
+    voltage = frames.voltage_v.copy()
+    voltage[:, (ROWS[:, :2] == 7).any(axis=1)] *= 1e-3
+    finding = only(changed(frames, frames.reference_voltage_v, voltage), "electrode-lost")
+    assert finding.evidence["electrode"] == 7 and finding.evidence["frames"] == [0]
+
+
+@pytest.mark.parametrize("quantile", (0.9, 0.99))
+def test_saturated_channels_are_named(quantile: float) -> None:
+    frames = healthy_frames(12)
+    rail = float(np.quantile(np.abs(frames.reference_voltage_v), quantile))
+    reference = np.clip(frames.reference_voltage_v, -rail, rail)
+    finding = only(changed(frames, reference, np.clip(frames.voltage_v, -rail, rail)), "saturated")
+    clipped = (np.abs(reference) == rail).any(axis=0) | (np.abs(frames.voltage_v) >= rail).any(axis=0)
+    assert finding.evidence["channels"] == np.flatnonzero(clipped).tolist()
+    assert finding.evidence["rail_v"] == [pytest.approx(-rail)]
+
+
+def test_a_noisy_channel_a_stuck_one_and_a_noisy_electrode_are_named() -> None:
+    frames, rng = healthy_frames(13), np.random.default_rng(13)
+    sigma = 20e-3 * rms(frames)
+    reference = frames.reference_voltage_v.copy()
+    reference[:, 77] += sigma * rng.normal(size=len(reference))
+    finding = only(with_reference(frames, reference), "noisy-channels")
+    assert finding.evidence["channels"] == [77] and finding.mend == "--impute-channels 77"
+    reference = frames.reference_voltage_v.copy()
+    reference[:, 13] = reference[0, 13]
+    finding = only(with_reference(frames, reference), "stuck")
+    assert finding.evidence["channels"] == [13]
+    reference = frames.reference_voltage_v.copy()
+    using = (ROWS == 5).any(axis=1)
+    reference[:, using] += sigma * rng.normal(size=(len(reference), using.sum()))
+    finding = only(with_reference(frames, reference), "noisy-channels")
+    assert finding.evidence["channels"] == np.flatnonzero(using).tolist()
+    assert finding.mend == "--drop-electrodes 5"
+
+
+@pytest.mark.parametrize(("snr_db", "severity"), [(40.0, "note"), (20.0, "fault")])
+def test_the_snr_is_measured_and_judged(snr_db: float, severity: str) -> None:
+    report = report_of(quiet_only(healthy_frames(14, snr_db=snr_db, quiet=60, gain=0.0)))
+    assert named(report) == [("snr", severity)]
+    assert report.measured["snr_db"] == pytest.approx(snr_db, abs=0.5)
+
+
+@pytest.mark.parametrize(("drift", "severity"), [(0.01, "note"), (-0.03, "fault")])
+def test_drift_is_measured_and_judged(drift: float, severity: str) -> None:
+    frames = healthy_frames(15)
+    ramp = 1 + np.linspace(-drift / 2, drift / 2, len(frames.reference_voltage_v))
+    finding = only(with_reference(frames, frames.reference_voltage_v * ramp[:, None]), "drift", severity)
+    assert finding.evidence["drift"] == pytest.approx(drift, rel=0.05)
+
+
+def test_gain_faults_are_told_apart() -> None:
+    frames, rng = healthy_frames(16), np.random.default_rng(16)
+    one = np.ones(208)
+    one[40] = 1.4
+    finding = only(times(frames, one), "channel-gain")
+    assert finding.evidence["channels"] == [40] and finding.mend == "--impute-channels 40"
+    assert finding.evidence["worst_gain"] == pytest.approx(1.4, rel=0.1)
+    for name, columns, gain in (("drive", [0, 1], 0.7), ("measure", [2, 3], 1.3)):
+        of_pair = (ROWS[:, columns] == [3, 4]).all(axis=1)
+        finding = only(times(frames, np.where(of_pair, gain, 1.0)), f"{name}-pair-gain")
+        assert finding.evidence["pair"] == [3, 4] and finding.evidence["gain"] == pytest.approx(gain, rel=0.03)
+    report = report_of(times(frames, rng.uniform(0.8, 1.2, 208)))
+    assert named(report) == [("gain-spread", "fault"), ("reciprocity", "fault")]
+    assert report.mend == "--equalise"
+    assert named(report_of(healthy_frames(16, gain=0.045))) == [("gain-spread", "note"), ("reciprocity", "note")]
+
+
+def test_a_pair_that_breaks_reciprocity_is_named() -> None:
+    frames = healthy_frames(17, gain=0.005)
+    gains = np.ones(208)
+    gains[[3, 65]] = 1.18, 0.86
+    assert ROWS[3].tolist() == [0, 1, 5, 6] and ROWS[65].tolist() == [5, 6, 0, 1]
+    finding = only(times(frames, gains), "reciprocity-pairs")
+    assert list(finding.evidence["errors"]) == ["3/65"]
+    assert finding.evidence["errors"]["3/65"] == pytest.approx(0.32 / 1.02, rel=0.1)
+    assert finding.evidence["off"] == [3]
+
+
+def test_channels_of_the_wrong_sign_are_named() -> None:
+    frames = healthy_frames(18)
+    some = np.ones(208)
+    some[[17, 90]] = -1
+    assert only(times(frames, some), "flipped-channels").mend == "--flip-channels 17,90"
+    of_pair = (ROWS[:, :2] == [3, 4]).all(axis=1)
+    finding = only(times(frames, np.where(of_pair, -1.0, 1.0)), "flipped-channels")
+    assert "drive [3, 4]" in finding.text and finding.evidence["channels"] == np.flatnonzero(of_pair).tolist()
+
+
+def test_values_that_are_no_numbers_are_counted_and_named() -> None:
+    frames = healthy_frames(19)
+    reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
+    reference[3, 13], voltage[0, 100] = np.nan, np.inf
+    finding = only(quiet_only(changed(frames, reference, voltage)), "not-finite")
+    assert finding.evidence == {"channels": [13, 100], "frames": ["0"], "quiet_frames": [3]}
+
+
+def test_frames_that_cannot_be_examined_say_only_that() -> None:
+    frames, rng = healthy_frames(20), np.random.default_rng(20)
+    only(times(frames, np.float64(0)), "no-signal")
+    noise = changed(quiet_only(frames), np.abs(rng.normal(size=208))[None], np.zeros((0, 208)))
+    assert "unlike-a-homogeneous-skin" in dict(named(report_of(noise)))
+    imaginary = quiet_only(changed(frames, frames.reference_voltage_v, -0.4 * frames.voltage_v))
+    finding = only(imaginary, "frames-unlike-the-reference")
+    assert finding.evidence["frames"] == ["0"] and "--complex-part" in finding.text
+
+
+def test_a_wrong_unit_is_noted() -> None:
+    finding = only(times(healthy_frames(21), np.float64(1000)), "unit", "note")
+    assert finding.evidence["reference_per_predicted"] == pytest.approx(1000, rel=0.05)
+
+
+def test_one_quiet_frame_leaves_noise_untold() -> None:
+    report = report_of(healthy_frames(22, quiet=1))
+    assert named(report) == [] and "snr_db" not in report.measured
+    assert any(text.startswith("noise, SNR and drift: 1 quiet frame(s)") for text in report.untold)
+
+
+def test_several_remedies_become_one() -> None:
+    frames = healthy_frames(23)
+    gains = np.ones(208)
+    gains[[0, 26, 100]] = 1.5, 0.5, 1.4
+    reference = frames.reference_voltage_v * gains
+    reference[:, 50] = reference[0, 50]
+    report = report_of(changed(frames, reference, frames.voltage_v * gains))
+    assert named(report) == [("stuck", "fault"), ("channel-gain", "fault")]
+    assert report.mend == "--impute-channels 50,100 --drop-channels 0,26"

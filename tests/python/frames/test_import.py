@@ -1,0 +1,313 @@
+"""Import: every option that says how a source differs gives back the frames that the source was made from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from injected import healthy_frames
+
+from eitskin.errors import EitskinError, FrameError, ProtocolError, UsageError
+from eitskin.frames.frames import Frames, load_frames, save_frames
+from eitskin.frames.importer import ImportOptions, import_frames
+from eitskin.frames.orders import ORDERS, electrode_map, match_rows, relabel, source_table, swap_map
+from eitskin.frames.source import SourceOptions
+from eitskin.frames.truth import TruthOptions
+from eitskin.skin.protocol import adjacent, opposite, table
+from eitskin.skin.skin import paper_skin
+
+TABLE = adjacent(16).drive_measure.astype(np.int64)
+KEYS = SourceOptions(voltage="v", reference="r", scale=1.0)
+
+
+def source(tmp_path: Path, frames: Frames, index: Any = slice(None), sign: Any = 1.0, **more: Any) -> Path:
+    """An NPZ with the frames' channels under ``index`` and ``sign``."""
+    path = tmp_path / "source.npz"
+    np.savez(path, v=frames.voltage_v[:, index] * sign, r=frames.reference_voltage_v[:, index] * sign, **more)
+    return path
+
+
+def assert_same(frames: Frames, wanted: Frames) -> None:
+    assert frames.protocol.hash == wanted.protocol.hash
+    assert np.allclose(frames.voltage_v, wanted.voltage_v, rtol=1e-12)
+    assert np.allclose(frames.reference_voltage_v, wanted.reference_voltage_v, rtol=1e-12)
+
+
+@pytest.mark.parametrize("protocol", (adjacent(16), opposite(16)), ids=("adjacent", "opposite"))
+@pytest.mark.parametrize("order", ORDERS)
+def test_every_order_comes_back_in_ours(tmp_path: Path, protocol: Any, order: str) -> None:
+    frames = healthy_frames(1, protocol)
+    rows = source_table(order, protocol)
+    measured = ~(rows[:, :2, None] == rows[:, None, 2:]).any(axis=(1, 2))
+    index = np.zeros(len(rows), dtype=np.int64)
+    index[measured] = match_rows(protocol.drive_measure, rows[measured]).index
+    path = source(tmp_path, frames, index, np.where(measured, 1.0, 77.0))
+    assert_same(import_frames(path, ImportOptions(source=KEYS, order=order), protocol, None), frames)
+
+
+def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
+    frames, rng = healthy_frames(2), np.random.default_rng(2)
+    index = rng.permutation(208)
+    rows = TABLE[index].copy()
+    rows[:50] = rows[:50, [0, 1, 3, 2]]
+    sign = np.where(np.arange(208) < 50, -1.0, 1.0)
+    path = source(tmp_path, frames, index, sign, rows=rows + 1)
+    inside = replace(KEYS, protocol_table="rows", table_base=1)
+    assert_same(import_frames(path, ImportOptions(source=inside), adjacent(16), None), frames)
+    text = tmp_path / "rows.csv"
+    np.savetxt(text, rows, fmt="%d", delimiter=",", header="I+,I-,V+,V-")
+    options = ImportOptions(source=KEYS, order="table", table_file=str(text))
+    assert_same(import_frames(path, options, adjacent(16), None), frames)
+    kept = import_frames(path, replace(options, keep_table=True), adjacent(16), None)
+    assert np.array_equal(kept.protocol.drive_measure, rows)
+    assert np.allclose(kept.voltage_v, frames.voltage_v[:, index] * sign)
+    assert_same(import_frames(path, options, None, None, 16), kept)
+    with pytest.raises(FrameError, match="1 to 16, but they are 0 to 15; if it counts from 1 say --table-base 1"):
+        import_frames(path, ImportOptions(source=replace(inside, table_base=0)), adjacent(16), None)
+
+
+@pytest.mark.parametrize("sign", ("reversed", "magnitude"))
+@pytest.mark.parametrize("protocol", (adjacent(16), opposite(16)), ids=("adjacent", "opposite"))
+def test_signs_come_back(tmp_path: Path, protocol: Any, sign: str) -> None:
+    frames = healthy_frames(3, protocol)
+    path = tmp_path / "s.npz"
+    change = np.abs if sign == "magnitude" else np.negative
+    np.savez(path, v=change(frames.voltage_v), r=change(frames.reference_voltage_v))
+    assert_same(import_frames(path, ImportOptions(source=KEYS, sign=sign), protocol, None), frames)
+
+
+@pytest.mark.parametrize(("rotate", "mirror"), [(3, False), (0, True), (5, True)])
+def test_renumbering_comes_back(tmp_path: Path, rotate: int, mirror: bool) -> None:
+    frames = healthy_frames(4)
+    back = electrode_map(16, rotate, mirror)
+    match = match_rows(TABLE, relabel(TABLE, back))
+    path = source(tmp_path, frames, match.index, match.sign)
+    options = ImportOptions(source=KEYS, rotate=rotate, mirror=mirror)
+    assert_same(import_frames(path, options, adjacent(16), None), frames)
+
+
+def test_clockwise_mirrors_unless_the_skin_is_clockwise(tmp_path: Path) -> None:
+    frames = healthy_frames(5)
+    match = match_rows(TABLE, relabel(TABLE, electrode_map(16, 0, True)))
+    path = source(tmp_path, frames, match.index, match.sign)
+    options = ImportOptions(source=KEYS, clockwise=True)
+    assert_same(import_frames(path, options, adjacent(16), paper_skin()), frames)
+    skin = paper_skin()
+    clockwise = replace(skin, electrodes=replace(skin.electrodes, clockwise=True))
+    unchanged = import_frames(path, options, adjacent(16), clockwise)
+    assert np.allclose(unchanged.voltage_v, frames.voltage_v[:, match.index] * match.sign)
+
+
+def test_swapped_wires_give_the_table_that_was_really_measured(tmp_path: Path) -> None:
+    path = source(tmp_path, healthy_frames(6))
+    frames = import_frames(path, ImportOptions(source=KEYS, swaps=((3, 9), (1, 2))), adjacent(16), None)
+    assert np.array_equal(frames.protocol.drive_measure, swap_map(16, [(3, 9), (1, 2)])[TABLE])
+
+
+def test_channels_are_flipped_filled_and_left_out(tmp_path: Path) -> None:
+    frames = healthy_frames(7)
+    path = source(tmp_path, frames)
+    options = ImportOptions(
+        source=KEYS, flip_channels=(5,), impute_channels=(0,), drop_channels=(207,), drop_electrodes=(9,)
+    )
+    mended = import_frames(path, options, adjacent(16), None)
+    kept = [row for row in range(207) if 9 not in TABLE[row]]
+    assert np.array_equal(mended.protocol.drive_measure, TABLE[kept])
+    assert np.allclose(mended.voltage_v[:, 5], -frames.voltage_v[:, 5])
+    assert TABLE[0].tolist() == [0, 1, 2, 3] and TABLE[26].tolist() == [2, 3, 0, 1]
+    assert np.allclose(mended.voltage_v[:, 0], frames.voltage_v[:, 26])
+    for bad, said in (
+        ({"impute_channels": (0, 26)}, "no good reciprocal"),
+        ({"impute_channels": (208,)}, "--impute-channels 208: out of range; there are 0 to 207"),
+        ({"drop_electrodes": (16,)}, "--drop-electrodes 16"),
+        ({"drop_electrodes": tuple(range(14))}, "nothing is left"),
+        ({"flip_channels": (-1,)}, "--flip-channels -1"),
+    ):
+        with pytest.raises(UsageError, match=said):
+            import_frames(path, ImportOptions(source=KEYS, **bad), adjacent(16), None)
+
+
+def test_bad_values_pass_only_where_they_are_mended(tmp_path: Path) -> None:
+    frames = healthy_frames(8)
+    voltage = frames.voltage_v.copy()
+    voltage[0, 0] = np.nan
+    path = tmp_path / "nan.npz"
+    np.savez(path, v=voltage, r=frames.reference_voltage_v)
+    with pytest.raises(FrameError, match=r"frame 0, row 0 \(from 0\) is nan"):
+        import_frames(path, ImportOptions(source=KEYS), adjacent(16), None)
+    with pytest.raises(FrameError, match="frame 0, channel 0 is nan"):
+        import_frames(path, ImportOptions(source=KEYS, impute_channels=(3,)), adjacent(16), None)
+    mended = import_frames(path, ImportOptions(source=KEYS, impute_channels=(0,)), adjacent(16), None)
+    assert mended.voltage_v[0, 0] == voltage[0, 26]
+
+
+def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
+    frames = healthy_frames(9, gain=0.15)
+    mended = import_frames(source(tmp_path, frames), ImportOptions(source=KEYS, equalise=True), adjacent(16), None)
+    gains = mended.reference_v / frames.reference_v
+    assert np.allclose(mended.voltage_v, frames.voltage_v * gains)
+    pairs = mended.protocol.reciprocal_pairs()
+    assert np.allclose(mended.reference_v[pairs.first], mended.reference_v[pairs.second], rtol=1e-9)
+    weak = frames.reference_voltage_v.copy()
+    weak[:, 40] *= 0.01
+    np.savez(tmp_path / "weak.npz", v=frames.voltage_v, r=weak)
+    with pytest.raises(FrameError, match=r"channel 40 has 0\.0\d+ of its predicted reference \(1 such\)"):
+        import_frames(tmp_path / "weak.npz", ImportOptions(source=KEYS, equalise=True), adjacent(16), None)
+
+
+def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
+    frames = healthy_frames(10)
+    quiet, voltage = frames.reference_voltage_v, frames.voltage_v
+    rows = tmp_path / "rows.csv"
+    three = np.vstack([quiet[0], quiet[1], voltage]).T
+    np.savetxt(rows, three, delimiter=";", header="q0;q1;one", comments="", fmt="%.17g")
+    options = SourceOptions(columns="one", reference_columns="q0,q1", scale=1.0)
+    got = import_frames(rows, ImportOptions(source=options), adjacent(16), None)
+    assert got.frame_name == ("one",) and len(got.reference_voltage_v) == 2
+    assert np.array_equal(got.voltage_v, voltage) and np.array_equal(got.reference_voltage_v, quiet[:2])
+    wide = tmp_path / "wide.csv"
+    times = np.arange(len(quiet) + 1) * 0.25
+    np.savetxt(wide, np.column_stack([times, 1000 * np.vstack([quiet, voltage])]), delimiter=",", fmt="%.17g")
+    options = SourceOptions(columns="1:209", time="0", reference_frames="0:12", scale=1e-3)
+    got = import_frames(wide, ImportOptions(source=options), adjacent(16), None)
+    assert np.allclose(got.voltage_v, voltage, rtol=1e-12) and np.allclose(got.reference_voltage_v, quiet, rtol=1e-12)
+    assert got.time_s is not None and got.time_s.tolist() == [3.0]
+    assert got.meta["unit"] == "V" and got.meta["options"]["scale"] == 1e-3
+    with pytest.raises(FrameError, match=r"209 chosen columns: a frame should have 208 channels \(16 electrodes, "):
+        import_frames(wide, ImportOptions(source=SourceOptions(reference_frames="0:12")), adjacent(16), None)
+
+
+@pytest.mark.parametrize("part", ("real", "imag", "abs", "in-phase"))
+def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> None:
+    frames = healthy_frames(11)
+    phase = np.exp(0.4j)
+    voltage, quiet = frames.voltage_v * phase, frames.reference_voltage_v * phase
+    wanted = {"real": np.real, "imag": np.imag, "abs": np.abs, "in-phase": lambda z: np.real(z / phase)}[part]
+    np.savez(tmp_path / "z.npz", v=voltage, r=quiet)
+    source_of = replace(KEYS, complex_part=part)
+    got = import_frames(tmp_path / "z.npz", ImportOptions(source=source_of), adjacent(16), None)
+    assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
+    pairs = np.column_stack([quiet[0].real, quiet[0].imag, voltage[0].real, voltage[0].imag])
+    np.savetxt(tmp_path / "z.csv", pairs, delimiter=",", fmt="%.17g")
+    columns = SourceOptions(columns="2,3", reference_columns="0,1", complex_part=part)
+    got = import_frames(tmp_path / "z.csv", ImportOptions(source=columns), adjacent(16), None)
+    assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9) and got.meta["unit"] == "unknown, taken as V"
+    with pytest.raises(UsageError, match="numbers are complex; say with --complex-part"):
+        import_frames(tmp_path / "z.npz", ImportOptions(source=KEYS), adjacent(16), None)
+    with pytest.raises(UsageError, match="pairs re,im; 1 are named"):
+        import_frames(tmp_path / "z.csv", ImportOptions(source=replace(columns, columns="2")), adjacent(16), None)
+
+
+def test_mat_files_with_structs(tmp_path: Path) -> None:
+    savemat = pytest.importorskip("scipy.io").savemat
+    frames = healthy_frames(12)
+    path = tmp_path / "m.mat"
+    savemat(path, {"data": {"v": frames.voltage_v.T, "quiet": frames.reference_voltage_v.T}, "note": "x"})
+    options = SourceOptions(voltage="data.v", reference="data.quiet", scale=1.0)
+    assert_same(import_frames(path, ImportOptions(source=options), adjacent(16), None), frames)
+    with pytest.raises(FrameError, match=r"no array 'v' for --voltage; it holds data.quiet \(208, 12\), data.v"):
+        import_frames(path, ImportOptions(source=KEYS), adjacent(16), None)
+    path.write_bytes(path.read_bytes()[:700])
+    with pytest.raises(EitskinError, match=r"not a readable MAT file|cannot read"):
+        import_frames(path, ImportOptions(source=options), adjacent(16), None)
+
+
+def test_truth_comes_along_in_millimetres(tmp_path: Path) -> None:
+    frames, rng = healthy_frames(13), np.random.default_rng(13)
+    mask = rng.integers(-1, 2, size=(1, 5, 6)).astype(np.int8)
+    path = tmp_path / "t.npz"
+    np.savez(
+        path,
+        v=frames.voltage_v,
+        r=frames.reference_voltage_v,
+        names=np.array(["two"]),
+        of=np.array(["two", "two"]),
+        xy=np.array([[0.1, 0.2], [0.3, -0.4]]),
+        rad=np.array([0.1, 0.2]),
+        more=np.array([True, False]),
+        mask=mask,
+    )
+    truth = TruthOptions(
+        touch_frame="of", touch_xy="xy", touch_radius="rad", touch_sign="more", touch_unit_mm=97.0, mask="mask"
+    )
+    options = ImportOptions(source=replace(KEYS, names="names"), truth=truth)
+    got = import_frames(path, options, adjacent(16), paper_skin())
+    assert got.touch_frame is not None and got.touch_xy_mm is not None and got.touch_sign is not None
+    assert got.touch_frame.tolist() == [0, 0] and got.touch_sign.tolist() == [1, -1]
+    assert np.allclose(got.touch_xy_mm, [[9.7, 19.4], [29.1, -38.8]])
+    assert got.touch_strength is not None and np.isnan(got.touch_strength).all()
+    assert np.array_equal(got.truth_mask, mask) and got.truth_mask_extent_mm == (-97.0, -97.0, 97.0, 97.0)
+    top_first = replace(options, truth=replace(truth, mask_top_first=True))
+    flipped = import_frames(path, top_first, adjacent(16), paper_skin())
+    assert np.array_equal(flipped.truth_mask, mask[:, ::-1])
+    with pytest.raises(UsageError, match="--truth-mask-extent"):
+        import_frames(path, options, adjacent(16), None)
+    with pytest.raises(UsageError, match="need --truth-xy too"):
+        import_frames(path, replace(options, truth=TruthOptions(touch_frame="of")), adjacent(16), None)
+    with pytest.raises(FrameError, match="names frame 'two'; frames are 0"):
+        import_frames(path, replace(options, source=KEYS), adjacent(16), paper_skin())
+
+
+def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path: Path) -> None:
+    frames = healthy_frames(14)
+    save_frames(tmp_path / "a.npz", frames)
+    mended = import_frames(tmp_path / "a.npz", ImportOptions(sign="reversed"), None, None)
+    save_frames(tmp_path / "b.npz", mended)
+    back = load_frames(tmp_path / "b.npz")
+    assert np.array_equal(back.voltage_v, -frames.voltage_v)
+    assert np.array_equal(back.touch_xy_mm, frames.touch_xy_mm)
+    assert back.meta["before"] == {} and back.meta["options"] == {"sign": "reversed"}
+    with pytest.raises(UsageError, match="a frames file already"):
+        import_frames(tmp_path / "a.npz", ImportOptions(source=KEYS), None, None)
+    with pytest.raises(ProtocolError, match="another protocol"):
+        import_frames(tmp_path / "a.npz", ImportOptions(), opposite(16), None)
+
+
+@pytest.mark.parametrize(
+    ("options", "protocol", "said"),
+    [
+        (ImportOptions(source=SourceOptions(voltage="x")), adjacent(16), r"no array 'x' .*r \(12, 208\), v \(1, 208\)"),
+        (ImportOptions(source=SourceOptions()), adjacent(16), "--voltage KEY"),
+        (ImportOptions(source=SourceOptions(voltage="v")), adjacent(16), "which frames are quiet: --reference KEY"),
+        (ImportOptions(source=replace(KEYS, columns="1")), adjacent(16), "--columns does not go with a NPZ"),
+        (ImportOptions(source=KEYS), adjacent(8), r"v \(1, 208\): a frame should have 40 channels"),
+        (ImportOptions(source=KEYS, order="fixed-all"), adjacent(16), "should have 256 channels"),
+        (ImportOptions(source=KEYS), None, "say which protocol"),
+        (ImportOptions(source=KEYS, order="table"), adjacent(16), "--order table needs"),
+        (ImportOptions(source=KEYS, sign="maybe"), adjacent(16), "--sign maybe"),
+        (ImportOptions(source=replace(KEYS, scale=0.0)), adjacent(16), "--scale 0"),
+        (ImportOptions(source=replace(KEYS, layout="channels-in-rows")), adjacent(16), "--layout channels-in-rows a"),
+        (ImportOptions(source=replace(KEYS, reference_frames="0")), adjacent(16), "another reference"),
+        (ImportOptions(source=replace(KEYS, protocol_table="v")), adjacent(16), "table is .rows, 4"),
+    ],
+)
+def test_bad_options_say_what_to_do(tmp_path: Path, options: ImportOptions, protocol: Any, said: str) -> None:
+    with pytest.raises(EitskinError, match=said) as caught:
+        import_frames(source(tmp_path, healthy_frames(15)), options, protocol, None)
+    assert "\n" not in str(caught.value)
+
+
+def test_foreign_and_square_sources(tmp_path: Path) -> None:
+    (tmp_path / "a.xyz").write_text("1")
+    with pytest.raises(UsageError, match=r"suffix '.xyz' is not known; use .csv"):
+        import_frames(tmp_path / "a.xyz", ImportOptions(), adjacent(16), None)
+    with pytest.raises(EitskinError, match="no such table"):
+        import_frames(tmp_path / "absent.csv", ImportOptions(), adjacent(16), None)
+    np.savez(tmp_path / "square.npz", v=np.ones((40, 40)), r=np.ones(40), words=np.array(["a"]))
+    with pytest.raises(UsageError, match="both sides fit; say --layout"):
+        import_frames(tmp_path / "square.npz", ImportOptions(source=KEYS), adjacent(8), None)
+    with pytest.raises(FrameError, match="holds <U1, no numbers"):
+        words = ImportOptions(source=replace(KEYS, voltage="words"))
+        import_frames(tmp_path / "square.npz", words, adjacent(8), None)
+
+
+def test_kept_tables_need_the_number_of_electrodes(tmp_path: Path) -> None:
+    frames = healthy_frames(16)
+    path = source(tmp_path, frames, rows=TABLE)
+    options = ImportOptions(source=replace(KEYS, protocol_table="rows"))
+    with pytest.raises(UsageError, match="--electrodes N"):
+        import_frames(path, options, None, None)
+    assert import_frames(path, options, None, None, 16).protocol.hash == table(16, TABLE).hash
