@@ -69,6 +69,7 @@ FAULTS: dict[str, Callable[[], Frames]] = {
         as_if_electrodes(healthy_frames(5), swap_map(16, [(3, 9), (1, 14)]), seed=5)
     ),
     "dead": lambda: dead(healthy_frames(6), 11),
+    "two dead": lambda: dead(dead(healthy_frames(19), 2), 9),
     "dead, rotating, reversed": lambda: times(rotating(dead(healthy_frames(7), 4)), np.float64(-1)),
     "one channel": lambda: one_off(healthy_frames(8), [40], 1.5),
     "both of a pair": lambda: one_off(healthy_frames(9), [0, 26], 1.5),

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from eitskin.frames.doctor.case import (
+    GROUP,
+    SAME,
     BoolArray,
     Case,
     FloatArray,
@@ -31,6 +33,7 @@ PAIR_AGREE = 0.75
 PAIR_SPREADS = 3.0
 MANY = 0.5
 FOREIGN_BELOW = 0.9
+LEAST_CHANNELS = 8
 UNIT_OFF = 30.0
 
 
@@ -51,7 +54,10 @@ def outliers(case: Case) -> BoolArray:
 def check_resemblance(case: Case) -> Outcome:
     """Whether the reference looks like a homogeneous skin at all."""
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
-    reached = correlation(np.abs(measured), np.abs(predicted))
+    size = np.abs(predicted)
+    if size.size < LEAST_CHANNELS or np.ptp(size) <= SAME * size.max():
+        return Outcome(untold=("whether this is a homogeneous skin: too few channels, or all alike",))
+    reached = correlation(np.abs(measured), size)
     numbers_ = {"reference_correlation": round(reached, 4)}
     if reached >= FOREIGN_BELOW or rms(measured) == 0:
         return Outcome(measured=numbers_)
@@ -91,7 +97,7 @@ def check_gain(case: Case) -> tuple[Case, Outcome]:
                 channel_remedy(case, channels),
             )
         )
-    if spread >= SPREAD_NOTE:
+    if spread >= SPREAD_NOTE and strong.sum() >= GROUP:
         fault = spread >= SPREAD_FAULT
         findings.append(
             Finding(
@@ -108,11 +114,13 @@ def check_gain(case: Case) -> tuple[Case, Outcome]:
 
 def check_unit(case: Case, unit_known: bool) -> Outcome:
     """Whether the numbers can be volts, where the skin's conductivity and the current are known."""
-    scale = float(np.median(np.abs(case.reference[case.trusted]))) if case.trusted.any() else 0.0
-    predicted = float(np.median(np.abs(case.predicted[case.trusted]))) * case.frames.protocol.current_a
     if case.skin is None:
         return Outcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
-    if scale == 0 or predicted == 0:
+    if not case.trusted.any():
+        return Outcome()
+    scale = float(np.median(np.abs(case.reference[case.trusted])))
+    predicted = float(np.median(np.abs(case.predicted[case.trusted]))) * case.frames.protocol.current_a
+    if scale == 0:
         return Outcome()
     ratio = scale / predicted
     measured = {"reference_per_predicted": float(f"{ratio:.4g}")}

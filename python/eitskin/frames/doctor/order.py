@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.frames.doctor.case import Case, FloatArray, cosine, numbers, rms
+from eitskin.frames.doctor.case import SAME, Case, FloatArray, cosine, numbers, rms
 from eitskin.frames.doctor.report import FAULT, Finding, Outcome
 from eitskin.frames.doctor.subject import AS_GIVEN
 from eitskin.frames.doctor.swaps import likeness
@@ -33,13 +33,16 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
     Where none reaches LIKELY, exchanged wires or a dead electrode may hide it: then what is reached without those is
     compared. Another order than ``given`` is found where it is better by more than BETTER_BY and at least LIKELY.
     """
+    said = orders.index(given) if given in orders else -1
+    size = np.abs(cases[0].predicted)
+    if said >= 0 and np.ptp(size) <= SAME * size.max():
+        return OrderChoice(said, Outcome(untold=("the channel order: the protocol makes all channels alike",)))
     reached = [likeness(case, allow_fault=False) for case in cases]
     if max(reached) < LIKELY:
         reached = [likeness(case, allow_fault=True) for case in cases]
     best = int(np.argmax(reached))
     evidence: dict[str, Any] = {name: round(value, 4) for name, value in zip(orders, reached, strict=True)}
     measured: dict[str, Any] = {"order_correlation": evidence}
-    said = orders.index(given) if given in orders else -1
     if said >= 0 and (best == said or reached[best] < max(reached[said] + BETTER_BY, LIKELY)):
         return OrderChoice(said, Outcome(measured=measured))
     why = "by their number" if said < 0 else "by correlation with the homogeneous frame"

@@ -14,6 +14,8 @@ PAIR_OFF = 0.25
 PAIR_TIMES_USUAL = 6.0
 RMS_NOTE = 0.05
 RMS_FAULT = 0.08
+MEDIAN_NOTE = 0.03
+LEAST_PAIRS = 8
 WORST = 5
 
 
@@ -60,15 +62,21 @@ def check_reciprocity(case: Case) -> Outcome:
                 channel_remedy(case, off),
             )
         )
-    if overall >= RMS_NOTE:
-        fault = overall >= RMS_FAULT
+    fault = overall >= RMS_FAULT
+    if fault or (overall >= RMS_NOTE and usual >= MEDIAN_NOTE and len(first) >= LEAST_PAIRS):
         findings.append(
             Finding(
                 "reciprocity",
                 FAULT if fault else NOTE,
                 f"reciprocal channels differ by {100 * overall:.1f} % of the rms voltage"
                 + ("; measured at different times, gains or currents" if fault else ""),
-                {"rms": round(overall, 4), "worst_pairs": worst, "note_from": RMS_NOTE, "fault_from": RMS_FAULT},
+                {
+                    "rms": round(overall, 4),
+                    "median": round(usual, 4),
+                    "worst_pairs": worst,
+                    "note_from": RMS_NOTE,
+                    "fault_from": RMS_FAULT,
+                },
             )
         )
     return Outcome(tuple(findings), measured=measured)

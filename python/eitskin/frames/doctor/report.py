@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 FAULT = "fault"
@@ -61,7 +62,7 @@ class Report:
         return 0 if self.healthy else EXIT_FAULT
 
     def as_table(self) -> dict[str, Any]:
-        """The report as JSON values."""
+        """The report as JSON values; a number that is not finite becomes null."""
         return {
             "source": self.source,
             "subject": self.subject,
@@ -71,13 +72,13 @@ class Report:
                     "name": finding.name,
                     "severity": finding.severity,
                     "text": finding.text,
-                    "evidence": dict(finding.evidence),
+                    "evidence": _finite(finding.evidence),
                     "mend": finding.mend,
                 }
                 for finding in self.findings
             ],
             "untold": list(self.untold),
-            "measured": dict(self.measured),
+            "measured": _finite(self.measured),
             "mend": self.mend,
         }
 
@@ -100,6 +101,14 @@ class Report:
         if self.mend:
             lines.append(f"  all in one: eitskin import {self.source} -o OUT.npz ... {self.mend}")
         return lines
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def _shown(value: Any) -> str:

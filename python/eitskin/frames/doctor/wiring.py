@@ -1,17 +1,18 @@
 """Electrodes that are dead or joined: every such hypothesis predicts a frame, and the best one is named.
 
 Joined electrodes: the transfer matrix with the wire in it. A dead electrode: nearly all channels that drive by it, or
-that measure by it, stand out, and all channels without it are as if nothing had happened.
+that measure by it, stand out or are silent, and all channels without it are as if nothing had happened.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from eitskin.frames.doctor.case import Case, numbers
+from eitskin.frames.doctor.case import Case, FloatArray, numbers
 from eitskin.frames.doctor.gain import channel_gains, outliers
 from eitskin.frames.doctor.misfit import Joined, best_joined, misfit
 from eitskin.frames.doctor.report import FAULT, Finding, Outcome
@@ -23,14 +24,16 @@ GOOD = 0.2
 PREFER_JOINED = 1.25
 MOSTLY = 0.8
 LOST = 0.2
+SILENT = 0.1
+MOST_SUSPECTS = 8
 MOST_FAULTS = 4
 
 
 @dataclass(frozen=True)
 class Dead:
-    """``electrode`` taken for dead, and the misfit that the channels without it are left with."""
+    """``electrodes`` taken for dead, and the misfit that the channels without them are left with."""
 
-    electrode: int
+    electrodes: tuple[int, ...]
     misfit: float
 
 
@@ -40,15 +43,15 @@ def check_wiring(case: Case) -> tuple[Case, Outcome]:
     Nothing more is sought once a short circuit is found: its frame is known only roughly.
     """
     findings: list[Finding] = []
-    while len(findings) < MOST_FAULTS and np.count_nonzero(outliers(case)) >= LEAST_OUTLIERS:
+    while len(findings) < MOST_FAULTS and (np.count_nonzero(outliers(case)) >= LEAST_OUTLIERS or _suspects(case)):
         before = misfit(case, case.trusted, case.magnitude)
         enough = min(GOOD, before / BETTER_TIMES)
         joined, dead = best_joined(case, case.magnitude), _best_dead(case)
         if dead is not None and PREFER_JOINED * dead.misfit < joined.misfit:
             if dead.misfit > enough:
                 break
-            case, finding = _without(case, dead, before)
-            findings.append(finding)
+            case, found = _without(case, dead, before)
+            findings.extend(found)
             continue
         if joined.misfit <= enough:
             case, finding = _with_joined(case, joined, before)
@@ -84,35 +87,59 @@ def check_lost(case: Case) -> Outcome:
 
 
 def _best_dead(case: Case) -> Dead | None:
-    found = []
-    for electrode in sorted(set(case.rows.ravel().tolist())):
-        if _sides_off(case, electrode):
-            others = case.trusted & ~touching(case.rows, [electrode])
-            found.append(Dead(electrode, misfit(case, others, case.magnitude)))
-    return min(found, key=lambda dead: dead.misfit, default=None)
+    """The fewest suspects without which the other channels are well explained: one, or two."""
+    suspects = _suspects(case)
+    sets = [(e,) for e in suspects] + (list(combinations(suspects, 2)) if len(suspects) <= MOST_SUSPECTS else [])
+    best: Dead | None = None
+    for electrodes in sets:
+        others = case.trusted & ~touching(case.rows, electrodes)
+        dead = Dead(electrodes, misfit(case, others, case.magnitude) if others.any() else 1.0)
+        if best is None or dead.misfit * (1 if len(electrodes) == len(best.electrodes) else BETTER_TIMES) < best.misfit:
+            best = dead
+    return best
+
+
+def _suspects(case: Case) -> list[int]:
+    return [e for e in sorted(set(case.rows.ravel().tolist())) if _sides_off(case, e)]
 
 
 def _sides_off(case: Case, electrode: int) -> dict[str, float]:
-    """Of "driving" and "measuring" those by which nearly all channels of ``electrode`` stand out, with their gain."""
-    off, (gain, _) = outliers(case), channel_gains(case)
+    """Of "driving" and "measuring" those by which nearly all channels of ``electrode`` stand out, with their gain.
+
+    They stand out from like channels, or, where too many of those are dead, by being nearly silent.
+    """
+    off, (gain, _), strength = outliers(case), channel_gains(case), _strength(case)
     sides = {}
     for name, columns in (("driving", [0, 1]), ("measuring", [2, 3])):
         using = (case.rows[:, columns] == electrode).any(axis=1) & case.trusted
-        if using.any() and off[using].mean() >= MOSTLY:
+        if not using.any():
+            continue
+        silent = float(np.median(strength[using]))
+        if silent < SILENT:
+            sides[name] = round(silent, 4)
+        elif off[using].mean() >= MOSTLY:
             sides[name] = round(float(np.median(np.abs(gain[using]))), 4)
     return sides
 
 
-def _without(case: Case, dead: Dead, before: float) -> tuple[Case, Finding]:
-    sides = _sides_off(case, dead.electrode)
-    evidence: dict[str, Any] = {"electrode": dead.electrode}
-    evidence |= {f"{name}_gain": gain for name, gain in sides.items()}
-    evidence |= {"misfit": round(dead.misfit, 4), "misfit_without": round(before, 4)}
-    text = (
-        f"electrode {dead.electrode} (from 0) is dead, {' and '.join(sides)}: mend its contact or wire, or leave it out"
-    )
-    finding = Finding("dead-electrode", FAULT, text, evidence, f"--drop-electrodes {dead.electrode}")
-    return replace(case, trusted=case.trusted & ~touching(case.rows, [dead.electrode])), finding
+def _strength(case: Case) -> FloatArray:
+    """|Reference| per |prediction| (m,), relative to its upper quartile: robust while fewer than half are dead."""
+    size = np.abs(case.predicted)
+    ratio = np.divide(np.abs(case.reference), size, out=np.ones_like(size), where=size > 0)
+    usual = float(np.quantile(ratio[case.trusted], 0.75)) if case.trusted.any() else 0.0
+    return ratio / usual if usual > 0 else np.ones_like(ratio)
+
+
+def _without(case: Case, dead: Dead, before: float) -> tuple[Case, list[Finding]]:
+    findings = []
+    for electrode in dead.electrodes:
+        sides = _sides_off(case, electrode)
+        evidence: dict[str, Any] = {"electrode": electrode}
+        evidence |= {f"{name}_gain": gain for name, gain in sides.items()}
+        evidence |= {"misfit": round(dead.misfit, 4), "misfit_without": round(before, 4)}
+        text = f"electrode {electrode} (from 0) is dead, {' and '.join(sides)}: mend its contact, or leave it out"
+        findings.append(Finding("dead-electrode", FAULT, text, evidence, f"--drop-electrodes {electrode}"))
+    return replace(case, trusted=case.trusted & ~touching(case.rows, dead.electrodes)), findings
 
 
 def _with_joined(case: Case, joined: Joined, before: float) -> tuple[Case, Finding]:
