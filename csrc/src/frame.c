@@ -19,6 +19,16 @@ static uint32_t find_unusable(eits_context *ctx, const eits_real *frame)
     return count;
 }
 
+/* A frame of nothing but zeros is a dead front end, not a quiet skin. */
+static int is_dead(const eits_context *ctx, const eits_real *frame)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (!ctx->unusable[i] && frame[i] != 0)
+            return 0;
+    }
+    return 1;
+}
+
 /* The datum of one row from its voltage and its reference, in model volts (or without unit where normalised). */
 static eits_real datum(const eits_context *ctx, eits_real v, eits_real v0)
 {
@@ -40,7 +50,10 @@ static int ratio_undefined(const eits_context *ctx, eits_real v0)
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE && eits_fabs(v0) < R(1e-6) * ctx->baseline.v0_rms;
 }
 
-/* d_k: the mean of a row and its reciprocal, or whichever is usable; sets basis_for where neither is. */
+/* What of a folded row the basis was built for: see drift_direction. */
+enum { BY_FIRST = 0, LEFT_OUT = 1, BY_SECOND = 2 };
+
+/* d_k: the mean of a row and its reciprocal, or whichever is usable; sets basis_for, and says whether any of it changed. */
 static int fold_data(eits_context *ctx, const eits_real *frame)
 {
     const eits_real *v0 = ctx->baseline.v0;
@@ -60,10 +73,11 @@ static int fold_data(eits_context *ctx, const eits_real *frame)
             sum += turn ? -value : value;
             ++used;
         }
-        const uint8_t left_out = used == 0;
+        const int by_second = ctx->unusable[fold.first] && fold.second != EITS_FOLD_NONE;
+        const uint8_t side = used == 0 ? LEFT_OUT : (by_second ? BY_SECOND : BY_FIRST);
         ctx->d[k] = used == 2 ? R(0.5) * sum : sum;
-        changed |= left_out != ctx->basis_for[k];
-        ctx->basis_for[k] = left_out;
+        changed |= side != ctx->basis_for[k];
+        ctx->basis_for[k] = side;
     }
     return changed;
 }
@@ -102,11 +116,12 @@ static uint64_t drift_direction(eits_context *ctx, eits_real *out)
     const eits_model *model = ctx->model;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
-        const uint32_t row = ctx->unusable[fold.first] && fold.second != EITS_FOLD_NONE ? fold.second : fold.first;
-        const eits_real turn = row == fold.second ? (eits_real)fold.sign : 1;
+        const int by_second = ctx->basis_for[k] == BY_SECOND;
+        const uint32_t row = by_second ? fold.second : fold.first;
+        const eits_real turn = by_second ? (eits_real)fold.sign : 1;
         const eits_real along = model->data_kind == EITS_DATA_NORMALISED ? 1 : turn * ctx->baseline.gain * ctx->baseline.v0[row];
         ctx->list_index[k] = k;
-        ctx->list_value[k] = ctx->basis_for[k] ? 0 : along;
+        ctx->list_value[k] = ctx->basis_for[k] == LEFT_OUT ? 0 : along;
     }
     ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->list_value, model->n_folded, out);
     return (uint64_t)model->n_folded * model->rank;
@@ -117,7 +132,7 @@ static uint64_t rebuild_basis(eits_context *ctx)
     uint64_t macs = 0;
     ctx->basis_count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (!ctx->basis_for[k])
+        if (ctx->basis_for[k] != LEFT_OUT)
             continue;
         reduction_column(ctx, k, ctx->residual);
         macs += extend_basis(ctx, ctx->residual);
@@ -137,13 +152,15 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     *macs = 0;
     if (*masked > ctx->options.max_masked)
         return EITS_E_FRAME_CHANNELS;
+    if (*masked < model->n_rows && is_dead(ctx, frame))
+        return EITS_E_FRAME_ZERO;
     if (fold_data(ctx, frame) || ctx->basis_stale)
         *macs += rebuild_basis(ctx);
     uint32_t count = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         ctx->list_index[count] = k;
         ctx->list_value[count] = ctx->d[k];
-        count += !ctx->basis_for[k];
+        count += ctx->basis_for[k] != LEFT_OUT;
     }
     ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->list_value, count, ctx->y);
     *macs += (uint64_t)count * model->rank;

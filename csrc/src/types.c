@@ -15,7 +15,7 @@ const char *eits_status_text(eits_status status)
     case EITS_E_MODEL_ALIGNMENT: return "the model does not start at a 16-byte boundary";
     case EITS_E_FRAME_LENGTH: return "the frame's length is not the number of rows of the protocol";
     case EITS_E_FRAME_CHANNELS: return "too many channels of the frame are unusable";
-    case EITS_E_FRAME_ZERO: return "the reference frame is all zero";
+    case EITS_E_FRAME_ZERO: return "all voltages are zero; is the skin driven and connected?";
     case EITS_E_NO_BASELINE: return "no reference frame has been set";
     case EITS_E_BASELINE_SHORT: return "the baseline has too few quiet frames";
     case EITS_E_NOT_FINITE: return "the result would not be finite";

@@ -30,7 +30,8 @@ eits_status eits_baseline_finish(eits_context *ctx);
 eits_status eits_mask_row(eits_context *ctx, uint32_t row, int bad);
 
 /* The frame stage alone: fills ctx->d, ctx->y, ctx->basis, ctx->unusable and returns the number of rows left out in
- * `masked`. Errors: EITS_E_NO_BASELINE, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_NOT_FINITE. */
+ * `masked`. Errors: EITS_E_NO_BASELINE, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO,
+ * EITS_E_NOT_FINITE. */
 eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t length, uint32_t *masked, uint64_t *macs);
 
 #ifdef __cplusplus

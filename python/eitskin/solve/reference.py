@@ -20,6 +20,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 BASIS_TOLERANCE = 1e-6
 MAX_STEP_HALVINGS = 8
+DEAD = "all voltages are zero; is the skin driven and connected?"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +64,13 @@ def certify(
 
 
 def fista(
-    s: FloatArray, y: FloatArray, lam: float, lipschitz: float, options: Options, basis: FloatArray, start: FloatArray | None = None
+    s: FloatArray,
+    y: FloatArray,
+    lam: float,
+    lipschitz: float,
+    options: Options,
+    basis: FloatArray,
+    start: FloatArray | None = None,
 ) -> FistaResult:
     """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the misfit."""
     sign, step, t, halvings = options.sign, 1.0 / lipschitz, 1.0, 0
@@ -94,7 +101,7 @@ def fista(
             x, sx = np.zeros_like(x), np.zeros_like(sx)
             z, sz = x.copy(), sx.copy()
             continue
-        if 0 < options.gap_rel and gap <= options.gap_rel * scale:
+        if options.gap_rel > 0 and gap <= options.gap_rel * scale:
             stop = "gap"
             break
     return FistaResult(x, sx, k, stop, gap, residual, halvings)
@@ -127,6 +134,7 @@ class ReferenceEngine:
         self._v_ref = model.v_ref_v.astype(np.float64)
         self._bad = np.zeros(model.protocol.n_rows, dtype=bool)
         self._v0: FloatArray | None = None
+        self._drift_v0: FloatArray | None = None
         self._gain = 1.0
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
@@ -161,11 +169,11 @@ class ReferenceEngine:
         folded, known = self._fold_reference(v0)
         v, r = folded[known], self._v_ref[known]
         if not np.abs(v).max(initial=0.0) > 0:
-            raise FrameError("reference frame: the reference frame is all zero")
+            raise FrameError(f"reference frame: {DEAD}")
         correlation = float(v @ r / np.sqrt((v @ v) * (r @ r)))
         self._gain = float(np.sqrt((r @ r) / (v @ v))) * (-1 if correlation < 0 else 1)
         self._v0, self._v0_rms = v0, float(np.sqrt(np.mean(v**2)))
-        self._warm = None
+        self._drift_v0, self._warm = v0, None
         return correlation
 
     def set_baseline(self, frames: FloatArray) -> Baseline:
@@ -180,15 +188,23 @@ class ReferenceEngine:
             raise FrameError("reference frames: a channel is not finite or saturated; mask it or measure again")
         self._lambda_noise, noise = 0.0, 0.0
         if len(frames) >= 4:
-            for k in range(len(frames) // 2, len(frames)):
-                if k == len(frames) // 2:
-                    self._fit_to_model(frames[:k].mean(axis=0))
-                self._v0 = frames[:k].mean(axis=0)
-                y, _, _ = self.frame_stage(frames[k])
-                self._lambda_noise = max(self._lambda_noise, greatest(self._s.T @ y, "both"))
+            self._lambda_noise = self._learn_lambda_noise(frames)
             noise = float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
         correlation = self._fit_to_model(frames.mean(axis=0))
         return Baseline(len(frames), correlation, self._gain, self._v0_rms, noise, self._lambda_noise)
+
+    def _learn_lambda_noise(self, frames: FloatArray) -> float:
+        """The greatest max |S'y| of the second half of ``frames``, each against the mean of those before it."""
+        half, seen = len(frames) // 2, 0.0
+        try:
+            self._fit_to_model(frames[:half].mean(axis=0))
+            for k in range(half, len(frames)):
+                self._v0 = frames[:k].mean(axis=0)
+                seen = max(seen, greatest(self._s.T @ self.frame_stage(frames[k])[0], "both"))
+        except FrameError:
+            self._v0 = None
+            raise
+        return seen
 
     def _datum(self, frame: FloatArray, v0: FloatArray) -> FloatArray:
         kind = self.model.data_kind
@@ -213,6 +229,8 @@ class ReferenceEngine:
             unusable |= np.abs(np.nan_to_num(frame)) >= limit
         if int(unusable.sum()) > self.options.max_masked:
             raise FrameError("frame: too many channels of the frame are unusable")
+        if not unusable.all() and not frame[~unusable].any():
+            raise FrameError(f"frame: {DEAD}")
         out = unusable | ((kind != "difference") & (np.abs(self._v0) < 1e-6 * self._v0_rms))
         value = np.where(out, 0.0, self._datum(np.where(out, self._v0, frame), self._v0))
         sign = np.ones_like(fold.sign) if kind == "normalised" else fold.sign
@@ -225,10 +243,10 @@ class ReferenceEngine:
     def _directions(self, unusable: BoolArray, left_out: BoolArray) -> list[FloatArray]:
         """What the misfit ignores: P's columns of rows left out, and the drift of the gain."""
         directions = [self._p[:, k] for k in np.flatnonzero(left_out)]
-        if self.options.project_baseline and self._v0 is not None:
-            fold = self.model.fold
+        if self.options.project_baseline and self._drift_v0 is not None:
+            fold, v0 = self.model.fold, self._drift_v0
             other = unusable[fold.first] & (fold.second >= 0)
-            along = self._gain * np.where(other, fold.sign * self._v0[fold.second], self._v0[fold.first])
+            along = self._gain * np.where(other, fold.sign * v0[fold.second], v0[fold.first])
             along = np.ones_like(along) if self.model.data_kind == "normalised" else along
             directions.append(self._p @ np.where(left_out, 0.0, along))
         return directions
@@ -241,7 +259,11 @@ class ReferenceEngine:
         """
         if frame.shape != (self.model.protocol.n_rows,):
             raise FrameError(f"frame: has shape {frame.shape}, but the model's protocol has {self.model.protocol.n_rows} rows")
-        y, basis, masked = self.frame_stage(np.asarray(frame, dtype=np.float64))
+        try:
+            y, basis, masked = self.frame_stage(np.asarray(frame, dtype=np.float64))
+        except FrameError:
+            self._warm = None
+            raise
         o, norm = self.options, float(np.linalg.norm(y))
         lambda_max = greatest(self._s.T @ y, o.sign)
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * self._lambda_noise)
