@@ -172,7 +172,7 @@ static eits_status read_dims(eits_model *model, const section *dims)
     const float numbers[] = {model->pixel_mm, model->origin_x_mm, model->origin_y_mm,
                              model->current_a, model->lipschitz,   model->noise_gain};
     if (!all_finite(numbers, sizeof numbers / sizeof numbers[0]) || model->pixel_mm <= 0.0f || model->lipschitz <= 0.0f ||
-        model->noise_gain < 0.0f)
+        model->current_a <= 0.0f || model->noise_gain < 0.0f)
         return EITS_E_MODEL_VALUE;
     model->data_kind = (eits_data_kind)kind;
     model->reduction.rows = model->rank;
@@ -203,8 +203,9 @@ static eits_status check_sizes(const eits_model *model, const sections *found)
 
 static eits_status check_tables(const eits_model *model)
 {
-    for (size_t i = 0; i < (size_t)model->n_rows * 4; ++i) {
-        if (model->protocol[i] >= model->n_electrodes)
+    for (size_t i = 0; i < (size_t)model->n_rows * 4; i += 2) { /* pair by pair: drive, then measurement */
+        const uint8_t *pair = model->protocol + i;
+        if (pair[0] >= model->n_electrodes || pair[1] >= model->n_electrodes || pair[0] == pair[1])
             return EITS_E_MODEL_VALUE;
     }
     for (uint32_t i = 0; i < model->n_folded; ++i) {
@@ -236,6 +237,23 @@ static int halves_finite(const uint16_t *values, size_t count)
     return 1;
 }
 
+static int between(float value, float low, float high)
+{
+    return is_finite_f32(value) && value >= low && value <= high;
+}
+
+/* The ranges that eits_set_options asks for, so that a model's own defaults are always good options. */
+static int defaults_in_range(const eits_defaults *d)
+{
+    const float huge = 1e30f;
+    return d->iterations >= 1 && between(d->lambda_rel, 0, 1) && between(d->mask_threshold, 0, 1) &&
+           between(d->touch_threshold, 0, 1) && between(d->touch_share, 0, 1) && between(d->lambda_noise_factor, 0, huge) &&
+           between(d->gate_factor, 0, huge) && between(d->touch_change_s_per_m, 0, huge) && between(d->follow_mm, 0, huge) &&
+           between(d->touch_radius_weight, 0, huge) && between(d->touch_min_radius_mm, 1e-6f, huge) &&
+           between(d->touch_max_radius_mm, d->touch_min_radius_mm, huge) &&
+           between(d->touch_seed_radius_mm, d->touch_min_radius_mm, d->touch_max_radius_mm);
+}
+
 static eits_status check_numbers(const eits_model *model)
 {
     const eits_matrix *s = &model->sensitivity;
@@ -247,12 +265,7 @@ static eits_status check_numbers(const eits_model *model)
         (s->storage == EITS_STORAGE_F32 && !all_finite(s->data, stored)) ||
         (s->storage == EITS_STORAGE_F16 && !halves_finite(s->data, stored)))
         return EITS_E_MODEL_VALUE;
-    const eits_defaults *d = model->defaults;
-    if (!all_finite(&d->lambda_rel, 12) || d->lambda_rel < 0.0f || d->lambda_noise_factor < 0.0f || d->gate_factor < 0.0f ||
-        d->touch_min_radius_mm <= 0.0f || d->touch_max_radius_mm < d->touch_min_radius_mm ||
-        d->touch_seed_radius_mm < d->touch_min_radius_mm || d->touch_seed_radius_mm > d->touch_max_radius_mm ||
-        d->lambda_rel > 1.0f || d->touch_threshold < 0.0f || d->touch_threshold > 1.0f || d->touch_share < 0.0f ||
-        d->touch_share > 1.0f || d->touch_change_s_per_m < 0.0f || d->follow_mm < 0.0f || d->touch_radius_weight < 0.0f || d->iterations == 0)
+    if (!defaults_in_range(model->defaults))
         return EITS_E_MODEL_VALUE;
     return EITS_OK;
 }

@@ -15,7 +15,7 @@ extern "C" {
 #define EITS_MODEL_MINOR 0
 #define EITS_MODEL_ALIGNMENT 16
 #define EITS_MAX_RANK 1024
-#define EITS_MAX_PIXELS 65534
+#define EITS_MAX_PIXELS 65535
 #define EITS_MAX_ROWS 65535
 
 /* How the reduced Jacobian is stored. Integer types carry one scale per column. */

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from eitskin import __version__
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid, grid_for
-from eitskin.model.eitm import encode_model
+from eitskin.model.eitm import MAX_PIXELS, MAX_RANK, encode_model
 from eitskin.model.model import DATA_KINDS, Defaults, Golden, Model
 from eitskin.model.reduction import (
     DEFAULT_COLUMN_POWER,
@@ -30,7 +30,7 @@ FloatArray = npt.NDArray[np.float64]
 
 LIPSCHITZ_MARGIN = 1e-4
 PAPER_DIAMETER_MM = 194.0
-# a disc of contrast c in a sheet of conductivity s answers as a linear change of 2 (c - 1) / (c + 1) s; c = 3 to 10 give 1.0 to 1.64
+# a disc of contrast c in a sheet of conductivity s answers as a linear change of 2 (c - 1) / (c + 1) s: for c = 3 to 10, 1.0 to 1.64 s
 TOUCH_CHANGE_RATIO = 1.35
 # the logarithm draws strong touches together, so that their data say little of the radius and strength must
 LOG_RADIUS_WEIGHT = 1.0
@@ -86,8 +86,7 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
     Raises:
         UsageError: a setting is out of range, or the C core is not built.
     """
-    if settings.storage not in STORAGES or settings.data_kind not in DATA_KINDS:
-        raise UsageError(f"model: storage must be one of {', '.join(STORAGES)}; data one of {', '.join(DATA_KINDS)}")
+    _refuse_settings(settings, linear.grid)
     fold = protocol.reciprocal_pairs()
     v_ref, jacobian = fold_rows(linear.v0_v, fold), fold_rows(linear.jacobian, fold)
     if settings.data_kind == "normalised":
@@ -118,6 +117,16 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
     return replace(model, golden=replace(model.golden, image=_golden_image(model)))
 
 
+def _refuse_settings(settings: BuildSettings, grid: Grid) -> None:
+    """Refuse what no .eitm file can hold, before the work."""
+    if settings.storage not in STORAGES or settings.data_kind not in DATA_KINDS:
+        raise UsageError(f"model: storage must be one of {', '.join(STORAGES)}; data one of {', '.join(DATA_KINDS)}")
+    if not 0 <= settings.rank <= MAX_RANK:
+        raise UsageError(f"model: rank = {settings.rank} is out of range; use 1 to {MAX_RANK}, or 0 for the usual one")
+    if grid.n_pixels > MAX_PIXELS:
+        raise UsageError(f"model: {grid.n_pixels} pixels are more than a model's {MAX_PIXELS}; use fewer across")
+
+
 def scaled_defaults(skin: Skin, data_kind: str, touch_change_ratio: float = TOUCH_CHANGE_RATIO) -> Defaults:
     """Defaults for ``skin``: lengths in proportion to its size, the expected change to its conductivity."""
     paper = Defaults()
@@ -140,6 +149,7 @@ def _round(value: float) -> float:
 def build_model(skin: Skin, protocol: Protocol, settings: BuildSettings | None = None) -> Model:
     """The whole way from ``skin`` to a model; raises what ``linearise`` and ``make_model`` raise."""
     chosen = settings or BuildSettings()
+    _refuse_settings(chosen, grid_for(skin.outline, chosen.pixels_across))
     linear = linearise(skin, protocol, pixels_across=chosen.pixels_across, elements=chosen.elements)
     return make_model(skin, protocol, linear, chosen)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from dataclasses import astuple, fields
+from dataclasses import astuple, dataclass, fields
+from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -17,6 +18,7 @@ from eitskin.fem.grid import Grid
 from eitskin.fileio import read_bytes, write_bytes
 from eitskin.model.model import DATA_KINDS, Defaults, Golden, Model
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
+from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
@@ -29,6 +31,10 @@ REQUIRED = ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEF
 FOLD_DTYPE = np.dtype([("first", "<u2"), ("second", "<u2"), ("sign", "<i2"), ("reserved", "<u2")])
 FOLD_NONE = 0xFFFF
 REQUIRED_FLAG = 1
+SCALED = ("i16", "i8")
+MAX_SECTIONS = 256
+MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
+LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
 
 Sections = dict[str, bytes]
 
@@ -97,8 +103,6 @@ def decode_model(blob: bytes, where: str) -> Model:
     sections = _split(blob, where)
     try:
         return _decode_sections(sections, _header(blob, where)[7], where)
-    except (struct.error, ValueError, KeyError, IndexError) as error:
-        raise ModelError(f"{where}: a section does not fit the dimensions ({error}); build the model again") from None
     except ModelError:
         raise
     except EitskinError as error:
@@ -118,15 +122,18 @@ def _split(blob: bytes, where: str) -> Sections:
     _, major, minor, total, crc, count, _, _ = _header(blob, where)
     if major != MAJOR:
         raise ModelError(
-            f"{where}: the model's format is {major}.{minor}, this eitskin reads {MAJOR}.x; upgrade eitskin or build the model again"
+            f"{where}: the model's format is {major}.{minor}, this eitskin reads {MAJOR}.x; "
+            "upgrade eitskin or build the model again"
         )
-    if len(blob) < total or total < HEADER.size:
+    if total < HEADER.size or total % 16:
+        raise ModelError(f"{where}: the header states a size of {total} bytes, as no model has; build the model again")
+    if len(blob) < total:
         raise ModelError(f"{where}: the model is truncated ({len(blob)} of {total} bytes); copy or build it again")
     if zlib.crc32(blob[16:total]) != crc:
         raise ModelError(f"{where}: the model is corrupted (its checksum does not fit); copy or build it again")
     table_end = HEADER.size + count * ENTRY.size
-    if table_end > total:
-        raise ModelError(f"{where}: the section table runs past the end; build the model again")
+    if count > MAX_SECTIONS or table_end > total:
+        raise ModelError(f"{where}: the section table is too long; build the model again")
     sections: Sections = {}
     for place in range(count):
         tag, offset, size, flags = ENTRY.unpack_from(blob, HEADER.size + place * ENTRY.size)
@@ -144,59 +151,156 @@ def _split(blob: bytes, where: str) -> Sections:
     return sections
 
 
-def _floats(content: bytes, shape: tuple[int, ...], where: str) -> npt.NDArray[np.float32]:
-    values = np.frombuffer(content, dtype="<f4").reshape(shape)
-    if not np.isfinite(values).all():
-        _bad_value(where, "a number that is not finite")
-    return values
+@dataclass(frozen=True)
+class _Dims:
+    """Section DIMS, field by field."""
+
+    n_electrodes: int
+    n_rows: int
+    n_folded: int
+    rank: int
+    stride: int
+    n_pixels: int
+    nx: int
+    ny: int
+    storage: int
+    kind: int
+    pixel_mm: float
+    origin_x_mm: float
+    origin_y_mm: float
+    current_a: float
+    lipschitz: float
+    noise_gain: float
 
 
-def _bad_value(where: str, what: str) -> NoReturn:
+def _refuse(where: str, what: str) -> NoReturn:
     raise ModelError(f"{where}: holds {what}; build the model again")
 
 
-def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model:
-    (n_electrodes, n_rows, n_folded, rank, stride, n_pixels, nx, ny, storage, kind,
-     pixel_mm, origin_x, origin_y, current_a, lipschitz, noise_gain) = DIMS.unpack(sections["DIMS"])  # fmt: skip
-    if storage >= len(STORAGES) or kind >= len(DATA_KINDS) or stride != stride_for(rank) or rank == 0:
-        _bad_value(where, "a dimension out of range")
-    if not (np.isfinite([pixel_mm, origin_x, origin_y, lipschitz, noise_gain]).all() and lipschitz > 0 and pixel_mm > 0):
-        _bad_value(where, "a number that is not finite or not positive")
-    protocol = Protocol(n_electrodes, np.frombuffer(sections["PROT"], dtype="u1").reshape(n_rows, 4), _short(current_a))
-    if protocol.hash != protocol_hash:
-        _bad_value(where, "a protocol table that does not fit its hash")
-    fold = np.frombuffer(sections["FOLD"], dtype=FOLD_DTYPE)
-    if len(fold) != n_folded:
-        _bad_value(where, "a fold of the wrong length")
-    name = STORAGES[storage]
-    columns = np.frombuffer(sections["SENS"], dtype=DTYPES[name]).reshape(n_pixels, stride)
-    scale = _floats(sections["SCAL"], (n_pixels,), where) if name in ("i16", "i8") else None
-    if not np.isfinite(columns).all():
-        _bad_value(where, "a number that is not finite")
-    index = np.frombuffer(sections["GRID"], dtype="<u2").reshape(n_pixels, 2).astype(np.int64)
-    if (index >= [nx, ny]).any():
-        _bad_value(where, "a pixel outside the grid")
-    golden = _floats(sections["GOLD"], (2 * n_rows + n_pixels,), where)
+def _read_dims(content: bytes, where: str) -> _Dims:
+    if len(content) != DIMS.size:
+        _refuse(where, f"section 'DIMS' of {len(content)} bytes instead of {DIMS.size}")
+    d = _Dims(*DIMS.unpack(content))
+    in_range = (
+        MIN_COUNT <= d.n_electrodes <= MAX_COUNT
+        and 1 <= d.n_rows <= MAX_ROWS
+        and 1 <= d.n_folded <= d.n_rows
+        and 1 <= d.rank <= MAX_RANK
+        and d.stride == stride_for(d.rank)
+        and 1 <= d.n_pixels <= MAX_PIXELS
+        and 1 <= d.nx <= MAX_SIDE
+        and 1 <= d.ny <= MAX_SIDE
+        and d.storage < len(STORAGES)
+        and d.kind < len(DATA_KINDS)
+    )
+    if not in_range:
+        _refuse(where, "a dimension out of range")
+    numbers = (d.pixel_mm, d.origin_x_mm, d.origin_y_mm, d.current_a, d.lipschitz, d.noise_gain)
+    if not all(map(isfinite, numbers)) or min(d.pixel_mm, d.current_a, d.lipschitz) <= 0 or d.noise_gain < 0:
+        _refuse(where, "a number in section 'DIMS' that is out of range")
+    return d
+
+
+def _check_sizes(sections: Sections, d: _Dims, where: str) -> None:
+    item = DTYPES[STORAGES[d.storage]].itemsize
+    wanted = {
+        "PROT": 4 * d.n_rows,
+        "FOLD": FOLD_DTYPE.itemsize * d.n_folded,
+        "VREF": 4 * d.n_folded,
+        "REDU": 4 * d.n_folded * d.stride,
+        "SENS": item * d.n_pixels * d.stride,
+        "SCAL": 4 * d.n_pixels if STORAGES[d.storage] in SCALED else None,
+        "COLW": 4 * d.n_pixels,
+        "GRID": 4 * d.n_pixels,
+        "DEFS": DEFAULTS.size,
+        "GOLD": 4 * (2 * d.n_rows + d.n_pixels),
+    }
+    for name, size in wanted.items():
+        given = len(sections[name]) if name in sections else None
+        if given != size:
+            _refuse(where, f"section {name!r} of {given or 'no'} bytes where its dimensions ask for {size or 'none'}")
+
+
+def _floats(sections: Sections, name: str, shape: tuple[int, ...], where: str) -> npt.NDArray[np.float32]:
+    values = np.frombuffer(sections[name], dtype="<f4").reshape(shape)
+    if not np.isfinite(values).all():
+        _refuse(where, f"a number in section {name!r} that is not finite")
+    return values
+
+
+def _read_fold(content: bytes, n_rows: int, where: str) -> Reciprocity:
+    fold = np.frombuffer(content, dtype=FOLD_DTYPE)
+    first, second, sign = (fold[name].astype(np.int64) for name in ("first", "second", "sign"))
+    second = np.where(second == FOLD_NONE, -1, second)
+    if (first >= n_rows).any() or (second >= n_rows).any() or (np.abs(sign) != 1).any():
+        _refuse(where, "a fold of rows that do not exist, or a sign that is not 1 or -1")
+    return Reciprocity(first, second, sign)
+
+
+def _read_grid(content: bytes, d: _Dims, where: str) -> Grid:
+    index = np.frombuffer(content, dtype="<u2").reshape(d.n_pixels, 2).astype(np.int64)
+    if (index >= [d.nx, d.ny]).any():
+        _refuse(where, "a pixel outside the image")
+    if (np.diff(index[:, 1] * d.nx + index[:, 0]) <= 0).any():
+        _refuse(where, "pixels that are not ordered by row, then column")
+    return Grid(d.nx, d.ny, d.pixel_mm, (d.origin_x_mm, d.origin_y_mm), index)
+
+
+def _read_defaults(content: bytes, where: str) -> Defaults:
     names = [entry.name for entry in fields(Defaults)]
+    values: dict[str, Any] = dict(zip(names, map(_short, DEFAULTS.unpack(content)), strict=False))
+    d = Defaults(**values)
+    shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_share)
+    sizes = (d.lambda_noise_factor, d.gate_factor, d.touch_change_s_per_m, d.follow_mm, d.touch_radius_weight)
+    in_range = (
+        d.iterations >= 1
+        and all(0 <= share <= 1 for share in shares)
+        and all(0 <= size <= HUGE for size in sizes)
+        and LEAST_RADIUS_MM <= d.touch_min_radius_mm <= d.touch_seed_radius_mm <= d.touch_max_radius_mm <= HUGE
+    )
+    if not in_range:
+        _refuse(where, "a default out of range")
+    return d
+
+
+def _read_meta(content: bytes, where: str) -> dict[str, Any]:
+    try:
+        meta = json.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError):
+        _refuse(where, "section 'META' that is not JSON")
+    skin = meta.get("skin", {}) if isinstance(meta, dict) else None
+    if not isinstance(skin, dict) or not isinstance(skin.get("skin", {}), dict):
+        _refuse(where, "section 'META' that is no description of a model")
+    return dict(meta)
+
+
+def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model:
+    d = _read_dims(sections["DIMS"], where)
+    _check_sizes(sections, d, where)
+    table = np.frombuffer(sections["PROT"], dtype="u1").reshape(d.n_rows, 4)
+    protocol = Protocol(d.n_electrodes, table, _short(d.current_a))
+    if protocol.hash != protocol_hash:
+        _refuse(where, "a protocol table that does not fit its hash")
+    name = STORAGES[d.storage]
+    columns = np.frombuffer(sections["SENS"], dtype=DTYPES[name]).reshape(d.n_pixels, d.stride)
+    if not np.isfinite(columns).all():
+        _refuse(where, "a number in section 'SENS' that is not finite")
+    golden = _floats(sections, "GOLD", (2 * d.n_rows + d.n_pixels,), where)
     return Model(
         protocol=protocol,
-        fold=Reciprocity(
-            first=fold["first"].astype(np.int64),
-            second=np.where(fold["second"] == FOLD_NONE, -1, fold["second"].astype(np.int64)),
-            sign=fold["sign"].astype(np.int64),
-        ),
-        grid=Grid(nx, ny, float(pixel_mm), (float(origin_x), float(origin_y)), index),
-        data_kind=DATA_KINDS[kind],
-        rank=rank,
-        v_ref_v=_floats(sections["VREF"], (n_folded,), where),
-        projection=_floats(sections["REDU"], (n_folded, stride), where)[:, :rank].T,
-        stored=StoredMatrix(name, columns, scale),
-        column_weight=_floats(sections["COLW"], (n_pixels,), where),
-        lipschitz=float(lipschitz),
-        noise_gain=float(noise_gain),
-        defaults=Defaults(**dict(zip(names, map(_short, DEFAULTS.unpack(sections["DEFS"])), strict=False))),
-        golden=Golden(golden[:n_rows], golden[n_rows : 2 * n_rows], golden[2 * n_rows :]),
-        meta=json.loads(sections["META"]) if "META" in sections else {},
+        fold=_read_fold(sections["FOLD"], d.n_rows, where),
+        grid=_read_grid(sections["GRID"], d, where),
+        data_kind=DATA_KINDS[d.kind],
+        rank=d.rank,
+        v_ref_v=_floats(sections, "VREF", (d.n_folded,), where),
+        projection=_floats(sections, "REDU", (d.n_folded, d.stride), where)[:, : d.rank].T,
+        stored=StoredMatrix(name, columns, _floats(sections, "SCAL", (d.n_pixels,), where) if name in SCALED else None),
+        column_weight=_floats(sections, "COLW", (d.n_pixels,), where),
+        lipschitz=d.lipschitz,
+        noise_gain=d.noise_gain,
+        defaults=_read_defaults(sections["DEFS"], where),
+        golden=Golden(golden[: d.n_rows], golden[d.n_rows : 2 * d.n_rows], golden[2 * d.n_rows :]),
+        meta=_read_meta(sections["META"], where) if "META" in sections else {},
     )
 
 

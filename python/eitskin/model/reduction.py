@@ -23,6 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 
 DEFAULT_FLOOR = 1e-2
 DEFAULT_COLUMN_POWER = 0.5
+MAX_FLOOR = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +61,8 @@ def reduce_jacobian(
         raise UsageError("reduction: the Jacobian must be a finite matrix; check the skin's conductivity and mesh")
     if not 1 <= rank <= min(j.shape):
         raise UsageError(f"reduction: rank = {rank} is out of range; use 1 to {min(j.shape)}")
-    if not (floor >= 0 and 0 <= column_power <= 1):
-        raise UsageError("reduction: the floor must be at least 0 and the column power within 0 to 1")
+    if not (0 <= floor <= MAX_FLOOR and 0 <= column_power <= 1):
+        raise UsageError(f"reduction: the floor must be within 0 to {MAX_FLOOR:g} and the column power within 0 to 1")
     norm = np.linalg.norm(j, axis=0)
     if not norm.max() > 0:
         raise UsageError("reduction: the Jacobian is zero; no pixel would be seen")
