@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.config import nearest
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.skin.protocol import Protocol
 from eitskin.solve.core import CoreEngine
 from eitskin.solve.reference import ReferenceEngine
-from eitskin.solve.results import Baseline, Options, Reconstruction, default_options
+from eitskin.solve.results import Baseline, Options, Reconstruction, check_options, default_options
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -63,11 +64,20 @@ class Reconstructor:
         Raises:
             UsageError: one is out of its range; the old ones stay.
         """
+        check_options(options)
         self._engine.set_options(options)
         self._options = options
 
     def with_options(self, **changes: Any) -> None:
-        """Change some options by name; raises as ``set_options``."""
+        """Change some options by name.
+
+        Raises:
+            UsageError: one is unknown or out of its range; the old ones stay.
+        """
+        known = [entry.name for entry in fields(Options)]
+        for name in changes:
+            if name not in known:
+                raise UsageError(f"options: {name!r} is unknown; {nearest(name, known)}")
         self.set_options(replace(self._options, **changes))
 
     def check_protocol(self, protocol: Protocol) -> None:
@@ -90,7 +100,10 @@ class Reconstructor:
         Raises:
             FrameError: a frame has the wrong length or cannot be used.
         """
-        return self._engine.set_baseline(self._shaped(np.atleast_2d(np.asarray(quiet_v, dtype=np.float64)), "reference"))
+        frames, rows = np.atleast_2d(_numbers(quiet_v, "reference")), self.model.protocol.n_rows
+        if frames.ndim != 2 or frames.shape[1] != rows or not len(frames):
+            raise FrameError(f"reference: has shape {frames.shape}, but the model's protocol has {rows} rows")
+        return self._engine.set_baseline(frames)
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before ``tare``."""
@@ -102,7 +115,7 @@ class Reconstructor:
         Raises:
             FrameError: the frame cannot be used, or no reference has been taken.
         """
-        return self._engine.reconstruct(np.asarray(frame_v, dtype=np.float64), touches=touches)
+        return self._engine.reconstruct(_numbers(frame_v, "frame"), touches=touches)
 
     def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
         """One after another; ids follow touches from frame to frame."""
@@ -113,8 +126,9 @@ class Reconstructor:
         """Forget the warm start and the touches that were followed: the next frame has nothing to do with the last."""
         self._engine.forget()
 
-    def _shaped(self, frames: FloatArray, what: str) -> FloatArray:
-        rows = self.model.protocol.n_rows
-        if frames.ndim != 2 or frames.shape[1] != rows or not len(frames):
-            raise FrameError(f"{what}: has shape {frames.shape}, but the model's protocol has {rows} rows")
-        return frames
+
+def _numbers(values: npt.ArrayLike, what: str) -> FloatArray:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise FrameError(f"{what}: is not an array of voltages; give numbers in V, rows of one length") from None

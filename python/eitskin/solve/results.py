@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.errors import UsageError
 from eitskin.model.model import Model
 
 SIGNS = ("increase", "decrease", "both")
+MAX_TOUCHES = 16
+LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
 STOPS = ("iterations", "gap", "gate", "zero", "diverged")
 
 
@@ -45,12 +48,52 @@ class Options:
     touch_sweeps: int = 6
 
 
+WHOLE = {
+    "iterations": (1, 2**32 - 1),
+    "gap_every": (1, 2**32 - 1),
+    "max_touches": (0, MAX_TOUCHES),
+    "max_masked": (0, 2**32 - 1),
+    "touch_sweeps": (0, 1000),
+}
+SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_share")
+
+
+def check_options(o: Options) -> None:
+    """Refuse what eits_set_options in the C core refuses, naming the option.
+
+    Raises:
+        UsageError: one is out of its range, or of the wrong type.
+    """
+    for name, value in asdict(o).items():
+        if name == "sign":
+            if value not in SIGNS:
+                raise UsageError(f"options: sign = {value!r} is not known; use one of {', '.join(SIGNS)}")
+        elif name in ("warm_start", "project_baseline"):
+            if value not in (False, True):
+                raise UsageError(f"options: {name} = {value!r} must be true or false")
+        else:
+            _check_number(name, value, *WHOLE.get(name, (0, 1) if name in SHARES else (0, HUGE)))
+    if not LEAST_RADIUS_MM <= o.touch_min_radius_mm <= o.touch_seed_radius_mm <= o.touch_max_radius_mm:
+        raise UsageError(
+            f"options: touch radii of {o.touch_min_radius_mm:g}, {o.touch_seed_radius_mm:g} and "
+            f"{o.touch_max_radius_mm:g} mm (least, seed, most) must ascend from above 0"
+        )
+
+
+def _check_number(name: str, value: Any, low: float, high: float) -> None:
+    kind = (int, np.integer) if name in WHOLE else (int, float, np.integer, np.floating)
+    if isinstance(value, bool) or not isinstance(value, kind):
+        raise UsageError(f"options: {name} = {value!r} must be a {'whole ' if name in WHOLE else ''}number")
+    if not low <= value <= high:
+        raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
+
+
 def default_options(model: Model) -> Options:
     """The model's own defaults."""
     d = model.defaults
     return Options(
         iterations=d.iterations,
-        max_touches=min(d.max_touches, 16),
+        max_touches=min(d.max_touches, MAX_TOUCHES),
         max_masked=model.protocol.n_rows // 2,
         lambda_rel=d.lambda_rel,
         lambda_noise_factor=d.lambda_noise_factor,
