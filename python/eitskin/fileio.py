@@ -11,6 +11,19 @@ from pathlib import Path
 from eitskin.errors import FileError
 
 
+def refuse_unwritable(*paths: str | Path | None) -> None:
+    """Refuse before long work the outputs that ``write_beside`` would refuse after it; None stands for no output.
+
+    Raises:
+        FileError: a path's folder does not exist, or the path is a folder itself.
+    """
+    for path in (Path(given) for given in paths if given is not None):
+        if not path.parent.is_dir():
+            raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
+        if path.is_dir():
+            raise FileError(f"{path}: this is a folder; name a file in it")
+
+
 @contextmanager
 def write_beside(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path in the folder of ``path``; rename it to ``path`` if the block succeeds, else remove it.

@@ -66,6 +66,7 @@ def load_or_prebuilt(path: Path | None) -> tuple[Model, bytes, str]:
 
 def run_build(options: argparse.Namespace) -> int:
     """Build and write a model."""
+    from eitskin.fileio import refuse_unwritable
     from eitskin.model.build import BuildSettings, build_model
     from eitskin.model.eitm import save_model
     from eitskin.skin.protocol import adjacent
@@ -73,8 +74,7 @@ def run_build(options: argparse.Namespace) -> int:
 
     if (options.skin is None) == (not options.paper):
         raise UsageError("model build: name a SKIN.toml, or give --paper, not both")
-    if not options.output.parent.is_dir():
-        raise UsageError(f"model build: the folder {options.output.parent} does not exist; make it first")
+    refuse_unwritable(options.output)
     if not 100 <= options.elements <= 500_000:
         raise UsageError(f"model build: --elements {options.elements} is out of range; use 100 to 500000")
     if not 0 <= options.touch_change <= 100:

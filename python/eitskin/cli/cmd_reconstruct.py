@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.errors import EitskinError, FileError, FrameError, UsageError
+from eitskin.errors import ConfigError, EitskinError, FrameError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
     from eitskin.frames.frames import Frames
@@ -27,7 +27,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES.npz", help="a frames file (eitskin import makes one)")
     parser.add_argument("--model", type=Path, metavar="MODEL.eitm", help="default: the prebuilt model of the paper's skin")
-    parser.add_argument("--engine", choices=("c", "c64", "numpy"), default="c", help="default: %(default)s, float32 as on the board")
+    parser.add_argument("--engine", choices=("c", "c64", "numpy"), default="c", help="default: %(default)s, float32 as on a board")
     parser.add_argument("--sign", choices=("increase", "decrease", "both"), default="increase", help="which changes to look for")
     parser.add_argument("--iterations", type=int, metavar="N", help="of FISTA, at most (default: the model's)")
     parser.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
@@ -42,12 +42,15 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Reconstruct all frames; those that cannot be used are named, and the others are still done."""
     from eitskin.cli.cmd_model import load_or_prebuilt
+    from eitskin.fileio import refuse_unwritable
     from eitskin.frames.frames import load_frames
     from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
 
-    for path in (options.output, options.picture):
-        if path is not None and not path.parent.is_dir():
-            raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
+    refuse_unwritable(options.output, options.picture)
+    if options.picture is not None:
+        from eitskin.view.pictures import load_matplotlib
+
+        load_matplotlib()
     frames = load_frames(options.frames, allow_nonfinite=True)
     model, blob, name = load_or_prebuilt(options.model)
     reconstructor = Reconstructor(model, engine=options.engine, blob=blob)
@@ -123,8 +126,12 @@ def _scores(
         return {}
     from eitskin.study.score import scorer_for
 
-    scorer = scorer_for(reconstructor.model)
-    scored = {number: scorer.score(frames, number, result, sign) for number, result in results.items()}
+    try:
+        scorer = scorer_for(reconstructor.model)
+        scored = {number: scorer.score(frames, number, result, sign) for number, result in results.items()}
+    except (ConfigError, MissingExtraError) as error:
+        print(f"eitskin: warning: not held against the truth in the frames: {error}", file=sys.stderr)
+        return {}
     return {number: score for number, score in scored.items() if score is not None}
 
 
@@ -136,7 +143,7 @@ def _print(
     print("frame       touch    x mm     y mm  radius mm  strength S/m mm2   error mm")
     for number, result in results.items():
         score = scores.get(number)
-        errors = {} if score is None else {found: d for (_, found), d in zip(score.matching.pairs, score.matching.distances_mm, strict=True)}
+        errors = {} if score is None else errors_by_touch(score)
         label = frames.frame_name[number][:11]
         if not result.touches:
             print(f"{label:11} none ({'no change above the noise' if result.info.stop == 'gate' else result.info.stop})")
@@ -147,7 +154,8 @@ def _print(
                 f"{touch.strength_s_per_m_mm2:16.3f}  {error}"
             )
     macs = [result.info.macs + result.info.touch_macs for result in results.values()]
-    print(f"{len(results)} frames, {len(refused)} refused" + (f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""))
+    cost = f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""
+    print(f"{len(results)} frames, {len(refused)} refused{cost}")
     if scores:
         facts = summary(scores)
         print(
@@ -156,6 +164,11 @@ def _print(
             f"worst {facts['position_worst_mm']:.2f} mm; "
             f"MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
         )
+
+
+def errors_by_touch(score: FrameScore) -> dict[int, float]:
+    """Position error in mm of each found touch that has a true one."""
+    return {found: d for (_, found), d in zip(score.matching.pairs, score.matching.distances_mm, strict=True)}
 
 
 def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:

@@ -6,16 +6,25 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from eitskin import __version__
-from eitskin.errors import EitskinError
+from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = ("demo", "model", "reconstruct", "import", "doctor", "compare", "bench")
 
 
+class Parser(argparse.ArgumentParser):
+    """What cannot be parsed is refused in one line, as everything else is."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise UsageError instead of printing the usage and leaving."""
+        raise UsageError(f"{message}; see  {self.prog} --help")
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The whole parser; each module ``cmd_NAME`` has ``add_parser(subparsers)``, which sets ``run``."""
-    parser = argparse.ArgumentParser(prog="eitskin", description="Electrical impedance tomography skins, from model to touches.")
+    parser = Parser(prog="eitskin", description="Electrical impedance tomography skins, from model to touches.")
     parser.add_argument("--version", action="version", version=f"eitskin {__version__}")
     parser.add_argument("--traceback", action="store_true", help="on an error, show where in the code it arose")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -26,11 +35,13 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code (docs/error-codes.md) and prints errors as one line on stderr."""
-    options = build_parser().parse_args(arguments)
+    traceback = False
     try:
+        options = build_parser().parse_args(arguments)
+        traceback = options.traceback
         return int(options.run(options) or 0)
     except EitskinError as error:
-        if options.traceback:
+        if traceback:
             raise
         print(f"eitskin: {error}", file=sys.stderr)
         return error.exit_code
