@@ -30,11 +30,10 @@ class Homogeneous:
     """What a homogeneous skin would measure.
 
     ``transfer_ohm`` (n, n): potential at electrode i per ampere into j, up to a constant for each row and column.
-    ``symmetric``: a disk with evenly spaced electrodes. ``source`` says how it was computed.
+    ``source`` says how it was computed.
     """
 
     transfer_ohm: FloatArray
-    symmetric: bool
     source: str
 
     def voltages(self, rows: IntArray, current_a: float = 1.0) -> FloatArray:
@@ -73,17 +72,17 @@ def homogeneous(skin: Skin | None, n_electrodes: int) -> Homogeneous:
     if skin is None:
         angles = np.arange(n_electrodes, dtype=np.float64) * (2 * np.pi / n_electrodes)
         width = DEFAULT_WIDTH_PER_PITCH * 2 * np.pi / n_electrodes
-        return Homogeneous(disk_transfer(angles, width), True, "closed form, disk with even electrodes")
+        return Homogeneous(disk_transfer(angles, width), "closed form, disk with even electrodes")
     if skin.electrodes.count != n_electrodes:
         raise UsageError(f"skin {skin.name!r} has {skin.electrodes.count} electrodes, the frames have {n_electrodes}")
     sheet_s = skin.conductivity_s_per_m * skin.thickness_mm * 1e-3
     if skin.outline.diameter_mm is None:
-        from eitskin.frames.homogeneous_fem import FemPrediction
+        from eitskin.frames.homogeneous_fem import fem_prediction
 
-        return Homogeneous(FemPrediction(skin).transfer_ohm(), False, "finite elements")
+        return Homogeneous(fem_prediction(skin).transfer_ohm(), "finite elements")
     radius_mm = skin.outline.diameter_mm / 2
     transfer = disk_transfer(electrode_angles_rad(skin), skin.electrodes.width_mm / radius_mm) / sheet_s
-    return Homogeneous(transfer, skin.electrodes.positions_mm is None, "closed form, disk")
+    return Homogeneous(transfer, "closed form, disk")
 
 
 def touch_transfer(skin: Skin, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]) -> FloatArray:
@@ -93,9 +92,9 @@ def touch_transfer(skin: Skin, xy_mm: FloatArray, radius_mm: FloatArray, sign: N
         MissingExtraError: the outline is no disk and the extra ``model`` is not installed.
     """
     if skin.outline.diameter_mm is None:
-        from eitskin.frames.homogeneous_fem import FemPrediction
+        from eitskin.frames.homogeneous_fem import fem_prediction
 
-        return FemPrediction(skin).touch_transfer(xy_mm, radius_mm, sign)
+        return fem_prediction(skin).touch_transfer(xy_mm, radius_mm, sign)
     radius = skin.outline.diameter_mm / 2
     return disk_touch_transfer(electrode_angles_rad(skin), xy_mm / radius, radius_mm / radius, sign)
 

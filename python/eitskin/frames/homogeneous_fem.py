@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,12 @@ from eitskin.skin.skin import Skin
 FloatArray = NDArray[np.float64]
 ELEMENTS = 3000
 TOUCH_CONTRAST = 3.0
+
+
+@lru_cache(maxsize=4)
+def fem_prediction(skin: Skin) -> FemPrediction:
+    """The prediction of ``skin``, made once."""
+    return FemPrediction(skin)
 
 
 class FemPrediction:

@@ -168,8 +168,9 @@ def accepted_counts(options: ImportOptions, protocol: Protocol | None) -> tuple[
         raise UsageError("say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table")
     if options.order == "table":
         raise UsageError("--order table needs --table-file FILE, or --protocol-table KEY of the source's own table")
-    rows_of_order = len(source_table(options.order, protocol))
-    return (rows_of_order,), f"{protocol.n_electrodes} electrodes, --order {options.order}"
+    n, count = protocol.n_electrodes, len(source_table(options.order, protocol))
+    hint = "" if options.order.endswith("-all") else f"; with pairs at driving electrodes {n * n}, --order fixed-all"
+    return (count,), f"{n} electrodes, --order {options.order}{hint}"
 
 
 def _placed(
@@ -220,7 +221,7 @@ def _meta(path: str | Path, options: ImportOptions, base: Frames | None, skin: S
         defaults = type(group)()
         for name, value in asdict(group).items():
             if name not in ("source", "truth") and value != getattr(defaults, name):
-                changed[name] = list(value) if isinstance(value, tuple) else value
+                changed[name] = Path(value).name if name == "table_file" else value
     unit = "V" if options.source.scale is not None else "unknown, taken as V"
     if base is not None:
         unit = str(base.meta.get("unit", "V"))

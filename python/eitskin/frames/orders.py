@@ -52,18 +52,6 @@ def source_table(order: str, protocol: Protocol) -> IntArray:
     return np.asarray(rows[np.lexsort((turn, block))])
 
 
-def orders_of(protocol: Protocol, rows: int) -> tuple[str, ...]:
-    """The named orders in which ``protocol`` has exactly ``rows`` rows."""
-    fitting = []
-    for order in ORDERS:
-        try:
-            if len(source_table(order, protocol)) == rows:
-                fitting.append(order)
-        except UsageError:
-            continue
-    return tuple(fitting)
-
-
 def match_rows(source: IntArray, wanted: IntArray) -> RowMatch:
     """Find each row of ``wanted`` (m, 4) in ``source`` (rows, 4), up to the direction of either pair.
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -349,3 +353,14 @@ def test_several_remedies_become_one() -> None:
     report = report_of(changed(frames, reference, frames.voltage_v * gains))
     assert named(report) == [("stuck", "fault"), ("channel-gain", "fault")]
     assert report.mend == "--impute-channels 50,100 --drop-channels 0,26"
+
+
+def test_a_round_skin_needs_no_scipy() -> None:
+    program = (
+        "import sys; from injected import healthy_frames; from eitskin.skin.skin import paper_skin\n"
+        "from eitskin.frames.doctor import examine, subject_from_frames\n"
+        "assert not examine(subject_from_frames(healthy_frames(1), paper_skin())).findings\n"
+        "assert 'scipy' not in sys.modules and 'matplotlib' not in sys.modules"
+    )
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    subprocess.run([sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": path}, check=True, timeout=60)

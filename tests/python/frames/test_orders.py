@@ -10,7 +10,6 @@ from eitskin.frames.orders import (
     ORDERS,
     electrode_map,
     match_rows,
-    orders_of,
     relabel,
     source_table,
     swap_map,
@@ -38,9 +37,6 @@ def test_rotating_order_starts_behind_the_drive() -> None:
     for drive in range(16):
         assert rows[drive, :, 2].tolist() == [(drive + 2 + k) % 16 for k in range(13)]
         assert rows[drive, :, 3].tolist() == [(drive + 3 + k) % 16 for k in range(13)]
-    assert orders_of(adjacent(16), 208) == ("fixed", "rotating")
-    assert orders_of(adjacent(16), 256) == ("fixed-all", "rotating-all")
-    assert orders_of(adjacent(16), 104) == ()
 
 
 def test_rows_match_turned_and_reciprocal_with_their_sign() -> None:

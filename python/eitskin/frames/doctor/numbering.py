@@ -18,6 +18,11 @@ from eitskin.frames.orders import electrode_map, relabel
 SAME_FRAME = 0.9995
 CLEARLY = 0.5
 LIKELY = 0.9
+SHOWN = 3
+ALL_ALIKE = (
+    "where electrode 0 is and which way the numbers run: a quiet frame of this symmetric skin and protocol is the same "
+    "for all of them"
+)
 
 
 @dataclass(frozen=True)
@@ -68,18 +73,15 @@ def check_numbering(case: Case) -> tuple[Case, Outcome]:
     frames = renumbered_frames(case, case.transfer_ohm)
     alike = np.array([[correlation(np.abs(case.predicted), np.abs(frame)) for frame in side] for side in frames])
     if (alike >= SAME_FRAME).all():
-        return case, Outcome(
-            untold=(
-                "where electrode 0 is and which way the numbers run: a quiet frame of this symmetric skin and protocol "
-                "is the same for all of them",
-            )
-        )
+        return case, Outcome(untold=(ALL_ALIKE,))
     order = ranked(_likeness(case, frames))
     given, best = next(numbering for numbering in order if numbering.given), order[0]
     measured = {"numbering_by_quiet_frame": {"as given": round(given.fit, 4), str(best): round(best.fit, 4)}}
     distinct = alike[int(best.mirror), best.rotate] < SAME_FRAME
     if not distinct or best.fit < LIKELY or 1 - best.fit > CLEARLY * (1 - given.fit):
-        return case, Outcome(measured=measured)
+        like_given = [other for other in ranked(alike) if other.fit >= SAME_FRAME and not other.given]
+        text = f"whether {' or '.join(map(str, like_given[:SHOWN]))}: the quiet frame is the same"
+        return case, Outcome(untold=(text,) if like_given else (), measured=measured)
     text = f"the quiet frame fits the skin's shape when the electrodes are renumbered ({best}), not as they are"
     rows = relabel(case.rows, electrode_map(case.n_electrodes, best.rotate, best.mirror))
     finding = Finding("numbering", FAULT, text, measured["numbering_by_quiet_frame"], best.option)
