@@ -58,9 +58,9 @@ def check_resemblance(case: Case) -> Outcome:
     if size.size < LEAST_CHANNELS or np.ptp(size) <= SAME * size.max():
         return Outcome(untold=("whether this is a homogeneous skin: too few channels, or all alike",))
     reached = correlation(np.abs(measured), size)
-    numbers_ = {"reference_correlation": round(reached, 4)}
+    summary = {"reference_correlation": round(reached, 4)}
     if reached >= FOREIGN_BELOW or rms(measured) == 0:
-        return Outcome(measured=numbers_)
+        return Outcome(measured=summary)
     finding = Finding(
         "unlike-a-homogeneous-skin",
         FAULT,
@@ -68,7 +68,7 @@ def check_resemblance(case: Case) -> Outcome:
         "wiring, or the frame was not quiet; if the source has a table of its rows, import it with that",
         {"correlation": round(reached, 4), "least": FOREIGN_BELOW},
     )
-    return Outcome((finding,), measured=numbers_)
+    return Outcome((finding,), measured=summary)
 
 
 def check_gain(case: Case) -> tuple[Case, Outcome]:
