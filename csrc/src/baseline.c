@@ -20,12 +20,17 @@ static eits_status check_quiet(const eits_context *ctx, const eits_real *frame, 
     return EITS_OK;
 }
 
+/* Whether a row takes part in the reference: not masked, neither now nor when the reference was taken. */
+static int has_reference(const eits_context *ctx, uint32_t row)
+{
+    return row != EITS_FOLD_NONE && !ctx->bad[row] && eits_is_finite(ctx->baseline.v0[row]);
+}
+
 /* The reference on one folded row: the mean of both sides in use; 0 where neither is. */
 static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
 {
     const eits_real *v0 = ctx->baseline.v0;
-    const int first = !ctx->bad[fold.first];
-    const int second = fold.second != EITS_FOLD_NONE && !ctx->bad[fold.second];
+    const int first = has_reference(ctx, fold.first), second = has_reference(ctx, fold.second);
     const eits_real turned = second ? (eits_real)fold.sign * v0[fold.second] : 0;
     return first && second ? R(0.5) * (v0[fold.first] + turned) : (first ? v0[fold.first] : turned);
 }
@@ -47,7 +52,7 @@ static eits_status fit_to_model(eits_context *ctx)
     uint32_t used = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
-        if (ctx->bad[fold.first] && (fold.second == EITS_FOLD_NONE || ctx->bad[fold.second]))
+        if (!has_reference(ctx, fold.first) && !has_reference(ctx, fold.second))
             continue;
         const eits_real v = folded_reference(ctx, fold) / largest, r = (eits_real)model->v_ref[k] / largest_ref;
         vv = eits_fma(v, v, vv);
@@ -76,11 +81,12 @@ eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t 
         return status;
     eits_baseline *b = &ctx->baseline;
     eits_real *old = b->m2; /* keeps the old reference until the new one is known to be good */
+    b->wanted = 0; /* learning, if any was under way, ends here */
     eits_copy(old, b->v0, length);
     eits_copy(b->v0, frame, length);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (ctx->bad[i])
-            b->v0[i] = 0;
+            b->v0[i] = R(NAN);
     }
     status = fit_to_model(ctx);
     if (status != EITS_OK) {
@@ -142,6 +148,8 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
     ++b->count;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* Welford, Technometrics 4 (1962) 419 */
         if (ctx->bad[i])
+            b->v0[i] = R(NAN);
+        if (!eits_is_finite(b->v0[i]))
             continue;
         const eits_real delta = frame[i] - b->v0[i];
         b->v0[i] += delta / (eits_real)b->count;
@@ -163,7 +171,7 @@ eits_status eits_baseline_finish(eits_context *ctx)
     eits_real sum = 0;
     uint32_t used = 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (!ctx->bad[i]) {
+        if (has_reference(ctx, i)) {
             sum += b->m2[i];
             ++used;
         }

@@ -13,7 +13,8 @@ static uint32_t find_unusable(eits_context *ctx, const eits_real *frame)
     uint32_t count = 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const int saturated = limit > 0 && eits_fabs(frame[i]) >= limit;
-        ctx->unusable[i] = (uint8_t)(ctx->bad[i] || !eits_is_finite(frame[i]) || saturated);
+        const int unknown = !eits_is_finite(frame[i]) || !eits_is_finite(ctx->baseline.v0[i]);
+        ctx->unusable[i] = (uint8_t)(ctx->bad[i] || unknown || saturated);
         count += ctx->unusable[i];
     }
     return count;

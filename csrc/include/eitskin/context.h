@@ -85,7 +85,7 @@ struct eits_kernels; /* matrix products, chosen at start-up among builds that gi
 
 /* Learned from quiet frames. */
 typedef struct eits_baseline {
-    eits_real *v0;       /* n_rows: mean of the quiet frames, V */
+    eits_real *v0;       /* n_rows: mean of the quiet frames, V; NaN for a row that was masked in any of them */
     eits_real *m2;       /* n_rows: sum of squared deviations, V^2 */
     uint32_t wanted, count;
     uint32_t ready;

@@ -26,7 +26,8 @@ eits_status eits_baseline_begin(eits_context *ctx, uint32_t count);
 eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length);
 eits_status eits_baseline_finish(eits_context *ctx);
 
-/* Leave row `row` of the protocol out of every frame (bad = 1) or use it again (0). Errors: EITS_E_ARGUMENT. */
+/* Leave row `row` of the protocol out of every frame (bad = 1) or use it again (0). A row that was left out while the
+ * reference was taken has none, and stays out until the next reference. Errors: EITS_E_ARGUMENT. */
 eits_status eits_mask_row(eits_context *ctx, uint32_t row, int bad);
 
 /* The frame stage alone: fills ctx->d, ctx->y, ctx->basis, ctx->unusable and returns the number of rows left out in
