@@ -1,0 +1,315 @@
+#include "small_model.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char TAGS[SMALL_SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
+                                             "COLW", "GRID", "DEFS", "GOLD", "SCAL", "META"};
+enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META };
+
+void *small_aligned(void **memory, size_t size)
+{
+    *memory = calloc(1, size + 64);
+    if (*memory == NULL)
+        abort();
+    const uintptr_t at = ((uintptr_t)*memory + 63u) & ~(uintptr_t)63u;
+    return (void *)at;
+}
+
+static double *doubles(size_t count)
+{
+    double *made = calloc(count, sizeof *made);
+    if (made == NULL)
+        abort();
+    return made;
+}
+
+double small_random(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) / 4503599627370496.0 - 1.0;
+}
+
+void small_put_u16(uint8_t *at, uint32_t value)
+{
+    at[0] = (uint8_t)value;
+    at[1] = (uint8_t)(value >> 8);
+}
+
+void small_put_u32(uint8_t *at, uint32_t value)
+{
+    small_put_u16(at, value);
+    small_put_u16(at + 2, value >> 16);
+}
+
+void small_put_f32(uint8_t *at, float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, 4);
+    small_put_u32(at, bits);
+}
+
+uint32_t small_get_u32(const uint8_t *at)
+{
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+static uint16_t half_of(double value) /* towards zero, too small becomes zero: good enough for tests */
+{
+    int exponent;
+    const double fraction = frexp(fabs(value), &exponent); /* in [0.5, 1) */
+    const uint32_t sign = value < 0 ? 0x8000u : 0;
+    if (value == 0 || exponent < -13)
+        return (uint16_t)sign;
+    return (uint16_t)(sign | (uint32_t)(exponent + 14) << 10 | (uint32_t)((fraction * 2 - 1) * 1024));
+}
+
+static void fill_protocol(uint8_t *protocol, uint8_t *fold)
+{
+    uint8_t rows[SMALL_ROWS][4];
+    uint32_t count = 0, pairs = 0;
+    for (uint32_t d = 0; d < SMALL_ELECTRODES; ++d) {
+        for (uint32_t k = 0; k < SMALL_ELECTRODES; ++k) {
+            const uint32_t d2 = (d + 1) % SMALL_ELECTRODES, k2 = (k + 1) % SMALL_ELECTRODES;
+            if (d == k || d2 == k || d == k2)
+                continue;
+            const uint8_t row[4] = {(uint8_t)d, (uint8_t)d2, (uint8_t)k, (uint8_t)k2};
+            memcpy(rows[count++], row, 4);
+        }
+    }
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+        for (uint32_t j = i + 1; j < SMALL_ROWS; ++j) {
+            uint8_t *at = fold + 8 * pairs;
+            if (rows[i][0] != rows[j][2] || rows[i][2] != rows[j][0])
+                continue;
+            small_put_u16(at, i);
+            small_put_u16(at + 4, 1);
+            if (pairs == SMALL_PAIRS) { /* the last pair is not folded */
+                small_put_u16(at + 2, EITS_FOLD_NONE);
+                small_put_u16(at + 8, j);
+                small_put_u16(at + 10, EITS_FOLD_NONE);
+                small_put_u16(at + 12, 1);
+            } else {
+                small_put_u16(at + 2, j);
+            }
+            ++pairs;
+        }
+    }
+    if (count != SMALL_ROWS || pairs != SMALL_PAIRS + 1)
+        abort();
+    for (uint32_t k = 2; k < SMALL_PAIRS; k += 5) { /* measured the other way round: the reciprocal's sign turns */
+        uint8_t *row = rows[fold[8 * k + 2]], kept = row[2];
+        row[2] = row[3];
+        row[3] = kept;
+        small_put_u16(fold + 8 * k + 4, 0xFFFFu);
+    }
+    memcpy(protocol, rows, sizeof rows);
+}
+
+static double wave(uint32_t order, uint32_t place, uint32_t side)
+{
+    const double pi = 3.14159265358979323846;
+    return sqrt((order == 0 ? 1.0 : 2.0) / side) * cos(pi * order * (place + 0.5) / side);
+}
+
+/* S (column after column, rank numbers each) in double. */
+static double *make_s(const small_spec *spec)
+{
+    const uint32_t side = spec->side, n = side * side, rank = spec->rank;
+    double *s = doubles((size_t)n * rank);
+    uint64_t state = 77;
+    uint32_t across = 1;
+    while (across * across < rank)
+        ++across;
+    for (uint32_t j = 0; j < n; ++j) {
+        for (uint32_t i = 0; i < rank; ++i) {
+            double value = i == j;
+            if (spec->shape == SMALL_RANDOM)
+                value = small_random(&state) / sqrt(n);
+            else if (spec->shape == SMALL_WAVES)
+                value = wave(i % across, j % side, side) * wave(i / across, j / side, side);
+            s[(size_t)j * rank + i] = value;
+        }
+    }
+    return s;
+}
+
+/* The greatest eigenvalue of S S', by many steps of power iteration. */
+static double greatest_eigenvalue(const double *s, uint32_t rank, uint32_t n)
+{
+    double *v = doubles(rank), *w = doubles(rank), value = 0;
+    uint64_t state = 5;
+    for (uint32_t i = 0; i < rank; ++i)
+        v[i] = small_random(&state);
+    for (int step = 0; step < 300; ++step) {
+        double norm = 0;
+        memset(w, 0, rank * sizeof *w);
+        for (uint32_t j = 0; j < n; ++j) {
+            double dot = 0;
+            for (uint32_t i = 0; i < rank; ++i)
+                dot += s[(size_t)j * rank + i] * v[i];
+            for (uint32_t i = 0; i < rank; ++i)
+                w[i] += s[(size_t)j * rank + i] * dot;
+        }
+        for (uint32_t i = 0; i < rank; ++i)
+            norm += w[i] * w[i];
+        value = sqrt(norm);
+        for (uint32_t i = 0; i < rank; ++i)
+            v[i] = w[i] / value;
+    }
+    free(v);
+    free(w);
+    return value;
+}
+
+static void store_s(const small_spec *spec, const double *s, uint32_t stride, uint8_t *sens, uint8_t *scal)
+{
+    const uint32_t n = spec->side * spec->side, rank = spec->rank;
+    for (uint32_t j = 0; j < n; ++j) {
+        const double *column = s + (size_t)j * rank;
+        double largest = 1e-6;
+        for (uint32_t i = 0; i < rank; ++i)
+            largest = fabs(column[i]) > largest ? fabs(column[i]) : largest;
+        const float scale = (float)(largest * (1 + 0.1 * (j % 3)) / (spec->storage == EITS_STORAGE_I8 ? 127.0 : 32767.0));
+        small_put_f32(scal + 4 * j, scale);
+        for (uint32_t i = 0; i < rank; ++i) {
+            const size_t at = (size_t)j * stride + i;
+            switch (spec->storage) {
+            case EITS_STORAGE_F32: small_put_f32(sens + 4 * at, (float)column[i]); break;
+            case EITS_STORAGE_F16: small_put_u16(sens + 2 * at, half_of(column[i])); break;
+            case EITS_STORAGE_I16: small_put_u16(sens + 2 * at, (uint32_t)(int32_t)lrint(column[i] / (double)scale)); break;
+            case EITS_STORAGE_I8: sens[at] = (uint8_t)(int8_t)lrint(column[i] / (double)scale); break;
+            }
+        }
+    }
+}
+
+static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *const at[SMALL_SECTIONS])
+{
+    const uint32_t n = spec->side * spec->side;
+    const int identity = spec->shape == SMALL_IDENTITY;
+    double *s = make_s(spec);
+    const double factor = spec->lipschitz_factor > 0 ? spec->lipschitz_factor : 1.02;
+    const uint32_t whole[10] = {SMALL_ELECTRODES, SMALL_ROWS, SMALL_FOLDED, spec->rank, stride, n, spec->side, spec->side,
+                                (uint32_t)spec->storage, (uint32_t)spec->kind};
+    for (uint32_t i = 0; i < 10; ++i)
+        small_put_u32(at[DIMS] + 4 * i, whole[i]);
+    const float pixel = spec->pixel_mm > 0 ? spec->pixel_mm : 6.0f, corner = -0.5f * pixel * (float)spec->side;
+    const float numbers[6] = {pixel, corner, corner, 1e-3f, (float)(factor * greatest_eigenvalue(s, spec->rank, n)), 1.0f};
+    for (uint32_t i = 0; i < 6; ++i)
+        small_put_f32(at[DIMS] + 40 + 4 * i, numbers[i]);
+    store_s(spec, s, stride, at[SENS], at[SCAL]);
+    free(s);
+    fill_protocol(at[PROT], at[FOLD]);
+    uint64_t state = 20240918;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        small_put_f32(at[VREF] + 4 * k, 1.0f + 0.5f * (float)small_random(&state));
+        for (uint32_t i = 0; i < spec->rank; ++i)
+            small_put_f32(at[REDU] + 4 * ((size_t)k * stride + i), identity ? (float)(i == k) : 0.3f * (float)small_random(&state));
+    }
+    for (uint32_t j = 0; j < n; ++j) {
+        small_put_f32(at[COLW] + 4 * j, identity ? 1.0f : 0.02f + 0.001f * (float)(j % 7));
+        small_put_u16(at[GRID] + 4 * j, j % spec->side);
+        small_put_u16(at[GRID] + 4 * j + 2, j / spec->side);
+    }
+    small_put_u32(at[DEFS], 60);
+    small_put_u32(at[DEFS] + 4, 8);
+    const float defaults[12] = {0.03f, 0.3f, 1.2f, 0.3f, 0.2f, 0.003f, 3.0f, 40.0f, 9.0f, 0.0f, 25.0f, 1e-3f};
+    for (uint32_t i = 0; i < 12; ++i)
+        small_put_f32(at[DEFS] + 8 + 4 * i, defaults[i]);
+    for (uint32_t i = 0; i < 2 * SMALL_ROWS; ++i)
+        small_put_f32(at[GOLD] + 4 * i, 1.0f + 0.01f * (float)small_random(&state));
+    memcpy(at[META], "{}", 2);
+}
+
+small_model small_model_make(small_spec spec)
+{
+    static const uint32_t item[] = {4, 2, 2, 1};
+    const uint32_t n = spec.side * spec.side, stride = (spec.rank + 7u) & ~7u, table = 64 + 16 * SMALL_SECTIONS;
+    const uint32_t sizes[SMALL_SECTIONS] = {64, SMALL_ROWS * 4, SMALL_FOLDED * 8, SMALL_FOLDED * 4, SMALL_FOLDED * stride * 4,
+                                            n * stride * item[spec.storage], n * 4, n * 4, 64, (2 * SMALL_ROWS + n) * 4, n * 4, 2};
+    const int integer = spec.storage == EITS_STORAGE_I16 || spec.storage == EITS_STORAGE_I8;
+    uint32_t total = table, offset = table;
+    for (uint32_t p = 0; p < SMALL_SECTIONS; ++p)
+        total += (sizes[p] + 15u) & ~15u;
+    small_model made = {.size = total};
+    made.blob = small_aligned(&made.memory, total);
+    uint8_t *at[SMALL_SECTIONS];
+    for (uint32_t p = 0; p < SMALL_SECTIONS; ++p) {
+        uint8_t *entry = made.blob + 64 + 16 * p;
+        /* an absent scale is written under a tag that readers skip */
+        memcpy(entry, p == SCAL && !integer ? "XTRA" : TAGS[p], 4);
+        small_put_u32(entry + 4, offset);
+        small_put_u32(entry + 8, sizes[p]);
+        small_put_u32(entry + 12, p < SCAL || (p == SCAL && integer));
+        at[p] = made.blob + offset;
+        offset += (sizes[p] + 15u) & ~15u;
+    }
+    fill_sections(&spec, stride, at);
+    memcpy(made.blob, "EITM", 4);
+    small_put_u16(made.blob + 4, 1);
+    small_put_u32(made.blob + 8, total);
+    small_put_u32(made.blob + 16, SMALL_SECTIONS);
+    const uint64_t hash = eits_protocol_hash(SMALL_ELECTRODES, SMALL_ROWS, at[PROT]);
+    memcpy(made.blob + 24, &hash, sizeof hash);
+    small_model_seal(&made);
+    return made;
+}
+
+void small_model_free(small_model *model)
+{
+    free(model->memory);
+    model->memory = NULL;
+}
+
+void small_model_seal(small_model *model)
+{
+    small_put_u32(model->blob + 12, eits_crc32(0, model->blob + 16, model->size - 16));
+}
+
+uint8_t *small_model_entry(const small_model *model, const char *tag)
+{
+    for (uint32_t p = 0; p < SMALL_SECTIONS; ++p) {
+        uint8_t *entry = model->blob + 64 + 16 * p;
+        if (memcmp(entry, tag, 4) == 0)
+            return entry;
+    }
+    fprintf(stderr, "no section %s\n", tag);
+    abort();
+}
+
+uint8_t *small_model_section(const small_model *model, const char *tag, uint32_t *size)
+{
+    const uint8_t *entry = small_model_entry(model, tag);
+    if (size != NULL)
+        *size = small_get_u32(entry + 8);
+    return model->blob + small_get_u32(entry + 4);
+}
+
+void small_context_open(small_context *context, const small_model *model, int prepared)
+{
+    if (eits_model_open(&context->model, model->blob, model->size) != EITS_OK)
+        abort();
+    const size_t size = eits_workspace_size(&context->model, prepared);
+    void *workspace = small_aligned(&context->memory, size);
+    if (eits_init(&context->ctx, &context->model, workspace, size) != EITS_OK)
+        abort();
+}
+
+void small_context_close(small_context *context)
+{
+    free(context->memory);
+    context->memory = NULL;
+}
+
+void small_reference(const eits_model *model, double gain, eits_real *frame)
+{
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const eits_fold fold = model->fold[k];
+        frame[fold.first] = (eits_real)(gain * (double)model->v_ref[k]);
+        if (fold.second != EITS_FOLD_NONE)
+            frame[fold.second] = (eits_real)(gain * fold.sign * (double)model->v_ref[k]);
+    }
+}

@@ -1,0 +1,66 @@
+/* Small .eitm models made in memory, for tests. Bytes are written here field by field, apart from the core's reader. */
+#ifndef EITSKIN_TEST_SMALL_MODEL_H
+#define EITSKIN_TEST_SMALL_MODEL_H
+
+#include "eitskin/eitskin.h"
+
+/* 8 electrodes, adjacent: 40 rows in 19 reciprocal pairs, every fifth measured the other way round, and 2 single rows. */
+enum { SMALL_ELECTRODES = 8, SMALL_ROWS = 40, SMALL_PAIRS = 19, SMALL_FOLDED = 21, SMALL_SECTIONS = 12 };
+
+typedef enum small_shape {
+    SMALL_RANDOM = 0,
+    SMALL_IDENTITY, /* P and S are (as far as shapes go) identities and weights are 1, so that results can be said beforehand */
+    SMALL_WAVES     /* the rows of S are orthonormal cosines over the image, the lowest first: discs can be fitted */
+} small_shape;
+
+typedef struct small_spec {
+    uint32_t rank, side; /* a full square image of side x side pixels */
+    eits_storage storage;
+    eits_data_kind kind;
+    small_shape shape;
+    double lipschitz_factor; /* the stated constant over the true greatest eigenvalue of S S'; 0: 1.02 */
+    float pixel_mm;          /* 0: 6 mm */
+} small_spec;
+
+typedef struct small_model {
+    void *memory; /* to be freed */
+    uint8_t *blob;
+    size_t size;
+} small_model;
+
+/* Never fails: aborts where memory is short. */
+small_model small_model_make(small_spec spec);
+void small_model_free(small_model *model);
+
+/* Write the checksum anew after bytes were changed. */
+void small_model_seal(small_model *model);
+
+/* Where the section with this tag starts, and its 16-byte entry in the table; both abort if it is absent. */
+uint8_t *small_model_section(const small_model *model, const char *tag, uint32_t *size);
+uint8_t *small_model_entry(const small_model *model, const char *tag);
+
+/* Little-endian numbers at any place. */
+void small_put_u16(uint8_t *at, uint32_t value);
+void small_put_u32(uint8_t *at, uint32_t value);
+void small_put_f32(uint8_t *at, float value);
+uint32_t small_get_u32(const uint8_t *at);
+
+/* A context with its own aligned workspace. */
+typedef struct small_context {
+    void *memory;
+    eits_model model;
+    eits_context ctx;
+} small_context;
+void small_context_open(small_context *context, const small_model *model, int prepared);
+void small_context_close(small_context *context);
+
+/* `gain` times the frame that agrees with the model's v_ref on every row. */
+void small_reference(const eits_model *model, double gain, eits_real *frame);
+
+/* `size` zeroed bytes from a 64-byte boundary; free(*memory). */
+void *small_aligned(void **memory, size_t size);
+
+/* A uniform random number in [-1, 1): a fixed generator, the same on every machine. */
+double small_random(uint64_t *state);
+
+#endif

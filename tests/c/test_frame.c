@@ -1,0 +1,370 @@
+/* The frame stage: difference, fold, reduction, rows left out, drift; against the dense computation. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/solve.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RANK = 12, SIDE = 4 };
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    dense d;
+    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+    uint8_t out[SMALL_ROWS];
+} bench;
+
+/* A context with a reference of `gain` times the model's, and a frame that differs from it by up to 20 %. */
+static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int project)
+{
+    uint64_t state = 31;
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .kind = kind});
+    small_context_open(&b->c, &b->made, 0);
+    b->d = dense_of(&b->c.model);
+    small_reference(&b->c.model, gain, b->reference);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
+    eits_options o = b->c.ctx.options;
+    o.project_baseline = (uint32_t)project;
+    CHECK_EQUAL(eits_set_options(&b->c.ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_baseline_set(&b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    dense_free(&b->d);
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+static eits_status stage(bench *b, uint32_t *masked)
+{
+    uint64_t macs;
+    return eits_frame_stage(&b->c.ctx, b->frame, SMALL_ROWS, masked, &macs);
+}
+
+/* Run the stage; y must be what the dense computation gives with the rows in b->out left out. */
+static void check_stage(bench *b, uint32_t masked_expected)
+{
+    eits_context *ctx = &b->c.ctx;
+    double *v0 = dense_copy(b->reference, SMALL_ROWS), y[RANK];
+    uint32_t masked = 99;
+    CHECK_EQUAL(stage(b, &masked), EITS_OK);
+    CHECK_EQUAL(masked, masked_expected);
+    dense_frame(&b->c.model, &b->d, v0, (double)ctx->baseline.gain, ctx->options.project_baseline ? v0 : NULL, b->frame, b->out, y);
+    CHECK(sqrt(dense_dot(y, y, RANK)) > 0.01);
+    CHECK_NEAR(dense_greatest_difference(y, ctx->y, RANK), 0, 60 * EPS);
+    for (uint32_t i = RANK; i < EITS_STRIDE(RANK); ++i)
+        CHECK(ctx->y[i] == 0);
+    for (uint32_t k = 0; k < ctx->basis_count; ++k) { /* orthonormal, and y is orthogonal to it */
+        double *a = dense_copy(ctx->basis + EITS_STRIDE(RANK) * k, RANK), *yy = dense_copy(ctx->y, RANK);
+        for (uint32_t l = 0; l <= k; ++l) {
+            double *other = dense_copy(ctx->basis + EITS_STRIDE(RANK) * l, RANK);
+            CHECK_NEAR(dense_dot(a, other, RANK), k == l, 10 * EPS);
+            free(other);
+        }
+        CHECK_NEAR(dense_dot(a, yy, RANK), 0, 10 * EPS);
+        free(a);
+        free(yy);
+    }
+    free(v0);
+}
+
+static void data_of_each_kind(void)
+{
+    for (int kind = 0; kind < 3; ++kind) {
+        for (int project = 0; project < 2; ++project) {
+            for (int turned = 0; turned < 2; ++turned) { /* polarity: the gain takes it up */
+                bench b;
+                eits_context *ctx = set_up(&b, (eits_data_kind)kind, turned ? -0.5 : 2, project);
+                check_stage(&b, 0);
+                for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+                    const eits_fold fold = b.c.model.fold[k];
+                    double sum = 0, used = 0;
+                    for (int side = 0; side < 2; ++side) {
+                        const uint32_t row = side == 0 ? fold.first : fold.second;
+                        if (row == EITS_FOLD_NONE)
+                            continue;
+                        const double v = (double)b.frame[row], v0 = (double)b.reference[row], gain = turned ? -2 : 0.5;
+                        const double sign = side == 1 && kind != EITS_DATA_NORMALISED ? fold.sign : 1;
+                        sum += sign * (kind == EITS_DATA_DIFFERENCE   ? gain * (v - v0)
+                                       : kind == EITS_DATA_NORMALISED ? (v - v0) / v0
+                                                                      : gain * v0 * log(v / v0));
+                        used += 1;
+                    }
+                    CHECK_NEAR(ctx->d[k], sum / used, 10 * EPS);
+                }
+                CHECK_EQUAL(ctx->basis_count, project);
+                tear_down(&b);
+            }
+        }
+    }
+}
+
+static void drift_of_the_gain(void)
+{
+    static const double drifts[] = {1e-3, 0.05, -0.3, 0.8};
+    for (int kind = 0; kind < 3; ++kind) {
+        for (size_t e = 0; e < sizeof drifts / sizeof drifts[0]; ++e) {
+            double size[2];
+            for (int project = 0; project < 2; ++project) {
+                bench b;
+                eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1.7, project);
+                for (int i = 0; i < SMALL_ROWS; ++i)
+                    b.frame[i] = b.reference[i] * (eits_real)(1 + drifts[e]);
+                uint32_t masked;
+                CHECK_EQUAL(stage(&b, &masked), EITS_OK);
+                double *y = dense_copy(ctx->y, RANK);
+                size[project] = sqrt(dense_dot(y, y, RANK));
+                free(y);
+                tear_down(&b);
+            }
+            CHECK(size[0] > 0.5 * fabs(drifts[e]));
+            CHECK(size[1] <= 30 * EPS * (1 + fabs(drifts[e])));
+        }
+    }
+}
+
+/* What is no number or saturated is left out, counted, and does not reach the data. */
+static void unusable_channels(void)
+{
+    for (int kind = 0; kind < 3; ++kind) {
+        for (int project = 0; project < 2; ++project) {
+            bench b;
+            eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, project);
+            const eits_fold pair = b.c.model.fold[2], other = b.c.model.fold[6], single = b.c.model.fold[20];
+            b.frame[pair.first] = (eits_real)NAN; /* the reciprocal stands in, sign turned */
+            b.out[pair.first] = 1;
+            check_stage(&b, 1);
+            CHECK_EQUAL(ctx->basis_count, project);
+            b.frame[other.second] = (eits_real)-INFINITY;
+            b.out[other.second] = 1;
+            check_stage(&b, 2);
+            CHECK(ctx->unusable[pair.first] && ctx->unusable[other.second] && !ctx->unusable[pair.second]);
+            b.frame[single.first] = (eits_real)INFINITY; /* a row without reciprocal */
+            b.out[single.first] = 1;
+            check_stage(&b, 3);
+            CHECK_EQUAL(ctx->basis_count, 1 + project);
+            b.frame[pair.second] = (eits_real)NAN; /* now both of a pair */
+            b.out[pair.second] = 1;
+            check_stage(&b, 4);
+            CHECK_EQUAL(ctx->basis_count, 2 + project);
+            eits_options o = ctx->options;
+            o.saturation_v = 5;
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            b.frame[0] = 5; /* at the limit counts as beyond it */
+            b.frame[1] = R(-5.5);
+            b.out[0] = b.out[1] = 1;
+            check_stage(&b, 6);
+            memset(b.out, 0, sizeof b.out); /* all well again: the basis must be made anew */
+            memcpy(b.frame, b.reference, sizeof b.frame);
+            b.frame[3] *= R(1.2);
+            check_stage(&b, 0);
+            CHECK_EQUAL(ctx->basis_count, project);
+            tear_down(&b);
+        }
+    }
+}
+
+/* The mask changes from frame to frame in all ways: y is always what a fresh context gives. */
+static void changing_masks(void)
+{
+    for (int kind = 0; kind < 3; ++kind) {
+        bench b;
+        eits_context *ctx = set_up(&b, (eits_data_kind)kind, -1.5, 1);
+        uint64_t state = 41;
+        eits_real good[SMALL_ROWS];
+        memcpy(good, b.frame, sizeof good);
+        for (int round = 0; round < 60; ++round) {
+            uint32_t expected = 0;
+            for (int i = 0; i < SMALL_ROWS; ++i) {
+                b.out[i] = small_random(&state) < -0.7 + 0.4 * (round % 2);
+                b.frame[i] = b.out[i] && i % 3 != 0 ? (eits_real)NAN : good[i];
+                CHECK_EQUAL(eits_mask_row(ctx, (uint32_t)i, b.out[i] && i % 3 == 0), EITS_OK);
+                expected += b.out[i];
+            }
+            if (expected <= ctx->options.max_masked)
+                check_stage(&b, expected);
+        }
+        tear_down(&b);
+    }
+}
+
+/* Rows left out on both sides: the answer does not depend on their values, and is the one that minimises over them. */
+static void left_out_is_minimised_over(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 0);
+    const uint32_t k = 5, first = b.c.model.fold[k].first, second = b.c.model.fold[k].second;
+    double *v0 = dense_copy(b.reference, SMALL_ROWS), y[RANK], y_with[RANK];
+    eits_real seen[2][RANK];
+    for (int round = 0; round < 2; ++round) {
+        b.frame[first] = round == 0 ? R(123.0) : R(-0.001);
+        b.frame[second] = round == 0 ? R(-9.0) : R(77.0);
+        CHECK_EQUAL(eits_mask_row(ctx, first, 1), EITS_OK);
+        CHECK_EQUAL(eits_mask_row(ctx, second, 1), EITS_OK);
+        uint32_t masked;
+        CHECK_EQUAL(stage(&b, &masked), EITS_OK);
+        CHECK_EQUAL(masked, 2);
+        memcpy(seen[round], ctx->y, sizeof seen[round]);
+    }
+    CHECK(memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
+    /* min over a of |y + a p|^2, p the row's column of P, is |projected y|^2, and any start gives the same */
+    dense_frame(&b.c.model, &b.d, v0, 1, NULL, b.frame, b.out, y_with);
+    const double *p = b.d.p + k * RANK;
+    const double a = -dense_dot(y_with, p, RANK) / dense_dot(p, p, RANK);
+    for (int i = 0; i < RANK; ++i)
+        y[i] = y_with[i] + a * p[i];
+    CHECK(fabs(a) > 1);
+    CHECK_NEAR(dense_greatest_difference(y, seen[0], RANK), 0, 60 * EPS);
+    free(v0);
+    tear_down(&b);
+}
+
+static void refused_frames_clear_the_image(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
+    eits_options o = ctx->options;
+    eits_real image[SIDE * SIDE], again[SIDE * SIDE], good[SMALL_ROWS];
+    eits_info info;
+    o.max_masked = 3;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    memcpy(good, b.frame, sizeof good);
+    static const eits_status expected[] = {EITS_E_FRAME_CHANNELS, EITS_E_FRAME_LENGTH, EITS_E_FRAME_LENGTH,
+                                           EITS_E_FRAME_LENGTH,   EITS_E_NOT_FINITE,   EITS_E_FRAME_ZERO};
+    static const size_t length[] = {SMALL_ROWS, 0, SMALL_ROWS - 1, SMALL_ROWS + 1, SMALL_ROWS, SMALL_ROWS};
+    for (int wrong = 0; wrong < 6; ++wrong) {
+        memcpy(b.frame, good, sizeof good);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, &info), EITS_OK);
+        CHECK(info.nonzeros > 0 && info.iterations > 0);
+        for (int i = 0; i < SMALL_ROWS; ++i) {
+            if (wrong == 0 && i < 4)
+                b.frame[i] = (eits_real)NAN;
+            if (wrong == 4)
+                b.frame[i] = (eits_real)(BOTH_WIDTHS(1e38, 1e307) * (i % 2 == 0 ? 1 : -1));
+            if (wrong == 5)
+                b.frame[i] = R(-0.0);
+        }
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, length[wrong], again, &info), expected[wrong]);
+        for (int j = 0; j < SIDE * SIDE; ++j)
+            CHECK(again[j] == 0 && ctx->image[j] == 0 && ctx->x[j] == 0);
+        CHECK(info.nonzeros == 0 && info.iterations == 0 && info.stop == EITS_STOP_GATE);
+        CHECK_EQUAL(info.masked, wrong == 0 ? 4 : 0);
+        uint32_t count = 9;
+        CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+        CHECK_EQUAL(count, 0);
+        memcpy(b.frame, good, sizeof good); /* and nothing of it stays */
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, again, &info), EITS_OK);
+        CHECK(memcmp(image, again, sizeof image) == 0);
+    }
+    for (int i = 0; i < 3; ++i)
+        b.frame[i] = (eits_real)NAN;
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, &info), EITS_OK); /* three may be missing */
+    CHECK_EQUAL(info.masked, 3);
+    CHECK_EQUAL(eits_reconstruct(NULL, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reconstruct(ctx, NULL, SMALL_ROWS, NULL, NULL), EITS_E_ARGUMENT);
+    uint32_t masked;
+    uint64_t macs;
+    CHECK_EQUAL(eits_frame_stage(NULL, good, SMALL_ROWS, &masked, &macs), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_frame_stage(ctx, NULL, SMALL_ROWS, &masked, &macs), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_frame_stage(ctx, good, SMALL_ROWS, NULL, &macs), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_frame_stage(ctx, good, SMALL_ROWS, &masked, NULL), EITS_E_ARGUMENT);
+    tear_down(&b);
+}
+
+static void masked_rows(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
+    eits_real image[SIDE * SIDE], again[SIDE * SIDE];
+    CHECK_EQUAL(eits_mask_row(NULL, 0, 1), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_mask_row(ctx, SMALL_ROWS, 1), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_mask_row(ctx, 0xFFFFFFFFu, 1), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
+    CHECK_EQUAL(eits_mask_row(ctx, SMALL_ROWS - 1, 7), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, again, NULL), EITS_OK);
+    CHECK_EQUAL(ctx->info.masked, 1);
+    CHECK(memcmp(image, again, sizeof image) != 0);
+    CHECK_EQUAL(eits_mask_row(ctx, SMALL_ROWS - 1, 0), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, again, NULL), EITS_OK);
+    CHECK(ctx->info.masked == 0 && memcmp(image, again, sizeof image) == 0);
+    tear_down(&b);
+}
+
+/* A row that was left out while the reference was taken has none: it stays out until the next reference. */
+static void row_without_reference(void)
+{
+    for (int learned = 0; learned < 2; ++learned) {
+        bench b;
+        eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
+        CHECK_EQUAL(eits_mask_row(ctx, 9, 1), EITS_OK);
+        b.out[9] = 1;
+        if (learned) {
+            CHECK_EQUAL(eits_baseline_begin(ctx, 6), EITS_OK);
+            for (int k = 0; k < 6; ++k)
+                CHECK_EQUAL(eits_baseline_add(ctx, b.reference, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+            CHECK(ctx->baseline.noise_v <= 10 * EPS);
+        } else {
+            CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        }
+        check_stage(&b, 1);
+        CHECK_EQUAL(eits_mask_row(ctx, 9, 0), EITS_OK);
+        check_stage(&b, 1);
+        CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        b.out[9] = 0;
+        check_stage(&b, 0);
+        tear_down(&b);
+    }
+}
+
+/* Ratios need a reference that is not all but zero, and are bounded. */
+static void ratios_at_their_limits(void)
+{
+    for (int kind = EITS_DATA_NORMALISED; kind <= EITS_DATA_LOG_RATIO; ++kind) {
+        bench b;
+        eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, 0);
+        const uint32_t row = b.c.model.fold[20].first;
+        b.reference[row] = R(1e-8);
+        CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        b.out[row] = 1; /* left out as if masked, though not counted as unusable */
+        check_stage(&b, 0);
+        CHECK_EQUAL(ctx->basis_count, 1);
+        tear_down(&b);
+    }
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_LOG_RATIO, 1, 0);
+    const uint32_t row = b.c.model.fold[20].first;
+    static const double factors[] = {16, 17, 1e6, -1, 0, 1.0 / 16, 1.0 / 17};
+    static const double ratios[] = {16, 16, 16, 1.0 / 16, 1.0 / 16, 1.0 / 16, 1.0 / 16};
+    for (int f = 0; f < 7; ++f) {
+        b.frame[row] = b.reference[row] * (eits_real)factors[f];
+        uint32_t masked;
+        CHECK_EQUAL(stage(&b, &masked), EITS_OK);
+        CHECK_NEAR(ctx->d[20], (double)b.reference[row] * log(ratios[f]), 20 * EPS);
+    }
+    tear_down(&b);
+}
+
+int main(void)
+{
+    data_of_each_kind();
+    drift_of_the_gain();
+    unusable_channels();
+    changing_masks();
+    left_out_is_minimised_over();
+    refused_frames_clear_the_image();
+    masked_rows();
+    row_without_reference();
+    ratios_at_their_limits();
+    return checks_report("frame");
+}

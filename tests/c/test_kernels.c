@@ -1,0 +1,298 @@
+/* The matrix products: against naive sums within a bound, and to the bit between builds and layouts. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "kernels.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef EITS_BUILD_AVX2
+extern const eits_kernels eits_kernels_avx2;
+#endif
+
+/* Every build that this processor runs. */
+static const eits_kernels *builds[2];
+static int build_count = 0;
+
+static void find_builds(void)
+{
+    const eits_kernels *best = eits_kernels_best();
+    builds[build_count++] = &eits_kernels_portable;
+    CHECK(strcmp(eits_kernels_portable.name, "portable") == 0);
+#ifdef EITS_BUILD_AVX2
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        builds[build_count++] = &eits_kernels_avx2;
+        CHECK(best == &eits_kernels_avx2 && strcmp(best->name, "avx2") == 0);
+        return;
+    }
+    printf("kernels: no AVX2 on this processor, the portable build alone is tested\n");
+#endif
+    CHECK(best == &eits_kernels_portable);
+}
+
+typedef struct sample {
+    eits_matrix matrix;
+    void *data;
+    float *scale;
+} sample;
+
+static void *memory_of(size_t size)
+{
+    void *made = calloc(1, size + 1);
+    if (made == NULL)
+        abort();
+    return made;
+}
+
+/* Random columns, a fifth of the numbers zero, padding zero; exactly as large as stated, so that reads beyond are seen. */
+static sample make_sample(eits_storage storage, uint32_t rows, uint32_t cols, uint64_t *state)
+{
+    static const size_t item[] = {4, 2, 2, 1};
+    const uint32_t stride = (rows + 7u) & ~7u;
+    sample s = {.data = malloc((size_t)stride * cols * item[storage])};
+    const int integer = storage >= EITS_STORAGE_I16;
+    if (s.data == NULL)
+        abort();
+    memset(s.data, 0, (size_t)stride * cols * item[storage]);
+    for (uint32_t j = 0; j < cols; ++j) {
+        for (uint32_t i = 0; i < rows; ++i) {
+            const double value = small_random(state) < -0.6 ? 0 : small_random(state);
+            const size_t at = (size_t)stride * j + i;
+            switch (storage) {
+            case EITS_STORAGE_F32: ((float *)s.data)[at] = (float)value; break;
+            case EITS_STORAGE_F16: ((uint16_t *)s.data)[at] = (uint16_t)(0xBBFF & (int)(32768 + 32767 * value)); break;
+            case EITS_STORAGE_I16: ((int16_t *)s.data)[at] = (int16_t)(32767 * value); break;
+            case EITS_STORAGE_I8: ((int8_t *)s.data)[at] = (int8_t)(127 * value); break;
+            }
+        }
+    }
+    if (integer) {
+        s.scale = memory_of(cols * sizeof(float));
+        for (uint32_t j = 0; j < cols; ++j)
+            s.scale[j] = (float)((1.2 + small_random(state)) / (storage == EITS_STORAGE_I8 ? 127 : 32767));
+    }
+    s.matrix = (eits_matrix){s.data, s.scale, rows, cols, stride, storage};
+    return s;
+}
+
+static void free_sample(sample *s)
+{
+    free(s->data);
+    free(s->scale);
+}
+
+static eits_real *reals(size_t count)
+{
+    return memory_of(count * sizeof(eits_real));
+}
+
+static void fill(eits_real *out, size_t count, double zeros, uint64_t *state)
+{
+    for (size_t i = 0; i < count; ++i)
+        out[i] = small_random(state) < 2 * zeros - 1 ? 0 : (eits_real)small_random(state);
+}
+
+static int same_bits(const eits_real *a, const eits_real *b, size_t count)
+{
+    return memcmp(a, b, count * sizeof *a) == 0;
+}
+
+/* S x for a list of columns: the exact sum in long double, and the documented chain of fused multiply-adds. */
+static void check_mul(const sample *s, uint64_t *state)
+{
+    const eits_matrix *m = &s->matrix;
+    eits_real *x = reals(m->cols), *value = reals(m->cols), *out[2] = {reals(m->stride), reals(m->stride)};
+    uint32_t *index = memory_of(m->cols * sizeof *index);
+    for (int share = 0; share <= 4; ++share) { /* of zeros: all, three quarters, ... none */
+        fill(x, m->cols, 1 - 0.25 * share, state);
+        const uint32_t count = eits_list_nonzeros(m, x, index, value);
+        uint32_t seen = 0;
+        for (uint32_t j = 0; j < m->cols; ++j) {
+            if (x[j] == 0)
+                continue;
+            CHECK(seen < count && index[seen] == j);
+            const eits_real scaled = m->scale != NULL ? x[j] * (eits_real)m->scale[j] : x[j];
+            CHECK(seen < count && value[seen] == scaled);
+            ++seen;
+        }
+        CHECK_EQUAL(count, seen);
+        for (int b = 0; b < build_count; ++b) {
+            memset(out[b], 0xFF, m->stride * sizeof(eits_real));
+            builds[b]->mul(m, index, value, count, out[b]);
+        }
+        CHECK(build_count < 2 || same_bits(out[0], out[1], m->stride));
+        for (uint32_t i = 0; i < m->stride; ++i) {
+            long double exact = 0, sizes = 0;
+            eits_real chain = 0;
+            for (uint32_t k = 0; k < count; ++k) {
+                const double entry = i < m->rows ? dense_entry(m, index[k], i) : 0;
+                exact += (long double)entry * (long double)value[k];
+                sizes += fabsl((long double)entry * (long double)value[k]);
+                chain = eits_fma((eits_real)entry, value[k], chain);
+            }
+            CHECK_NEAR(out[0][i], exact, (count + 2.0) * EPS / 2 * (double)sizes);
+            CHECK(out[0][i] == chain);
+        }
+    }
+    free(x), free(value), free(out[0]), free(out[1]), free(index);
+}
+
+/* S' v from columns and from panels, in each build: one result, to the bit. */
+static void check_mul_t(const sample *s, uint64_t *state)
+{
+    const eits_matrix *m = &s->matrix;
+    eits_real *v = reals(m->rows), *expected = reals(m->cols), *out = reals(m->cols);
+    eits_real *panels = reals(EITS_PANEL_COLUMNS(m->cols) * m->rows), *column = reals(m->rows);
+    eits_make_panels(m, panels);
+    fill(v, m->rows, 0.1, state);
+    for (uint32_t j = 0; j < m->cols; ++j) {
+        long double exact = 0, sizes = 0;
+        eits_real chain = 0;
+        const eits_real scale = m->scale != NULL ? (eits_real)m->scale[j] : 1;
+        eits_read_column(m, j, column);
+        for (uint32_t i = 0; i < m->rows; ++i) {
+            const double entry = dense_entry(m, j, i);
+            CHECK((double)column[i] == entry);
+            exact += (long double)entry * (long double)v[i];
+            sizes += fabsl((long double)entry * (long double)v[i]);
+            chain = eits_fma((eits_real)entry, v[i], chain);
+        }
+        expected[j] = m->scale != NULL ? chain * scale : chain;
+        CHECK_NEAR(expected[j], exact * (long double)scale, (m->rows + 3.0) * EPS / 2 * (double)(sizes * (long double)scale));
+    }
+    for (int b = 0; b < build_count; ++b) {
+        memset(out, 0xFF, m->cols * sizeof *out);
+        builds[b]->mul_t(m, v, out);
+        CHECK(same_bits(out, expected, m->cols));
+        memset(out, 0xFF, m->cols * sizeof *out);
+        builds[b]->mul_t_panels(m, panels, v, out);
+        CHECK(same_bits(out, expected, m->cols));
+    }
+    free(v), free(expected), free(out), free(panels), free(column);
+}
+
+static void products_of_all_storages_and_sizes(void)
+{
+    static const uint32_t rows[] = {1, 3, 7, 8, 9, 13, 24, 33}, cols[] = {1, 2, 3, 4, 5, 7, 31, 32, 33, 64, 99};
+    uint64_t state = 11;
+    for (int storage = 0; storage < 4; ++storage) {
+        for (size_t r = 0; r < sizeof rows / sizeof rows[0]; ++r) {
+            for (size_t c = 0; c < sizeof cols / sizeof cols[0]; ++c) {
+                sample s = make_sample((eits_storage)storage, rows[r], cols[c], &state);
+                check_mul(&s, &state);
+                check_mul_t(&s, &state);
+                free_sample(&s);
+            }
+        }
+    }
+}
+
+static void dots_and_axpys(void)
+{
+    uint64_t state = 12;
+    for (size_t count = 0; count <= 70; ++count) {
+        eits_real *a = reals(count), *b = reals(count), *out[2] = {reals(count), reals(count)};
+        fill(a, count, 0.1, &state);
+        fill(b, count, 0.1, &state);
+        long double exact = 0, sizes = 0;
+        eits_real lane[8] = {0};
+        for (size_t i = 0; i < count; ++i) {
+            exact += (long double)a[i] * (long double)b[i];
+            sizes += fabsl((long double)a[i] * (long double)b[i]);
+            lane[i % 8] = eits_fma(a[i], b[i], lane[i % 8]);
+        }
+        const eits_real tree = ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
+        for (int k = 0; k < build_count; ++k) {
+            const eits_real got = builds[k]->dot(a, b, count);
+            CHECK_NEAR(got, exact, ((double)count / 8 + 5) * EPS / 2 * (double)sizes);
+            CHECK(got == tree);
+            memcpy(out[k], b, count * sizeof *b);
+            builds[k]->axpy(out[k], R(-0.37), a, count);
+            for (size_t i = 0; i < count; ++i)
+                CHECK(out[k][i] == eits_fma(R(-0.37), a[i], b[i]));
+        }
+        free(a), free(b), free(out[0]), free(out[1]);
+    }
+}
+
+static void proximal_steps(void)
+{
+    uint64_t state = 13;
+    const double step = 0.7, threshold = 0.3, beta = 0.4;
+    for (int sign = 0; sign < 3; ++sign) {
+        for (uint32_t n = 0; n <= 40; ++n) {
+            eits_real *g = reals(n), *x = reals(n), *start = reals(n), *z[2] = {reals(n), reals(n)}, *next[2] = {reals(n), reals(n)};
+            const eits_prox how = {(eits_real)step, (eits_real)threshold, (eits_real)beta, (eits_sign)sign};
+            fill(g, n, 0.1, &state);
+            fill(x, n, 0.3, &state);
+            fill(start, n, 0.2, &state);
+            for (int b = 0; b < build_count; ++b) {
+                memcpy(z[b], start, n * sizeof *start);
+                builds[b]->prox(&how, n, g, x, next[b], z[b]);
+            }
+            for (uint32_t j = 0; j < n; ++j) {
+                const double v = (double)start[j] + step * (double)g[j];
+                double moved = 0;
+                if (v > threshold && sign != EITS_SIGN_DECREASE)
+                    moved = v - threshold;
+                if (v < -threshold && sign != EITS_SIGN_INCREASE)
+                    moved = v + threshold;
+                CHECK_NEAR(next[0][j], moved, 3 * EPS);
+                CHECK_NEAR(z[0][j], moved + beta * (moved - (double)x[j]), 6 * EPS);
+                CHECK(next[0][j] != 0 || fabs(v) <= threshold + EPS || moved == 0);
+            }
+            CHECK(build_count < 2 || (same_bits(next[0], next[1], n) && same_bits(z[0], z[1], n)));
+            free(g), free(x), free(start), free(z[0]), free(z[1]), free(next[0]), free(next[1]);
+        }
+    }
+}
+
+static void zeros_are_skipped(void)
+{
+    uint64_t state = 14;
+    sample s = make_sample(EITS_STORAGE_F32, 5, 9, &state);
+    eits_real x[9] = {0, R(-0.0), 2, 0, 0, R(-1e-30), 0, 0, 3}, value[9], out[8];
+    uint32_t index[9];
+    CHECK_EQUAL(eits_list_nonzeros(&s.matrix, x, index, value), 3); /* minus zero is zero, however small is not */
+    CHECK(index[0] == 2 && index[1] == 5 && index[2] == 8);
+    for (uint32_t i = 0; i < 5; ++i)
+        ((float *)s.data)[8 * 3 + i] = NAN; /* a column that is not listed is not read */
+    builds[0]->mul(&s.matrix, index, value, 3, out);
+    for (uint32_t i = 0; i < 8; ++i)
+        CHECK(isfinite((double)out[i]));
+    builds[0]->mul(&s.matrix, index, value, 0, out);
+    for (uint32_t i = 0; i < 8; ++i)
+        CHECK(out[i] == 0);
+    free_sample(&s);
+}
+
+static void choice_of_kernels(void)
+{
+    small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
+    small_context c;
+    small_context_open(&c, &made, 0);
+    CHECK(strcmp(eits_kernels_name(&c.ctx), eits_kernels_best()->name) == 0);
+    CHECK_EQUAL(eits_use_portable_kernels(&c.ctx, 1), EITS_OK);
+    CHECK(strcmp(eits_kernels_name(&c.ctx), "portable") == 0);
+    CHECK_EQUAL(eits_use_portable_kernels(&c.ctx, 0), EITS_OK);
+    CHECK(strcmp(eits_kernels_name(&c.ctx), eits_kernels_best()->name) == 0);
+    CHECK_EQUAL(eits_use_portable_kernels(NULL, 0), EITS_E_ARGUMENT);
+    CHECK(strcmp(eits_kernels_name(NULL), "") == 0);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+int main(void)
+{
+    find_builds();
+    products_of_all_storages_and_sizes();
+    dots_and_axpys();
+    proximal_steps();
+    zeros_are_skipped();
+    choice_of_kernels();
+    return checks_report("kernels");
+}
