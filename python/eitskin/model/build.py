@@ -29,8 +29,9 @@ from eitskin.solve.core import CoreEngine
 FloatArray = npt.NDArray[np.float64]
 
 LIPSCHITZ_MARGIN = 1e-4
+LEAST_RATIO_REFERENCE = 1e-6
 PAPER_DIAMETER_MM = 194.0
-# a disc of contrast c in a sheet of conductivity s answers as a linear change of 2 (c - 1) / (c + 1) s: for c = 3 to 10, 1.0 to 1.64 s
+# a disc of contrast c in a sheet of conductivity s answers as a change of 2 (c - 1) / (c + 1) s: for c = 3 to 10, 1.0 to 1.64 s
 TOUCH_CHANGE_RATIO = 1.35
 # the logarithm draws strong touches together, so that their data say little of the radius and strength must
 LOG_RADIUS_WEIGHT = 1.0
@@ -89,11 +90,14 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
     _refuse_settings(settings, linear.grid)
     fold = protocol.reciprocal_pairs()
     v_ref, jacobian = fold_rows(linear.v0_v, fold), fold_rows(linear.jacobian, fold)
+    silent = np.zeros(len(v_ref), dtype=np.bool_)
     if settings.data_kind == "normalised":
-        jacobian = jacobian / v_ref[:, None]
+        # a row whose reference is all but zero says nothing as a ratio; the solver leaves it out as well
+        silent = np.abs(v_ref) < LEAST_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
+        jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
     rank = settings.rank or min(64, *jacobian.shape)
     reduction = reduce_jacobian(jacobian, rank, floor=settings.floor, column_power=settings.column_power)
-    projection = reduction.projection.astype(np.float32)
+    projection = np.where(silent, 0.0, reduction.projection).astype(np.float32)
     stored = store(reduction.sensitivity, settings.storage)
     decoded = stored.decode(rank)
     empty = np.zeros(linear.grid.n_pixels, dtype=np.float32)
