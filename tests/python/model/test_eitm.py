@@ -1,0 +1,281 @@
+"""The .eitm file: what is written is read again, the bytes lie where docs/eitm-format.md says, and damage is refused."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitm_bytes import HEADER_SIZE, entry_place, sealed, sections_of
+from eitskin.errors import EitskinError, FileError, ModelError
+from eitskin.model import eitm
+from eitskin.model.build import BuildSettings, Linearisation, make_model
+from eitskin.model.eitm import decode_model, encode_model, load_model, save_model
+from eitskin.skin.protocol import table
+from eitskin.solve.core import CoreEngine
+from small_models import DATA_KINDS, STORAGES, prebuilt, small, small_blob, small_model, tiny_blob
+
+ITEM = {"f32": "<f4", "f16": "<f2", "i16": "<i2", "i8": "i1"}
+
+
+def refusal(blob: bytes) -> str:
+    """The text with which ``blob`` is refused; a fault of the test where it is not, or not in one line."""
+    with pytest.raises(ModelError) as caught:
+        decode_model(blob, "x.eitm")
+    text = str(caught.value)
+    assert text.startswith("x.eitm: ") and "\n" not in text
+    return text
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_round_trip(storage: str, data_kind: str) -> None:
+    blob = small_blob(storage, data_kind)
+    first = decode_model(blob, "first")
+    again = decode_model(encode_model(first), "again")
+    assert encode_model(first) == blob
+    for model in (first, again):
+        assert (model.stored.storage, model.data_kind, model.rank) == (storage, data_kind, 37)
+        assert model.protocol.hash == small().protocol.hash
+        assert model.protocol.current_a == small().protocol.current_a
+        assert model.skin == small().skin
+        assert (model.grid.index == small().linear.grid.index).all()
+        assert model.grid.pixel_mm == pytest.approx(small().linear.grid.pixel_mm, rel=1e-7)
+    for name in ("v_ref_v", "projection", "column_weight"):
+        assert (getattr(first, name) == getattr(again, name)).all()
+    assert (first.sensitivity == again.sensitivity).all()
+    for name in ("first", "second", "sign"):
+        assert (getattr(first.fold, name) == getattr(small().protocol.reciprocal_pairs(), name)).all()
+    for name in ("reference_v", "frame_v", "image"):
+        assert (getattr(first.golden, name) == getattr(again.golden, name)).all()
+    assert first.defaults == again.defaults
+    assert first.defaults.lambda_rel == 0.03  # not 0.029999999329
+    assert first.meta == again.meta
+
+
+def test_header_as_documented() -> None:
+    blob = small_blob()
+    assert blob[:4] == b"EITM"
+    assert struct.unpack_from("<HH", blob, 4) == (1, 0)
+    total, crc, count, zero = struct.unpack_from("<4I", blob, 8)
+    assert total == len(blob) and total % 16 == 0
+    assert crc == zlib.crc32(blob[16:])
+    assert count == 11 and zero == 0
+    assert struct.unpack_from("<Q", blob, 24)[0] == small().protocol.hash
+    assert blob[32:64] == bytes(32)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_sections_as_documented(storage: str) -> None:
+    """Every section's size and content, read by offsets alone."""
+    blob, model, linear = small_blob(storage), small_model(storage), small().linear
+    sections = sections_of(blob)
+    required = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD"}
+    required |= {"SCAL"} if storage in ("i16", "i8") else set()
+    assert set(sections) == required | {"META"}
+    for name, place in sections.items():
+        assert place.offset % 16 == 0 and place.offset >= HEADER_SIZE + 16 * len(sections)
+        assert place.flags == (1 if name in required else 0)
+    body = {name: blob[place.offset : place.offset + place.size] for name, place in sections.items()}
+    m, k, r, stride, n = 208, 104, 37, 40, linear.grid.n_pixels
+    dims = struct.unpack("<10I6f", body["DIMS"])
+    grid = linear.grid
+    assert dims[:10] == (16, m, k, r, stride, n, grid.nx, grid.ny, STORAGES.index(storage), 0)
+    assert dims[10:] == pytest.approx(
+        (grid.pixel_mm, *grid.origin_mm, 1e-3, model.lipschitz, model.noise_gain), rel=1e-6
+    )
+    assert (np.frombuffer(body["PROT"], "u1").reshape(m, 4) == small().protocol.drive_measure).all()
+    fold = np.frombuffer(body["FOLD"], "<u2").reshape(k, 4)
+    assert (fold[:, 0] == model.fold.first).all() and (fold[:, 1] == model.fold.second).all()
+    assert (fold[:, 2] == 1).all() and not fold[:, 3].any()
+    assert np.frombuffer(body["VREF"], "<f4") == pytest.approx(linear.v0_v[model.fold.first], rel=1e-6)
+    projection = np.frombuffer(body["REDU"], "<f4").reshape(k, stride)
+    assert (model.projection == projection[:, :r].T).all() and not projection[:, r:].any()
+    columns = np.frombuffer(body["SENS"], ITEM[storage]).reshape(n, stride)
+    scale = np.frombuffer(body["SCAL"], "<f4")[:, None] if "SCAL" in body else 1.0
+    assert (model.sensitivity == (columns[:, :r].astype(float) * scale).T).all() and not columns[:, r:].any()
+    assert (np.frombuffer(body["COLW"], "<f4") == model.column_weight).all()
+    assert (np.frombuffer(body["GRID"], "<u2").reshape(n, 2) == grid.index).all()
+    defaults = struct.unpack("<2I12f2f", body["DEFS"])
+    assert defaults[:14] == pytest.approx(tuple(asdict(model.defaults).values()), rel=1e-6)
+    assert defaults[14:] == (0, 0)
+    gold = np.frombuffer(body["GOLD"], "<f4")
+    assert gold[:m] == pytest.approx(linear.v0_v, rel=1e-6)
+    assert (gold[m : 2 * m] == model.golden.frame_v).all() and (gold[2 * m :] == model.golden.image).all()
+    assert json.loads(body["META"])["skin"]["skin"]["name"] == "disk"
+
+
+def fold_section(blob: bytes) -> np.ndarray:
+    """Section FOLD as (k, 4) numbers of 16 bits."""
+    place = sections_of(blob)["FOLD"]
+    return np.frombuffer(blob, "<u2", place.size // 2, place.offset).reshape(-1, 4)
+
+
+def test_reciprocals_of_the_other_sign() -> None:
+    """Opposite drive is repeated the other way round half a turn later."""
+    blob = small_blob(outline="l", kind="opposite")
+    fold = fold_section(blob)
+    assert fold.shape == (96, 4) and (fold[:, 1] == fold[:, 0] + 96).all()
+    assert (fold.view(np.int16)[:, 2] == -1).all()
+    assert (decode_model(blob, "x").fold.sign == -1).all()
+
+
+def test_rows_without_a_reciprocal_are_marked() -> None:
+    s = small("l", "opposite")
+    half = Linearisation(s.linear.grid, s.linear.jacobian[:96], s.linear.v0_v[:96], s.linear.elements)
+    protocol = table(16, s.protocol.drive_measure[:96])
+    blob = encode_model(make_model(s.skin, protocol, half, BuildSettings(rank=20)))
+    assert (fold_section(blob)[:, 1] == 0xFFFF).all()
+    model = decode_model(blob, "x")
+    assert (model.fold.second == -1).all() and len(model.fold.first) == 96
+    assert CoreEngine(blob).self_test() == 0
+
+
+def test_the_prebuilt_model_is_written_again_bit_for_bit() -> None:
+    model, blob = prebuilt()
+    assert encode_model(model) == blob
+    assert len(blob) < 256 * 1024
+
+
+def test_bytes_after_the_end_do_not_belong_to_the_model() -> None:
+    assert encode_model(decode_model(tiny_blob() + b"and more", "x")) == tiny_blob()
+
+
+def test_every_truncation_is_refused() -> None:
+    blob = tiny_blob()
+    for length in range(len(blob)):
+        assert "truncated" in refusal(blob[:length]) or length < 4
+
+
+@pytest.mark.parametrize("flip", [0x01, 0x80, 0xFF])
+def test_every_damaged_byte_is_refused(flip: int) -> None:
+    """All but the minor version, which is not sealed: a newer minor is read."""
+    blob = bytearray(tiny_blob())
+    for place in range(len(blob)):
+        blob[place] ^= flip
+        if place in (6, 7):
+            assert decode_model(bytes(blob), "x").rank == 5
+        else:
+            refusal(bytes(blob))
+        blob[place] ^= flip
+
+
+@pytest.mark.parametrize("content", [b"", b"E", b"PK\x03\x04" + bytes(200), b"[skin]\nname = 'x'\n" * 20])
+def test_a_foreign_file_is_no_model(content: bytes) -> None:
+    assert "not an .eitm model" in refusal(content)
+
+
+def test_a_newer_major_is_refused_before_the_checksum() -> None:
+    blob = bytearray(tiny_blob())
+    blob[4] = 2
+    blob[100] ^= 1
+    assert "format is 2.0, this eitskin reads 1.x" in refusal(bytes(blob))
+
+
+def with_extra_section(tag: bytes, flags: int) -> bytes:
+    """The tiny model with one section more, moved behind a table that is one entry longer."""
+    blob = tiny_blob()
+    places = sections_of(blob)
+    count, shift = len(places) + 1, 16
+    table = b"".join(
+        struct.pack("<4sIII", name.encode(), p.offset + shift, p.size, p.flags) for name, p in places.items()
+    )
+    start = HEADER_SIZE + 16 * len(places)
+    body = blob[start:]
+    table += struct.pack("<4sIII", tag, len(blob) + shift, 5, flags)
+    whole = blob[:HEADER_SIZE] + table + body + b"extra" + bytes(11)
+    return sealed(whole, total=len(whole), count=count)
+
+
+def test_an_unknown_optional_section_is_skipped() -> None:
+    model = decode_model(with_extra_section(b"NEWS", 0), "x")
+    assert encode_model(model) == tiny_blob()
+
+
+def test_an_unknown_required_section_is_refused() -> None:
+    assert "needs section 'NEWS', which this eitskin does not know" in refusal(with_extra_section(b"NEWS", 1))
+
+
+def test_a_section_that_stands_twice_is_refused() -> None:
+    assert "'COLW' is misplaced or repeated" in refusal(with_extra_section(b"COLW", 1))
+
+
+@pytest.mark.parametrize("name", eitm.REQUIRED)
+def test_a_missing_section_is_named(name: str) -> None:
+    blob = bytearray(tiny_blob())
+    blob[entry_place(blob, name) : entry_place(blob, name) + 4] = b"NONE"
+    blob[entry_place(blob, "NONE") + 12] = 0
+    assert f"section {name!r} is missing" in refusal(sealed(bytes(blob)))
+
+
+@pytest.mark.parametrize("storage", ["i8", "f32"])
+def test_scales_go_with_integers_only(storage: str) -> None:
+    if storage == "i8":
+        blob = bytearray(tiny_blob("i8"))
+        blob[entry_place(blob, "SCAL") : entry_place(blob, "SCAL") + 4] = b"NONE"
+        blob[entry_place(blob, "NONE") + 12] = 0
+        assert "section 'SCAL' of no bytes" in refusal(sealed(bytes(blob)))
+    else:
+        assert "section 'SCAL' of 5 bytes" in refusal(with_extra_section(b"SCAL", 1))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"{", b"[]", b"3", b'"x"', b"\xff\xfe", b'{"skin": 3}', b'{"skin": {"skin": []}}', b"[" * 100_000],
+    ids=lambda content: repr(content[:12]),
+)
+def test_meta_must_be_an_object(content: bytes) -> None:
+    blob, place = tiny_blob(), sections_of(tiny_blob())["META"]
+    assert place.offset + -(-place.size // 16) * 16 == len(blob)
+    padded = content + bytes(-len(content) % 16)
+    whole = bytearray(blob[: place.offset] + padded)
+    struct.pack_into("<I", whole, entry_place(blob, "META") + 8, len(content))
+    assert "'META'" in refusal(sealed(bytes(whole), total=len(whole)))
+
+
+def test_save_and_load(tmp_path: Path) -> None:
+    path = tmp_path / "small.eitm"
+    size = save_model(path, small_model())
+    assert path.stat().st_size == size == len(small_blob())
+    model, blob = load_model(path)
+    assert blob == small_blob() and encode_model(model) == blob
+    assert [entry.name for entry in tmp_path.iterdir()] == ["small.eitm"]
+
+
+def test_a_failed_save_leaves_the_old_file_and_nothing_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "small.eitm"
+    path.write_bytes(b"old")
+
+    def full(self: Path, content: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(FileError, match="No space left on device"):
+        save_model(path, small_model())
+    assert [entry.name for entry in tmp_path.iterdir()] == ["small.eitm"]
+    assert path.read_bytes() == b"old"
+
+
+def test_a_failed_rename_leaves_nothing_beside(tmp_path: Path) -> None:
+    (tmp_path / "folder.eitm").mkdir()
+    with pytest.raises(FileError, match="cannot write it"):
+        save_model(tmp_path / "folder.eitm", small_model())
+    assert [entry.name for entry in tmp_path.iterdir()] == ["folder.eitm"]
+
+
+def test_missing_and_unreadable_files(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no such model"):
+        load_model(tmp_path / "none.eitm")
+    with pytest.raises(FileError, match="cannot read this model"):
+        load_model(tmp_path)
+    with pytest.raises(FileError, match="cannot write there"):
+        save_model(tmp_path / "none" / "x.eitm", small_model())
+
+
+def test_errors_are_of_the_project() -> None:
+    assert issubclass(ModelError, EitskinError) and ModelError.exit_code == 6

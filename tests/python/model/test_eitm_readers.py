@@ -1,0 +1,257 @@
+"""Two readers of one format, Python's and the C core's: what one refuses the other refuses, whatever the bytes."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eitm_bytes import ENTRY_SIZE, entry_place, sealed, sections_of
+from eitskin.errors import EitskinError, ModelError
+from eitskin.model.eitm import decode_model
+from eitskin.solve.core import CoreEngine
+from eitskin.solve.reconstructor import Reconstructor
+from small_models import tiny_blob
+
+WORDS = (0, 1, 3, 4, 255, 256, 1024, 1025, 4096, 4097, 65534, 65535, 65536, 2**31 - 1, 2**31, 2**32 - 1)
+FLOATS = (0.0, -0.0, -1.0, 1.0, 2.0, 1e-45, 1e-7, 1e29, 1.1e30, 3.4e38, float("inf"), float("-inf"), float("nan"))
+STORAGE = {0: "f32", 1: "f16", 2: "i16", 3: "i8"}
+
+
+def accepts(blob: bytes) -> tuple[bool, bool]:
+    """Whether Python and C read ``blob``; whatever they raise but ModelError goes through and fails the test."""
+    answers = []
+    for read in (lambda: decode_model(blob, "x"), lambda: CoreEngine(blob, prepared=False)):
+        try:
+            read()
+            answers.append(True)
+        except ModelError as error:
+            assert "\n" not in str(error)
+            answers.append(False)
+    return answers[0], answers[1]
+
+
+def agreed(blob: bytes, what: object) -> bool:
+    """Whether both read ``blob``; fails where they differ."""
+    python, c = accepts(blob)
+    assert python == c, f"{what}: Python {'reads' if python else 'refuses'} it, C does not"
+    return python
+
+
+@pytest.mark.parametrize("storage", STORAGE.values())
+def test_both_read_the_whole_one(storage: str) -> None:
+    assert agreed(tiny_blob(storage), storage)
+
+
+def test_both_refuse_every_truncation() -> None:
+    blob = tiny_blob()
+    for length in range(0, len(blob), 7):
+        assert not agreed(blob[:length], length)
+
+
+@pytest.mark.parametrize("flip", [0x01, 0x80, 0xFF])
+def test_both_refuse_every_damaged_byte(flip: int) -> None:
+    blob = bytearray(tiny_blob())
+    for place in range(len(blob)):
+        blob[place] ^= flip
+        assert agreed(bytes(blob), place) == (place in (6, 7))
+        blob[place] ^= flip
+
+
+@pytest.mark.parametrize("field", range(10))
+def test_whole_numbers_of_dims(field: int) -> None:
+    """What else fits the sections' sizes: larger images, more electrodes, ranks of the same stride, another data kind."""
+    blob = tiny_blob()
+    place = sections_of(blob)["DIMS"].offset + 4 * field
+    own = struct.unpack_from("<I", blob, place)[0]
+    read = []
+    for word in (*WORDS, own + 1, own - 1):
+        changed = bytearray(blob)
+        struct.pack_into("<I", changed, place, word % 2**32)
+        if agreed(sealed(changed, rehash=True), (field, word)):
+            read.append(word)
+    names = ["n_electrodes", "m", "k", "r", "stride", "n", "nx", "ny", "storage", "data"]
+    expected = {
+        "n_electrodes": {255, 9},
+        "r": {1, 3, 4, 6},
+        "nx": {255, 256, 1024, 1025, 4096, 7},
+        "ny": {255, 256, 1024, 1025, 4096, 7},
+        "data": {0, 1},
+        "storage": {0},
+    }
+    assert set(read) - {own} == expected.get(names[field], set()) - {own}
+
+
+@pytest.mark.parametrize(
+    ("field", "good"),
+    [
+        (0, lambda v: 0 < v < np.inf),
+        (1, np.isfinite),
+        (2, np.isfinite),
+        (3, lambda v: 0 < v < np.inf),
+        (4, lambda v: 0 < v < np.inf),
+        (5, lambda v: 0 <= v < np.inf),
+    ],
+)
+def test_numbers_of_dims(field: int, good: Callable[[float], bool]) -> None:
+    blob = tiny_blob()
+    for value in FLOATS:
+        changed = bytearray(blob)
+        struct.pack_into("<f", changed, sections_of(blob)["DIMS"].offset + 40 + 4 * field, value)
+        assert agreed(sealed(changed), (field, value)) == bool(good(value)), value
+
+
+SHARE = {1.0, 0.0, -0.0, 1e-45, 1e-7}
+SIZE = {0.0, -0.0, 1e-45, 1e-7, 1.0, 2.0, 1e29}
+GOOD_DEFAULTS = {
+    **dict.fromkeys((0, 3, 4, 5), SHARE),
+    **dict.fromkeys((1, 2, 9, 10, 11), SIZE),
+    6: {1.0, 2.0},  # least radius: above 1e-6, not above the seed's
+    7: {1e29},  # greatest radius
+    8: {2.0},  # seed radius
+}
+
+
+@pytest.mark.parametrize("field", range(12))
+def test_numbers_of_defaults(field: int) -> None:
+    """The field's range as documented; the tiny model's radii are 1.55, 15.5 and 4.64 mm."""
+    blob = tiny_blob()
+    start = sections_of(blob)["DEFS"].offset + 8
+    assert struct.unpack_from("<3f", blob, start + 24) == pytest.approx((1.546, 15.46, 4.639), rel=1e-3)
+    read = set()
+    for value in FLOATS:
+        changed = bytearray(blob)
+        struct.pack_into("<f", changed, start + 4 * field, value)
+        if agreed(sealed(changed), (field, value)):
+            read.add(value)
+    assert read == GOOD_DEFAULTS[field]
+
+
+def test_a_default_of_no_iterations_is_refused() -> None:
+    changed = bytearray(tiny_blob())
+    struct.pack_into("<I", changed, sections_of(changed)["DEFS"].offset, 0)
+    assert not agreed(sealed(changed), "iterations")
+
+
+@pytest.mark.parametrize("name", ["VREF", "REDU", "SENS", "SCAL", "COLW", "GOLD"])
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+def test_numbers_that_are_not_finite(name: str, value: float) -> None:
+    blob = tiny_blob("i8" if name == "SCAL" else "f32")
+    place = sections_of(blob)[name]
+    for at in (0, place.size - 4):
+        changed = bytearray(blob)
+        struct.pack_into("<f", changed, place.offset + at, value)
+        assert not agreed(sealed(changed), (name, at))
+
+
+@pytest.mark.parametrize("half", [0x7C00, 0xFC00, 0x7E01])
+def test_halves_that_are_not_finite(half: int) -> None:
+    changed = bytearray(tiny_blob("f16"))
+    struct.pack_into("<H", changed, sections_of(changed)["SENS"].offset + 10, half)
+    assert not agreed(sealed(changed), half)
+
+
+@pytest.mark.parametrize(
+    ("row", "good"), [((0, 1, 2, 3), True), ((0, 1, 2, 8), False), ((4, 4, 2, 3), False), ((0, 1, 5, 5), False)]
+)
+def test_a_protocol_of_pairs(row: tuple[int, ...], good: bool) -> None:
+    changed = bytearray(tiny_blob())
+    struct.pack_into("<4B", changed, sections_of(changed)["PROT"].offset, *row)
+    assert agreed(sealed(changed, rehash=True), row) == good
+    assert not agreed(sealed(changed), "another hash") or row == tuple(tiny_blob()[sections_of(changed)["PROT"].offset :][:4])
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "good"),
+    [(0, 39, True), (0, 40, False), (2, 39, True), (2, 40, False), (2, 0xFFFF, True), (4, 1, True), (4, 0xFFFF, True),
+     (4, 0, False), (4, 2, False), (6, 77, True)],
+)  # fmt: skip
+def test_a_fold_of_rows(at: int, value: int, good: bool) -> None:
+    """40 rows; the sign is 1 or -1; the last number of an entry is not looked at."""
+    changed = bytearray(tiny_blob())
+    struct.pack_into("<H", changed, sections_of(changed)["FOLD"].offset + at, value)
+    assert agreed(sealed(changed), (at, value)) == good
+
+
+def test_pixels_are_ordered_and_inside() -> None:
+    blob = tiny_blob()
+    place = sections_of(blob)["GRID"]
+    pixels = np.frombuffer(blob, "<u2", place.size // 2, place.offset).reshape(-1, 2)
+    swapped, repeated, outside = pixels.copy(), pixels.copy(), pixels.copy()
+    swapped[[3, 4]] = swapped[[4, 3]]
+    repeated[5] = repeated[4]
+    outside[-1, 1] = 6
+    for wrong in (swapped, repeated, outside):
+        changed = bytearray(blob)
+        changed[place.offset : place.offset + place.size] = wrong.tobytes()
+        assert not agreed(sealed(changed), "pixels")
+
+
+@pytest.mark.parametrize("count", [0, 1, 10, 12, 13, 257, 2**20, 2**32 - 1])
+def test_numbers_of_sections(count: int) -> None:
+    """Sections beyond the table are read from other sections' bytes, and one too few lacks nothing that is required."""
+    assert agreed(sealed(tiny_blob(), count=count), count) == (count == 10)
+
+
+@pytest.mark.parametrize("size", [0, 16, 48, 64, 80])
+def test_sizes_that_no_model_has(size: int) -> None:
+    assert not agreed(sealed(tiny_blob(), total=size), size)
+
+
+def test_a_size_that_is_no_multiple_of_sixteen() -> None:
+    blob = tiny_blob() + bytes(8)
+    assert not agreed(sealed(blob, total=len(blob)), len(blob))
+
+
+def test_misplaced_sections() -> None:
+    blob = tiny_blob()
+    for name, place in sections_of(blob).items():
+        for offset in (0, 48, 64, place.offset + 4, len(blob), len(blob) + 16, 2**32 - 16):
+            changed = bytearray(blob)
+            struct.pack_into("<I", changed, entry_place(blob, name) + 4, offset)
+            assert not agreed(sealed(changed), (name, offset)), (name, offset)
+
+
+@given(st.data())
+@settings(max_examples=400, deadline=None)
+def test_agreement_on_anything(data: st.DataObject) -> None:
+    """Bytes changed anywhere but in META, which boards ignore, and sealed again; what both read also runs."""
+    blob = bytearray(tiny_blob(data.draw(st.sampled_from(list(STORAGE.values())))))
+    places = {name: place for name, place in sections_of(blob).items() if name != "META"}
+    name = data.draw(st.sampled_from(["table", *places]))
+    if name == "table":
+        start, size = entry_place(blob, data.draw(st.sampled_from(list(places)))), ENTRY_SIZE
+    else:
+        start, size, _ = places[name]
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = start + data.draw(st.integers(0, size - 1))
+        blob[at] = data.draw(st.sampled_from([0, 1, 0x7F, 0x80, 0xFF, blob[at] ^ 1, blob[at] ^ 0x80, (blob[at] + 1) % 256]))
+    whole = sealed(blob, rehash=name == "PROT")
+    if agreed(whole, name) and name not in ("DIMS", "table"):
+        runs(whole)
+
+
+def runs(blob: bytes) -> None:
+    """Every engine gives finite images and touches for the golden frame, or says in one line why not."""
+    model = decode_model(blob, "x")
+    for engine in ("c", "c64"):
+        try:
+            reconstructor = Reconstructor(model, engine=engine, blob=blob)
+            reconstructor.with_options(iterations=20)
+            reconstructor.tare(model.golden.reference_v)
+            result = reconstructor.reconstruct(model.golden.frame_v)
+            assert np.isfinite(result.image).all()
+        except EitskinError as error:
+            assert "\n" not in str(error)
+
+
+def test_what_boards_ignore() -> None:
+    """META that is no JSON: Python says so, a board runs."""
+    blob = bytearray(tiny_blob())
+    place = sections_of(blob)["META"]
+    blob[place.offset] = ord("}")
+    assert accepts(sealed(blob)) == (False, True)

@@ -1,0 +1,58 @@
+"""Storage: how far from the truth each type may be, and what pads it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.model.storage import STORAGES, store, stride_for
+
+GENERATOR = np.random.default_rng(22)
+MATRIX = GENERATOR.normal(size=(13, 40)) * np.geomspace(1, 1e-3, 40)
+MATRIX[:, 17] = 0.0
+
+
+@pytest.mark.parametrize(("rank", "stride"), [(1, 8), (7, 8), (8, 8), (9, 16), (64, 64), (104, 104)])
+def test_stride_is_the_rank_rounded_up_to_eight(rank: int, stride: int) -> None:
+    assert stride_for(rank) == stride
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_columns_are_padded_with_zeros(storage: str) -> None:
+    stored = store(MATRIX, storage)
+    assert stored.columns.shape == (40, 16)
+    assert not stored.columns[:, 13:].any()
+    assert stored.decode(13).shape == MATRIX.shape
+
+
+def test_f32_is_the_float_nearest() -> None:
+    stored = store(MATRIX, "f32")
+    assert stored.scale is None
+    assert (stored.decode(13) == MATRIX.astype(np.float32)).all()
+
+
+def test_f16_is_within_half_a_step() -> None:
+    stored = store(MATRIX, "f16")
+    step = np.maximum(2.0 ** (np.floor(np.log2(np.maximum(np.abs(MATRIX), 1e-30))) - 10), 2.0**-24)
+    assert stored.scale is None
+    assert (np.abs(stored.decode(13) - MATRIX) <= 0.5 * step).all()
+
+
+@pytest.mark.parametrize(("storage", "top"), [("i16", 32767), ("i8", 127)])
+def test_integers_are_within_half_a_step_of_their_column(storage: str, top: int) -> None:
+    stored = store(MATRIX, storage)
+    assert stored.scale is not None and stored.scale.shape == (40,)
+    peak = np.abs(MATRIX).max(axis=0)
+    used = peak > 0
+    assert stored.scale[used] == pytest.approx(peak[used] / top, rel=1e-7)
+    assert (np.abs(stored.columns).max(axis=1)[used] == top).all()
+    error = np.abs(stored.decode(13) - MATRIX)
+    assert (error <= 0.5 * stored.scale * (1 + 1e-6)).all()
+    assert error.max() > 0.4 * stored.scale[used].max()
+
+
+@pytest.mark.parametrize("storage", ["i16", "i8"])
+def test_a_column_of_zeros_has_scale_one(storage: str) -> None:
+    stored = store(MATRIX, storage)
+    assert stored.scale is not None and stored.scale[17] == 1
+    assert not stored.decode(13)[:, 17].any()
