@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.config import nearest
 from eitskin.errors import ConfigError, EitskinError, FrameError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
@@ -27,8 +28,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES.npz", help="a frames file (eitskin import makes one)")
     parser.add_argument("--model", type=Path, metavar="MODEL.eitm", help="default: the prebuilt model of the paper's skin")
-    parser.add_argument("--engine", choices=("c", "c64", "numpy"), default="c", help="default: %(default)s, float32 as on a board")
+    parser.add_argument("--engine", choices=("c", "c64", "numpy"), default="c", help="default: c, float32 as on a board")
     parser.add_argument("--sign", choices=("increase", "decrease", "both"), default="increase", help="which changes to look for")
+    parser.add_argument("--only", metavar="NAME,...", help="frames with these names only")
     parser.add_argument("--iterations", type=int, metavar="N", help="of FISTA, at most (default: the model's)")
     parser.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
     parser.add_argument("--warm", action="store_true", help="start each frame from the last one's result")
@@ -66,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
             f"run  eitskin doctor {options.frames}",
             file=sys.stderr,
         )
-    results, refused = _reconstruct_all(reconstructor, frames, options.warm)
+    results, refused = _reconstruct_all(reconstructor, frames, _chosen(frames, options.only), options.warm)
     scores = _scores(reconstructor, frames, results, options.sign)
     if options.output is not None:
         from eitskin.frames.results_file import save_results
@@ -102,14 +104,25 @@ def _apply(options: argparse.Namespace, reconstructor: Reconstructor) -> None:
     reconstructor.with_options(**changes)
 
 
+def _chosen(frames: Frames, only: str | None) -> list[int]:
+    """The numbers of the frames that ``--only`` names; all without it."""
+    if only is None:
+        return list(range(frames.n_frames))
+    names = only.split(",")
+    for name in names:
+        if name not in frames.frame_name:
+            raise UsageError(f"--only {only}: no frame is named {name!r}; {nearest(name, frames.frame_name)}")
+    return [number for number, name in enumerate(frames.frame_name) if name in names]
+
+
 def _reconstruct_all(
-    reconstructor: Reconstructor, frames: Frames, warm: bool
+    reconstructor: Reconstructor, frames: Frames, chosen: list[int], warm: bool
 ) -> tuple[dict[int, Reconstruction], dict[int, str]]:
     from tqdm import tqdm
 
     results: dict[int, Reconstruction] = {}
     refused: dict[int, str] = {}
-    for number in tqdm(range(frames.n_frames), desc="frames", leave=False, disable=not sys.stderr.isatty()):
+    for number in tqdm(chosen, desc="frames", leave=False, disable=not sys.stderr.isatty()):
         if not warm:
             reconstructor.forget()
         try:
@@ -200,7 +213,7 @@ def _as_json(
     from dataclasses import asdict
 
     listed = []
-    for number in range(frames.n_frames):
+    for number in sorted({*results, *refused}):
         entry: dict[str, Any] = {"frame": number, "name": frames.frame_name[number]}
         if number in refused:
             entry["refused"] = refused[number]

@@ -133,6 +133,7 @@ class ReferenceEngine:
         self._s, self._p = model.sensitivity, model.projection.astype(np.float64)
         self._v_ref = model.v_ref_v.astype(np.float64)
         self._bad = np.zeros(model.protocol.n_rows, dtype=bool)
+        self._without_reference = self._bad
         self._v0: FloatArray | None = None
         self._drift_v0: FloatArray | None = None
         self._gain = 1.0
@@ -158,7 +159,7 @@ class ReferenceEngine:
 
     def _fold_reference(self, v0: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Folded reference (k,) and where it is known."""
-        fold, usable = self.model.fold, ~self._bad
+        fold, usable = self.model.fold, ~(self._bad | self._without_reference)
         first = usable[fold.first]
         second = (fold.second >= 0) & usable[fold.second]
         total = np.where(first, v0[fold.first], 0) + np.where(second, fold.sign * v0[fold.second], 0)
@@ -186,11 +187,17 @@ class ReferenceEngine:
         limit = self.options.saturation_v
         if not np.isfinite(frames).all() or (limit > 0 and np.abs(frames).max() >= limit):
             raise FrameError("reference frames: a channel is not finite or saturated; mask it or measure again")
-        self._lambda_noise, noise = 0.0, 0.0
-        if len(frames) >= 4:
-            self._lambda_noise = self._learn_lambda_noise(frames)
-            noise = float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
-        correlation = self._fit_to_model(frames.mean(axis=0))
+        before, self._without_reference = self._without_reference, self._bad.copy()
+        lambda_noise, noise = 0.0, 0.0
+        try:
+            if len(frames) >= 4:
+                lambda_noise = self._learn_lambda_noise(frames)
+                noise = float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
+            correlation = self._fit_to_model(frames.mean(axis=0))
+        except FrameError:
+            self._without_reference = before
+            raise
+        self._lambda_noise = lambda_noise
         return Baseline(len(frames), correlation, self._gain, self._v0_rms, noise, self._lambda_noise)
 
     def _learn_lambda_noise(self, frames: FloatArray) -> float:
@@ -224,7 +231,7 @@ class ReferenceEngine:
         if self._v0 is None:
             raise FrameError("frame: no reference frame has been set")
         fold, kind, limit = self.model.fold, self.model.data_kind, self.options.saturation_v
-        unusable = self._bad | ~np.isfinite(frame)
+        unusable = self._bad | self._without_reference | ~np.isfinite(frame)
         if limit > 0:
             unusable |= np.abs(np.nan_to_num(frame)) >= limit
         if int(unusable.sum()) > self.options.max_masked:
@@ -237,18 +244,19 @@ class ReferenceEngine:
         first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
         count = first.astype(int) + second
         d = (value[fold.first] + np.where(second, sign * value[fold.second], 0.0)) / np.maximum(count, 1)
-        basis = orthonormal(self._directions(unusable, count == 0), self.model.rank)
+        basis = orthonormal(self._directions(first, second), self.model.rank)
         return project(self._p @ np.where(count > 0, d, 0.0), basis), basis, int(unusable.sum())
 
-    def _directions(self, unusable: BoolArray, left_out: BoolArray) -> list[FloatArray]:
-        """What the misfit ignores: P's columns of rows left out, and the drift of the gain."""
-        directions = [self._p[:, k] for k in np.flatnonzero(left_out)]
+    def _directions(self, first: BoolArray, second: BoolArray) -> list[FloatArray]:
+        """What the misfit ignores: P's columns of rows left out, and the drift of the gain; by which rows of each fold (k,)
+        are in use."""
+        count = first.astype(int) + second
+        directions = [self._p[:, k] for k in np.flatnonzero(count == 0)]
         if self.options.project_baseline and self._drift_v0 is not None:
             fold, v0 = self.model.fold, self._drift_v0
-            other = unusable[fold.first] & (fold.second >= 0)
-            along = self._gain * np.where(other, fold.sign * v0[fold.second], v0[fold.first])
-            along = np.ones_like(along) if self.model.data_kind == "normalised" else along
-            directions.append(self._p @ np.where(left_out, 0.0, along))
+            total = np.where(first, v0[fold.first], 0.0) + np.where(second, fold.sign * v0[fold.second], 0.0)
+            along = np.ones_like(total) if self.model.data_kind == "normalised" else self._gain * total / np.maximum(count, 1)
+            directions.append(self._p @ np.where(count > 0, along, 0.0))
         return directions
 
     def reconstruct(self, frame: FloatArray, *, touches: bool = True) -> Reconstruction:

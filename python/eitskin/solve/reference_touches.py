@@ -214,7 +214,9 @@ def find_touches(
 def _track(found: list[Touch], last: tuple[Touch, ...], follow_mm: float, next_id: int) -> tuple[tuple[Touch, ...], int]:
     """Ids by nearest pairs first within ``follow_mm``; new ones from ``next_id``."""
     pairs = sorted(
-        (np.hypot(t.x_mm - l.x_mm, t.y_mm - l.y_mm), k, i) for k, t in enumerate(found) for i, l in enumerate(last)
+        (np.hypot(t.x_mm - old.x_mm, t.y_mm - old.y_mm), k, i)
+        for k, t in enumerate(found)
+        for i, old in enumerate(last)
     )
     ids: dict[int, int] = {}
     taken: set[int] = set()

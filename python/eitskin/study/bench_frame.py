@@ -97,8 +97,8 @@ def to_text(times: FrameTimes) -> str:
     """A table."""
     whole = times.p50_us["Python: frame to touches"]
     lines = [
-        f"one frame, prebuilt model, defaults: {times.iterations} iterations, {times.macs / 1e6:.2f} + {times.touch_macs / 1e6:.2f} "
-        f"million MACs, {times.kernels} kernels; {times.runs} interleaved runs; {machine()}",
+        f"one frame, prebuilt model, defaults: {times.iterations} iterations, {times.macs / 1e6:.2f} + "
+        f"{times.touch_macs / 1e6:.2f} million MACs, {times.kernels} kernels; {times.runs} interleaved runs; {machine()}",
         f"{'':40} p50 us   p99 us  ratio of p50",
     ]
     for name, p50 in times.p50_us.items():

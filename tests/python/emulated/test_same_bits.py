@@ -1,4 +1,4 @@
-"""The Cortex-M7, under QEMU, gives the bits that the host gives: images and touches, in every storage, with faults and warm starts.
+"""The Cortex-M7, under QEMU, gives the bits that the host gives: images and touches, all storages, with faults and warm starts.
 
 The same program prints exact instruction counts (-icount); pytest -s shows them.
 """
@@ -26,7 +26,8 @@ from eitskin.solve.results import SIGNS, STOPS, Reconstruction, default_options
 ROOT = Path(__file__).resolve().parents[3]
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm", "cmake", "ninja")
 LINE = re.compile(
-    r"frame (\d+) status (-?\d+) stop (\d) iterations (\d+) macs (\d+) solve (\d+) touch (\d+) image ([0-9a-f]{8}) touches (\d+)(.*)"
+    r"frame (\d+) status (-?\d+) stop (\d) iterations (\d+) macs (\d+) solve (\d+) touch (\d+) "
+    r"image ([0-9a-f]{8}) touches (\d+)(.*)"
 )
 
 
