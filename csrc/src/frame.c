@@ -51,8 +51,8 @@ static int ratio_undefined(const eits_context *ctx, eits_real v0)
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE && eits_fabs(v0) < R(1e-6) * ctx->baseline.v0_rms;
 }
 
-/* What of a folded row the basis was built for: see drift_direction. */
-enum { BY_FIRST = 0, LEFT_OUT = 1, BY_SECOND = 2 };
+/* Which rows of a fold are in use, as bits; none: the fold is left out. */
+enum { LEFT_OUT = 0, FIRST = 1, SECOND = 2, BOTH = FIRST | SECOND };
 
 /* d_k: the mean of a row and its reciprocal, or whichever is usable; sets basis_for, and says whether any of it changed. */
 static int fold_data(eits_context *ctx, const eits_real *frame)
@@ -63,7 +63,7 @@ static int fold_data(eits_context *ctx, const eits_real *frame)
         const eits_fold fold = ctx->model->fold[k];
         const uint32_t rows[2] = {fold.first, fold.second};
         eits_real sum = 0;
-        int used = 0;
+        uint8_t used = LEFT_OUT;
         for (int side = 0; side < 2; ++side) {
             const uint32_t i = rows[side];
             if (i == EITS_FOLD_NONE || ctx->unusable[i] || ratio_undefined(ctx, v0[i]))
@@ -72,13 +72,11 @@ static int fold_data(eits_context *ctx, const eits_real *frame)
             const int turn = side == 1 && fold.sign < 0 && ctx->model->data_kind != EITS_DATA_NORMALISED;
             const eits_real value = datum(ctx, frame[i], v0[i]);
             sum += turn ? -value : value;
-            ++used;
+            used |= (uint8_t)(side == 0 ? FIRST : SECOND);
         }
-        const int by_second = ctx->unusable[fold.first] && fold.second != EITS_FOLD_NONE;
-        const uint8_t side = used == 0 ? LEFT_OUT : (by_second ? BY_SECOND : BY_FIRST);
-        ctx->d[k] = used == 2 ? R(0.5) * sum : sum;
-        changed |= side != ctx->basis_for[k];
-        ctx->basis_for[k] = side;
+        ctx->d[k] = used == BOTH ? R(0.5) * sum : sum;
+        changed |= used != ctx->basis_for[k];
+        ctx->basis_for[k] = used;
     }
     return changed;
 }
@@ -111,18 +109,18 @@ static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
     return macs + 2u * rank;
 }
 
-/* The reduced direction along which drift of the gain moves the data. */
+/* The reduced direction along which drift of the gain moves the data: the reference, folded as the data are. */
 static uint64_t drift_direction(eits_context *ctx, eits_real *out)
 {
     const eits_model *model = ctx->model;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
-        const int by_second = ctx->basis_for[k] == BY_SECOND;
-        const uint32_t row = by_second ? fold.second : fold.first;
-        const eits_real turn = by_second ? (eits_real)fold.sign : 1;
-        const eits_real along = model->data_kind == EITS_DATA_NORMALISED ? 1 : turn * ctx->baseline.gain * ctx->baseline.v0[row];
+        const uint8_t used = ctx->basis_for[k];
+        const eits_real first = used & FIRST ? ctx->baseline.v0[fold.first] : 0;
+        const eits_real second = used & SECOND ? (eits_real)fold.sign * ctx->baseline.v0[fold.second] : 0;
+        const eits_real along = ctx->baseline.gain * (used == BOTH ? R(0.5) * (first + second) : first + second);
         ctx->list_index[k] = k;
-        ctx->list_value[k] = ctx->basis_for[k] == LEFT_OUT ? 0 : along;
+        ctx->list_value[k] = used != LEFT_OUT && model->data_kind == EITS_DATA_NORMALISED ? 1 : along;
     }
     ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->list_value, model->n_folded, out);
     return (uint64_t)model->n_folded * model->rank;

@@ -103,7 +103,7 @@ typedef struct eits_context {
     eits_baseline baseline;
     uint8_t *bad;            /* n_rows: masked by the caller */
     uint8_t *unusable;       /* n_rows: masked in this frame */
-    uint8_t *basis_for;      /* n_folded: which folded rows the basis below leaves out, and which have their second row only */
+    uint8_t *basis_for;      /* n_folded: which rows of each fold were in use when the basis below was built */
     eits_real *d;            /* n_folded: data of this frame */
     eits_real *y;            /* stride: reduced data, projected */
     eits_real *basis;        /* rank x stride: orthonormal directions to ignore */
