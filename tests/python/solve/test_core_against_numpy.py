@@ -1,0 +1,174 @@
+"""The C core in both widths against the numpy reference: the same options, the same lambda, after exactly 60 iterations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.errors import FrameError
+from eitskin.solve.reconstructor import ENGINES, Reconstructor
+from eitskin.solve.results import Reconstruction
+from small_models import DATA_KINDS, SIGNS, STORAGES, small, small_model
+
+FRAMES = 20
+F64_BOUND, F32_BOUND = 1e-12, 1e-4
+
+
+def engines(storage: str, data_kind: str, **options: object) -> dict[str, Reconstructor]:
+    """One of each, without a gate."""
+    made = {name: Reconstructor(small_model(storage, data_kind), engine=name) for name in ENGINES}
+    for reconstructor in made.values():
+        reconstructor.with_options(iterations=60, gate_factor=0.0, **options)
+    return made
+
+
+def share_lambda(made: dict[str, Reconstructor], frame: np.ndarray, share: float = 0.05) -> None:
+    """Give all engines the lambda that is ``share`` of numpy's lambda_max for ``frame``."""
+    made["numpy"].with_options(lambda_abs=1e30)
+    greatest = made["numpy"].reconstruct(frame, touches=False).info.lambda_max
+    for reconstructor in made.values():
+        reconstructor.with_options(lambda_abs=share * greatest)
+
+
+def difference(result: Reconstruction, expected: Reconstruction) -> float:
+    """The greatest difference of the images over the expected peak; a zero image must be zero in both."""
+    peak = float(np.abs(expected.image).max())
+    assert (peak > 0) == bool(np.abs(result.image).max() > 0) == (expected.info.stop == "iterations")
+    assert result.info.iterations == expected.info.iterations
+    assert result.info.stop == expected.info.stop
+    assert result.info.masked == expected.info.masked
+    return float(np.abs(result.image - expected.image).max()) / (peak or 1.0)
+
+
+def agree(made: dict[str, Reconstructor], frames: np.ndarray, *, keep: bool = False) -> dict[str, float]:
+    """The worst difference of each width over ``frames``; ``keep`` what an engine remembers from frame to frame."""
+    worst = {"c64": 0.0, "c": 0.0}
+    for frame in frames:
+        if not keep:
+            share_lambda(made, frame)
+            for reconstructor in made.values():
+                reconstructor.forget()
+        results = {name: reconstructor.reconstruct(frame, touches=False) for name, reconstructor in made.items()}
+        assert results["numpy"].info.iterations == 60 or (keep and results["numpy"].info.stop == "zero")
+        for name in worst:
+            worst[name] = max(worst[name], difference(results[name], results["numpy"]))
+    return worst
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize("drift", [True, False], ids=["project", "keep"])
+def test_same_images(storage: str, data_kind: str, drift: bool) -> None:
+    made = engines(storage, data_kind, project_baseline=drift)
+    for seed, sign in enumerate(SIGNS):
+        for reconstructor in made.values():
+            reconstructor.with_options(sign=sign, lambda_abs=0.0)
+            reconstructor.tare(small().quiet(1, 8) if drift else small().linear.v0_v)
+        worst = agree(made, small().frames(5 + seed, FRAMES, sign))
+        assert worst["c64"] <= F64_BOUND and worst["c"] <= F32_BOUND, (sign, worst)
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+@pytest.mark.parametrize("storage", ["f32", "i8"])
+def test_same_images_with_rows_left_out(storage: str, data_kind: str) -> None:
+    """Rows masked from the start, one of a reciprocal pair or both, and others that drop out in single frames."""
+    s, generator = small(), np.random.default_rng(8)
+    made = engines(storage, data_kind)
+    mask = np.zeros(208, dtype=bool)
+    mask[generator.choice(208, 12, replace=False)] = True
+    fold = s.protocol.reciprocal_pairs()
+    mask[[fold.first[10], fold.second[10]]] = True
+    frames = s.frames(9, FRAMES)
+    for k, frame in enumerate(frames):
+        frame[generator.choice(208, k % 6, replace=False)] = (np.nan, np.inf)[k % 2]
+    for reconstructor in made.values():
+        reconstructor.mask_rows(mask)
+        reconstructor.tare(s.quiet(1, 8))
+    worst = agree(made, frames)
+    assert worst["c64"] <= F64_BOUND and worst["c"] <= F32_BOUND, worst
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+def test_same_images_from_a_warm_start(data_kind: str) -> None:
+    """A touch that moves, then lifts; a frame that is refused and one with dropouts in between."""
+    s = small()
+    made = engines("f32", data_kind, warm_start=True)
+    grid = s.linear.grid
+    frames = []
+    for k in range(FRAMES):
+        near = np.linalg.norm(grid.centres_mm() - (-30 + 3 * k, 10), axis=1) <= 9
+        change = 0.03 * near if k < 16 else np.zeros(len(near))
+        frames.append(s.linear.v0_v + s.linear.jacobian @ change)
+    noisy = np.array(frames) + s.quiet(4, FRAMES) - s.linear.v0_v
+    noisy[7, :40] = np.nan
+    for reconstructor in made.values():
+        reconstructor.tare(s.quiet(1, 8))
+    share_lambda(made, noisy[0])
+    for reconstructor in made.values():
+        reconstructor.forget()
+    first = agree(made, noisy[:10], keep=True)
+    for reconstructor in made.values():
+        with pytest.raises(FrameError):
+            reconstructor.reconstruct(np.zeros(208))
+    second = agree(made, noisy[10:], keep=True)
+    assert max(first["c64"], second["c64"]) <= F64_BOUND
+    assert max(first["c"], second["c"]) <= F32_BOUND
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+def test_same_facts(data_kind: str) -> None:
+    """Baseline and info of float64 C are the reference's."""
+    made = engines("f16", data_kind)
+    quiet = small().quiet(3, 21)
+    baselines = {name: reconstructor.tare(quiet) for name, reconstructor in made.items()}
+    for reconstructor in made.values():
+        reconstructor.with_options(lambda_abs=0.0, lambda_rel=0.05, gate_factor=1.2)
+    frame = small().frames(4, 1)[0]
+    infos = {name: reconstructor.reconstruct(frame).info for name, reconstructor in made.items()}
+    for name, bound in (("c64", 1e-10), ("c", 1e-4)):
+        for field in ("correlation", "gain", "v0_rms_v", "noise_v", "lambda_noise"):
+            expected = getattr(baselines["numpy"], field)
+            assert expected != 0
+            # what is a small difference of voltages keeps fewer figures in float32
+            loose = 20 if name == "c" and field in ("noise_v", "lambda_noise") else 1
+            assert getattr(baselines[name], field) == pytest.approx(expected, rel=loose * bound), field
+        for field in ("lambda_", "lambda_max", "gap", "gap_rel", "residual", "data_norm"):
+            assert getattr(infos[name], field) == pytest.approx(getattr(infos["numpy"], field), rel=30 * bound), field
+        assert infos[name].nonzeros == infos["numpy"].nonzeros
+        assert infos[name].touches == infos["numpy"].touches
+
+
+@pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
+def test_a_frame_does_not_depend_on_those_before(engine: str) -> None:
+    """Without a warm start the order of frames is nothing to an image, dropouts or not."""
+    s = small()
+    frames = s.frames(12, 4)
+    fold = s.protocol.reciprocal_pairs()
+    frames[1, fold.first[20:60]] = np.nan
+    frames[2, fold.second[20:60]] = np.nan
+    frames[3, [fold.first[5], fold.second[5]]] = np.nan
+    made = Reconstructor(small_model(), engine=engine)
+    made.tare(s.quiet(1, 8))
+    images = {}
+    for order in ((0, 1, 2, 3), (3, 2, 1, 0), (1, 0, 3, 2)):
+        for k in order:
+            image = made.reconstruct(frames[k]).image
+            assert (images.setdefault(k, image) == image).all(), (order, k)
+
+
+@pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
+def test_a_row_masked_at_the_reference_stays_out_until_the_next(engine: str) -> None:
+    s = small()
+    made = Reconstructor(small_model(), engine=engine)
+    mask = np.zeros(208, dtype=bool)
+    mask[3:9] = True
+    made.mask_rows(mask)
+    made.tare(s.quiet(1, 8))
+    frame = s.frames(6, 1)[0]
+    masked = made.reconstruct(frame)
+    made.mask_rows(np.zeros(208, dtype=bool))
+    still = made.reconstruct(frame)
+    assert masked.info.masked == still.info.masked == 6
+    assert (masked.image == still.image).all()
+    made.tare(s.quiet(1, 8))
+    assert made.reconstruct(frame).info.masked == 0

@@ -1,0 +1,97 @@
+"""The same bits from every build of the kernels: prepared or not, portable or the processor's own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from eitskin.solve.core import CoreEngine
+from eitskin.solve.results import Reconstruction, default_options
+from small_models import DATA_KINDS, SIGNS, STORAGES, prebuilt, session, small, small_blob, small_model
+
+BUILDS = [(True, False), (False, False), (True, True), (False, True)]
+
+
+def same(results: list[Reconstruction]) -> None:
+    """Images, coefficients, touches and info, bit for bit."""
+    first = results[0]
+    for other in results[1:]:
+        assert (other.image == first.image).all() and (other.coefficients == first.coefficients).all()
+        assert other.touches == first.touches
+        assert other.info == first.info
+
+
+@pytest.mark.parametrize("width", ["float32", "float64"])
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_small_models(storage: str, data_kind: str, width: str) -> None:
+    blob, s = small_blob(storage, data_kind), small()
+    built = [CoreEngine(blob, width, prepared=prepared, portable=portable) for prepared, portable in BUILDS]
+    for sign in SIGNS:
+        frames = s.frames(30, 3, sign)
+        frames[1, 17:25] = np.nan
+        results = []
+        for engine in built:
+            engine.set_options(replace(default_options(small_model(storage, data_kind)), sign=sign, warm_start=True))
+            engine.set_baseline(s.quiet(31, 8))
+            engine.forget()
+            results.append([engine.reconstruct(frame) for frame in frames])
+        for k in range(len(frames)):
+            same([of_build[k] for of_build in results])
+        assert np.abs(results[0][0].image).max() > 0
+
+
+@pytest.mark.parametrize("width", ["float32", "float64"])
+def test_touches_of_simulated_frames(width: str) -> None:
+    _, blob = prebuilt()
+    frames = session().as_frames()
+    found = 0
+    built = [CoreEngine(blob, width, prepared=prepared, portable=portable) for prepared, portable in BUILDS]
+    for engine in built:
+        engine.set_baseline(frames.reference_voltage_v)
+    for frame in frames.voltage_v:
+        results = [engine.reconstruct(frame) for engine in built]
+        same(results)
+        found += len(results[0].touches)
+    assert found >= 20
+
+
+def test_names_and_sizes() -> None:
+    """The portable kernels say so; the copy in panels is what a prepared context has more."""
+    model, blob = prebuilt()
+    portable, bare = CoreEngine(blob, portable=True), CoreEngine(blob, prepared=False)
+    assert portable.kernels == "portable"
+    assert portable.workspace_bytes - bare.workspace_bytes == 832 * 64 * 4
+    wide = CoreEngine(blob, "float64", prepared=False)
+    assert 1.7 * bare.workspace_bytes < wide.workspace_bytes < 2 * bare.workspace_bytes
+    assert (bare.n_rows, bare.n_pixels) == (208, model.grid.n_pixels)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_units_of_the_frames_do_not_matter(scale: float) -> None:
+    """A power of two would give the same bits; any other factor gives the same image to rounding."""
+    _, blob = prebuilt()
+    frames, images = session().as_frames(), []
+    for factor in (1.0, scale):
+        engine = CoreEngine(blob)
+        engine.set_baseline(frames.reference_voltage_v * factor)
+        images.append(engine.reconstruct(frames.voltage_v[0] * factor).image)
+    assert np.abs(images[1] - images[0]).max() < 1e-4 * images[0].max()
+
+
+def test_macs_follow_the_work() -> None:
+    """Without zeros skipped: per iteration one S'r, one S x of the non-zeros, and the projection."""
+    model, blob = prebuilt()
+    frames = session().as_frames()
+    macs = {}
+    for iterations in (1, 20, 40):
+        engine = CoreEngine(blob)
+        engine.set_options(replace(default_options(model), iterations=iterations))
+        engine.set_baseline(frames.reference_voltage_v)
+        macs[iterations] = engine.reconstruct(frames.voltage_v[0]).info.macs
+    whole = model.grid.n_pixels * model.rank
+    per_iteration = (macs[40] - macs[20]) / 20
+    assert whole < per_iteration < 1.25 * whole
+    assert macs[1] < 4 * whole

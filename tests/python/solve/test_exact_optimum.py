@@ -1,0 +1,148 @@
+"""FISTA run to a small duality gap against scikit-learn's coordinate descent: the same optimum, and the gap bounds the error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from eitskin.solve.core import CoreEngine
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.solve.reference import certify, fista, orthonormal
+from eitskin.solve.results import Options, default_options
+from small_models import prebuilt, session, small, small_blob, small_model
+
+GAP_REL = 1e-6
+
+
+def objective(s: np.ndarray, y: np.ndarray, x: np.ndarray, lam: float) -> float:
+    """|y - S x|^2 / 2 + lambda |x|_1."""
+    residual = y - s @ x
+    return 0.5 * float(residual @ residual) + lam * float(np.abs(x).sum())
+
+
+def lasso(s: np.ndarray, y: np.ndarray, lam: float, sign: str) -> np.ndarray:
+    """The optimum by another solver; it divides the misfit by the number of rows, so lambda too."""
+    linear_model = pytest.importorskip("sklearn.linear_model")
+    turn = -1.0 if sign == "decrease" else 1.0
+    solver = linear_model.Lasso(
+        alpha=lam / len(y), fit_intercept=False, positive=sign != "both", tol=1e-13, max_iter=10**6
+    )
+    return np.asarray(turn * solver.fit(turn * s, y).coef_)
+
+
+def options(sign: str, **changes: object) -> Options:
+    return replace(default_options(small_model()), sign=sign, iterations=100_000, gap_rel=GAP_REL, gate_factor=0.0, **changes)
+
+
+def problem(seed: int, sign: str, share: float, drift: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """S, y and basis of one small frame, and a lambda that is ``share`` of lambda_max."""
+    model, s = small_model(), small()
+    engine = Reconstructor(model, engine="numpy", options=options(sign, project_baseline=drift))._engine
+    engine.set_baseline(s.linear.v0_v[None])
+    y, basis, _ = engine.frame_stage(s.frames(seed, 1, sign)[0])
+    correlation = model.sensitivity.T @ y
+    top = {"increase": correlation.max(), "decrease": -correlation.min(), "both": np.abs(correlation).max()}[sign]
+    return model.sensitivity, y, basis, share * float(top)
+
+
+@pytest.mark.parametrize("drift", [True, False], ids=["project", "keep"])
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
+@pytest.mark.parametrize("sign", ["increase", "decrease", "both"])
+def test_same_optimum(sign: str, share: float, drift: bool) -> None:
+    """Objectives agree within the gap, predictions S x to its square root."""
+    for seed in range(3):
+        s, y, basis, lam = problem(seed, sign, share, drift)
+        projected = s - basis.T @ (basis @ s)
+        best = lasso(projected, y, lam, sign)
+        result = fista(s, y, lam, small_model().lipschitz, options(sign), basis)
+        assert result.stop == "gap" and result.step_halvings == 0
+        scale = 0.5 * float(y @ y)
+        above = objective(projected, y, result.x, lam) - objective(projected, y, best, lam)
+        assert -1e-10 * scale <= above <= result.gap <= GAP_REL * scale
+        # strong convexity in S x: |S x - S x*|^2 / 2 <= f(x) - f*
+        assert np.linalg.norm(projected @ (result.x - best)) <= np.sqrt(2 * result.gap) * (1 + 1e-6)
+        assert np.linalg.norm(projected @ (result.x - best)) < 2e-3 * np.linalg.norm(y)
+        if sign != "both":
+            assert (np.sign(result.x) * (1 if sign == "increase" else -1) >= 0).all()
+
+
+@pytest.mark.parametrize("sign", ["increase", "both"])
+def test_the_gap_bounds_the_error_all_the_way(sign: str) -> None:
+    """At every number of iterations the reported gap is at least what the objective lacks, and shrinks over the run."""
+    s, y, basis, lam = problem(5, sign, 0.03, True)
+    projected = s - basis.T @ (basis @ s)
+    best = objective(projected, y, lasso(projected, y, lam, sign), lam)
+    gaps = []
+    for iterations in (1, 2, 5, 10, 30, 60, 100, 300, 1000):
+        run = replace(options(sign), iterations=iterations, gap_rel=0.0)
+        result = fista(s, y, lam, small_model().lipschitz, run, basis)
+        assert result.iterations == iterations
+        assert result.gap >= objective(projected, y, result.x, lam) - best - 1e-12 * best
+        gaps.append(result.gap)
+    assert gaps[-1] < 1e-3 * gaps[0]
+    assert gaps[5] < 0.05 * gaps[0]
+
+
+def test_the_gap_is_that_of_the_dual_point() -> None:
+    """The sum of terms that are not negative equals primal minus dual objective at the scaled residual."""
+    s, y, basis, lam = problem(6, "both", 0.1, False)
+    basis = np.zeros((0, len(y)))
+    x = np.random.default_rng(2).normal(size=s.shape[1]) * 1e-3
+    gap, value, residual = certify(s, y, x, s @ x, lam, "both", basis)
+    r = y - s @ x
+    dual = min(1.0, lam / np.abs(s.T @ r).max()) * r
+    assert gap == pytest.approx(objective(s, y, x, lam) - (0.5 * y @ y - 0.5 * (y - dual) @ (y - dual)), rel=1e-9)
+    assert value == pytest.approx(objective(s, y, x, lam))
+    assert residual == pytest.approx(np.linalg.norm(r))
+
+
+@pytest.mark.parametrize("width", ["float64", "float32"])
+def test_the_core_stops_at_the_gap(width: str) -> None:
+    """C run to a gap on simulated frames: its coefficients are as near to the optimum as it says."""
+    model, blob = prebuilt()
+    gap_rel = 1e-6 if width == "float64" else 1e-4
+    engine = CoreEngine(blob, width)
+    engine.set_options(replace(default_options(model), iterations=100_000, gap_rel=gap_rel, project_baseline=False))
+    frames = session().as_frames()
+    engine.set_baseline(frames.reference_voltage_v)
+    for frame in frames.voltage_v[:5]:
+        result = engine.reconstruct(frame, touches=False)
+        assert result.info.stop == "gap" and result.info.gap_rel <= gap_rel
+        y = engine.reduced_data()[: model.rank].astype(np.float64)
+        x = result.coefficients.astype(np.float64)
+        best = objective(model.sensitivity, y, lasso(model.sensitivity, y, result.info.lambda_, "increase"), result.info.lambda_)
+        above = objective(model.sensitivity, y, x, result.info.lambda_) - best
+        rounding = 1e-12 if width == "float64" else 1e-6
+        assert -rounding * best <= above <= result.info.gap * (1 + 1e-3) + rounding * best
+        assert result.info.gap == pytest.approx(result.info.gap_rel * 0.5 * result.info.data_norm**2, rel=1e-3)
+
+
+def test_a_fixed_number_of_iterations_is_exactly_that() -> None:
+    engine = CoreEngine(small_blob())
+    engine.set_baseline(small().quiet(1, 8))
+    for iterations in (1, 7, 60, 333):
+        engine.set_options(replace(default_options(small_model()), iterations=iterations))
+        info = engine.reconstruct(small().frames(3, 1)[0]).info
+        assert (info.iterations, info.stop) == (iterations, "iterations")
+
+
+def test_a_step_too_long_is_halved_until_it_converges() -> None:
+    """With a Lipschitz constant a sixteenth of the true one the reference recovers by itself."""
+    s, y, basis, lam = problem(7, "increase", 0.05, True)
+    run = replace(options("increase"), gap_every=5, iterations=20_000)
+    result = fista(s, y, lam, small_model().lipschitz / 16, run, basis)
+    assert result.stop == "gap" and 3 <= result.step_halvings <= 5
+    hopeless = fista(s, y, lam, small_model().lipschitz / 1e9, run, basis)
+    assert hopeless.stop == "diverged" and hopeless.step_halvings == 8
+
+
+def test_orthonormal_basis() -> None:
+    generator = np.random.default_rng(4)
+    a, b = generator.normal(size=(2, 20))
+    basis = orthonormal([a, 2 * a, b, a - b, np.zeros(20)], 20)
+    assert basis.shape == (2, 20)
+    assert basis @ basis.T == pytest.approx(np.eye(2), abs=1e-14)
+    for v in (a, b):
+        assert v - basis.T @ (basis @ v) == pytest.approx(0, abs=1e-13)

@@ -1,0 +1,433 @@
+"""The reconstructor as users see it: what it refuses, what it survives, and what it says of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.errors import EitskinError, FrameError, ModelError, ProtocolError, UsageError
+from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.simulate import simulate
+from eitskin.skin.protocol import adjacent, opposite, table
+from eitskin.skin.skin import paper_skin
+from eitskin.solve.core import CoreEngine
+from eitskin.solve.reconstructor import ENGINES, Reconstructor
+from eitskin.solve.results import Options, default_options
+from small_models import prebuilt, session, small, small_blob, small_model, tiny_blob
+
+
+def made(engine: str = "c", quiet: bool = True, **options: object) -> Reconstructor:
+    """On the prebuilt model, tared on the session's 64 quiet frames."""
+    model, blob = prebuilt()
+    reconstructor = Reconstructor(model, engine=engine, blob=blob)
+    reconstructor.with_options(**options)
+    if quiet:
+        reconstructor.tare(session().quiet_v)
+    return reconstructor
+
+
+def one_line(error: pytest.ExceptionInfo[EitskinError]) -> str:
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+# ---- frames and protocols ----
+
+
+@pytest.mark.parametrize("other", [adjacent(32), opposite(16), table(16, adjacent(16).drive_measure[::-1])])
+def test_another_protocol_is_refused_by_both_hashes(other: object) -> None:
+    with pytest.raises(ProtocolError) as error:
+        made().check_protocol(other)
+    text = one_line(error)
+    assert f"{other.hash:016x}" in text and f"{prebuilt()[0].protocol.hash:016x}" in text
+    assert f"{other.n_electrodes} electrodes, {other.n_rows} rows" in text
+    made().check_protocol(adjacent(16, current_a=5e-3))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("frame", [np.ones(207), np.ones(209), np.ones((2, 208)), np.ones(0), 1.0, "volts", [1, [2]]])
+def test_frames_of_another_shape(engine: str, frame: object) -> None:
+    with pytest.raises(FrameError) as error:
+        made(engine).reconstruct(frame)
+    assert one_line(error)
+    with pytest.raises(FrameError):
+        made(engine).tare(frame if not isinstance(frame, np.ndarray) or frame.ndim != 2 else frame[:, :5])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("frames", [np.ones((0, 208)), np.ones((2, 2, 208)), [], [[1.0] * 208, [1.0] * 207]])
+def test_references_of_another_shape(engine: str, frames: object) -> None:
+    with pytest.raises(FrameError) as error:
+        made(engine).tare(frames)
+    assert one_line(error).startswith("reference")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_no_frame_before_a_reference(engine: str) -> None:
+    with pytest.raises(FrameError, match="no reference frame has been set"):
+        made(engine, quiet=False).reconstruct(session().frames_v[0])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("count", [1, 4, 16])
+def test_an_all_zero_reference_is_refused(engine: str, count: int) -> None:
+    with pytest.raises(FrameError, match="all voltages are zero; is the skin driven and connected"):
+        made(engine, quiet=False).tare(np.zeros((count, 208)))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine: str) -> None:
+    reconstructor = made(engine)
+    with pytest.raises(FrameError, match="all voltages are zero"):
+        reconstructor.reconstruct(np.zeros(208))
+    assert len(reconstructor.reconstruct(session().frames_v[0]).touches) > 0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_reference_must_be_whole(engine: str, value: float) -> None:
+    for count in (1, 2, 8):
+        quiet = session().quiet_v[:count].copy()
+        quiet[count // 2, 11] = value
+        with pytest.raises(FrameError):
+            made(engine, quiet=False).tare(quiet)
+    masked = made(engine, quiet=False)
+    masked.mask_rows(np.arange(208) == 11)
+    masked.tare(quiet)
+    assert masked.reconstruct(session().frames_v[0]).info.masked == 1
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_refused_single_reference_leaves_the_old_one(engine: str) -> None:
+    reconstructor, frame = made(engine), session().frames_v[0]
+    before = reconstructor.reconstruct(frame).image
+    with pytest.raises(FrameError):
+        reconstructor.tare(np.zeros(208))
+    assert (reconstructor.reconstruct(frame).image == before).all()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_refused_series_leaves_no_reference(engine: str) -> None:
+    reconstructor = made(engine)
+    with pytest.raises(FrameError):
+        reconstructor.tare(np.zeros((8, 208)))
+    with pytest.raises(FrameError, match="no reference"):
+        reconstructor.reconstruct(session().frames_v[0])
+
+
+# ---- channels that cannot be used ----
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("value", "count"), [(np.nan, 1), (np.inf, 3), (np.nan, 12)])
+def test_some_bad_channels_cost_little(engine: str, value: float, count: int) -> None:
+    reconstructor, generator = made(engine), np.random.default_rng(count)
+    for frame in session().frames_v[:6]:
+        whole = reconstructor.reconstruct(frame)
+        damaged = frame.copy()
+        damaged[generator.choice(208, count, replace=False)] = value
+        result = reconstructor.reconstruct(damaged)
+        assert (whole.info.masked, result.info.masked) == (0, count)
+        assert np.isfinite(result.image).all()
+        assert np.abs(result.image - whole.image).max() < 0.2 * whole.image.max()
+        assert len(result.touches) == len(whole.touches)
+        for a, b in zip(result.touches, whole.touches, strict=True):
+            assert np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) < 1.5
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_whole_electrode_lost(engine: str) -> None:
+    """Every row that touches electrode 5: both rows of a pair drop out, and are projected away. Touches near it suffer."""
+    reconstructor = made(engine)
+    rows = (session().protocol.drive_measure == 5).any(axis=1)
+    assert rows.sum() == 52
+    alike = []
+    for frame in session().frames_v:
+        whole = reconstructor.reconstruct(frame)
+        result = reconstructor.reconstruct(np.where(rows, np.nan, frame))
+        assert result.info.masked == 52 and np.isfinite(result.image).all()
+        alike.append(np.corrcoef(result.image, whole.image)[0, 1])
+    assert np.median(alike) > 0.9 and min(alike) > 0.75
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_too_many_bad_channels(engine: str) -> None:
+    """Half of the rows are the default limit; max_masked changes it."""
+    reconstructor, frame = made(engine), session().frames_v[0].copy()
+    frame[:104] = np.nan
+    assert reconstructor.reconstruct(frame).info.masked == 104
+    frame[104] = np.nan
+    with pytest.raises(FrameError, match="too many channels"):
+        reconstructor.reconstruct(frame)
+    reconstructor.with_options(max_masked=3)
+    frame = session().frames_v[0].copy()
+    frame[:4] = np.inf
+    with pytest.raises(FrameError, match="too many channels"):
+        reconstructor.reconstruct(frame)
+    with pytest.raises(FrameError, match="too many channels"):
+        reconstructor.reconstruct(np.full(208, np.nan))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_saturated_channels_are_left_out(engine: str) -> None:
+    reconstructor, frame = made(engine), session().frames_v[1]
+    whole = reconstructor.reconstruct(frame)
+    limit = 1.5 * float(np.abs(session().quiet_v).max())
+    damaged = frame.copy()
+    damaged[[3, 50, 171]] = [limit, -limit, 3 * limit]
+    spoilt = reconstructor.reconstruct(damaged)
+    assert np.abs(spoilt.image - whole.image).max() > whole.image.max()
+    reconstructor.with_options(saturation_v=limit)
+    saved = reconstructor.reconstruct(damaged)
+    assert saved.info.masked == 3
+    assert np.abs(saved.image - whole.image).max() < 0.1 * whole.image.max()
+    with pytest.raises(FrameError):
+        reconstructor.tare(np.vstack([session().quiet_v[:7], damaged]))
+
+
+# ---- quiet skins ----
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_no_change_gives_no_touch(engine: str) -> None:
+    reconstructor = made(engine)
+    result = reconstructor.reconstruct(session().reference_v)
+    assert result.info.stop == "gate" and result.touches == () and not result.image.any()
+    reconstructor.tare(session().exact_quiet_v)
+    result = reconstructor.reconstruct(session().exact_quiet_v)
+    assert result.info.stop == "zero" and result.touches == () and not result.image.any()
+    assert result.info.nonzeros == result.info.iterations == 0
+
+
+@pytest.mark.parametrize("engine", ["c", "numpy"])
+def test_false_alarms(engine: str) -> None:
+    """Of 200 quiet frames at 60 dB, after 64 for the reference, at most 2 % show a touch."""
+    quiet = session("quiet", 1, seed=11)
+    exact, sigma = quiet.exact_quiet_v, quiet.noise_v
+    generator = np.random.default_rng(5)
+    reconstructor = made(engine, quiet=False)
+    baseline = reconstructor.tare(exact + sigma * generator.normal(size=(64, 208)))
+    assert baseline.noise_v == pytest.approx(sigma, rel=0.05)
+    alarms = 0
+    for frame in exact + sigma * generator.normal(size=(200, 208)):
+        result = reconstructor.reconstruct(frame)
+        assert (len(result.touches) > 0) <= (result.info.stop == "iterations")
+        alarms += len(result.touches) > 0
+    assert alarms <= 4
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_drift_of_the_gain_costs_little(engine: str) -> None:
+    """5 % more on all channels: under 2 % of the peak with the reference's direction left out, most of it without."""
+    lost = {}
+    for project in (True, False):
+        reconstructor = made(engine, project_baseline=project)
+        worst = 0.0
+        for frame in session().frames_v[:10]:
+            image = reconstructor.reconstruct(frame).image
+            drifted = reconstructor.reconstruct(1.05 * frame).image
+            worst = max(worst, float(np.abs(drifted / 1.05 - image).max() / image.max()))
+        lost[project] = worst
+    assert lost[True] < 0.02
+    assert lost[False] > 0.2
+
+
+def test_a_reference_upside_down_gives_the_same_image() -> None:
+    """Swapped wires turn every sign; the gain learns it."""
+    frames, quiet = session().frames_v[:3], session().quiet_v
+    ours, turned = made(), made(quiet=False)
+    baseline = turned.tare(-quiet)
+    assert baseline.correlation == pytest.approx(-ours.tare(quiet).correlation)
+    assert baseline.gain < 0
+    for frame in frames:
+        assert np.abs(turned.reconstruct(-frame).image - ours.reconstruct(frame).image).max() == 0
+
+
+# ---- touches over time ----
+
+
+@pytest.mark.parametrize("engine", ["c", "numpy"])
+def test_ids_follow_moving_touches(engine: str) -> None:
+    """Two touches pass, one lifts and comes back elsewhere: each keeps its id, the newcomer gets another."""
+    steps = np.linspace(0, 1, 8)
+    scenes = []
+    for k, t in enumerate(steps):
+        touches = [Touch(-60 + 100 * t, 30.0, 9.0, 6.0)]
+        if k != 4:
+            touches.append(Touch(50 - 90 * t, -35.0, 8.0, 4.0) if k < 4 else Touch(60.0, -40.0, 8.0, 4.0))
+        scenes.append(Scene(str(k), tuple(touches)))
+    simulated = simulate(paper_skin(), adjacent(16), TouchSet("moving", 2, tuple(scenes)))
+    reconstructor = made(engine, quiet=False)
+    reconstructor.tare(simulated.quiet_v)
+    ids = []
+    for result, scene in zip(reconstructor.stream(simulated.frames_v), scenes, strict=True):
+        assert len(result.touches) == len(scene.touches)
+        found = {}
+        for touch in result.touches:
+            distance = [np.hypot(touch.x_mm - put.x_mm, touch.y_mm - put.y_mm) for put in scene.touches]
+            assert min(distance) < 3
+            found[int(np.argmin(distance))] = touch.id
+        ids.append(found)
+    first = [found[0] for found in ids]
+    second = [found.get(1) for found in ids]
+    assert len(set(first)) == 1
+    assert len(set(second[:4])) == 1 and second[4] is None and len(set(second[5:])) == 1
+    assert len({first[0], second[0], second[5]}) == 3
+    reconstructor.forget()
+    assert {t.id for t in reconstructor.reconstruct(simulated.frames_v[-1]).touches}.isdisjoint({first[0], second[5]})
+
+
+def test_a_warm_start_is_nearer_after_few_iterations_and_leaves_no_ghost() -> None:
+    """Resting touches: after 10 frames of 20 iterations each the optimum is nearer; after lift-off nothing is left."""
+    for frame in session().frames_v[:4]:
+        target = made(iterations=3000).reconstruct(frame).image
+        error, gap = {}, {}
+        for warm in (False, True):
+            reconstructor = made(iterations=20, warm_start=warm)
+            for _ in range(10):
+                result = reconstructor.reconstruct(frame)
+            error[warm] = np.linalg.norm(result.image - target)
+            gap[warm] = result.info.gap
+        assert gap[True] < 0.4 * gap[False]
+        assert error[True] < 0.9 * error[False]
+    after = reconstructor.reconstruct(session().quiet_v[0])
+    assert after.touches == () and not after.image.any()
+
+
+# ---- options ----
+
+
+def option_name(value: object) -> str:
+    """A case's name."""
+    return "-".join(value) if isinstance(value, dict) else ""
+
+
+BAD_OPTIONS = [
+    ({"iterations": 0}, "iterations = 0 is out of range; use 1 to"),
+    ({"iterations": 2**32}, "iterations"),
+    ({"iterations": 2.5}, "iterations = 2.5 must be a whole number"),
+    ({"iterations": True}, "iterations"),
+    ({"iterations": "30"}, "iterations"),
+    ({"gap_every": 0}, "gap_every"),
+    ({"max_touches": 17}, "max_touches = 17 is out of range; use 0 to 16"),
+    ({"max_masked": -1}, "max_masked"),
+    ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),
+    ({"warm_start": 2}, "warm_start"),
+    ({"project_baseline": "yes"}, "project_baseline"),
+    ({"lambda_abs": -1.0}, "lambda_abs"),
+    ({"lambda_rel": 1.5}, "lambda_rel = 1.5 is out of range; use 0 to 1"),
+    ({"lambda_rel": float("nan")}, "lambda_rel"),
+    ({"lambda_noise_factor": float("inf")}, "lambda_noise_factor"),
+    ({"gate_factor": -0.1}, "gate_factor"),
+    ({"gap_rel": 1.01}, "gap_rel"),
+    ({"saturation_v": -3.0}, "saturation_v"),
+    ({"touch_threshold": 2.0}, "touch_threshold"),
+    ({"touch_share": -1.0}, "touch_share"),
+    ({"touch_min_radius_mm": 0.0}, "touch radii of 0, 9 and 30 mm"),
+    ({"touch_max_radius_mm": 5.0}, "touch radii"),
+    ({"touch_seed_radius_mm": 31.0}, "touch radii"),
+    ({"touch_change_s_per_m": -1.0}, "touch_change_s_per_m"),
+    ({"touch_radius_weight": None}, "touch_radius_weight"),
+    ({"touch_sweeps": 1001}, "touch_sweeps"),
+    ({"follow_mm": -1.0}, "follow_mm"),
+    ({"iteration": 5}, "'iteration' is unknown; did you mean 'iterations'"),
+]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("changes", "text"), BAD_OPTIONS, ids=option_name)
+def test_bad_options_are_named_and_the_old_ones_stay(engine: str, changes: dict[str, object], text: str) -> None:
+    reconstructor = made(engine, iterations=7)
+    before = reconstructor.options
+    with pytest.raises(UsageError) as error:
+        reconstructor.with_options(**changes)
+    assert text in one_line(error)
+    assert reconstructor.options == before
+    assert reconstructor.reconstruct(session().frames_v[0]).info.iterations == 7
+
+
+@pytest.mark.parametrize("changes", [c for c, _ in BAD_OPTIONS[:-1] if c.get("iterations") is not True], ids=option_name)
+def test_the_core_refuses_them_by_itself(changes: dict[str, object]) -> None:
+    """Python's check and the core's have the same bounds: what passes here would run on a board."""
+    engine = CoreEngine(prebuilt()[1])
+    with pytest.raises(UsageError):
+        engine.set_options(replace(default_options(prebuilt()[0]), **changes))
+
+
+EDGES = {
+    "iterations": 1, "gap_every": 2**32 - 1, "max_touches": 16, "max_masked": 0, "lambda_rel": 1.0, "gap_rel": 1.0,
+    "lambda_noise_factor": 1e29, "gate_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0, "touch_share": 1.0,
+    "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000, "follow_mm": 0.0, "lambda_abs": 1e29,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EDGES)
+def test_the_edges_of_the_ranges_are_inside_for_all(name: str) -> None:
+    for engine in ENGINES:
+        made(engine, quiet=False, **{name: EDGES[name]})
+
+
+def test_every_option_has_a_range() -> None:
+    tried = {name for changes, _ in BAD_OPTIONS[:-1] for name in changes}
+    assert tried == set(Options.__dataclass_fields__)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_options_do(engine: str) -> None:
+    frame = session(scenes=40).frames_v[2]
+    base = made(engine).reconstruct(frame)
+    assert base.info.lambda_ == pytest.approx(0.03 * base.info.lambda_max, rel=1e-6)
+    sparse = made(engine, lambda_rel=0.5).reconstruct(frame)
+    assert sparse.info.nonzeros < base.info.nonzeros
+    assert made(engine, lambda_rel=1.0).reconstruct(frame).info.stop == "zero"
+    assert made(engine, gate_factor=1e6).reconstruct(frame).info.stop == "gate"
+    assert made(engine, lambda_abs=base.info.lambda_max * 2).reconstruct(frame).info.stop == "zero"
+    assert len(made(engine, max_touches=1).reconstruct(frame).touches) == 1
+    assert made(engine, max_touches=0).reconstruct(frame).touches == ()
+    assert made(engine).reconstruct(frame, touches=False).touches == ()
+    gap = made(engine, iterations=10_000, gap_rel=1e-3).reconstruct(frame).info
+    assert gap.stop == "gap" and gap.gap_rel <= 1e-3 and gap.iterations % 10 == 0
+
+
+# ---- files and engines ----
+
+
+def test_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "small.eitm"
+    path.write_bytes(small_blob())
+    for engine in ENGINES:
+        reconstructor = Reconstructor.from_file(path, engine=engine)
+        reconstructor.tare(small().linear.v0_v)
+        assert reconstructor.reconstruct(small().frames(1, 1)[0]).image.shape == (small_model().grid.n_pixels,)
+    path.write_bytes(small_blob()[:-1])
+    with pytest.raises(ModelError, match="truncated"):
+        Reconstructor.from_file(path)
+
+
+def test_unknown_engines_and_refused_models() -> None:
+    with pytest.raises(UsageError, match="engine 'gpu' is not known; use one of c, c64, numpy"):
+        Reconstructor(prebuilt()[0], engine="gpu")
+    with pytest.raises(ModelError, match="checksum does not fit"):
+        CoreEngine(tiny_blob()[:-1] + b"x")
+
+
+def test_results_do_not_change_afterwards() -> None:
+    """Images are copies: the next frame does not write into them."""
+    reconstructor = made()
+    first = reconstructor.reconstruct(session().frames_v[0])
+    kept = first.image.copy()
+    reconstructor.reconstruct(session().frames_v[1])
+    assert (first.image == kept).all()
+    assert first.image.dtype == np.float32 and made("c64").reconstruct(session().frames_v[0]).image.dtype == np.float64
+
+
+def test_two_reconstructors_share_nothing() -> None:
+    a, b = made(), made()
+    a.with_options(sign="both", iterations=3)
+    assert b.options.iterations == 60
+    alone = b.reconstruct(session().frames_v[0]).image
+    a.reconstruct(session().frames_v[1])
+    assert (b.reconstruct(session().frames_v[0]).image == alone).all()

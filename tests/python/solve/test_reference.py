@@ -1,0 +1,187 @@
+"""The numpy reference against the formulas that it writes out: brute force, finite differences, another order of doing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from eitskin.model.model import Model
+from eitskin.solve.reference import ReferenceEngine, fista, greatest, project, shrink
+from eitskin.solve.reference_touches import Disc, Fit, damped_step
+from eitskin.solve.results import default_options
+from eitskin.study.metrics import pixel_cover
+from small_models import DATA_KINDS, SIGNS, prebuilt, small, small_model
+
+GENERATOR = np.random.default_rng(41)
+
+
+def reference(model: Model, **options: object) -> ReferenceEngine:
+    """An engine with its reference set to the skin's own."""
+    engine = ReferenceEngine(model)
+    engine.set_options(replace(default_options(model), **options))
+    engine.set_baseline(small().linear.v0_v[None])
+    return engine
+
+
+@pytest.mark.parametrize("sign", SIGNS)
+def test_shrink_minimises_its_objective(sign: str) -> None:
+    """argmin over allowed x of (x - v)^2 / 2 + t |x|, by brute force on a fine grid."""
+    allowed = {"increase": np.linspace(0, 4, 4001), "decrease": np.linspace(-4, 0, 4001), "both": np.linspace(-4, 4, 8001)}
+    v = GENERATOR.uniform(-3, 3, 50)
+    best = [allowed[sign][np.argmin(0.5 * (allowed[sign] - one) ** 2 + 0.7 * np.abs(allowed[sign]))] for one in v]
+    assert shrink(v, 0.7, sign) == pytest.approx(np.array(best), abs=1e-3)
+
+
+def test_greatest_is_the_lambda_at_which_zero_is_optimal() -> None:
+    g = np.array([-3.0, 1.0, 2.0])
+    assert [greatest(g, sign) for sign in SIGNS] == [2.0, 3.0, 3.0]
+    assert greatest(np.array([-1.0, -2.0]), "increase") == 0
+    model = small_model()
+    y, basis, _ = reference(model).frame_stage(small().frames(2, 1)[0])
+    top = greatest(model.sensitivity.T @ y, "increase")
+    for share, zero in ((1.0001, True), (0.9999, False)):
+        x = fista(model.sensitivity, y, share * top, model.lipschitz, default_options(model), basis).x
+        assert (not x.any()) == zero
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+def test_data_of_small_changes_are_the_linear_change(data_kind: str) -> None:
+    """For a change towards nothing, y is S g whatever the kind of data; the drift direction is gone from both."""
+    s, model = small(), small_model("f32", data_kind)
+    change = s.discs(np.random.default_rng(1), 2, "increase") * 1e-4
+    frame = s.linear.v0_v + s.linear.jacobian @ change
+    engine = reference(model)
+    y, basis, masked = engine.frame_stage(3.0 * frame / 3.0)
+    expected = project(model.sensitivity @ (change / model.column_weight), basis)
+    assert (masked, basis.shape) == (0, (1, 37))
+    assert np.abs(y - expected).max() < 2e-3 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+def test_data_have_the_units_of_the_model_whatever_the_gain(data_kind: str) -> None:
+    s, frame = small(), small().frames(3, 1)[0]
+    ys = []
+    for gain in (1.0, -0.02, 1e3):
+        engine = ReferenceEngine(small_model("f32", data_kind))
+        baseline = engine.set_baseline(gain * s.linear.v0_v[None])
+        assert baseline.gain == pytest.approx(1 / gain, rel=1e-5)
+        assert baseline.correlation == pytest.approx(np.sign(gain))
+        ys.append(engine.frame_stage(gain * frame)[0])
+    for y in ys[1:]:
+        assert y == pytest.approx(ys[0], rel=1e-6, abs=1e-9 * np.abs(ys[0]).max())
+
+
+def test_a_row_left_out_is_a_row_of_any_value() -> None:
+    """Leaving a pair out equals the least misfit over all values of its datum, for any coefficients."""
+    s, model = small(), small_model()
+    fold = s.protocol.reciprocal_pairs()
+    frame = s.frames(4, 1)[0]
+    engine = reference(model, project_baseline=False)
+    whole, _, _ = engine.frame_stage(frame)
+    damaged = frame.copy()
+    damaged[[fold.first[30], fold.second[30]]] = np.nan
+    y, basis, _ = engine.frame_stage(damaged)
+    column = model.projection[:, 30].astype(float)
+    x = np.abs(GENERATOR.normal(size=model.grid.n_pixels)) * 1e-4
+    ours = float(np.sum(project(y - model.sensitivity @ x, basis) ** 2))
+    residual = whole - model.sensitivity @ x
+    best = float(np.sum((residual - column * (column @ residual) / (column @ column)) ** 2))
+    assert ours == pytest.approx(best, rel=1e-9)
+    assert ours < float(np.sum(residual**2))
+
+
+def test_one_of_a_pair_stands_for_both() -> None:
+    s, model = small(), small_model()
+    fold = s.protocol.reciprocal_pairs()
+    frame = s.linear.v0_v + s.linear.jacobian @ s.discs(np.random.default_rng(3), 2, "increase")
+    engine = reference(model)
+    whole = engine.frame_stage(frame)[0]
+    for side in (fold.first, fold.second):
+        damaged = frame.copy()
+        damaged[side[::2]] = np.nan
+        assert engine.frame_stage(damaged)[0] == pytest.approx(whole, rel=1e-6, abs=1e-9 * np.abs(whole).max())
+
+
+def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
+    s, model = small(), small_model()
+    quiet = s.quiet(5, 10)
+    engine = ReferenceEngine(model)
+    baseline = engine.set_baseline(quiet)
+    seen = []
+    for k in range(5, 10):
+        probe = ReferenceEngine(model)
+        probe.set_baseline(quiet[:5].mean(axis=0)[None])
+        direction = probe.frame_stage(quiet[k])[1]
+        d = probe._gain * (quiet[k] - quiet[:k].mean(axis=0))
+        fold = model.fold
+        folded = 0.5 * (d[fold.first] + fold.sign * d[fold.second])
+        seen.append(np.abs(model.sensitivity.T @ project(model.projection @ folded, direction)).max())
+    assert baseline.lambda_noise == pytest.approx(max(seen), rel=1e-9)
+    assert baseline.noise_v == pytest.approx(quiet.std(axis=0, ddof=1).mean(), rel=0.1)
+    assert baseline.frames == 10 and ReferenceEngine(model).set_baseline(quiet[:3]).lambda_noise == 0
+
+
+# ---- discs ----
+
+
+def fit_of(model: Model, **options: object) -> Fit:
+    chosen = replace(default_options(model), **options)
+    y = GENERATOR.normal(size=model.rank)
+    return Fit(model, y, np.zeros((0, model.rank)), chosen, 0.0)
+
+
+def test_a_discs_answer_is_that_of_the_pixels_it_covers() -> None:
+    model = prebuilt()[0]
+    fit = fit_of(model)
+    disc = Disc(12.0, -20.0, 15.0, 1.0, 1.0)
+    atom, _ = fit.answers(disc)
+    exact = model.sensitivity @ (pixel_cover(model.grid, [(12.0, -20.0)], [15.0]) / model.column_weight)
+    assert np.linalg.norm(atom - exact) < 0.05 * np.linalg.norm(exact)
+
+
+def test_slopes_are_derivatives() -> None:
+    """Against central differences; the cover is piecewise smooth, so a step far below a pixel."""
+    fit = fit_of(prebuilt()[0])
+    disc = Disc(-31.7, 18.3, 13.1, 1.0, 1.0)
+    _, slopes = fit.answers(disc)
+    step = 1e-5
+    for row, name in enumerate(("x_mm", "y_mm", "radius_mm")):
+        up, down = (fit.answers(replace(disc, **{name: getattr(disc, name) + h}))[0] for h in (step, -step))
+        assert slopes[row] == pytest.approx((up - down) / (2 * step), rel=1e-4, abs=1e-6 * np.abs(slopes[row]).max())
+
+
+def test_the_step_solves_the_damped_equations_and_leaves_what_nothing_moves() -> None:
+    a = GENERATOR.normal(size=(9, 4)) * [1.0, 1e3, 1e-3, 1.0]
+    h, g = a.T @ a, GENERATOR.normal(size=4)
+    step = damped_step(h, g)
+    assert (h + 1e-3 * np.diag(np.diag(h))) @ step == pytest.approx(g, rel=1e-9)
+    h[2], h[:, 2] = 0, 0
+    assert damped_step(h, g)[2] == 0
+
+
+def test_expected_radius_from_strength() -> None:
+    fit = fit_of(prebuilt()[0], touch_change_s_per_m=0.01)
+    disc = Disc(0, 0, 10.0, 0.04, 1.0)
+    assert fit.expected_radius(disc) == pytest.approx(20.0)
+    assert fit.expected_radius(replace(disc, change=1.0)) == 30.0
+    assert fit.expected_radius(replace(disc, change=1e-6)) == 3.0
+    assert fit.expected_radius(replace(disc, change=-0.04, polarity=-1.0)) == pytest.approx(20.0)
+    assert fit_of(prebuilt()[0], touch_change_s_per_m=0.0).expected_radius(disc) == 9.0
+
+
+def test_what_a_disc_explains_is_what_leaving_it_out_costs() -> None:
+    """With changes at the joint least-squares optimum: (|residual without k|^2 - |residual|^2) / |y|^2."""
+    fit = fit_of(prebuilt()[0])
+    fit.discs = [Disc(-40.0, 20.0, 12.0, 0.0, 1.0), Disc(10.0, -5.0, 15.0, 0.0, 1.0), Disc(20.0, -18.0, 15.0, 0.0, 1.0)]
+    atoms = np.array([fit.answers(disc)[0] for disc in fit.discs]).T
+    changes, *_ = np.linalg.lstsq(atoms, fit.y, rcond=None)
+    fit.discs = [replace(disc, change=float(c)) for disc, c in zip(fit.discs, changes, strict=True)]
+    whole = float(np.sum((fit.y - atoms @ changes) ** 2))
+    expected = []
+    for k in range(3):
+        rest = np.delete(atoms, k, axis=1)
+        left = fit.y - rest @ np.linalg.lstsq(rest, fit.y, rcond=None)[0]
+        expected.append((float(left @ left) - whole) / float(fit.y @ fit.y))
+    assert fit.explained() == pytest.approx(expected, rel=1e-3)

@@ -1,0 +1,126 @@
+"""Touches: C against numpy, and both against the truth of simulated frames."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.model.model import Model
+from eitskin.scene.random_touches import Scene, TouchSet
+from eitskin.scene.random_touches import Touch as Put
+from eitskin.scene.simulate import Measurement, simulate
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.solve.reconstructor import ENGINES, Reconstructor
+from eitskin.solve.results import Touch
+from small_models import DATA_KINDS, STORAGES, prebuilt, session, small, small_model
+
+BOUND_MM = {"c64": 1e-6, "c": 0.05}
+
+
+def sizes_mm(touches: tuple[Touch, ...]) -> np.ndarray:
+    """x, y and radius, (k, 3)."""
+    return np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in touches]).reshape(-1, 3)
+
+
+def compare(model: Model, quiet: np.ndarray, frames: np.ndarray, **options: object) -> int:
+    """Hold both widths against numpy over ``frames``; returns how many touches numpy found."""
+    made = {name: Reconstructor(model, engine=name) for name in ENGINES}
+    for reconstructor in made.values():
+        reconstructor.with_options(**options)
+        reconstructor.tare(quiet)
+    count = 0
+    for frame in frames:
+        found = {name: reconstructor.reconstruct(frame).touches for name, reconstructor in made.items()}
+        count += len(found["numpy"])
+        for name, bound in BOUND_MM.items():
+            assert len(found[name]) == len(found["numpy"])
+            assert np.abs(sizes_mm(found[name]) - sizes_mm(found["numpy"])).max(initial=0) <= bound
+            assert [t.id for t in found[name]] == [t.id for t in found["numpy"]]
+            rel = 1e-6 if name == "c64" else 0.01
+            for ours, expected in zip(found[name], found["numpy"], strict=True):
+                assert ours.strength_s_per_m_mm2 == pytest.approx(expected.strength_s_per_m_mm2, rel=rel)
+                assert ours.confidence == pytest.approx(expected.confidence, rel=rel, abs=1e-4)
+    return count
+
+
+def test_simulated_frames_of_the_paper_skin() -> None:
+    frames = session(scenes=40).as_frames()
+    assert compare(prebuilt()[0], frames.reference_voltage_v, frames.voltage_v) >= 60
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_small_models(storage: str, data_kind: str) -> None:
+    s = small()
+    assert compare(small_model(storage, data_kind), s.quiet(2, 32), s.frames(7, 10)) >= 10
+
+
+def test_both_signs_and_dropouts() -> None:
+    s = small()
+    frames = s.frames(17, 12, "both")
+    frames[3, 20:26] = np.nan
+    assert compare(small_model(), s.quiet(2, 32), frames, sign="both") >= 12
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("touch_sweeps", 0), ("touch_change_s_per_m", 0.0), ("max_touches", 1), ("gate_factor", 0.0)]
+)
+def test_other_options(name: str, value: float) -> None:
+    frames = session(scenes=40).as_frames()
+    compare(prebuilt()[0], frames.reference_voltage_v, frames.voltage_v[:10], **{name: value})
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_touches_are_where_they_were_put(engine: str) -> None:
+    """One touch of 9 mm and contrast 5 at several places, simulated without noise on another mesh."""
+    places = [(0.0, 0.0), (40.0, 10.0), (-20.0, -60.0), (55.0, -45.0), (-70.0, 20.0)]
+    scenes = tuple(Scene(str(k), (Put(x, y, 9.0, 5.0),)) for k, (x, y) in enumerate(places))
+    ideal = Measurement(snr_db=None, adc_bits=None, contact_spread=0.0, quiet_frames=1)
+    frames = simulate(paper_skin(), adjacent(16), TouchSet("places", 1, scenes), measurement=ideal).as_frames()
+    made = Reconstructor(prebuilt()[0], engine=engine)
+    made.tare(frames.reference_voltage_v)
+    for frame, (x, y) in zip(frames.voltage_v, places, strict=True):
+        made.forget()
+        touches = made.reconstruct(frame).touches
+        assert len(touches) == 1
+        assert np.hypot(touches[0].x_mm - x, touches[0].y_mm - y) < 1.0
+        assert touches[0].radius_mm == pytest.approx(9.0, rel=0.12)
+        # a disc of contrast c answers as a linear change of 2 (c - 1) / (c + 1) times the sheet's conductivity
+        expected = 2 * 4 / 6 * 0.01 * np.pi * 9.0**2
+        assert touches[0].strength_s_per_m_mm2 == pytest.approx(expected, rel=0.12)
+        assert touches[0].confidence > 0.9
+
+
+def test_touches_come_strongest_first_with_ids_of_their_own() -> None:
+    frames = session(scenes=40).as_frames()
+    made = Reconstructor(prebuilt()[0])
+    made.tare(frames.reference_voltage_v)
+    most = 0
+    for frame in frames.voltage_v:
+        touches = made.reconstruct(frame).touches
+        strength = [t.strength_s_per_m_mm2 for t in touches]
+        assert strength == sorted(strength, reverse=True)
+        assert len({t.id for t in touches}) == len(touches)
+        assert all(0 < t.confidence <= 1 and 3.0 <= t.radius_mm <= 30.0 for t in touches)
+        most = max(most, len(touches))
+    assert most == 3
+
+
+def test_a_resistive_change_is_a_touch_of_negative_strength() -> None:
+    s, model = small(), small_model()
+    near = np.linalg.norm(s.linear.grid.centres_mm() - (10, 15), axis=1) <= 8
+    x, y = s.linear.grid.centres_mm()[near].mean(axis=0)
+    frame = s.linear.v0_v - s.linear.jacobian @ (0.01 * near)
+    for sign, expected in (("decrease", -1), ("both", -1), ("increase", 0)):
+        made = Reconstructor(model)
+        made.with_options(sign=sign)
+        made.tare(s.quiet(1, 16, 1e-5))
+        touches = made.reconstruct(frame).touches
+        if expected:
+            assert np.sign(touches[0].strength_s_per_m_mm2) == expected
+            assert np.hypot(touches[0].x_mm - x, touches[0].y_mm - y) < 0.5
+            assert made.reconstruct(frame).image.min() < 0
+        else:
+            assert all(t.strength_s_per_m_mm2 > 0 for t in touches)
+            assert made.reconstruct(frame).image.min() == 0
