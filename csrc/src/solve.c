@@ -154,6 +154,7 @@ static void answer_zero(eits_context *ctx, eits_stop why)
     ctx->warm = 0;
     ctx->info.stop = why;
     ctx->info.nonzeros = 0;
+    ctx->info.gap = ctx->info.gap_rel = 0;
     ctx->info.residual = ctx->info.data_norm;
 }
 
@@ -176,10 +177,9 @@ static int warm_start(eits_context *ctx)
     return twice < ctx->info.data_norm * ctx->info.data_norm;
 }
 
-eits_status eits_solve(eits_context *ctx)
+/* ctx->info holds what the frame stage counted, and zeros. */
+static eits_status solve(eits_context *ctx)
 {
-    if (ctx == NULL)
-        return EITS_E_ARGUMENT;
     const eits_options *o = &ctx->options;
     const uint32_t rank = ctx->model->rank;
     ctx->info.data_norm = eits_sqrt(eits_dot(ctx, ctx->y, ctx->y, rank));
@@ -188,6 +188,7 @@ eits_status eits_solve(eits_context *ctx)
     ctx->info.lambda_max = eits_greatest(ctx->gradient, ctx->model->n_pixels, o->sign);
     ctx->info.lambda = choose_lambda(ctx);
     if (!eits_is_finite(ctx->info.data_norm) || !eits_is_finite(ctx->info.lambda_max)) {
+        ctx->info.data_norm = ctx->info.lambda_max = ctx->info.lambda = 0;
         answer_zero(ctx, EITS_STOP_DIVERGED);
         return EITS_E_NOT_FINITE;
     }
@@ -216,6 +217,14 @@ eits_status eits_solve(eits_context *ctx)
     return EITS_OK;
 }
 
+eits_status eits_solve(eits_context *ctx)
+{
+    if (ctx == NULL)
+        return EITS_E_ARGUMENT;
+    ctx->info = (eits_info){0};
+    return solve(ctx);
+}
+
 eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length, eits_real *image, eits_info *info)
 {
     if (ctx == NULL || frame == NULL)
@@ -223,7 +232,7 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
     ctx->info = (eits_info){0};
     eits_status status = eits_frame_stage(ctx, frame, length, &ctx->info.masked, &ctx->info.macs);
     if (status == EITS_OK)
-        status = eits_solve(ctx);
+        status = solve(ctx);
     else
         answer_zero(ctx, EITS_STOP_GATE);
     if (image != NULL)

@@ -67,7 +67,7 @@ typedef struct eits_info {
     eits_real lambda;
     eits_real lambda_max;
     eits_real lambda_noise;
-    eits_real gap;        /* duality gap at the result, absolute */
+    eits_real gap;        /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED */
     eits_real gap_rel;    /* gap / (|y|^2 / 2) */
     eits_real residual;   /* |y - S x| */
     eits_real data_norm;  /* |y| */

@@ -18,7 +18,8 @@ extern "C" {
  * On an error the image is cleared, never NaN. Errors: those of eits_frame_stage, EITS_E_NOT_FINITE. */
 eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length, eits_real *image, eits_info *info);
 
-/* The solver alone on reduced data ctx->y (as eits_frame_stage leaves it). Fills ctx->x, ctx->image, ctx->info. */
+/* The solver alone on reduced data ctx->y (as eits_frame_stage leaves it). Fills ctx->x, ctx->image and, anew, ctx->info;
+ * masked rows and the frame stage's MACs are then not in it. */
 eits_status eits_solve(eits_context *ctx);
 
 /* Run the model's golden frame with default options: the image must have the bits that the model states (float32), or be
