@@ -15,7 +15,7 @@
 #define BOTH_WIDTHS(narrow, wide) (narrow)
 #endif
 
-enum { MOST_SHOWN = 50 };
+enum { MOST_SHOWN = 20 };
 static int checks_failed = 0;
 static int checks_made = 0;
 

@@ -108,6 +108,18 @@ static void fill_protocol(uint8_t *protocol, uint8_t *fold)
     memcpy(protocol, rows, sizeof rows);
 }
 
+/* The cells of the image that are kept, in order; returns their number. */
+static uint32_t kept_cells(const small_spec *spec, uint32_t cells[64 * 64])
+{
+    uint32_t n = 0;
+    for (uint32_t cell = 0; cell < spec->side * spec->side; ++cell) {
+        const double x = cell % spec->side + 0.5 - 0.5 * spec->side, y = cell / spec->side + 0.5 - 0.5 * spec->side;
+        if (!spec->round || x * x + y * y < 0.25 * spec->side * spec->side)
+            cells[n++] = cell;
+    }
+    return n;
+}
+
 static double wave(uint32_t order, uint32_t place, uint32_t side)
 {
     const double pi = 3.14159265358979323846;
@@ -115,9 +127,9 @@ static double wave(uint32_t order, uint32_t place, uint32_t side)
 }
 
 /* S (column after column, rank numbers each) in double. */
-static double *make_s(const small_spec *spec)
+static double *make_s(const small_spec *spec, const uint32_t *cells, uint32_t n)
 {
-    const uint32_t side = spec->side, n = side * side, rank = spec->rank;
+    const uint32_t side = spec->side, rank = spec->rank;
     double *s = doubles((size_t)n * rank);
     uint64_t state = 77;
     uint32_t across = 1;
@@ -129,7 +141,7 @@ static double *make_s(const small_spec *spec)
             if (spec->shape == SMALL_RANDOM)
                 value = small_random(&state) / sqrt(n);
             else if (spec->shape == SMALL_WAVES)
-                value = wave(i % across, j % side, side) * wave(i / across, j / side, side);
+                value = wave(i % across, cells[j] % side, side) * wave(i / across, cells[j] / side, side);
             s[(size_t)j * rank + i] = value;
         }
     }
@@ -164,9 +176,9 @@ static double greatest_eigenvalue(const double *s, uint32_t rank, uint32_t n)
     return value;
 }
 
-static void store_s(const small_spec *spec, const double *s, uint32_t stride, uint8_t *sens, uint8_t *scal)
+static void store_s(const small_spec *spec, const double *s, uint32_t n, uint32_t stride, uint8_t *sens, uint8_t *scal)
 {
-    const uint32_t n = spec->side * spec->side, rank = spec->rank;
+    const uint32_t rank = spec->rank;
     for (uint32_t j = 0; j < n; ++j) {
         const double *column = s + (size_t)j * rank;
         double largest = 1e-6;
@@ -188,9 +200,10 @@ static void store_s(const small_spec *spec, const double *s, uint32_t stride, ui
 
 static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *const at[SMALL_SECTIONS])
 {
-    const uint32_t n = spec->side * spec->side;
+    uint32_t cells[64 * 64];
+    const uint32_t n = kept_cells(spec, cells);
     const int identity = spec->shape == SMALL_IDENTITY;
-    double *s = make_s(spec);
+    double *s = make_s(spec, cells, n);
     const double factor = spec->lipschitz_factor > 0 ? spec->lipschitz_factor : 1.02;
     const uint32_t whole[10] = {SMALL_ELECTRODES, SMALL_ROWS, SMALL_FOLDED, spec->rank, stride, n, spec->side, spec->side,
                                 (uint32_t)spec->storage, (uint32_t)spec->kind};
@@ -200,7 +213,7 @@ static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *cons
     const float numbers[6] = {pixel, corner, corner, 1e-3f, (float)(factor * greatest_eigenvalue(s, spec->rank, n)), 1.0f};
     for (uint32_t i = 0; i < 6; ++i)
         small_put_f32(at[DIMS] + 40 + 4 * i, numbers[i]);
-    store_s(spec, s, stride, at[SENS], at[SCAL]);
+    store_s(spec, s, n, stride, at[SENS], at[SCAL]);
     free(s);
     fill_protocol(at[PROT], at[FOLD]);
     uint64_t state = 20240918;
@@ -211,8 +224,8 @@ static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *cons
     }
     for (uint32_t j = 0; j < n; ++j) {
         small_put_f32(at[COLW] + 4 * j, identity ? 1.0f : 0.02f + 0.001f * (float)(j % 7));
-        small_put_u16(at[GRID] + 4 * j, j % spec->side);
-        small_put_u16(at[GRID] + 4 * j + 2, j / spec->side);
+        small_put_u16(at[GRID] + 4 * j, cells[j] % spec->side);
+        small_put_u16(at[GRID] + 4 * j + 2, cells[j] / spec->side);
     }
     small_put_u32(at[DEFS], 60);
     small_put_u32(at[DEFS] + 4, 8);
@@ -227,7 +240,10 @@ static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *cons
 small_model small_model_make(small_spec spec)
 {
     static const uint32_t item[] = {4, 2, 2, 1};
-    const uint32_t n = spec.side * spec.side, stride = (spec.rank + 7u) & ~7u, table = 64 + 16 * SMALL_SECTIONS;
+    uint32_t cells[64 * 64];
+    if (spec.side > 64)
+        abort();
+    const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u, table = 64 + 16 * SMALL_SECTIONS;
     const uint32_t sizes[SMALL_SECTIONS] = {64, SMALL_ROWS * 4, SMALL_FOLDED * 8, SMALL_FOLDED * 4, SMALL_FOLDED * stride * 4,
                                             n * stride * item[spec.storage], n * 4, n * 4, 64, (2 * SMALL_ROWS + n) * 4, n * 4, 2};
     const int integer = spec.storage == EITS_STORAGE_I16 || spec.storage == EITS_STORAGE_I8;

@@ -14,7 +14,8 @@ typedef enum small_shape {
 } small_shape;
 
 typedef struct small_spec {
-    uint32_t rank, side; /* a full square image of side x side pixels */
+    uint32_t rank, side; /* an image of side x side pixels, at most 64 */
+    int round;           /* only the pixels whose centre lies in the inscribed circle are kept */
     eits_storage storage;
     eits_data_kind kind;
     small_shape shape;

@@ -1,0 +1,190 @@
+/* A disc's response and its derivatives, against sums written out and against differences. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "disc.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 12, RANK = 36 };
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    dense d;
+} bench;
+
+static eits_context *set_up(bench *b, eits_storage storage)
+{
+    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .round = 1, .storage = storage});
+    small_context_open(&b->c, &b->made, 0);
+    b->d = dense_of(&b->c.model);
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    dense_free(&b->d);
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+/* The documented cover, over all pixels; with the gradient's basis taken out. Returns the number of covered pixels. */
+static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *atom)
+{
+    const eits_model *m = &b->c.model;
+    const double pixel = (double)m->pixel_mm;
+    uint32_t covered = 0;
+    memset(atom, 0, RANK * sizeof *atom);
+    for (uint32_t j = 0; j < m->n_pixels; ++j) {
+        const double dx = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
+        const double dy = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
+        const double share = 0.5 + ((double)disc->radius_mm - sqrt(dx * dx + dy * dy)) / pixel;
+        const double cover = fmin(1, fmax(0, share)) / (double)m->column_weight[j];
+        covered += cover > 0;
+        for (uint32_t i = 0; i < RANK; ++i)
+            atom[i] += cover * b->d.s[(size_t)j * RANK + i];
+    }
+    for (uint32_t k = 0; k < b->c.ctx.basis_count; ++k) {
+        double *basis = dense_copy(b->c.ctx.basis + k * EITS_STRIDE(RANK), RANK);
+        const double along = dense_dot(basis, atom, RANK);
+        for (uint32_t i = 0; i < RANK; ++i)
+            atom[i] -= along * basis[i];
+        free(basis);
+    }
+    return covered;
+}
+
+static eits_disc random_disc(uint64_t *state)
+{
+    const eits_disc disc = {.x_mm = (eits_real)(45 * small_random(state)), /* the image ends at 36 mm */
+                            .y_mm = (eits_real)(45 * small_random(state)),
+                            .radius_mm = (eits_real)(11 + 9 * small_random(state)),
+                            .change = 1,
+                            .polarity = 1};
+    return disc;
+}
+
+static void responses(void)
+{
+    uint64_t state = 81;
+    for (int storage = 0; storage < 4; ++storage) {
+        bench b;
+        eits_context *ctx = set_up(&b, (eits_storage)storage);
+        for (int round = 0; round < 60; ++round) {
+            if (round == 30) { /* from here on with a direction to ignore */
+                for (int i = 0; i < RANK; ++i)
+                    ctx->basis[i] = R(1.0 / 6.0);
+                ctx->basis_count = 1;
+            }
+            const eits_disc disc = random_disc(&state);
+            eits_real atom[EITS_STRIDE(RANK)];
+            double expected[RANK];
+            const uint32_t covered = expected_atom(&b, &disc, expected);
+            const uint64_t macs = eits_disc_atom(ctx, &disc, atom, NULL);
+            CHECK_EQUAL(macs, covered * RANK + ctx->basis_count * 2 * RANK);
+            CHECK_NEAR(dense_greatest_difference(expected, atom, RANK), 0, 2000 * EPS);
+            CHECK_EQUAL(eits_disc_atom(ctx, &disc, atom, ctx->slope), 4 * macs);
+            CHECK_NEAR(dense_greatest_difference(expected, atom, RANK), 0, 2000 * EPS);
+        }
+        tear_down(&b);
+    }
+}
+
+static void far_away_there_is_nothing(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
+    static const double places[] = {200, -200, 1e6, -1e6, 1e30, -1e30};
+    for (int p = 0; p < 6; ++p) {
+        for (int axis = 0; axis < 2; ++axis) {
+            const eits_disc disc = {.x_mm = axis ? 0 : (eits_real)places[p],
+                                    .y_mm = axis ? (eits_real)places[p] : 0,
+                                    .radius_mm = 9,
+                                    .polarity = 1};
+            eits_real atom[EITS_STRIDE(RANK)];
+            CHECK_EQUAL(eits_disc_atom(ctx, &disc, atom, ctx->slope), 0);
+            for (int i = 0; i < RANK; ++i)
+                CHECK(atom[i] == 0 && ctx->slope[0][i] == 0 && ctx->slope[1][i] == 0 && ctx->slope[2][i] == 0);
+        }
+    }
+    tear_down(&b);
+}
+
+/* Derivatives by x, y and radius against central differences of the response written out in double. Where a pixel's cover
+ * has its corner (0 or 1) within the step, the derivative jumps: such discs are passed over. */
+static int smooth_around(const bench *b, const eits_disc *disc, double step)
+{
+    const eits_model *m = &b->c.model;
+    const double pixel = (double)m->pixel_mm;
+    for (uint32_t j = 0; j < m->n_pixels; ++j) {
+        const double dx = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
+        const double dy = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
+        const double from = sqrt(dx * dx + dy * dy), share = 0.5 + ((double)disc->radius_mm - from) / pixel;
+        if (fabs(share) < 2 * step / pixel || fabs(share - 1) < 2 * step / pixel || from < 0.1)
+            return 0;
+    }
+    return 1;
+}
+
+static void derivatives(void)
+{
+    uint64_t state = 82;
+    const double step = 1e-4;
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
+    int tried = 0;
+    for (int round = 0; round < 60; ++round) {
+        eits_disc disc = random_disc(&state);
+        eits_real atom[EITS_STRIDE(RANK)];
+        if (!smooth_around(&b, &disc, 1e-3))
+            continue;
+        ++tried;
+        (void)eits_disc_atom(ctx, &disc, atom, ctx->slope);
+        if (sizeof(eits_real) == 4)
+            continue; /* the difference itself needs doubles; that both widths agree is seen below */
+        for (int k = 0; k < 3; ++k) {
+            double up[RANK], down[RANK], size = 0;
+            eits_disc moved = disc;
+            eits_real *place = k == 0 ? &moved.x_mm : (k == 1 ? &moved.y_mm : &moved.radius_mm);
+            *place += (eits_real)step;
+            (void)expected_atom(&b, &moved, up);
+            *place -= (eits_real)(2 * step);
+            (void)expected_atom(&b, &moved, down);
+            for (int i = 0; i < RANK; ++i)
+                size = fmax(size, fabs(up[i] - down[i]) / (2 * step));
+            for (int i = 0; i < RANK; ++i)
+                CHECK_NEAR(ctx->slope[k][i], (up[i] - down[i]) / (2 * step), 1e-5 * size + 1e-9);
+        }
+    }
+    CHECK(tried >= 20);
+    /* one disc that touches no corner: numbers of the double build */
+    const eits_disc disc = {.x_mm = R(3.5), .y_mm = R(-8.25), .radius_mm = R(10.0), .polarity = 1};
+    eits_real atom[EITS_STRIDE(RANK)];
+    double up[RANK], down[RANK];
+    CHECK(smooth_around(&b, &disc, 1e-3));
+    (void)eits_disc_atom(ctx, &disc, atom, ctx->slope);
+    for (int k = 0; k < 3; ++k) {
+        eits_disc moved = disc;
+        eits_real *place = k == 0 ? &moved.x_mm : (k == 1 ? &moved.y_mm : &moved.radius_mm);
+        *place += R(1.0 / 1024.0); /* exact in either width */
+        (void)expected_atom(&b, &moved, up);
+        *place -= R(1.0 / 512.0);
+        (void)expected_atom(&b, &moved, down);
+        for (int i = 0; i < RANK; ++i)
+            CHECK_NEAR(ctx->slope[k][i], (up[i] - down[i]) * 512, 2e-3);
+    }
+    tear_down(&b);
+}
+
+int main(void)
+{
+    responses();
+    far_away_there_is_nothing();
+    derivatives();
+    return checks_report("disc");
+}

@@ -1,0 +1,347 @@
+/* The solver on given reduced data: against the closed form, a textbook FISTA, and the conditions of an optimum. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 6, N = SIDE * SIDE, RANK = 12 };
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    dense d;
+    double y[16];
+} bench;
+
+/* A context of this model, with random y in [-1, 1). */
+static eits_context *set_up(bench *b, small_spec spec, int prepared)
+{
+    uint64_t state = 51;
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make(spec);
+    small_context_open(&b->c, &b->made, prepared);
+    b->d = dense_of(&b->c.model);
+    for (uint32_t i = 0; i < spec.rank; ++i) {
+        b->c.ctx.y[i] = (eits_real)small_random(&state);
+        b->y[i] = (double)b->c.ctx.y[i];
+    }
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    dense_free(&b->d);
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
+
+/* Solve with these settings; other options at their defaults. */
+static eits_info solve(eits_context *ctx, uint32_t iterations, eits_sign sign, double lambda)
+{
+    eits_options o = ctx->options;
+    o.iterations = iterations;
+    o.sign = sign;
+    o.lambda_abs = (eits_real)lambda;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return ctx->info;
+}
+
+static void identity_gives_the_soft_threshold(void)
+{
+    const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 1};
+    for (int sign = 0; sign < 3; ++sign) {
+        for (uint32_t iterations = 1; iterations <= 41; iterations += 40) {
+            bench b;
+            eits_context *ctx = set_up(&b, spec, 0);
+            const eits_info info = solve(ctx, iterations, (eits_sign)sign, 0.25);
+            uint32_t nonzeros = 0;
+            double squares = 0;
+            for (int j = 0; j < 16; ++j) {
+                const double size = fabs(b.y[j]) - 0.25;
+                const int allowed = b.y[j] > 0 ? sign != EITS_SIGN_DECREASE : sign != EITS_SIGN_INCREASE;
+                const double expected = size > 0 && allowed ? copysign(size, b.y[j]) : 0;
+                CHECK_NEAR(ctx->x[j], expected, iterations == 1 ? 0 : 2 * EPS); /* one step is exact: 1/4 is a round number */
+                CHECK(ctx->image[j] == ctx->x[j]);
+                nonzeros += expected != 0;
+                squares += pow(b.y[j] - expected, 2);
+            }
+            CHECK(nonzeros >= 4);
+            CHECK_EQUAL(info.nonzeros, nonzeros);
+            CHECK_NEAR(info.residual, sqrt(squares), 8 * EPS);
+            CHECK_NEAR(info.data_norm, sqrt(dense_dot(b.y, b.y, 16)), 8 * EPS);
+            CHECK_NEAR(info.gap, 0, 8 * EPS);
+            CHECK_NEAR(info.lambda, 0.25, 0);
+            tear_down(&b);
+        }
+    }
+}
+
+static void same_as_the_textbook(void)
+{
+    static const uint32_t counts[] = {1, 2, 3, 11, 60};
+    for (int storage = 0; storage < 4; ++storage) {
+        for (int sign = 0; sign < 3; ++sign) {
+            for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
+                const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
+                bench b;
+                eits_context *ctx = set_up(&b, spec, (int)(k % 2));
+                double x[N] = {0}, largest = 0;
+                const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
+                dense_fista(&b.d, b.y, (double)ctx->info.lambda, (double)b.c.model.lipschitz, counts[k], (eits_sign)sign, x);
+                for (int j = 0; j < N; ++j)
+                    largest = fmax(largest, fabs(x[j]));
+                CHECK(largest > 0.1);
+                CHECK_NEAR(dense_greatest_difference(x, ctx->x, N), 0, 400 * EPS * largest);
+                for (int j = 0; j < N; ++j)
+                    CHECK(ctx->image[j] == ctx->x[j] * (eits_real)b.c.model.column_weight[j]);
+                CHECK_EQUAL(info.iterations, counts[k]); /* exactly so many */
+                CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
+                tear_down(&b);
+            }
+        }
+    }
+}
+
+/* Panels, portable and fastest kernels: the same bits of image and info. */
+static void same_bits_in_every_layout(void)
+{
+    for (int storage = 0; storage < 4; ++storage) {
+        eits_real first[N];
+        eits_info first_info = {0};
+        for (int way = 0; way < 4; ++way) {
+            const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
+            bench b;
+            eits_context *ctx = set_up(&b, spec, way % 2);
+            CHECK((ctx->panels != NULL) == (way % 2 == 1));
+            CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
+            const eits_info info = solve(ctx, 60, EITS_SIGN_BOTH, 0.02);
+            if (way == 0) {
+                memcpy(first, ctx->image, sizeof first);
+                first_info = info;
+            }
+            CHECK(memcmp(first, ctx->image, sizeof first) == 0);
+            CHECK(info.gap == first_info.gap && info.residual == first_info.residual && info.macs == first_info.macs);
+            tear_down(&b);
+        }
+    }
+}
+
+static void optimum_has_its_marks(void)
+{
+    for (int sign = 0; sign < 3; ++sign) {
+        bench b;
+        eits_context *ctx = set_up(&b, RANDOM, 1);
+        eits_options o = ctx->options;
+        o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12));
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        const eits_info info = solve(ctx, 50000, (eits_sign)sign, 0.05);
+        CHECK_EQUAL(info.stop, EITS_STOP_GAP);
+        CHECK(info.gap_rel <= o.gap_rel && info.gap >= 0);
+        double *x = dense_copy(ctx->x, N), r[RANK], c[N], largest = 0;
+        dense_residual(&b.d, b.y, x, r);
+        dense_correlate(&b.d, r, c);
+        const double lambda = (double)info.lambda;
+        const double slack = sqrt(2 * (double)b.c.model.lipschitz * (double)info.gap) + 20 * EPS; /* |S (x - optimum)| sqrt L */
+        for (int j = 0; j < N; ++j)
+            largest = fmax(largest, fabs(x[j]));
+        uint32_t on = 0, off = 0;
+        for (int j = 0; j < N; ++j) {
+            if (sign != EITS_SIGN_DECREASE)
+                CHECK(c[j] <= lambda + slack);
+            if (sign != EITS_SIGN_INCREASE)
+                CHECK(c[j] >= -lambda - slack);
+            CHECK(sign != EITS_SIGN_INCREASE || x[j] >= 0);
+            CHECK(sign != EITS_SIGN_DECREASE || x[j] <= 0);
+            if (fabs(x[j]) > 0.05 * largest) {
+                CHECK_NEAR(c[j], copysign(lambda, x[j]), slack);
+                ++on;
+            }
+            off += x[j] == 0;
+        }
+        CHECK(slack < 0.1 * lambda && on >= 3 && off >= 10);
+        free(x);
+        tear_down(&b);
+    }
+}
+
+static void gap_bounds_the_suboptimality(void)
+{
+    static const uint32_t counts[] = {1, 2, 4, 8, 16, 32, 64, 128};
+    for (int sign = 0; sign < 3; ++sign) {
+        double before = 1e9;
+        for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
+            bench b;
+            eits_context *ctx = set_up(&b, RANDOM, 0);
+            const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
+            double *x = dense_copy(ctx->x, N), best_x[N] = {0}, r[RANK];
+            const double lambda = (double)info.lambda, gap = (double)info.gap;
+            dense_fista(&b.d, b.y, lambda, (double)b.c.model.lipschitz, 30000, (eits_sign)sign, best_x);
+            const double best = dense_objective(&b.d, b.y, best_x, lambda), own = dense_objective(&b.d, b.y, x, lambda);
+            const double rounding = 40 * EPS * dense_dot(b.y, b.y, RANK);
+            CHECK(own - best >= -1e-12);
+            CHECK(own - best <= gap + rounding);
+            CHECK_NEAR(gap, dense_gap(&b.d, b.y, x, lambda, (eits_sign)sign), rounding);
+            CHECK_NEAR(info.gap_rel, gap / (0.5 * dense_dot(b.y, b.y, RANK)), 10 * EPS);
+            dense_residual(&b.d, b.y, x, r);
+            CHECK_NEAR(info.residual, sqrt(dense_dot(r, r, RANK)), 20 * EPS);
+            CHECK(counts[k] < 4 || gap < before);
+            before = gap;
+            free(x);
+            tear_down(&b);
+        }
+    }
+}
+
+static void stopping_by_the_gap(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM, 0);
+    eits_options o = ctx->options;
+    o.gap_rel = R(1e-3);
+    o.gap_every = 7;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    eits_info info = solve(ctx, 100000, EITS_SIGN_INCREASE, 0.05);
+    CHECK_EQUAL(info.stop, EITS_STOP_GAP);
+    CHECK(info.gap_rel <= R(1e-3) && info.gap_rel > 0);
+    CHECK(info.iterations % 7 == 0 && info.iterations < 2000);
+    const uint32_t needed = info.iterations;
+    info = solve(ctx, needed - 7, EITS_SIGN_INCREASE, 0.05); /* one check earlier it was not small enough */
+    CHECK(info.stop == EITS_STOP_ITERATIONS && info.iterations == needed - 7 && info.gap_rel > R(1e-3));
+    info = solve(ctx, 5, EITS_SIGN_INCREASE, 0.05);
+    CHECK(info.stop == EITS_STOP_ITERATIONS && info.iterations == 5 && info.gap_rel > 0);
+    o.gap_rel = R(0.9);
+    o.gap_every = 1000;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.05); /* the last iteration is always checked */
+    CHECK(info.stop == EITS_STOP_GAP && info.iterations == 3);
+    tear_down(&b);
+}
+
+static void zero_is_the_optimum(void)
+{
+    for (int sign = 0; sign < 3; ++sign) {
+        bench b;
+        eits_context *ctx = set_up(&b, RANDOM, 0);
+        double c[N], greatest = 0;
+        dense_correlate(&b.d, b.y, c);
+        for (int j = 0; j < N; ++j)
+            greatest = fmax(greatest, sign == EITS_SIGN_INCREASE ? c[j] : (sign == EITS_SIGN_DECREASE ? -c[j] : fabs(c[j])));
+        eits_info info = solve(ctx, 20, (eits_sign)sign, greatest * (1 + 1e-5));
+        CHECK_NEAR(info.lambda_max, greatest, 10 * EPS);
+        CHECK_EQUAL(info.stop, EITS_STOP_ZERO);
+        CHECK(info.iterations == 0 && info.nonzeros == 0 && info.gap == 0 && info.residual == info.data_norm);
+        for (int j = 0; j < N; ++j)
+            CHECK(ctx->x[j] == 0 && ctx->image[j] == 0);
+        info = solve(ctx, 20, (eits_sign)sign, greatest * (1 - 1e-3));
+        CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros == 1);
+        info = solve(ctx, 20, (eits_sign)sign, (double)info.lambda_max); /* lambda just at lambda_max */
+        CHECK_EQUAL(info.stop, EITS_STOP_ZERO);
+        tear_down(&b);
+    }
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM, 0);
+    memset(ctx->y, 0, RANK * sizeof *ctx->y);
+    eits_info info = solve(ctx, 20, EITS_SIGN_BOTH, 0);
+    CHECK(info.stop == EITS_STOP_ZERO && info.lambda_max == 0 && info.data_norm == 0);
+    tear_down(&b);
+    const small_spec identity = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
+    ctx = set_up(&b, identity, 0);
+    for (int i = 0; i < 16; ++i)
+        ctx->y[i] = R(-1); /* nothing to be found above zero */
+    info = solve(ctx, 20, EITS_SIGN_INCREASE, 0);
+    CHECK(info.stop == EITS_STOP_ZERO && info.lambda_max == 0);
+    tear_down(&b);
+}
+
+/* Rows that are left out: the same as the dense problem with their directions taken out of S and y. */
+static void solving_beside_a_basis(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM, 1);
+    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+    uint64_t state = 52, macs;
+    uint32_t masked;
+    small_reference(&b.c.model, 1, reference);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+    frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] = frame[b.c.model.fold[20].first] = R(NAN);
+    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_EQUAL(ctx->basis_count, 3);
+    const eits_info info = solve(ctx, 40, EITS_SIGN_INCREASE, 0.01);
+    double *basis = dense_numbers(3 * RANK), *y = dense_copy(ctx->y, RANK), x[N] = {0}, r[RANK];
+    for (uint32_t k = 0; k < 3; ++k) {
+        for (uint32_t i = 0; i < RANK; ++i)
+            basis[k * RANK + i] = (double)ctx->basis[k * EITS_STRIDE(RANK) + i];
+    }
+    for (int j = 0; j < N; ++j)
+        dense_project_out(b.d.s + j * RANK, basis, 3, RANK);
+    dense_fista(&b.d, y, (double)info.lambda, (double)b.c.model.lipschitz, 40, EITS_SIGN_INCREASE, x);
+    CHECK(info.nonzeros >= 3);
+    CHECK_NEAR(dense_greatest_difference(x, ctx->x, N), 0, 400 * EPS);
+    CHECK_NEAR(info.gap, dense_gap(&b.d, y, x, (double)info.lambda, EITS_SIGN_INCREASE), 400 * EPS);
+    dense_residual(&b.d, y, x, r);
+    CHECK_NEAR(info.residual, sqrt(dense_dot(r, r, RANK)), 100 * EPS);
+    free(basis);
+    free(y);
+    tear_down(&b);
+}
+
+/* On the identity with one positive datum each iterate has one non-zero, so that each product can be counted by hand. */
+static void work_is_counted(void)
+{
+    const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
+    bench b;
+    eits_context *ctx = set_up(&b, spec, 0);
+    const uint64_t whole = 16 * 16, column = 16;
+    memset(ctx->y, 0, 16 * sizeof *ctx->y);
+    ctx->y[3] = 1;
+    for (uint32_t iterations = 1; iterations <= 25; iterations += 8) {
+        const eits_info info = solve(ctx, iterations, EITS_SIGN_INCREASE, 0.25);
+        /* S'y once, which the first iteration uses again; S'r in each later one and for the last gap; S x in each */
+        CHECK_EQUAL(info.macs, whole + (iterations - 1) * whole + whole + iterations * column);
+    }
+    eits_options o = ctx->options;
+    o.gap_rel = R(1e-12); /* the gap is asked for every 5 iterations: another S'r each */
+    o.gap_every = 5;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    eits_info info = solve(ctx, 4, EITS_SIGN_INCREASE, 0.25);
+    CHECK_EQUAL(info.macs, whole + 3 * whole + whole + 4 * column);
+    ctx->y[3] = 0;
+    info = solve(ctx, 20, EITS_SIGN_INCREASE, 0.25); /* no more than S'y where there is nothing */
+    CHECK_EQUAL(info.macs, whole);
+    /* with the frame stage: P d over all folded rows, and two projections' passes for the drift direction at first */
+    eits_real frame[SMALL_ROWS];
+    small_reference(&b.c.model, 1, frame);
+    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    const uint64_t reduce = SMALL_FOLDED * 16, project = 2 * 16;
+    CHECK_EQUAL(ctx->info.macs, reduce + 2 * 16 /* direction, normalised */ + reduce + project + whole);
+    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_EQUAL(ctx->info.macs, reduce + project + whole); /* the basis is kept */
+    tear_down(&b);
+}
+
+int main(void)
+{
+    identity_gives_the_soft_threshold();
+    same_as_the_textbook();
+    same_bits_in_every_layout();
+    optimum_has_its_marks();
+    gap_bounds_the_suboptimality();
+    stopping_by_the_gap();
+    zero_is_the_optimum();
+    solving_beside_a_basis();
+    work_is_counted();
+    return checks_report("solve");
+}

@@ -1,0 +1,349 @@
+/* What the solver takes from outside one frame: gate and lambda rule, warm start, a wrong step, units. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 8, N = SIDE * SIDE, RANK = 16 };
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    dense d;
+} bench;
+
+static eits_context *set_up(bench *b, small_spec spec)
+{
+    b->made = small_model_make(spec);
+    small_context_open(&b->c, &b->made, 1);
+    b->d = dense_of(&b->c.model);
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    dense_free(&b->d);
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
+
+/* y = S x for two patches of x, times `size`, plus noise; `shift` moves the patches. */
+static void fill_y(bench *b, double size, double noise, uint32_t shift)
+{
+    uint64_t state = 61;
+    for (uint32_t i = 0; i < RANK; ++i) {
+        double sum = noise * small_random(&state);
+        for (uint32_t k = 0; k < 4; ++k) {
+            const uint32_t j = (k < 2 ? 9 + k : 41 + 2 * k) + shift;
+            sum += size * b->d.s[(size_t)j * RANK + i];
+        }
+        b->c.ctx.y[i] = (eits_real)sum;
+    }
+}
+
+static void set_options(eits_context *ctx, eits_options o)
+{
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+}
+
+static eits_info solve(eits_context *ctx)
+{
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return ctx->info;
+}
+
+static void gate_and_lambda_rule(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM);
+    fill_y(&b, 1, 0, 0);
+    eits_options o = ctx->options;
+    o.gate_factor = R(1.5);
+    o.lambda_rel = R(0.1);
+    o.lambda_noise_factor = R(0.5);
+    set_options(ctx, o);
+    eits_info info = solve(ctx); /* the noise is not known: nothing is gated */
+    const double top = (double)info.lambda_max;
+    CHECK(top > 0.1 && info.stop == EITS_STOP_ITERATIONS);
+    CHECK_NEAR(info.lambda, 0.1 * top, 2 * EPS * top);
+    ctx->baseline.lambda_noise = (eits_real)(0.1 * top);
+    info = solve(ctx); /* 0.05 of lambda_max by the noise, 0.1 by the share */
+    CHECK_NEAR(info.lambda, 0.1 * top, 2 * EPS * top);
+    CHECK_NEAR(info.lambda_noise, 0.1 * top, 2 * EPS * top);
+    ctx->baseline.lambda_noise = (eits_real)(0.5 * top);
+    info = solve(ctx);
+    CHECK_NEAR(info.lambda, 0.25 * top, 2 * EPS * top);
+    o.lambda_abs = (eits_real)(0.6 * top); /* goes before both */
+    set_options(ctx, o);
+    info = solve(ctx);
+    CHECK_NEAR(info.lambda, 0.6 * top, 2 * EPS * top);
+    CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
+    ctx->baseline.lambda_noise = (eits_real)(top / 1.49); /* just below the gate, then just above */
+    info = solve(ctx);
+    CHECK(info.stop == EITS_STOP_GATE && info.iterations == 0 && info.nonzeros == 0);
+    for (int j = 0; j < N; ++j)
+        CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
+    ctx->baseline.lambda_noise = (eits_real)(top / 1.51);
+    info = solve(ctx);
+    CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros > 0);
+    o.gate_factor = 0;
+    set_options(ctx, o);
+    ctx->baseline.lambda_noise = (eits_real)(100 * top);
+    CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS); /* no gate, and lambda_abs does not look at the noise */
+    tear_down(&b);
+}
+
+static void warm_start_saves_iterations(void)
+{
+    uint32_t needed[2];
+    for (uint32_t warm = 0; warm < 2; ++warm) {
+        bench b;
+        eits_context *ctx = set_up(&b, RANDOM);
+        eits_options o = ctx->options;
+        o.gap_rel = R(1e-4);
+        o.gap_every = 1;
+        o.iterations = 100000;
+        o.warm_start = warm;
+        set_options(ctx, o);
+        fill_y(&b, 1, 0, 0);
+        (void)solve(ctx);
+        fill_y(&b, 1.01, 1e-3, 0); /* nearly the same frame */
+        const eits_info info = solve(ctx);
+        CHECK_EQUAL(info.stop, EITS_STOP_GAP);
+        CHECK(info.gap_rel <= R(1e-4));
+        needed[warm] = info.iterations;
+        tear_down(&b);
+    }
+    CHECK(needed[0] >= 10);
+    CHECK(2 * needed[1] <= needed[0]);
+}
+
+/* After lift-off, a frame of noise with the touch's coefficients as its start: what is left is what a cold start gives. */
+static void no_ghost_after_lift_off(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM);
+    eits_options o = ctx->options;
+    o.warm_start = 1;
+    o.iterations = 20;
+    set_options(ctx, o);
+    fill_y(&b, 1, 0, 0);
+    double peak = 0;
+    for (int k = 0; k < 5; ++k)
+        (void)solve(ctx);
+    for (int j = 0; j < N; ++j)
+        peak = fmax(peak, (double)ctx->x[j]);
+    CHECK(peak > 0.1);
+    fill_y(&b, 0, 1e-3, 0);
+    (void)solve(ctx);
+    double *after = dense_copy(ctx->x, N);
+    eits_forget(ctx);
+    (void)solve(ctx);
+    CHECK(dense_greatest_difference(after, ctx->x, N) == 0); /* zero is the better start: the very cold result */
+    for (int j = 0; j < N; ++j)
+        CHECK(fabs(after[j]) < 0.1 * peak);
+    free(after);
+    tear_down(&b);
+}
+
+static void warm_start_is_forgotten(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM);
+    eits_options o = ctx->options;
+    eits_real cold[N], warm[N], reference[SMALL_ROWS];
+    o.warm_start = 1;
+    o.iterations = 6;
+    set_options(ctx, o);
+    fill_y(&b, 1, 0.01, 0);
+    (void)solve(ctx);
+    memcpy(cold, ctx->x, sizeof cold);
+    (void)solve(ctx);
+    memcpy(warm, ctx->x, sizeof warm);
+    CHECK(memcmp(cold, warm, sizeof cold) != 0); /* it does start elsewhere */
+    eits_forget(ctx);
+    (void)solve(ctx);
+    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    o.sign = EITS_SIGN_DECREASE; /* coefficients of the other sign are no start */
+    set_options(ctx, o);
+    o.sign = EITS_SIGN_INCREASE;
+    set_options(ctx, o);
+    (void)solve(ctx);
+    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    small_reference(&b.c.model, 1, reference);
+    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK); /* nor are those against another reference */
+    (void)solve(ctx);
+    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    o.warm_start = 0;
+    set_options(ctx, o);
+    (void)solve(ctx);
+    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    eits_forget(NULL);
+    tear_down(&b);
+}
+
+/* A stated Lipschitz constant that is too small: the step is halved until the objective falls. */
+static void step_too_large(void)
+{
+    static const double factors[] = {0.3, 0.125, 0.02};
+    for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
+        bench b;
+        eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
+        eits_options o = ctx->options;
+        o.iterations = 400;
+        set_options(ctx, o);
+        fill_y(&b, 1, 0.01, 0);
+        const eits_info info = solve(ctx);
+        CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
+        CHECK(info.step_halvings >= 1 && info.step_halvings <= 8);
+        CHECK(ldexp(factors[f], (int)info.step_halvings) > 0.4); /* enough of them */
+        double *y = dense_copy(ctx->y, RANK), *x = dense_copy(ctx->x, N), good[N] = {0};
+        const double lambda = (double)info.lambda, at_zero = 0.5 * dense_dot(y, y, RANK);
+        dense_fista(&b.d, y, lambda, (double)b.c.model.lipschitz / factors[f], 20000, EITS_SIGN_INCREASE, good);
+        const double best = dense_objective(&b.d, y, good, lambda), own = dense_objective(&b.d, y, x, lambda);
+        CHECK(own < 0.1 * at_zero && own - best < 0.02 * at_zero);
+        CHECK_NEAR(info.gap, dense_gap(&b.d, y, x, lambda, EITS_SIGN_INCREASE), 1e-4 * at_zero);
+        for (int again = 0; again < 12; ++again) { /* no count runs on from call to call */
+            const eits_info next = solve(ctx);
+            CHECK(next.step_halvings == info.step_halvings && next.stop == info.stop && next.macs == info.macs);
+        }
+        free(y);
+        free(x);
+        tear_down(&b);
+    }
+}
+
+static void step_absurdly_large(void)
+{
+    static const double factors[] = {1e-4, 1e-12, 1e-36};
+    for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
+        for (int sign = 0; sign < 3; ++sign) {
+            bench b;
+            eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
+            eits_options o = ctx->options;
+            o.iterations = 1000;
+            o.sign = (eits_sign)sign;
+            o.warm_start = 1;
+            set_options(ctx, o);
+            fill_y(&b, 1, 0.01, 0);
+            for (int again = 0; again < 2; ++again) {
+                const eits_info info = solve(ctx);
+                CHECK_EQUAL(info.stop, EITS_STOP_DIVERGED);
+                CHECK(info.nonzeros == 0 && info.step_halvings == 8 && info.iterations < 1000);
+                CHECK(info.residual == info.data_norm && info.gap == 0 && info.gap_rel == 0); /* no number of the wild run stays */
+                for (int j = 0; j < N; ++j)
+                    CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
+                uint32_t count = 9;
+                CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+                CHECK_EQUAL(count, 0);
+            }
+            tear_down(&b);
+        }
+    }
+}
+
+static void data_that_are_not_finite(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM);
+    static const double wrong[] = {NAN, INFINITY, -INFINITY, BOTH_WIDTHS(1e30, 1e200)};
+    CHECK_EQUAL(eits_solve(NULL), EITS_E_ARGUMENT);
+    for (int k = 0; k < 4; ++k) {
+        fill_y(&b, 1, 0.01, 0);
+        (void)solve(ctx);
+        CHECK(ctx->info.nonzeros > 0);
+        ctx->y[5] = (eits_real)wrong[k];
+        CHECK_EQUAL(eits_solve(ctx), EITS_E_NOT_FINITE);
+        CHECK(ctx->info.nonzeros == 0 && ctx->info.data_norm == 0 && ctx->info.residual == 0 && ctx->info.lambda == 0);
+        for (int j = 0; j < N; ++j)
+            CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
+    }
+    tear_down(&b);
+    /* coefficients that are finite, an image that is not */
+    bench w;
+    w.made = small_model_make(RANDOM);
+    for (uint32_t j = 0; j < N; ++j)
+        small_put_f32(small_model_section(&w.made, "COLW", NULL) + 4 * j, 3e38f);
+    small_model_seal(&w.made);
+    small_context_open(&w.c, &w.made, 1);
+    w.d = dense_of(&w.c.model);
+    fill_y(&w, 1000, 0, 0);
+    CHECK_EQUAL(eits_solve(&w.c.ctx), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
+    for (int j = 0; j < N; ++j)
+        CHECK(isfinite((double)w.c.ctx.image[j]) && (sizeof(eits_real) == 8 || w.c.ctx.image[j] == 0));
+    tear_down(&w);
+}
+
+/* Frames in other units: the gain takes them up. By powers of two to the bit, by others within rounding. */
+static void units_do_not_matter(void)
+{
+    static const double units[] = {1, 0x1p-20, 0x1p20, 0x1p-60, 1e-6, 1e-3, 3.7, 1e6, -1, -1e-6};
+    eits_real first[N], frame[SMALL_ROWS], reference[SMALL_ROWS];
+    eits_info first_info = {0};
+    double peak = 0;
+    for (size_t u = 0; u < sizeof units / sizeof units[0]; ++u) {
+        bench b;
+        eits_context *ctx = set_up(&b, RANDOM);
+        uint64_t state = 71;
+        small_reference(&b.c.model, 1, reference);
+        for (int i = 0; i < SMALL_ROWS; ++i) {
+            reference[i] *= (eits_real)(1 + 0.01 * small_random(&state));
+            frame[i] = reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
+            reference[i] *= (eits_real)units[u];
+            frame[i] *= (eits_real)units[u];
+        }
+        CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        if (u == 0) {
+            memcpy(first, ctx->image, sizeof first);
+            first_info = ctx->info;
+            for (int j = 0; j < N; ++j)
+                peak = fmax(peak, (double)first[j]);
+            CHECK(ctx->info.nonzeros >= 3);
+        }
+        double *as_doubles = dense_copy(first, N);
+        CHECK_NEAR(dense_greatest_difference(as_doubles, ctx->image, N), 0, u < 4 ? 0 : 200 * EPS * peak);
+        CHECK_NEAR(ctx->info.lambda, first_info.lambda, 100 * EPS * (double)first_info.lambda);
+        free(as_doubles);
+        tear_down(&b);
+    }
+    /* and reduced data in other units give coefficients in them */
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM);
+    fill_y(&b, 1, 0.01, 0);
+    (void)solve(ctx);
+    memcpy(first, ctx->x, sizeof first);
+    for (int power = -40; power <= 40; power += 20) {
+        fill_y(&b, 1, 0.01, 0);
+        for (int i = 0; i < RANK; ++i)
+            ctx->y[i] *= (eits_real)ldexp(1, power);
+        const eits_info info = solve(ctx);
+        for (int j = 0; j < N; ++j)
+            CHECK(ctx->x[j] == first[j] * (eits_real)ldexp(1, power));
+        CHECK(info.gap_rel > 0);
+    }
+    tear_down(&b);
+}
+
+int main(void)
+{
+    gate_and_lambda_rule();
+    warm_start_saves_iterations();
+    no_ghost_after_lift_off();
+    warm_start_is_forgotten();
+    step_too_large();
+    step_absurdly_large();
+    data_that_are_not_finite();
+    units_do_not_matter();
+    return checks_report("solve_state");
+}
