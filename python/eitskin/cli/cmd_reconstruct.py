@@ -42,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct all frames; those that cannot be used are named, and the others are still done."""
+    """Reconstruct all frames; those that cannot be used are named, and the others are still done and written."""
     from eitskin.cli.cmd_model import load_or_prebuilt
     from eitskin.fileio import refuse_unwritable
     from eitskin.frames.frames import load_frames
@@ -54,6 +54,8 @@ def run(options: argparse.Namespace) -> int:
 
         load_matplotlib()
     frames = load_frames(options.frames, allow_nonfinite=True)
+    if not frames.n_frames:
+        raise FrameError(f"{options.frames}: holds a reference but no frame; nothing to reconstruct")
     model, blob, name = load_or_prebuilt(options.model)
     reconstructor = Reconstructor(model, engine=options.engine, blob=blob)
     try:
@@ -61,7 +63,10 @@ def run(options: argparse.Namespace) -> int:
     except EitskinError as error:
         raise type(error)(f"{options.frames} and {name}: {error}") from None
     _apply(options, reconstructor)
-    baseline = reconstructor.tare(frames.reference_voltage_v)
+    try:
+        baseline = reconstructor.tare(frames.reference_voltage_v)
+    except FrameError as error:
+        raise FrameError(f"{options.frames}: {error}; run  eitskin doctor {options.frames}") from None
     if baseline.correlation < MIN_CORRELATION:
         print(
             f"eitskin: warning: the reference correlates with the model by {baseline.correlation:.3f} only; "
@@ -70,11 +75,11 @@ def run(options: argparse.Namespace) -> int:
         )
     results, refused = _reconstruct_all(reconstructor, frames, _chosen(frames, options.only), options.warm)
     scores = _scores(reconstructor, frames, results, options.sign)
-    if options.output is not None:
+    if options.output is not None and results:
         from eitskin.frames.results_file import save_results
 
         save_results(options.output, model, frames, results)
-    if options.picture is not None:
+    if options.picture is not None and results:
         from eitskin.view.frame_pictures import draw_results
 
         draw_results(options.picture, model, frames, results, scores)
