@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
-import eitskin
+from fresh_python import MAIN, run_python, without
 
-BLOCKED = ("scipy", "netgen", "matplotlib", "sklearn")
-BLOCK = f"import sys\nfor name in {BLOCKED!r}:\n    sys.modules[name] = None\n"
+BLOCK = without("scipy", "netgen", "matplotlib", "sklearn")
 RECONSTRUCT = """
 import json, sys
 import numpy as np
@@ -31,23 +26,8 @@ print(json.dumps(facts))
 """
 
 
-def run(code: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """A fresh Python on ``code``."""
-    root = str(Path(eitskin.__file__).parents[1])
-    path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
-        cwd=cwd,
-        timeout=60,
-        check=False,
-    )
-
-
 def test_reconstruction_where_they_cannot_be_imported() -> None:
-    done = run(BLOCK + RECONSTRUCT)
+    done = run_python(BLOCK + RECONSTRUCT)
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
     for engine in ("c", "c64", "numpy"):
@@ -57,22 +37,19 @@ def test_reconstruction_where_they_cannot_be_imported() -> None:
 
 
 def test_reconstruction_does_not_import_them_where_it_could() -> None:
-    done = run(RECONSTRUCT)
+    done = run_python(RECONSTRUCT)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["loaded"] == []
 
 
-MAIN = "\nfrom eitskin.cli.main import main\nsys.exit(main(sys.argv[1:]))\n"
-
-
 def test_info_and_verify_of_the_prebuilt_model() -> None:
     for action in ("info", "verify"):
-        done = run(BLOCK + MAIN, "model", action, "--json")
+        done = run_python(BLOCK + MAIN, "model", action, "--json")
         assert (done.returncode, done.stderr) == (0, "")
         assert json.loads(done.stdout)["model"] == "prebuilt paper skin"
 
 
 def test_the_parser_is_light() -> None:
     """Help and refusals need nothing but the standard library: imports come when a command runs."""
-    done = run("import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\nprint('numpy' in sys.modules)")
+    done = run_python("import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\nprint('numpy' in sys.modules)")
     assert (done.returncode, done.stdout.strip()) == (0, "False")

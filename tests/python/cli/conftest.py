@@ -1,0 +1,75 @@
+"""Running the command line in this process, and the files that it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eitskin.cli.main import main
+from eitskin.frames.frames import save_frames
+from small_models import session
+
+Refused = Callable[..., str]
+
+
+@pytest.fixture(scope="session")
+def frames_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Twenty simulated frames of the paper's skin with their truth."""
+    path = tmp_path_factory.mktemp("frames") / "frames.npz"
+    save_frames(path, session().as_frames())
+    return path
+
+
+@pytest.fixture
+def changed_frames(frames_file: Path, tmp_path: Path) -> Callable[..., Path]:
+    """Write the frames file with fields replaced (None: left out), past the checks of ``save_frames``."""
+
+    def write(name: str = "changed.npz", first: int | None = None, **changes: Any) -> Path:
+        fields = dict(np.load(frames_file)) | changes
+        if first is not None:
+            kept = fields["touch_frame"] < first
+            for key in ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"):
+                fields[key] = fields[key][kept]
+            for key in ("voltage_v", "frame_name"):
+                fields[key] = fields[key][:first]
+        path = tmp_path / name
+        np.savez(path, **{key: value for key, value in fields.items() if value is not None})
+        return path
+
+    return write
+
+
+@pytest.fixture
+def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
+    """Run the command; it must give ``code``, one line on stderr, nothing on stdout, and no new file. Returns the line."""
+
+    def run(code: int, *arguments: object) -> str:
+        before = sorted(tmp_path.rglob("*"))
+        capsys.readouterr()
+        assert main([str(argument) for argument in arguments]) == code
+        out, err = capsys.readouterr()
+        assert err.endswith("\n") and err.count("\n") == 1, err
+        assert err.startswith("eitskin: ") and "Traceback" not in err
+        assert out == ""
+        assert sorted(tmp_path.rglob("*")) == before
+        return err[len("eitskin: ") : -1]
+
+    return run
+
+
+@pytest.fixture
+def done(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run the command; it must succeed in silence on stderr. Returns what it printed."""
+
+    def run(*arguments: object) -> str:
+        capsys.readouterr()
+        code = main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        assert (code, err) == (0, "")
+        return out
+
+    return run

@@ -1,0 +1,459 @@
+"""What the command line refuses: the documented exit code, one line that says what to do, no traceback, no file left."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitm_bytes import sealed
+from eitskin.cli.main import COMMANDS, build_parser, main
+from eitskin.skin.protocol import opposite
+from fresh_python import MAIN, run_python, without
+from small_models import prebuilt, session, small_blob
+
+Refused = Callable[..., str]
+
+USAGE, FILE, CONFIG, GEOMETRY, MODEL, PROTOCOL, FRAME, EXTRA, VERIFICATION = range(2, 11)
+
+
+# ---- arguments ----
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ([], "the following arguments are required: COMMAND"),
+        (["recnstruct"], "invalid choice: 'recnstruct'"),
+        (["model"], "required: ACTION"),
+        (["model", "build", "x.toml"], "required: -o/--output"),
+        (["model", "build", "x.toml", "-o", "x", "--storage", "f64"], "invalid choice: 'f64'"),
+        (["model", "build", "x.toml", "-o", "x", "--rank", "many"], "invalid int value: 'many'"),
+        (["model", "info", "--verbose"], "unrecognized arguments: --verbose"),
+        (["reconstruct"], "required: FRAMES.npz"),
+        (["reconstruct", "x.npz", "--engine", "gpu"], "invalid choice: 'gpu'"),
+        (["reconstruct", "x.npz", "--gap", "1e"], "invalid float value: '1e'"),
+    ],
+)
+def test_arguments_that_cannot_be_parsed(refused: Refused, arguments: list[str], text: str) -> None:
+    line = refused(USAGE, *arguments)
+    assert text in line and line.endswith("--help")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([command, "--help"])
+    assert end.value.code == 0
+    assert f"usage: eitskin {command}" in capsys.readouterr().out
+    assert command in build_parser().format_help()
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0 and capsys.readouterr().out == "eitskin 0.1.0\n"
+
+
+# ---- models ----
+
+
+def newer(blob: bytes) -> bytes:
+    changed = bytearray(blob)
+    struct.pack_into("<H", changed, 4, 9)
+    return sealed(changed)
+
+
+def corrupted(blob: bytes) -> bytes:
+    changed = bytearray(blob)
+    changed[len(blob) // 2] ^= 4
+    return bytes(changed)
+
+
+MODELS = {
+    "truncated": (lambda blob: blob[: len(blob) // 2], "is truncated"),
+    "cut in the header": (lambda blob: blob[:40], "is truncated (40 bytes)"),
+    "corrupted": (corrupted, "is corrupted"),
+    "newer": (newer, "format is 9.0, this eitskin reads 1.x"),
+    "foreign": (lambda blob: b"\x93NUMPY" + blob, "is not an .eitm model"),
+    "empty": (lambda blob: b"", "is not an .eitm model"),
+}
+
+
+@pytest.mark.parametrize("command", [("model", "info"), ("model", "info", "--json"), ("model", "verify"), ("reconstruct",)])
+@pytest.mark.parametrize("kind", MODELS)
+def test_models_that_cannot_be_read(
+    kind: str, command: tuple[str, ...], refused: Refused, tmp_path: Path, frames_file: Path
+) -> None:
+    change, text = MODELS[kind]
+    path = tmp_path / "bad.eitm"
+    path.write_bytes(change(small_blob()))
+    if command[0] == "model":
+        line = refused(MODEL, *command, path)
+    else:
+        output = tmp_path / "out.npz"
+        line = refused(MODEL, *command, frames_file, "--model", path, "-o", output, "--picture", tmp_path / "out.png")
+    assert str(path) in line and text in line and ";" in line
+
+
+def test_a_golden_image_of_other_bits_fails_verification(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One bit of the stored image: read without complaint, but not what this core gives."""
+    blob = bytearray(small_blob())
+    from eitm_bytes import sections_of
+
+    place = sections_of(blob)["GOLD"]
+    image = np.frombuffer(bytes(blob), "<f4", (place.size - 4 * 416) // 4, place.offset + 4 * 416)
+    at = place.offset + 4 * 416 + 4 * int(np.argmax(image))
+    blob[at] ^= 1
+    path = tmp_path / "bits.eitm"
+    path.write_bytes(sealed(blob))
+    assert main(["model", "verify", str(path)]) == VERIFICATION
+    out, err = capsys.readouterr()
+    assert "does not give the golden image's bits" in err and err.count("\n") == 1
+    assert "C float32" in out
+
+
+# ---- frames ----
+
+FIRST = session().frames_v[:1]
+
+
+def with_nan(count: int) -> np.ndarray:
+    values = FIRST.copy()
+    values[0, :count] = np.nan
+    return values
+
+
+@pytest.mark.parametrize(
+    ("voltage", "text"),
+    [
+        (with_nan(150), "too many channels"),
+        (np.full((1, 208), np.inf), "too many channels"),
+        (np.zeros((1, 208)), "all voltages are zero; is the skin driven and connected?"),
+    ],
+    ids=["nan", "inf", "zero"],
+)
+@pytest.mark.parametrize("engine", ["c", "numpy"])
+def test_frames_that_cannot_be_used(
+    voltage: np.ndarray, text: str, engine: str, tmp_path: Path, changed_frames: Callable[..., Path],
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """The frame is named on its one line; nothing is written where nothing could be done."""
+    path = changed_frames(first=1, voltage_v=voltage)
+    outputs = ["-o", str(tmp_path / "out.npz"), "--picture", str(tmp_path / "out.png")]
+    assert main(["reconstruct", str(path), "--engine", engine, *outputs]) == FRAME
+    err = capsys.readouterr().err
+    assert err.startswith(f"eitskin: {path}: frame 0 (test-s3-0) refused: ") and err.count("\n") == 1
+    assert text in err
+    assert [entry.name for entry in tmp_path.iterdir()] == ["changed.npz"]
+
+
+def test_saturated_frames(changed_frames: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    """Every channel at the rail, told by --saturation-v."""
+    path = changed_frames(first=1, voltage_v=np.where(FIRST < 0, -3.3, 3.3))
+    assert main(["reconstruct", str(path), "--saturation-v", "3.3"]) == FRAME
+    err = capsys.readouterr().err
+    assert "too many channels" in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(np.nan, "too many channels"), (np.inf, "too many channels"), (0.0, "all voltages are zero")],
+)
+def test_references_that_cannot_be_used(
+    value: float, text: str, refused: Refused, changed_frames: Callable[..., Path], tmp_path: Path
+) -> None:
+    quiet = session().quiet_v.copy()
+    if value:
+        quiet[7, 20] = value
+    else:
+        quiet[:] = 0
+    path = changed_frames(first=1, reference_voltage_v=quiet)
+    line = refused(FRAME, "reconstruct", path, "-o", tmp_path / "out.npz")
+    assert text in line and line.endswith(f"run  eitskin doctor {path}")
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "text"),
+    [
+        ({"voltage_v": np.ones((1, 207))}, FRAME, "voltage_v"),
+        ({"voltage_v": np.ones(208)}, FRAME, "voltage_v"),
+        ({"voltage_v": np.array([["a"] * 208])}, FRAME, "voltage_v"),
+        ({"voltage_v": np.ones((0, 208)), "frame_name": np.zeros(0, "U1")}, FRAME, "nothing to reconstruct"),
+        ({"reference_voltage_v": np.ones((2, 200))}, FRAME, "reference_voltage_v"),
+        ({"voltage_v": None}, FRAME, "'voltage_v' is missing"),
+        ({"version": np.array(2)}, FRAME, "format version 2"),
+        ({"drive_measure": opposite(16).drive_measure}, FRAME, "voltage_v"),
+        ({"drive_measure": np.full((208, 4), 3, np.uint8)}, PROTOCOL, "two different electrodes"),
+        ({"n_electrodes": np.array(12)}, PROTOCOL, "electrodes are 0 to 11"),
+    ],
+)
+def test_frames_files_that_cannot_be_read(
+    changes: dict[str, np.ndarray], code: int, text: str, refused: Refused, changed_frames: Callable[..., Path],
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    empty = {"touch_frame": None, "touch_xy_mm": None, "touch_radius_mm": None, "touch_strength": None, "touch_sign": None}
+    path = changed_frames(**({"voltage_v": FIRST, "frame_name": np.array(["a"])} | empty | changes))
+    line = refused(code, "reconstruct", path, "-o", tmp_path / "out.npz", "--picture", tmp_path / "out.png")
+    assert str(path) in line and text in line
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04 broken"])
+def test_what_is_no_frames_file(content: bytes, refused: Refused, tmp_path: Path) -> None:
+    path = tmp_path / "x.npz"
+    path.write_bytes(content)
+    assert str(path) in refused(FILE, "reconstruct", path)
+
+
+def test_another_protocol_names_both_hashes_and_files(
+    refused: Refused, changed_frames: Callable[..., Path], tmp_path: Path
+) -> None:
+    rows = prebuilt()[0].protocol.drive_measure[::-1].copy()
+    path = changed_frames(drive_measure=rows)
+    line = refused(PROTOCOL, "reconstruct", path, "-o", tmp_path / "out.npz")
+    assert str(path) in line and "prebuilt paper skin" in line
+    assert f"{prebuilt()[0].protocol.hash:016x}" in line and line.count("(16 electrodes, 208 rows)") == 2
+
+
+# ---- skins ----
+
+DISK = "[skin]\ndiameter_mm = 100.0\n"
+
+
+def points(*corners: tuple[float, float]) -> str:
+    return f"[skin]\npolygon_mm = {[list(corner) for corner in corners]}\n"
+
+
+SKINS = {
+    "self-intersecting": (points((0, 0), (100, 100), (100, 0), (0, 100)), GEOMETRY, "crosses or touches itself"),
+    "tiny": (points((0, 0), (0.4, 0), (0, 0.4)), GEOMETRY, "are the units mm?"),
+    "two points": (points((0, 0), (50, 0)), GEOMETRY, "a polygon needs 3"),
+    "not finite": ("[skin]\npolygon_mm = [[0,0],[nan,1],[5,5]]\n", GEOMETRY, "not finite"),
+    "tiny disk": ("[skin]\ndiameter_mm = 0.5\n", CONFIG, "diameter_mm = 0.5 is out of range"),
+    "overlapping electrodes": (DISK + "[electrodes]\nwidth_mm = 30.0\n", GEOMETRY, "do not fit on a rim of 314"),
+    "two electrodes at one place": (
+        DISK + "[electrodes]\ncount = 4\nwidth_mm = 5.0\npositions_mm = [0.0, 3.0, 100.0, 200.0]\n",
+        GEOMETRY,
+        "electrodes 0 and 1 (from 0) overlap",
+    ),
+    "unknown key": (DISK + "thicknes_mm = 3.0\n", CONFIG, "unknown key 'thicknes_mm'; did you mean 'thickness_mm'?"),
+    "unknown table": (DISK + "[electrode]\ncount = 8\n", CONFIG, "unknown key 'electrode'; did you mean 'electrodes'?"),
+    "unknown kind": (DISK + '[protocol]\nkind = "adjacnt"\n', CONFIG, "did you mean 'adjacent'?"),
+    "wrong type": (DISK + 'thickness_mm = "thick"\n', CONFIG, "thickness_mm must be a number"),
+    "out of range": (DISK + "conductivity_s_per_m = -0.1\n", CONFIG, "conductivity_s_per_m = -0.1 is out of range"),
+    "no outline": ("[skin]\nname = 'x'\n", CONFIG, "give either diameter_mm or polygon_mm"),
+    "nothing": ("", CONFIG, "[skin] is needed"),
+    "odd opposite": (DISK + '[electrodes]\ncount = 15\n[protocol]\nkind = "opposite"\n', PROTOCOL, "even number"),
+    "electrode that is not there": (
+        DISK + '[protocol]\nkind = "table"\ntable = [[0, 1, 2, 16]]\n', PROTOCOL, "electrodes are 0 to 15"
+    ),
+    "invalid TOML": ("[skin\ndiameter_mm = 100", CONFIG, "not valid TOML"),
+    "repeated key": (DISK + "diameter_mm = 90.0\n", CONFIG, "not valid TOML"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", SKINS)
+def test_skins_that_cannot_be(kind: str, refused: Refused, tmp_path: Path) -> None:
+    content, code, text = SKINS[kind]
+    path = tmp_path / "skin.toml"
+    path.write_text(content)
+    line = refused(code, "model", "build", path, "-o", tmp_path / "out.eitm")
+    assert line.startswith(str(path)) and text in line
+
+
+def test_a_description_that_is_no_text(refused: Refused, tmp_path: Path) -> None:
+    path = tmp_path / "skin.toml"
+    path.write_bytes(b"[skin]\nname = '\xff\xfe'\n")
+    assert "not UTF-8" in refused(CONFIG, "model", "build", path, "-o", tmp_path / "out.eitm")
+    path.write_bytes("[skin]\nname = 'x'\n".encode("utf-16"))
+    assert "not UTF-8" in refused(CONFIG, "model", "build", path, "-o", tmp_path / "out.eitm")
+
+
+# ---- files ----
+
+
+def test_missing_files(refused: Refused, tmp_path: Path, frames_file: Path) -> None:
+    none, output = tmp_path / "none", tmp_path / "out"
+    assert "no such skin description; check the path" in refused(FILE, "model", "build", none, "-o", output)
+    assert "no such model; check the path" in refused(FILE, "model", "info", none)
+    assert "no such model" in refused(FILE, "model", "verify", none)
+    assert "no such frames file; check the path" in refused(FILE, "reconstruct", none)
+    assert "no such model" in refused(FILE, "reconstruct", frames_file, "--model", none, "-o", output)
+    assert "no such skin description" in refused(FILE, "compare", "--skin", none)
+
+
+def test_folders_instead_of_files(refused: Refused, tmp_path: Path, frames_file: Path) -> None:
+    for arguments in (
+        ("model", "info", tmp_path),
+        ("model", "build", tmp_path, "-o", tmp_path / "out.eitm"),
+        ("reconstruct", tmp_path),
+        ("reconstruct", frames_file, "--model", tmp_path),
+    ):
+        assert str(tmp_path) in refused(FILE, *arguments)
+
+
+@pytest.mark.parametrize("place", ["none/out", "."])
+def test_outputs_are_checked_before_the_work(place: str, refused: Refused, tmp_path: Path, frames_file: Path) -> None:
+    """A folder that does not exist, and a folder where a file is wanted; nothing was read or computed before."""
+    output = tmp_path / place
+    text = "does not exist; make it first" if place != "." else "this is a folder"
+    for arguments in (
+        ("model", "build", "--paper", "-o", output),
+        ("reconstruct", "unread.npz", "-o", output),
+        ("reconstruct", "unread.npz", "--picture", output),
+        ("demo", "--picture", output),
+    ):
+        assert text in refused(FILE, *arguments)
+    if place != ".":
+        assert text in refused(FILE, "compare", "--csv", output)
+
+
+def test_a_disk_that_is_full(
+    refused: Refused, tmp_path: Path, frames_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Path, target: Path) -> Path:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    output = tmp_path / "out.npz"
+    line = refused(FILE, "reconstruct", frames_file, "-o", output)
+    assert line == f"{output}: cannot write it (No space left on device)"
+
+
+def test_a_folder_that_cannot_be_written(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a plain user sees it; simulated, since tests may run as root."""
+
+    def forbidden(*arguments: object, **keywords: object) -> tuple[int, str]:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("eitskin.fileio.tempfile.mkstemp", forbidden)
+    skin = tmp_path / "skin.toml"
+    skin.write_text(DISK)
+    line = refused(FILE, "model", "build", skin, "-o", tmp_path / "out.eitm", "--elements", 800, "--pixels", 8)
+    assert "cannot write there (Permission denied)" in line
+
+
+# ---- options ----
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--iterations", "0"], "--iterations 0 is out of range; use 1 to 1000000"),
+        (["--iterations", "-5"], "--iterations -5 is out of range"),
+        (["--iterations", "2000000"], "--iterations 2000000 is out of range"),
+        (["--gap", "0"], "--gap 0 is out of range"),
+        (["--gap", "1.5"], "--gap 1.5 is out of range"),
+        (["--gap", "nan"], "--gap nan is out of range"),
+        (["--saturation-v", "-1"], "--saturation-v -1 must be above 0"),
+        (["--saturation-v", "inf"], "saturation_v = inf is out of range"),
+        (["--only", "test-s3-99"], "no frame is named 'test-s3-99'; did you mean 'test-s3-"),
+    ],
+)
+def test_options_of_reconstruct(arguments: list[str], text: str, refused: Refused, frames_file: Path) -> None:
+    assert text in refused(USAGE, "reconstruct", frames_file, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--rank", "-1"], "rank = -1 is out of range"),
+        (["--rank", "2000"], "rank = 2000 is out of range"),
+        (["--pixels", "2"], "2 pixels across is out of range"),
+        (["--pixels", "512"], "pixels are more than a model's 65535"),
+        (["--elements", "99"], "--elements 99 is out of range"),
+        (["--elements", "600000"], "--elements 600000 is out of range"),
+        (["--touch-change", "-1"], "--touch-change -1 is out of range"),
+        (["--touch-change", "nan"], "--touch-change nan is out of range"),
+        (["--floor", "-1", "--elements", "800", "--pixels", "8"], "floor"),
+        (["skin.toml"], "name a SKIN.toml, or give --paper, not both"),
+    ],
+)
+def test_options_of_model_build(arguments: list[str], text: str, refused: Refused, tmp_path: Path) -> None:
+    assert text in refused(USAGE, "model", "build", "--paper", "-o", tmp_path / "out.eitm", *arguments)
+
+
+def test_neither_a_skin_nor_the_paper(refused: Refused, tmp_path: Path) -> None:
+    assert "name a SKIN.toml, or give --paper" in refused(USAGE, "model", "build", "-o", tmp_path / "out.eitm")
+
+
+@pytest.mark.parametrize("arguments", [["--snr-db", "-30"], ["--snr-db", "nan"], ["--seed", "-1"]])
+def test_options_of_the_demo(arguments: list[str], refused: Refused, tmp_path: Path) -> None:
+    assert "demo:" in refused(USAGE, "demo", "--picture", tmp_path / "out.png", *arguments)
+
+
+# ---- extras ----
+
+
+@pytest.mark.parametrize(
+    ("package", "extra", "arguments"),
+    [
+        ("scipy", "model", ["model", "build", "--paper", "-o", "OUT"]),
+        ("netgen", "model", ["model", "build", "--paper", "-o", "OUT"]),
+        ("scipy", "model", ["compare", "--scenes", "2", "--train", "2", "--csv", "OUT"]),
+        ("netgen", "model", ["compare", "--scenes", "2", "--train", "2", "--csv", "OUT"]),
+        ("matplotlib", "plot", ["compare", "--scenes", "2", "--train", "2", "--picture", "OUT"]),
+        ("matplotlib", "plot", ["reconstruct", "FRAMES", "-o", "OUT", "--picture", "OUT"]),
+        ("matplotlib", "plot", ["demo", "--picture", "OUT"]),
+        ("scipy", "model", ["demo", "--picture", "OUT"]),
+        ("netgen", "model", ["demo", "--picture", "OUT"]),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else value,
+)
+def test_missing_extras_are_named_with_the_command_to_install_them(
+    package: str, extra: str, arguments: list[str], tmp_path: Path, frames_file: Path
+) -> None:
+    given = [{"OUT": tmp_path / "out", "FRAMES": frames_file}.get(a, a) for a in arguments]
+    done = run_python(without(package) + MAIN, *given)
+    assert (done.returncode, done.stdout) == (EXTRA, "")
+    assert done.stderr.startswith("eitskin: ") and done.stderr.count("\n") == 1
+    assert package in done.stderr and done.stderr.endswith(f"run  pip install 'eitskin[{extra}]'\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_scipy_frames_are_reconstructed_but_not_scored(frames_file: Path, tmp_path: Path) -> None:
+    output = tmp_path / "out.npz"
+    done = run_python(without("scipy", "netgen", "matplotlib") + MAIN, "reconstruct", frames_file, "-o", output)
+    assert done.returncode == 0
+    assert "20 frames, 0 refused" in done.stdout and "against the truth" not in done.stdout
+    assert done.stderr.startswith("eitskin: warning: not held against the truth") and done.stderr.count("\n") == 1
+    assert output.exists()
+
+
+# ---- ends ----
+
+
+def test_an_interrupt_is_said_and_coded(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", interrupted)
+    assert refused(130, "model", "info") == "stopped"
+
+
+def test_a_traceback_where_it_is_asked_for(tmp_path: Path) -> None:
+    from eitskin.errors import FileError
+
+    with pytest.raises(FileError):
+        main(["--traceback", "model", "info", str(tmp_path / "none")])
+
+
+def test_a_reader_that_stops_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: object) -> None:
+        raise BrokenPipeError
+
+    class Closable:
+        closed = False
+
+        def close(self) -> None:
+            self.closed = True
+
+    stderr = Closable()
+    monkeypatch.setattr("eitskin.model.prebuilt.load_prebuilt", broken)
+    monkeypatch.setattr(sys, "stderr", stderr)
+    assert main(["model", "info"]) == 0
+    assert stderr.closed

@@ -1,0 +1,29 @@
+"""A fresh Python process for what must not depend on what tests have imported before."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import eitskin
+
+MAIN = "import sys\nfrom eitskin.cli.main import main\nsys.exit(main(sys.argv[1:]))\n"
+
+
+def without(*packages: str) -> str:
+    """Code that makes ``packages`` unimportable, as if they were not installed."""
+    return "import sys\n" + "".join(f"sys.modules[{name!r}] = None\n" for name in packages)
+
+
+def run_python(code: str, *arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run ``code`` with this project importable."""
+    return run_command([sys.executable, "-c", code, *map(str, arguments)], cwd=cwd)
+
+
+def run_command(command: list[str], cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run ``command`` with this project importable, one thread in BLAS."""
+    path = os.pathsep.join(filter(None, [str(Path(eitskin.__file__).parents[1]), os.environ.get("PYTHONPATH")]))
+    environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=cwd, timeout=120, check=False)
