@@ -328,15 +328,18 @@ static void keep_real(eits_context *ctx, fit *f)
     }
 }
 
-static void report(const fit *f, eits_touch *out)
+/* A disc's covers (disc.h) add up to pi (radius^2 + pixel^2 / 12), averaged over its places, where the radius is at least half
+ * a pixel: that is the area its change was fitted with. */
+static void report(const fit *f, eits_real pixel_mm, eits_touch *out)
 {
+    const eits_real soft_edge = pixel_mm * pixel_mm / 12;
     for (uint32_t k = 0; k < f->count; ++k) {
         const eits_disc *disc = &f->disc[k];
         const eits_touch touch = {
             .x_mm = disc->x_mm,
             .y_mm = disc->y_mm,
             .radius_mm = disc->radius_mm,
-            .strength_s_per_m_mm2 = disc->change * PI * disc->radius_mm * disc->radius_mm,
+            .strength_s_per_m_mm2 = disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, soft_edge),
             .confidence = f->explained[k] < 1 ? f->explained[k] : 1,
         };
         uint32_t place = k;
@@ -365,7 +368,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         move_all(ctx, &f, ctx->options.touch_sweeps);
         keep_real(ctx, &f);
     }
-    report(&f, found);
+    report(&f, (eits_real)ctx->model->pixel_mm, found);
     eits_track(ctx, found, f.count);
     ctx->info.touches = f.count;
     ctx->info.touch_macs = f.macs;

