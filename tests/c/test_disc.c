@@ -59,6 +59,36 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
     return covered;
 }
 
+/* What a touch's strength is made of: the covers' sum, averaged over places, is pi (radius^2 + pixel^2 / 12). */
+static void area(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
+    const double pixel = (double)b.c.model.pixel_mm;
+    for (double radius = 3; radius <= 15; radius += 4) {
+        double sum = 0;
+        for (int place = 0; place < 24 * 24; ++place) {
+            const eits_disc disc = {.x_mm = (eits_real)(place % 24 * pixel / 24),
+                                    .y_mm = (eits_real)(place / 24 * pixel / 24),
+                                    .radius_mm = (eits_real)radius};
+            eits_real atom[EITS_STRIDE(RANK)];
+            (void)eits_disc_atom(ctx, &disc, atom, NULL);
+            /* the first row of S is constant, but the weights are not: their covers are in list_value */
+            const double reach = radius / pixel + 0.5;
+            uint32_t k = 0;
+            for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) {
+                const double dx = (double)b.c.model.pixel[j].ix + 0.5 - SIDE / 2.0 - place % 24 / 24.0;
+                const double dy = (double)b.c.model.pixel[j].iy + 0.5 - SIDE / 2.0 - place / 24 / 24.0;
+                if (hypot(dx, dy) >= reach - 1e-6 || k >= ctx->model->n_pixels || ctx->list_index[k] != j)
+                    continue;
+                sum += (double)ctx->list_value[k++] * (double)b.c.model.column_weight[j] * pixel * pixel / (24 * 24);
+            }
+        }
+        CHECK_NEAR(sum, 3.14159265358979 * (radius * radius + pixel * pixel / 12), 0.005 * sum);
+    }
+    tear_down(&b);
+}
+
 static eits_disc random_disc(uint64_t *state)
 {
     const eits_disc disc = {.x_mm = (eits_real)(45 * small_random(state)), /* the image ends at 36 mm */
@@ -184,6 +214,7 @@ static void derivatives(void)
 int main(void)
 {
     responses();
+    area();
     far_away_there_is_nothing();
     derivatives();
     return checks_report("disc");
