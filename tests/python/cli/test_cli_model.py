@@ -1,0 +1,176 @@
+"""``eitskin model``: from a description to a model, what is in it, and that it verifies."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitm_bytes import sections_of
+from eitskin.model.eitm import load_model
+from eitskin.model.model import Defaults
+from eitskin.skin.skin import load_skin
+from fresh_python import run_command, run_python
+from small_models import prebuilt
+
+Done = Callable[..., str]
+
+SKIN = """
+[skin]
+name = "palm"
+{outline}
+thickness_mm = 6.0
+conductivity_s_per_m = 0.02
+
+[electrodes]
+count = {count}
+width_mm = 3.0
+
+[protocol]
+kind = "{kind}"
+"""
+OUTLINES = {
+    "disk": "diameter_mm = 120.0",
+    "L": "polygon_mm = [[0, 0], [100, 0], [100, 40], [40, 40], [40, 100], [0, 100]]",
+    "clockwise L": "polygon_mm = [[0, 100], [40, 100], [40, 40], [100, 40], [100, 0], [0, 0]]",
+}
+FACTS = (
+    "model", "bytes", "made_by", "skin", "electrodes", "protocol_rows", "protocol_hash", "folded_rows", "rank", "pixels",
+    "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "defaults",
+)  # fmt: skip
+QUICK = ("--elements", "900", "--pixels", "14")
+
+
+def write_skin(folder: Path, outline: str = "disk", count: int = 16, kind: str = "adjacent") -> Path:
+    path = folder / "skin.toml"
+    path.write_text(SKIN.format(outline=OUTLINES[outline], count=count, kind=kind))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("outline", "count", "kind", "options", "expected"),
+    [
+        ("disk", 16, "adjacent", [], {"protocol_rows": 208, "folded_rows": 104, "rank": 64, "storage": "f32"}),
+        ("disk", 32, "adjacent", ["--storage", "i8"], {"protocol_rows": 928, "folded_rows": 464, "rank": 64, "storage": "i8"}),
+        ("L", 16, "opposite", ["--rank", "20", "--storage", "f16"], {"protocol_rows": 192, "rank": 20, "storage": "f16"}),
+        ("clockwise L", 8, "adjacent", ["--data", "log-ratio"], {"protocol_rows": 40, "rank": 20, "data": "log-ratio"}),
+    ],
+)
+def test_build_info_verify(
+    outline: str, count: int, kind: str, options: list[str], expected: dict[str, object], done: Done, tmp_path: Path
+) -> None:
+    skin, model = write_skin(tmp_path, outline, count, kind), tmp_path / "palm.eitm"
+    built = json.loads(done("model", "build", skin, "-o", model, "--json", *QUICK, *options))
+    assert tuple(built) == FACTS
+    assert json.loads(done("model", "info", model, "--json")) == built
+    assert built == built | expected
+    assert built["bytes"] == model.stat().st_size and built["skin"] == "palm" and built["electrodes"] == count
+    assert built["protocol_hash"] == f"{load_skin(skin)[1].hash:016x}"
+    assert set(built["defaults"]) == set(asdict(Defaults()))
+    assert load_model(model)[0].skin == load_skin(skin)[0]
+    verified = json.loads(done("model", "verify", model, "--json"))
+    differences = verified["difference_to_golden_over_peak"]
+    assert verified["ok"] is True and verified["model"] == str(model)
+    assert differences["C float32"] == differences["C float32, portable"] == 0
+    assert 0 < differences["C float64"] < 1e-4 and 0 < differences["numpy float64"] < 1e-4
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["palm.eitm", "skin.toml"]
+
+
+def test_a_clockwise_outline_is_the_same_skin(done: Done, tmp_path: Path) -> None:
+    """Orientation is normalised: the same area, pixels and electrodes, wherever the list of points begins."""
+    models = {}
+    for outline in ("L", "clockwise L"):
+        skin, path = write_skin(tmp_path, outline), tmp_path / f"{outline}.eitm"
+        done("model", "build", skin, "-o", path, *QUICK)
+        models[outline] = load_model(path)[0]
+    a, b = models.values()
+    assert (a.grid.index == b.grid.index).all()
+    assert a.skin.electrode_centres_mm() == pytest.approx(b.skin.electrode_centres_mm(), abs=1e-6)
+    assert a.v_ref_v == pytest.approx(b.v_ref_v, rel=0.05)
+    assert np.corrcoef(a.golden.image, b.golden.image)[0, 1] > 0.99
+
+
+def test_touch_change_and_floor_reach_the_model(done: Done, tmp_path: Path) -> None:
+    skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
+    facts = json.loads(done("model", "build", skin, "-o", path, "--json", "--touch-change", "2", "--floor", "0.1", *QUICK))
+    assert facts["defaults"]["touch_change_s_per_m"] == 0.04
+    assert facts["lipschitz"] == pytest.approx(1 / 1.1, rel=2e-4)
+
+
+def test_the_prebuilt_model_for_people(done: Done) -> None:
+    text = done("model", "info")
+    assert "protocol hash    73aa164087184d25" in text and "rank             64" in text
+    assert "defaults         iterations 60" in text
+    text = done("model", "verify")
+    assert text.count("the same bits") == 2 and "numpy float64" in text
+    facts = json.loads(done("model", "info", "--json"))
+    assert facts["bytes"] == len(prebuilt()[1]) and facts["pixels"] == 812
+
+
+def test_building_twice_gives_the_same_bytes(done: Done, tmp_path: Path) -> None:
+    skin = write_skin(tmp_path)
+    for name in ("a.eitm", "b.eitm"):
+        done("model", "build", skin, "-o", tmp_path / name, *QUICK)
+    assert (tmp_path / "a.eitm").read_bytes() == (tmp_path / "b.eitm").read_bytes()
+
+
+def test_building_over_an_old_model_replaces_it_whole(done: Done, tmp_path: Path) -> None:
+    skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
+    path.write_bytes(b"old")
+    done("model", "build", skin, "-o", path, *QUICK)
+    assert struct.unpack_from("<I", path.read_bytes(), 8)[0] == path.stat().st_size
+    assert "META" in sections_of(path.read_bytes())
+
+
+def test_in_a_process_of_its_own(tmp_path: Path) -> None:
+    """The module as users run it: exit codes, streams, and output in pipes."""
+    import sys
+
+    command = [sys.executable, "-m", "eitskin.cli.main"]
+    skin = write_skin(tmp_path)
+    built = run_command([*command, "model", "build", "skin.toml", "-o", "palm.eitm", "--json", *QUICK], cwd=tmp_path)
+    assert (built.returncode, built.stderr) == (0, "")
+    assert json.loads(built.stdout)["model"] == "palm.eitm"
+    skin.write_text(skin.read_text().replace("thickness_mm", "thicknes_mm"))
+    refused = run_command([*command, "model", "build", "skin.toml", "-o", "other.eitm"], cwd=tmp_path)
+    assert (refused.returncode, refused.stdout) == (4, "")
+    assert refused.stderr == "eitskin: skin.toml [skin]: unknown key 'thicknes_mm'; did you mean 'thickness_mm'?\n"
+    (tmp_path / "palm.eitm").write_bytes((tmp_path / "palm.eitm").read_bytes()[:-16])
+    broken = run_command([*command, "model", "verify", "palm.eitm"], cwd=tmp_path)
+    assert broken.returncode == 6 and broken.stderr.startswith("eitskin: palm.eitm: the model is truncated")
+    wrong = run_command([*command, "model", "verfy"], cwd=tmp_path)
+    assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1
+    traced = run_command([*command, "--traceback", "model", "info", "none.eitm"], cwd=tmp_path)
+    assert traced.returncode == 1 and "FileError: none.eitm: no such model" in traced.stderr
+
+
+def test_a_pipe_that_closes_early_leaves_no_traceback() -> None:
+    import os
+    import subprocess
+    import sys
+
+    import eitskin
+
+    environment = {**os.environ, "PYTHONPATH": str(Path(eitskin.__file__).parents[1])}
+    with subprocess.Popen(
+        [sys.executable, "-u", "-m", "eitskin.cli.main", "model", "info", "--json"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        assert b"Traceback" not in process.stderr.read()
+
+
+def test_start_up_imports_little() -> None:
+    """Help needs no numpy; info needs neither scipy nor matplotlib."""
+    code = (
+        "import sys\nfrom eitskin.cli.main import main\nmain(sys.argv[1:])\n"
+        "print([name for name in ('scipy', 'matplotlib', 'netgen', 'sklearn') if name in sys.modules], file=sys.stderr)"
+    )
+    done = run_python(code, "model", "info")
+    assert (done.returncode, done.stderr) == (0, "[]\n")

@@ -1,0 +1,178 @@
+"""``eitskin reconstruct``: frames to touches, images, files and pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.cli.main import main
+from eitskin.frames.frames import load_frames, save_frames
+from eitskin.model.eitm import load_model
+from eitskin.scene.random_touches import TouchRules, random_touches
+from eitskin.scene.simulate import simulate
+from eitskin.skin.skin import load_skin
+from eitskin.solve.reconstructor import Reconstructor
+from small_models import prebuilt, session
+
+Done = Callable[..., str]
+
+PNG = b"\x89PNG\r\n\x1a\n"
+TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence"}
+INFO = {
+    "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs", "lambda", "lambda_max",
+    "lambda_noise", "gap", "gap_rel", "residual", "data_norm",
+}  # fmt: skip
+SUMMARY = {
+    "frames", "found", "true", "false", "position_median_mm", "position_worst_mm", "miou_image", "miou_touches",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
+def test_json(engine: str, done: Done, frames_file: Path) -> None:
+    facts = json.loads(done("reconstruct", frames_file, "--engine", engine, "--json"))
+    assert (facts["model"], facts["engine"], len(facts["frames"])) == ("prebuilt paper skin", engine, 20)
+    for number, frame in enumerate(facts["frames"]):
+        assert frame["frame"] == number and frame["name"] == f"test-s3-{number}"
+        assert set(frame["info"]) == INFO and frame["info"]["iterations"] == 60
+        assert all(set(touch) == TOUCH for touch in frame["touches"])
+        assert len(frame["touches"]) == frame["info"]["touches"]
+        assert 0.4 < frame["miou_image"] < 1 and 0.4 < frame["miou_touches"] < 1
+    summary = facts["summary"]
+    assert set(summary) == SUMMARY
+    assert summary["frames"] == 20
+    assert summary["true"] == sum(len(scene.touches) for scene in session().touches.scenes)
+    assert summary["found"] >= 0.9 * summary["true"] and summary["false"] <= 2
+    assert summary["position_median_mm"] < 1.5 < summary["position_worst_mm"] < 10
+    assert summary["miou_image"] > 0.8 and summary["miou_touches"] > 0.88
+
+
+def test_what_it_says_is_what_the_reconstructor_does(done: Done, frames_file: Path) -> None:
+    facts = json.loads(done("reconstruct", frames_file, "--json", "--iterations", "25", "--sign", "both"))
+    reconstructor = Reconstructor(*prebuilt()[:1], blob=prebuilt()[1])
+    reconstructor.with_options(iterations=25, sign="both")
+    reconstructor.tare(session().quiet_v)
+    for number in (0, 7, 19):
+        reconstructor.forget()
+        touches = reconstructor.reconstruct(session().frames_v[number]).touches
+        listed = facts["frames"][number]["touches"]
+        assert [(t["x_mm"], t["y_mm"]) for t in listed] == [(t.x_mm, t.y_mm) for t in touches]
+
+
+def test_options_reach_the_solver(done: Done, frames_file: Path, changed_frames: Callable[..., Path]) -> None:
+    facts = json.loads(done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000"))
+    assert {frame["info"]["stop"] for frame in facts["frames"]} == {"gap"}
+    assert all(frame["info"]["gap_rel"] <= 0.001 for frame in facts["frames"])
+    resting = changed_frames(voltage_v=np.repeat(session().frames_v[:1], 20, axis=0))
+    cold = json.loads(done("reconstruct", resting, "--json", "--iterations", "10"))["frames"]
+    warm = json.loads(done("reconstruct", resting, "--json", "--iterations", "10", "--warm"))["frames"]
+    assert cold[0]["info"]["gap"] == warm[0]["info"]["gap"] == cold[5]["info"]["gap"] > 2 * warm[5]["info"]["gap"]
+    assert len({frame["touches"][0]["id"] for frame in warm}) == 1 and cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
+    limit = str(0.999 * np.abs(session().frames_v).max())
+    masked = json.loads(done("reconstruct", frames_file, "--json", "--saturation-v", limit))
+    assert max(frame["info"]["masked"] for frame in masked["frames"]) >= 1
+    some = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-4,test-s3-11"))
+    assert [frame["frame"] for frame in some["frames"]] == [4, 11] and some["summary"]["frames"] == 2
+
+
+def test_for_people(done: Done, frames_file: Path) -> None:
+    text = done("reconstruct", frames_file)
+    lines = text.splitlines()
+    assert lines[0].split() == ["frame", "touch", "x", "mm", "y", "mm", "radius", "mm", "strength", "S/m", "mm2", "error", "mm"]
+    assert "20 frames, 0 refused; median " in text and " of " in lines[-1] and lines[-1].startswith("against the truth of 20")
+    assert sum(line.startswith("test-s3-") for line in lines) == 20
+
+
+def test_quiet_frames_show_nothing(done: Done, changed_frames: Callable[..., Path]) -> None:
+    quiet = session().quiet_v
+    empty = dict.fromkeys(["touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"])
+    names = np.array([f"q{k}" for k in range(8)])
+    path = changed_frames(voltage_v=quiet[:8], reference_voltage_v=quiet[8:], frame_name=names, **empty)
+    text = done("reconstruct", path)
+    assert text.count("none (no change above the noise)") >= 7
+    assert "against the truth" not in text
+    facts = json.loads(done("reconstruct", path, "--json"))
+    assert "summary" not in facts and {frame["info"]["stop"] for frame in facts["frames"]} <= {"gate", "iterations"}
+
+
+def test_output_and_picture(done: Done, frames_file: Path, tmp_path: Path) -> None:
+    output, picture = tmp_path / "out.npz", tmp_path / "out.png"
+    facts = json.loads(done("reconstruct", frames_file, "-o", output, "--picture", picture, "--json"))
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out.npz", "out.png"]
+    assert picture.read_bytes()[:8] == PNG and picture.stat().st_size > 20_000
+    with np.load(output, allow_pickle=False) as saved:
+        assert str(saved["format"]) == "eitskin-results"
+        assert saved["image_s_per_m"].shape == (20, 32, 32)
+        assert len(saved["touch_frame"]) == sum(len(frame["touches"]) for frame in facts["frames"])
+
+
+def test_a_bad_frame_among_good_ones(
+    changed_frames: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The others are done, written and listed; the exit code says that not all were."""
+    voltage = session().frames_v.copy()
+    voltage[3, :150] = np.nan
+    voltage[5] = 0
+    path, output = changed_frames(voltage_v=voltage), tmp_path / "out.npz"
+    assert main(["reconstruct", str(path), "--json", "-o", str(output)]) == 8
+    out, err = capsys.readouterr()
+    facts = json.loads(out)
+    assert ["refused" in frame for frame in facts["frames"]].count(True) == 2
+    assert "too many channels" in facts["frames"][3]["refused"] and "zero" in facts["frames"][5]["refused"]
+    lines = err.splitlines()
+    assert len(lines) == 2 and all(line.startswith(f"eitskin: {path}: frame ") for line in lines)
+    with np.load(output) as saved:
+        assert saved["frame"].tolist() == [k for k in range(20) if k not in (3, 5)]
+
+
+def test_a_reference_of_another_skin_is_warned_of(
+    changed_frames: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    order = np.random.default_rng(1).permutation(208)
+    path = changed_frames(voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order])
+    assert main(["reconstruct", str(path)]) == 0
+    err = capsys.readouterr().err
+    assert err.startswith("eitskin: warning: the reference correlates with the model by 0.") and err.count("\n") == 1
+    assert f"eitskin doctor {path}" in err
+
+
+def test_the_whole_way(done: Done, tmp_path: Path) -> None:
+    """A description to a model to simulated frames to touches, with one's own skin: an L with 24 electrodes."""
+    skin_file = tmp_path / "hand.toml"
+    skin_file.write_text(
+        "[skin]\nname = 'hand'\npolygon_mm = [[0,0],[160,0],[160,80],[80,80],[80,160],[0,160]]\nthickness_mm = 6.0\n"
+        "conductivity_s_per_m = 0.02\n[electrodes]\ncount = 24\nwidth_mm = 5.0\n[protocol]\nkind = 'skip'\nskip = 2\n"
+    )
+    model_file, frames_path = tmp_path / "hand.eitm", tmp_path / "frames.npz"
+    done("model", "build", skin_file, "-o", model_file)
+    assert json.loads(done("model", "info", model_file, "--json"))["skin"] == "hand"
+    done("model", "verify", model_file)
+    skin, protocol = load_skin(skin_file)
+    rules = TouchRules(count=(1, 2), radius_mm=(7, 10), gap_mm=20, rim_margin_mm=8)
+    save_frames(frames_path, simulate(skin, protocol, random_touches(skin.outline, 5, 12, rules=rules)).as_frames())
+    output, picture = tmp_path / "out.npz", tmp_path / "out.png"
+    facts = json.loads(
+        done("reconstruct", frames_path, "--model", model_file, "-o", output, "--picture", picture, "--json")
+    )
+    assert facts["model"] == str(model_file)
+    summary = facts["summary"]
+    assert summary["found"] >= 0.85 * summary["true"] and summary["false"] <= 2
+    assert summary["position_median_mm"] < 2 and summary["miou_image"] > 0.75 and summary["miou_touches"] > 0.8
+    assert picture.read_bytes()[:8] == PNG
+    with np.load(output) as saved:
+        grid = load_model(model_file)[0].grid
+        assert saved["image_s_per_m"].shape == (12, grid.ny, grid.nx)
+        assert np.isnan(saved["image_s_per_m"]).sum() == 12 * (grid.nx * grid.ny - grid.n_pixels)
+    assert load_frames(frames_path).n_frames == 12
+
+
+def test_the_demo(done: Done, tmp_path: Path) -> None:
+    facts = json.loads(done("demo", "--picture", tmp_path / "demo.png", "--json"))
+    assert (facts["hits"], facts["false"]) == (3, 0)
+    assert max(facts["position_errors_mm"]) < 1
+    assert (tmp_path / "demo.png").read_bytes()[:8] == PNG
+    assert facts["difference_to_numpy_over_peak"]["c_float32"] < 1e-4
+    assert facts["difference_to_numpy_over_peak"]["c_float64"] < 1e-12

@@ -1,0 +1,92 @@
+"""The results file: every field, its shape and unit, read without pickle."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.errors import FileError
+from eitskin.frames.results_file import save_results
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.solve.results import Reconstruction
+from small_models import prebuilt, session
+
+FIELDS = {
+    "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm", "touch_frame", "touch_id",
+    "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_confidence", "info",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[int, Reconstruction]:
+    """Frames 2, 0 and 9, asked for in this order."""
+    reconstructor = Reconstructor(prebuilt()[0])
+    reconstructor.tare(session().quiet_v)
+    return {number: reconstructor.reconstruct(session().frames_v[number]) for number in (2, 0, 9)}
+
+
+def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
+    path, model = tmp_path / "out.npz", prebuilt()[0]
+    save_results(path, model, session().as_frames(), results)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out.npz"]
+    with np.load(path, allow_pickle=False) as archive:
+        saved = {name: archive[name] for name in archive.files}
+    assert set(saved) == FIELDS
+    assert (str(saved["format"]), int(saved["version"])) == ("eitskin-results", 1)
+    assert saved["frame"].tolist() == [0, 2, 9]
+    assert saved["frame_name"].tolist() == ["test-s3-0", "test-s3-2", "test-s3-9"]
+    assert saved["image_s_per_m"].shape == (3, 32, 32)
+    for place, number in enumerate((0, 2, 9)):
+        image = saved["image_s_per_m"][place]
+        assert (image[model.grid.index[:, 1], model.grid.index[:, 0]] == results[number].image).all()
+        assert np.isnan(image).sum() == 32 * 32 - 812
+    assert float(saved["pixel_mm"]) == pytest.approx(194 / 32)
+    assert saved["image_origin_mm"] == pytest.approx([-97, -97])
+    touches = [(number, touch) for number in (0, 2, 9) for touch in results[number].touches]
+    assert len(touches) >= 3
+    assert saved["touch_frame"].tolist() == [number for number, _ in touches]
+    assert saved["touch_id"].tolist() == [touch.id for _, touch in touches]
+    assert saved["touch_xy_mm"].tolist() == [[touch.x_mm, touch.y_mm] for _, touch in touches]
+    for field, name in (("radius_mm",) * 2, ("strength_s_per_m_mm2",) * 2, ("confidence",) * 2):
+        assert saved[f"touch_{name}"].tolist() == [getattr(touch, field) for _, touch in touches]
+    info = json.loads(str(saved["info"]))
+    assert [entry["stop"] for entry in info] == ["iterations"] * 3
+    assert info[1]["lambda"] == results[2].info.lambda_ and "lambda_" not in info[1]
+
+
+def test_a_pixel_lies_where_the_grid_says(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
+    """Row 0 is the lowest y: the peak of the picture, by origin and pixel size, is the peak of the pixels."""
+    model = prebuilt()[0]
+    save_results(tmp_path / "out.npz", model, session().as_frames(), results)
+    with np.load(tmp_path / "out.npz") as saved:
+        row, column = np.unravel_index(np.nanargmax(saved["image_s_per_m"][0]), (32, 32))
+        x, y = saved["image_origin_mm"] + (np.array([column, row]) + 0.5) * saved["pixel_mm"]
+    assert (x, y) == pytest.approx(tuple(model.grid.centres_mm()[np.argmax(results[0].image)]))
+
+
+def test_no_results(tmp_path: Path) -> None:
+    save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), {})
+    with np.load(tmp_path / "out.npz") as saved:
+        assert set(saved.files) == FIELDS
+        assert saved["image_s_per_m"].shape == (0, 32, 32) and saved["touch_xy_mm"].shape == (0, 2)
+
+
+def test_frames_without_touches(tmp_path: Path) -> None:
+    reconstructor = Reconstructor(prebuilt()[0])
+    reconstructor.tare(session().quiet_v)
+    quiet = {0: reconstructor.reconstruct(session().reference_v)}
+    save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), quiet)
+    with np.load(tmp_path / "out.npz") as saved:
+        assert saved["touch_frame"].shape == (0,) and not np.nansum(saved["image_s_per_m"])
+
+
+def test_where_it_cannot_be_written(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
+    with pytest.raises(FileError, match="cannot write there"):
+        save_results(tmp_path / "none" / "out.npz", prebuilt()[0], session().as_frames(), results)
+    (tmp_path / "out.npz").mkdir()
+    with pytest.raises(FileError, match="cannot write it"):
+        save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), results)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out.npz"]
