@@ -254,6 +254,37 @@ static void learned_numbers(int project)
     tear_down(&b);
 }
 
+/* A row masked in any of the quiet frames has no reference, and does not disturb the others' noise. */
+static void masked_while_learning(void)
+{
+    double noise[2];
+    for (int masked = 0; masked < 2; ++masked) {
+        bench b;
+        eits_context *ctx = set_up(&b);
+        uint64_t state = 33;
+        CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
+        for (int k = 0; k < QUIET; ++k) {
+            CHECK_EQUAL(eits_mask_row(ctx, 4, masked && (k == 3 || k == 13)), EITS_OK);
+            quiet_frame(&b, 1, 1e-3, &state);
+            if (masked && (k == 3 || k == 13))
+                b.frame[4] = R(1e20);
+            CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        }
+        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+        noise[masked] = (double)ctx->baseline.noise_v;
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(ctx->info.masked, masked);
+        CHECK(ctx->unusable[4] == masked && isnan((double)ctx->baseline.v0[4]) == masked);
+        CHECK_NEAR(ctx->baseline.correlation, 1, 1e-3);
+        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK); /* until the next reference */
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(ctx->info.masked, 0);
+        tear_down(&b);
+    }
+    CHECK(noise[0] > 1e-4 && noise[0] != noise[1]);
+    CHECK_NEAR(noise[1], noise[0], 0.05 * noise[0]);
+}
+
 /* Offsets far above the noise do not drown it (Welford). */
 static void noise_on_a_large_offset(void)
 {
@@ -290,6 +321,7 @@ int main(void)
     order_of_learning();
     learned_numbers(0);
     learned_numbers(1);
+    masked_while_learning();
     noise_on_a_large_offset();
     return checks_report("baseline");
 }

@@ -108,6 +108,11 @@ static void data_of_each_kind(void)
                     CHECK_NEAR(ctx->d[k], sum / used, 10 * EPS);
                 }
                 CHECK_EQUAL(ctx->basis_count, project);
+                eits_options o = ctx->options; /* the option counts from the next frame on */
+                o.project_baseline = !project;
+                CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+                check_stage(&b, 0);
+                CHECK_EQUAL(ctx->basis_count, !project);
                 tear_down(&b);
             }
         }

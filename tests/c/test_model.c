@@ -112,7 +112,7 @@ static void every_byte_flipped_in_turn(void)
     small_model made = small_model_make(TINY);
     for (size_t at = 0; at < made.size; ++at) {
         for (unsigned bit = 0; bit < 9; ++bit) {
-            const uint8_t change = bit < 8 ? (uint8_t)(1u << bit) : 0xFF;
+            const uint8_t change = (uint8_t)(bit < 8 ? 1u << bit : 0xFFu);
             made.blob[at] ^= change;
             const eits_status status = open_small(&made);
             if (at < 4)

@@ -1,0 +1,312 @@
+/* The workspace: its size, its bounds, contexts beside each other; the options; the self-test. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The size is a constant expression: this compiles only if it is. */
+static uint8_t constant[EITS_WORKSPACE_SIZE(40, 21, 12, 36, 36, 1)];
+
+static void sizes_agree(void)
+{
+    static const uint32_t ranks[] = {1, 3, 8, 12, 20}, sides[] = {3, 4, 6, 13};
+    CHECK_EQUAL(eits_workspace_size(NULL, 0), 0);
+    CHECK_EQUAL(eits_workspace_size(NULL, 1), 0);
+    for (size_t r = 0; r < 5; ++r) {
+        for (size_t s = 0; s < 4; ++s) {
+            for (int round = 0; round < 2; ++round) {
+                small_model made = small_model_make((small_spec){.rank = ranks[r], .side = sides[s], .round = round});
+                eits_model m;
+                CHECK_EQUAL(eits_model_open(&m, made.blob, made.size), EITS_OK);
+                for (int prepared = 0; prepared < 2; ++prepared) {
+                    const size_t size = eits_workspace_size(&m, prepared);
+                    CHECK_EQUAL(size, EITS_WORKSPACE_SIZE(m.n_rows, m.n_folded, m.rank, m.n_pixels, (size_t)m.nx * m.ny, prepared));
+                    CHECK_EQUAL(size % 16, 0);
+                    void *memory;
+                    eits_context ctx;
+                    uint8_t *workspace = small_aligned(&memory, size);
+                    CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
+                    const uint8_t *cells_end = (uint8_t *)ctx.cell + EITS_ALIGN16(m.nx * m.ny * 2);
+                    const uint8_t *end = prepared ? (uint8_t *)ctx.panels + EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank) : cells_end;
+                    CHECK(end == workspace + size); /* nothing is missing and nothing is wasted */
+                    CHECK((ctx.panels != NULL) == prepared);
+                    CHECK((uint8_t *)ctx.baseline.v0 == workspace);
+                    CHECK(((uintptr_t)ctx.y | (uintptr_t)ctx.basis | (uintptr_t)ctx.x | (uintptr_t)ctx.list_index) % 16 == 0);
+                    free(memory);
+                }
+                small_model_free(&made);
+            }
+        }
+    }
+    CHECK(sizeof constant > 0 && sizeof constant % 16 == 0);
+}
+
+static void refused_workspaces(void)
+{
+    small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
+    eits_model m;
+    eits_context ctx, before;
+    CHECK_EQUAL(eits_model_open(&m, made.blob, made.size), EITS_OK);
+    const size_t size = eits_workspace_size(&m, 0), prepared = eits_workspace_size(&m, 1);
+    CHECK_EQUAL(prepared, sizeof constant);
+    CHECK(prepared > size);
+    void *memory;
+    uint8_t *workspace = small_aligned(&memory, prepared + 16);
+    memset(&ctx, 0x5A, sizeof ctx);
+    memcpy(&before, &ctx, sizeof ctx);
+    CHECK_EQUAL(eits_init(NULL, &m, workspace, size), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_init(&ctx, NULL, workspace, size), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_init(&ctx, &m, NULL, size), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_init(&ctx, &m, workspace, 0), EITS_E_WORKSPACE);
+    CHECK_EQUAL(eits_init(&ctx, &m, workspace, size - 1), EITS_E_WORKSPACE);
+    for (size_t shift = 1; shift < 16; ++shift)
+        CHECK_EQUAL(eits_init(&ctx, &m, workspace + shift, prepared), EITS_E_WORKSPACE);
+    CHECK(memcmp(&ctx, &before, sizeof ctx) == 0);
+    CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
+    CHECK(ctx.panels == NULL);
+    CHECK_EQUAL(eits_init(&ctx, &m, workspace, prepared - 1), EITS_OK);
+    CHECK(ctx.panels == NULL); /* not enough for the copy: it is left out */
+    CHECK_EQUAL(eits_init(&ctx, &m, workspace, prepared), EITS_OK);
+    CHECK(ctx.panels != NULL);
+    free(memory);
+    small_model_free(&made);
+}
+
+/* Everything that a context does, with many touches and rows left out. */
+static void exercise(eits_context *ctx, uint64_t *state)
+{
+    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+    eits_touch touches[EITS_MAX_TOUCHES];
+    uint32_t count;
+    small_reference(ctx->model, 1, reference);
+    CHECK_EQUAL(eits_baseline_begin(ctx, 8), EITS_OK);
+    for (int k = 0; k < 8; ++k) {
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            frame[i] = reference[i] * (eits_real)(1 + 1e-4 * small_random(state));
+        CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), EITS_OK);
+    }
+    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    eits_options o = ctx->options;
+    o.touch_share = 0;
+    o.touch_threshold = 0;
+    o.max_touches = EITS_MAX_TOUCHES;
+    o.warm_start = 1;
+    o.sign = EITS_SIGN_BOTH;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    for (int k = 0; k < 6; ++k) {
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            frame[i] = small_random(state) < -0.9 + 0.2 * k ? R(NAN) : reference[i] * (eits_real)(1 + 0.2 * small_random(state));
+        const eits_status status = eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL);
+        CHECK(status == EITS_OK || status == EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    }
+}
+
+static void nothing_is_written_beside_the_workspace(void)
+{
+    enum { GUARD = 64 };
+    for (int prepared = 0; prepared < 2; ++prepared) {
+        for (uint32_t rank = 1; rank <= 24; rank += 23) {
+            const small_spec spec = {.rank = rank, .side = 5, .shape = SMALL_WAVES, .round = 1};
+            small_model made = small_model_make(spec);
+            eits_model m;
+            CHECK_EQUAL(eits_model_open(&m, made.blob, made.size), EITS_OK);
+            const size_t size = eits_workspace_size(&m, prepared);
+            void *memory, *copy_memory;
+            uint8_t *whole = small_aligned(&memory, size + 2 * GUARD), *copy = small_aligned(&copy_memory, made.size);
+            memset(whole, 0xC3, size + 2 * GUARD);
+            memcpy(copy, made.blob, made.size);
+            eits_context ctx;
+            uint64_t state = 101;
+            CHECK_EQUAL(eits_init(&ctx, &m, whole + GUARD, size), EITS_OK);
+            exercise(&ctx, &state);
+            for (int i = 0; i < GUARD; ++i)
+                CHECK(whole[i] == 0xC3 && whole[GUARD + size + (size_t)i] == 0xC3);
+            CHECK(memcmp(copy, made.blob, made.size) == 0); /* the model is only read */
+            free(memory);
+            free(copy_memory);
+            small_model_free(&made);
+        }
+    }
+}
+
+/* Two contexts on one model, used in turn, give what each gives alone; whatever the workspace held before. */
+static void contexts_are_independent(void)
+{
+    small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
+    eits_real alone[2][36], image[36], frames[2][SMALL_ROWS], references[2][SMALL_ROWS];
+    uint64_t state = 102;
+    small_context c[2];
+    small_context_open(&c[0], &made, 0);
+    small_context_open(&c[1], &made, 1);
+    for (int k = 0; k < 2; ++k) {
+        small_reference(&c[k].model, k == 0 ? 1 : -3, references[k]);
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            frames[k][i] = references[k][i] * (eits_real)(1 + 0.2 * small_random(&state));
+        CHECK_EQUAL(eits_baseline_set(&c[k].ctx, references[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reconstruct(&c[k].ctx, frames[k], SMALL_ROWS, alone[k], NULL), EITS_OK);
+    }
+    CHECK(memcmp(alone[0], alone[1], sizeof image) != 0);
+    for (int round = 0; round < 6; ++round) {
+        CHECK_EQUAL(eits_reconstruct(&c[round % 2].ctx, frames[round % 2], SMALL_ROWS, image, NULL), EITS_OK);
+        CHECK(memcmp(image, alone[round % 2], sizeof image) == 0);
+    }
+    const size_t size = eits_workspace_size(&c[0].model, 0);
+    memset(c[0].ctx.baseline.v0, 0xFF, size); /* the workspace's first byte; all NaN */
+    uint8_t *workspace = (uint8_t *)c[0].ctx.baseline.v0;
+    CHECK_EQUAL(eits_init(&c[0].ctx, &c[0].model, workspace, size), EITS_OK);
+    CHECK_EQUAL(eits_baseline_set(&c[0].ctx, references[0], SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(&c[0].ctx, frames[0], SMALL_ROWS, image, NULL), EITS_OK);
+    CHECK(memcmp(image, alone[0], sizeof image) == 0);
+    small_context_close(&c[0]);
+    small_context_close(&c[1]);
+    small_model_free(&made);
+}
+
+static void default_options(void)
+{
+    small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
+    small_put_u32(small_model_section(&made, "DEFS", NULL) + 4, 99); /* more touches than a context holds */
+    small_model_seal(&made);
+    eits_model m;
+    eits_options o;
+    CHECK_EQUAL(eits_model_open(&m, made.blob, made.size), EITS_OK);
+    CHECK_EQUAL(eits_options_default(NULL, &o), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_options_default(&m, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_options_default(&m, &o), EITS_OK);
+    CHECK(o.iterations == 60 && o.max_touches == EITS_MAX_TOUCHES && o.max_masked == SMALL_ROWS / 2);
+    CHECK(o.gap_every >= 1 && o.sign == EITS_SIGN_INCREASE && o.warm_start == 0 && o.project_baseline == 1);
+    CHECK(o.lambda_abs == 0 && o.gap_rel == 0 && o.saturation_v == 0 && o.touch_sweeps >= 1);
+    CHECK_NEAR(o.lambda_rel, 0.03f, 0);
+    CHECK_NEAR(o.lambda_noise_factor, 0.3f, 0);
+    CHECK_NEAR(o.gate_factor, 1.2f, 0);
+    CHECK_NEAR(o.touch_threshold, 0.2f, 0);
+    CHECK_NEAR(o.touch_share, 0.003f, 0);
+    CHECK_NEAR(o.touch_min_radius_mm, 3, 0);
+    CHECK_NEAR(o.touch_max_radius_mm, 40, 0);
+    CHECK_NEAR(o.touch_seed_radius_mm, 9, 0);
+    CHECK_NEAR(o.touch_change_s_per_m, 0, 0);
+    CHECK_NEAR(o.touch_radius_weight, 1e-3f, 0);
+    CHECK_NEAR(o.follow_mm, 25, 0);
+    small_model_free(&made);
+}
+
+#define WORD(field, value) {offsetof(eits_options, field), 1, (value)}
+#define REAL(field, value) {offsetof(eits_options, field), 0, (value)}
+#define REAL_WRONG(field) REAL(field, NAN), REAL(field, INFINITY), REAL(field, -INFINITY), REAL(field, -1e-3), REAL(field, 1.1e30)
+
+static void options_out_of_range(void)
+{
+    static const struct {
+        size_t offset;
+        int whole;
+        double value;
+    } wrong[] = {
+        WORD(iterations, 0), WORD(gap_every, 0), WORD(max_touches, EITS_MAX_TOUCHES + 1), WORD(sign, 3), WORD(sign, 4294967295.0),
+        WORD(warm_start, 2), WORD(project_baseline, 2), WORD(touch_sweeps, 1001),
+        REAL_WRONG(lambda_abs), REAL_WRONG(lambda_rel), REAL(lambda_rel, 1.001), REAL_WRONG(lambda_noise_factor),
+        REAL_WRONG(gate_factor), REAL_WRONG(gap_rel), REAL(gap_rel, 1.001), REAL_WRONG(saturation_v), REAL_WRONG(touch_threshold),
+        REAL(touch_threshold, 1.001), REAL_WRONG(touch_share), REAL(touch_share, 1.001), REAL_WRONG(touch_min_radius_mm),
+        REAL(touch_min_radius_mm, 0), REAL(touch_min_radius_mm, 9.1), REAL_WRONG(touch_max_radius_mm), REAL(touch_max_radius_mm, 8.9),
+        REAL_WRONG(touch_seed_radius_mm), REAL(touch_seed_radius_mm, 2.9), REAL(touch_seed_radius_mm, 40.1),
+        REAL_WRONG(touch_change_s_per_m), REAL_WRONG(touch_radius_weight), REAL_WRONG(follow_mm),
+    };
+    small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
+    small_context c;
+    small_context_open(&c, &made, 0);
+    const eits_options before = c.ctx.options;
+    CHECK_EQUAL(eits_set_options(NULL, &before), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_set_options(&c.ctx, NULL), EITS_E_ARGUMENT);
+    for (size_t k = 0; k < sizeof wrong / sizeof wrong[0]; ++k) {
+        eits_options o = before;
+        const uint32_t whole = wrong[k].whole ? (uint32_t)wrong[k].value : 0;
+        const eits_real real = (eits_real)wrong[k].value;
+        memcpy((uint8_t *)&o + wrong[k].offset, wrong[k].whole ? (const void *)&whole : &real, wrong[k].whole ? 4 : sizeof real);
+        CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_E_ARGUMENT);
+        CHECK(memcmp(&c.ctx.options, &before, sizeof before) == 0);
+    }
+    eits_options o = before; /* all limits that are still allowed, at once */
+    o.iterations = o.gap_every = UINT32_MAX;
+    o.max_touches = 0;
+    o.max_masked = UINT32_MAX;
+    o.touch_sweeps = 1000;
+    o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_share = 1;
+    o.lambda_abs = o.gate_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm = o.touch_change_s_per_m = R(1e30);
+    o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);
+    CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
+    CHECK(memcmp(&c.ctx.options, &o, sizeof o) == 0);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+/* A golden image that is what this build gives: no difference. One pixel changed: just that difference is told. */
+static void self_test(void)
+{
+    small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
+    small_context c;
+    eits_real difference = 9, image[36];
+    uint8_t *golden = small_model_section(&made, "GOLD", NULL) + 4 * 2 * SMALL_ROWS;
+    small_context_open(&c, &made, 1);
+    CHECK_EQUAL(eits_self_test(NULL, &difference), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_self_test(&c.ctx, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
+    double peak = 0;
+    for (int j = 0; j < 36; ++j)
+        peak = fmax(peak, fabs((double)c.ctx.image[j]));
+    CHECK(peak > 0);
+    CHECK_NEAR(difference, peak, 2 * EPS * peak); /* against an image of zeros: the absolute difference */
+    memcpy(image, c.ctx.image, sizeof image);
+    small_context_close(&c);
+    for (int j = 0; j < 36; ++j)
+        small_put_f32(golden + 4 * j, (float)image[j]);
+    small_model_seal(&made);
+    for (int prepared = 0; prepared < 2; ++prepared) {
+        small_context_open(&c, &made, prepared);
+        CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
+        CHECK_NEAR(difference, 0, BOTH_WIDTHS(0, 1e-7)); /* the very bits; in double, the rounding of the stored image */
+        CHECK(c.ctx.baseline.ready);
+        CHECK_NEAR(c.ctx.baseline.v0[3], c.model.golden.reference[3], 0);
+        CHECK_EQUAL(eits_baseline_begin(&c.ctx, 4), EITS_OK); /* a context as before: learning starts from nothing */
+        for (int k = 0; k < 4; ++k) {
+            eits_real frame[SMALL_ROWS];
+            small_reference(&c.model, 1, frame);
+            CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+        }
+        CHECK_EQUAL(eits_baseline_finish(&c.ctx), EITS_OK);
+        CHECK(c.ctx.baseline.noise_v <= R(1e-6));
+        small_context_close(&c);
+    }
+    small_put_f32(golden + 4 * 7, (float)(image[7] + (eits_real)(0.25 * peak)));
+    small_model_seal(&made);
+    small_context_open(&c, &made, 1);
+    CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
+    const double stated_peak = fmax(peak, (double)image[7] + 0.25 * peak);
+    CHECK_NEAR(difference, 0.25 * peak / stated_peak, 1e-6);
+    small_context_close(&c);
+    memset(golden - 8 * SMALL_ROWS, 0, 4 * SMALL_ROWS); /* a reference of zeros is none */
+    small_model_seal(&made);
+    small_context_open(&c, &made, 1);
+    CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_E_FRAME_ZERO);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+int main(void)
+{
+    sizes_agree();
+    refused_workspaces();
+    nothing_is_written_beside_the_workspace();
+    contexts_are_independent();
+    default_options();
+    options_out_of_range();
+    self_test();
+    return checks_report("context");
+}
