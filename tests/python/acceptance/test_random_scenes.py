@@ -1,0 +1,67 @@
+"""What the prebuilt model must do on random touches that it has never seen: one to three, 6 to 12 mm, contrast 3 to 10, 60 dB.
+
+Frames are simulated nonlinearly on a mesh four times finer than the model's, with contact impedances spread by 20 %, white
+noise and a 12-bit converter. The threshold of the image's mask is the model's own; nothing here is fitted to these scenes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.study.score import FrameScore, scorer_for
+from small_models import prebuilt, session
+
+SCENES = 200
+SEED = 2024
+
+
+@pytest.fixture(scope="module")
+def scores() -> list[FrameScore]:
+    """Each scene by itself, by the float32 core."""
+    model, blob = prebuilt()
+    frames = session("acceptance", SCENES, SEED).as_frames()
+    reconstructor, scorer = Reconstructor(model, blob=blob), scorer_for(model)
+    reconstructor.tare(frames.reference_voltage_v)
+    found = []
+    for number in range(SCENES):
+        reconstructor.forget()
+        result = reconstructor.reconstruct(frames.voltage_v[number])
+        assert result.info.iterations <= 60 and result.info.stop == "iterations"
+        score = scorer.score(frames, number, result, "increase")
+        assert score is not None
+        found.append(score)
+    return found
+
+
+def test_the_scenes_are_what_they_should_be() -> None:
+    simulated = session("acceptance", SCENES, SEED)
+    counts = [len(scene.touches) for scene in simulated.touches.scenes]
+    assert set(counts) == {1, 2, 3} and min(counts.count(k) for k in (1, 2, 3)) > 45
+    assert simulated.mesh_elements > 3 * prebuilt()[0].meta["mesh_elements"]
+    assert 20 * np.log10(np.sqrt(np.mean(simulated.exact_quiet_v**2)) / simulated.noise_v) == pytest.approx(60)
+
+
+def test_image(scores: list[FrameScore]) -> None:
+    values = np.array([score.miou_image for score in scores])
+    assert values.mean() >= 0.84
+    assert np.quantile(values, 0.1) >= 0.72
+
+
+def test_touches_as_discs(scores: list[FrameScore]) -> None:
+    values = np.array([score.miou_touches for score in scores])
+    assert values.mean() >= 0.88
+    assert np.quantile(values, 0.1) >= 0.80
+
+
+def test_positions(scores: list[FrameScore]) -> None:
+    errors = [distance for score in scores for distance in score.matching.distances_mm]
+    assert np.median(errors) <= 1.5
+    assert np.quantile(errors, 0.95) <= 4.0
+
+
+def test_counts(scores: list[FrameScore]) -> None:
+    assert np.mean([score.matching.exact for score in scores]) >= 0.9
+    assert sum(score.matching.false_touches for score in scores) <= 0.05 * SCENES
+    assert sum(score.matching.misses for score in scores) <= 0.05 * SCENES
