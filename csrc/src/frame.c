@@ -164,6 +164,8 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->list_value, count, ctx->y);
     *macs += (uint64_t)count * model->rank;
     *macs += eits_project(ctx, ctx->y);
+    if (ctx->basis_count == model->rank) /* no direction is left: what is there is rounding */
+        eits_zero(ctx->y, model->rank);
     return eits_is_finite(eits_dot(ctx, ctx->y, ctx->y, model->rank)) ? EITS_OK : EITS_E_NOT_FINITE;
 }
 

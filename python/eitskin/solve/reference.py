@@ -245,7 +245,9 @@ class ReferenceEngine:
         count = first.astype(int) + second
         d = (value[fold.first] + np.where(second, sign * value[fold.second], 0.0)) / np.maximum(count, 1)
         basis = orthonormal(self._directions(first, second), self.model.rank)
-        return project(self._p @ np.where(count > 0, d, 0.0), basis), basis, int(unusable.sum())
+        y = project(self._p @ np.where(count > 0, d, 0.0), basis)
+        # where the basis leaves no direction, what is there is rounding
+        return y if len(basis) < len(y) else np.zeros_like(y), basis, int(unusable.sum())
 
     def _directions(self, first: BoolArray, second: BoolArray) -> list[FloatArray]:
         """What the misfit ignores: P's columns of rows left out, and the drift of the gain; by which rows of each fold (k,)
