@@ -188,7 +188,7 @@ static void order_of_learning(void)
     tear_down(&b);
 }
 
-/* Mean, noise and lambda_noise against two passes in double. Row 11 is masked. */
+/* Mean, noise and lambda_noise against two passes in double. Row 11 is masked, and both rows of the first fold. */
 static void learned_numbers(int project)
 {
     bench b;
@@ -199,14 +199,20 @@ static void learned_numbers(int project)
     uint64_t state = 10;
     o.project_baseline = (uint32_t)project;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_mask_row(ctx, 11, 1), EITS_OK);
+    const eits_fold whole = b.c.model.fold[0];
+    const uint32_t masked[3] = {11, whole.first, whole.second};
+    for (int k = 0; k < 3; ++k)
+        CHECK_EQUAL(eits_mask_row(ctx, masked[k], 1), EITS_OK);
     CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
     double mean[SMALL_ROWS] = {0}, half[SMALL_ROWS] = {0}, squares = 0, lambda_noise = 0, gain = 0;
-    uint8_t out[SMALL_ROWS] = {[11] = 1};
+    uint8_t out[SMALL_ROWS] = {0};
+    for (int k = 0; k < 3; ++k)
+        out[masked[k]] = 1;
+    CHECK(whole.first != 11 && whole.second < SMALL_ROWS);
     for (uint32_t k = 0; k < QUIET; ++k) {
         quiet_frame(&b, -2, 2e-3, &state);
         memcpy(frames[k], b.frame, sizeof frames[k]);
-        frames[k][11] = (eits_real)(k % 2 == 0 ? NAN : 1e9);
+        frames[k][11] = frames[k][whole.first] = frames[k][whole.second] = (eits_real)(k % 2 == 0 ? NAN : 1e9);
         if (k == QUIET / 2) {
             double vv = 0, rr = 0;
             memcpy(half, mean, sizeof half);
@@ -244,7 +250,7 @@ static void learned_numbers(int project)
         if (!out[i])
             CHECK_NEAR(ctx->baseline.v0[i], mean[i], 10 * EPS * fabs(mean[i]));
     }
-    const double noise = sqrt(squares / ((SMALL_ROWS - 1) * (QUIET - 1.0)));
+    const double noise = sqrt(squares / ((SMALL_ROWS - 3) * (QUIET - 1.0)));
     CHECK(noise > 1e-3 && noise < 1e-2);
     CHECK_NEAR(ctx->baseline.noise_v, noise, BOTH_WIDTHS(2e-4, 1e-10) * noise);
     CHECK(lambda_noise > 1e-5 && ctx->baseline.lambda_noise > 0);
@@ -285,6 +291,52 @@ static void masked_while_learning(void)
     CHECK_NEAR(noise[1], noise[0], 0.05 * noise[0]);
 }
 
+/* References that say nothing of the model, and masks that leave nothing of the reference. */
+static void nothing_to_compare(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b);
+    uint64_t state = 34;
+    eits_options o = ctx->options;
+    o.max_masked = 0;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_mask_row(ctx, 2, 1), EITS_OK);
+    CHECK_EQUAL(eits_baseline_begin(ctx, 4), EITS_OK);
+    for (int k = 0; k < 4; ++k) { /* the second half runs the frame stage, which allows no masked row */
+        quiet_frame(&b, 1, 1e-3, &state);
+        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), k < 2 ? EITS_OK : EITS_E_FRAME_CHANNELS);
+    }
+    CHECK_EQUAL(ctx->baseline.count, 2);
+    o.max_masked = 1;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    for (int k = 0; k < 2; ++k)
+        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        CHECK_EQUAL(eits_mask_row(ctx, i, 1), EITS_OK);
+    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_E_FRAME_ZERO);
+    CHECK(!ctx->baseline.ready);
+    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        CHECK_EQUAL(eits_mask_row(ctx, i, 0), EITS_OK);
+    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    tear_down(&b);
+    small_model made = small_model_make((small_spec){.rank = 12, .side = 4}); /* a model that is zero on all rows but one fold's */
+    for (uint32_t k = 1; k < SMALL_FOLDED; ++k)
+        small_put_f32(small_model_section(&made, "VREF", NULL) + 4 * k, 0);
+    small_model_seal(&made);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].first, 1), EITS_OK);
+    CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].second, 1), EITS_OK);
+    CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].first, 0), EITS_OK);
+    CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_OK);
+    small_put_f32(small_model_section(&made, "VREF", NULL), 0); /* and one that is zero throughout, read in place */
+    CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
 /* Offsets far above the noise do not drown it (Welford). */
 static void noise_on_a_large_offset(void)
 {
@@ -322,6 +374,7 @@ int main(void)
     learned_numbers(0);
     learned_numbers(1);
     masked_while_learning();
+    nothing_to_compare();
     noise_on_a_large_offset();
     return checks_report("baseline");
 }

@@ -239,6 +239,30 @@ static void left_out_is_minimised_over(void)
     tear_down(&b);
 }
 
+/* So many rows left out that no direction is left: nothing is seen, not the rounding of nothing. */
+static void nothing_left(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
+    eits_options o = ctx->options;
+    o.max_masked = SMALL_ROWS;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        const eits_fold fold = b.c.model.fold[k];
+        b.frame[fold.first] = R(NAN);
+        if (fold.second != EITS_FOLD_NONE)
+            b.frame[fold.second] = R(NAN);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(ctx->basis_count, k + 2 < RANK ? k + 2 : RANK);
+        if (ctx->basis_count < RANK)
+            CHECK(ctx->info.data_norm > R(1e-3));
+        else
+            CHECK(ctx->info.data_norm == 0 && ctx->info.stop == EITS_STOP_ZERO && ctx->info.nonzeros == 0);
+    }
+    CHECK_EQUAL(ctx->info.masked, SMALL_ROWS);
+    tear_down(&b);
+}
+
 static void refused_frames_clear_the_image(void)
 {
     bench b;
@@ -372,6 +396,7 @@ int main(void)
     unusable_channels();
     changing_masks();
     left_out_is_minimised_over();
+    nothing_left();
     refused_frames_clear_the_image();
     masked_rows();
     row_without_reference();
