@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
-from eitskin.solve.results import SIGNS, STOPS, Baseline, Info, Options, Reconstruction, Touch
+from eitskin.solve.results import SIGNS, STOPS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
 
 WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
 
@@ -67,6 +67,7 @@ class CoreEngine:
         self._touches = self._ffi.new("eits_touch[]", int(self._lib.EITS_MAX_TOUCHES))
         self._touch_count = self._ffi.new("uint32_t *")
         self._null = self._ffi.NULL
+        self._masked, self._saturation_v = np.zeros(self.n_rows, dtype=np.bool_), 0.0
 
     @property
     def kernels(self) -> str:
@@ -95,6 +96,7 @@ class CoreEngine:
         except (ValueError, TypeError, OverflowError) as error:
             raise UsageError(f"options: {error}") from None
         self._check(self._lib.eits_set_options(self._context, given), "options", UsageError)
+        self._saturation_v = float(options.saturation_v)
 
     def set_baseline(self, frames: npt.NDArray[np.float64]) -> Baseline:
         """Take the reference from quiet ``frames`` (k, m) volts: one as it is, four or more also for the noise.
@@ -102,6 +104,7 @@ class CoreEngine:
         Raises:
             FrameError: a frame cannot be used.
         """
+        check_quiet(frames, self._masked, self._saturation_v)
         if len(frames) < 4:
             self._frame[:] = frames.mean(axis=0)
             self._check_frame(self._lib.eits_baseline_set(self._context, self._frame_pointer, self.n_rows), "reference frame")
@@ -117,6 +120,7 @@ class CoreEngine:
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
+        self._masked = rows.copy()
         for row in range(self.n_rows):
             self._check(self._lib.eits_mask_row(self._context, row, int(rows[row])), "mask", UsageError)
 

@@ -106,8 +106,15 @@ class Reconstructor:
         return self._engine.set_baseline(frames)
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
-        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before ``tare``."""
-        self._engine.mask_rows(rows)
+        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before ``tare``.
+
+        Raises:
+            UsageError: not one truth value a row.
+        """
+        given, count = np.asarray(rows), self.model.protocol.n_rows
+        if given.shape != (count,) or given.dtype != np.bool_:
+            raise UsageError(f"mask: is {given.dtype} {given.shape}, but must be one truth value for each of {count} rows")
+        self._engine.mask_rows(given)
 
     def reconstruct(self, frame_v: npt.ArrayLike, *, touches: bool = True) -> Reconstruction:
         """One frame (m,) in V.

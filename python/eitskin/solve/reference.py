@@ -13,7 +13,7 @@ import numpy.typing as npt
 from eitskin.errors import FrameError
 from eitskin.model.model import Model
 from eitskin.solve.reference_touches import find_touches
-from eitskin.solve.results import Baseline, Info, Options, Reconstruction, Touch, default_options
+from eitskin.solve.results import Baseline, Info, Options, Reconstruction, Touch, check_quiet, default_options
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -183,10 +183,8 @@ class ReferenceEngine:
         Raises:
             FrameError: a frame cannot be used.
         """
+        check_quiet(frames, self._bad, self.options.saturation_v)
         frames = np.where(self._bad, 0.0, frames)
-        limit = self.options.saturation_v
-        if not np.isfinite(frames).all() or (limit > 0 and np.abs(frames).max() >= limit):
-            raise FrameError("reference frames: a channel is not finite or saturated; mask it or measure again")
         before, self._without_reference = self._without_reference, self._bad.copy()
         lambda_noise, noise = 0.0, 0.0
         try:

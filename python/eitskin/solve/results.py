@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.errors import UsageError
+from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 
 SIGNS = ("increase", "decrease", "both")
@@ -107,6 +107,21 @@ def default_options(model: Model) -> Options:
         touch_radius_weight=d.touch_radius_weight,
         follow_mm=d.follow_mm,
     )
+
+
+def check_quiet(frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float) -> None:
+    """Refuse quiet ``frames`` (k, m) with an unusable voltage in a row that is not ``masked`` (m,); 0: no saturation.
+
+    Raises:
+        FrameError: naming the first such frame and row.
+    """
+    values = np.where(masked, 0.0, frames)
+    unusable = ~np.isfinite(values) | ((saturation_v > 0) & (np.abs(values) >= saturation_v))
+    if unusable.any():
+        frame, row = (int(place[0]) for place in np.nonzero(unusable))
+        raise FrameError(
+            f"reference frame {frame} (from 0): row {row} (from 0) is not finite or saturated; mask it or measure again"
+        )
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ def test_saturated_frames(changed_frames: Callable[..., Path], capsys: pytest.Ca
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(np.nan, "too many channels"), (np.inf, "too many channels"), (0.0, "all voltages are zero")],
+    [(np.nan, "row 20 (from 0) is not finite"), (np.inf, "reference frame 7 (from 0)"), (0.0, "all voltages are zero")],
 )
 def test_references_that_cannot_be_used(
     value: float, text: str, refused: Refused, changed_frames: Callable[..., Path], tmp_path: Path

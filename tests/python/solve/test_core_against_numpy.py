@@ -150,7 +150,7 @@ def test_a_frame_does_not_depend_on_those_before(engine: str) -> None:
     made = Reconstructor(small_model(), engine=engine)
     made.tare(s.quiet(1, 8))
     images = {}
-    for order in ((0, 1, 2, 3), (3, 2, 1, 0), (1, 0, 3, 2)):
+    for order in ((0, 1, 2, 3), (3, 2, 1, 0), (3, 1, 0, 2)):
         for k in order:
             image = made.reconstruct(frames[k]).image
             assert (images.setdefault(k, image) == image).all(), (order, k)

@@ -92,7 +92,7 @@ def test_a_reference_must_be_whole(engine: str, value: float) -> None:
     for count in (1, 2, 8):
         quiet = session().quiet_v[:count].copy()
         quiet[count // 2, 11] = value
-        with pytest.raises(FrameError):
+        with pytest.raises(FrameError, match=rf"reference frame {count // 2} \(from 0\): row 11 \(from 0\)"):
             made(engine, quiet=False).tare(quiet)
     masked = made(engine, quiet=False)
     masked.mask_rows(np.arange(208) == 11)
@@ -184,8 +184,16 @@ def test_saturated_channels_are_left_out(engine: str) -> None:
     saved = reconstructor.reconstruct(damaged)
     assert saved.info.masked == 3
     assert np.abs(saved.image - whole.image).max() < 0.1 * whole.image.max()
-    with pytest.raises(FrameError):
-        reconstructor.tare(np.vstack([session().quiet_v[:7], damaged]))
+    for before in (0, 1, 7):
+        with pytest.raises(FrameError, match=f"reference frame {before} .* row 3 .* saturated"):
+            reconstructor.tare(np.vstack([session().quiet_v[:before], damaged]))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("rows", [np.zeros(207, dtype=bool), np.zeros(208), [1, 2], np.zeros((208, 1), dtype=bool)])
+def test_masks_of_another_shape(engine: str, rows: object) -> None:
+    with pytest.raises(UsageError, match="one truth value for each of 208 rows"):
+        made(engine).mask_rows(rows)
 
 
 # ---- quiet skins ----
