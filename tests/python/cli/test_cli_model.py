@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import eitskin
 from eitm_bytes import sections_of
 from eitskin.model.eitm import load_model
 from eitskin.model.model import Defaults
@@ -129,8 +133,6 @@ def test_building_over_an_old_model_replaces_it_whole(done: Done, tmp_path: Path
 
 def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     """The module as users run it: exit codes, streams, and output in pipes."""
-    import sys
-
     command = [sys.executable, "-m", "eitskin.cli.main"]
     skin = write_skin(tmp_path)
     built = run_command([*command, "model", "build", "skin.toml", "-o", "palm.eitm", "--json", *QUICK], cwd=tmp_path)
@@ -150,12 +152,6 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
 
 
 def test_a_pipe_that_closes_early_leaves_no_traceback() -> None:
-    import os
-    import subprocess
-    import sys
-
-    import eitskin
-
     environment = {**os.environ, "PYTHONPATH": str(Path(eitskin.__file__).parents[1])}
     with subprocess.Popen(
         [sys.executable, "-u", "-m", "eitskin.cli.main", "model", "info", "--json"],

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eitm_bytes import sealed
+from eitm_bytes import sealed, sections_of
 from eitskin.cli.main import COMMANDS, build_parser, main
+from eitskin.errors import FileError
 from eitskin.skin.protocol import opposite
 from fresh_python import MAIN, run_python, without
 from small_models import prebuilt, session, small_blob
@@ -103,8 +104,6 @@ def test_models_that_cannot_be_read(
 def test_a_golden_image_of_other_bits_fails_verification(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One bit of the stored image: read without complaint, but not what this core gives."""
     blob = bytearray(small_blob())
-    from eitm_bytes import sections_of
-
     place = sections_of(blob)["GOLD"]
     image = np.frombuffer(bytes(blob), "<f4", (place.size - 4 * 416) // 4, place.offset + 4 * 416)
     at = place.offset + 4 * 416 + 4 * int(np.argmax(image))
@@ -436,8 +435,6 @@ def test_an_interrupt_is_said_and_coded(refused: Refused, monkeypatch: pytest.Mo
 
 
 def test_a_traceback_where_it_is_asked_for(tmp_path: Path) -> None:
-    from eitskin.errors import FileError
-
     with pytest.raises(FileError):
         main(["--traceback", "model", "info", str(tmp_path / "none")])
 
