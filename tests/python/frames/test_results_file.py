@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,20 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
     info = json.loads(str(saved["info"]))
     assert [entry["stop"] for entry in info] == ["iterations"] * 3
     assert info[1]["lambda"] == results[2].info.lambda_ and "lambda_" not in info[1]
+
+
+def test_the_documented_fields_are_the_saved_ones(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
+    """Names and types of the table in docs/frames-format.md, row by row."""
+    page = (Path(__file__).resolve().parents[3] / "docs" / "frames-format.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`.*?) \| (.*?) \|", page.split("# The results file")[1], re.MULTILINE)
+    documented = {name: kind for names, kind in rows for name in re.findall(r"`(\w+)`", names)}
+    save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), results)
+    with np.load(tmp_path / "out.npz") as saved:
+        assert set(documented) == set(saved.files) == FIELDS
+        for name, kind in documented.items():
+            wanted = re.findall(r"float64|int64|int32|text", kind)
+            kinds = {"text": "U", "float64": "f8", "int64": "i8", "int32": "i4"}
+            assert saved[name].dtype.str[1:].startswith(kinds[wanted[-1 if name == "version" else 0]]), name
 
 
 def test_a_pixel_lies_where_the_grid_says(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
