@@ -1,0 +1,46 @@
+"""The compiler and its kin, for tests that build the C core themselves."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+CSRC = ROOT / "csrc"
+
+
+def tool(*names: str) -> str:
+    """The path of the first of these programs that is there, in PATH or beside this Python.
+
+    Raises:
+        AssertionError: none is; the core cannot be judged then, so the test fails.
+    """
+    for name in names:
+        beside = Path(sys.executable).parent / name
+        found = shutil.which(name) or (str(beside) if beside.exists() else None)
+        if found:
+            return found
+    raise AssertionError(f"none of {', '.join(names)} is installed; the C core cannot be built and judged without it")
+
+
+def run(*command: str | Path) -> str:
+    """What the command prints.
+
+    Raises:
+        AssertionError: it fails; with what it said.
+    """
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{' '.join(map(str, command))}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def build_core(folder: Path) -> dict[str, Path]:
+    """The static libraries of both widths, configured and built in ``folder``: {"f32": path, "f64": path}."""
+    compiler, cmake = tool("cc", "gcc", "clang"), tool("cmake")
+    generator = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}"] if not shutil.which("make") else []
+    settings = [f"-DCMAKE_C_COMPILER={compiler}", "-DEITSKIN_TESTS=OFF", "-DEITSKIN_PYTHON=OFF"]
+    run(cmake, "-S", ROOT, "-B", folder, *generator, *settings)
+    run(cmake, "--build", folder, "--target", "eitskin_f32", "eitskin_f64")
+    return {width: folder / f"libeitskin_{width}.a" for width in ("f32", "f64")}
