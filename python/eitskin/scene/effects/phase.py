@@ -23,6 +23,8 @@ STAGE = Stage.EXCITATION
 ORDER = 10
 SUMMARY = "Capacitances turn the voltages' phase: a complex solve."
 VACUUM_F_PER_M = 8.8541878128e-12
+NO_CONTACT_OHM_M2 = 1e6
+"""From here on an electrode does not touch (that is how detached ones are solved), so it has no double layer either."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,10 @@ def admittivity(conductivity: FloatArray, frequency_hz: float, relative_permitti
 
 
 def interface(impedance_ohm_m2: FloatArray, frequency_hz: float, capacitance_f_per_m2: float) -> ComplexArray:
-    """Charge-transfer resistance parallel to the double layer, (L,) in ohm m2; 0 stays 0."""
-    return np.asarray(impedance_ohm_m2 / (1 + 2j * pi * frequency_hz * capacitance_f_per_m2 * impedance_ohm_m2))
+    """Charge-transfer resistance parallel to the double layer, (L,) in ohm m2; 0 and no contact stay what they are."""
+    touching = impedance_ohm_m2 < NO_CONTACT_OHM_M2
+    susceptance = 2 * pi * frequency_hz * capacitance_f_per_m2 * touching
+    return np.asarray(impedance_ohm_m2 / (1 + 1j * susceptance * impedance_ohm_m2))
 
 
 def in_phase(voltage: ComplexArray) -> FloatArray:
