@@ -6,8 +6,8 @@ An effect is a module. It is imported only when a scene names it, and defines
 - ``ORDER``: a number; within a stage, steps run by (ORDER, NAME). Leave gaps: 10, 20, 30.
 - ``Parameters``: a frozen dataclass, one field a key, units in the names. ``field(default=..., metadata={"low": ...,
   "high": ..., "open_low": True, "choices": (...), "unit": "V", "doc": "..."})``; types are float, int, bool, str,
-  tuple[int, ...], tuple[float, ...], or one of these ``| None``. Its ``__post_init__`` may raise ConfigError with one line
-  that begins with the key; file and table are put before it.
+  tuple[int, ...], tuple[float, ...], or one of these ``| None``. Its ``__post_init__`` may raise ConfigError with one
+  line that begins with the key; file and table are put before it.
 - ``make(parameters, session) -> Step``: it may raise ConfigError in the same way.
 - optionally ``CONFLICTS``: names of effects that it cannot be named together with.
 
@@ -186,8 +186,9 @@ class ContactStep:
 class PhaseStep:
     """Makes the forward solve complex, at ``frequency_hz``.
 
-    ``admittivity(conductivity (E,) S/m) -> (E,) complex S/m``; ``contact(impedance (L,) ohm m2) -> (L,) complex ohm m2``,
-    in which 0 stays an ideal shunt; ``readout(v (m,) complex) -> (m,) float``, taken just before the digitising stage.
+    ``admittivity(conductivity (E,) S/m) -> (E,) complex S/m``, element by element; ``contact(impedance (L,) ohm m2) ->
+    (L,) complex ohm m2``, in which 0 is an ideal shunt; ``readout(v (m,) complex) -> (m,) float``, taken just before the
+    digitising stage.
     """
 
     name: str
@@ -202,7 +203,7 @@ class PhaseStep:
 
 @dataclass(frozen=True, eq=False)
 class LoadedStep:
-    """``apply(v (m,), loads, time_s, frame) -> (m,)``: needs the electrodes' potentials (source impedance, common mode)."""
+    """``apply(v (m,), loads, time_s, frame) -> (m,)``: uses electrode potentials (source impedance, common mode)."""
 
     name: str
     stage: Stage
@@ -213,7 +214,7 @@ class LoadedStep:
 
 @dataclass(frozen=True, eq=False)
 class VoltageStep:
-    """``apply(v (m,), time_s, frame) -> (m,)``. Rows are in the order they are scanned, evenly over the frame's time."""
+    """``apply(v (m,), time_s, frame) -> (m,)``. Rows are in the order of the scan, evenly over the frame's time."""
 
     name: str
     stage: Stage
