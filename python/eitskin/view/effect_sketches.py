@@ -31,6 +31,7 @@ def gel_drying(axes: Axes, session: Session, parameters: Any) -> None:
     axes.plot(hours, [drying_factor(3600 * h, parameters) for h in hours], color=STRONG)
     axes.axhline(drying_factor(1e12, parameters), color=LIGHT, linestyle="--")
     axes.set(xlabel="time (h)", ylabel="conductivity / described", ylim=(0, 1.05), title="a sheet that dries")
+    axes.locator_params(axis="x", nbins=5)
 
 
 def temperature(axes: Axes, session: Session, parameters: Any) -> None:
@@ -125,7 +126,8 @@ def phase(axes: Axes, session: Session, parameters: Any) -> None:
     for f in (10.0, 100.0, 1e3, parameters.frequency_hz):
         at = interface(z, f, parameters.capacitance_f_per_m2)[0] * 1e3
         axes.plot(at.real, -at.imag, "o", color=FOUND, markersize=4)
-        axes.annotate(f"{f:g} Hz", (at.real, -at.imag), xytext=(5, 4), textcoords="offset points", fontsize=8)
+        aside = (5, 4) if at.real < 9 else (-32, 0)
+        axes.annotate(f"{f:g} Hz", (at.real, -at.imag), xytext=aside, textcoords="offset points", fontsize=8)
     axes.set_aspect("equal")
     axes.set(xlabel="real part (mohm m2)", ylabel="- imaginary part (mohm m2)", title="interface of 10 mohm m2")
     axes.margins(0.12)

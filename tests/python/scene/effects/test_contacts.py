@@ -20,7 +20,6 @@ from eitskin.skin.protocol import adjacent, table
 from eitskin.skin.skin import Skin, paper_skin
 
 
-
 def _ideal(count=16):
     return Contacts(np.zeros(count), np.zeros(count, dtype=bool))
 
