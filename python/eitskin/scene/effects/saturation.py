@@ -1,7 +1,7 @@
 """Saturation: an amplifier cannot go beyond its supply, so that larger voltages are clipped.
 
 A hard limiter, symmetric about 0. The limit is given in V or as a multiple of the largest voltage of the untouched skin
-with ideal electrodes.
+with ideal electrodes. The characteristic is the same for every row and has no memory: equal rows stay equal.
 """
 
 from __future__ import annotations
