@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from eitskin import __version__
 from eitskin.errors import EitskinError
 
-COMMANDS = ("demo", "model", "reconstruct", "import", "doctor", "compare", "bench")
+COMMANDS = ("demo", "model", "reconstruct", "import", "doctor", "scene", "compare", "bench")
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -187,8 +187,8 @@ class PhaseStep:
     """Makes the forward solve complex, at ``frequency_hz``.
 
     ``admittivity(conductivity (E,) S/m) -> (E,) complex S/m``, element by element; ``contact(impedance (L,) ohm m2) ->
-    (L,) complex ohm m2``, in which 0 is an ideal shunt; ``readout(v (m,) complex) -> (m,) float``, taken just before the
-    digitising stage.
+    (L,) complex ohm m2``, in which 0 is an ideal shunt; ``readout(v (m,) complex) -> (m,) float``, taken just before
+    the digitising stage.
     """
 
     name: str

@@ -36,7 +36,7 @@ MAX_CONTRAST = 1e4
 
 @dataclass(frozen=True)
 class ShortCircuit:
-    """Contact with a conductor; driven by ``press``, its part of full contact, 0 to 1. Below 1 ``contrast`` insulates."""
+    """Contact with a conductor, driven by ``press``: its part of full contact, 0 to 1. A contrast below 1 insulates."""
 
     contrast: float = 9.0
 
