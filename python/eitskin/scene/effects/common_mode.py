@@ -1,9 +1,10 @@
 """The amplifier's common mode: what both inputs share comes through, divided by the rejection ratio.
 
 An instrumentation amplifier gives v_difference + v_common / CMRR (referred to its input), v_common = (V+ + V-) / 2
-against its ground (Pallas-Areny and Webster, Sensors and Signal Conditioning). 80 to 100 dB at direct current shrink to
-50 to 70 dB at 50 kHz, mostly by unequal capacitances of the two lines. With a grounded sink the electrodes ride at half
-the driven voltage, often far above the difference that is measured; a balanced source keeps their mean at ground.
+against its ground (Pallas-Areny and Webster, Sensors and Signal Conditioning). 80 to 100 dB at direct current shrink
+to 50 to 70 dB at 50 kHz, mostly by unequal capacitances of the two lines, so that either sign occurs. With a grounded
+sink the electrodes ride at half the driven voltage, often far above the difference that is measured; a balanced source
+keeps their mean at ground.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ class Parameters:
 
     cmrr_db: float = parameter(60.0, "dB", "common-mode rejection ratio at the excitation's frequency", low=0, high=300)
     ground: str = parameter("sink", "", "the electrode I-, or the mean of all electrodes", choices=("sink", "mean"))
+    inverted: bool = parameter(False, "", "whether it enters with the opposite sign")
 
 
 def common_v(loads: Loads, ground: str) -> Voltages:
@@ -37,7 +39,7 @@ def common_v(loads: Loads, ground: str) -> Voltages:
 
 def make(parameters: Parameters, session: Session) -> LoadedStep:
     """Adds what the amplifier does not reject."""
-    passed = 10 ** (-parameters.cmrr_db / 20)
+    passed = 10 ** (-parameters.cmrr_db / 20) * (-1 if parameters.inverted else 1)
 
     def apply(v: Voltages, loads: Loads, time_s: float, frame: int) -> Voltages:
         return np.asarray(v + passed * common_v(loads, parameters.ground))

@@ -27,7 +27,7 @@ SUMMARY = "Current meets a resistance where it enters and leaves the sheet."
 class Parameters:
     """The electrodes' mean, and how they differ."""
 
-    mean_ohm_m2: float = parameter(0.01, "ohm m2", "resistance of a contact times its area", low=0, high=1e6)
+    mean_ohm_m2: float = parameter(0.01, "ohm m2", "resistance of a contact times its area", low=0, high=1e3)
     spread: float = parameter(0.0, "1", "each electrode's differs by up to this part of the mean", low=0, high=1)
 
     def __post_init__(self) -> None:

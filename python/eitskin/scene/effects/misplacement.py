@@ -1,6 +1,6 @@
 """Electrodes that are not where the description says: each is shifted along the rim.
 
-Hand-made skins carry electrodes to about a millimetre. Shifts are uniform within +- spread, drawn once; a
+Hand-made skins carry electrodes to about a millimetre. Shifts are given, or uniform within +- spread, drawn once; a
 reconstruction that assumes the described places then has a wrong model (the classical modelling error of absolute EIT;
 difference imaging cancels most of it).
 """
@@ -24,9 +24,12 @@ SUMMARY = "Electrodes sit beside the places that the description gives."
 
 @dataclass(frozen=True)
 class Parameters:
-    """How far."""
+    """By chance, or as measured."""
 
     spread_mm: float = parameter(1.0, "mm", "each electrode is shifted along the rim by up to this, either way", low=0)
+    shift_mm: tuple[float, ...] = parameter(
+        (), "mm", "known shifts instead, one an electrode, along the numbering; nothing is then drawn"
+    )
 
 
 def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
@@ -47,17 +50,20 @@ def make(parameters: Parameters, session: Session) -> GeometryStep:
     """The skin that is meshed.
 
     Raises:
-        ConfigError: shifted electrodes overlap.
+        ConfigError: there is not one known shift for each electrode, or shifted electrodes overlap.
     """
-    spread = parameters.spread_mm
-    shift_mm = session.stream(NAME).uniform(-spread, spread, session.skin.electrodes.count)
+    count, spread, known = session.skin.electrodes.count, parameters.spread_mm, len(parameters.shift_mm)
+    if known not in (0, count):
+        raise ConfigError(f"shift_mm: {known} shifts for {count} electrodes; give one each")
+    shift_mm = np.array(parameters.shift_mm) if known else session.stream(NAME).uniform(-spread, spread, count)
     try:
         shifted(session.skin, shift_mm)
     except GeometryError as error:
-        raise ConfigError(f"spread_mm = {spread:g}: {error}") from None
+        key = "shift_mm" if known else f"spread_mm = {spread:g}"
+        raise ConfigError(f"{key}: {error}") from None
 
     def apply(skin: Skin) -> Skin:
         return shifted(skin, shift_mm)
 
     note = f"electrodes shifted along the rim by up to {np.abs(shift_mm).max():.3g} mm"
-    return GeometryStep(NAME, Cost(random_numbers=len(shift_mm)), note, apply)
+    return GeometryStep(NAME, Cost(random_numbers=0 if known else count), note, apply)

@@ -14,6 +14,7 @@ from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.scene.effect import Contacts, PhaseStep
 from eitskin.scene.effects import bridged, contact_impedance, detached, phase
 from eitskin.scene.forward_steps import Change, FactoriseComplex, Work
+from eitskin.scene.reading import OPEN_BRIDGED_OHM_M2, OPEN_OHM_M2
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
 from eitskin.skin.protocol import adjacent, table
@@ -131,6 +132,8 @@ def test_the_interface_is_a_resistance_parallel_to_a_capacitance():
     fast = phase.interface(z, 1e9, 0.1)
     np.testing.assert_allclose(fast[1:3], 1 / (2j * pi * 1e9 * 0.1), rtol=1e-6)
     assert fast[0] == 0 and fast[3] == 1e6  # a shunt stays one, and what does not touch has no double layer
+    assert contact_impedance.Parameters.__dataclass_fields__["mean_ohm_m2"].metadata["high"] < phase.NO_CONTACT_OHM_M2
+    assert min(OPEN_OHM_M2, OPEN_BRIDGED_OHM_M2) >= phase.NO_CONTACT_OHM_M2  # detached electrodes are solved with these
     y = phase.admittivity(np.array([0.01]), 50e3, 80.0)
     assert y[0].imag == pytest.approx(2.2253e-4, rel=1e-3)
 

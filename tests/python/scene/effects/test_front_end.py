@@ -172,3 +172,5 @@ def test_common_mode_is_the_inputs_mean_over_the_rejection(make_session, cmrr_db
     for ground, common in (("sink", middle - loads.sink_v), ("mean", middle)):
         step = common_mode.make(common_mode.Parameters(cmrr_db, ground), make_session())
         np.testing.assert_allclose(step.apply(v, loads, 0.0, 0) - v, common * 10 ** (-cmrr_db / 20), atol=1e-15)
+        other = common_mode.make(common_mode.Parameters(cmrr_db, ground, inverted=True), make_session())
+        np.testing.assert_allclose(other.apply(v, loads, 0.0, 0) + step.apply(v, loads, 0.0, 0), 2 * v, atol=1e-14)

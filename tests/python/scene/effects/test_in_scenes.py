@@ -31,7 +31,8 @@ def _last(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any
 
 
 def _direct(impedance: Any = 0.0, protocol: Protocol | None = None) -> np.ndarray:
-    return ForwardModel(BENCH.mesh(paper_skin(), ELEMENTS), paper_skin(), protocol or adjacent(16), impedance).voltages(0.01)
+    mesh = BENCH.mesh(paper_skin(), ELEMENTS)
+    return ForwardModel(mesh, paper_skin(), protocol or adjacent(16), impedance).voltages(0.01)
 
 
 @pytest.mark.parametrize("contact", [{}, {"contact_impedance": {"mean_ohm_m2": 0.02}}])

@@ -102,3 +102,16 @@ def test_misplacement_keeps_given_places_and_refuses_overlap(make_session):
     assert moved.electrodes.positions_mm == (1.0, 49.0, 150.0, 202.0)
     with pytest.raises(ConfigError, match=r"spread_mm = 60: .*electrode"):
         misplacement.make(misplacement.Parameters(60.0), make_session())
+
+
+def test_known_shifts_are_taken_as_they_are(make_session):
+    drawn = []
+    session = make_session(drawn=drawn)
+    known = tuple(0.1 * k for k in range(16))
+    step = misplacement.make(misplacement.Parameters(shift_mm=known), session)
+    assert step.apply(session.skin) == misplacement.shifted(session.skin, np.array(known))
+    assert not drawn and step.cost.random_numbers == 0
+    with pytest.raises(ConfigError, match="shift_mm: 3 shifts for 16 electrodes"):
+        misplacement.make(misplacement.Parameters(shift_mm=(1.0, 2.0, 3.0)), session)
+    with pytest.raises(ConfigError, match=r"shift_mm: .*electrode"):
+        misplacement.make(misplacement.Parameters(shift_mm=(60.0, *[0.0] * 15)), session)
