@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
+from effect_types import FloatArray, MakeSession
 
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, build_mesh
@@ -13,8 +12,6 @@ from eitskin.scene.effect import Session
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-
-MakeSession = Callable[..., Session]
 
 
 @pytest.fixture(scope="session")
@@ -24,12 +21,12 @@ def small_mesh() -> Mesh:
 
 
 @pytest.fixture(scope="session")
-def v0(small_mesh: Mesh) -> np.ndarray:
+def v0(small_mesh: Mesh) -> FloatArray:
     return ForwardModel(small_mesh, paper_skin(), adjacent(16), 0.0).voltages(0.01)
 
 
 @pytest.fixture
-def make_session(small_mesh: Mesh, v0: np.ndarray) -> MakeSession:
+def make_session(small_mesh: Mesh, v0: FloatArray) -> MakeSession:
     """Sessions on the paper's skin; ``drawn`` records the streams that were asked for."""
 
     def make(

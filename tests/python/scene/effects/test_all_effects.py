@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from effect_types import FloatArray, MakeSession
 
 from eitskin.scene.compiler import Bench, compile_scene
 from eitskin.scene.description import scene_from_table
@@ -56,7 +57,7 @@ RANDOM = {
 }  # fmt: skip
 
 
-def _frames(effects: dict[str, Any], seed: int = 5, frames: int = 2) -> np.ndarray:
+def _frames(effects: dict[str, Any], seed: int = 5, frames: int = 2) -> FloatArray:
     """Frames of a press that is nowhere symmetrical, without a quiet frame."""
     table = {
         "scene": {"seed": seed, "frames": frames, "quiet_frames": 1, "elements": 1200},
@@ -66,23 +67,23 @@ def _frames(effects: dict[str, Any], seed: int = 5, frames: int = 2) -> np.ndarr
     return simulate_frames(compile_scene(scene_from_table(table, "test", Path()), bench=BENCH)).voltage_v[1:]
 
 
-def _irreciprocity(v: np.ndarray) -> float:
+def _irreciprocity(v: FloatArray) -> float:
     pairs = adjacent(16).reciprocal_pairs()
     return float(np.abs(v[pairs.first] - pairs.sign * v[pairs.second]).max() / np.abs(v).max())
 
 
-def test_every_effect_is_looked_at():
+def test_every_effect_is_looked_at() -> None:
     assert set(STRONG) == set(BUILT_IN)
     assert not (KEEP | RANDOM) - set(BUILT_IN)
 
 
 @pytest.fixture(scope="module")
-def plain() -> np.ndarray:
+def plain() -> FloatArray:
     return _frames({})
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_reciprocity(name, plain):
+def test_reciprocity(name: str, plain: FloatArray) -> None:
     v = _frames({name: STRONG[name]})
     assert np.abs(v - plain).max() > 1e-4 * np.abs(plain).max()  # it does something
     if name in KEEP:
@@ -91,13 +92,13 @@ def test_reciprocity(name, plain):
         assert _irreciprocity(v[-1]) > 1e-3
 
 
-def test_without_effects_the_sheet_is_reciprocal_and_all_kept_together_keep_it(plain):
+def test_without_effects_the_sheet_is_reciprocal_and_all_kept_together_keep_it(plain: FloatArray) -> None:
     assert _irreciprocity(plain[-1]) < 1e-10
     assert _irreciprocity(_frames({name: STRONG[name] for name in sorted(KEEP)})[-1]) < 1e-9
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_streams_are_the_effects_own(name, make_session):
+def test_streams_are_the_effects_own(name: str, make_session: MakeSession) -> None:
     """It draws from streams of its own name only; without randomness it asks for none."""
     module = importlib.import_module(BUILT_IN[name])
     drawn: list[str] = []
@@ -113,14 +114,14 @@ def test_streams_are_the_effects_own(name, make_session):
 
 
 @pytest.mark.parametrize("name", sorted(RANDOM))
-def test_a_seed_makes_the_same_frames_and_another_others(name):
+def test_a_seed_makes_the_same_frames_and_another_others(name: str) -> None:
     first = _frames({name: STRONG[name]})
     assert np.array_equal(first, _frames({name: STRONG[name]}))
     assert not np.array_equal(first, _frames({name: STRONG[name]}, seed=6))
 
 
 @pytest.mark.parametrize("name", ["channel_gain", "charge_injection", "mains", "amplitude_drift"])
-def test_another_effect_leaves_the_noises_samples_as_they_were(name):
+def test_another_effect_leaves_the_noises_samples_as_they_were(name: str) -> None:
     noise = {"noise": {"noise_v": 1e-3}}
     alone = _frames(noise) - _frames({})
     beside = _frames({**noise, name: STRONG[name]}) - _frames({name: STRONG[name]})
@@ -128,7 +129,7 @@ def test_another_effect_leaves_the_noises_samples_as_they_were(name):
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_a_step_is_a_pure_function(name, make_session):
+def test_a_step_is_a_pure_function(name: str, make_session: MakeSession) -> None:
     """Applied twice, out of order, it gives the same and leaves its arguments as they are."""
     module = importlib.import_module(BUILT_IN[name])
     values = {key: tuple(value) if isinstance(value, list) else value for key, value in STRONG[name].items()}
@@ -138,19 +139,20 @@ def test_a_step_is_a_pure_function(name, make_session):
         return
     v = np.linspace(-1, 1, 208)
     kept = v.copy()
-    parts = np.random.default_rng(1).standard_normal((4, 208))
-    more = (Loads(*parts, current_a=1e-3),) if isinstance(step, LoadedStep) else ()
-    first = step.apply(v, *more, 0.1, 3)
-    step.apply(v, *more, 0.5, 9)
-    assert np.array_equal(step.apply(v, *more, 0.1, 3), first)
+    a, b, c, d = np.random.default_rng(1).standard_normal((4, 208))
+    more: tuple[Any, ...] = (Loads(a, b, c, d, 1e-3),) if isinstance(step, LoadedStep) else ()
+    apply: Any = step.apply
+    first = apply(v, *more, 0.1, 3)
+    apply(v, *more, 0.5, 9)
+    assert np.array_equal(apply(v, *more, 0.1, 3), first)
     assert np.array_equal(v, kept) and first is not v
     assert first.shape == (208,) and first.dtype == np.float64
     if module.STAGE < Stage.DIGITISE:
-        assert step.apply(v + 0.1j * v, *more, 0.1, 3).dtype == np.complex128
+        assert apply(v + 0.1j * v, *more, 0.1, 3).dtype == np.complex128
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_an_effect_declares_what_it_is(name):
+def test_an_effect_declares_what_it_is(name: str) -> None:
     module = importlib.import_module(BUILT_IN[name])
     assert name == module.NAME and isinstance(module.STAGE, Stage) and module.SUMMARY.endswith(".")
     assert module.__doc__ and len(module.__doc__) > 250
@@ -165,7 +167,7 @@ def test_an_effect_declares_what_it_is(name):
 
 
 @pytest.mark.parametrize("name", sorted(STRONG))
-def test_the_page_tells_of_every_effect_and_parameter(name):
+def test_the_page_tells_of_every_effect_and_parameter(name: str) -> None:
     folder = Path(__file__).resolve().parents[4] / "docs" / "effects"
     page = (folder / "README.md").read_text(encoding="utf-8")
     section = page.split(f"\n## {name}\n", 1)[1].split("\n## ", 1)[0]
@@ -180,7 +182,7 @@ def test_the_page_tells_of_every_effect_and_parameter(name):
     assert 2_000 < (folder / f"{name}.png").stat().st_size < 60_000
 
 
-def test_misplacement_is_the_only_geometry_step():
+def test_misplacement_is_the_only_geometry_step() -> None:
     stages = {name: importlib.import_module(module).STAGE for name, module in BUILT_IN.items()}
     assert [name for name, stage in stages.items() if stage is Stage.GEOMETRY] == ["misplacement"]
     assert GeometryStep.__dataclass_fields__["stage"].default is Stage.GEOMETRY

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi
+from typing import Any
 
 import numpy as np
 import pytest
+from effect_types import MakeSession
 
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
-from eitskin.scene.effect import Contacts, PhaseStep
+from eitskin.scene.effect import Contacts, PhaseStep, Session
 from eitskin.scene.effects import bridged, contact_impedance, detached, phase
 from eitskin.scene.forward_steps import Change, FactoriseComplex, Work
 from eitskin.scene.reading import OPEN_BRIDGED_OHM_M2, OPEN_OHM_M2
@@ -21,23 +23,23 @@ from eitskin.skin.protocol import adjacent, table
 from eitskin.skin.skin import Skin, paper_skin
 
 
-def _ideal(count=16):
+def _ideal(count: int = 16) -> Contacts:
     return Contacts(np.zeros(count), np.zeros(count, dtype=bool))
 
 
-def _impedance(session, mean, spread=0.0):
+def _impedance(session: Session, mean: float, spread: float = 0.0) -> FloatArray:
     step = contact_impedance.make(contact_impedance.Parameters(mean, spread), session)
     return step.apply(_ideal(), 0.0, 0).impedance_ohm_m2
 
 
-def test_impedances_lie_within_their_spread(make_session):
+def test_impedances_lie_within_their_spread(make_session: MakeSession) -> None:
     z = _impedance(make_session(), 0.02, 0.25)
     assert 0.015 <= z.min() < 0.018 and 0.022 < z.max() <= 0.025
     assert np.array_equal(_impedance(make_session(), 0.02), np.full(16, 0.02))
     assert not np.array_equal(_impedance(make_session(seed=2), 0.02, 0.25), z)
 
 
-def test_a_vanishing_impedance_is_a_shunt(make_session, small_mesh):
+def test_a_vanishing_impedance_is_a_shunt(make_session: MakeSession, small_mesh: Mesh) -> None:
     """Towards z = 0 the voltages go to the shunt's, in proportion to z."""
     forward = ForwardModel(small_mesh, paper_skin(), adjacent(16), 0.0)
     shunt = forward.voltages(0.01)
@@ -51,7 +53,7 @@ def test_a_vanishing_impedance_is_a_shunt(make_session, small_mesh):
     assert distance[1] / distance[2] == pytest.approx(10, rel=0.05)
 
 
-def test_a_large_impedance_adds_z_over_area_on_driven_electrodes(make_session, small_mesh):
+def test_a_large_impedance_adds_z_over_area_on_driven_electrodes(make_session: MakeSession, small_mesh: Mesh) -> None:
     forward = ForwardModel(small_mesh, paper_skin(), table(16, [[0, 5, 0, 5], [0, 5, 5, 0]], 1e-3), 0.0)
     edges = small_mesh.nodes_mm[small_mesh.electrode_edges[0]]  # chords, a little shorter than 4 mm
     area_m2 = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum() * 1e-3 * 12e-3
@@ -61,7 +63,7 @@ def test_a_large_impedance_adds_z_over_area_on_driven_electrodes(make_session, s
     assert hundred / 1e5 == pytest.approx(2e-3 / area_m2, rel=1e-3)
 
 
-def test_under_a_large_impedance_four_point_voltages_are_the_gap_models(make_session):
+def test_under_a_large_impedance_four_point_voltages_are_the_gap_models(make_session: MakeSession) -> None:
     """The gap model (current density uniform under an electrode) has a closed Fourier series on a disk."""
     skin, protocol = paper_skin(), adjacent(16)
     k = np.arange(1, 20001)
@@ -97,7 +99,9 @@ def _bar(cells: int = 8) -> tuple[Mesh, Skin]:
 
 @pytest.mark.parametrize("hertz", [100.0, 5e3, 50e3, 1e6])
 @pytest.mark.parametrize("resistance", [0.0, 0.003, 0.1])
-def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(make_session, hertz, resistance):
+def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(
+    make_session: MakeSession, hertz: float, resistance: float
+) -> None:
     """A bar with whole ends as electrodes: Z = length / ((sigma + j w eps) area) + 2 (R || C) / area, exactly."""
     mesh, skin = _bar()
     protocol = table(4, [[2, 3, 2, 3], [2, 3, 0, 1]])
@@ -107,7 +111,7 @@ def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(make_session, 
     contacts = np.array([9e5, 9e5, resistance, resistance])
     solver = FactoriseComplex(forward, _only_ends(step), Work())
     nothing = Change(np.zeros(0, np.int64), np.zeros(0))
-    v = forward.patterns.voltages(solver.electrodes(np.full(mesh.n_elements, 0.05), nothing, contacts)) * 1e-3
+    v: Any = forward.patterns.voltages(solver.electrodes(np.full(mesh.n_elements, 0.05), nothing, contacts)) * 1e-3
     omega, area_m2 = 2 * pi * hertz, 20e-3 * 5e-3
     admittivity = 0.05 + 1j * omega * 8.8541878128e-12 * 2e4
     interface = resistance / (1 + 1j * omega * resistance * 0.02)
@@ -124,7 +128,7 @@ def _only_ends(step: PhaseStep) -> PhaseStep:
     return replace(step, contact=lambda z: np.where(np.arange(len(z)) < 2, z + 0j, inner(z)))
 
 
-def test_the_interface_is_a_resistance_parallel_to_a_capacitance():
+def test_the_interface_is_a_resistance_parallel_to_a_capacitance() -> None:
     z = np.array([0.0, 0.01, 0.5, 1e6])
     slow, corner = phase.interface(z, 1e-6, 0.1), phase.interface(z, 1 / (2 * pi * 0.01 * 0.1), 0.1)
     np.testing.assert_allclose(slow, z, rtol=1e-6)
@@ -138,7 +142,7 @@ def test_the_interface_is_a_resistance_parallel_to_a_capacitance():
     assert y[0].imag == pytest.approx(2.2253e-4, rel=1e-3)
 
 
-def test_detached_electrodes_are_marked_while_they_are_off(make_session):
+def test_detached_electrodes_are_marked_while_they_are_off(make_session: MakeSession) -> None:
     step = detached.make(detached.Parameters((2, 9), from_s=1.0, until_s=2.0), make_session())
     assert step.varies
     for time_s, off in ((-0.1, False), (0.99, False), (1.0, True), (1.99, True), (2.0, False)):
@@ -160,6 +164,6 @@ def test_detached_electrodes_are_marked_while_they_are_off(make_session):
         (lambda s: contact_impedance.Parameters(spread=1.0), "must be below 1"),
     ],
 )
-def test_impossible_contacts_are_refused(make_session, build, message):
+def test_impossible_contacts_are_refused(make_session: MakeSession, build: Any, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         build(make_session())

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import exp, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
+from effect_types import FloatArray, MakeSession
 
 from eitskin.errors import ConfigError
 from eitskin.scene.effect import Loads
@@ -15,19 +17,19 @@ from eitskin.scene.scan import channels, row_delays_s, settled_from_the_row_befo
 from eitskin.skin.protocol import adjacent, table
 
 
-def _loads(m=208, seed=3):
+def _loads(m: int = 208, seed: int = 3) -> Loads:
     draw = np.random.default_rng(seed)
     source, sink, plus, minus = draw.standard_normal((4, m))
     return Loads(source, sink, plus, minus, 1e-3)
 
 
-def test_channels_of_adjacent_measurement_are_the_sixteen_pairs():
+def test_channels_of_adjacent_measurement_are_the_sixteen_pairs() -> None:
     pairs, number = channels(adjacent(16))
     assert pairs.shape == (16, 2)
     assert np.array_equal(pairs[number], adjacent(16).drive_measure[:, 2:])
 
 
-def test_a_channel_has_one_gain_within_its_spread(make_session, v0):
+def test_a_channel_has_one_gain_within_its_spread(make_session: MakeSession, v0: FloatArray) -> None:
     session = make_session()
     gain = channel_gain.make(channel_gain.Parameters(0.05), session).apply(np.ones(208), 0.0, 0)
     _, number = channels(session.protocol)
@@ -40,7 +42,7 @@ def test_a_channel_has_one_gain_within_its_spread(make_session, v0):
 
 
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 3.0, 30.0])
-def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(make_session, ratio):
+def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(make_session: MakeSession, ratio: float) -> None:
     """From a single step in the scan: the rows after it, each by itself, against exp(-t / tau)."""
     parameters = mux.Parameters(on_resistance_ohm=0.0, settling_us=10.0, dwell_us=10.0 * ratio)
     step = mux.make(parameters, make_session())
@@ -56,13 +58,13 @@ def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(make_session, r
 
 
 @pytest.mark.parametrize("left", [0.0, 0.01, 0.6, 0.99, 0.999])
-def test_settling_is_the_periodic_recurrence(left):
+def test_settling_is_the_periodic_recurrence(left: float) -> None:
     target = np.random.default_rng(2).standard_normal(208)
     found = settled_from_the_row_before(target, left)
     np.testing.assert_allclose(found, target + left * (np.roll(found, 1) - target), atol=1e-11)
 
 
-def test_settling_depends_on_the_order_of_the_scan(make_session, v0):
+def test_settling_depends_on_the_order_of_the_scan(make_session: MakeSession, v0: FloatArray) -> None:
     session = make_session()
     parameters = mux.Parameters(settling_us=50.0)
     order = np.random.default_rng(4).permutation(208)
@@ -75,7 +77,7 @@ def test_settling_depends_on_the_order_of_the_scan(make_session, v0):
     assert np.array_equal(mux.make(settled, turned).apply(v0[order], 0.0, 0), straight)
 
 
-def test_on_resistance_divides(make_session):
+def test_on_resistance_divides(make_session: MakeSession) -> None:
     parameters = mux.Parameters(on_resistance_ohm=100.0, input_resistance_ohm=800.0, settling_us=0.0)
     session = make_session()
     assert mux.make(parameters, session).apply(np.ones(208), 0.0, 0) == pytest.approx(0.8)
@@ -83,7 +85,7 @@ def test_on_resistance_divides(make_session):
     assert 800 / 1100 <= spread.min() < 0.79 and 0.81 < spread.max() <= 800 / 900
 
 
-def test_switched_lines():
+def test_switched_lines() -> None:
     rows = table(8, [[0, 1, 2, 3], [0, 1, 3, 4], [1, 2, 3, 4], [1, 2, 5, 4]])
     assert switched(rows).tolist() == [
         [True, True, True, True],
@@ -110,11 +112,11 @@ def _quadrature(p: charge_injection.Parameters) -> float:
         charge_injection.Parameters(settling_us=500.0, dwell_us=100.0, window_us=1000.0, frequency_hz=1e3),
     ],
 )
-def test_what_a_demodulator_keeps_of_injected_charge(parameters):
+def test_what_a_demodulator_keeps_of_injected_charge(parameters: Any) -> None:
     assert charge_injection.kept_by_demodulator(parameters) == pytest.approx(_quadrature(parameters), rel=1e-6)
 
 
-def test_injected_charge_is_q_over_c_on_lines_that_switch(make_session):
+def test_injected_charge_is_q_over_c_on_lines_that_switch(make_session: MakeSession) -> None:
     """One line switches, the other stays: exactly Q / C, with the line's sign, whatever the signal."""
     session = replace(make_session(), protocol=table(8, [[0, 1, 2, 4], [0, 1, 3, 4], [1, 2, 3, 4], [1, 2, 3, 5]]))
     p = charge_injection.Parameters(charge_pc=2.0, capacitance_pf=100.0, spread=0.0)
@@ -128,12 +130,12 @@ def test_injected_charge_is_q_over_c_on_lines_that_switch(make_session):
     assert 0 < abs(uneven[0]) <= 0.8 * unit and uneven[2] == 0
 
 
-def test_a_window_of_broken_periods_is_refused():
+def test_a_window_of_broken_periods_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"window_us = 15 is 0\.75 periods of 50000 Hz"):
         charge_injection.Parameters(window_us=15.0)
 
 
-def test_crosstalk_comes_from_driven_wires_beside(make_session):
+def test_crosstalk_comes_from_driven_wires_beside(make_session: MakeSession) -> None:
     rows = [[0, 1, 2, 3], [3, 8, 2, 5], [8, 3, 4, 2], [0, 5, 15, 10], [0, 8, 4, 12], [7, 5, 6, 12]]
     session = replace(make_session(), protocol=table(16, rows))
     loads, part = _loads(6), 10 ** (-40 / 20)
@@ -146,7 +148,9 @@ def test_crosstalk_comes_from_driven_wires_beside(make_session):
 
 
 @pytest.mark.parametrize(("frequency_hz", "alias"), [(50.0, 10.0), (60.0, 0.0), (50.3, 9.7), (47.0, 7.0)])
-def test_mains_aliases_at_its_frequency_and_amplitude(make_session, frequency_hz, alias):
+def test_mains_aliases_at_its_frequency_and_amplitude(
+    make_session: MakeSession, frequency_hz: float, alias: float
+) -> None:
     """400 frames at 20 Hz: the spectrum of any row has one line, at the alias, with the amplitude given."""
     session = make_session(n_frames=400, quiet_frames=0)
     step = mains.make(mains.Parameters(2e-3, frequency_hz, 30.0), session)
@@ -166,7 +170,7 @@ def test_mains_aliases_at_its_frequency_and_amplitude(make_session, frequency_hz
 
 
 @pytest.mark.parametrize("cmrr_db", [0.0, 40.0, 80.0])
-def test_common_mode_is_the_inputs_mean_over_the_rejection(make_session, cmrr_db):
+def test_common_mode_is_the_inputs_mean_over_the_rejection(make_session: MakeSession, cmrr_db: float) -> None:
     loads, v = _loads(), np.linspace(-1, 1, 208)
     middle = (loads.plus_v + loads.minus_v) / 2
     for ground, common in (("sink", middle - loads.sink_v), ("mean", middle)):

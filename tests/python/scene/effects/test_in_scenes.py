@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from effect_types import FloatArray, MakeSession
 
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
@@ -26,18 +27,18 @@ def _compiled(effects: dict[str, Any], protocol: Protocol | None = None, **more:
     return compile_scene(Scene("test", protocol=protocol or adjacent(16), effects=effects, **given), bench=BENCH)
 
 
-def _last(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any) -> np.ndarray:
-    return simulate_frames(_compiled(effects, protocol, **more)).voltage_v[-1]
+def _last(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any) -> FloatArray:
+    return np.asarray(simulate_frames(_compiled(effects, protocol, **more)).voltage_v[-1])
 
 
-def _direct(impedance: Any = 0.0, protocol: Protocol | None = None) -> np.ndarray:
+def _direct(impedance: Any = 0.0, protocol: Protocol | None = None) -> FloatArray:
     mesh = BENCH.mesh(paper_skin(), ELEMENTS)
     return ForwardModel(mesh, paper_skin(), protocol or adjacent(16), impedance).voltages(0.01)
 
 
 @pytest.mark.parametrize("contact", [{}, {"contact_impedance": {"mean_ohm_m2": 0.02}}])
 @pytest.mark.parametrize("ohm", [0.0, 1.0, 300.0, 1e5, 1e9])
-def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm, contact):
+def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm: float, contact: dict[str, Any]) -> None:
     """Seen from electrodes 3 and 4 the skin is R_34: a bridge leaves R / (R + R_34) of their voltage."""
     rows = table(16, [[3, 4, 3, 4], [0, 8, 3, 4], [12, 5, 4, 3]])
     whole = _last(contact, rows)
@@ -46,7 +47,7 @@ def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm, contact):
     np.testing.assert_allclose(bridged, whole * ohm / (ohm + skin_ohm), rtol=1e-9, atol=1e-12 * np.abs(whole).max())
 
 
-def test_bridged_without_resistance_electrodes_are_at_one_potential():
+def test_bridged_without_resistance_electrodes_are_at_one_potential() -> None:
     """A chain of three: rows between its electrodes read 0 V, all others the same on each of them."""
     rows = table(16, [[0, 8, 2, 3], [0, 8, 3, 9], [0, 8, 2, 9], [0, 8, 2, 6], [0, 8, 9, 6], [2, 8, 5, 6], [3, 8, 5, 6]])
     v = _last({"bridged": {"electrodes": [2, 3, 9], "resistance_ohm": 0.0}}, rows)
@@ -58,7 +59,7 @@ def test_bridged_without_resistance_electrodes_are_at_one_potential():
 
 @pytest.mark.parametrize("others", [{}, {"contact_impedance": {"mean_ohm_m2": 0.01}}])
 @pytest.mark.parametrize("electrodes", [[5], [0, 15], [2, 3, 11]])
-def test_detached_electrodes_carry_no_signal_and_leave_the_rest(electrodes, others):
+def test_detached_electrodes_carry_no_signal_and_leave_the_rest(electrodes: list[int], others: dict[str, Any]) -> None:
     v = _last({**others, "detached": {"electrodes": electrodes}})
     impedance = np.full(16, others["contact_impedance"]["mean_ohm_m2"] if others else 0.0)
     impedance[electrodes] = 1e5
@@ -69,7 +70,7 @@ def test_detached_electrodes_carry_no_signal_and_leave_the_rest(electrodes, othe
     assert np.abs(v - _direct())[~lost].max() > 1e-4  # an insulated rim is not a shunted one
 
 
-def test_a_wobbling_electrode_is_lost_for_a_while():
+def test_a_wobbling_electrode_is_lost_for_a_while() -> None:
     effects = {"detached": {"electrodes": [5], "from_s": 0.1, "until_s": 0.2}}
     done = simulate_frames(_compiled(effects, frames=6, rate_hz=20.0))
     lost = np.isin(adjacent(16).drive_measure, [5]).any(axis=1)
@@ -78,7 +79,7 @@ def test_a_wobbling_electrode_is_lost_for_a_while():
     assert np.array_equal(done.voltage_v[0], done.voltage_v[-1])
 
 
-def test_phase_leaves_detached_electrodes_detached():
+def test_phase_leaves_detached_electrodes_detached() -> None:
     """The double layer would else shunt what does not touch."""
     off = {"detached": {"electrodes": [5]}, "contact_impedance": {"mean_ohm_m2": 0.01}}
     slow = {"phase": {"frequency_hz": 1e-3, "relative_permittivity": 1.0, "capacitance_f_per_m2": 1e-3}}
@@ -89,7 +90,7 @@ def test_phase_leaves_detached_electrodes_detached():
     )
 
 
-def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor():
+def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor() -> None:
     effects = {"phase": {"frequency_hz": 50e3, "relative_permittivity": 80.0}}
     compiled = _compiled(effects)
     done = simulate_frames(compiled)
@@ -103,7 +104,7 @@ def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor():
 
 @pytest.mark.parametrize("hertz", [0.0, 50e3])
 @pytest.mark.parametrize("with_phase", [False, True])
-def test_source_impedance_divides_the_current(hertz, with_phase):
+def test_source_impedance_divides_the_current(hertz: float, with_phase: bool) -> None:
     """The load is what a row measures on the driven electrodes themselves."""
     rows = table(16, [[0, 8, 0, 8], [0, 8, 3, 4], [1, 2, 1, 2], [1, 2, 9, 11]])
     source = {"resistance_ohm": 30e3, "capacitance_pf": 200.0, "frequency_hz": hertz, "series_ohm": 240.0}
@@ -116,8 +117,8 @@ def test_source_impedance_divides_the_current(hertz, with_phase):
     assert 0.3 < abs(share).min() < abs(share).max() < 0.9
 
 
-def test_a_sheets_factor_divides_the_voltages_of_shunts():
-    more = {"frames": 5, "rate_hz": 0.01}
+def test_a_sheets_factor_divides_the_voltages_of_shunts() -> None:
+    more: dict[str, Any] = {"frames": 5, "rate_hz": 0.01}
     warm = {"offset_k": 3.0, "drift_k_per_min": 0.1}
     dry = {"time_constant_h": 0.1}
     done = simulate_frames(_compiled({"temperature": warm, "gel_drying": dry}, **more)).voltage_v
@@ -128,14 +129,14 @@ def test_a_sheets_factor_divides_the_voltages_of_shunts():
         np.testing.assert_allclose(done[frame], _direct() / factor, rtol=1e-9)
 
 
-def test_contact_impedance_is_the_forward_models():
+def test_contact_impedance_is_the_forward_models() -> None:
     compiled = _compiled({"contact_impedance": {"mean_ohm_m2": 0.03, "spread": 0.5}})
     drawn = compiled.states[0].contacts.impedance_ohm_m2
     assert np.ptp(drawn) > 0.01
     assert np.array_equal(simulate_frames(compiled).voltage_v[-1], _direct(drawn))
 
 
-def test_misplacement_is_the_forward_models_on_the_moved_skin(make_session):
+def test_misplacement_is_the_forward_models_on_the_moved_skin(make_session: MakeSession) -> None:
     compiled = _compiled({"misplacement": {"spread_mm": 3.0}})
     skin = misplacement.make(misplacement.Parameters(3.0), make_session(seed=3)).apply(paper_skin())
     assert compiled.skin == skin
@@ -144,7 +145,7 @@ def test_misplacement_is_the_forward_models_on_the_moved_skin(make_session):
     assert np.abs(direct - _direct()).max() > 0.01
 
 
-def test_common_mode_with_a_grounded_sink():
+def test_common_mode_with_a_grounded_sink() -> None:
     """Row [0, 8, 3, 12]: the common voltage is the mean of what [0, 8, 3, 8] and [0, 8, 12, 8] read."""
     rows = table(16, [[0, 8, 3, 12], [0, 8, 3, 8], [0, 8, 12, 8]])
     plain = _last({}, rows)
@@ -165,7 +166,7 @@ def test_common_mode_with_a_grounded_sink():
         ({"adc": {"bits": 0}}, r"\[effects.adc\].*bits.*at least 1"),
     ],
 )
-def test_impossible_parameters_name_table_and_key(effects, message):
+def test_impossible_parameters_name_table_and_key(effects: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message) as caught:
         _compiled(effects)
     assert "\n" not in str(caught.value)
