@@ -25,9 +25,8 @@ def add_parser(subparsers: Any) -> None:
     one = what.add_parser("run", help="simulate a scene: frames with their truth")
     one.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
     one.add_argument("-o", "--output", metavar="FRAMES", type=Path, required=True, help="frames file to write (.npz)")
-    one.add_argument(
-        "--truth-pixels", metavar="N", type=int, default=64, help="of mask and conductivity; 0: none (default: %(default)s)"
-    )
+    pixels = "of mask and conductivity; 0: none (default: %(default)s)"
+    one.add_argument("--truth-pixels", metavar="N", type=int, default=64, help=pixels)
     one.add_argument("--json", action="store_true")
     one.set_defaults(run=run_scene)
     plan = what.add_parser("plan", help="what a scene will compute, step by step, and what that costs")
@@ -56,8 +55,8 @@ def _add_dataset(what: Any) -> None:
     dataset = what.add_parser(
         "dataset",
         help="many seeded scenes drawn from ranges, in chunks; an interrupted run resumes",
-        description="Draw scenes from the table [dataset] of a scene and simulate them into a folder of chunks. The result "
-        "depends on the description and the seed only. Run the same command again to resume.",
+        description="Draw scenes from the table [dataset] of a scene and simulate them into a folder of chunks. The "
+        "result depends on the description and the seed only. Run the same command again to resume.",
     )
     dataset.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
     dataset.add_argument("--count", metavar="N", type=int, required=True, help="how many scenes")
@@ -107,8 +106,9 @@ def run_scene(options: argparse.Namespace) -> int:
     save_frames(options.output, frames)
     counters = frames.meta["counters"]
     if options.json:
-        facts = {"scene": scene.name, "frames": scene.frames, "quiet_frames": scene.quiet_frames}
-        print(json.dumps({**facts, "effects": list(scene.effects), "counters": counters, "output": str(options.output)}, indent=2))
+        facts: dict[str, Any] = {"scene": scene.name, "frames": scene.frames, "quiet_frames": scene.quiet_frames}
+        facts |= {"effects": list(scene.effects), "counters": counters, "output": str(options.output)}
+        print(json.dumps(facts, indent=2))
         return 0
     print(f"{scene.name}: {scene.frames} frames after {scene.quiet_frames} quiet ones -> {options.output}")
     print(f"effects: {', '.join(scene.effects) or 'none'}")

@@ -1,7 +1,8 @@
 """How a dataset varies a scene: the table [dataset], and one drawn scene a number.
 
-``[dataset.touches]`` draws touches anew (in place of [[touch]]); ``[dataset.ranges]`` holds [low, high] at the place of the
-number that is drawn: ``[dataset.ranges.effects.noise] snr_db = [50, 70]``, ``[dataset.ranges.touch.0] radius_mm = [6, 9]``.
+``[dataset.touches]`` draws touches anew (in place of [[touch]]); ``[dataset.ranges]`` holds [low, high] at the place of
+the number that is drawn: ``snr_db = [50, 70]`` in ``[dataset.ranges.effects.noise]``, ``radius_mm = [6, 9]`` in
+``[dataset.ranges.touch.0]``.
 Scene k of a dataset depends on (its description, the dataset's seed, k) only. Every range has a stream of its own.
 """
 
@@ -24,7 +25,7 @@ TOUCH_NUMBERS = ("x_mm", "y_mm", "radius_mm", "contrast")
 
 @dataclass(frozen=True)
 class Range:
-    """A number drawn evenly from [low, high]; whole where both ends are. ``key`` is where: ("effects", "noise", "snr_db")."""
+    """A number drawn evenly from [low, high], whole where both ends are; ``key`` is where: ("effects", "noise", ...)."""
 
     key: tuple[str, ...]
     low: float
@@ -64,7 +65,7 @@ def ranges_of(table: Mapping[str, Any], scene: Scene, where: str) -> Ranges:
         place = f"{where} [dataset.touches]"
         check_keys(table["touches"], [one.name for one in fields(TouchRules)], place)
         if scene.touches:
-            raise ConfigError(f"{place}: the scene has touches of its own; remove [[touch]], or vary it in [dataset.ranges]")
+            raise ConfigError(f"{place}: the scene has touches of its own; remove [[touch]], or use [dataset.ranges]")
         rules = _rules(table["touches"], place)
     numbers = tuple(_walk(table.get("ranges", {}), (), f"{where} [dataset.ranges]"))
     for one in numbers:
@@ -73,7 +74,7 @@ def ranges_of(table: Mapping[str, Any], scene: Scene, where: str) -> Ranges:
 
 
 def _rules(table: Mapping[str, Any], where: str) -> TouchRules:
-    given = {}
+    given: dict[str, Any] = {}
     for key, value in table.items():
         if key in ("count", "radius_mm", "contrast"):
             low, high, whole = _pair(value, f"{where}: {key}")

@@ -20,8 +20,11 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 AnyArray = npt.NDArray[Any]
 
-OPEN_OHM_M2 = 1e6
-"""A detached electrode's impedance in the solve: 20 Gohm on the paper's 48 mm2, so that next to nothing leaks."""
+# A detached electrode's impedance in the solve. It carries no current as a whole, and 1e4 ohm m2 keeps what little runs
+# in and out again along its width below 1e-8 of the other rows; one that a bridge feeds has 2 Gohm on the paper's
+# 48 mm2, where about 1e-5 leaks. More would cost the solve as many digits.
+OPEN_OHM_M2 = 1e4
+OPEN_BRIDGED_OHM_M2 = 1e5
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,4 +101,6 @@ def live_rows(contacts: Contacts, rows: IntArray) -> BoolArray:
 
 def solved_impedance(contacts: Contacts) -> FloatArray:
     """The contact impedances (L,) that are solved with."""
-    return np.asarray(np.where(contacts.detached, OPEN_OHM_M2, contacts.impedance_ohm_m2))
+    is_open = np.full(len(contacts.detached), OPEN_OHM_M2)
+    is_open[[k for i, j, _ in contacts.bridges for k in (i, j)]] = OPEN_BRIDGED_OHM_M2
+    return np.asarray(np.where(contacts.detached, is_open, contacts.impedance_ohm_m2))
