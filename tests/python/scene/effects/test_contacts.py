@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_types import MakeSession
+from effect_types import FloatArray, MakeSession
 
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
