@@ -173,6 +173,7 @@ def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Benc
         name: parse_parameters(module, scene.effects[name], f"{scene.where} [effects.{name}]")
         for name, module in modules.items()
     }
+    _check_shared(scene, modules, parameters)
     steps, skin = _make_steps(scene, modules, parameters, desk, work)
     phase = _only_phase(scene, steps)
     states, state_of_frame = _states(scene, desk.cover(skin, scene.elements), steps)
@@ -251,6 +252,20 @@ def _load(scene: Scene, registry: Registry) -> dict[str, EffectModule]:
             if other in modules:
                 raise ConfigError(f"{scene.where} [effects.{name}]: it contradicts [effects.{other}]; keep one of them")
     return dict(sorted(modules.items(), key=lambda item: (item[1].STAGE, item[1].ORDER, item[0])))
+
+
+def _check_shared(scene: Scene, modules: dict[str, EffectModule], parameters: dict[str, Any]) -> None:
+    """Refuse effects that say different things of what they share, such as the excitation's frequency."""
+    said: dict[str, tuple[str, Any]] = {}
+    for name, module in modules.items():
+        for key, meaning in getattr(module, "SHARED", {}).items():
+            value = getattr(parameters[name], key)
+            other, before = said.setdefault(meaning, (f"[effects.{name}] {key}", value))
+            if before != value:
+                raise ConfigError(
+                    f"{scene.where} [effects.{name}]: {key} = {value!r} contradicts {other} = {before!r}; both are the "
+                    f"{meaning}, so make them equal"
+                )
 
 
 def _make_steps(

@@ -25,7 +25,7 @@ TOUCH_NUMBERS = ("x_mm", "y_mm", "radius_mm", "contrast")
 
 @dataclass(frozen=True)
 class Range:
-    """A number drawn evenly from [low, high], whole where both ends are; ``key`` is where: ("effects", "noise", ...)."""
+    """A number drawn evenly from [low, high], whole where both ends are; ``key`` is ("effects", "noise", "snr_db")."""
 
     key: tuple[str, ...]
     low: float

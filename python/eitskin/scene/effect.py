@@ -9,7 +9,8 @@ An effect is a module. It is imported only when a scene names it, and defines
   tuple[int, ...], tuple[float, ...], or one of these ``| None``. Its ``__post_init__`` may raise ConfigError with one
   line that begins with the key; file and table are put before it.
 - ``make(parameters, session) -> Step``: it may raise ConfigError in the same way.
-- optionally ``CONFLICTS``: names of effects that it cannot be named together with.
+- optionally ``CONFLICTS``: names of effects that it cannot be named together with, and ``SHARED``: a dict from its
+  keys to what they say of the instrument ({"frequency_hz": "excitation frequency"}), on which named effects must agree.
 
 Times: ``time_s`` is in seconds from the first recorded frame, on the same axis as the touches' keyframes, so that it is
 NEGATIVE during the quiet frames. ``frame`` counts all frames from 0, quiet ones first.
@@ -228,7 +229,7 @@ Step: TypeAlias = GeometryStep | MaterialStep | ContactStep | PhaseStep | Loaded
 
 @runtime_checkable
 class EffectModule(Protocol):
-    """What a module with an effect defines; ``CONFLICTS`` may be left out."""
+    """What a module with an effect defines; ``CONFLICTS`` and ``SHARED`` may be left out."""
 
     NAME: str
     STAGE: Stage

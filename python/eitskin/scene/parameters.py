@@ -85,7 +85,7 @@ def _number(value: Any, kind: type, metadata: Mapping[str, Any], what: str) -> f
     if not (finite and low <= value <= high) or (open_low and value == low):
         bounds = [f"{'above' if open_low else 'at least'} {low:g}"] if low > float("-inf") else []
         bounds += [f"at most {high:g}"] if high < float("inf") else []
-        unit = f" {metadata['unit']}" if metadata.get("unit") else ""
+        unit = f" {metadata['unit']}" if metadata.get("unit") not in (None, "", "1") else ""
         raise ConfigError(f"{what} = {value!r} is out of range; it must be {' and '.join(bounds) or 'finite'}{unit}")
     return kind(value)  # type: ignore[no-any-return]
 

@@ -204,3 +204,12 @@ def test_bad_steps_are_said_to_be_the_effects(bench: Bench) -> None:
             compile_scene(still_scene(effects={name: {}}), registry=registry, bench=bench)
     with pytest.raises(ConfigError, match=r"frame -2, row 0 is -?inf.*endless"):
         simulate_frames(compile_scene(still_scene(effects={"endless": {}}), registry=registry, bench=bench))
+
+
+def test_effects_that_disagree_on_the_excitation_frequency_are_refused(bench: Bench) -> None:
+    effects = {"phase": {"frequency_hz": 1e4}, "source_impedance": {"frequency_hz": 5e4}}
+    said = r"f.toml \[effects.source_impedance\]: frequency_hz = 50000.0 contradicts \[effects.phase\] frequency_hz"
+    with pytest.raises(ConfigError, match=said):
+        compile_scene(still_scene(effects=effects, where="f.toml"), bench=bench)
+    effects["source_impedance"]["frequency_hz"] = 1e4
+    compile_scene(still_scene(effects=effects), bench=bench)

@@ -28,6 +28,7 @@ NAME = "charge_injection"
 STAGE = Stage.FRONT_END
 ORDER = 30
 SUMMARY = "Closing switches leave charge on the measuring lines."
+SHARED = {"frequency_hz": "excitation frequency"}
 
 
 @dataclass(frozen=True)

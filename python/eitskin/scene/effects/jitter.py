@@ -25,6 +25,7 @@ NAME = "jitter"
 STAGE = Stage.DIGITISE
 ORDER = 10
 SUMMARY = "Samples are taken a little early or late."
+SHARED = {"frequency_hz": "excitation frequency"}
 
 
 @dataclass(frozen=True)

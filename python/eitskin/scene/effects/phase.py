@@ -22,6 +22,7 @@ NAME = "phase"
 STAGE = Stage.EXCITATION
 ORDER = 10
 SUMMARY = "Capacitances turn the voltages' phase: a complex solve."
+SHARED = {"frequency_hz": "excitation frequency"}
 VACUUM_F_PER_M = 8.8541878128e-12
 NO_CONTACT_OHM_M2 = 1e4
 """From here on an electrode does not touch (that is how detached ones are solved), so it has no double layer either."""

@@ -21,6 +21,7 @@ NAME = "source_impedance"
 STAGE = Stage.EXCITATION
 ORDER = 20
 SUMMARY = "The source loses current to its own output impedance."
+SHARED = {"frequency_hz": "excitation frequency"}
 
 
 @dataclass(frozen=True)

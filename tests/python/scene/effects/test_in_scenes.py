@@ -102,8 +102,7 @@ def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor() -> None:
     np.testing.assert_allclose(magnitude, _direct() * abs(factor), rtol=1e-9)
 
 
-@pytest.mark.parametrize("hertz", [0.0, 50e3])
-@pytest.mark.parametrize("with_phase", [False, True])
+@pytest.mark.parametrize(("hertz", "with_phase"), [(0.0, False), (50e3, False), (50e3, True)])
 def test_source_impedance_divides_the_current(hertz: float, with_phase: bool) -> None:
     """The load is what a row measures on the driven electrodes themselves."""
     rows = table(16, [[0, 8, 0, 8], [0, 8, 3, 4], [1, 2, 1, 2], [1, 2, 9, 11]])
