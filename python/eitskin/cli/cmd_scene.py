@@ -75,11 +75,11 @@ def _check_folder(path: Path) -> None:
         raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
 
 
-def frame_progress(frames: range) -> Iterable[int]:
+def solve_progress(states: range) -> Iterable[int]:
     """A bar on stderr where that is a terminal; nothing otherwise."""
     from tqdm import tqdm
 
-    shown: Iterable[int] = tqdm(frames, desc="frames", unit="", leave=False, disable=not sys.stderr.isatty())
+    shown: Iterable[int] = tqdm(states, desc="solving", unit="", leave=False, disable=not sys.stderr.isatty())
     return shown
 
 
@@ -102,7 +102,7 @@ def run_scene(options: argparse.Namespace) -> int:
 
     _check_folder(options.output)
     scene = find_scene(options.scene)
-    frames = run(compile_scene(scene), truth_pixels=options.truth_pixels, progress=frame_progress)
+    frames = run(compile_scene(scene), truth_pixels=options.truth_pixels, progress=solve_progress)
     save_frames(options.output, frames)
     counters = frames.meta["counters"]
     if options.json:
@@ -136,7 +136,7 @@ def run_picture(options: argparse.Namespace) -> int:
     _check_folder(options.output)
     load_matplotlib()
     scene = find_scene(options.scene)
-    draw_scene(options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=frame_progress))
+    draw_scene(options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=solve_progress))
     print(f"picture: {options.output}")
     return 0
 

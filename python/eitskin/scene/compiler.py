@@ -8,6 +8,7 @@ The frame loop (``runner.py``) then asks nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -17,7 +18,6 @@ import numpy.typing as npt
 from eitskin.errors import ConfigError, EitskinError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
-from eitskin.fem.patterns import Patterns
 from eitskin.scene.cover import Cover
 from eitskin.scene.description import Scene
 from eitskin.scene.effect import (
@@ -58,7 +58,7 @@ class Bench:
 
     def __init__(self) -> None:
         self._meshes: dict[tuple[Skin, int], Mesh] = {}
-        self._models: dict[tuple[Skin, int, int], tuple[ForwardModel, Patterns]] = {}
+        self._models: dict[tuple[Skin, int, int], ForwardModel] = {}
         self._covers: dict[tuple[Skin, int], Cover] = {}
         self._untouched: dict[tuple[Skin, int, int], FloatArray] = {}
 
@@ -70,14 +70,11 @@ class Bench:
         return self._meshes[key]
 
     def model(self, skin: Skin, protocol: Protocol, elements: int) -> ForwardModel:
-        """The forward model of ``skin`` with ideal electrodes and with the protocol's own patterns."""
+        """The forward model of ``skin`` with ideal electrodes; whoever changes its patterns takes a copy."""
         key = (skin, elements, protocol.hash)
         if key not in self._models:
-            model = ForwardModel(self.mesh(skin, elements), skin, protocol, 0.0)
-            self._models[key] = (model, model.patterns)
-        model, patterns = self._models[key]
-        model.patterns = patterns
-        return model
+            self._models[key] = ForwardModel(self.mesh(skin, elements), skin, protocol, 0.0)
+        return self._models[key]
 
     def cover(self, skin: Skin, elements: int) -> Cover:
         """Which elements of the mesh touches cover."""
@@ -177,7 +174,7 @@ def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Benc
     steps, skin = _make_steps(scene, modules, parameters, desk, work)
     phase = _only_phase(scene, steps)
     states, state_of_frame = _states(scene, desk.cover(skin, scene.elements), steps)
-    model = desk.model(skin, scene.protocol, scene.elements)
+    model = copy(desk.model(skin, scene.protocol, scene.elements))
     pairs = tuple(dict.fromkeys((i, j) for state in states for i, j, _ in state.contacts.bridges))
     model.patterns = with_bridges(model.patterns, pairs)
     method, reach, counted = _choose_method(scene, model, states, steps)

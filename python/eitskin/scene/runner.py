@@ -46,32 +46,29 @@ def forward_of(compiled: Compiled, work: Work) -> Forward:
 
 
 def simulate_frames(compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None) -> Run:
-    """Run every frame; ``progress`` wraps the frames' numbers.
+    """Solve every state, then take every frame through the steps; ``progress`` wraps the states' numbers.
 
     Raises:
         ConfigError: an effect makes a conductivity that cannot be, or a voltage that is not finite.
     """
     scene, work = compiled.scene, Work()
     forward, background, read = forward_of(compiled, work), background_of(compiled), _reader(compiled)
-    times, voltage_v = compiled.times_s().tolist(), np.zeros((scene.n_frames, scene.protocol.n_rows))
-    readings: dict[int, Reading] = {
-        k: read(electrodes, compiled.states[k]) for k, electrodes in compiled.known.items()
-    }
-    quiet_factorisations = 0
-    numbers, functions = range(scene.n_frames), compiled.functions
-    for frame in numbers if progress is None else progress(numbers):
-        number = int(compiled.state_of_frame[frame])
-        reading = readings.get(number)
-        if reading is None:
-            state = compiled.states[number]
-            solved = forward.electrodes(background(state), state.change, solved_impedance(state.contacts))
-            reading = readings[number] = read(solved, state)
-        v, loads, time_s = reading.v, reading.loads, times[frame]
+    unknown = [k for k in range(len(compiled.states)) if k not in compiled.known]
+    readings = {k: read(electrodes, compiled.states[k]) for k, electrodes in compiled.known.items()}
+    factorised = np.zeros(scene.n_frames, dtype=np.int64)
+    for k in map(unknown.__getitem__, progress(range(len(unknown))) if progress else range(len(unknown))):
+        state, before = compiled.states[k], work.factorisations
+        solved = forward.electrodes(background(state), state.change, solved_impedance(state.contacts))
+        readings[k] = read(solved, state)
+        factorised[state.frame] += work.factorisations - before
+
+    voltage_v, functions = np.zeros((scene.n_frames, scene.protocol.n_rows)), compiled.functions
+    numbers, times = compiled.state_of_frame.tolist(), compiled.times_s().tolist()
+    for frame, (number, time_s) in enumerate(zip(numbers, times, strict=True)):
+        v, loads = readings[number].v, readings[number].loads
         for function in functions:
             v = function(v, loads, time_s, frame)  # type: ignore[arg-type]
         voltage_v[frame] = v
-        if frame == scene.quiet_frames - 1:
-            quiet_factorisations = work.factorisations
     if not np.isfinite(voltage_v).all():
         frame, row = np.argwhere(~np.isfinite(voltage_v))[0]
         named = ", ".join(scene.effects) or "none"
@@ -80,7 +77,7 @@ def simulate_frames(compiled: Compiled, progress: Callable[[range], Iterable[int
             f"an effect's parameters (of {named}) are too extreme"
         )
     true_v = np.array([readings[k].v for k in range(len(compiled.states))])
-    recorded = work.factorisations - quiet_factorisations
+    recorded = int(factorised[scene.quiet_frames :].sum())
     return Run(voltage_v, true_v, work, recorded, compiled.work.generators)
 
 

@@ -14,10 +14,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from eitskin.errors import ConfigError
 from eitskin.fem.cem import factorise
-from eitskin.scene.compiler import Bench, Compiled, compile_scene
+from eitskin.scene.compiler import Bench, compile_scene
 from eitskin.scene.dataset import Job, job_of, make_chunk
+from eitskin.scene.dataset_ranges import drawn
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.registry import BUILT_IN
@@ -139,47 +139,53 @@ def scenes_table(
 def _dataset(scenes: int, elements: int, desk: Bench, progress: Progress | None) -> dict[str, Any]:
     job = job_of(replace(find_scene("random_touches"), elements=elements), scenes, 1)
     make_chunk(replace(job, count=1), 0, desk)
-    chunks = range(job.chunks)
-    start = perf_counter()
-    size = sum(len(make_chunk(job, chunk, desk)) for chunk in (chunks if progress is None else progress(chunks)))
-    seconds = perf_counter() - start
+    chunks, seconds, size = range(job.chunks), 0.0, 0
+    parts: list[tuple[float, float]] = []
+    time_parts = _timer_of_parts(job, desk)
+    for chunk in chunks if progress is None else progress(chunks):
+        start = perf_counter()
+        size += len(make_chunk(job, chunk, desk))
+        seconds += perf_counter() - start
+        parts += [time_parts() for _ in range(5)]
     return {
         "scenes": scenes,
         "seconds": seconds,
         "scenes_per_s": scenes / seconds,
         "bytes_a_scene": size / scenes,
         "projected_s": PROJECTED * seconds / scenes if scenes != PROJECTED else seconds,
-        "shares": _shares(job, desk, seconds / scenes),
+        "shares": _shares(parts, _solved_states(job, desk), seconds / scenes),
     }
 
 
-def _shares(job: Job, desk: Bench, scene_s: float, runs: int = 30) -> dict[str, float]:
-    """The parts of a scene's time that its factorisations and its solves take, timed alone."""
-    from eitskin.scene.dataset_ranges import drawn
+def _solved_states(job: Job, desk: Bench) -> int:
+    compiled = compile_scene(drawn(job.scene, job.ranges, job.seed, 0), bench=desk)
+    return len(compiled.states) - len(compiled.known)
 
-    compiled: Compiled = compile_scene(drawn(job.scene, job.ranges, job.seed, 0), bench=desk)
-    model, states = compiled.model, len(compiled.states)
-    impedance = compiled.states[0].contacts.impedance_ohm_m2
-    conductivity = np.full(model.mesh.n_elements, 0.01)
+
+def _timer_of_parts(job: Job, desk: Bench) -> Callable[[], tuple[float, float]]:
+    """A function that times one factorisation and one solve of all patterns, alone, in s; called among the chunks."""
+    compiled = compile_scene(drawn(job.scene, job.ranges, job.seed, 0), bench=desk)
+    model, impedance = compiled.model, compiled.states[0].contacts.impedance_ohm_m2
+    conductivity = np.full(model.mesh.n_elements, job.scene.skin.conductivity_s_per_m)
     matrix = model.system_for(impedance == 0).matrix(conductivity, impedance)
     loads = np.zeros((matrix.shape[0], len(model.patterns.solved)))
     loads[: loads.shape[1]] = np.eye(loads.shape[1])
-    factor_s, solve_s = [], []
-    for _ in range(runs):
+
+    def time_parts() -> tuple[float, float]:
         start = perf_counter()
         factors = factorise(matrix)
         middle = perf_counter()
         factors.solve(loads)
-        factor_s.append(middle - start)
-        solve_s.append(perf_counter() - middle)
-    solved = states - len(compiled.known)
-    if not solved:
-        raise ConfigError("bench: the dataset's scene solves nothing; mend its description")
-    shares = {
-        "factorisation": solved * statistics.median(factor_s) / scene_s,
-        "triangular solves": solved * statistics.median(solve_s) / scene_s,
-    }
-    return {**shares, "the rest": 1 - sum(shares.values())}
+        return middle - start, perf_counter() - middle
+
+    return time_parts
+
+
+def _shares(parts: Sequence[tuple[float, float]], solved: int, scene_s: float) -> dict[str, float]:
+    """The parts of a scene's time that its factorisations and its solves take."""
+    factor_s, solve_s = (statistics.fmean(values) for values in zip(*parts, strict=True))
+    shares = {"factorisation": solved * factor_s / scene_s, "triangular solves": solved * solve_s / scene_s}
+    return {**shares, "the rest": max(0.0, 1 - sum(shares.values()))}
 
 
 def scenes_text(result: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import sys
 from dataclasses import replace
 from typing import Any
@@ -69,6 +70,33 @@ def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames(bench: Bench
     among = compile_scene(scene, registry=Registry({**BUILT_IN, **many}, entry_points=False), bench=bench)
     assert len(many) == 200 and among.plan.steps == alone.plan.steps and among.plan.text() == alone.plan.text()
     assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
+
+
+def test_the_factory_of_an_unnamed_effect_is_never_called(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(parameters: Any, session: Any) -> Any:
+        raise AssertionError("called")
+
+    before = simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v
+    for target in BUILT_IN.values():
+        monkeypatch.setattr(importlib.import_module(target), "make", refuse)
+    assert np.array_equal(simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v, before)
+    with pytest.raises(AssertionError, match="called"):
+        compile_scene(still_scene(effects={"noise": {"snr_db": 60.0}}), bench=bench)
+
+
+def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(bench: Bench) -> None:
+    """V0 has patterns of its own; asking for it late does not disturb the scene's."""
+
+    def make(parameters: Any, session: Any) -> VoltageStep:
+        return VoltageStep("late", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v / session.v0_rms_v())
+
+    registry = Registry({**BUILT_IN, "late": effect_module("late", make)}, entry_points=False)
+    effects: dict[str, Any] = {"bridged": {"electrodes": [2, 3]}, "gel_drying": {}}
+    plain = simulate_frames(compile_scene(still_scene(4, effects=effects))).voltage_v
+    with_late = compile_scene(still_scene(4, effects={**effects, "late": {}}), registry=registry)
+    v0_v = still_scene(1, touches=()).run().voltage_v[0]
+    scaled = simulate_frames(with_late).voltage_v * np.sqrt(np.mean(v0_v**2))
+    assert scaled == pytest.approx(plain, rel=1e-12)
 
 
 def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
