@@ -54,13 +54,13 @@ NO_CHANGE = Change(np.zeros(0, np.int64), np.zeros(0))
 
 
 class Bench:
-    """Meshes, models and untouched skins, kept between scenes of the same skin (dataset mode)."""
+    """Meshes, models and untouched skins, kept between scenes of the same skin and protocol object (dataset mode)."""
 
     def __init__(self) -> None:
         self._meshes: dict[tuple[Skin, int], Mesh] = {}
-        self._models: dict[tuple[Skin, int, int], ForwardModel] = {}
+        self._models: dict[tuple[Skin, int, Protocol, bytes], ForwardModel] = {}
         self._covers: dict[tuple[Skin, int], Cover] = {}
-        self._untouched: dict[tuple[Skin, int, int], FloatArray] = {}
+        self._untouched: dict[tuple[Skin, int, Protocol], FloatArray] = {}
 
     def mesh(self, skin: Skin, elements: int) -> Mesh:
         """The mesh of ``skin`` with about so many ``elements``."""
@@ -69,12 +69,12 @@ class Bench:
             self._meshes[key] = mesh_for_elements(skin, elements)
         return self._meshes[key]
 
-    def model(self, skin: Skin, protocol: Protocol, elements: int) -> ForwardModel:
-        """The forward model of ``skin`` with ideal electrodes; whoever changes its patterns takes a copy."""
-        key = (skin, elements, protocol.hash)
+    def model(self, skin: Skin, protocol: Protocol, elements: int, contacts: FloatArray) -> ForwardModel:
+        """A copy of a forward model of ``skin`` whose matrix has the pattern for ``contacts`` (L,), by which are 0."""
+        key = (skin, elements, protocol, (contacts == 0).tobytes())
         if key not in self._models:
-            self._models[key] = ForwardModel(self.mesh(skin, elements), skin, protocol, 0.0)
-        return self._models[key]
+            self._models[key] = ForwardModel(self.mesh(skin, elements), skin, protocol, contacts)
+        return copy(self._models[key])
 
     def cover(self, skin: Skin, elements: int) -> Cover:
         """Which elements of the mesh touches cover."""
@@ -85,15 +85,15 @@ class Bench:
 
     def known(self, scene: Scene) -> FloatArray | None:
         """The electrodes' potentials (L, P) of ``scene``'s untouched skin, where they were asked for before."""
-        return self._untouched.get((scene.skin, scene.elements, scene.protocol.hash))
+        return self._untouched.get((scene.skin, scene.elements, scene.protocol))
 
     def v0_v(self, scene: Scene, work: SessionWork) -> FloatArray:
         """The reference frame (m,) of ``scene``'s skin without any effect; a factorisation when first asked for."""
-        model = self.model(scene.skin, scene.protocol, scene.elements)
+        model = self.model(scene.skin, scene.protocol, scene.elements, np.zeros(scene.skin.electrodes.count))
         electrodes = self.known(scene)
         if electrodes is None:
             electrodes = model.solve(scene.skin.conductivity_s_per_m, 0.0).electrodes
-            self._untouched[scene.skin, scene.elements, scene.protocol.hash] = electrodes
+            self._untouched[scene.skin, scene.elements, scene.protocol] = electrodes
             work.v0_factorisations += 1
             work.v0_solves += electrodes.shape[1]
         return model.patterns.voltages(electrodes) * scene.protocol.current_a
@@ -174,7 +174,7 @@ def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Benc
     steps, skin = _make_steps(scene, modules, parameters, desk, work)
     phase = _only_phase(scene, steps)
     states, state_of_frame = _states(scene, desk.cover(skin, scene.elements), steps)
-    model = copy(desk.model(skin, scene.protocol, scene.elements))
+    model = desk.model(skin, scene.protocol, scene.elements, solved_impedance(states[0].contacts))
     pairs = tuple(dict.fromkeys((i, j) for state in states for i, j, _ in state.contacts.bridges))
     model.patterns = with_bridges(model.patterns, pairs)
     method, reach, counted = _choose_method(scene, model, states, steps)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import types
 import typing
 from collections.abc import Mapping
@@ -21,7 +22,8 @@ def parse_parameters(module: EffectModule, table: Mapping[str, Any], where: str)
     """
     fields = {one.name: one for one in dataclasses.fields(module.Parameters)}
     check_keys(table, fields, where)
-    hints = typing.get_type_hints(module.Parameters)
+    declared: Any = module.Parameters
+    hints = _hints(declared)
     values = {}
     for name, one in fields.items():
         if name in table:
@@ -32,6 +34,11 @@ def parse_parameters(module: EffectModule, table: Mapping[str, Any], where: str)
         return module.Parameters(**values)
     except EitskinError as error:
         raise type(error)(f"{where}: {error}") from None
+
+
+@functools.cache
+def _hints(parameters: Any) -> dict[str, Any]:
+    return typing.get_type_hints(parameters)
 
 
 def _value(value: Any, hint: Any, metadata: Mapping[str, Any], what: str) -> Any:
@@ -92,7 +99,8 @@ def _number(value: Any, kind: type, metadata: Mapping[str, Any], what: str) -> f
 
 def describe_parameters(module: EffectModule) -> list[dict[str, Any]]:
     """Each parameter's name, type, default, range, unit and meaning, for ``eitskin scene effects NAME``."""
-    hints = typing.get_type_hints(module.Parameters)
+    declared: Any = module.Parameters
+    hints = _hints(declared)
     rows = []
     for one in dataclasses.fields(module.Parameters):
         default = one.default

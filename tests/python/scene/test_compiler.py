@@ -59,15 +59,15 @@ def test_frames_without_effects_are_the_forward_models_to_the_bit() -> None:
             assert np.array_equal(frames.voltage_v[k], direct)
 
 
-def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames(bench: Bench) -> None:
+def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
     def refuse(parameters: Any, session: Any) -> Any:
         raise AssertionError("the factory of an unnamed effect was called")
 
     many = {f"unnamed{k}": effect_module(f"unnamed{k}", refuse) for k in range(100)}
     many |= {f"absent{k}": f"no_such_package.effect{k}" for k in range(100)}
     scene = moving_scene(4, effects={"noise": {"snr_db": 60.0}})
-    alone = compile_scene(scene, bench=bench)
-    among = compile_scene(scene, registry=Registry({**BUILT_IN, **many}, entry_points=False), bench=bench)
+    alone = compile_scene(scene)
+    among = compile_scene(scene, registry=Registry({**BUILT_IN, **many}, entry_points=False))
     assert len(many) == 200 and among.plan.steps == alone.plan.steps and among.plan.text() == alone.plan.text()
     assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
 
