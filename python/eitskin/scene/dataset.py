@@ -26,10 +26,11 @@ from eitskin.config import load_toml
 from eitskin.errors import ConfigError, EitskinError, FileError, UsageError, missing_extra
 from eitskin.fileio import write_bytes
 from eitskin.frames.frames import Frames, read_npz
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.compiler import compile_scene
 from eitskin.scene.dataset_ranges import Ranges, drawn, ranges_of
 from eitskin.scene.description import Scene
 from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
 from eitskin.scene.truth import truth_of
 from eitskin.skin.protocol import table as protocol_of_rows
 from eitskin.skin.skin import skin_to_table

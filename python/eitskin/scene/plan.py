@@ -10,8 +10,8 @@ from eitskin.scene.effect import ContactStep, Cost, GeometryStep, MaterialStep, 
 
 if TYPE_CHECKING:
     from eitskin.fem.cem import ForwardModel
-    from eitskin.scene.compiler import SessionWork
     from eitskin.scene.description import Scene
+    from eitskin.scene.session import SessionWork
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from eitskin.fem.cem import factorise
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.compiler import compile_scene
 from eitskin.scene.dataset import Job, job_of, make_chunk
 from eitskin.scene.dataset_ranges import drawn
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.registry import BUILT_IN
 from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.study.bench_frame import machine
 

@@ -19,11 +19,12 @@ from scene_helpers import ELEMENTS, effect_module, moving_scene, still_scene
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.compiler import compile_scene
 from eitskin.scene.effect import Contacts, ContactStep, Cost, Stage, VoltageStep
 from eitskin.scene.forward_steps import count_costs
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
 from eitskin.scene.simulate import conductivity_with
 from eitskin.scene.touch_path import touches_at
 

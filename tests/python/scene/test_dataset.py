@@ -17,11 +17,12 @@ from scene_helpers import ELEMENTS, scene_command, still_scene
 
 from eitskin.errors import ConfigError, FileError, MissingExtraError, UsageError
 from eitskin.scene import dataset
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.compiler import compile_scene
 from eitskin.scene.dataset import Job, chunk_path, frames_of, job_of, load_chunk, make_chunk, write_dataset
 from eitskin.scene.dataset_ranges import drawn, ranges_of
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
 
 
 def small_job(count: int = 7, seed: int = 3, chunk: int = 3) -> Job:

@@ -13,9 +13,10 @@ pytest.importorskip("netgen")
 from scene_helpers import ELEMENTS
 
 from eitskin.errors import FileError
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.compiler import compile_scene
 from eitskin.scene.library_scenes import descriptions, find_scene, library
 from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
 
 EXPECTED = {
     *("single_press", "light_press", "two_touch", "pinch", "swipe", "ring7", "roll", "rotate", "grip", "drying_gel"),

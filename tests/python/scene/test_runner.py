@@ -16,11 +16,12 @@ from scene_helpers import effect_module, moving_scene, still_scene
 
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import load_frames, save_frames
-from eitskin.scene import compiler
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene import session
+from eitskin.scene.compiler import compile_scene
 from eitskin.scene.effect import Cost, MaterialStep, Stage
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import run, simulate_frames
+from eitskin.scene.session import Bench
 
 RANDOM = ("noise", "jitter", "channel_gain", "contact_impedance", "background", "charge_injection")
 
@@ -62,14 +63,14 @@ def test_adding_an_effect_leaves_the_others_samples_as_they_were(
 ) -> None:
     """Every number that named effects draw, by stream: equal to the bit with and without one more effect."""
     drawn: dict[tuple[int, str, int], np.random.BitGenerator] = {}
-    real = compiler.stream
+    real = session.stream
 
     def watched(seed: int, name: str, index: int = 0) -> np.random.Generator:
         generator = real(seed, name, index)
         drawn[seed, name, index] = generator.bit_generator
         return generator
 
-    monkeypatch.setattr(compiler, "stream", watched)
+    monkeypatch.setattr(session, "stream", watched)
     effects = {name: {} for name in RANDOM if name not in (added, "noise")} | {"noise": {"snr_db": 60.0}}
     steps, states = [], []
     for own in (effects, {added: {}, **effects}):
