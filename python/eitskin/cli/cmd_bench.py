@@ -1,9 +1,11 @@
-"""``eitskin bench frame | jacobian``: speed, side by side in one run."""
+"""``eitskin bench frame | jacobian | effects | scenes``: speed, side by side in one run."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from eitskin.errors import UsageError
@@ -20,6 +22,16 @@ def add_parser(subparsers: Any) -> None:
     jacobian = what.add_parser("jacobian", help="building: Jacobian beside pyEIT's, and the whole model")
     jacobian.add_argument("--json", action="store_true")
     jacobian.set_defaults(run=run_jacobian)
+    effects = what.add_parser("effects", help="scenes: the time with no effect, with each alone, with all")
+    effects.add_argument("--frames", type=int, default=100, help="default: %(default)s")
+    effects.add_argument("--json", action="store_true")
+    effects.set_defaults(run=run_effects)
+    scenes = what.add_parser("scenes", help="scenes: frames/s of a moving touch, static scenes/s of a dataset")
+    scenes.add_argument("--frames", type=int, default=400, help="of the moving touch (default: %(default)s)")
+    scenes.add_argument("--scenes", type=int, default=500, help="of the dataset (default: %(default)s)")
+    scenes.add_argument("--elements", type=int, default=3000, help="of the mesh (default: %(default)s)")
+    scenes.add_argument("--json", action="store_true")
+    scenes.set_defaults(run=run_scenes)
 
 
 def run_frame(options: argparse.Namespace) -> int:
@@ -39,4 +51,39 @@ def run_jacobian(options: argparse.Namespace) -> int:
 
     times = bench_jacobian.run()
     print(json.dumps(times, indent=2) if options.json else bench_jacobian.text(times))
+    return 0
+
+
+def _within(name: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise UsageError(f"bench: {name} {value} is out of range; use {low} to {high}")
+
+
+def _progress(items: Sequence[Any]) -> Iterable[Any]:
+    """A bar on stderr where that is a terminal; nothing otherwise."""
+    from tqdm import tqdm
+
+    shown: Iterable[Any] = tqdm(items, unit="", leave=False, disable=not sys.stderr.isatty())
+    return shown
+
+
+def run_effects(options: argparse.Namespace) -> int:
+    """Time each effect on one scene."""
+    from eitskin.study import bench_scenes
+
+    _within("--frames", options.frames, 2, 100_000)
+    result = bench_scenes.effects_table(options.frames, progress=_progress)
+    print(json.dumps(result, indent=2) if options.json else bench_scenes.effects_text(result))
+    return 0
+
+
+def run_scenes(options: argparse.Namespace) -> int:
+    """Time a moving touch and a dataset."""
+    from eitskin.study import bench_scenes
+
+    _within("--frames", options.frames, 2, 100_000)
+    _within("--scenes", options.scenes, 1, 1_000_000)
+    _within("--elements", options.elements, 200, 200_000)
+    result = bench_scenes.scenes_table(options.frames, options.scenes, options.elements, progress=_progress)
+    print(json.dumps(result, indent=2) if options.json else bench_scenes.scenes_text(result))
     return 0

@@ -11,7 +11,7 @@ from typing import NoReturn
 from eitskin import __version__
 from eitskin.errors import EitskinError, UsageError
 
-COMMANDS = ("demo", "model", "reconstruct", "import", "doctor", "compare", "bench")
+COMMANDS = ("demo", "model", "reconstruct", "import", "doctor", "scene", "compare", "bench")
 
 
 class Parser(argparse.ArgumentParser):

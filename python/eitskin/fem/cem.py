@@ -11,6 +11,7 @@ fixed at 0, which leaves the matrix symmetric positive definite; potentials are 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -116,18 +117,11 @@ class ForwardModel:
         impedance = self._impedance
         if contact_impedance_ohm_m2 is not None:
             impedance = _checked_impedance(contact_impedance_ohm_m2, len(impedance))
-        if not np.array_equal(impedance == 0, self._system.shunted):
-            self._system = self._make_system(impedance == 0)
-        system, n_nodes = self._system, self.mesh.n_nodes
+        system, n_nodes = self.system_for(impedance == 0), self.mesh.n_nodes
         currents = self.patterns.right_hand_sides(len(impedance))
         loads = np.zeros((system.size + 1, currents.shape[1]))
         loads[system.unknown[n_nodes:]] = currents
-        factors = splu(
-            system.matrix(conductivity, impedance),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        factors = factorise(system.matrix(conductivity, impedance))
         potentials = np.zeros_like(loads)
         potentials[: system.size] = factors.solve(loads[: system.size])
         self.counters.factorisations += 1
@@ -135,6 +129,12 @@ class ForwardModel:
         electrodes = potentials[system.unknown[n_nodes:]]
         shift = electrodes.mean(axis=0)
         return Solution(potentials[system.unknown[:n_nodes]] - shift, electrodes - shift)
+
+    def system_for(self, shunted: BoolArray) -> System:
+        """The system in which the electrodes ``shunted`` (L,) are ideal; made anew only when they change."""
+        if not np.array_equal(shunted, self._system.shunted):
+            self._system = self._make_system(shunted)
+        return self._system
 
     def voltages_of(self, solution: Solution) -> FloatArray:
         """The boundary voltages (m,) in V that the protocol reads off ``solution``, at the protocol's current."""
@@ -163,6 +163,11 @@ class ForwardModel:
         self.counters.patterns += 1
         volumes_m3 = self.mesh.areas_mm2 * (1e-6 * self.thickness_m)
         return _system(self.mesh, shunted, _stiffness(self.gradients_per_m, volumes_m3), self.thickness_m)
+
+
+def factorise(matrix: csc_matrix) -> Any:
+    """The factors (scipy's SuperLU object) of a symmetric ``matrix``, real or complex, that needs no pivoting."""
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def shape_gradients(mesh: Mesh) -> FloatArray:

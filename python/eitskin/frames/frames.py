@@ -38,7 +38,8 @@ class Frames:
     Truth, where known: ``touch_frame`` (t,) index of the touch's frame, ``touch_xy_mm`` (t, 2) in the skin's
     coordinates, ``touch_radius_mm`` (t,), ``touch_strength`` (t,) relative conductivity change inside the touch (NaN:
     unknown), ``touch_sign`` (t,) +1 more conductive, -1 less (from the strength where not given);
-    ``truth_mask`` (n, h, w) +1/-1/0 over ``truth_mask_extent_mm`` (xmin, ymin, xmax, ymax).
+    ``truth_mask`` (n, h, w) +1/-1/0 over ``truth_mask_extent_mm`` (xmin, ymin, xmax, ymax);
+    ``truth_conductivity_s_per_m`` (n, h, w) float32 on the same raster, NaN outside the skin.
     ``meta`` says how the frames were made (JSON values only).
 
     Raises:
@@ -57,6 +58,7 @@ class Frames:
     touch_sign: NDArray[np.int8] | None = None
     truth_mask: NDArray[np.int8] | None = None
     truth_mask_extent_mm: tuple[float, float, float, float] | None = None
+    truth_conductivity_s_per_m: NDArray[np.float32] | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
     allow_nonfinite: bool = False
 
@@ -114,6 +116,8 @@ class Frames:
 
     def _check_mask(self, n: int) -> None:
         if self.truth_mask is None:
+            if self.truth_conductivity_s_per_m is not None:
+                raise FrameError("truth_conductivity_s_per_m without truth_mask; it lies on the mask's raster")
             return
         mask = np.asarray(self.truth_mask)
         if mask.ndim != 3 or len(mask) != n or not np.isin(mask, (-1, 0, 1)).all():
@@ -123,6 +127,13 @@ class Frames:
         if len(extent) != 4 or not (extent[0] < extent[2] and extent[1] < extent[3]):
             raise FrameError("truth_mask needs truth_mask_extent_mm: xmin, ymin, xmax, ymax")
         self._set("truth_mask_extent_mm", extent)
+        if self.truth_conductivity_s_per_m is not None:
+            conductivity = _floats(self.truth_conductivity_s_per_m, "truth_conductivity_s_per_m").astype(np.float32)
+            if conductivity.shape != mask.shape:
+                raise FrameError(
+                    f"truth_conductivity_s_per_m is {conductivity.shape}, truth_mask {mask.shape}; make them equal"
+                )
+            self._set("truth_conductivity_s_per_m", conductivity)
 
     @property
     def n_frames(self) -> int:
@@ -161,7 +172,7 @@ def save_frames(path: str | Path, frames: Frames) -> None:
         "frame_name": np.array(frames.frame_name, dtype=np.str_),
         "meta": np.array(json.dumps(dict(frames.meta), sort_keys=True, allow_nan=False)),
     }
-    for name in ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_mask_extent_mm"):
+    for name in ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_mask_extent_mm", "truth_conductivity_s_per_m"):
         value = getattr(frames, name)
         if value is not None:
             fields[name] = np.asarray(value)
@@ -225,7 +236,7 @@ def read_npz(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
 
 
 def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Frames:
-    optional = ("time_s", *TOUCH_FIELDS, "truth_mask")
+    optional = ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_conductivity_s_per_m")
     required = ("voltage_v", "reference_voltage_v", "drive_measure", "n_electrodes", "current_a", "frame_name", "meta")
     for name in required:
         if name not in arrays:

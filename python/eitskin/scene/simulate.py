@@ -17,6 +17,7 @@ from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.frames.frames import Frames
+from eitskin.scene.cover import SUBDIVISION, Cover
 from eitskin.scene.random_touches import Scene, Touch, TouchSet
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import Protocol
@@ -25,7 +26,6 @@ from eitskin.skin.skin import Skin
 FloatArray = npt.NDArray[np.float64]
 
 ELEMENTS = 11_000
-SUBDIVISION = 8
 
 
 @dataclass(frozen=True)
@@ -127,27 +127,8 @@ class Simulated:
 
 
 def element_cover(mesh: Mesh, touch: Touch, subdivision: int = SUBDIVISION) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Which elements a touch meets (e,), and what part of each it covers (e,), in (0, 1].
-
-    Each element near the disc is split into ``subdivision`` squared equal triangles, whose centres are looked at.
-    """
-    centre = np.array([touch.x_mm, touch.y_mm])
-    middles = mesh.centroids_mm()
-    reach = np.linalg.norm(mesh.nodes_mm[mesh.triangles] - middles[:, None], axis=2).max(axis=1)
-    near = np.flatnonzero(np.linalg.norm(middles - centre, axis=1) <= touch.radius_mm + reach)
-    points = _sub_triangle_weights(subdivision) @ mesh.nodes_mm[mesh.triangles[near]]
-    part = (((points - centre) ** 2).sum(axis=2) <= touch.radius_mm**2).mean(axis=1)
-    met = part > 0
-    return near[met], part[met]
-
-
-def _sub_triangle_weights(subdivision: int) -> FloatArray:
-    """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a triangle's sides."""
-    s = subdivision
-    upright = [(3 * i + 1, 3 * j + 1) for i in range(s) for j in range(s - i)]
-    turned = [(3 * i + 2, 3 * j + 2) for i in range(s - 1) for j in range(s - 1 - i)]
-    first = np.array(upright + turned, dtype=np.float64) / (3 * s)
-    return np.column_stack([first, 1.0 - first.sum(axis=1)])
+    """Which elements a touch meets (e,), and what part of each it covers (e,), in (0, 1]; see ``cover.Cover``."""
+    return Cover(mesh, subdivision).of(touch)
 
 
 def conductivity_with(mesh: Mesh, touches: Iterable[Touch], sheet_s_per_m: float) -> FloatArray:

@@ -1,0 +1,298 @@
+"""A scene becomes a list of steps that is fixed before the first frame: ``compile_scene``.
+
+Only the effects that the scene names are imported and made. What can be known before solving is worked out here: which
+frames share a state of sheet, touches and contacts, and whether touches are solved by factorisation or by update.
+The frame loop (``runner.py``) then asks nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import ConfigError
+from eitskin.fem.cem import ForwardModel
+from eitskin.scene.cover import Cover
+from eitskin.scene.description import Scene
+from eitskin.scene.effect import (
+    Contacts,
+    ContactStep,
+    LoadedStep,
+    Loads,
+    MaterialStep,
+    PhaseStep,
+    Stage,
+    Step,
+    VoltageStep,
+)
+from eitskin.scene.forward_steps import Change, Counted, count_costs, touched_unknowns
+from eitskin.scene.parameters import parse_parameters
+from eitskin.scene.plan import Plan, make_plan
+from eitskin.scene.random_touches import Touch
+from eitskin.scene.reading import live_rows, solved_impedance, with_bridges
+from eitskin.scene.registry import Registry
+from eitskin.scene.session import Bench, SessionWork, check_shared, load_effects, make_steps
+from eitskin.scene.touch_path import touches_at
+from eitskin.skin.skin import Skin
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+AnyArray = npt.NDArray[Any]
+VoltageFunction: TypeAlias = Callable[[AnyArray, Loads, float, int], AnyArray]
+
+NO_CHANGE = Change(np.zeros(0, np.int64), np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A distinct state of sheet, touches and contacts: one forward solve. ``frame`` is the first that has it."""
+
+    touches: tuple[Touch, ...]
+    change: Change
+    contacts: Contacts
+    frame: int
+
+
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """A scene ready to run; nothing in it changes any more but ``work``, which counts.
+
+    Attributes:
+        skin: as it truly is, after geometry steps.
+        steps: those of the named effects, in the order that they run.
+        parameters: of each effect.
+        states: solved once each; ``state_of_frame`` (n,) says which one a frame has.
+        known: potentials of states that were solved already, for V0.
+        functions: from a state's true voltages to the recorded ones, for each frame.
+        bridge_pairs: electrodes that some state bridges.
+        method: "factorise" or "update"; ``counted`` says why, where it was a choice.
+        reach: the unknowns that touches ever reach, for the update.
+    """
+
+    scene: Scene
+    skin: Skin
+    model: ForwardModel
+    steps: tuple[Step, ...]
+    parameters: dict[str, Any]
+    phase: PhaseStep | None
+    states: tuple[State, ...]
+    state_of_frame: IntArray
+    known: dict[int, FloatArray]
+    functions: tuple[VoltageFunction, ...]
+    needs_whole_reader: bool
+    bridge_pairs: tuple[tuple[int, int], ...]
+    method: str
+    reach: IntArray
+    counted: Counted | None
+    plan: Plan
+    work: SessionWork
+
+    def times_s(self) -> FloatArray:
+        """All frames' times (n,), below 0 for quiet ones."""
+        return np.asarray((np.arange(self.scene.n_frames) - self.scene.quiet_frames) / self.scene.rate_hz)
+
+
+def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Bench | None = None) -> Compiled:
+    """Compile ``scene``; ``bench`` lends the meshes and untouched skins of scenes before.
+
+    Raises:
+        ConfigError: an effect or a parameter is unknown or impossible, or effects contradict each other.
+        GeometryError, ProtocolError, UsageError, MissingExtraError: from effects, meshing and the forward model.
+    """
+    desk, work = Bench() if bench is None else bench, SessionWork()
+    modules = load_effects(scene, Registry() if registry is None else registry)
+    parameters = {
+        name: parse_parameters(module, scene.effects[name], f"{scene.where} [effects.{name}]")
+        for name, module in modules.items()
+    }
+    check_shared(scene, modules, parameters)
+    steps, skin = make_steps(scene, modules, parameters, desk, work)
+    phase = _only_phase(scene, steps)
+    states, state_of_frame = _states(scene, desk.cover(skin, scene.elements), steps)
+    model = desk.model(skin, scene.protocol, scene.elements, solved_impedance(states[0].contacts))
+    pairs = tuple(dict.fromkeys((i, j) for state in states for i, j, _ in state.contacts.bridges))
+    model.patterns = with_bridges(model.patterns, pairs)
+    method, reach, counted = _choose_method(scene, model, states, steps)
+    known = {}
+    if method == "factorise" and all(step.stage >= Stage.FRONT_END or _is_voltage(step) for step in steps):
+        if bench is not None:
+            desk.v0_v(scene, work)
+        electrodes = desk.known(scene)
+        known = {k: electrodes for k, s in enumerate(states) if electrodes is not None and not s.touches}
+    functions = _functions(steps, phase)
+    gone = any(state.contacts.detached.any() for state in states)
+    return Compiled(
+        scene=scene,
+        skin=skin,
+        model=model,
+        steps=steps,
+        parameters=parameters,
+        phase=phase,
+        states=states,
+        state_of_frame=state_of_frame,
+        known=known,
+        functions=functions,
+        needs_whole_reader=bool(pairs) or gone or any(isinstance(step, LoadedStep) for step in steps),
+        bridge_pairs=pairs,
+        method=method,
+        reach=reach,
+        counted=counted,
+        plan=make_plan(scene, model, steps, len(states), len(known), method, len(reach), work),
+        work=work,
+    )
+
+
+def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
+    """A function from a state to its sheet's conductivity (E,) without touches.
+
+    Steps before the first that varies are applied once, here; the others for each state, at the time of its frame.
+
+    Raises:
+        ConfigError: an effect leaves a conductivity that is not finite and above 0 (here, and from the function).
+    """
+    scene, times = compiled.scene, compiled.times_s()
+    materials = [step for step in compiled.steps if isinstance(step, MaterialStep)]
+    fixed = next((k for k, step in enumerate(materials) if step.varies), len(materials))
+    sheet = np.full(compiled.model.mesh.n_elements, compiled.skin.conductivity_s_per_m)
+
+    def applied(step: MaterialStep, conductivity: FloatArray, frame: int) -> FloatArray:
+        changed = step.apply(conductivity, float(times[frame]), frame)
+        if changed.shape != conductivity.shape or not (changed.min() > 0 and changed.max() < np.inf):
+            raise ConfigError(
+                f"{scene.where} [effects.{step.name}]: at {times[frame]:g} s it makes a conductivity of "
+                f"{changed.min():.3g} S/m; every conductivity must be finite and above 0, so use milder parameters"
+            )
+        return changed
+
+    for step in materials[:fixed]:
+        sheet = applied(step, sheet, 0)
+
+    def background(state: State) -> FloatArray:
+        conductivity = sheet
+        for step in materials[fixed:]:
+            conductivity = applied(step, conductivity, state.frame)
+        return conductivity
+
+    return background
+
+
+def _only_phase(scene: Scene, steps: Sequence[Step]) -> PhaseStep | None:
+    phases = [step for step in steps if isinstance(step, PhaseStep)]
+    if len(phases) > 1:
+        raise ConfigError(f"{scene.where} [effects.{phases[1].name}]: [effects.{phases[0].name}] sets the phase too")
+    return phases[0] if phases else None
+
+
+def _is_voltage(step: Step) -> bool:
+    return isinstance(step, VoltageStep | LoadedStep)
+
+
+def _states(scene: Scene, cover: Cover, steps: Sequence[Step]) -> tuple[tuple[State, ...], IntArray]:
+    """The distinct states, in the order that frames first have them, and which one each frame has (n,)."""
+    varies = any(isinstance(step, MaterialStep) and step.varies for step in steps)
+    contacts = _contacts(scene, steps)
+    samples = scene.samples()
+    changes: dict[tuple[Touch, ...], Change] = {(): NO_CHANGE}
+    states: dict[Any, State] = {}
+    state_of_frame = np.zeros(scene.n_frames, dtype=np.int64)
+    number: dict[Any, int] = {}
+    for frame in range(scene.n_frames):
+        recorded = frame - scene.quiet_frames
+        touches = touches_at(samples, recorded) if recorded >= 0 else ()
+        contact = contacts[frame if len(contacts) > 1 else 0]
+        key = (touches, contact_key(contact), frame if varies else 0)
+        if key not in number:
+            if touches not in changes:
+                changes[touches] = Change(*cover.factor(touches))
+            number[key] = len(states)
+            states[key] = State(touches, changes[touches], contact, frame)
+        state_of_frame[frame] = number[key]
+    return tuple(states.values()), state_of_frame
+
+
+def contact_key(contacts: Contacts) -> tuple[bytes, bytes, tuple[tuple[int, int, float], ...]]:
+    """Equal for equal contacts."""
+    return contacts.impedance_ohm_m2.tobytes(), contacts.detached.tobytes(), contacts.bridges
+
+
+def _contacts(scene: Scene, steps: Sequence[Step]) -> list[Contacts]:
+    """The contacts of each frame, or of all frames (one) where nothing varies."""
+    own = [step for step in steps if isinstance(step, ContactStep)]
+    count, rows = scene.skin.electrodes.count, scene.protocol.drive_measure.astype(np.int64)
+    frames = scene.n_frames if any(step.varies for step in own) else 1
+    found = []
+    for frame in range(frames):
+        time_s = (frame - scene.quiet_frames) / scene.rate_hz
+        contacts, detaching = Contacts(np.zeros(count), np.zeros(count, np.bool_)), ""
+        for step in own:
+            contacts = step.apply(contacts, time_s, frame)
+            where = f"{scene.where} [effects.{step.name}]"
+            if contacts.detached.any() and not detaching:
+                detaching = where
+            _check_contacts(contacts, count, where)
+        if own and not live_rows(contacts, rows).any():
+            raise ConfigError(
+                f"{detaching or scene.where}: at {time_s:g} s electrodes {np.flatnonzero(contacts.detached).tolist()} "
+                "(from 0) are detached, and no row of the protocol is left that can be measured; detach fewer"
+            )
+        found.append(contacts)
+    return found
+
+
+def _check_contacts(contacts: Contacts, count: int, where: str) -> None:
+    impedance = contacts.impedance_ohm_m2
+    if impedance.shape != (count,) or not (impedance.min() >= 0 and impedance.max() < np.inf):
+        raise ConfigError(f"{where}: a contact impedance is negative or not finite; use milder parameters")
+    for i, j, ohm in contacts.bridges:
+        if not (0 <= i < count and 0 <= j < count and i != j and 0 <= ohm < np.inf):
+            raise ConfigError(
+                f"{where}: a bridge of {ohm:g} ohm between electrodes {i} and {j} (from 0) cannot be; name two "
+                f"different ones of 0 to {count - 1} and at least 0 ohm"
+            )
+
+
+def _choose_method(
+    scene: Scene, model: ForwardModel, states: Sequence[State], steps: Sequence[Step]
+) -> tuple[str, IntArray, Counted | None]:
+    """How to solve, the unknowns that touches reach (for the update), and the count that decided it."""
+    nothing = np.zeros(0, np.int64)
+    varying = [step.name for step in steps if isinstance(step, MaterialStep | ContactStep) and step.varies]
+    if varying and scene.solver == "update":
+        raise ConfigError(
+            f'{scene.where} [scene]: solver = "update" needs sheet and contacts that stay, but [effects.{varying[0]}] '
+            'changes them; use "auto"'
+        )
+    moves = any(track.moves for track in scene.touches)
+    if varying or scene.solver == "factorise" or (scene.solver == "auto" and not moves):
+        return "factorise", nothing, None
+    shunted = np.asarray(solved_impedance(states[0].contacts) == 0)
+    under = [touched_unknowns(model, shunted, state.change.elements) for state in states]
+    reach = np.unique(np.concatenate([*under, nothing]))
+    counted = count_costs(model, shunted, np.array([len(one) for one in under]), len(reach))
+    if scene.solver == "update" or counted.cheaper == "update":
+        return "update", reach, counted
+    return "factorise", nothing, counted
+
+
+def _functions(steps: Sequence[Step], phase: PhaseStep | None) -> tuple[VoltageFunction, ...]:
+    """The per-frame line from true voltages to recorded ones; a phase step's readout stands before the digitising."""
+    before = [_function(step) for step in steps if _is_voltage(step) and step.stage < Stage.DIGITISE]
+    after = [_function(step) for step in steps if _is_voltage(step) and step.stage >= Stage.DIGITISE]
+    readout = [] if phase is None else [_readout(phase)]
+    return (*before, *readout, *after)
+
+
+def _function(step: Step) -> VoltageFunction:
+    if isinstance(step, LoadedStep):
+        return step.apply
+    assert isinstance(step, VoltageStep)
+    apply = step.apply
+    return lambda v, loads, time_s, frame: apply(v, time_s, frame)
+
+
+def _readout(phase: PhaseStep) -> VoltageFunction:
+    return lambda v, loads, time_s, frame: phase.readout(v)

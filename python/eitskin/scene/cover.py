@@ -1,0 +1,60 @@
+"""Which elements of a mesh a touch covers, and how much of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.mesh import Mesh
+from eitskin.scene.random_touches import Touch
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+SUBDIVISION = 8
+LEAST_FACTOR = 1e-3
+
+
+class Cover:
+    """Elements under touches on one mesh; what does not depend on the touch is computed once.
+
+    Each element near the disc is split into ``subdivision`` squared equal triangles, whose centres are looked at.
+    """
+
+    def __init__(self, mesh: Mesh, subdivision: int = SUBDIVISION) -> None:
+        self._corners = mesh.nodes_mm[mesh.triangles]
+        self._middles = mesh.centroids_mm()
+        self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
+        self._weights = _sub_triangle_weights(subdivision)
+
+    def of(self, touch: Touch) -> tuple[IntArray, FloatArray]:
+        """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,), in (0, 1]."""
+        centre = np.array([touch.x_mm, touch.y_mm])
+        near = np.flatnonzero(np.linalg.norm(self._middles - centre, axis=1) <= touch.radius_mm + self._reach)
+        points = self._weights @ self._corners[near]
+        part = (((points - centre) ** 2).sum(axis=2) <= touch.radius_mm**2).mean(axis=1)
+        met = part > 0
+        return near[met], part[met]
+
+    def factor(self, touches: Iterable[Touch]) -> tuple[IntArray, FloatArray]:
+        """Elements (e,) that ``touches`` meet, ascending, and what each one's conductivity is multiplied by (e,).
+
+        Where touches share an element their changes add (never below a thousandth).
+        """
+        change = np.zeros(len(self._middles))
+        for touch in touches:
+            elements, part = self.of(touch)
+            change[elements] += part * (touch.contrast - 1.0)
+        elements = np.flatnonzero(change)
+        return elements, np.maximum(1.0 + change[elements], LEAST_FACTOR)
+
+
+def _sub_triangle_weights(subdivision: int) -> FloatArray:
+    """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a triangle's sides."""
+    s = subdivision
+    upright = [(3 * i + 1, 3 * j + 1) for i in range(s) for j in range(s - i)]
+    turned = [(3 * i + 2, 3 * j + 2) for i in range(s - 1) for j in range(s - 1 - i)]
+    first = np.array(upright + turned, dtype=np.float64) / (3 * s)
+    return np.column_stack([first, 1.0 - first.sum(axis=1)])

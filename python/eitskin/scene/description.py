@@ -1,0 +1,291 @@
+"""A scene: what happens on a skin, and which imperfections take part. Read from TOML, checked whole.
+
+Effects' tables are kept as they are; the compiler reads them when it imports their modules. The schema: docs/scenes.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.config import check_keys, choice, integer, load_toml, number
+from eitskin.errors import ConfigError
+from eitskin.scene.laws import DRIVING_KEY, LAW_KEYS, LAWS, law_from_table
+from eitskin.scene.random_touches import rim_distance_mm
+from eitskin.scene.touch_path import ALWAYS_S, Keyframe, TouchTrack, TrackSamples, sample
+from eitskin.skin.protocol import Protocol, adjacent
+from eitskin.skin.skin import Skin, load_skin, paper_skin
+
+if TYPE_CHECKING:
+    from eitskin.frames.frames import Frames
+    from eitskin.scene.plan import Plan
+
+FloatArray = npt.NDArray[np.float64]
+
+SCENE_KEYS = (
+    "name",
+    "description",
+    "skin",
+    "seed",
+    "frames",
+    "rate_hz",
+    "quiet_frames",
+    "elements",
+    "solver",
+)
+SOLVERS = ("auto", "factorise", "update")
+MAX_FRAMES = 1_000_000
+MAX_TIME_S = 1e7
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What happens on a skin.
+
+    Attributes:
+        name, description: a word and a line.
+        skin, protocol: what is touched and how it is scanned.
+        seed: of all that is random.
+        frames: recorded frames, the first at 0 s; ``rate_hz`` a second.
+        quiet_frames: reference frames before them, at negative times, without touches.
+        elements: of the mesh, about.
+        solver: "factorise" anew for each conductivity, "update" the untouched skin's factors, or "auto": whichever
+            counts cheaper where touches move, "factorise" where they do not.
+        touches: in the order of [[touch]].
+        effects: name to its table, as in TOML.
+        where: the file, for errors.
+        dataset: the table [dataset], as in TOML.
+        text: the TOML that it was read from.
+
+    Raises:
+        ConfigError: a number is out of range, or a touch lies outside the skin, overlaps another or has no size.
+    """
+
+    name: str
+    skin: Skin = field(default_factory=paper_skin)
+    protocol: Protocol = field(default_factory=lambda: adjacent(16))
+    touches: tuple[TouchTrack, ...] = ()
+    effects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    seed: int = 1
+    frames: int = 1
+    rate_hz: float = 20.0
+    quiet_frames: int = 16
+    elements: int = 3000
+    solver: str = "auto"
+    description: str = ""
+    where: str = "scene"
+    dataset: Mapping[str, Any] = field(default_factory=dict)
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        place, numbers = f"{self.where} [scene]", {"seed": self.seed, "frames": self.frames}
+        numbers |= {"quiet_frames": self.quiet_frames, "elements": self.elements}
+        integer(numbers, "seed", None, place, low=0, high=2**63 - 1)
+        integer(numbers, "frames", None, place, low=1, high=MAX_FRAMES)
+        integer(numbers, "quiet_frames", None, place, low=1, high=MAX_FRAMES)
+        integer(numbers, "elements", None, place, low=200, high=200_000)
+        number({"rate_hz": self.rate_hz}, "rate_hz", None, place, low=0, high=1e6, open_low=True)
+        choice({"solver": self.solver}, "solver", None, SOLVERS, place)
+        _check_touches(self)
+
+    @property
+    def n_frames(self) -> int:
+        """All frames, quiet ones included."""
+        return self.quiet_frames + self.frames
+
+    def times_s(self) -> FloatArray:
+        """The recorded frames' times (frames,)."""
+        return np.asarray(np.arange(self.frames) / self.rate_hz)
+
+    def samples(self) -> tuple[TrackSamples, ...]:
+        """Each track at the recorded frames' times."""
+        times = self.times_s()
+        return tuple(sample(track, times) for track in self.touches)
+
+    def plan(self) -> Plan:
+        """What running this scene will do, step by step, and what it will cost (``compiler.compile_scene``)."""
+        from eitskin.scene.compiler import compile_scene
+
+        return compile_scene(self).plan
+
+    def run(self) -> Frames:
+        """The frames of this scene with their truth (``runner.run``)."""
+        from eitskin.scene.compiler import compile_scene
+        from eitskin.scene.runner import run
+
+        return run(compile_scene(self))
+
+
+def load_scene(path: str | Path) -> Scene:
+    """The scene in the TOML file ``path``.
+
+    Raises:
+        FileError: it, or the skin that it names, cannot be read.
+        ConfigError, GeometryError, ProtocolError: what it describes cannot be.
+    """
+    table = load_toml(path, "scene")
+    return scene_from_table(table, str(path), Path(path).parent, Path(path).read_text(encoding="utf-8"))
+
+
+def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: str = "") -> Scene:
+    """The scene in a parsed TOML ``table``; ``where`` names it in errors, and skins are looked for in ``folder``.
+
+    Raises:
+        FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
+    """
+    check_keys(table, ("scene", "touch", "effects", "dataset"), where)
+    head, place = _table(table, "scene", where), f"{where} [scene]"
+    check_keys(head, SCENE_KEYS, place)
+    skin, protocol = _skin(head, place, folder)
+    given = {
+        "frames": integer(head, "frames", 1, place, low=1, high=MAX_FRAMES),
+        "quiet_frames": integer(head, "quiet_frames", 16, place, low=1, high=MAX_FRAMES),
+        "seed": integer(head, "seed", 1, place, low=0, high=2**63 - 1),
+        "elements": integer(head, "elements", 3000, place, low=200, high=200_000),
+    }
+    touches = table.get("touch", [])
+    if not isinstance(touches, list) or not all(isinstance(one, Mapping) for one in touches):
+        raise ConfigError(f"{where}: touches are written as tables [[touch]], with two brackets")
+    effects = _table(table, "effects", where)
+    for name, one in effects.items():
+        if not isinstance(one, Mapping):
+            raise ConfigError(f"{where} [effects]: {name} = {one!r} must be a table: write [effects.{name}]")
+    return Scene(
+        name=_word(head, "name", Path(where).stem, place),
+        description=_word(head, "description", "", place),
+        skin=skin,
+        protocol=protocol,
+        touches=tuple(_track(one, f"{where} [[touch]] {k} (from 0)") for k, one in enumerate(touches)),
+        effects=effects,
+        rate_hz=number(head, "rate_hz", 20.0, place, low=0, high=1e6, open_low=True),
+        solver=choice(head, "solver", "auto", SOLVERS, place),
+        where=where,
+        dataset=_table(table, "dataset", where),
+        text=text,
+        **given,
+    )
+
+
+def _table(table: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
+    value = table.get(key, {})
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"{where}: {key} must be a table: write [{key}]")
+    return value
+
+
+def _word(table: Mapping[str, Any], key: str, default: str, where: str) -> str:
+    value = table.get(key, default)
+    if not isinstance(value, str):
+        raise ConfigError(f"{where}: {key} must be text in quotes, not {value!r}")
+    return value
+
+
+def _skin(head: Mapping[str, Any], where: str, folder: Path) -> tuple[Skin, Protocol]:
+    name = _word(head, "skin", "paper", where)
+    if name == "paper":
+        return paper_skin(), adjacent(16)
+    path = folder / name
+    if not path.is_file():
+        raise ConfigError(f'{where}: skin = {name!r} is neither "paper" nor a file beside the scene ({path})')
+    return load_skin(path)
+
+
+def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
+    name = choice(table, "law", "short_circuit", LAWS, where)
+    driving = DRIVING_KEY[name]
+    own = {key for keys in LAW_KEYS.values() for key in keys} | set(DRIVING_KEY.values())
+    check_keys(table, {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_s"} | own, where)
+    law = law_from_table(table, name, where)
+    hold = table.get("hold", False)
+    if not isinstance(hold, bool):
+        raise ConfigError(f"{where}: hold must be true or false, not {hold!r}")
+    path = table.get("path")
+    if path is None:
+        return TouchTrack(*_standing(table, driving, where))
+    for key in ("x_mm", "y_mm", "from_s", "to_s"):
+        if key in table:
+            raise ConfigError(f"{where}: {key} beside path; give a path, or x_mm and y_mm of a touch that stays")
+    if not isinstance(path, list) or not path or not all(isinstance(one, Mapping) for one in path):
+        raise ConfigError(f"{where}: path must be a list of keyframes {{ t_s = .., x_mm = .., y_mm = .. }}")
+    keys = []
+    for k, one in enumerate(path):
+        place = f"{where} path {k} (from 0)"
+        check_keys(one, ("t_s", "x_mm", "y_mm", "radius_mm", driving), place)
+        keys.append(_keyframe({**_defaults(table, driving), **one}, driving, place))
+        if k and keys[-1].t_s <= keys[-2].t_s:
+            raise ConfigError(f"{place}: t_s = {keys[-1].t_s:g} is not after {keys[-2].t_s:g}; keyframes must ascend")
+    return TouchTrack(tuple(keys), law, hold)
+
+
+def _defaults(table: Mapping[str, Any], driving: str) -> dict[str, Any]:
+    return {key: table[key] for key in ("radius_mm", driving) if key in table}
+
+
+def _standing(table: Mapping[str, Any], driving: str, where: str) -> tuple[tuple[Keyframe, ...], Any, bool]:
+    """A touch without a path: there from from_s to to_s, or always."""
+    law = law_from_table(table, choice(table, "law", "short_circuit", LAWS, where), where)
+    start = number(table, "from_s", 0.0, where, low=-MAX_TIME_S, high=MAX_TIME_S) if "from_s" in table else ALWAYS_S[0]
+    first = _keyframe({**table, "t_s": 0.0}, driving, where)
+    keys = [Keyframe(start, first.x_mm, first.y_mm, first.radius_mm, first.drive)]
+    if "to_s" in table:
+        begin = max(start, -MAX_TIME_S)
+        end = number(table, "to_s", None, where, low=begin, high=MAX_TIME_S, open_low=True)
+        keys = [Keyframe(t, first.x_mm, first.y_mm, first.radius_mm, first.drive) for t in (begin, end)]
+    return tuple(keys), law, "to_s" not in table
+
+
+def _keyframe(table: Mapping[str, Any], driving: str, where: str) -> Keyframe:
+    far = 1e5
+    standard, most = (1.0, 1.0) if driving == "press" else (None, 1e5)
+    return Keyframe(
+        t_s=number(table, "t_s", None, where, low=-MAX_TIME_S, high=MAX_TIME_S),
+        x_mm=number(table, "x_mm", None, where, low=-far, high=far),
+        y_mm=number(table, "y_mm", None, where, low=-far, high=far),
+        radius_mm=number(table, "radius_mm", None, where, low=0, high=far, open_low=True),
+        drive=number(table, driving, standard, where, low=0, high=most),
+    )
+
+
+def _check_touches(scene: Scene) -> None:
+    """Refuse touches outside the skin, without size, or overlapping, in any recorded frame."""
+    for k, track in enumerate(scene.touches):
+        where = f"{scene.where} [[touch]] {k} (from 0)"
+        if not track.keyframes:
+            raise ConfigError(f"{where}: it has no keyframes; give a path")
+        if not all(key.radius_mm > 0 for key in track.keyframes):
+            raise ConfigError(f"{where}: radius_mm must be above 0; a touch needs a size")
+        if not track.law.contrast_at(np.array([key.drive for key in track.keyframes])).min() > 0:
+            raise ConfigError(f"{where}: contrast must be above 0; a negative conductivity cannot be")
+    samples, times = scene.samples(), scene.times_s()
+    for k, one in enumerate(samples):
+        if len(scene.touches[k].keyframes) and not one.there.any():
+            continue
+        at = np.flatnonzero(one.there)
+        room = rim_distance_mm(scene.skin.outline, np.column_stack([one.x_mm[at], one.y_mm[at]])) - one.radius_mm[at]
+        if room.min() < -1e-9:
+            worst = int(at[room.argmin()])
+            raise ConfigError(
+                f"{scene.where} [[touch]] {k} (from 0): at {times[worst]:g} s x_mm = {one.x_mm[worst]:g}, y_mm = "
+                f"{one.y_mm[worst]:g} with radius_mm = {one.radius_mm[worst]:g} reaches {-room.min():.3g} mm outside "
+                f"the skin {scene.skin.name!r}; move it inwards or make it smaller"
+            )
+    _refuse_overlaps(scene, samples, times)
+
+
+def _refuse_overlaps(scene: Scene, samples: Sequence[TrackSamples], times: FloatArray) -> None:
+    for k, one in enumerate(samples):
+        for j in range(k):
+            other = samples[j]
+            gap = np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm) - one.radius_mm - other.radius_mm
+            bad = np.flatnonzero(one.there & other.there & (gap < -1e-9))
+            if len(bad):
+                worst = int(bad[gap[bad].argmin()])
+                raise ConfigError(
+                    f"{scene.where} [[touch]] {k} (from 0): it overlaps touch {j} by {-gap[worst]:.3g} mm at "
+                    f"{times[worst]:g} s; change x_mm, y_mm or radius_mm so that they lie apart"
+                )

@@ -1,0 +1,61 @@
+"""The converter: voltages become whole numbers of steps, and what is out of range the first or last of them.
+
+Mid-tread, two's complement: B bits over +-range have the step LSB = 2 range / 2^B, codes from -2^(B-1) to 2^(B-1) - 1.
+The error is uniform over a step, with the variance LSB^2 / 12, wherever the signal moves over many steps (Bennett, Bell
+Syst. Tech. J. 27, 1948). What goes out is code times LSB, in V.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eitskin.errors import ConfigError
+from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.parameter import parameter
+
+NAME = "adc"
+STAGE = Stage.DIGITISE
+ORDER = 40
+SUMMARY = "Voltages are rounded to the converter's steps."
+DEFAULT_HEADROOM = 1.25
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Resolution, and the range in one of two ways; a headroom of 1.25 without either."""
+
+    bits: int = parameter(12, "bit", "resolution", low=1, high=32)
+    range_v: float | None = parameter(None, "V", "the converter spans +- this", low=0, open_low=True)
+    headroom: float | None = parameter(None, "1", "range / largest untouched voltage", low=0, high=1e6, open_low=True)
+
+    def __post_init__(self) -> None:
+        if self.range_v is not None and self.headroom is not None:
+            raise ConfigError("range_v: give either range_v or headroom")
+
+
+def range_v(parameters: Parameters, session: Session) -> float:
+    """The converter's range in V."""
+    if parameters.range_v is not None:
+        return parameters.range_v
+    headroom = DEFAULT_HEADROOM if parameters.headroom is None else parameters.headroom
+    return headroom * float(np.abs(session.v0_v()).max())
+
+
+def codes(v: Voltages, lsb_v: float, bits: int) -> Voltages:
+    """Whole numbers (m,), as float64, from -2^(bits - 1) to 2^(bits - 1) - 1."""
+    half = 2.0 ** (bits - 1)
+    return np.asarray(np.clip(np.round(v / lsb_v), -half, half - 1))
+
+
+def make(parameters: Parameters, session: Session) -> VoltageStep:
+    """Rounds every row."""
+    span_v = range_v(parameters, session)
+    lsb_v = 2 * span_v / 2**parameters.bits
+
+    def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
+        return np.asarray(codes(v, lsb_v, parameters.bits) * lsb_v)
+
+    note = f"{parameters.bits} bits over +-{span_v:.3g} V, step {lsb_v:.3g} V"
+    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=3), note, apply)

@@ -1,0 +1,47 @@
+"""Channels with gains of their own: in instruments with an amplifier for each measuring pair, gains do not match.
+
+Resistors of 1 % make gains that differ by about 1 %. Each measuring pair (V+, V-) is a channel with the gain
+1 + uniform(-spread, spread), drawn once. Two rows that reciprocity makes equal are read by different channels, so their
+difference tells the mismatch; a difference image relative to the reference (dv / v) cancels it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eitskin.scene.effect import Cost, FloatArray, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.parameter import parameter
+from eitskin.scene.scan import channels
+
+NAME = "channel_gain"
+STAGE = Stage.FRONT_END
+ORDER = 60
+SUMMARY = "Each measuring pair has a gain of its own."
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """How far gains differ."""
+
+    spread: float = parameter(0.01, "1", "each channel's gain differs from 1 by up to this", low=0, high=1)
+
+
+def gains(parameters: Parameters, session: Session) -> FloatArray:
+    """The gain of each row's channel, (m,)."""
+    pairs, number = channels(session.protocol)
+    drawn = session.stream(NAME).uniform(-parameters.spread, parameters.spread, len(pairs))
+    return np.asarray((1 + drawn)[number])
+
+
+def make(parameters: Parameters, session: Session) -> VoltageStep:
+    """Multiplies each row by its channel's gain."""
+    factors = gains(parameters, session)
+
+    def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
+        return np.asarray(v * factors)
+
+    count = len(channels(session.protocol)[0])
+    note = f"{count} channels whose gains differ by up to {100 * parameters.spread:g} %"
+    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=count), note, apply)

@@ -1,0 +1,50 @@
+"""Cross-talk: wires of electrodes next in number couple, so that a measuring wire picks up its neighbours' potential.
+
+Neighbouring wires of a ribbon cable, and neighbouring switches of a multiplexer, couple by a capacitance of the order
+of a pF; a datasheet states the part that comes through in dB (the ADG1206: -85 dB at 1 MHz, in 50 ohm; cables with
+higher source impedances are far worse). The driven wires carry by far the largest potentials, so they alone are taken
+as sources: a measuring wire next in number to a driven one gets 10^(dB / 20) of its potential, against the mean of all
+electrodes. The first and the last wire are not neighbours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eitskin.scene.effect import Cost, FloatArray, LoadedStep, Loads, Session, Stage, Voltages
+from eitskin.scene.parameter import parameter
+from eitskin.skin.protocol import Protocol
+
+NAME = "crosstalk"
+STAGE = Stage.FRONT_END
+ORDER = 10
+SUMMARY = "Driven wires couple into measuring wires beside them."
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """How much."""
+
+    coupling_db: float = parameter(-60.0, "dB", "voltage picked up / the driven wire's potential", low=-300, high=0)
+
+
+def pick_up(protocol: Protocol) -> tuple[FloatArray, FloatArray]:
+    """How often the source's and the sink's wire couples into each row's voltage, (m,) each, in {-1, 0, 1}."""
+    rows = protocol.drive_measure.astype(np.int64)
+    beside = (np.abs(rows[:, None, :2] - rows[:, 2:, None]) == 1).astype(np.float64)  # (m, [V+, V-], [I+, I-])
+    onto = beside[:, 0] - beside[:, 1]
+    return onto[:, 0].copy(), onto[:, 1].copy()
+
+
+def make(parameters: Parameters, session: Session) -> LoadedStep:
+    """Adds what comes through from the two driven wires."""
+    part = 10 ** (parameters.coupling_db / 20)
+    of_source, of_sink = (part * weight for weight in pick_up(session.protocol))
+
+    def apply(v: Voltages, loads: Loads, time_s: float, frame: int) -> Voltages:
+        return np.asarray(v + of_source * loads.source_v + of_sink * loads.sink_v)
+
+    note = f"{parameters.coupling_db:g} dB of a driven wire's potential onto the wires beside it"
+    return LoadedStep(NAME, STAGE, Cost(vector_passes_per_frame=4), note, apply)

@@ -1,0 +1,69 @@
+"""Electrodes that are not where the description says: each is shifted along the rim.
+
+Hand-made skins carry electrodes to about a millimetre. Shifts are given, or uniform within +- spread, drawn once; a
+reconstruction that assumes the described places then has a wrong model (the classical modelling error of absolute EIT;
+difference imaging cancels most of it).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from eitskin.errors import ConfigError, GeometryError
+from eitskin.scene.effect import Cost, FloatArray, GeometryStep, Session, Stage
+from eitskin.scene.parameter import parameter
+from eitskin.skin.skin import Skin
+
+NAME = "misplacement"
+STAGE = Stage.GEOMETRY
+ORDER = 10
+SUMMARY = "Electrodes sit beside the places that the description gives."
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """By chance, or as measured."""
+
+    spread_mm: float = parameter(1.0, "mm", "each electrode is shifted along the rim by up to this, either way", low=0)
+    shift_mm: tuple[float, ...] = parameter(
+        (), "mm", "known shifts instead, one an electrode, along the numbering; nothing is then drawn"
+    )
+
+
+def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
+    """``skin`` with each electrode moved by ``shift_mm`` (L,) along the rim, in the direction of numbering.
+
+    Raises:
+        GeometryError: electrodes overlap or change their order.
+    """
+    electrodes = skin.electrodes
+    along = np.arange(electrodes.count) * (skin.outline.perimeter_mm / electrodes.count)
+    if electrodes.positions_mm is not None:
+        along = np.array(electrodes.positions_mm, dtype=np.float64)
+    places = tuple(float(place) for place in along + shift_mm)
+    return replace(skin, electrodes=replace(electrodes, positions_mm=places))
+
+
+def make(parameters: Parameters, session: Session) -> GeometryStep:
+    """The skin that is meshed.
+
+    Raises:
+        ConfigError: there is not one known shift for each electrode, or shifted electrodes overlap.
+    """
+    count, spread, known = session.skin.electrodes.count, parameters.spread_mm, len(parameters.shift_mm)
+    if known not in (0, count):
+        raise ConfigError(f"shift_mm: {known} shifts for {count} electrodes; give one each")
+    shift_mm = np.array(parameters.shift_mm) if known else session.stream(NAME).uniform(-spread, spread, count)
+    try:
+        shifted(session.skin, shift_mm)
+    except GeometryError as error:
+        key = "shift_mm" if known else f"spread_mm = {spread:g}"
+        raise ConfigError(f"{key}: {error}") from None
+
+    def apply(skin: Skin) -> Skin:
+        return shifted(skin, shift_mm)
+
+    note = f"electrodes shifted along the rim by up to {np.abs(shift_mm).max():.3g} mm"
+    return GeometryStep(NAME, Cost(random_numbers=0 if known else count), note, apply)

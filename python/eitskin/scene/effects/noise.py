@@ -1,0 +1,53 @@
+"""White noise: normal, of one deviation on every row, independent from row to row and frame to frame.
+
+Thermal and amplifier noise in the demodulator's band. The signal-to-noise ratio counts against the exact frame V0 of
+the untouched skin with ideal electrodes: SNR_dB = 20 log10(rms(V0) / sigma), rms over the protocol's rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eitskin.errors import ConfigError
+from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.parameter import parameter
+
+NAME = "noise"
+STAGE = Stage.DIGITISE
+ORDER = 20
+SUMMARY = "White noise on every row."
+DEFAULT_SNR_DB = 60.0
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Its size, in one of two ways; 60 dB without either."""
+
+    snr_db: float | None = parameter(None, "dB", "20 log10(rms of the untouched frame / deviation)", low=-100, high=300)
+    noise_v: float | None = parameter(None, "V", "standard deviation", low=0, high=1e6)
+
+    def __post_init__(self) -> None:
+        if self.snr_db is not None and self.noise_v is not None:
+            raise ConfigError("snr_db: give either snr_db or noise_v")
+
+
+def deviation_v(parameters: Parameters, session: Session) -> float:
+    """The noise's standard deviation in V."""
+    if parameters.noise_v is not None:
+        return parameters.noise_v
+    snr_db = DEFAULT_SNR_DB if parameters.snr_db is None else parameters.snr_db
+    return session.v0_rms_v() / float(10 ** (snr_db / 20))
+
+
+def make(parameters: Parameters, session: Session) -> VoltageStep:
+    """Adds a fresh draw to each frame."""
+    sigma_v = deviation_v(parameters, session)
+
+    def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
+        return np.asarray(v + sigma_v * session.stream(NAME, frame).standard_normal(len(v)))
+
+    rows = session.protocol.n_rows
+    cost = Cost(vector_passes_per_frame=2, random_numbers_per_frame=rows)
+    return VoltageStep(NAME, STAGE, cost, f"white, sigma {sigma_v:.3g} V", apply)

@@ -1,0 +1,51 @@
+"""Saturation: an amplifier cannot go beyond its supply, so that larger voltages are clipped.
+
+A hard limiter, symmetric about 0. The limit is given in V or as a multiple of the largest voltage of the untouched skin
+with ideal electrodes. The characteristic is the same for every row and has no memory: equal rows stay equal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eitskin.errors import ConfigError
+from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.parameter import parameter
+
+NAME = "saturation"
+STAGE = Stage.DIGITISE
+ORDER = 30
+SUMMARY = "Voltages beyond a limit are clipped."
+DEFAULT_HEADROOM = 1.25
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The limit, in one of two ways; a headroom of 1.25 without either."""
+
+    limit_v: float | None = parameter(None, "V", "the largest voltage either way", low=0, open_low=True)
+    headroom: float | None = parameter(None, "1", "limit / largest untouched voltage", low=0, high=1e6, open_low=True)
+
+    def __post_init__(self) -> None:
+        if self.limit_v is not None and self.headroom is not None:
+            raise ConfigError("limit_v: give either limit_v or headroom")
+
+
+def limit_v(parameters: Parameters, session: Session) -> float:
+    """The limit in V."""
+    if parameters.limit_v is not None:
+        return parameters.limit_v
+    headroom = DEFAULT_HEADROOM if parameters.headroom is None else parameters.headroom
+    return headroom * float(np.abs(session.v0_v()).max())
+
+
+def make(parameters: Parameters, session: Session) -> VoltageStep:
+    """Clips every row."""
+    limit = limit_v(parameters, session)
+
+    def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
+        return np.asarray(np.clip(v, -limit, limit))
+
+    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=1), f"clipped at +-{limit:.3g} V", apply)

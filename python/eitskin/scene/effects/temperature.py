@@ -1,0 +1,63 @@
+"""Warmth: the conductivity of an aqueous electrolyte rises by about 2 % a kelvin.
+
+sigma(T) = sigma_0 (1 + alpha (T - T_0)), the linear compensation that conductivity meters use; alpha is 0.019 to 0.022
+per K for dilute salts near 25 degrees C (ISO 7888 gives the tables), because water becomes less viscous and ions move
+faster. T_0 is the temperature at which the skin has the conductivity in its description. Time counts from the session's
+first frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eitskin.errors import ConfigError
+from eitskin.scene.effect import Cost, FloatArray, MaterialStep, Session, Stage
+from eitskin.scene.parameter import parameter
+
+NAME = "temperature"
+STAGE = Stage.MATERIAL
+ORDER = 20
+SUMMARY = "The sheet's conductivity follows its temperature."
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The temperature's course, and what a kelvin does."""
+
+    offset_k: float = parameter(0.0, "K", "temperature at the first frame - described skin's", low=-50, high=100)
+    drift_k_per_min: float = parameter(0.2, "K/min", "how fast the temperature rises", low=-1000, high=1000)
+    coefficient_per_k: float = parameter(0.02, "1/K", "relative change of conductivity a kelvin", low=-0.1, high=0.1)
+
+
+def temperature_factor(age_s: float, parameters: Parameters) -> float:
+    """The conductivity ``age_s`` after the first frame, relative to the described skin's."""
+    warmer_k = parameters.offset_k + parameters.drift_k_per_min * age_s / 60
+    return 1 + parameters.coefficient_per_k * warmer_k
+
+
+def make(parameters: Parameters, session: Session) -> MaterialStep:
+    """The sheet's conductivity by time, one factor for all elements.
+
+    Raises:
+        ConfigError: the linear law would make the conductivity 0 or negative within the session.
+    """
+    times_s = session.times_s()
+    ages_s = (0.0, float(times_s[-1] - times_s[0]))
+    if min(temperature_factor(age_s, parameters) for age_s in ages_s) <= 0:
+        raise ConfigError(
+            f"drift_k_per_min: over the session's {ages_s[1]:g} s the conductivity would fall to 0; use a smaller drift"
+        )
+    varies = parameters.drift_k_per_min != 0 and parameters.coefficient_per_k != 0
+
+    def apply(conductivity: FloatArray, time_s: float, frame: int) -> FloatArray:
+        return np.asarray(conductivity * temperature_factor(time_s - float(times_s[0]), parameters))
+
+    note = (
+        f"conductivity x (1 + {parameters.coefficient_per_k:g}/K dT), dT = {parameters.offset_k:g} K "
+        f"+ {parameters.drift_k_per_min:g} K/min"
+    )
+    each = 1 if varies else 0
+    cost = Cost(factorisations_per_frame=each, vector_passes_per_frame=each)
+    return MaterialStep(NAME, cost, note, apply, varies=varies)

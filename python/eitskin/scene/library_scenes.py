@@ -1,0 +1,45 @@
+"""The scenes that come with the package, found by name."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from eitskin.config import load_toml, nearest
+from eitskin.errors import FileError
+from eitskin.scene.description import Scene, load_scene
+
+
+def library() -> dict[str, Path]:
+    """Each library scene's name and its file, by name."""
+    folder = Path(str(files("eitskin.scene"))) / "library"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def descriptions() -> dict[str, str]:
+    """Each library scene's name and its line."""
+    return {name: str(load_toml(path, "scene")["scene"]["description"]) for name, path in library().items()}
+
+
+def scene_path(name: str) -> Path:
+    """The file of ``name``: a path as given, or a library scene.
+
+    Raises:
+        FileError: neither exists.
+    """
+    path = Path(name)
+    if path.suffix == ".toml" or path.exists():
+        return path
+    known = library()
+    if name not in known:
+        raise FileError(f"{name}: no such scene file, nor a scene of the library; {nearest(name, known)}")
+    return known[name]
+
+
+def find_scene(name: str) -> Scene:
+    """The scene ``name``: a file, or one of the library.
+
+    Raises:
+        FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
+    """
+    return load_scene(scene_path(name))

@@ -1,0 +1,49 @@
+"""The scan as the front end lives it: when a row is read, on which channel, and what the multiplexers do before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.scene.effect import Session
+from eitskin.skin.protocol import Protocol
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+def row_delays_s(session: Session) -> FloatArray:
+    """When each row (m,) is read, in s after its frame's time: rows follow each other evenly over the frame."""
+    rows = session.protocol.n_rows
+    return np.asarray(np.arange(rows) / (rows * session.rate_hz))
+
+
+def channels(protocol: Protocol) -> tuple[IntArray, IntArray]:
+    """The different measuring pairs (C, 2) [V+, V-], sorted, and the number of each row's pair among them (m,)."""
+    pairs, number = np.unique(protocol.drive_measure[:, 2:].astype(np.int64), axis=0, return_inverse=True)
+    return pairs, np.asarray(number).reshape(-1)
+
+
+def switched(protocol: Protocol) -> npt.NDArray[np.bool_]:
+    """Whether each of the four multiplexers [I+, I-, V+, V-] switches just before each row, (m, 4).
+
+    The scan is periodic: the last row comes before the first.
+    """
+    rows = protocol.drive_measure
+    return np.asarray(rows != np.roll(rows, 1, axis=0))
+
+
+def settled_from_the_row_before(target: npt.NDArray[Any], left: float) -> npt.NDArray[Any]:
+    """What a first-order settling leaves in each row (m,) of a periodic scan.
+
+    Row k starts from what row k - 1 reached, and ``left`` (0 to below 1) of the distance to ``target[k]`` remains:
+    y_k = target_k + left (y_{k-1} - target_k), row 0 coming after the last one. The sum (1 - left) sum_j left^j
+    target_{k-j} is doubled in length until what remains is below 1e-17.
+    """
+    reached, factor, shift = (1.0 - left) * target, left, 1
+    while factor > 1e-17:
+        reached = reached + factor * np.roll(reached, shift)
+        factor, shift = factor * factor, 2 * shift
+    return np.asarray(reached)

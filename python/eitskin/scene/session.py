@@ -1,0 +1,143 @@
+"""A scene's session: its named effects imported and made, and the meshes and models that scenes share."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import ConfigError, EitskinError
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.mesh import Mesh, mesh_for_elements
+from eitskin.scene.cover import Cover
+from eitskin.scene.description import Scene
+from eitskin.scene.effect import EffectModule, GeometryStep, Session, Stage, Step
+from eitskin.scene.registry import Registry
+from eitskin.scene.streams import stream
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Bench:
+    """Meshes, models and untouched skins, kept between scenes of the same skin and protocol object (dataset mode)."""
+
+    def __init__(self) -> None:
+        self._meshes: dict[tuple[Skin, int], Mesh] = {}
+        self._models: dict[tuple[Skin, int, Protocol, bytes], ForwardModel] = {}
+        self._covers: dict[tuple[Skin, int], Cover] = {}
+        self._untouched: dict[tuple[Skin, int, Protocol], FloatArray] = {}
+
+    def mesh(self, skin: Skin, elements: int) -> Mesh:
+        """The mesh of ``skin`` with about so many ``elements``."""
+        key = (skin, elements)
+        if key not in self._meshes:
+            self._meshes[key] = mesh_for_elements(skin, elements)
+        return self._meshes[key]
+
+    def model(self, skin: Skin, protocol: Protocol, elements: int, contacts: FloatArray) -> ForwardModel:
+        """A copy of a forward model of ``skin`` whose matrix has the pattern for ``contacts`` (L,), by which are 0."""
+        key = (skin, elements, protocol, (contacts == 0).tobytes())
+        if key not in self._models:
+            self._models[key] = ForwardModel(self.mesh(skin, elements), skin, protocol, contacts)
+        return copy(self._models[key])
+
+    def cover(self, skin: Skin, elements: int) -> Cover:
+        """Which elements of the mesh touches cover."""
+        key = (skin, elements)
+        if key not in self._covers:
+            self._covers[key] = Cover(self.mesh(skin, elements))
+        return self._covers[key]
+
+    def known(self, scene: Scene) -> FloatArray | None:
+        """The electrodes' potentials (L, P) of ``scene``'s untouched skin, where they were asked for before."""
+        return self._untouched.get((scene.skin, scene.elements, scene.protocol))
+
+    def v0_v(self, scene: Scene, work: SessionWork) -> FloatArray:
+        """The reference frame (m,) of ``scene``'s skin without any effect; a factorisation when first asked for."""
+        model = self.model(scene.skin, scene.protocol, scene.elements, np.zeros(scene.skin.electrodes.count))
+        electrodes = self.known(scene)
+        if electrodes is None:
+            electrodes = model.solve(scene.skin.conductivity_s_per_m, 0.0).electrodes
+            self._untouched[scene.skin, scene.elements, scene.protocol] = electrodes
+            work.v0_factorisations += 1
+            work.v0_solves += electrodes.shape[1]
+        return model.patterns.voltages(electrodes) * scene.protocol.current_a
+
+
+@dataclass
+class SessionWork:
+    """What making a session costs beside its forward solves: the reference V0, and random generators."""
+
+    v0_factorisations: int = 0
+    v0_solves: int = 0
+    generators: int = 0
+
+
+def load_effects(scene: Scene, registry: Registry) -> dict[str, EffectModule]:
+    """The named effects' modules in the order that they will run."""
+    modules = {name: registry.load(name, scene.where) for name in scene.effects}
+    for name, module in modules.items():
+        for other in getattr(module, "CONFLICTS", ()):
+            if other in modules:
+                raise ConfigError(f"{scene.where} [effects.{name}]: it contradicts [effects.{other}]; keep one of them")
+    return dict(sorted(modules.items(), key=lambda item: (item[1].STAGE, item[1].ORDER, item[0])))
+
+
+def check_shared(scene: Scene, modules: dict[str, EffectModule], parameters: dict[str, Any]) -> None:
+    """Refuse effects that say different things of what they share, such as the excitation's frequency."""
+    said: dict[str, tuple[str, Any]] = {}
+    for name, module in modules.items():
+        for key, meaning in getattr(module, "SHARED", {}).items():
+            value = getattr(parameters[name], key)
+            other, before = said.setdefault(meaning, (f"[effects.{name}] {key}", value))
+            if before != value:
+                raise ConfigError(
+                    f"{scene.where} [effects.{name}]: {key} = {value!r} contradicts {other} = {before!r}; both are the "
+                    f"{meaning}, so make them equal"
+                )
+
+
+def make_steps(
+    scene: Scene, modules: dict[str, EffectModule], parameters: dict[str, Any], desk: Bench, work: SessionWork
+) -> tuple[tuple[Step, ...], Skin]:
+    """Every named effect's step, geometry first, and the skin as it truly is."""
+    skin, in_geometry = scene.skin, True
+
+    def build_mesh() -> Mesh:
+        if in_geometry:
+            raise ConfigError("an effect of the geometry comes before the mesh and cannot ask for it; mend the effect")
+        return desk.mesh(skin, scene.elements)
+
+    def make_stream(name: str, index: int) -> np.random.Generator:
+        work.generators += 1
+        return stream(scene.seed, name, index)
+
+    session = Session(
+        skin=scene.skin,
+        protocol=scene.protocol,
+        n_frames=scene.n_frames,
+        quiet_frames=scene.quiet_frames,
+        rate_hz=scene.rate_hz,
+        seed=scene.seed,
+        build_mesh=build_mesh,
+        solve_v0=lambda: desk.v0_v(scene, work),
+        make_stream=make_stream,
+    )
+    steps: list[Step] = []
+    for name, module in modules.items():
+        in_geometry = module.STAGE is Stage.GEOMETRY
+        try:
+            step = module.make(parameters[name], session)
+            if isinstance(step, GeometryStep):
+                skin = step.apply(skin)
+        except EitskinError as error:
+            raise type(error)(f"{scene.where} [effects.{name}]: {error}") from None
+        if step.stage is not module.STAGE or step.name != name:
+            raise ConfigError(f"{scene.where} [effects.{name}]: its step has another name or stage; mend the effect")
+        steps.append(step)
+    return tuple(steps), skin

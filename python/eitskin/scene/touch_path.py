@@ -1,0 +1,90 @@
+"""Where a touch is at any time, and how hard: straight lines between keyframes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.scene.laws import Law, ShortCircuit
+from eitskin.scene.random_touches import Touch
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+ALWAYS_S = (float("-inf"), float("inf"))
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A touch at ``t_s`` after the first recorded frame; ``drive`` is press (0 to 1) or grams, as its law wants."""
+
+    t_s: float
+    x_mm: float
+    y_mm: float
+    radius_mm: float
+    drive: float = 1.0
+
+
+@dataclass(frozen=True)
+class TouchTrack:
+    """A touch that comes, moves, presses and lifts.
+
+    It is there from its first keyframe to its last, both included; with ``hold`` it stays after the last. A track of
+    one keyframe at t_s = -inf is there always. Between keyframes everything changes in proportion to time.
+    """
+
+    keyframes: tuple[Keyframe, ...]
+    law: Law = field(default_factory=ShortCircuit)
+    hold: bool = False
+
+    @property
+    def moves(self) -> bool:
+        """Whether place, size or load change while it is there."""
+        return len({(k.x_mm, k.y_mm, k.radius_mm, k.drive) for k in self.keyframes}) > 1
+
+
+@dataclass(frozen=True, eq=False)
+class TrackSamples:
+    """One track at given times, all (n,). Where it is not ``there``, the other numbers mean nothing.
+
+    ``there`` is False also where it presses so little that it changes nothing.
+    """
+
+    there: BoolArray
+    x_mm: FloatArray
+    y_mm: FloatArray
+    radius_mm: FloatArray
+    contrast: FloatArray
+
+
+def always(x_mm: float, y_mm: float, radius_mm: float, law: Law | None = None, drive: float = 1.0) -> TouchTrack:
+    """A touch that stays where it is through all recorded frames."""
+    frame = Keyframe(ALWAYS_S[0], x_mm, y_mm, radius_mm, drive)
+    return TouchTrack((frame,), ShortCircuit() if law is None else law, hold=True)
+
+
+def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
+    """``track`` at ``times_s`` (n,), ascending or not."""
+    keys = track.keyframes
+    start, end = keys[0].t_s, keys[-1].t_s
+    slack = 1e-9
+    there = (times_s >= start - slack) & (track.hold | (times_s <= end + slack))
+    at = np.array([k.t_s for k in keys]) if len(keys) > 1 else np.zeros(1)
+
+    def line(name: str) -> FloatArray:
+        return np.asarray(np.interp(times_s, at, [getattr(k, name) for k in keys]))
+
+    contrast = track.law.contrast_at(line("drive"))
+    return TrackSamples(there & (contrast != 1.0), line("x_mm"), line("y_mm"), line("radius_mm"), contrast)
+
+
+def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[Touch, ...]:
+    """The touches that are there in ``frame``, in the tracks' order."""
+    return tuple(
+        Touch(float(s.x_mm[frame]), float(s.y_mm[frame]), float(s.radius_mm[frame]), float(s.contrast[frame]))
+        for s in samples
+        if s.there[frame]
+    )

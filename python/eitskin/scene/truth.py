@@ -1,0 +1,95 @@
+"""What was truly there: each frame's touches, the mask of them, and the conductivity that was solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import UsageError
+from eitskin.fem.grid import grid_for
+from eitskin.fem.sensitivity import element_to_pixel
+from eitskin.scene.compiler import Compiled, background_of
+from eitskin.scene.forward_steps import touched
+from eitskin.scene.random_touches import Touch
+
+FloatArray = npt.NDArray[np.float64]
+
+MOST_CELLS = 500_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The truth fields of ``Frames``, with its shapes; rasters are None where none were asked for."""
+
+    touch_frame: npt.NDArray[np.int64]
+    touch_xy_mm: FloatArray
+    touch_radius_mm: FloatArray
+    touch_strength: FloatArray
+    touch_sign: npt.NDArray[np.int8]
+    truth_mask: npt.NDArray[np.int8] | None
+    truth_mask_extent_mm: tuple[float, float, float, float] | None
+    truth_conductivity_s_per_m: npt.NDArray[np.float32] | None
+
+
+def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
+    """The truth of the recorded frames, rastered with ``pixels`` along the longer side, or 0 for no rasters.
+
+    Raises:
+        UsageError: ``pixels`` is neither 0 nor 4 to 512, or the rasters would hold over 500 million cells.
+    """
+    scene = compiled.scene
+    numbers = compiled.state_of_frame[scene.quiet_frames :]
+    flat = [(frame, t) for frame, k in enumerate(numbers) for t in compiled.states[k].touches]
+    contrast = np.array([t.contrast for _, t in flat], dtype=np.float64)
+    masks = conductivity = extent = None
+    if pixels:
+        masks, conductivity, extent = _rasters(compiled, numbers, pixels)
+    return Truth(
+        touch_frame=np.array([frame for frame, _ in flat], dtype=np.int64),
+        touch_xy_mm=np.array([(t.x_mm, t.y_mm) for _, t in flat], dtype=np.float64).reshape(-1, 2),
+        touch_radius_mm=np.array([t.radius_mm for _, t in flat], dtype=np.float64),
+        touch_strength=contrast - 1.0,
+        touch_sign=np.sign(contrast - 1.0).astype(np.int8),
+        truth_mask=masks,
+        truth_mask_extent_mm=extent,
+        truth_conductivity_s_per_m=conductivity,
+    )
+
+
+def mask_of(touches: tuple[Touch, ...], x_mm: FloatArray, y_mm: FloatArray) -> npt.NDArray[np.int8]:
+    """+1 where the centres (h, w) lie in a conductive touch, -1 in a resistive one, else 0."""
+    mask = np.zeros(x_mm.shape, dtype=np.int8)
+    for touch in touches:
+        inside = (x_mm - touch.x_mm) ** 2 + (y_mm - touch.y_mm) ** 2 <= touch.radius_mm**2
+        mask[inside] = 1 if touch.contrast > 1 else -1
+    return mask
+
+
+def _rasters(
+    compiled: Compiled, numbers: npt.NDArray[np.int64], pixels: int
+) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.float32], tuple[float, float, float, float]]:
+    grid, mesh = grid_for(compiled.skin.outline, pixels), compiled.model.mesh
+    if len(numbers) * grid.nx * grid.ny > MOST_CELLS:
+        raise UsageError(
+            f"truth of {len(numbers)} frames with {grid.nx} x {grid.ny} cells each is over {MOST_CELLS} cells; "
+            "use fewer --truth-pixels, or 0 for none"
+        )
+    x0, y0 = grid.origin_mm
+    x_mm, y_mm = np.meshgrid(
+        x0 + (np.arange(grid.nx) + 0.5) * grid.pixel_mm, y0 + (np.arange(grid.ny) + 0.5) * grid.pixel_mm
+    )
+    share: Any = element_to_pixel(mesh, grid).multiply(mesh.areas_mm2[:, None]).T
+    total = np.asarray(share.sum(axis=1)).ravel()
+    used, background = np.unique(numbers), background_of(compiled)
+    masks = np.zeros((len(compiled.states), grid.ny, grid.nx), dtype=np.int8)
+    images = np.zeros((len(compiled.states), grid.ny, grid.nx), dtype=np.float32)
+    for k in used:
+        state = compiled.states[k]
+        masks[k] = mask_of(state.touches, x_mm, y_mm)
+        values = share @ touched(background(state), state.change) / np.where(total > 0, total, np.nan)
+        images[k] = grid.image(values)
+    extent = (x0, y0, x0 + grid.nx * grid.pixel_mm, y0 + grid.ny * grid.pixel_mm)
+    return masks[numbers], images[numbers], extent

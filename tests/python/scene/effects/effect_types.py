@@ -1,0 +1,13 @@
+"""Names for what the effects' tests hand to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.scene.effect import Session
+
+FloatArray = npt.NDArray[np.float64]
+MakeSession = Callable[..., Session]

@@ -1,0 +1,188 @@
+"""What every effect must keep: reciprocity where physics does, its own stream, its arguments, its documented ranges."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from effect_types import FloatArray, MakeSession
+
+from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.description import scene_from_table
+from eitskin.scene.effect import GeometryStep, LoadedStep, Loads, Stage, VoltageStep
+from eitskin.scene.parameters import describe_parameters
+from eitskin.scene.registry import BUILT_IN
+from eitskin.scene.runner import simulate_frames
+from eitskin.skin.protocol import adjacent
+
+BENCH = Bench()  # keeps the meshes
+# The parameters under which each effect is looked at, so strong that breaking reciprocity shows.
+STRONG: dict[str, dict[str, Any]] = {
+    "misplacement": {"spread_mm": 4.0},
+    "background": {"spread": 0.4},
+    "temperature": {"offset_k": 5.0, "drift_k_per_min": 10.0},
+    "gel_drying": {"time_constant_h": 0.001},
+    "contact_impedance": {"mean_ohm_m2": 0.05, "spread": 0.5},
+    "detached": {"electrodes": [3, 11]},
+    "bridged": {"electrodes": [2, 3, 9], "resistance_ohm": 50.0},
+    "phase": {"relative_permittivity": 1000.0, "readout": "magnitude"},
+    "source_impedance": {"resistance_ohm": 50e3, "frequency_hz": 50e3},
+    "amplitude_drift": {"slope_per_min": 3.0, "walk_per_sqrt_min": 0.1},
+    "channel_gain": {"spread": 0.05},
+    "mux": {"settling_us": 50.0, "on_spread_ohm": 10.0},
+    "charge_injection": {"charge_pc": 50.0},
+    "crosstalk": {"coupling_db": -40.0},
+    "mains": {"amplitude_v": 0.01},
+    "common_mode": {"cmrr_db": 50.0},
+    "noise": {"snr_db": 50.0},
+    "saturation": {"headroom": 0.5},
+    "adc": {"bits": 8},
+    "jitter": {"jitter_ns": 100.0},
+}
+# The sheet is a reciprocal network whatever its conductivity, contacts and resistors. One factor for a whole frame, and
+# a characteristic that is the same for all rows, keep equal rows equal. Everything that treats the two rows of a pair
+# differently breaks it: their time, order, channel, load, potentials or chance.
+KEEP = {
+    "misplacement", "background", "temperature", "gel_drying", "contact_impedance", "detached", "bridged", "phase",
+    "amplitude_drift", "saturation", "adc",
+}  # fmt: skip
+RANDOM = {
+    "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux", "charge_injection",
+    "jitter", "noise",
+}  # fmt: skip
+
+
+def _frames(effects: dict[str, Any], seed: int = 5, frames: int = 2) -> FloatArray:
+    """Frames of a press that is nowhere symmetrical, without a quiet frame."""
+    table = {
+        "scene": {"seed": seed, "frames": frames, "quiet_frames": 1, "elements": 1200},
+        "touch": [{"x_mm": 37.0, "y_mm": 22.0, "radius_mm": 20.0, "contrast": 9.0}],
+        "effects": effects,
+    }
+    return simulate_frames(compile_scene(scene_from_table(table, "test", Path()), bench=BENCH)).voltage_v[1:]
+
+
+def _irreciprocity(v: FloatArray) -> float:
+    pairs = adjacent(16).reciprocal_pairs()
+    return float(np.abs(v[pairs.first] - pairs.sign * v[pairs.second]).max() / np.abs(v).max())
+
+
+def test_every_effect_is_looked_at() -> None:
+    assert set(STRONG) == set(BUILT_IN)
+    assert not (KEEP | RANDOM) - set(BUILT_IN)
+
+
+@pytest.fixture(scope="module")
+def plain() -> FloatArray:
+    return _frames({})
+
+
+@pytest.mark.parametrize("name", sorted(STRONG))
+def test_reciprocity(name: str, plain: FloatArray) -> None:
+    v = _frames({name: STRONG[name]})
+    assert np.abs(v - plain).max() > 1e-4 * np.abs(plain).max()  # it does something
+    if name in KEEP:
+        assert _irreciprocity(v[-1]) < 1e-9
+    else:
+        assert _irreciprocity(v[-1]) > 1e-3
+
+
+def test_without_effects_the_sheet_is_reciprocal_and_all_kept_together_keep_it(plain: FloatArray) -> None:
+    assert _irreciprocity(plain[-1]) < 1e-10
+    assert _irreciprocity(_frames({name: STRONG[name] for name in sorted(KEEP)})[-1]) < 1e-9
+
+
+@pytest.mark.parametrize("name", sorted(STRONG))
+def test_streams_are_the_effects_own(name: str, make_session: MakeSession) -> None:
+    """It draws from streams of its own name only; without randomness it asks for none."""
+    module = importlib.import_module(BUILT_IN[name])
+    drawn: list[str] = []
+    session = make_session(drawn=drawn)
+    values = {key: tuple(value) if isinstance(value, list) else value for key, value in STRONG[name].items()}
+    step = module.make(module.Parameters(**values), session)
+    if isinstance(step, VoltageStep):
+        step.apply(np.ones(208), 0.0, 3)
+    assert all(one == name or one.startswith(f"{name} ") for one in drawn)
+    assert bool(drawn) == (name in RANDOM)
+    cost = step.cost
+    assert bool(cost.random_numbers or cost.random_numbers_per_frame) == (name in RANDOM)
+
+
+@pytest.mark.parametrize("name", sorted(RANDOM))
+def test_a_seed_makes_the_same_frames_and_another_others(name: str) -> None:
+    first = _frames({name: STRONG[name]})
+    assert np.array_equal(first, _frames({name: STRONG[name]}))
+    assert not np.array_equal(first, _frames({name: STRONG[name]}, seed=6))
+
+
+@pytest.mark.parametrize("name", ["channel_gain", "charge_injection", "mains", "amplitude_drift"])
+def test_another_effect_leaves_the_noises_samples_as_they_were(name: str) -> None:
+    noise = {"noise": {"noise_v": 1e-3}}
+    alone = _frames(noise) - _frames({})
+    beside = _frames({**noise, name: STRONG[name]}) - _frames({name: STRONG[name]})
+    np.testing.assert_allclose(beside, alone, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", sorted(STRONG))
+def test_a_step_is_a_pure_function(name: str, make_session: MakeSession) -> None:
+    """Applied twice, out of order, it gives the same and leaves its arguments as they are."""
+    module = importlib.import_module(BUILT_IN[name])
+    values = {key: tuple(value) if isinstance(value, list) else value for key, value in STRONG[name].items()}
+    step = module.make(module.Parameters(**values), make_session())
+    assert step.name == name and step.stage is module.STAGE and step.note
+    if not isinstance(step, VoltageStep | LoadedStep):
+        return
+    v = np.linspace(-1, 1, 208)
+    kept = v.copy()
+    a, b, c, d = np.random.default_rng(1).standard_normal((4, 208))
+    more: tuple[Any, ...] = (Loads(a, b, c, d, 1e-3),) if isinstance(step, LoadedStep) else ()
+    apply: Any = step.apply
+    first = apply(v, *more, 0.1, 3)
+    apply(v, *more, 0.5, 9)
+    assert np.array_equal(apply(v, *more, 0.1, 3), first)
+    assert np.array_equal(v, kept) and first is not v
+    assert first.shape == (208,) and first.dtype == np.float64
+    if module.STAGE < Stage.DIGITISE:
+        assert apply(v + 0.1j * v, *more, 0.1, 3).dtype == np.complex128
+
+
+@pytest.mark.parametrize("name", sorted(STRONG))
+def test_an_effect_declares_what_it_is(name: str) -> None:
+    module = importlib.import_module(BUILT_IN[name])
+    assert name == module.NAME and isinstance(module.STAGE, Stage) and module.SUMMARY.endswith(".")
+    assert module.__doc__ and len(module.__doc__) > 250
+    assert len(inspect.getsource(module).splitlines()) < 120
+    module.Parameters()  # defaults are possible
+    for field in dataclasses.fields(module.Parameters):
+        assert field.metadata["doc"] and "unit" in field.metadata
+        default, low, high = field.default, field.metadata.get("low"), field.metadata.get("high")
+        for value in default if isinstance(default, tuple) else (default,):
+            assert value is None or low is None or value >= low
+            assert value is None or high is None or value <= high
+
+
+@pytest.mark.parametrize("name", sorted(STRONG))
+def test_the_page_tells_of_every_effect_and_parameter(name: str) -> None:
+    folder = Path(__file__).resolve().parents[4] / "docs" / "effects"
+    page = (folder / "README.md").read_text(encoding="utf-8")
+    section = page.split(f"\n## {name}\n", 1)[1].split("\n## ", 1)[0]
+    module = importlib.import_module(BUILT_IN[name])
+    assert module.SUMMARY in section and f"({name}.png)" in section
+    for row in describe_parameters(module):
+        line = next(line for line in section.splitlines() if line.startswith(f"| `{row['name']}` |"))
+        assert row["doc"] in line and (row["unit"] or "-") in line
+        default = row["default"]
+        shown = "-" if default is None else str(list(default) if isinstance(default, tuple) else default)
+        assert f"| {shown} |" in line
+    assert 2_000 < (folder / f"{name}.png").stat().st_size < 60_000
+
+
+def test_misplacement_is_the_only_geometry_step() -> None:
+    stages = {name: importlib.import_module(module).STAGE for name, module in BUILT_IN.items()}
+    assert [name for name, stage in stages.items() if stage is Stage.GEOMETRY] == ["misplacement"]
+    assert GeometryStep.__dataclass_fields__["stage"].default is Stage.GEOMETRY

@@ -1,0 +1,33 @@
+"""A picture for every effect, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from eitskin.errors import UsageError
+from eitskin.scene.registry import BUILT_IN
+from eitskin.view.effect_pictures import SHOWN, draw_effect
+from eitskin.view.effect_sketches import SKETCHES
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def test_every_effect_has_a_picture() -> None:
+    assert set(SHOWN) == set(SKETCHES) == set(BUILT_IN)
+
+
+@pytest.mark.parametrize("name", ["background", "phase", "bridged"])
+def test_pictures_are_drawn_small_and_the_same_again(name: str, tmp_path: Path) -> None:
+    for run in ("first", "second"):
+        draw_effect(tmp_path / run, name)
+    first = (tmp_path / "first").read_bytes()
+    assert first == (tmp_path / "second").read_bytes()
+    assert first.startswith(PNG) and 2_000 < len(first) < 60_000
+
+
+def test_an_unknown_effect_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no picture of an effect 'noice'; did you mean 'noise'"):
+        draw_effect(tmp_path / "x.png", "noice")
+    assert not (tmp_path / "x.png").exists()

@@ -1,0 +1,60 @@
+"""What the tests of scenes share: small scenes, effects made on the spot, and the command line of scenes alone."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+from eitskin.cli import cmd_scene
+from eitskin.scene.description import Scene
+from eitskin.scene.effect import Cost, Session, Stage, VoltageStep
+from eitskin.scene.touch_path import Keyframe, TouchTrack, always
+
+ELEMENTS = 600
+
+
+def still_scene(frames: int = 3, **changes: Any) -> Scene:
+    """A touch that stays; a coarse mesh."""
+    given = {"touches": (always(-30, 20, 10),), "frames": frames, "quiet_frames": 2, "elements": ELEMENTS}
+    return Scene("still", **{**given, **changes})
+
+
+def moving_scene(frames: int = 8, **changes: Any) -> Scene:
+    """A touch that crosses the skin, passing an electrode's neighbourhood; a coarse mesh."""
+    end = (frames - 1) / 20.0
+    path = (Keyframe(0.0, -80, 0, 10), Keyframe(end, 60, 30, 10))
+    given = {"touches": (TouchTrack(path),), "frames": frames, "quiet_frames": 2, "elements": ELEMENTS}
+    return Scene("moving", **{**given, **changes})
+
+
+@dataclass(frozen=True)
+class Offset:
+    """Parameters of the effects made here."""
+
+    offset_v: float = 0.001
+
+
+def effect_module(name: str, make: Callable[[Any, Session], Any] | None = None, stage: Stage = Stage.FRONT_END) -> str:
+    """Put a module with the effect ``name`` into sys.modules, and return its name there."""
+
+    def add_offset(parameters: Offset, session: Session) -> VoltageStep:
+        return VoltageStep(name, stage, Cost(), "adds", lambda v, time_s, frame: v + parameters.offset_v)
+
+    module = ModuleType(f"effects_of_tests_{name}")
+    vars(module).update(
+        NAME=name, STAGE=stage, ORDER=50, SUMMARY="adds", Parameters=Offset, make=add_offset if make is None else make
+    )
+    sys.modules[module.__name__] = module
+    return module.__name__
+
+
+def scene_command(*arguments: str) -> int:
+    """``eitskin scene ARGUMENTS``; errors are raised."""
+    parser = argparse.ArgumentParser()
+    cmd_scene.add_parser(parser.add_subparsers())
+    options = parser.parse_args(["scene", *arguments])
+    return int(options.run(options))

@@ -1,0 +1,244 @@
+"""The plan, the choice of the solve, and what unnamed effects must not do."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("netgen")
+
+from scene_helpers import ELEMENTS, effect_module, moving_scene, still_scene
+
+from eitskin.errors import ConfigError
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.mesh import mesh_for_elements
+from eitskin.scene.compiler import compile_scene
+from eitskin.scene.effect import Contacts, ContactStep, Cost, Stage, VoltageStep
+from eitskin.scene.forward_steps import count_costs
+from eitskin.scene.registry import BUILT_IN, Registry
+from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
+from eitskin.scene.simulate import conductivity_with
+from eitskin.scene.touch_path import touches_at
+
+NEEDED: dict[str, dict[str, Any]] = {"noise": {"snr_db": 60.0}}
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+def test_naming_an_effect_adds_exactly_one_step(name: str, bench: Bench) -> None:
+    """The steps of the scene without it stay, in their order."""
+    scene = moving_scene(4)
+    without = compile_scene(scene, bench=bench).plan.steps
+    named = compile_scene(replace(scene, effects={name: NEEDED.get(name, {})}), bench=bench).plan.steps
+    assert len(named) == len(without) + 1
+    assert [step.name for step in named if step.name != name] == [step.name for step in without]
+    assert [step.name for step in named if step.effect] == [name]
+
+
+def test_frames_without_effects_are_the_forward_models_to_the_bit() -> None:
+    for scene in (still_scene(), moving_scene(4, solver="factorise")):
+        frames = scene.run()
+        forward = ForwardModel(mesh_for_elements(scene.skin, ELEMENTS), scene.skin, scene.protocol, 0.0)
+        sheet = scene.skin.conductivity_s_per_m
+        assert np.array_equal(frames.reference_voltage_v, np.tile(forward.voltages(sheet), (2, 1)))
+        for k in range(scene.frames):
+            touches = touches_at(scene.samples(), k)
+            assert touches
+            direct = forward.voltages(conductivity_with(forward.mesh, touches, sheet))
+            assert np.array_equal(frames.voltage_v[k], direct)
+
+
+def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
+    def refuse(parameters: Any, session: Any) -> Any:
+        raise AssertionError("the factory of an unnamed effect was called")
+
+    many = {f"unnamed{k}": effect_module(f"unnamed{k}", refuse) for k in range(100)}
+    many |= {f"absent{k}": f"no_such_package.effect{k}" for k in range(100)}
+    scene = moving_scene(4, effects={"noise": {"snr_db": 60.0}})
+    alone = compile_scene(scene)
+    among = compile_scene(scene, registry=Registry({**BUILT_IN, **many}, entry_points=False))
+    assert len(many) == 200 and among.plan.steps == alone.plan.steps and among.plan.text() == alone.plan.text()
+    assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
+
+
+def test_the_factory_of_an_unnamed_effect_is_never_called(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(parameters: Any, session: Any) -> Any:
+        raise AssertionError("called")
+
+    before = simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v
+    for target in BUILT_IN.values():
+        monkeypatch.setattr(importlib.import_module(target), "make", refuse)
+    assert np.array_equal(simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v, before)
+    with pytest.raises(AssertionError, match="called"):
+        compile_scene(still_scene(effects={"noise": {"snr_db": 60.0}}), bench=bench)
+
+
+def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(bench: Bench) -> None:
+    """V0 has patterns of its own; asking for it late does not disturb the scene's."""
+
+    def make(parameters: Any, session: Any) -> VoltageStep:
+        return VoltageStep("late", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v / session.v0_rms_v())
+
+    registry = Registry({**BUILT_IN, "late": effect_module("late", make)}, entry_points=False)
+    effects: dict[str, Any] = {"bridged": {"electrodes": [2, 3]}, "gel_drying": {}}
+    plain = simulate_frames(compile_scene(still_scene(4, effects=effects))).voltage_v
+    with_late = compile_scene(still_scene(4, effects={**effects, "late": {}}), registry=registry)
+    v0_v = still_scene(1, touches=()).run().voltage_v[0]
+    scaled = simulate_frames(with_late).voltage_v * np.sqrt(np.mean(v0_v**2))
+    assert scaled == pytest.approx(plain, rel=1e-12)
+
+
+def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
+    """Real, with contacts, with bridges and complex, and with the grounded electrode off."""
+    around = moving_scene(16, rate_hz=20.0)
+    for effects in (
+        {},
+        {"contact_impedance": {"mean_ohm_m2": 0.02, "spread": 0.5}},
+        {"bridged": {"electrodes": [2, 3], "resistance_ohm": 5.0}},
+        {"phase": {}, "contact_impedance": {}},
+        {"detached": {"electrodes": [15]}},
+        {"background": {}},
+    ):
+        frames = {}
+        for solver in ("update", "factorise"):
+            compiled = compile_scene(replace(around, effects=effects, solver=solver), bench=bench)
+            assert compiled.method == solver
+            frames[solver] = simulate_frames(compiled)
+            assert frames[solver].work.factorisations == (1 if solver == "update" else 17 - len(compiled.known))
+        largest = np.abs(frames["factorise"].voltage_v).max()
+        difference = np.abs(frames["update"].voltage_v - frames["factorise"].voltage_v).max()
+        assert difference < 1e-9 * largest, effects
+
+
+def test_the_way_with_fewer_multiplications_is_chosen(bench: Bench) -> None:
+    many = compile_scene(moving_scene(60), bench=bench)
+    assert many.counted is not None and many.counted.update < many.counted.factorise and many.method == "update"
+    assert many.counted.update_solves == 16 + len(many.reach)
+    done = simulate_frames(many)
+    assert (done.work.factorisations, done.work.solves) == (1, 16 + len(many.reach))
+    still = compile_scene(still_scene(60), bench=bench)
+    assert still.method == "factorise" and still.counted is None
+
+
+def test_count_prefers_factorisations_where_few_states_touch_much() -> None:
+    model = compile_scene(still_scene()).model
+    shunted = np.ones(16, np.bool_)
+    assert count_costs(model, shunted, np.array([10, 12]), 15).cheaper == "update"
+    assert count_costs(model, shunted, np.array([300, 300]), 600).cheaper == "factorise"
+
+
+def test_the_plan_tells_what_the_run_then_does(bench: Bench) -> None:
+    for effects in ({}, {"noise": {"snr_db": 60.0}}, {"gel_drying": {}}, {"contact_impedance": {}}, {"phase": {}}):
+        for scene in (still_scene(5, effects=effects), moving_scene(5, effects=effects)):
+            compiled = compile_scene(scene)
+            done = simulate_frames(compiled)
+            assert compiled.plan.factorisations == done.work.factorisations + compiled.work.v0_factorisations
+            assert compiled.plan.solves == done.work.solves + compiled.work.v0_solves
+            assert compiled.plan.is_complex == ("phase" in effects)
+
+
+def test_a_plan_cannot_be_changed_and_prints_every_step() -> None:
+    plan = moving_scene(4, effects={"noise": {"snr_db": 60.0}, "mains": {}}).plan()
+    assert isinstance(plan.steps, tuple)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        plan.steps = ()  # type: ignore[misc]
+    text = plan.text()
+    assert [name in text for name in ("mesh", "touches", "solve", "*mains", "*noise")] == [True] * 5
+    assert "in all: 2 factorisations (real" in text and "208 random/frame" in text
+    assert text.index("*mains") < text.index("*noise")
+    assert [step["name"] for step in plan.as_dict()["steps"]][-2:] == ["mains", "noise"]
+
+
+def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames() -> None:
+    frames = still_scene(1000).run()
+    assert frames.n_frames == 1000
+    assert frames.meta["counters"]["factorisations_in_recorded_frames"] == 1
+    assert frames.meta["counters"]["factorisations"] == 2
+    bare = still_scene(1000, touches=()).run()
+    assert bare.meta["counters"]["factorisations"] == 1
+
+
+def test_order_within_a_stage_is_that_of_order_then_name(bench: Bench) -> None:
+    scene = still_scene(effects={"jitter": {}, "adc": {}, "noise": {"snr_db": 60.0}, "saturation": {}})
+    names = [step.name for step in compile_scene(scene, bench=bench).plan.steps if step.effect]
+    turned = replace(scene, effects=dict(reversed(scene.effects.items())))
+    assert names == [step.name for step in compile_scene(turned, bench=bench).plan.steps if step.effect]
+    assert set(names[-1:]) == {"adc"}
+
+
+def test_contradictory_effects_are_refused(bench: Bench) -> None:
+    name = effect_module("opposed")
+    sys.modules[name].CONFLICTS = ("mains",)  # type: ignore[attr-defined]
+    registry = Registry({**BUILT_IN, "opposed": name})
+    scene = still_scene(effects={"mains": {}, "opposed": {}}, where="f.toml")
+    with pytest.raises(ConfigError, match=r"f.toml \[effects.opposed\]: it contradicts \[effects.mains\]"):
+        compile_scene(scene, registry=registry, bench=bench)
+    varying = still_scene(effects={"gel_drying": {}}, solver="update", where="f.toml")
+    with pytest.raises(ConfigError, match=r'f.toml \[scene\]: solver = "update" .* \[effects.gel_drying\]'):
+        compile_scene(varying, bench=bench)
+
+
+def test_a_protocol_that_detached_electrodes_leave_unsolvable_is_refused(bench: Bench) -> None:
+    everything = {"detached": {"electrodes": list(range(0, 16, 2)), "from_s": 0.05}}
+    with pytest.raises(ConfigError, match=r"f.toml \[effects.detached\]: .*no row of the protocol"):
+        compile_scene(still_scene(effects=everything, where="f.toml"), bench=bench)
+
+
+def test_a_bridge_rescues_a_detached_electrode(bench: Bench) -> None:
+    """Electrode 5 off, but joined to 6 by a wire: rows over both read 0, the others' rows are read through 6."""
+    effects = {"detached": {"electrodes": [5]}, "bridged": {"electrodes": [5, 6], "resistance_ohm": 0.0}}
+    compiled = compile_scene(still_scene(effects=effects), bench=bench)
+    v, rows = simulate_frames(compiled).voltage_v[-1], compiled.scene.protocol.drive_measure
+    across = [set(row[2:]) == {5, 6} or set(row[:2]) == {5, 6} for row in rows.tolist()]
+    assert np.abs(v[across]).max() < 1e-6 * np.abs(v).max() and (np.abs(v[np.logical_not(across)]) > 0).all()
+
+
+def test_a_bridge_of_no_resistance_is_one_electrode_and_of_much_is_none(bench: Bench) -> None:
+    plain = simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v
+    for ohm, bound in ((1e12, 1e-7), (0.0, None)):
+        effects = {"bridged": {"electrodes": [3, 4], "resistance_ohm": ohm}}
+        bridged = simulate_frames(compile_scene(still_scene(effects=effects), bench=bench)).voltage_v
+        difference = np.abs(bridged - plain).max() / np.abs(plain).max()
+        assert difference > 0.1 if bound is None else difference < bound
+
+
+def test_bad_steps_are_said_to_be_the_effects(bench: Bench) -> None:
+    def renamed(parameters: Any, session: Any) -> VoltageStep:
+        return VoltageStep("other", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v)
+
+    def negative(parameters: Any, session: Any) -> ContactStep:
+        less = Contacts(np.full(16, -1.0), np.zeros(16, np.bool_))
+        return ContactStep("negative", Cost(), "", lambda contacts, time_s, frame: less)
+
+    def endless(parameters: Any, session: Any) -> VoltageStep:
+        return VoltageStep("endless", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v * np.inf)
+
+    modules = {"renamed": effect_module("renamed", renamed), "endless": effect_module("endless", endless)}
+    modules["negative"] = effect_module("negative", negative, Stage.BOUNDARY)
+    registry = Registry(modules, entry_points=False)
+    for name, said in (("renamed", "another name or stage"), ("negative", "negative or not finite")):
+        with pytest.raises(ConfigError, match=rf"scene \[effects.{name}\]: .*{said}"):
+            compile_scene(still_scene(effects={name: {}}), registry=registry, bench=bench)
+    with pytest.raises(ConfigError, match=r"frame -2, row 0 is -?inf.*endless"):
+        simulate_frames(compile_scene(still_scene(effects={"endless": {}}), registry=registry, bench=bench))
+
+
+def test_effects_that_disagree_on_the_excitation_frequency_are_refused(bench: Bench) -> None:
+    effects = {"phase": {"frequency_hz": 1e4}, "source_impedance": {"frequency_hz": 5e4}}
+    said = r"f.toml \[effects.source_impedance\]: frequency_hz = 50000.0 contradicts \[effects.phase\] frequency_hz"
+    with pytest.raises(ConfigError, match=said):
+        compile_scene(still_scene(effects=effects, where="f.toml"), bench=bench)
+    effects["source_impedance"]["frequency_hz"] = 1e4
+    compile_scene(still_scene(effects=effects), bench=bench)

@@ -1,0 +1,61 @@
+"""An effect that is not named is not imported: seen from outside, in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("netgen")
+
+ROOT = Path(__file__).resolve().parents[3]
+
+PROBE = """
+import json, sys
+from dataclasses import replace
+from eitskin.scene.description import Scene
+from eitskin.scene.touch_path import always
+effects = json.loads(sys.argv[1])
+scene = Scene("probe", touches=(always(0, 0, 10),), frames=2, quiet_frames=1, elements=400, effects=effects)
+scene.plan()
+scene.run()
+prefix = "eitskin.scene.effects."
+print(json.dumps([sorted(m[len(prefix):] for m in sys.modules if m.startswith(prefix)), sorted(sys.modules)]))
+"""
+
+
+def fresh(code: str, *arguments: str) -> str:
+    """What ``code`` prints in a fresh process."""
+    path = os.pathsep.join(filter(None, [str(ROOT / "python"), os.environ.get("PYTHONPATH")]))
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("effects", [{}, {"noise": {"snr_db": 60.0}}, {"mains": {}, "gel_drying": {}}])
+def test_only_named_effects_are_imported(effects: dict[str, dict[str, float]]) -> None:
+    own, every = json.loads(fresh(PROBE, json.dumps(effects)))
+    assert own == sorted(effects)
+    assert not [name for name in every if name.split(".")[0] in ("matplotlib", "dask", "distributed", "tqdm")]
+
+
+def test_listing_effects_imports_none() -> None:
+    code = """
+import sys
+from eitskin.scene.registry import Registry, summary_of
+rows = {name: summary_of(target) for name, target in Registry().names().items()}
+assert rows["noise"], rows
+print([m for m in sys.modules if m.startswith("eitskin.scene.effects.")])
+"""
+    assert fresh(code).strip() == "[]"
+
+
+def test_the_command_line_starts_without_scipy() -> None:
+    code = "import sys, eitskin.cli.cmd_scene; print([m for m in ('scipy', 'numpy', 'matplotlib') if m in sys.modules])"
+    assert fresh(code).strip() == "[]"

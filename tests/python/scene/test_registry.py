@@ -1,0 +1,113 @@
+"""Finding effects by name, a user's own by entry point, and the check of their parameters."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from scene_helpers import effect_module
+
+from eitskin.errors import ConfigError
+from eitskin.scene.parameter import parameter
+from eitskin.scene.parameters import describe_parameters, parse_parameters
+from eitskin.scene.registry import BUILT_IN, ENTRY_POINT_GROUP, Registry, summary_of
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@dataclass(frozen=True)
+class Every:
+    """One field of each kind."""
+
+    gain: float = parameter(1.0, "V", "a number", low=0, high=2, open_low=True)
+    bits: int = parameter(12, "bit", "whole", low=1, high=32)
+    on: bool = True
+    kind: str = parameter("slow", "", "word", choices=("slow", "fast"))
+    which: tuple[int, ...] = parameter((0,), "", "list", low=0)
+    pair: tuple[float, float] = (0.0, 1.0)
+    limit_v: float | None = parameter(None, "V", "or none", low=0)
+
+    def __post_init__(self) -> None:
+        if self.bits == 13:
+            raise ConfigError("bits = 13: unlucky; take another")
+
+
+MODULE = SimpleNamespace(Parameters=Every)
+
+
+def test_tables_become_parameters() -> None:
+    assert parse_parameters(MODULE, {}, "w") == Every()  # type: ignore[arg-type]
+    table = {"gain": 2, "bits": 8.0, "on": False, "kind": "fast", "which": [1, 2], "pair": [3, 4], "limit_v": 0.5}
+    found = parse_parameters(MODULE, table, "w")  # type: ignore[arg-type]
+    assert found == Every(2.0, 8, False, "fast", (1, 2), (3.0, 4.0), 0.5)
+    assert isinstance(found.gain, float) and isinstance(found.bits, int)
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({"gian": 1}, r"f \[effects.x\]: unknown key 'gian'; did you mean 'gain'"),
+        ({"gain": 0}, r"f \[effects.x\]: gain = 0 is out of range; it must be above 0 and at most 2 V"),
+        ({"gain": float("nan")}, "gain = nan is out of range"),
+        ({"gain": "loud"}, "gain must be a number"),
+        ({"gain": True}, "gain must be a number"),
+        ({"bits": 8.5}, "bits = 8.5 must be a whole number"),
+        ({"bits": 13}, r"f \[effects.x\]: bits = 13: unlucky"),
+        ({"on": 1}, "on must be true or false"),
+        ({"kind": "slwo"}, "kind = 'slwo' is not known; did you mean 'slow'"),
+        ({"kind": 3}, "kind must be text"),
+        ({"which": 3}, "which must be a list"),
+        ({"which": [1, -1]}, r"which entry 1 \(from 0\) = -1 is out of range"),
+        ({"pair": [1]}, "pair must be a list of 2"),
+        ({"limit_v": -1}, "limit_v = -1 is out of range; it must be at least 0 V"),
+    ],
+)
+def test_impossible_parameters_name_file_table_and_key(table: dict[str, object], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        parse_parameters(MODULE, table, "f [effects.x]")  # type: ignore[arg-type]
+
+
+def test_parameters_describe_themselves() -> None:
+    rows = {row["name"]: row for row in describe_parameters(MODULE)}  # type: ignore[arg-type]
+    gain = {"name": "gain", "type": "float", "default": 1.0, "low": 0, "high": 2, "unit": "V", "doc": "a number"}
+    assert rows["gain"] == gain
+    assert rows["kind"]["choices"] == ("slow", "fast")
+
+
+def test_an_unknown_effect_names_the_nearest() -> None:
+    with pytest.raises(ConfigError, match=r"f.toml \[effects.nosie\]: unknown effect 'nosie'; did you mean 'noise'"):
+        Registry().load("nosie", "f.toml")
+
+
+def test_a_package_adds_an_effect_by_an_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    point = importlib.metadata.EntryPoint("mine", effect_module("mine"), ENTRY_POINT_GROUP)
+    taken = importlib.metadata.EntryPoint("noise", effect_module("taken"), ENTRY_POINT_GROUP)
+    groups = {ENTRY_POINT_GROUP: [point, taken]}
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: groups[group])
+    assert Registry().load("mine", "f").NAME == "mine"
+    assert Registry().load("noise", "f").__name__ == BUILT_IN["noise"]  # type: ignore[attr-defined]
+    assert set(Registry().names()) == {*BUILT_IN, "mine"}
+    with pytest.raises(ConfigError, match="unknown effect 'mine'"):
+        Registry(entry_points=False).load("mine", "f")
+
+
+def test_modules_that_break_the_contract_are_refused() -> None:
+    name = effect_module("broken")
+    del sys.modules[name].SUMMARY  # type: ignore[attr-defined]
+    with pytest.raises(ConfigError, match=r"\[effects.broken\]: its module defines no SUMMARY"):
+        Registry({"broken": name}).load("broken", "f")
+    with pytest.raises(ConfigError, match="NAME must be 'alias'"):
+        Registry({"alias": effect_module("other")}).load("alias", "f")
+    with pytest.raises(ConfigError, match="cannot be imported"):
+        Registry({"gone": "no_such_module_at_all"}).load("gone", "f")
+
+
+def test_every_built_in_effect_keeps_the_contract() -> None:
+    for name, target in BUILT_IN.items():
+        module = Registry().load(name, "f")
+        assert summary_of(target) == module.SUMMARY and module.SUMMARY.endswith(".")
+        assert all(row["doc"] for row in describe_parameters(module)), name

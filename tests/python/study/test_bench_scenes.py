@@ -1,0 +1,33 @@
+"""The benchmarks of scenes: what they count and print; times are not judged."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("netgen")
+
+from eitskin.scene.registry import BUILT_IN
+from eitskin.study import bench_scenes
+
+
+def test_the_effects_table_has_none_each_and_all() -> None:
+    result = bench_scenes.effects_table(frames=3, rounds=1)
+    cases = result["cases"]
+    assert list(cases) == ["none", *BUILT_IN, "all"]
+    assert all(cases[name]["steps"] == cases["none"]["steps"] + 1 for name in BUILT_IN)
+    assert cases["all"]["steps"] == cases["none"]["steps"] + len(BUILT_IN)
+    assert cases["none"]["random_numbers"] == 0 and cases["noise"]["random_numbers"] == 7 * 208
+    assert "gel_drying" in bench_scenes.effects_text(result) and json.dumps(result)
+
+
+def test_the_scenes_table_has_both_ways_and_what_bounds_a_dataset() -> None:
+    result = bench_scenes.scenes_table(frames=6, scenes=4, elements=600, rounds=1)
+    ways = result["moving"]["ways"]
+    assert (ways["update"]["factorisations"], ways["factorise"]["factorisations"]) == (1, 6)
+    assert result["moving"]["largest_difference_relative"] < 1e-9
+    assert set(result["dataset"]["shares"]) == {"factorisation", "triangular solves", "the rest"}
+    text = bench_scenes.scenes_text(result)
+    assert "what bounds it" in text and "10000 would take" in text and json.dumps(result)
