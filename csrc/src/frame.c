@@ -134,7 +134,7 @@ static uint64_t rebuild_basis(eits_context *ctx)
         if (ctx->basis_for[k] != LEFT_OUT)
             continue;
         reduction_column(ctx, k, ctx->residual);
-        macs += extend_basis(ctx, ctx->residual);
+        macs += ctx->model->rank + extend_basis(ctx, ctx->residual);
     }
     if (ctx->options.project_baseline) {
         macs += drift_direction(ctx, ctx->residual);
