@@ -232,6 +232,9 @@ static void unknown_and_repeated_sections(void)
     CHECK_EQUAL(open_small(&made), EITS_E_MODEL_SECTION); /* the same section twice */
     small_model_free(&made);
     CHECK_EQUAL(with_entry(TINY, "META", 12, 1), EITS_OK); /* known, though required */
+    CHECK_EQUAL(with_entry(TINY, "META", 8, 16), EITS_OK); /* up to the very end of the model */
+    CHECK_EQUAL(with_entry(TINY, "META", 8, 17), EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(with_entry(TINY, "META", 8, 0), EITS_OK);
 }
 
 static void numbers_of_sections(void)
@@ -244,6 +247,18 @@ static void numbers_of_sections(void)
         CHECK_EQUAL(open_small(&made), counts[i] == SMALL_SECTIONS - 1 ? EITS_OK : EITS_E_MODEL_SECTION);
     }
     small_model_free(&made);
+    for (uint32_t count = 1; count <= 256; ++count) { /* a table that reaches beyond the blob, whose memory ends there */
+        uint8_t *blob = malloc(64);
+        if (blob == NULL)
+            abort();
+        memset(blob, 0, 64);
+        memcpy(blob, "EITM\1", 5);
+        small_put_u32(blob + 8, 64);
+        small_put_u32(blob + 16, count);
+        small_put_u32(blob + 12, eits_crc32(0, blob + 16, 48));
+        CHECK_EQUAL(open_untouched(blob, 64), EITS_E_MODEL_SECTION);
+        free(blob);
+    }
 }
 
 int main(void)

@@ -108,6 +108,10 @@ static void electrodes_folds_and_pixels(void)
     CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 0u | 2u << 16), EITS_E_MODEL_VALUE); /* not by column */
     CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 2u | 1u << 16), EITS_E_MODEL_VALUE); /* not by row */
     CHECK_EQUAL(with_word(TINY, "GRID", 0, 1u), EITS_E_MODEL_VALUE);                /* the next one's place */
+    const small_spec single = {.rank = 1, .side = 1};
+    CHECK_EQUAL(with_word(single, "GRID", 0, 0), EITS_OK);
+    CHECK_EQUAL(with_word(single, "GRID", 0, 1), EITS_E_MODEL_VALUE); /* the only pixel outside */
+    CHECK_EQUAL(with_word(single, "GRID", 0, 1u << 16), EITS_E_MODEL_VALUE);
 }
 
 static void not_finite_in_each_section(void)
@@ -146,6 +150,7 @@ static void defaults(void)
         {48, -0.01f, 1.1e30f}, {52, -0.01f, 1.1e30f},
     };
     CHECK_EQUAL(with_word(TINY, "DEFS", 0, 0), EITS_E_MODEL_VALUE); /* no iteration */
+    CHECK_EQUAL(with_word(TINY, "DEFS", 0, 1), EITS_OK);
     for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; ++i) {
         CHECK_EQUAL(with_number(TINY, "DEFS", ranges[i].at, ranges[i].low), EITS_E_MODEL_VALUE);
         CHECK_EQUAL(with_number(TINY, "DEFS", ranges[i].at, ranges[i].high), EITS_E_MODEL_VALUE);

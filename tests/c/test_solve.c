@@ -329,6 +329,12 @@ static void work_is_counted(void)
     CHECK_EQUAL(ctx->info.macs, reduce + 2 * 16 /* direction, normalised */ + reduce + project + whole);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     CHECK_EQUAL(ctx->info.macs, reduce + project + whole); /* the basis is kept */
+    /* one column of P less, but as a direction; the drift's is made orthogonal to it, twice */
+    frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] = R(NAN);
+    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    const uint64_t rebuilt = (16 + 2 * 16) + (reduce + 2 * project + 2 * 16);
+    CHECK_EQUAL(ctx->basis_count, 2);
+    CHECK_EQUAL(ctx->info.macs, rebuilt + (SMALL_FOLDED - 1) * 16 + 2 * project + whole);
     tear_down(&b);
 }
 

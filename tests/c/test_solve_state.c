@@ -223,6 +223,28 @@ static void step_too_large(void)
     }
 }
 
+/* On the identity one step of s leaves |1 - s| of the data: the objective is at its start's value for s = 2, and a run that
+ * ends above it has won nothing. */
+static void ending_above_the_start(void)
+{
+    for (int above = 0; above < 2; ++above) {
+        bench b;
+        const double step = above ? 2.02 : 1.98;
+        eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 1 / step});
+        eits_options o = ctx->options;
+        o.iterations = 1;
+        o.lambda_abs = R(1e-4);
+        set_options(ctx, o);
+        for (int i = 0; i < RANK; ++i)
+            ctx->y[i] = 1;
+        const eits_info info = solve(ctx);
+        CHECK_EQUAL(info.stop, above ? EITS_STOP_DIVERGED : EITS_STOP_ITERATIONS);
+        CHECK_EQUAL(info.nonzeros, above ? 0 : RANK);
+        CHECK_NEAR(ctx->x[0], above ? 0 : 1.98 * (1 - 1e-4), 1e-5);
+        tear_down(&b);
+    }
+}
+
 static void step_absurdly_large(void)
 {
     static const double factors[] = {1e-4, 1e-12, 1e-36};
@@ -342,6 +364,7 @@ int main(void)
     no_ghost_after_lift_off();
     warm_start_is_forgotten();
     step_too_large();
+    ending_above_the_start();
     step_absurdly_large();
     data_that_are_not_finite();
     units_do_not_matter();

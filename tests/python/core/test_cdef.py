@@ -11,9 +11,9 @@ import pytest
 from build_tools import CSRC, ROOT, run, tool
 from c_declarations import Declarations, Struct, differences, parse
 
-CDEF = (ROOT / "python" / "eitskin" / "solve" / "core.cdef").read_text(encoding="utf-8")
+CDEF = (ROOT / "python" / "eitskin" / "core" / "core.cdef").read_text(encoding="utf-8")
 HEADERS = "\n".join(path.read_text(encoding="utf-8") for path in sorted((CSRC / "include" / "eitskin").glob("*.h")))
-MODULES = {"f32": "eitskin.solve._core_f32", "f64": "eitskin.solve._core_f64"}
+MODULES = {"f32": "eitskin.core._core_f32", "f64": "eitskin.core._core_f64"}
 
 
 def test_the_cdef_says_what_the_headers_say() -> None:

@@ -54,8 +54,8 @@ def asked_of_others(library: Path) -> set[str]:
 
 
 def writable(library: Path) -> set[str]:
-    """Variables that can be written after start, and sections that hold such bytes. Tables of constant pointers are none: they are
-    relocated once (.data.rel.ro)."""
+    """Variables that can be written after start, and sections that hold such bytes. Tables of constant pointers are none: those
+    are relocated once (.data.rel.ro)."""
     of_section = {
         f"section {name}"
         for name, size in re.findall(r"^\s*\d+\s+(\S+)\s+([0-9a-f]{8,16})\s", run(tool("objdump"), "-h", library), re.M)

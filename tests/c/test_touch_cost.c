@@ -1,0 +1,110 @@
+/* What finding touches costs, and that units do not matter to it. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "disc.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "vec.h"
+
+#include <string.h>
+
+enum { SIDE = 20, RANK = 64 };
+
+static eits_context *set_up(small_model *made, small_context *c)
+{
+    *made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES});
+    small_context_open(c, made, 0);
+    return &c->ctx;
+}
+
+/* y of two discs at pixel centres, far from each other, or of the first alone; returns the pixels that the first covers. */
+static uint64_t press(eits_context *ctx, int both)
+{
+    const eits_disc discs[2] = {{-27, 3, 9, R(0.05), 1}, {33, -3, 9, R(0.02), 1}};
+    eits_real atom[RANK];
+    uint64_t covered = 0;
+    memset(ctx->y, 0, RANK * sizeof *ctx->y);
+    for (int d = 0; d <= both; ++d) {
+        const uint64_t macs = eits_disc_atom(ctx, &discs[d], atom, NULL);
+        covered = d == 0 ? macs / RANK : covered;
+        for (int i = 0; i < RANK; ++i)
+            ctx->y[i] += discs[d].change * atom[i];
+    }
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return covered;
+}
+
+static uint64_t touch_macs(eits_context *ctx, uint32_t expected_touches)
+{
+    uint32_t count;
+    CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+    CHECK_EQUAL(count, expected_touches);
+    return ctx->info.touch_macs;
+}
+
+/* Discs at pixel centres, of the seed's radius, held there: every product can be counted. */
+static void work_is_counted(void)
+{
+    small_model made;
+    small_context c;
+    eits_context *ctx = set_up(&made, &c);
+    eits_options o = ctx->options;
+    o.touch_sweeps = 0;
+    o.touch_threshold = R(0.2);
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    const uint64_t covered = press(ctx, 0);
+    CHECK_EQUAL(covered, 9); /* within 2 pixels of the centre of one: itself, 4 + 4 neighbours; the next ones lie on the edge */
+    const uint64_t strengths = covered * RANK + 10 * 4 * RANK; /* its response, ten passes */
+    CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK);         /* and one product of the Gram matrix */
+    (void)press(ctx, 1);
+    CHECK_EQUAL(touch_macs(ctx, 2), 2 * strengths + 3 * RANK);
+    (void)press(ctx, 0);
+    ctx->baseline.lambda_noise = R(1e-6); /* a gate: the 3 x 3 pixels around it, two products each */
+    CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK + 9 * 2 * RANK);
+    ctx->baseline.lambda_noise = 0;
+    o.touch_sweeps = 1; /* a response with three slopes, 17 products, and each attempted step's response with 3 products */
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    (void)press(ctx, 0);
+    const uint64_t moved = touch_macs(ctx, 1) - strengths - RANK - (4 * covered * RANK + 17 * RANK);
+    CHECK_EQUAL(moved % RANK, 0);
+    CHECK(moved >= (covered + 3) * RANK && moved <= 3 * (covered + 12 + 3) * RANK);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+static void units_do_not_matter(void)
+{
+    small_model made;
+    small_context c;
+    eits_context *ctx = set_up(&made, &c);
+    eits_touch first[2], found[2];
+    uint32_t count;
+    (void)press(ctx, 1);
+    CHECK_EQUAL(eits_find_touches(ctx, first, 2, &count), EITS_OK);
+    CHECK_EQUAL(count, 2);
+    for (int power = -24; power <= 24; power += 12) {
+        const eits_real unit = (eits_real)(power < 0 ? 1.0 / (double)(1 << -power) : (double)(1 << power));
+        (void)press(ctx, 1);
+        for (int i = 0; i < RANK; ++i)
+            ctx->y[i] *= unit;
+        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+        CHECK_EQUAL(eits_find_touches(ctx, found, 2, &count), EITS_OK);
+        CHECK_EQUAL(count, 2);
+        for (int k = 0; k < 2; ++k) { /* powers of two: the same bits */
+            CHECK(found[k].x_mm == first[k].x_mm && found[k].y_mm == first[k].y_mm && found[k].radius_mm == first[k].radius_mm);
+            CHECK(found[k].confidence == first[k].confidence && found[k].id == first[k].id);
+            CHECK(found[k].strength_s_per_m_mm2 == first[k].strength_s_per_m_mm2 * unit);
+        }
+    }
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+int main(void)
+{
+    work_is_counted();
+    units_do_not_matter();
+    return checks_report("touch_cost");
+}
