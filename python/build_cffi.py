@@ -7,7 +7,7 @@ import cffi
 
 
 def main(module: str, width: str, output: str) -> None:
-    cdef = (Path(__file__).parent / "eitskin" / "solve" / "core.cdef").read_text(encoding="utf-8")
+    cdef = (Path(__file__).parent / "eitskin" / "core" / "core.cdef").read_text(encoding="utf-8")
     ffi = cffi.FFI()
     ffi.cdef(f"typedef {width} eits_real;\n" + cdef)
     ffi.set_source(module, '#include "eitskin/eitskin.h"', py_limited_api=True)

@@ -136,7 +136,7 @@ def run_verify(options: argparse.Namespace) -> int:
     """Run the golden frame; the float32 core must give the stored bits."""
     import numpy as np
 
-    from eitskin.solve.core import CoreEngine
+    from eitskin.core.engine import CoreEngine
     from eitskin.solve.reconstructor import Reconstructor
 
     model, blob, name = load_or_prebuilt(options.model)

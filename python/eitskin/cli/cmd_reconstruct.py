@@ -12,9 +12,9 @@ from eitskin.config import nearest
 from eitskin.errors import ConfigError, EitskinError, FrameError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
+    from eitskin.core.results import Reconstruction
     from eitskin.frames.frames import Frames
     from eitskin.solve.reconstructor import Reconstructor
-    from eitskin.solve.results import Reconstruction
     from eitskin.study.score import FrameScore
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.core.results import Reconstruction
 from eitskin.fileio import write_beside
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
-from eitskin.solve.results import Reconstruction
 
 FORMAT = "eitskin-results"
 VERSION = 1

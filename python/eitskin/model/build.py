@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.core.engine import CoreEngine
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.model.eitm import MAX_PIXELS, MAX_RANK, encode_model
@@ -24,7 +25,6 @@ from eitskin.model.reduction import (
 from eitskin.model.storage import STORAGES, store
 from eitskin.skin.protocol import Protocol, protocol_to_table
 from eitskin.skin.skin import Skin, skin_to_table
-from eitskin.solve.core import CoreEngine
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -11,13 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.config import nearest
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import Baseline, Options, Reconstruction, check_options
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.skin.protocol import Protocol
-from eitskin.solve.core import CoreEngine
+from eitskin.solve.options import default_options
 from eitskin.solve.reference import ReferenceEngine
-from eitskin.solve.results import Baseline, Options, Reconstruction, check_options, default_options
 
 FloatArray = npt.NDArray[np.float64]
 

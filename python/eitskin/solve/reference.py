@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.results import Baseline, Info, Options, Reconstruction, Touch, check_quiet
 from eitskin.errors import FrameError
 from eitskin.model.model import Model
+from eitskin.solve.options import default_options
 from eitskin.solve.reference_touches import find_touches
-from eitskin.solve.results import Baseline, Info, Options, Reconstruction, Touch, check_quiet, default_options
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.results import Options, Touch
 from eitskin.model.model import Model
-from eitskin.solve.results import Options, Touch
 
 FloatArray = npt.NDArray[np.float64]
 

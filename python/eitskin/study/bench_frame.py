@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.core.engine import CoreEngine
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.solve.core import CoreEngine
 from eitskin.solve.reconstructor import Reconstructor
 
 SEED = 20240918

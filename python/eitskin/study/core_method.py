@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.results import Reconstruction
 from eitskin.errors import UsageError
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.solve.results import Reconstruction
 from eitskin.study.methods import Family, Setup
 from eitskin.study.metrics import pixel_cover
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
@@ -16,9 +18,7 @@ from eitskin.scene.random_touches import Scene, Touch, TouchSet
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.core import CoreEngine
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
-from eitskin.solve.results import Reconstruction
 from eitskin.study.score import FrameScore, scorer_for
 from eitskin.view.frame_pictures import found_marks
 from eitskin.view.pictures import Mark, draw_frame

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.results import Reconstruction, Touch
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
-from eitskin.solve.results import Reconstruction, Touch
 from eitskin.study import metrics
 from eitskin.study.matching import GATE_MM, Matching, match
 

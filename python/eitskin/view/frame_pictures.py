@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import ceil, sqrt
 from pathlib import Path
 
+from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
-from eitskin.solve.results import Reconstruction
 from eitskin.study.score import FrameScore
 from eitskin.view.pictures import Mark, Panel, draw_panels
 

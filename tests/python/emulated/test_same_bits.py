@@ -16,12 +16,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import SIGNS, STOPS, Reconstruction
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.model.storage import STORAGES, store
-from eitskin.solve.core import CoreEngine
-from eitskin.solve.results import SIGNS, STOPS, Reconstruction, default_options
+from eitskin.solve.options import default_options
 
 ROOT = Path(__file__).resolve().parents[3]
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm", "cmake", "ninja")

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eitskin.core.results import Reconstruction
 from eitskin.errors import FileError
 from eitskin.frames.results_file import save_results
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.solve.results import Reconstruction
 from small_models import prebuilt, session
 
 FIELDS = {

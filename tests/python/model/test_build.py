@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from eitskin.core.engine import CoreEngine
 from eitskin.errors import UsageError
 from eitskin.model.build import BuildSettings, Linearisation, build_model, make_model, scaled_defaults
 from eitskin.model.eitm import decode_model, encode_model
@@ -14,7 +15,6 @@ from eitskin.model.model import Model
 from eitskin.model.reduction import fold_rows, spectral_norm_squared
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.core import CoreEngine
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import DATA_KINDS, STORAGES, prebuilt, small, small_blob, small_model
 

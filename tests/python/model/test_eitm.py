@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from eitm_bytes import HEADER_SIZE, entry_place, sealed, sections_of
+from eitskin.core.engine import CoreEngine
 from eitskin.errors import EitskinError, FileError, ModelError
 from eitskin.model import eitm
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.eitm import decode_model, encode_model, load_model, save_model
 from eitskin.skin.protocol import table
-from eitskin.solve.core import CoreEngine
 from small_models import DATA_KINDS, STORAGES, prebuilt, small, small_blob, small_model, tiny_blob
 
 ITEM = {"f32": "<f4", "f16": "<f2", "i16": "<i2", "i8": "i1"}

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eitm_bytes import ENTRY_SIZE, entry_place, sealed, sections_of
+from eitskin.core.engine import CoreEngine
 from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import decode_model
-from eitskin.solve.core import CoreEngine
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import tiny_blob
 

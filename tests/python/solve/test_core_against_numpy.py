@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
-from eitskin.solve.results import Reconstruction
 from small_models import DATA_KINDS, SIGNS, STORAGES, small, small_model
 
 FRAMES = 20

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eitskin.solve.core import CoreEngine
-from eitskin.solve.results import Reconstruction, default_options
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import Reconstruction
+from eitskin.solve.options import default_options
 from small_models import DATA_KINDS, SIGNS, STORAGES, prebuilt, session, small, small_blob, small_model
 
 BUILDS = [(True, False), (False, False), (True, True), (False, True)]

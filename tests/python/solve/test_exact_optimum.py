@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eitskin.solve.core import CoreEngine
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import Options
+from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.solve.reference import certify, fista, orthonormal
-from eitskin.solve.results import Options, default_options
 from small_models import prebuilt, session, small, small_blob, small_model
 
 GAP_REL = 1e-6

@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import Options
 from eitskin.errors import EitskinError, FrameError, ModelError, ProtocolError, UsageError
 from eitskin.scene.random_touches import Scene, Touch, TouchSet
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.core import CoreEngine
+from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
-from eitskin.solve.results import Options, default_options
 from small_models import prebuilt, session, small, small_blob, small_model, tiny_blob
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from eitskin.core.results import Touch
 from eitskin.model.model import Model
 from eitskin.scene.random_touches import Scene, TouchSet
 from eitskin.scene.random_touches import Touch as Put
@@ -12,7 +13,6 @@ from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
-from eitskin.solve.results import Touch
 from small_models import DATA_KINDS, STORAGES, prebuilt, session, small, small_model
 
 BOUND_MM = {"c64": 1e-6, "c": 0.05}

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("scipy")
 pytest.importorskip("netgen")
-pytest.importorskip("eitskin.solve._core_f32", reason="the C core is not built")
+pytest.importorskip("eitskin.core._core_f32", reason="the C core is not built")
 
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import mesh_for_elements

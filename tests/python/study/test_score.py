@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from eitskin.core.results import Info, Reconstruction, Touch
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.skin.protocol import adjacent
-from eitskin.solve.results import Info, Reconstruction, Touch
 from eitskin.study import metrics
 from eitskin.study.score import scorer_for
 from small_models import prebuilt, small_model

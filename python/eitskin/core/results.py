@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import FrameError, UsageError
-from eitskin.model.model import Model
 
 SIGNS = ("increase", "decrease", "both")
 MAX_TOUCHES = 16
@@ -86,27 +85,6 @@ def _check_number(name: str, value: Any, low: float, high: float) -> None:
         raise UsageError(f"options: {name} = {value!r} must be a {'whole ' if name in WHOLE else ''}number")
     if not low <= value <= high:
         raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
-
-
-def default_options(model: Model) -> Options:
-    """The model's own defaults."""
-    d = model.defaults
-    return Options(
-        iterations=d.iterations,
-        max_touches=min(d.max_touches, MAX_TOUCHES),
-        max_masked=model.protocol.n_rows // 2,
-        lambda_rel=d.lambda_rel,
-        lambda_noise_factor=d.lambda_noise_factor,
-        gate_factor=d.gate_factor,
-        touch_threshold=d.touch_threshold,
-        touch_share=d.touch_share,
-        touch_min_radius_mm=d.touch_min_radius_mm,
-        touch_max_radius_mm=d.touch_max_radius_mm,
-        touch_seed_radius_mm=d.touch_seed_radius_mm,
-        touch_change_s_per_m=d.touch_change_s_per_m,
-        touch_radius_weight=d.touch_radius_weight,
-        follow_mm=d.follow_mm,
-    )
 
 
 def check_quiet(frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float) -> None:

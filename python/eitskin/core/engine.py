@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.results import SIGNS, STOPS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
-from eitskin.solve.results import SIGNS, STOPS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
 
 WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
 
@@ -23,7 +23,7 @@ def load_core(width: str) -> Any:
         UsageError: it was not built.
     """
     try:
-        return importlib.import_module(f"eitskin.solve.{WIDTHS[width]}")
+        return importlib.import_module(f"eitskin.core.{WIDTHS[width]}")
     except ImportError as error:
         raise UsageError(f"the C core is not built ({error}); install with  pip install .  in the project's root") from None
 
