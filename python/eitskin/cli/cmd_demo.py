@@ -30,7 +30,8 @@ def run(options: argparse.Namespace) -> int:
     """Simulate, reconstruct, print, draw."""
     from eitskin.fileio import refuse_unwritable
     from eitskin.frames.frames import save_frames
-    from eitskin.study.demo import draw_demo, run_demo, to_json, to_text
+    from eitskin.study.demo import run_demo, to_json, to_text
+    from eitskin.view.demo_picture import draw_demo
     from eitskin.view.pictures import load_matplotlib
 
     refuse_unwritable(options.picture, options.frames)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -20,8 +19,6 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from eitskin.study.score import FrameScore, scorer_for
-from eitskin.view.frame_pictures import found_marks
-from eitskin.view.pictures import Mark, draw_frame
 
 TOUCHES = (Touch(-38.0, 34.0, 9.0, 8.0), Touch(44.0, 22.0, 7.0, 5.0), Touch(-6.0, -52.0, 11.0, 4.0))
 TIMED_RUNS = 200
@@ -81,20 +78,6 @@ def _times_us(core: CoreEngine, frames: Frames) -> tuple[float, float]:
         times.append(1e6 * (perf_counter() - start))
     p50, p99 = np.percentile(times, [50, 99])
     return float(p50), float(p99)
-
-
-def draw_demo(path: str | Path, demo: Demo) -> None:
-    """Truth, image, touches.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: the file cannot be written.
-    """
-    skin = demo.model.skin
-    truth = [Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * skin.conductivity_s_per_m) for t in TOUCHES]
-    title = f"three simulated touches at {demo.frames.meta['snr_db']:g} dB, solved by the C core"
-    found = found_marks(demo.result)
-    draw_frame(path, skin, demo.model.grid, demo.result.image, truth=truth, found=found, title=title)
 
 
 def to_json(demo: Demo) -> dict[str, Any]:
