@@ -52,6 +52,19 @@ static void dimensions(void)
     CHECK_EQUAL(with_word(TINY, "DIMS", 8, 20), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(with_word(TINY, "DIMS", 20, 8), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(with_word(TINY, "DIMS", 32, EITS_STORAGE_F16), EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(with_word(TINY, "DIMS", 8, 40), EITS_E_MODEL_SECTION); /* no row folded: allowed, but not of this size */
+    small_model large = small_model_make(TINY);
+    uint8_t *dims = small_model_section(&large, "DIMS", NULL);
+    eits_model model;
+    small_put_u32(dims + 12, 1024); /* the greatest rank */
+    small_put_u32(dims + 16, 1024);
+    small_model_seal(&large);
+    CHECK_EQUAL(eits_model_open(&model, large.blob, large.size), EITS_E_MODEL_SECTION);
+    small_put_u32(dims + 12, 1025);
+    small_put_u32(dims + 16, 1032);
+    small_model_seal(&large);
+    CHECK_EQUAL(eits_model_open(&model, large.blob, large.size), EITS_E_MODEL_VALUE);
+    small_model_free(&large);
     /* the rank may be any with this stride */
     CHECK_EQUAL(with_word(TINY, "DIMS", 12, 8), EITS_OK);
     CHECK_EQUAL(with_word(TINY, "DIMS", 24, 4096), EITS_OK);

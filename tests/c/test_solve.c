@@ -317,6 +317,12 @@ static void work_is_counted(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_info info = solve(ctx, 4, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + 3 * whole + whole + 4 * column);
+    o = ctx->options; /* from the last coefficients: S x once more, and the first iteration's S'r */
+    o.gap_rel = 0;
+    o.warm_start = 1;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
+    CHECK_EQUAL(info.macs, whole + column + 3 * (whole + column) + whole);
     ctx->y[3] = 0;
     info = solve(ctx, 20, EITS_SIGN_INCREASE, 0.25); /* no more than S'y where there is nothing */
     CHECK_EQUAL(info.macs, whole);

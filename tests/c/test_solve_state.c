@@ -217,30 +217,37 @@ static void step_too_large(void)
             const eits_info next = solve(ctx);
             CHECK(next.step_halvings == info.step_halvings && next.stop == info.stop && next.macs == info.macs);
         }
+        for (int power = -10; power <= 10; power += 20) { /* nor does the unit matter */
+            for (int i = 0; i < RANK; ++i)
+                ctx->y[i] = (eits_real)ldexp(y[i], power);
+            const eits_info scaled = solve(ctx);
+            CHECK(scaled.step_halvings == info.step_halvings && scaled.macs == info.macs && scaled.gap_rel == info.gap_rel);
+        }
         free(y);
         free(x);
         tear_down(&b);
     }
 }
 
-/* On the identity one step of s leaves |1 - s| of the data: the objective is at its start's value for s = 2, and a run that
- * ends above it has won nothing. */
+/* On the identity one step of s takes the objective, for any lambda, to its start's value just where s = 2: a run that ends
+ * above it has won nothing. */
 static void ending_above_the_start(void)
 {
-    for (int above = 0; above < 2; ++above) {
+    for (int k = 0; k < 4; ++k) {
         bench b;
-        const double step = above ? 2.02 : 1.98;
+        const int above = k % 2;
+        const double step = above ? 2.02 : 1.98, lambda = k < 2 ? 1e-4 : 0.5;
         eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 1 / step});
         eits_options o = ctx->options;
         o.iterations = 1;
-        o.lambda_abs = R(1e-4);
+        o.lambda_abs = (eits_real)lambda;
         set_options(ctx, o);
         for (int i = 0; i < RANK; ++i)
             ctx->y[i] = 1;
         const eits_info info = solve(ctx);
         CHECK_EQUAL(info.stop, above ? EITS_STOP_DIVERGED : EITS_STOP_ITERATIONS);
         CHECK_EQUAL(info.nonzeros, above ? 0 : RANK);
-        CHECK_NEAR(ctx->x[0], above ? 0 : 1.98 * (1 - 1e-4), 1e-5);
+        CHECK_NEAR(ctx->x[0], above ? 0 : 1.98 * (1 - lambda), 1e-5);
         tear_down(&b);
     }
 }

@@ -1,0 +1,208 @@
+/* Finding touches: what it costs, units, and which touches are kept, against dense computations. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "disc.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 20, RANK = 64 };
+
+static eits_context *set_up(small_model *made, small_context *c)
+{
+    *made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES});
+    small_context_open(c, made, 0);
+    return &c->ctx;
+}
+
+/* y of two discs at pixel centres, far from each other, or of the first alone; returns the pixels that the first covers. */
+static uint64_t press(eits_context *ctx, int both)
+{
+    const eits_disc discs[2] = {{-27, 3, 9, R(0.05), 1}, {33, -3, 9, R(0.02), 1}};
+    eits_real atom[RANK];
+    uint64_t covered = 0;
+    memset(ctx->y, 0, RANK * sizeof *ctx->y);
+    for (int d = 0; d <= both; ++d) {
+        const uint64_t macs = eits_disc_atom(ctx, &discs[d], atom, NULL);
+        covered = d == 0 ? macs / RANK : covered;
+        for (int i = 0; i < RANK; ++i)
+            ctx->y[i] += discs[d].change * atom[i];
+    }
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return covered;
+}
+
+static uint64_t touch_macs(eits_context *ctx, uint32_t expected_touches)
+{
+    uint32_t count;
+    CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+    CHECK_EQUAL(count, expected_touches);
+    return ctx->info.touch_macs;
+}
+
+/* Discs at pixel centres, of the seed's radius, held there: every product can be counted. */
+static void work_is_counted(void)
+{
+    small_model made;
+    small_context c;
+    eits_context *ctx = set_up(&made, &c);
+    eits_options o = ctx->options;
+    o.touch_sweeps = 0;
+    o.touch_threshold = R(0.2);
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    const uint64_t covered = press(ctx, 0);
+    CHECK_EQUAL(covered, 9); /* within 2 pixels of the centre of one: itself, 4 + 4 neighbours; the next ones lie on the edge */
+    const uint64_t strengths = covered * RANK + 10 * 4 * RANK; /* its response, ten passes */
+    CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK);         /* and one product of the Gram matrix */
+    (void)press(ctx, 1);
+    CHECK_EQUAL(touch_macs(ctx, 2), 2 * strengths + 3 * RANK);
+    (void)press(ctx, 0);
+    ctx->baseline.lambda_noise = R(1e-6); /* a gate: the 3 x 3 pixels around it, two products each */
+    CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK + 9 * 2 * RANK);
+    ctx->baseline.lambda_noise = 0;
+    o.touch_sweeps = 1; /* a response with three slopes, 17 products, and each attempted step's response with 3 products */
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    (void)press(ctx, 0);
+    const uint64_t moved = touch_macs(ctx, 1) - strengths - RANK - (4 * covered * RANK + 17 * RANK);
+    CHECK_EQUAL(moved % RANK, 0);
+    CHECK(moved >= (covered + 3) * RANK && moved <= 3 * (covered + 12 + 3) * RANK);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+static void units_do_not_matter(void)
+{
+    small_model made;
+    small_context c;
+    eits_context *ctx = set_up(&made, &c);
+    eits_touch first[2], found[2];
+    uint32_t count;
+    (void)press(ctx, 1);
+    CHECK_EQUAL(eits_find_touches(ctx, first, 2, &count), EITS_OK);
+    CHECK_EQUAL(count, 2);
+    for (int power = -24; power <= 24; power += 12) {
+        const eits_real unit = (eits_real)(power < 0 ? 1.0 / (double)(1 << -power) : (double)(1 << power));
+        (void)press(ctx, 1);
+        for (int i = 0; i < RANK; ++i)
+            ctx->y[i] *= unit;
+        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+        CHECK_EQUAL(eits_find_touches(ctx, found, 2, &count), EITS_OK);
+        CHECK_EQUAL(count, 2);
+        for (int k = 0; k < 2; ++k) { /* powers of two: the same bits */
+            CHECK(found[k].x_mm == first[k].x_mm && found[k].y_mm == first[k].y_mm && found[k].radius_mm == first[k].radius_mm);
+            CHECK(found[k].confidence == first[k].confidence && found[k].id == first[k].id);
+            CHECK(found[k].strength_s_per_m_mm2 == first[k].strength_s_per_m_mm2 * unit);
+        }
+    }
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+/* |y - best fit by the atoms|^2, without atom `left_out` (-1: with all). */
+static double unexplained(const double *y, const double *atoms, uint32_t count, int left_out)
+{
+    double directions[4 * RANK], rest[RANK];
+    uint32_t used = 0;
+    for (uint32_t k = 0; k < count; ++k) {
+        if ((int)k != left_out)
+            memcpy(directions + RANK * used++, atoms + RANK * k, RANK * sizeof *atoms);
+    }
+    memcpy(rest, y, sizeof rest);
+    dense_project_out(rest, directions, used, RANK);
+    return dense_dot(rest, rest, RANK);
+}
+
+/* Confidence is the share of |y|^2 that leaving the touch out leaves unexplained, the others taking up what they can: for
+ * discs that overlap, at pixel centres, with their strengths alone fitted. One peak of the image has nothing behind it. */
+static void confidence_is_what_leaving_out_costs(void)
+{
+    static const double places[4][3] = {{-27, -27, 0}, {-3, 3, 0.05}, {15, 9, 0.04}, {3, 21, 0.03}}; /* x, y mm, change */
+    small_model made;
+    small_context c;
+    eits_context *ctx = set_up(&made, &c);
+    eits_options o = ctx->options;
+    eits_real atom[RANK];
+    double atoms[4 * RANK], y[RANK];
+    o.touch_sweeps = 0;
+    o.touch_threshold = 0;
+    o.touch_seed_radius_mm = 12;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    memset(ctx->y, 0, RANK * sizeof *ctx->y);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    ctx->info.stop = EITS_STOP_ITERATIONS; /* an image made by hand, the empty peak the highest */
+    for (int k = 0; k < 4; ++k) {
+        const eits_disc disc = {(eits_real)places[k][0], (eits_real)places[k][1], 12, 1, 1};
+        (void)eits_disc_atom(ctx, &disc, atom, NULL);
+        for (int i = 0; i < RANK; ++i) {
+            atoms[k * RANK + i] = (double)atom[i];
+            ctx->y[i] += (eits_real)places[k][2] * atom[i] + (k == 0 ? R(-0.02) * atom[i] : 0);
+        }
+        ctx->image[lround((places[k][1] + 57) / 6) * SIDE + lround((places[k][0] + 57) / 6)] = (eits_real)(4 - k);
+    }
+    for (int i = 0; i < RANK; ++i)
+        y[i] = (double)ctx->y[i];
+    eits_touch found[4];
+    uint32_t count;
+    CHECK_EQUAL(eits_find_touches(ctx, found, 4, &count), EITS_OK);
+    CHECK_EQUAL(count, 3);
+    const double all = unexplained(y, atoms + RANK, 3, -1), whole = dense_dot(y, y, RANK);
+    for (uint32_t t = 0; t < count && t < 4; ++t) {
+        int k = 1;
+        while (k < 3 && hypot(places[k][0] - (double)found[t].x_mm, places[k][1] - (double)found[t].y_mm) > 0.1)
+            ++k;
+        const double share = (unexplained(y, atoms + RANK, 3, k - 1) - all) / whole;
+        CHECK(share > 0.03 && share < 0.6);
+        CHECK_NEAR(found[t].confidence, share, 0.01 * share); /* strengths come by ten passes, not exactly */
+    }
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+/* A touch must stand out of the noise at its own place: at the greatest S_j'(its part) of the 3 x 3 pixels around it. */
+static void gate_of_one_touch(void)
+{
+    small_model made;
+    small_context c;
+    eits_context *ctx = set_up(&made, &c);
+    dense d = dense_of(&c.model);
+    eits_options o = ctx->options;
+    o.touch_sweeps = 0;
+    o.touch_share = 0;
+    o.lambda_noise_factor = 0;
+    o.gate_factor = 1;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    const eits_disc weak = {33, -3, 9, R(0.02), 1};
+    eits_real atom[RANK];
+    (void)eits_disc_atom(ctx, &weak, atom, NULL);
+    double *part = dense_copy(atom, RANK), most = 0;
+    for (int iy = 8; iy <= 10; ++iy) { /* pixel (15, 9) */
+        for (int ix = 14; ix <= 16; ++ix)
+            most = fmax(most, 0.02 * dense_dot(d.s + (iy * SIDE + ix) * RANK, part, RANK));
+    }
+    for (int k = 0; k < 2; ++k) {
+        ctx->baseline.lambda_noise = 0;
+        (void)press(ctx, 1);
+        ctx->baseline.lambda_noise = (eits_real)(most * (k == 0 ? 0.999 : 1.001));
+        CHECK(ctx->info.lambda_max > R(1.5) * ctx->baseline.lambda_noise);
+        (void)touch_macs(ctx, k == 0 ? 2 : 1);
+    }
+    free(part);
+    dense_free(&d);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+int main(void)
+{
+    confidence_is_what_leaving_out_costs();
+    gate_of_one_touch();
+    work_is_counted();
+    units_do_not_matter();
+    return checks_report("touch_fit");
+}
