@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 
+from eitm_bytes import sealed, sections_of
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError
+from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
-from small_models import DATA_KINDS, SIGNS, STORAGES, small, small_model
+from small_models import DATA_KINDS, SIGNS, STORAGES, small, small_blob, small_model
 
 FRAMES = 20
 F64_BOUND, F32_BOUND = 1e-12, 1e-4
@@ -90,13 +94,14 @@ def test_same_images_with_rows_left_out(storage: str, data_kind: str) -> None:
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_same_images_from_a_warm_start(data_kind: str) -> None:
-    """A touch that moves, then lifts; a frame that is refused and one with dropouts in between."""
+    """A touch that moves, jumps, lifts; a frame that is refused and one with dropouts in between."""
     s = small()
     made = engines("f32", data_kind, warm_start=True)
     grid = s.linear.grid
     frames = []
     for k in range(FRAMES):
-        near = np.linalg.norm(grid.centres_mm() - (-30 + 3 * k, 10), axis=1) <= 9
+        place = (-30 + 3 * k, 10) if k < 13 else (0, -35)
+        near = np.linalg.norm(grid.centres_mm() - place, axis=1) <= 9
         change = 0.03 * near if k < 16 else np.zeros(len(near))
         frames.append(s.linear.v0_v + s.linear.jacobian @ change)
     noisy = np.array(frames) + s.quiet(4, FRAMES) - s.linear.v0_v
@@ -113,6 +118,27 @@ def test_same_images_from_a_warm_start(data_kind: str) -> None:
     second = agree(made, noisy[10:], keep=True)
     assert max(first["c64"], second["c64"]) <= F64_BOUND
     assert max(first["c"], second["c"]) <= F32_BOUND
+
+
+@pytest.mark.parametrize(("factor", "halvings"), [(1 / 3, 1), (1 / 16, 4), (1e-9, 8)])
+def test_same_recovery_from_a_step_too_long(factor: float, halvings: int) -> None:
+    """A model that understates its Lipschitz constant: the step is halved and the run starts over, or is given up as zero."""
+    blob = bytearray(small_blob())
+    place = sections_of(blob)["DIMS"].offset + 56
+    struct.pack_into("<f", blob, place, factor * struct.unpack_from("<f", blob, place)[0])
+    sealed_blob = sealed(blob)
+    model, frame, results = decode_model(sealed_blob, "x"), small().frames(9, 1)[0], {}
+    for name in ENGINES:
+        made = Reconstructor(model, engine=name, blob=sealed_blob)
+        made.with_options(iterations=300, gap_every=5, gate_factor=0.0)
+        made.tare(small().linear.v0_v)
+        results[name] = made.reconstruct(frame)
+    expected = results["numpy"]
+    assert expected.info.step_halvings == halvings
+    assert expected.info.stop == ("iterations" if factor > 1e-6 else "diverged")
+    for name, bound in (("c64", 1e-10), ("c", 1e-3)):
+        assert (results[name].info.step_halvings, results[name].info.stop) == (halvings, expected.info.stop)
+        assert np.abs(results[name].image - expected.image).max() <= bound * np.abs(expected.image).max()
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
