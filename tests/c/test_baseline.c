@@ -105,6 +105,8 @@ static void refused_frames(void)
     CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
     small_reference(&b.c.model, 0.7, b.frame);
     CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    b.frame[3] = R(-1.2); /* at the limit counts as beyond it */
+    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
     tear_down(&b);
 }
 

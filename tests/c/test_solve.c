@@ -341,6 +341,14 @@ static void work_is_counted(void)
     const uint64_t rebuilt = (16 + 2 * 16) + (reduce + 2 * project + 2 * 16);
     CHECK_EQUAL(ctx->basis_count, 2);
     CHECK_EQUAL(ctx->info.macs, rebuilt + (SMALL_FOLDED - 1) * 16 + 2 * project + whole);
+    o.project_baseline = 0; /* each residual is projected */
+    o.warm_start = 0;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_EQUAL(ctx->basis_count, 1);
+    ctx->y[7] = 1;
+    info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
+    CHECK_EQUAL(info.macs, whole + 2 * (whole + project) + 3 * column + (whole + project));
     tear_down(&b);
 }
 

@@ -83,9 +83,14 @@ static void units_do_not_matter(void)
     eits_context *ctx = set_up(&made, &c);
     eits_touch first[2], found[2];
     uint32_t count;
+    eits_options o = ctx->options;
+    o.touch_seed_radius_mm = 8; /* not the discs' own: the radius is a compromise of data and expectation */
+    o.touch_radius_weight = R(3e-4);
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     (void)press(ctx, 1);
     CHECK_EQUAL(eits_find_touches(ctx, first, 2, &count), EITS_OK);
     CHECK_EQUAL(count, 2);
+    CHECK(first[0].radius_mm > R(8.02) && first[0].radius_mm < R(8.98));
     for (int power = -24; power <= 24; power += 12) {
         const eits_real unit = (eits_real)(power < 0 ? 1.0 / (double)(1 << -power) : (double)(1 << power));
         (void)press(ctx, 1);
