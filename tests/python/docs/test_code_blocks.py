@@ -34,7 +34,7 @@ def test_blocks_run(page: str, tmp_path: Path) -> None:
         done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == 0, f"{page}:\n{text}\n{done.stdout}\n{done.stderr}"
         ran += 1
-    assert ran >= 2
+    assert ran >= 1
 
 
 def test_pages_link_to_files_that_exist() -> None:
