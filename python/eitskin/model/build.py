@@ -24,13 +24,12 @@ from eitskin.model.reduction import (
 )
 from eitskin.model.storage import STORAGES, store
 from eitskin.skin.protocol import Protocol, protocol_to_table
-from eitskin.skin.skin import Skin, skin_to_table
+from eitskin.skin.skin import Skin, size_to_paper, skin_to_table
 
 FloatArray = npt.NDArray[np.float64]
 
 LIPSCHITZ_MARGIN = 1e-4
 LEAST_RATIO_REFERENCE = 1e-6
-PAPER_DIAMETER_MM = 194.0
 # a disc of contrast c in a sheet of conductivity s answers as a change of 2 (c - 1) / (c + 1) s: for c = 3 to 10, 1.0 to 1.64 s
 TOUCH_CHANGE_RATIO = 1.35
 # the logarithm draws strong touches together, so that their data say little of the radius and strength must
@@ -134,7 +133,7 @@ def _refuse_settings(settings: BuildSettings, grid: Grid) -> None:
 def scaled_defaults(skin: Skin, data_kind: str, touch_change_ratio: float = TOUCH_CHANGE_RATIO) -> Defaults:
     """Defaults for ``skin``: lengths in proportion to its size, the expected change to its conductivity."""
     paper = Defaults()
-    scale = 2 * float(np.sqrt(skin.outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
+    scale = size_to_paper(skin.outline)
     return replace(
         paper,
         touch_min_radius_mm=_round(paper.touch_min_radius_mm * scale),

@@ -22,6 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 SKIN_KEYS = ("name", "diameter_mm", "polygon_mm", "thickness_mm", "conductivity_s_per_m")
 ELECTRODE_KEYS = ("count", "width_mm", "start_angle_deg", "direction", "positions_mm", "contact_impedance_ohm_m2")
 MIN_GAP_PER_WIDTH = 0.05
+PAPER_DIAMETER_MM = 194.0
 
 
 @dataclass(frozen=True)
@@ -89,9 +90,14 @@ def _refuse_overlap(skin: Skin) -> None:
         )
 
 
+def size_to_paper(outline: Outline) -> float:
+    """The outline's size over the paper's: the diameter of the disk of equal area over 194 mm. Lengths are scaled by it."""
+    return 2 * float(np.sqrt(outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
+
+
 def paper_skin() -> Skin:
     """The hydrogel skin of the paper: a disk of 194 mm, 12 mm thick, 16 electrodes of 4 mm, 0.01 S/m."""
-    return Skin("paper", disk(194.0), Electrodes())
+    return Skin("paper", disk(PAPER_DIAMETER_MM), Electrodes())
 
 
 def skin_from_table(table: Mapping[str, Any], where: str) -> Skin:

@@ -10,13 +10,13 @@ import numpy.typing as npt
 from eitskin.core.results import Reconstruction, Touch
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
+from eitskin.skin.skin import size_to_paper
 from eitskin.study import metrics
 from eitskin.study.matching import GATE_MM, Matching, match
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-PAPER_DIAMETER_MM = 194.0
 WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
 
@@ -91,6 +91,6 @@ def scorer_for(model: Model) -> Scorer:
         ConfigError: the model does not say which skin it is for.
     """
     outline = model.skin.outline
-    scale = 2 * float(np.sqrt(outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
+    scale = size_to_paper(outline)
     judge = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale)
     return Scorer(model, judge, GATE_MM * scale)
