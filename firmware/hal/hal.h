@@ -1,0 +1,120 @@
+/* What the application and the drivers need of a board: small tables of functions, each with its context pointer.
+ *
+ * A board fills one fw_board and calls fw_run. Nothing above this file knows a register; nothing below it knows a frame.
+ */
+#ifndef FW_HAL_H
+#define FW_HAL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum fw_status {
+    FW_OK = 0,
+    FW_E_ARGUMENT = -1,
+    FW_E_TIMEOUT = -2, /* the peripheral did not answer */
+    FW_E_BUS = -3,     /* the bus reported an error */
+    FW_E_FLASH = -4,   /* erase or programming failed, or read back differently */
+    FW_E_RANGE = -5    /* a setting that this board cannot do */
+} fw_status;
+
+/* ---- SPI: 16-bit words, most significant bit first, SCLK idle high, data valid on the falling edge (mode 2); chip select
+ * low around each word ---- */
+typedef struct fw_spi_ops {
+    fw_status (*write)(void *ctx, const uint16_t *words, size_t count); /* returns when the last bit is out */
+} fw_spi_ops;
+typedef struct fw_spi { const fw_spi_ops *ops; void *ctx; } fw_spi;
+
+/* ---- digital outputs that are set together ---- */
+typedef struct fw_lines_ops {
+    fw_status (*write)(void *ctx, uint32_t mask, uint32_t levels); /* lines in `mask` take their bit of `levels` */
+    void (*wait_ns)(void *ctx, uint32_t ns);                       /* at least */
+} fw_lines_ops;
+typedef struct fw_lines { const fw_lines_ops *ops; void *ctx; } fw_lines;
+
+/* ---- sampling: slots of equal length, in each a burst of samples, started by hardware at the slot's start ---- */
+typedef struct fw_capture_setup {
+    uint32_t sample_rate_hz;
+    uint32_t samples; /* per slot, at most FW_MAX_SAMPLES */
+    uint32_t slot_us; /* from burst to burst; longer than the burst */
+} fw_capture_setup;
+#define FW_MAX_SAMPLES 1024u
+
+typedef struct fw_burst {
+    const uint16_t *samples; /* right-aligned codes; valid until the next but one burst ends */
+    uint32_t start_us;       /* of its slot on the board's clock, exact: differences are multiples of slot_us */
+    uint32_t next_start_us;  /* when the next slot's first sample will be taken */
+    bool lost;               /* the converter overran or DMA failed: do not use it */
+} fw_burst;
+
+typedef struct fw_capture_ops {
+    /* `done` is called from an interrupt when a slot's burst is complete. FW_E_RANGE: cannot be done. */
+    fw_status (*configure)(void *ctx, const fw_capture_setup *setup, void (*done)(void *user, const fw_burst *burst), void *user);
+    fw_status (*start)(void *ctx); /* the first slot starts at least 20 us later */
+    void (*stop)(void *ctx);       /* after it `done` is not called */
+} fw_capture_ops;
+typedef struct fw_capture {
+    const fw_capture_ops *ops;
+    void *ctx;
+    uint32_t full_scale_code;  /* 4095 for 12 bits */
+    uint32_t reference_uv;     /* of the converter */
+    uint32_t front_end_gain_ppm; /* volts at the converter for a volt between the electrodes, in millionths */
+} fw_capture;
+
+/* ---- the link: bytes to and from the host; never blocks ---- */
+typedef struct fw_link_ops {
+    bool (*write)(void *ctx, const uint8_t *bytes, size_t size); /* all or nothing; false: no room now */
+    size_t (*read)(void *ctx, uint8_t *bytes, size_t room);
+} fw_link_ops;
+typedef struct fw_link { const fw_link_ops *ops; void *ctx; } fw_link;
+
+/* ---- model storage: FW_BANKS regions that are erased whole and read in place ---- */
+#define FW_BANKS 2u
+typedef struct fw_store_ops {
+    const uint8_t *(*bank)(void *ctx, uint32_t bank); /* 16-byte aligned, memory-mapped */
+    fw_status (*erase)(void *ctx, uint32_t bank);     /* to 0xFF; may take seconds; feeds the watchdog */
+    fw_status (*program)(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size); /* multiples of 4; reads back */
+} fw_store_ops;
+typedef struct fw_store { const fw_store_ops *ops; void *ctx; uint32_t bank_bytes; } fw_store;
+
+/* ---- the rest of a board ---- */
+typedef struct fw_system_ops {
+    uint32_t (*time_us)(void *ctx);      /* wraps; runs from the clock that the generator's MCLK comes from */
+    void (*wait)(void *ctx);             /* until an interrupt has come since the last call, or at most about 1 ms */
+    uint32_t (*lock)(void *ctx);         /* interrupts off; returns what unlock wants */
+    void (*unlock)(void *ctx, uint32_t state);
+    void (*feed_watchdog)(void *ctx);
+    void (*reset)(void *ctx);            /* does not return */
+    uint32_t (*stack_used)(void *ctx);   /* most bytes so far */
+    void (*show)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
+} fw_system_ops;
+
+/* What the start-up code found in memory that survives a reset. */
+typedef struct fw_last_reset {
+    uint32_t crash;    /* 1: a processor fault, words as in EITS_FAULT_CRASH */
+    uint32_t watchdog; /* 1 */
+    uint32_t words[5];
+} fw_last_reset;
+
+typedef struct fw_board {
+    const char *name;      /* at most 15 characters */
+    const char *serial;    /* at most 24 characters, hexadecimal */
+    uint32_t f_cpu_hz;
+    uint32_t mclk_hz;      /* of the generator */
+    uint32_t stack_bytes;
+    fw_spi generator;      /* AD9833 */
+    fw_lines multiplexers; /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
+    fw_capture capture;
+    fw_link link;
+    fw_store store;
+    const fw_system_ops *system;
+    void *system_ctx;
+    fw_last_reset last_reset;
+    void *workspace;       /* 16-byte aligned: the core's, and the frames' */
+    size_t workspace_bytes;
+} fw_board;
+
+/* The application; returns only on boards whose input ends (emulators): 0, or a reason to fail. */
+int fw_run(const fw_board *board);
+
+#endif
