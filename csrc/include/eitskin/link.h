@@ -114,7 +114,7 @@ typedef struct eits_packet_info {
     uint64_t protocol_hash; /* of the table that is scanned */
     uint32_t n_electrodes, n_rows, n_folded, rank, n_pixels, nx, ny, storage; /* of the model */
     uint32_t bank;          /* that the model is in */
-    uint32_t excitation_mhz; /* in mHz: as the generator's tuning word gives it */
+    uint32_t excitation_millihz; /* as the generator's tuning word gives it */
     uint32_t sample_rate_hz;
     uint16_t samples;       /* per measurement */
     uint16_t settle_us;
@@ -204,7 +204,7 @@ typedef struct eits_command_tare { uint32_t request, frames; } eits_command_tare
 
 typedef struct eits_command_scan {
     uint32_t request;
-    uint32_t excitation_mhz; /* 1 Hz to 250 kHz */
+    uint32_t excitation_millihz; /* 1 Hz to 250 kHz */
     uint32_t sample_rate_hz;
     uint16_t samples;
     uint16_t settle_us;
