@@ -23,6 +23,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .max_touches = d->max_touches < EITS_MAX_TOUCHES ? d->max_touches : EITS_MAX_TOUCHES,
         .max_masked = model->n_rows / 2,
         .sign = EITS_SIGN_INCREASE,
+        .solver = model->format_minor >= 1 ? (eits_solver)d->solver : EITS_SOLVER_FISTA,
         .warm_start = 0,
         .project_baseline = 1,
         .lambda_abs = 0,
@@ -99,12 +100,14 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->gradient = take_reals(a, pixels);
     ctx->list_value = take_reals(a, EITS_LIST(pixels, folded));
     ctx->list_index = (uint32_t *)(void *)take_bytes(a, EITS_LIST(pixels, folded) * 4);
+    ctx->working = (uint32_t *)(void *)take_bytes(a, pixels * 4);
     ctx->image = take_reals(a, pixels);
     ctx->atoms = take_reals(a, EITS_MAX_TOUCHES * stride);
     ctx->cell = (uint16_t *)(void *)take_bytes(a, (size_t)ctx->model->nx * ctx->model->ny * 2);
     map_cells(ctx);
     if (prepared) {
         ctx->panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);
+        ctx->working_panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);
         eits_make_panels(&ctx->model->sensitivity, ctx->panels);
     }
 }
@@ -132,7 +135,8 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         return EITS_E_ARGUMENT;
     const eits_real huge = R(1e30);
     const int right = o->iterations >= 1 && o->gap_every >= 1 && o->max_touches <= EITS_MAX_TOUCHES &&
-                      (uint32_t)o->sign <= (uint32_t)EITS_SIGN_BOTH && o->warm_start <= 1 && o->project_baseline <= 1 &&
+                      (uint32_t)o->sign <= (uint32_t)EITS_SIGN_BOTH &&
+                      (uint32_t)o->solver <= (uint32_t)EITS_SOLVER_WORKING_SET && o->warm_start <= 1 && o->project_baseline <= 1 &&
                       in_range(o->lambda_abs, 0, huge) && in_range(o->lambda_rel, 0, 1) &&
                       in_range(o->lambda_noise_factor, 0, huge) && in_range(o->gate_factor, 0, huge) &&
                       in_range(o->gap_rel, 0, 1) && in_range(o->saturation_v, 0, huge) && in_range(o->touch_threshold, 0, 1) &&

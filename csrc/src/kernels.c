@@ -34,6 +34,14 @@ void eits_read_column(const eits_matrix *matrix, uint32_t column, eits_real *out
         out[i] = read_entry(matrix, (size_t)matrix->stride * column + i);
 }
 
+static void scale_listed(const eits_matrix *matrix, const uint32_t *index, uint32_t count, eits_real *values)
+{
+    if (matrix->scale == NULL)
+        return;
+    for (uint32_t k = 0; k < count; ++k)
+        values[k] *= (eits_real)matrix->scale[index[k]];
+}
+
 uint32_t eits_list_nonzeros(const eits_matrix *matrix, const eits_real *x, uint32_t *index, eits_real *value)
 {
     uint32_t count = 0;
@@ -42,10 +50,7 @@ uint32_t eits_list_nonzeros(const eits_matrix *matrix, const eits_real *x, uint3
         value[count] = x[j];
         count += x[j] != 0; /* without a branch that would be guessed wrong */
     }
-    if (matrix->scale != NULL) {
-        for (uint32_t k = 0; k < count; ++k)
-            value[k] *= (eits_real)matrix->scale[index[k]];
-    }
+    scale_listed(matrix, index, count, value);
     return count;
 }
 
@@ -53,9 +58,18 @@ void eits_apply_t(const eits_context *ctx, const eits_real *v, eits_real *out)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
     if (ctx->panels != NULL)
-        ctx->kernels->mul_t_panels(s, ctx->panels, v, out);
+        ctx->kernels->mul_t_panels(s, ctx->panels, NULL, s->cols, v, out);
     else
-        ctx->kernels->mul_t(s, v, out);
+        ctx->kernels->mul_t(s, NULL, s->cols, v, out);
+}
+
+void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real *out)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    if (ctx->working_panels != NULL)
+        ctx->kernels->mul_t_panels(s, ctx->working_panels, ctx->working, ctx->working_count, v, out);
+    else
+        ctx->kernels->mul_t(s, ctx->working, ctx->working_count, v, out);
 }
 
 uint32_t eits_apply(const eits_context *ctx, const eits_real *x, eits_real *out)
@@ -64,6 +78,34 @@ uint32_t eits_apply(const eits_context *ctx, const eits_real *x, eits_real *out)
     const uint32_t count = eits_list_nonzeros(s, x, ctx->list_index, ctx->list_value);
     ctx->kernels->mul(s, ctx->list_index, ctx->list_value, count, out);
     return count;
+}
+
+uint32_t eits_apply_working(const eits_context *ctx, const eits_real *x, eits_real *out)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->working_count; ++k) {
+        ctx->list_index[count] = ctx->working[k];
+        ctx->list_value[count] = x[k];
+        count += x[k] != 0;
+    }
+    scale_listed(s, ctx->list_index, count, ctx->list_value);
+    ctx->kernels->mul(s, ctx->list_index, ctx->list_value, count, out);
+    return count;
+}
+
+void eits_pack_panels(const eits_context *ctx)
+{
+    const uint32_t rows = ctx->model->rank;
+    if (ctx->working_panels == NULL)
+        return;
+    for (uint32_t k = 0; k < EITS_PANEL_COLUMNS(ctx->working_count); ++k) {
+        eits_real *to = ctx->working_panels + (size_t)(k / EITS_PANEL) * EITS_PANEL * rows + k % EITS_PANEL;
+        const uint32_t j = ctx->working[k < ctx->working_count ? k : 0]; /* lanes to spare hold any column */
+        const eits_real *from = ctx->panels + (size_t)(j / EITS_PANEL) * EITS_PANEL * rows + j % EITS_PANEL;
+        for (uint32_t i = 0; i < rows; ++i)
+            to[(size_t)i * EITS_PANEL] = from[(size_t)i * EITS_PANEL];
+    }
 }
 
 void eits_make_panels(const eits_matrix *matrix, eits_real *panels)

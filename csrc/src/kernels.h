@@ -1,7 +1,7 @@
 /* Matrix products with the stored matrices. Every output number is one chain of fused multiply-adds in a fixed order, so
  * that each build below gives the same bits, however it blocks, unrolls or vectorises:
  *     mul:    out_i = sum over the listed columns, in their order, of column_i * value
- *     mul_t:  out_j = scale_j * (sum over i = 0, 1, ... of column_j_i * v_i)
+ *     mul_t:  out_k = scale_j * (sum over i = 0, 1, ... of column_j_i * v_i), j the k-th listed column
  */
 #ifndef EITSKIN_KERNELS_H
 #define EITSKIN_KERNELS_H
@@ -17,9 +17,11 @@ typedef struct eits_kernels {
     const char *name;
     /* `out` has matrix->stride numbers; `value` already carries the column's scale. */
     void (*mul)(const eits_matrix *matrix, const uint32_t *index, const eits_real *value, uint32_t count, eits_real *out);
-    void (*mul_t)(const eits_matrix *matrix, const eits_real *v, eits_real *out);
-    /* The same as mul_t from the panels made by eits_make_panels. */
-    void (*mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const eits_real *v, eits_real *out);
+    /* `index` NULL: the first `count` columns. */
+    void (*mul_t)(const eits_matrix *matrix, const uint32_t *index, uint32_t count, const eits_real *v, eits_real *out);
+    /* The same from panels that hold just these columns (eits_make_panels, eits_pack_panels). */
+    void (*mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const uint32_t *index, uint32_t count,
+                         const eits_real *v, eits_real *out);
     /* Small vector sums: eight lanes, each a chain of fused multiply-adds, then a fixed tree (vec.h). */
     eits_real (*dot)(const eits_real *a, const eits_real *b, size_t count);
     /* out += factor * a */
@@ -42,6 +44,15 @@ uint32_t eits_list_nonzeros(const eits_matrix *matrix, const eits_real *x, uint3
 
 /* out = S' v by panels if there are any, else from the columns. */
 void eits_apply_t(const eits_context *ctx, const eits_real *v, eits_real *out);
+
+/* out = the working set's S' v, by its panels if there are any, else from the columns. */
+void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real *out);
+
+/* out = S x, x being that of the working set; returns the number of non-zeros. Uses the context's list. */
+uint32_t eits_apply_working(const eits_context *ctx, const eits_real *x, eits_real *out);
+
+/* Copy the working set's panels out of those of S; nothing to do for a context that is not prepared. */
+void eits_pack_panels(const eits_context *ctx);
 
 /* out = S x; returns the number of non-zeros. Uses the context's list. */
 uint32_t eits_apply(const eits_context *ctx, const eits_real *x, eits_real *out);

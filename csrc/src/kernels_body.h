@@ -30,13 +30,15 @@
             o[0] = a0, o[1] = a1, o[2] = a2, o[3] = a3, o[4] = a4, o[5] = a5, o[6] = a6, o[7] = a7;                        \
         }                                                                                                                  \
     }                                                                                                                      \
-    static void NAME(mul_t_##TAG)(const eits_matrix *matrix, const eits_real *v, eits_real *out)                           \
+    static void NAME(mul_t_##TAG)(const eits_matrix *matrix, const uint32_t *index, uint32_t count, const eits_real *v,    \
+                                  eits_real *out)                                                                          \
     {                                                                                                                      \
         const TYPE *data = matrix->data;                                                                                   \
         const size_t stride = matrix->stride;                                                                              \
-        uint32_t j = 0;                                                                                                    \
-        for (; j + 4 <= matrix->cols; j += 4) { /* four chains at a time hide the latency of one */                        \
-            const TYPE *c0 = data + stride * j, *c1 = c0 + stride, *c2 = c1 + stride, *c3 = c2 + stride;                    \
+        uint32_t k = 0;                                                                                                    \
+        for (; k + 4 <= count; k += 4) { /* four chains at a time hide the latency of one */                               \
+            const TYPE *c0 = data + stride * (index ? index[k] : k), *c1 = data + stride * (index ? index[k + 1] : k + 1); \
+            const TYPE *c2 = data + stride * (index ? index[k + 2] : k + 2), *c3 = data + stride * (index ? index[k + 3] : k + 3);\
             eits_real a0 = 0, a1 = 0, a2 = 0, a3 = 0;                                                                      \
             for (uint32_t i = 0; i < matrix->rows; ++i) {                                                                  \
                 const eits_real w = v[i];                                                                                  \
@@ -45,14 +47,14 @@
                 a2 = eits_fma(READ(c2[i]), w, a2);                                                                         \
                 a3 = eits_fma(READ(c3[i]), w, a3);                                                                         \
             }                                                                                                              \
-            out[j] = a0, out[j + 1] = a1, out[j + 2] = a2, out[j + 3] = a3;                                                \
+            out[k] = a0, out[k + 1] = a1, out[k + 2] = a2, out[k + 3] = a3;                                                \
         }                                                                                                                  \
-        for (; j < matrix->cols; ++j) {                                                                                    \
-            const TYPE *c = data + stride * j;                                                                             \
+        for (; k < count; ++k) {                                                                                           \
+            const TYPE *c = data + stride * (index ? index[k] : k);                                                        \
             eits_real a = 0;                                                                                               \
             for (uint32_t i = 0; i < matrix->rows; ++i)                                                                    \
                 a = eits_fma(READ(c[i]), v[i], a);                                                                         \
-            out[j] = a;                                                                                                    \
+            out[k] = a;                                                                                                    \
         }                                                                                                                  \
     }
 
@@ -66,12 +68,12 @@ DEFINE_PRODUCTS(i8, int8_t, READ_PLAIN)
 #undef READ_HALF
 #undef DEFINE_PRODUCTS
 
-static void NAME(scale)(const eits_matrix *matrix, eits_real *out)
+static void NAME(scale)(const eits_matrix *matrix, const uint32_t *index, uint32_t count, eits_real *out)
 {
     if (matrix->scale == NULL)
         return;
-    for (uint32_t j = 0; j < matrix->cols; ++j)
-        out[j] *= (eits_real)matrix->scale[j];
+    for (uint32_t k = 0; k < count; ++k)
+        out[k] *= (eits_real)matrix->scale[index == NULL ? k : index[k]];
 }
 
 static void NAME(mul)(const eits_matrix *matrix, const uint32_t *index, const eits_real *value, uint32_t count, eits_real *out)
@@ -84,28 +86,28 @@ static void NAME(mul)(const eits_matrix *matrix, const uint32_t *index, const ei
     }
 }
 
-static void NAME(mul_t)(const eits_matrix *matrix, const eits_real *v, eits_real *out)
+static void NAME(mul_t)(const eits_matrix *matrix, const uint32_t *index, uint32_t count, const eits_real *v, eits_real *out)
 {
     switch (matrix->storage) {
-    case EITS_STORAGE_F32: NAME(mul_t_f32)(matrix, v, out); break;
-    case EITS_STORAGE_F16: NAME(mul_t_f16)(matrix, v, out); break;
-    case EITS_STORAGE_I16: NAME(mul_t_i16)(matrix, v, out); break;
-    case EITS_STORAGE_I8: NAME(mul_t_i8)(matrix, v, out); break;
+    case EITS_STORAGE_F32: NAME(mul_t_f32)(matrix, index, count, v, out); break;
+    case EITS_STORAGE_F16: NAME(mul_t_f16)(matrix, index, count, v, out); break;
+    case EITS_STORAGE_I16: NAME(mul_t_i16)(matrix, index, count, v, out); break;
+    case EITS_STORAGE_I8: NAME(mul_t_i8)(matrix, index, count, v, out); break;
     }
-    NAME(scale)(matrix, out);
+    NAME(scale)(matrix, index, count, out);
 }
 
-static void NAME(mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const eits_real *v, eits_real *out)
+static void NAME(mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const uint32_t *index, uint32_t count,
+                               const eits_real *v, eits_real *out)
 {
-    for (uint32_t j = 0; j < matrix->cols; j += EITS_PANEL) {
-        const eits_real *panel = panels + (size_t)j * matrix->rows;
-        const uint32_t lanes = matrix->cols - j < EITS_PANEL ? matrix->cols - j : EITS_PANEL;
+    for (uint32_t j = 0; j < count; j += EITS_PANEL) {
+        const uint32_t lanes = count - j < EITS_PANEL ? count - j : EITS_PANEL;
         eits_real sum[EITS_PANEL];
-        NAME(sum_panel)(panel, v, matrix->rows, sum);
+        NAME(sum_panel)(panels + (size_t)j * matrix->rows, v, matrix->rows, sum);
         for (uint32_t l = 0; l < lanes; ++l)
             out[j + l] = sum[l];
     }
-    NAME(scale)(matrix, out);
+    NAME(scale)(matrix, index, count, out);
 }
 
 static eits_real NAME(dot)(const eits_real *a, const eits_real *b, size_t count)

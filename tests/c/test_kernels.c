@@ -166,10 +166,10 @@ static void check_mul_t(const sample *s, uint64_t *state)
     }
     for (int b = 0; b < build_count; ++b) {
         memset(out, 0xFF, m->cols * sizeof *out);
-        builds[b]->mul_t(m, v, out);
+        builds[b]->mul_t(m, NULL, m->cols, v, out);
         CHECK(same_bits(out, expected, m->cols));
         memset(out, 0xFF, m->cols * sizeof *out);
-        builds[b]->mul_t_panels(m, panels, v, out);
+        builds[b]->mul_t_panels(m, panels, NULL, m->cols, v, out);
         CHECK(same_bits(out, expected, m->cols));
     }
     free(v), free(expected), free(out), free(panels), free(column);

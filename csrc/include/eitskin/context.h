@@ -24,10 +24,12 @@ typedef enum eits_sign {
 
 typedef struct eits_options {
     uint32_t iterations;   /* at most so many; exactly so many where gap_rel is 0 */
-    uint32_t gap_every;    /* iterations between checks of the duality gap and of divergence; at least 1 */
+    uint32_t gap_every;    /* iterations between checks of the gap and of divergence, and between choices of the working
+                            * set; at least 1 */
     uint32_t max_touches;  /* at most EITS_MAX_TOUCHES */
     uint32_t max_masked;   /* a frame with more unusable rows than this is refused */
     eits_sign sign;
+    eits_solver solver;
     uint32_t warm_start;       /* 1: start from the last frame's coefficients, momentum reset */
     uint32_t project_baseline; /* 1: ignore changes along the reference frame, that is drift of the gain */
     eits_real lambda_abs;      /* > 0: this lambda, in the units of S'y; 0: by the rule below */
@@ -116,10 +118,13 @@ typedef struct eits_context {
     eits_real *gradient;     /* n_pixels */
     eits_real *list_value;   /* max(n_pixels, n_folded): numbers to multiply columns by, scales included */
     uint32_t *list_index;    /* as many: those columns */
+    uint32_t *working;       /* n_pixels: the working set's columns, ascending; x, x_next, z hold theirs only while it runs */
+    uint32_t working_count;
     eits_real *image;        /* n_pixels: S/m */
     eits_real *atoms;        /* EITS_MAX_TOUCHES x stride: responses of the touches */
     uint16_t *cell;          /* ny x nx: which kept pixel a cell of the image is; EITS_NO_PIXEL for none */
     eits_real *panels;       /* S again, in panels of EITS_PANEL columns; NULL: not prepared */
+    eits_real *working_panels; /* the working set's columns likewise; NULL: not prepared */
     eits_touch last[EITS_MAX_TOUCHES];
     uint32_t last_count, next_id;
     uint32_t warm; /* x holds the last frame's coefficients */
@@ -134,13 +139,14 @@ typedef struct eits_context {
 #define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
 #define EITS_PANEL_COLUMNS(n_pixels) (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
 
-/* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep a second, panel-wise copy of S
- * (hosts), else 0. */
+/* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise copies of S and of
+ * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
     (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + EITS_REALS(n_folded) +                   \
      (8 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
-     EITS_ALIGN16((size_t)(n_cells) * 2u) + ((prepared) ? EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) : 0u))
+     EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_ALIGN16((size_t)(n_cells) * 2u) +                                        \
+     ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) : 0u))
 
 /* The same number for an open model, as a function. Returns 0 for a null model. */
 size_t eits_workspace_size(const eits_model *model, int prepared);

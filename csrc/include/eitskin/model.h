@@ -12,7 +12,7 @@ extern "C" {
 #endif
 
 #define EITS_MODEL_MAJOR 1
-#define EITS_MODEL_MINOR 0
+#define EITS_MODEL_MINOR 1
 #define EITS_MODEL_ALIGNMENT 16
 #define EITS_MAX_RANK 1024
 #define EITS_MAX_PIXELS 65535
@@ -53,6 +53,12 @@ typedef struct eits_pixel {
     uint16_t iy;
 } eits_pixel;
 
+/* How an image is found; each minimises the same objective (solve.h). */
+typedef enum eits_solver {
+    EITS_SOLVER_FISTA = 0,      /* every column in every iteration */
+    EITS_SOLVER_WORKING_SET = 1 /* FISTA on the columns that may differ from zero, chosen anew every gap_every iterations */
+} eits_solver;
+
 /* Defaults that the model's maker chose; eits_options_default() starts from them. */
 typedef struct eits_defaults {
     uint32_t iterations;
@@ -69,7 +75,8 @@ typedef struct eits_defaults {
     float touch_change_s_per_m;
     float follow_mm;
     float touch_radius_weight;
-    float reserved[2];
+    uint32_t solver; /* eits_solver; since format 1.1, in files of 1.0 to be ignored */
+    float reserved;
 } eits_defaults;
 
 /* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */
@@ -80,6 +87,7 @@ typedef struct eits_golden {
 } eits_golden;
 
 typedef struct eits_model {
+    uint32_t format_minor;
     uint32_t n_electrodes;
     uint32_t n_rows;   /* rows of the protocol table: voltages in a frame */
     uint32_t n_folded; /* after the reciprocity fold */

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import SIGNS, STOPS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
+from eitskin.core.results import SIGNS, SOLVERS, STOPS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
 
 WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
@@ -91,7 +91,7 @@ class CoreEngine:
         """
         values = asdict(options)
         try:
-            values["sign"] = SIGNS.index(options.sign)
+            values["sign"], values["solver"] = SIGNS.index(options.sign), SOLVERS.index(options.solver)
             given = self._ffi.new("eits_options *", {name: _plain(value) for name, value in values.items()})
         except (ValueError, TypeError, OverflowError) as error:
             raise UsageError(f"options: {error}") from None

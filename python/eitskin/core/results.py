@@ -11,6 +11,7 @@ import numpy.typing as npt
 from eitskin.errors import FrameError, UsageError
 
 SIGNS = ("increase", "decrease", "both")
+SOLVERS = ("fista", "working-set")
 MAX_TOUCHES = 16
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
 STOPS = ("iterations", "gap", "gate", "zero", "diverged")
@@ -20,7 +21,8 @@ STOPS = ("iterations", "gap", "gate", "zero", "diverged")
 class Options:
     """The solver's options; csrc/include/eitskin/context.h documents each. Lambdas in the units of S'y.
 
-    ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both".
+    ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both". ``solver`` is "fista"
+    (every column in every iteration) or "working-set" (FISTA on the columns that may differ from zero).
     """
 
     iterations: int
@@ -39,6 +41,7 @@ class Options:
     follow_mm: float
     gap_every: int = 10
     sign: str = "increase"
+    solver: str = "fista"
     warm_start: bool = False
     project_baseline: bool = True
     lambda_abs: float = 0.0
@@ -64,9 +67,10 @@ def check_options(o: Options) -> None:
         UsageError: one is out of its range, or of the wrong type.
     """
     for name, value in asdict(o).items():
-        if name == "sign":
-            if value not in SIGNS:
-                raise UsageError(f"options: sign = {value!r} is not known; use one of {', '.join(SIGNS)}")
+        if name in ("sign", "solver"):
+            known = SIGNS if name == "sign" else SOLVERS
+            if value not in known:
+                raise UsageError(f"options: {name} = {value!r} is not known; use one of {', '.join(known)}")
         elif name in ("warm_start", "project_baseline"):
             if value not in (False, True):
                 raise UsageError(f"options: {name} = {value!r} must be true or false")

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.results import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import read_bytes, write_bytes
@@ -22,11 +23,11 @@ from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 0
+MAJOR, MINOR = 1, 1
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
-DEFAULTS = struct.Struct("<2I12f2f")
+DEFAULTS = struct.Struct("<2I12fIf")
 REQUIRED = ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD")
 FOLD_DTYPE = np.dtype([("first", "<u2"), ("second", "<u2"), ("sign", "<i2"), ("reserved", "<u2")])
 FOLD_NONE = 0xFFFF
@@ -58,7 +59,7 @@ def encode_model(model: Model) -> bytes:
         "SENS": stored.columns.tobytes(),
         "COLW": model.column_weight.astype("<f4").tobytes(),
         "GRID": model.grid.index.astype("<u2").tobytes(),
-        "DEFS": DEFAULTS.pack(*astuple(model.defaults), *[0.0] * 2),
+        "DEFS": DEFAULTS.pack(*astuple(model.defaults)[:-1], SOLVERS.index(model.defaults.solver), 0.0),
         "GOLD": np.concatenate([golden.reference_v, golden.frame_v, golden.image]).astype("<f4").tobytes(),
         "META": json.dumps(model.meta, sort_keys=True).encode("utf-8"),
     }
@@ -101,8 +102,9 @@ def decode_model(blob: bytes, where: str) -> Model:
         ModelError: it is truncated, corrupted, newer or foreign.
     """
     sections = _split(blob, where)
+    _, _, minor, _, _, _, _, protocol_hash = _header(blob, where)
     try:
-        return _decode_sections(sections, _header(blob, where)[7], where)
+        return _decode_sections(sections, protocol_hash, minor, where)
     except ModelError:
         raise
     except EitskinError as error:
@@ -246,10 +248,13 @@ def _read_grid(content: bytes, d: _Dims, where: str) -> Grid:
     return Grid(d.nx, d.ny, d.pixel_mm, (d.origin_x_mm, d.origin_y_mm), index)
 
 
-def _read_defaults(content: bytes, where: str) -> Defaults:
+def _read_defaults(content: bytes, minor: int, where: str) -> Defaults:
     names = [entry.name for entry in fields(Defaults)]
     values: dict[str, Any] = dict(zip(names, map(_short, DEFAULTS.unpack(content)), strict=False))
-    d = Defaults(**values)
+    number = values["solver"] if minor >= 1 else 0  # 1.0 had FISTA alone, and left the place open
+    if number >= len(SOLVERS):
+        _refuse(where, f"solver {number}, which this eitskin does not have; upgrade it")
+    d = Defaults(**{**values, "solver": SOLVERS[number]})
     shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_share)
     sizes = (d.lambda_noise_factor, d.gate_factor, d.touch_change_s_per_m, d.follow_mm, d.touch_radius_weight)
     in_range = (
@@ -274,7 +279,7 @@ def _read_meta(content: bytes, where: str) -> dict[str, Any]:
     return dict(meta)
 
 
-def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model:
+def _decode_sections(sections: Sections, protocol_hash: int, minor: int, where: str) -> Model:
     d = _read_dims(sections["DIMS"], where)
     _check_sizes(sections, d, where)
     table = np.frombuffer(sections["PROT"], dtype="u1").reshape(d.n_rows, 4)
@@ -298,7 +303,7 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         column_weight=_floats(sections, "COLW", (d.n_pixels,), where),
         lipschitz=d.lipschitz,
         noise_gain=d.noise_gain,
-        defaults=_read_defaults(sections["DEFS"], where),
+        defaults=_read_defaults(sections["DEFS"], minor, where),
         golden=Golden(golden[: d.n_rows], golden[d.n_rows : 2 * d.n_rows], golden[2 * d.n_rows :]),
         meta=_read_meta(sections["META"], where) if "META" in sections else {},
     )

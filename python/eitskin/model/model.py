@@ -21,7 +21,7 @@ DATA_KINDS = ("difference", "normalised", "log-ratio")
 class Defaults:
     """What the model's maker chose, in the file's order; csrc/include/eitskin/context.h says what each does.
 
-    Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t max(x).
+    Lambdas, gate and thresholds are factors without unit; ``solver`` is one of ``core.results.SOLVERS``; ``mask_threshold`` is t of the mask x > t max(x).
     """
 
     iterations: int = 60
@@ -38,6 +38,7 @@ class Defaults:
     touch_change_s_per_m: float = 0.0135
     follow_mm: float = 25.0
     touch_radius_weight: float = 1e-3
+    solver: str = "working-set"
 
 
 @dataclass(frozen=True, eq=False)

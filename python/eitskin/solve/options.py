@@ -24,4 +24,5 @@ def default_options(model: Model) -> Options:
         touch_change_s_per_m=d.touch_change_s_per_m,
         touch_radius_weight=d.touch_radius_weight,
         follow_mm=d.follow_mm,
+        solver=d.solver,
     )

@@ -73,15 +73,23 @@ def fista(
     basis: FloatArray,
     start: FloatArray | None = None,
 ) -> FistaResult:
-    """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the misfit."""
+    """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the misfit.
+
+    With the solver "working-set", columns outside the working set see no gradient until it is chosen anew.
+    """
     sign, step, t, halvings = options.sign, 1.0 / lipschitz, 1.0, 0
     x = np.zeros(s.shape[1]) if start is None else start.copy()
     sx = s @ x
     z, sz = x.copy(), sx.copy()
     scale = 0.5 * float(y @ y)
+    working = np.ones(s.shape[1], dtype=np.bool_)
     stop, gap, residual, k = "iterations", 0.0, float(np.linalg.norm(y)), 0
     for k in range(1, options.iterations + 1):
         gradient = s.T @ project(y - sz, basis)
+        if options.solver == "working-set":
+            if (k - 1) % options.gap_every == 0:
+                working = (x != 0) | (z != 0) | (shrink(gradient, lam, sign) != 0)
+            gradient = np.where(working, gradient, 0.0)
         x_next = shrink(z + step * gradient, step * lam, sign)
         t_next = 0.5 * (1 + np.sqrt(1 + 4 * t * t))
         beta = (t - 1) / t_next
