@@ -112,18 +112,34 @@ static eits_real iterate(eits_context *ctx, eits_real lambda, eits_real step, ei
     return t_next;
 }
 
-/* The gradient at z for iteration k (from 1): of every column where the working set is chosen, else of what is held. */
-static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, int known)
+/* When the working set is looked after: a look at every column after gap_every iterations, then after twice as many more,
+ * and so on, for less and less changes; where a gap is to be reached, always after gap_every. In between those at rest are
+ * left out every few iterations. */
+typedef struct schedule {
+    uint32_t next_look, interval;
+} schedule;
+
+enum { PRUNE_EVERY = 5 };
+
+/* The gradient at z for iteration k (from 1): of every column, or of the working set as it is then. */
+static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, schedule *s, int known)
 {
-    const int choose = by_working_set(ctx) && (k - 1) % ctx->options.gap_every == 0;
-    if (by_working_set(ctx) && !choose) {
-        take_working_gradient(ctx, ctx->sz);
+    if (!by_working_set(ctx)) {
+        if (!known)
+            take_gradient(ctx, ctx->sz);
         return;
     }
-    if (!known)
-        take_gradient(ctx, ctx->sz);
-    if (choose)
+    if (k >= s->next_look) {
+        if (!known)
+            take_gradient(ctx, ctx->sz);
         eits_working_set_choose(ctx, lambda);
+        s->next_look = k + s->interval;
+        s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / 4 ? s->interval : 2 * s->interval;
+        return;
+    }
+    take_working_gradient(ctx, ctx->sz);
+    if (k % PRUNE_EVERY == 1)
+        eits_working_set_prune(ctx, lambda);
 }
 
 static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient_known)
@@ -133,10 +149,11 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
     const eits_real ceiling = scale * (1 + R(1e-3)); /* at x = 0; above it nothing was won */
     eits_real step = 1 / (eits_real)ctx->model->lipschitz, t = 1;
     certificate c = {0};
+    schedule looks = {.next_look = 1, .interval = o->gap_every};
     restart_momentum(ctx);
     ctx->info.stop = EITS_STOP_ITERATIONS;
     for (uint32_t k = 1; k <= o->iterations; ++k) {
-        prepare_gradient(ctx, lambda, k, gradient_known && k == 1);
+        prepare_gradient(ctx, lambda, k, &looks, gradient_known && k == 1);
         t = iterate(ctx, lambda, step, t);
         ctx->info.iterations = k;
         if (k != o->iterations && k % o->gap_every != 0)
@@ -153,6 +170,7 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
             step *= R(0.5);
             t = 1;
             start_over_from_zero(ctx);
+            looks = (schedule){.next_look = k + 1, .interval = o->gap_every};
             continue;
         }
         if (o->gap_rel > 0 && c.gap <= o->gap_rel * scale) {
@@ -167,7 +185,8 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
 
 void eits_run_fista(eits_context *ctx, eits_real lambda, int gradient_known)
 {
-    if (by_working_set(ctx))
+    ctx->working_count = 0;
+    if (by_working_set(ctx) && !gradient_known) /* a warm start */
         eits_working_set_begin(ctx);
     iterate_to_the_end(ctx, lambda, gradient_known);
     if (by_working_set(ctx))

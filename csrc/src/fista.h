@@ -21,6 +21,9 @@ void eits_working_set_begin(eits_context *ctx);
  * move. Compacts x, z and gradient likewise. */
 void eits_working_set_choose(eits_context *ctx, eits_real lambda);
 
+/* Leave out the columns at rest, by ctx->gradient, that of the working set at z: the same rule, no look at the others. */
+void eits_working_set_prune(eits_context *ctx, eits_real lambda);
+
 /* Spread ctx->x over all columns again. */
 void eits_working_set_end(eits_context *ctx);
 

@@ -7,6 +7,9 @@
 #ifdef EITS_BUILD_AVX2
 extern const eits_kernels eits_kernels_avx2;
 #endif
+#ifdef EITS_BUILD_M7
+extern const eits_kernels eits_kernels_m7;
+#endif
 
 const eits_kernels *eits_kernels_best(void)
 {
@@ -14,7 +17,11 @@ const eits_kernels *eits_kernels_best(void)
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
         return &eits_kernels_avx2;
 #endif
+#ifdef EITS_BUILD_M7
+    return &eits_kernels_m7;
+#else
     return &eits_kernels_portable;
+#endif
 }
 
 static eits_real read_entry(const eits_matrix *matrix, size_t at)

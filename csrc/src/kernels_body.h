@@ -110,6 +110,7 @@ static void NAME(mul_t_panels)(const eits_matrix *matrix, const eits_real *panel
     NAME(scale)(matrix, index, count, out);
 }
 
+#ifndef KERNELS_OWN_VECTORS
 static eits_real NAME(dot)(const eits_real *a, const eits_real *b, size_t count)
 {
     eits_real lane[8] = {0};
@@ -129,17 +130,19 @@ static void NAME(axpy)(eits_real *out, eits_real factor, const eits_real *a, siz
         out[i] = eits_fma(factor, a[i], out[i]);
 }
 
-/* The proximal step of threshold |x|_1. With both signs allowed, one of the two halves is zero; with one sign, the other
- * half is multiplied away, so that one loop without branches serves all. */
+#endif
+
+/* The proximal step of threshold |x|_1: of the two halves one is zero, or both. v - v is zero, and NaN where v is not finite:
+ * a run that overflows must not end as a zero. */
 static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restrict gradient, const eits_real *restrict x,
                        eits_real *restrict next, eits_real *restrict z)
 {
     const eits_real step = how->step, t = how->threshold, beta = how->beta;
-    const eits_real allow_up = how->sign != EITS_SIGN_DECREASE, allow_down = how->sign != EITS_SIGN_INCREASE;
+    const int allow_up = how->sign != EITS_SIGN_DECREASE, allow_down = how->sign != EITS_SIGN_INCREASE;
     for (uint32_t j = 0; j < n; ++j) {
         const eits_real v = eits_fma(step, gradient[j], z[j]);
-        const eits_real up = v > t ? v - t : 0, down = v < -t ? v + t : 0;
-        const eits_real moved = allow_up * up + allow_down * down;
+        const eits_real up = allow_up && v > t ? v - t : 0, down = allow_down && v < -t ? v + t : 0;
+        const eits_real moved = up + down + (v - v);
         next[j] = moved;
         z[j] = eits_fma(beta, moved - x[j], moved);
     }

@@ -1,7 +1,7 @@
 /* FISTA's working set. An iteration moves few coefficients: those that are not zero, in x or in the extrapolated point z, and
  * those whose correlation with the residual exceeds lambda. All others stay zero, so between two looks at every column the
- * products run over these alone. What a skipped column would have done in the meantime it does after the next look; with a
- * look in every iteration the bits are those of FISTA on every column. */
+ * products run over these alone, and over fewer and fewer of them as they come to rest at zero. A column that would have moved
+ * meanwhile does so after the next look; with a look in every iteration the bits are those of FISTA on every column. */
 #include "fista.h"
 
 #include "kernels.h"
@@ -31,15 +31,20 @@ void eits_working_set_choose(eits_context *ctx, eits_real lambda)
     const eits_sign sign = ctx->options.sign;
     eits_real *x = ctx->x_next, *z = ctx->image; /* the image is made after the last iteration */
     uint32_t *chosen = ctx->list_index;
-    uint32_t count = 0, old = 0;
+    uint32_t count = 0, old = 0, next = before > 0 ? ctx->working[0] : n;
     for (uint32_t j = 0; j < n; ++j) {
-        const int was_in = old < before && ctx->working[old] == j;
         const eits_real gradient = ctx->gradient[j];
-        x[count] = was_in ? ctx->x[old] : 0;
-        z[count] = was_in ? ctx->z[old] : 0;
-        old += (uint32_t)was_in;
-        if (x[count] == 0 && z[count] == 0 && !would_move(gradient, lambda, sign))
+        const int moves = would_move(gradient, lambda, sign);
+        if (j != next && !moves)
             continue;
+        x[count] = z[count] = 0;
+        if (j == next) {
+            x[count] = ctx->x[old];
+            z[count] = ctx->z[old++];
+            next = old < before ? ctx->working[old] : n;
+            if (!moves && x[count] == 0 && z[count] == 0)
+                continue;
+        }
         chosen[count] = j;
         ctx->gradient[count++] = gradient;
     }
@@ -48,6 +53,24 @@ void eits_working_set_choose(eits_context *ctx, eits_real lambda)
     eits_copy(ctx->x, x, count);
     eits_copy(ctx->z, z, count);
     eits_pack_panels(ctx);
+}
+
+void eits_working_set_prune(eits_context *ctx, eits_real lambda)
+{
+    const uint32_t before = ctx->working_count;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < before; ++k) {
+        const eits_real x = ctx->x[k], z = ctx->z[k], gradient = ctx->gradient[k];
+        if (x == 0 && z == 0 && !would_move(gradient, lambda, ctx->options.sign))
+            continue;
+        ctx->working[count] = ctx->working[k];
+        ctx->x[count] = x;
+        ctx->z[count] = z;
+        ctx->gradient[count++] = gradient;
+    }
+    ctx->working_count = count;
+    if (count < before)
+        eits_pack_panels(ctx);
 }
 
 void eits_working_set_end(eits_context *ctx)

@@ -35,9 +35,9 @@ static void sizes_agree(void)
                     uint8_t *workspace = small_aligned(&memory, size);
                     CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
                     const uint8_t *cells_end = (uint8_t *)ctx.cell + EITS_ALIGN16(m.nx * m.ny * 2);
-                    const uint8_t *end = prepared ? (uint8_t *)ctx.panels + EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank) : cells_end;
+                    const uint8_t *end = prepared ? (uint8_t *)ctx.working_panels + EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank) : cells_end;
                     CHECK(end == workspace + size); /* nothing is missing and nothing is wasted */
-                    CHECK((ctx.panels != NULL) == prepared);
+                    CHECK((ctx.panels != NULL) == prepared && (ctx.working_panels != NULL) == prepared);
                     CHECK((uint8_t *)ctx.baseline.v0 == workspace);
                     CHECK(((uintptr_t)ctx.y | (uintptr_t)ctx.basis | (uintptr_t)ctx.x | (uintptr_t)ctx.list_index) % 16 == 0);
                     free(memory);

@@ -24,8 +24,8 @@ typedef enum eits_sign {
 
 typedef struct eits_options {
     uint32_t iterations;   /* at most so many; exactly so many where gap_rel is 0 */
-    uint32_t gap_every;    /* iterations between checks of the gap and of divergence, and between choices of the working
-                            * set; at least 1 */
+    uint32_t gap_every;    /* iterations between checks of the gap and of divergence, and until the working set is chosen
+                            * anew; at least 1 */
     uint32_t max_touches;  /* at most EITS_MAX_TOUCHES */
     uint32_t max_masked;   /* a frame with more unusable rows than this is refused */
     eits_sign sign;

@@ -21,6 +21,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 BASIS_TOLERANCE = 1e-6
 MAX_STEP_HALVINGS = 8
+PRUNE_EVERY = 5
 DEAD = "all voltages are zero; is the skin driven and connected?"
 
 
@@ -82,13 +83,17 @@ def fista(
     sx = s @ x
     z, sz = x.copy(), sx.copy()
     scale = 0.5 * float(y @ y)
-    working = np.ones(s.shape[1], dtype=np.bool_)
+    working, next_look, interval = np.ones(s.shape[1], dtype=np.bool_), 1, options.gap_every
     stop, gap, residual, k = "iterations", 0.0, float(np.linalg.norm(y)), 0
     for k in range(1, options.iterations + 1):
         gradient = s.T @ project(y - sz, basis)
         if options.solver == "working-set":
-            if (k - 1) % options.gap_every == 0:
-                working = (x != 0) | (z != 0) | (shrink(gradient, lam, sign) != 0)
+            moving = (x != 0) | (z != 0) | (shrink(gradient, lam, sign) != 0)
+            if k >= next_look:
+                working, next_look = moving, k + interval
+                interval *= 1 if options.gap_rel > 0 else 2
+            elif k % PRUNE_EVERY == 1:
+                working = working & moving
             gradient = np.where(working, gradient, 0.0)
         x_next = shrink(z + step * gradient, step * lam, sign)
         t_next = 0.5 * (1 + np.sqrt(1 + 4 * t * t))
@@ -109,6 +114,7 @@ def fista(
             halvings, step, t = halvings + 1, step / 2, 1.0
             x, sx = np.zeros_like(x), np.zeros_like(sx)
             z, sz = x.copy(), sx.copy()
+            next_look, interval = k + 1, options.gap_every
             continue
         if options.gap_rel > 0 and gap <= options.gap_rel * scale:
             stop = "gap"
