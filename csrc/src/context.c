@@ -23,7 +23,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .max_touches = d->max_touches < EITS_MAX_TOUCHES ? d->max_touches : EITS_MAX_TOUCHES,
         .max_masked = model->n_rows / 2,
         .sign = EITS_SIGN_INCREASE,
-        .solver = model->format_minor >= 1 ? (eits_solver)d->solver : EITS_SOLVER_FISTA,
+        .solver = (eits_solver)d->solver,
         .warm_start = 0,
         .project_baseline = 1,
         .lambda_abs = 0,

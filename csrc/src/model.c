@@ -243,10 +243,10 @@ static int between(float value, float low, float high)
 }
 
 /* The ranges that eits_set_options asks for, so that a model's own defaults are always good options. */
-static int defaults_in_range(const eits_defaults *d, uint32_t format_minor)
+static int defaults_in_range(const eits_defaults *d)
 {
     const float huge = 1e30f;
-    return d->iterations >= 1 && (format_minor < 1 || d->solver <= (uint32_t)EITS_SOLVER_WORKING_SET) && between(d->lambda_rel, 0, 1) && between(d->mask_threshold, 0, 1) &&
+    return d->iterations >= 1 && d->solver <= (uint32_t)EITS_SOLVER_WORKING_SET && between(d->lambda_rel, 0, 1) && between(d->mask_threshold, 0, 1) &&
            between(d->touch_threshold, 0, 1) && between(d->touch_share, 0, 1) && between(d->lambda_noise_factor, 0, huge) &&
            between(d->gate_factor, 0, huge) && between(d->touch_change_s_per_m, 0, huge) && between(d->follow_mm, 0, huge) &&
            between(d->touch_radius_weight, 0, huge) && between(d->touch_min_radius_mm, 1e-6f, huge) &&
@@ -265,7 +265,7 @@ static eits_status check_numbers(const eits_model *model)
         (s->storage == EITS_STORAGE_F32 && !all_finite(s->data, stored)) ||
         (s->storage == EITS_STORAGE_F16 && !halves_finite(s->data, stored)))
         return EITS_E_MODEL_VALUE;
-    if (!defaults_in_range(model->defaults, model->format_minor))
+    if (!defaults_in_range(model->defaults))
         return EITS_E_MODEL_VALUE;
     return EITS_OK;
 }
@@ -307,7 +307,6 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     if (status != EITS_OK)
         return status;
     memcpy(&opened.protocol_hash, bytes + 24, sizeof opened.protocol_hash);
-    opened.format_minor = (uint32_t)bytes[6] | (uint32_t)bytes[7] << 8;
     point_into(&opened, &found);
     status = check_tables(&opened);
     if (status == EITS_OK)

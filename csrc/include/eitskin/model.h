@@ -76,7 +76,7 @@ typedef struct eits_defaults {
     float touch_change_s_per_m;
     float follow_mm;
     float touch_radius_weight;
-    uint32_t solver; /* eits_solver; since format 1.1, in files of 1.0 to be ignored */
+    uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
     float reserved;
 } eits_defaults;
 
@@ -88,7 +88,6 @@ typedef struct eits_golden {
 } eits_golden;
 
 typedef struct eits_model {
-    uint32_t format_minor;
     uint32_t n_electrodes;
     uint32_t n_rows;   /* rows of the protocol table: voltages in a frame */
     uint32_t n_folded; /* after the reciprocity fold */

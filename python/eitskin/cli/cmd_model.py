@@ -129,7 +129,8 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
     defaults = facts.pop("defaults")
     for key, value in facts.items():
         print(f"{key.replace('_', ' '):16} {value}")
-    print("defaults         " + ", ".join(f"{key} {value:g}" for key, value in defaults.items()))
+    shown = (f"{key} {value if isinstance(value, str) else format(value, 'g')}" for key, value in defaults.items())
+    print("defaults         " + ", ".join(shown))
 
 
 def run_verify(options: argparse.Namespace) -> int:

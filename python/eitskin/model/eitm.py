@@ -102,9 +102,8 @@ def decode_model(blob: bytes, where: str) -> Model:
         ModelError: it is truncated, corrupted, newer or foreign.
     """
     sections = _split(blob, where)
-    _, _, minor, _, _, _, _, protocol_hash = _header(blob, where)
     try:
-        return _decode_sections(sections, protocol_hash, minor, where)
+        return _decode_sections(sections, _header(blob, where)[7], where)
     except ModelError:
         raise
     except EitskinError as error:
@@ -248,13 +247,12 @@ def _read_grid(content: bytes, d: _Dims, where: str) -> Grid:
     return Grid(d.nx, d.ny, d.pixel_mm, (d.origin_x_mm, d.origin_y_mm), index)
 
 
-def _read_defaults(content: bytes, minor: int, where: str) -> Defaults:
+def _read_defaults(content: bytes, where: str) -> Defaults:
     names = [entry.name for entry in fields(Defaults)]
     values: dict[str, Any] = dict(zip(names, map(_short, DEFAULTS.unpack(content)), strict=False))
-    number = values["solver"] if minor >= 1 else 0  # 1.0 had FISTA alone, and left the place open
-    if number >= len(SOLVERS):
-        _refuse(where, f"solver {number}, which this eitskin does not have; upgrade it")
-    d = Defaults(**{**values, "solver": SOLVERS[number]})
+    if values["solver"] >= len(SOLVERS):
+        _refuse(where, "a solver that this eitskin does not know")
+    d = Defaults(**{**values, "solver": SOLVERS[values["solver"]]})  # files of 1.0 have 0 there: FISTA
     shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_share)
     sizes = (d.lambda_noise_factor, d.gate_factor, d.touch_change_s_per_m, d.follow_mm, d.touch_radius_weight)
     in_range = (
@@ -279,7 +277,7 @@ def _read_meta(content: bytes, where: str) -> dict[str, Any]:
     return dict(meta)
 
 
-def _decode_sections(sections: Sections, protocol_hash: int, minor: int, where: str) -> Model:
+def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model:
     d = _read_dims(sections["DIMS"], where)
     _check_sizes(sections, d, where)
     table = np.frombuffer(sections["PROT"], dtype="u1").reshape(d.n_rows, 4)
@@ -303,7 +301,7 @@ def _decode_sections(sections: Sections, protocol_hash: int, minor: int, where: 
         column_weight=_floats(sections, "COLW", (d.n_pixels,), where),
         lipschitz=d.lipschitz,
         noise_gain=d.noise_gain,
-        defaults=_read_defaults(sections["DEFS"], minor, where),
+        defaults=_read_defaults(sections["DEFS"], where),
         golden=Golden(golden[: d.n_rows], golden[d.n_rows : 2 * d.n_rows], golden[2 * d.n_rows :]),
         meta=_read_meta(sections["META"], where) if "META" in sections else {},
     )

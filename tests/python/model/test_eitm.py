@@ -61,7 +61,7 @@ def test_round_trip(storage: str, data_kind: str) -> None:
 def test_header_as_documented() -> None:
     blob = small_blob()
     assert blob[:4] == b"EITM"
-    assert struct.unpack_from("<HH", blob, 4) == (1, 0)
+    assert struct.unpack_from("<HH", blob, 4) == (1, 1)
     total, crc, count, zero = struct.unpack_from("<4I", blob, 8)
     assert total == len(blob) and total % 16 == 0
     assert crc == zlib.crc32(blob[16:])
@@ -101,9 +101,9 @@ def test_sections_as_documented(storage: str) -> None:
     assert (model.sensitivity == (columns[:, :r].astype(float) * scale).T).all() and not columns[:, r:].any()
     assert (np.frombuffer(body["COLW"], "<f4") == model.column_weight).all()
     assert (np.frombuffer(body["GRID"], "<u2").reshape(n, 2) == grid.index).all()
-    defaults = struct.unpack("<2I12f2f", body["DEFS"])
-    assert defaults[:14] == pytest.approx(tuple(asdict(model.defaults).values()), rel=1e-6)
-    assert defaults[14:] == (0, 0)
+    defaults = struct.unpack("<2I12fIf", body["DEFS"])
+    assert defaults[:14] == pytest.approx(tuple(asdict(model.defaults).values())[:14], rel=1e-6)
+    assert model.defaults.solver == "working-set" and defaults[14:] == (1, 0)
     gold = np.frombuffer(body["GOLD"], "<f4")
     assert gold[:m] == pytest.approx(linear.v0_v, rel=1e-6)
     assert (gold[m : 2 * m] == model.golden.frame_v).all() and (gold[2 * m :] == model.golden.image).all()
@@ -174,7 +174,7 @@ def test_a_newer_major_is_refused_before_the_checksum() -> None:
     blob = bytearray(tiny_blob())
     blob[4] = 2
     blob[100] ^= 1
-    assert "format is 2.0, this eitskin reads 1.x" in refusal(bytes(blob))
+    assert "format is 2.1, this eitskin reads 1.x" in refusal(bytes(blob))
 
 
 def with_extra_section(tag: bytes, flags: int) -> bytes:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eitm_bytes import sealed, sections_of
-from eitskin.core.results import Reconstruction
+from eitskin.core.results import SOLVERS, Reconstruction
 from eitskin.errors import FrameError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
@@ -18,11 +18,17 @@ FRAMES = 20
 F64_BOUND, F32_BOUND = 1e-12, 1e-4
 
 
-def engines(storage: str, data_kind: str, **options: object) -> dict[str, Reconstructor]:
+@pytest.fixture(params=SOLVERS)
+def solver(request: pytest.FixtureRequest) -> str:
+    """Each solver in turn."""
+    return str(request.param)
+
+
+def engines(storage: str, data_kind: str, solver: str, **options: object) -> dict[str, Reconstructor]:
     """One of each, without a gate."""
     made = {name: Reconstructor(small_model(storage, data_kind), engine=name) for name in ENGINES}
     for reconstructor in made.values():
-        reconstructor.with_options(iterations=60, gate_factor=0.0, **options)
+        reconstructor.with_options(iterations=60, gate_factor=0.0, solver=solver, **options)
     return made
 
 
@@ -62,8 +68,8 @@ def agree(made: dict[str, Reconstructor], frames: np.ndarray, *, keep: bool = Fa
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("drift", [True, False], ids=["project", "keep"])
-def test_same_images(storage: str, data_kind: str, drift: bool) -> None:
-    made = engines(storage, data_kind, project_baseline=drift)
+def test_same_images(storage: str, data_kind: str, drift: bool, solver: str) -> None:
+    made = engines(storage, data_kind, solver, project_baseline=drift)
     for seed, sign in enumerate(SIGNS):
         for reconstructor in made.values():
             reconstructor.with_options(sign=sign, lambda_abs=0.0)
@@ -74,10 +80,10 @@ def test_same_images(storage: str, data_kind: str, drift: bool) -> None:
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", ["f32", "i8"])
-def test_same_images_with_rows_left_out(storage: str, data_kind: str) -> None:
+def test_same_images_with_rows_left_out(storage: str, data_kind: str, solver: str) -> None:
     """Rows masked from the start, one of a reciprocal pair or both, and others that drop out in single frames."""
     s, generator = small(), np.random.default_rng(8)
-    made = engines(storage, data_kind)
+    made = engines(storage, data_kind, solver)
     mask = np.zeros(208, dtype=bool)
     mask[generator.choice(208, 12, replace=False)] = True
     fold = s.protocol.reciprocal_pairs()
@@ -93,10 +99,10 @@ def test_same_images_with_rows_left_out(storage: str, data_kind: str) -> None:
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_same_images_from_a_warm_start(data_kind: str) -> None:
+def test_same_images_from_a_warm_start(data_kind: str, solver: str) -> None:
     """A touch that moves, jumps, lifts; a frame that is refused and one with dropouts in between."""
     s = small()
-    made = engines("f32", data_kind, warm_start=True)
+    made = engines("f32", data_kind, solver, warm_start=True)
     grid = s.linear.grid
     frames = []
     for k in range(FRAMES):
@@ -121,7 +127,7 @@ def test_same_images_from_a_warm_start(data_kind: str) -> None:
 
 
 @pytest.mark.parametrize(("factor", "halvings"), [(1 / 3, 1), (1 / 16, 4), (1e-9, 8)])
-def test_same_recovery_from_a_step_too_long(factor: float, halvings: int) -> None:
+def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver: str) -> None:
     """A model that understates its Lipschitz constant: the step is halved and the run starts over, or is given up as zero."""
     blob = bytearray(small_blob())
     place = sections_of(blob)["DIMS"].offset + 56
@@ -130,7 +136,7 @@ def test_same_recovery_from_a_step_too_long(factor: float, halvings: int) -> Non
     model, frame, results = decode_model(sealed_blob, "x"), small().frames(9, 1)[0], {}
     for name in ENGINES:
         made = Reconstructor(model, engine=name, blob=sealed_blob)
-        made.with_options(iterations=300, gap_every=5, gate_factor=0.0)
+        made.with_options(iterations=300, gap_every=5, gate_factor=0.0, solver=solver)
         made.tare(small().linear.v0_v)
         results[name] = made.reconstruct(frame)
     expected = results["numpy"]
@@ -142,9 +148,9 @@ def test_same_recovery_from_a_step_too_long(factor: float, halvings: int) -> Non
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
-def test_same_facts(data_kind: str) -> None:
+def test_same_facts(data_kind: str, solver: str) -> None:
     """Baseline and info of float64 C are the reference's."""
-    made = engines("f16", data_kind)
+    made = engines("f16", data_kind, solver)
     quiet = small().quiet(3, 21)
     baselines = {name: reconstructor.tare(quiet) for name, reconstructor in made.items()}
     for reconstructor in made.values():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Reconstruction
+from eitskin.core.results import SOLVERS, Reconstruction
 from eitskin.solve.options import default_options
 from small_models import DATA_KINDS, SIGNS, STORAGES, prebuilt, session, small, small_blob, small_model
 
@@ -27,7 +27,8 @@ def same(results: list[Reconstruction]) -> None:
 @pytest.mark.parametrize("width", ["float32", "float64"])
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
-def test_small_models(storage: str, data_kind: str, width: str) -> None:
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> None:
     blob, s = small_blob(storage, data_kind), small()
     built = [CoreEngine(blob, width, prepared=prepared, portable=portable) for prepared, portable in BUILDS]
     for sign in SIGNS:
@@ -35,7 +36,8 @@ def test_small_models(storage: str, data_kind: str, width: str) -> None:
         frames[1, 17:25] = np.nan
         results = []
         for engine in built:
-            engine.set_options(replace(default_options(small_model(storage, data_kind)), sign=sign, warm_start=True))
+            chosen = default_options(small_model(storage, data_kind))
+            engine.set_options(replace(chosen, solver=solver, sign=sign, warm_start=True))
             engine.set_baseline(s.quiet(31, 8))
             engine.forget()
             results.append([engine.reconstruct(frame) for frame in frames])
@@ -60,11 +62,11 @@ def test_touches_of_simulated_frames(width: str) -> None:
 
 
 def test_names_and_sizes() -> None:
-    """The portable kernels say so; the copy in panels is what a prepared context has more."""
+    """The portable kernels say so; the copies in panels, of S and of the working set, are what a prepared context has more."""
     model, blob = prebuilt()
     portable, bare = CoreEngine(blob, portable=True), CoreEngine(blob, prepared=False)
     assert portable.kernels == "portable"
-    assert portable.workspace_bytes - bare.workspace_bytes == 832 * 64 * 4
+    assert portable.workspace_bytes - bare.workspace_bytes == 2 * 832 * 64 * 4
     wide = CoreEngine(blob, "float64", prepared=False)
     assert 1.7 * bare.workspace_bytes < wide.workspace_bytes < 2 * bare.workspace_bytes
     assert (bare.n_rows, bare.n_pixels) == (208, model.grid.n_pixels)
@@ -82,17 +84,32 @@ def test_units_of_the_frames_do_not_matter(scale: float) -> None:
     assert np.abs(images[1] - images[0]).max() < 1e-4 * images[0].max()
 
 
+def macs_of(iterations: int, **options: object) -> int:
+    """Of the solve of one simulated frame."""
+    model, blob = prebuilt()
+    frames, engine = session().as_frames(), CoreEngine(blob)
+    engine.set_options(replace(default_options(model), iterations=iterations, **options))
+    engine.set_baseline(frames.reference_voltage_v)
+    return engine.reconstruct(frames.voltage_v[0]).info.macs
+
+
 def test_macs_follow_the_work() -> None:
     """Without zeros skipped: per iteration one S'r, one S x of the non-zeros, and the projection."""
-    model, blob = prebuilt()
-    frames = session().as_frames()
-    macs = {}
-    for iterations in (1, 20, 40):
-        engine = CoreEngine(blob)
-        engine.set_options(replace(default_options(model), iterations=iterations))
-        engine.set_baseline(frames.reference_voltage_v)
-        macs[iterations] = engine.reconstruct(frames.voltage_v[0]).info.macs
+    model, _ = prebuilt()
+    macs = {count: macs_of(count, solver="fista") for count in (1, 20, 40)}
     whole = model.grid.n_pixels * model.rank
     per_iteration = (macs[40] - macs[20]) / 20
     assert whole < per_iteration < 1.25 * whole
     assert macs[1] < 4 * whole
+
+
+def test_the_working_set_spares_macs() -> None:
+    """A look at every column at iterations 1 and 21 and for the certificate; a few columns at a time in between."""
+    model, _ = prebuilt()
+    whole = model.grid.n_pixels * model.rank
+    macs = {count: macs_of(count, solver="working-set") for count in (1, 20, 21, 60)}
+    assert macs[1] == macs_of(1, solver="fista")
+    assert macs[20] < macs[1] + 5 * whole
+    assert whole < macs[21] - macs[20] < 1.3 * whole
+    assert macs[60] - macs[21] < 39 * 0.2 * whole
+    assert macs[60] < 0.25 * macs_of(60, solver="fista")

@@ -1,4 +1,4 @@
-"""FISTA run to a small duality gap against scikit-learn's coordinate descent: the same optimum, and the gap bounds the error."""
+"""Both solvers run to a small duality gap against scikit-learn's coordinate descent: the same optimum, and the gap bounds the error."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Options
+from eitskin.core.results import SOLVERS, Options
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.solve.reference import certify, fista, orthonormal
@@ -34,7 +34,9 @@ def lasso(s: np.ndarray, y: np.ndarray, lam: float, sign: str) -> np.ndarray:
 
 
 def options(sign: str, **changes: object) -> Options:
-    return replace(default_options(small_model()), sign=sign, iterations=100_000, gap_rel=GAP_REL, gate_factor=0.0, **changes)
+    return replace(
+        default_options(small_model()), sign=sign, iterations=100_000, gap_rel=GAP_REL, gate_factor=0.0, gap_every=10, **changes
+    )
 
 
 def problem(seed: int, sign: str, share: float, drift: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -51,13 +53,14 @@ def problem(seed: int, sign: str, share: float, drift: bool) -> tuple[np.ndarray
 @pytest.mark.parametrize("drift", [True, False], ids=["project", "keep"])
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
 @pytest.mark.parametrize("sign", ["increase", "decrease", "both"])
-def test_same_optimum(sign: str, share: float, drift: bool) -> None:
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_same_optimum(solver: str, sign: str, share: float, drift: bool) -> None:
     """Objectives agree within the gap, predictions S x to its square root."""
     for seed in range(3):
         s, y, basis, lam = problem(seed, sign, share, drift)
         projected = s - basis.T @ (basis @ s)
         best = lasso(projected, y, lam, sign)
-        result = fista(s, y, lam, small_model().lipschitz, options(sign), basis)
+        result = fista(s, y, lam, small_model().lipschitz, options(sign, solver=solver), basis)
         assert result.stop == "gap" and result.step_halvings == 0
         scale = 0.5 * float(y @ y)
         above = objective(projected, y, result.x, lam) - objective(projected, y, best, lam)
@@ -70,20 +73,22 @@ def test_same_optimum(sign: str, share: float, drift: bool) -> None:
 
 
 @pytest.mark.parametrize("sign", ["increase", "both"])
-def test_the_gap_bounds_the_error_all_the_way(sign: str) -> None:
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_gap_bounds_the_error_all_the_way(solver: str, sign: str) -> None:
     """At every number of iterations the reported gap is at least what the objective lacks, and shrinks over the run."""
     s, y, basis, lam = problem(5, sign, 0.03, True)
     projected = s - basis.T @ (basis @ s)
     best = objective(projected, y, lasso(projected, y, lam, sign), lam)
     gaps = []
     for iterations in (1, 2, 5, 10, 30, 60, 100, 300, 1000):
-        run = replace(options(sign), iterations=iterations, gap_rel=0.0)
+        run = replace(options(sign, solver=solver), iterations=iterations, gap_rel=0.0)
         result = fista(s, y, lam, small_model().lipschitz, run, basis)
         assert result.iterations == iterations
         assert result.gap >= objective(projected, y, result.x, lam) - best - 1e-12 * best
         gaps.append(result.gap)
     assert gaps[-1] < 1e-3 * gaps[0]
-    assert gaps[5] < 0.05 * gaps[0]
+    # the working set's gap counts what its columns outside would do at the next look
+    assert gaps[5] < (0.05 if solver == "fista" else 0.25) * gaps[0]
 
 
 def test_the_gap_is_that_of_the_dual_point() -> None:
@@ -100,12 +105,13 @@ def test_the_gap_is_that_of_the_dual_point() -> None:
 
 
 @pytest.mark.parametrize("width", ["float64", "float32"])
-def test_the_core_stops_at_the_gap(width: str) -> None:
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
     """C run to a gap on simulated frames: its coefficients are as near to the optimum as it says."""
     model, blob = prebuilt()
     gap_rel = 1e-6 if width == "float64" else 1e-4
     engine = CoreEngine(blob, width)
-    engine.set_options(replace(default_options(model), iterations=100_000, gap_rel=gap_rel, project_baseline=False))
+    engine.set_options(replace(default_options(model), iterations=100_000, gap_rel=gap_rel, project_baseline=False, solver=solver))
     frames = session().as_frames()
     engine.set_baseline(frames.reference_voltage_v)
     for frame in frames.voltage_v[:5]:

@@ -1,0 +1,274 @@
+/* FISTA on a working set: with a look at every column in each iteration the bits of FISTA; with fewer, the same optimum for
+ * less work. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 9, N = SIDE * SIDE, RANK = 12 };
+
+static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+} bench;
+
+static void new_data(eits_context *ctx, uint64_t state)
+{
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        ctx->y[i] = (eits_real)small_random(&state);
+}
+
+static eits_context *set_up(bench *b, small_spec spec, int prepared)
+{
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make(spec);
+    small_context_open(&b->c, &b->made, prepared);
+    new_data(&b->c.ctx, 61);
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+static eits_options with(const eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign, double lambda)
+{
+    eits_options o = ctx->options;
+    o.solver = solver;
+    o.iterations = iterations;
+    o.sign = sign;
+    o.lambda_abs = (eits_real)lambda;
+    return o;
+}
+
+static eits_info solve(eits_context *ctx, eits_options o)
+{
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return ctx->info;
+}
+
+/* A gap is asked for that is never reached, so that each iteration looks at every column. */
+static void look_always(eits_options *o)
+{
+    o->gap_every = 1;
+    o->gap_rel = R(1e-30);
+}
+
+static void check_same(const eits_context *a, const eits_context *b)
+{
+    const eits_info *i = &a->info, *j = &b->info;
+    CHECK(memcmp(a->x, b->x, a->model->n_pixels * sizeof *a->x) == 0);
+    CHECK(memcmp(a->image, b->image, a->model->n_pixels * sizeof *a->image) == 0);
+    CHECK_EQUAL(i->iterations, j->iterations);
+    CHECK_EQUAL(i->stop, j->stop);
+    CHECK_EQUAL(i->nonzeros, j->nonzeros);
+    CHECK_EQUAL(i->step_halvings, j->step_halvings);
+    CHECK(i->gap == j->gap && i->residual == j->residual && i->lambda == j->lambda);
+}
+
+static void looking_always_gives_the_bits_of_fista(void)
+{
+    static const uint32_t counts[] = {1, 2, 11, 60};
+    for (int storage = 0; storage < 4; ++storage) {
+        for (int sign = 0; sign < 3; ++sign) {
+            for (int prepared = 0; prepared < 2; ++prepared) {
+                for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
+                    bench b[2];
+                    for (int solver = 0; solver < 2; ++solver) {
+                        eits_context *ctx = set_up(&b[solver], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, prepared);
+                        eits_options o = with(ctx, (eits_solver)solver, counts[k], (eits_sign)sign, 0.05);
+                        look_always(&o);
+                        o.warm_start = 1;
+                        (void)solve(ctx, o);
+                        new_data(ctx, 62); /* and from there to other data */
+                        (void)solve(ctx, o);
+                    }
+                    CHECK(b[0].c.ctx.info.nonzeros > 0);
+                    check_same(&b[0].c.ctx, &b[1].c.ctx);
+                    tear_down(&b[0]);
+                    tear_down(&b[1]);
+                }
+            }
+        }
+    }
+}
+
+/* A step that is too long, by little or beyond all bounds: the same halvings, the same end. */
+static void looking_always_recovers_like_fista(void)
+{
+    static const double factors[] = {1.0 / 3, 1.0 / 16, 1e-9};
+    for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
+        bench b[2];
+        for (int solver = 0; solver < 2; ++solver) {
+            eits_context *ctx = set_up(&b[solver], (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]}, solver);
+            eits_options o = with(ctx, (eits_solver)solver, 200, EITS_SIGN_BOTH, 0.05);
+            look_always(&o);
+            (void)solve(ctx, o);
+        }
+        CHECK(b[0].c.ctx.info.step_halvings > 0);
+        check_same(&b[0].c.ctx, &b[1].c.ctx);
+        tear_down(&b[0]);
+        tear_down(&b[1]);
+    }
+}
+
+static void a_wild_run_ends_as_zero(void)
+{
+    static const double factors[] = {1e-4, 1e-12, 1e-36};
+    for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
+        for (int sign = 0; sign < 3; ++sign) {
+            bench b;
+            eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]}, 0);
+            const eits_info info = solve(ctx, with(ctx, EITS_SOLVER_WORKING_SET, 1000, (eits_sign)sign, 0.01));
+            CHECK_EQUAL(info.stop, EITS_STOP_DIVERGED);
+            CHECK(info.nonzeros == 0 && info.step_halvings == 8 && info.residual == info.data_norm);
+            for (int j = 0; j < N; ++j)
+                CHECK(ctx->x[j] == 0 && ctx->image[j] == 0);
+            tear_down(&b);
+        }
+    }
+}
+
+/* Asked for a gap, or given time: the certificate holds over all columns, also those that no iteration touched. */
+static void the_optimum_is_that_of_all_columns(void)
+{
+    for (int sign = 0; sign < 3; ++sign) {
+        for (int asked = 0; asked < 2; ++asked) {
+            for (uint32_t every = 1; every <= 50; every += 7) {
+                bench b;
+                eits_context *ctx = set_up(&b, RANDOM, (int)(every % 2));
+                eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, asked ? 50000 : 20000, (eits_sign)sign, 0.03);
+                o.gap_every = every;
+                o.gap_rel = asked ? R(BOTH_WIDTHS(1e-5, 1e-11)) : 0;
+                const eits_info info = solve(ctx, o);
+                CHECK_EQUAL(info.stop, asked ? EITS_STOP_GAP : EITS_STOP_ITERATIONS);
+                dense d = dense_of(&b.c.model);
+                double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
+                const double gap = dense_gap(&d, y, x, (double)info.lambda, (eits_sign)sign), scale = 0.5 * dense_dot(y, y, RANK);
+                CHECK_NEAR(gap, info.gap, 100 * EPS * scale);
+                CHECK(gap <= BOTH_WIDTHS(1e-5, 1e-11) * scale * (1 + 1e-3) + 100 * EPS * scale);
+                CHECK(info.nonzeros >= 3);
+                dense_free(&d);
+                free(x), free(y);
+                tear_down(&b);
+            }
+        }
+    }
+}
+
+/* Prepared or not, portable or not: one result. */
+static void same_bits_in_every_layout(void)
+{
+    for (int storage = 0; storage < 4; ++storage) {
+        bench b[4];
+        for (int way = 0; way < 4; ++way) {
+            eits_context *ctx = set_up(&b[way], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, way % 2);
+            CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
+            (void)solve(ctx, with(ctx, EITS_SOLVER_WORKING_SET, 60, EITS_SIGN_BOTH, 0.02));
+            check_same(&b[0].c.ctx, ctx);
+            CHECK(ctx->info.macs == b[0].c.ctx.info.macs);
+        }
+        for (int way = 0; way < 4; ++way)
+            tear_down(&b[way]);
+    }
+}
+
+/* Rows left out and the drift of the gain: the same projections as FISTA's. */
+static void beside_a_basis(void)
+{
+    bench b[2];
+    for (int solver = 0; solver < 2; ++solver) {
+        eits_context *ctx = set_up(&b[solver], RANDOM, 0);
+        eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+        uint64_t state = 63;
+        small_reference(&b[solver].c.model, 1, reference);
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+        frame[b[solver].c.model.fold[4].first] = frame[b[solver].c.model.fold[4].second] = R(NAN);
+        CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        eits_options o = with(ctx, (eits_solver)solver, 40, EITS_SIGN_INCREASE, 0.01);
+        look_always(&o);
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(ctx->basis_count, 2);
+    }
+    CHECK(b[0].c.ctx.info.nonzeros >= 3);
+    check_same(&b[0].c.ctx, &b[1].c.ctx);
+    tear_down(&b[0]);
+    tear_down(&b[1]);
+}
+
+/* From the optimum a warm start stays there; what it starts from is all of the last frame's coefficients. */
+static void warm_starts(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM, 1);
+    eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, 20000, EITS_SIGN_BOTH, 0.03);
+    const eits_info cold = solve(ctx, o);
+    o.warm_start = 1;
+    o.iterations = 1;
+    const eits_info warm = solve(ctx, o);
+    CHECK_EQUAL(warm.iterations, 1);
+    CHECK(warm.gap_rel <= cold.gap_rel + R(200 * EPS));
+    CHECK_EQUAL(warm.nonzeros, cold.nonzeros);
+    tear_down(&b);
+}
+
+/* On the identity with one positive datum the working set is that one column. */
+static void work_is_counted(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, (small_spec){.rank = 16, .side = 4, .shape = SMALL_IDENTITY}, 0);
+    const uint64_t whole = 16 * 16, column = 16;
+    eits_zero(ctx->y, 16);
+    ctx->y[3] = 1;
+    eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, 1, EITS_SIGN_INCREASE, 0.25);
+    o.gap_every = 5;
+    CHECK_EQUAL(solve(ctx, o).macs, whole + column + whole);
+    o.iterations = 5; /* S'y serves the first iteration; then a column each for S'r and S x; S'r for the gap */
+    CHECK_EQUAL(solve(ctx, o).macs, whole + 4 * column + 5 * column + whole);
+    o.iterations = 25; /* looks at 6 and, after twice as many, at 16 */
+    CHECK_EQUAL(solve(ctx, o).macs, whole + 2 * whole + 22 * column + 25 * column + whole);
+    o.gap_rel = R(1e-30); /* a look at 6 likewise, and a gap at 5 and at the end */
+    o.iterations = 9;
+    CHECK_EQUAL(solve(ctx, o).macs, whole + whole + 7 * column + 9 * column + 2 * whole);
+    tear_down(&b);
+}
+
+static void refused_options(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, RANDOM, 0);
+    CHECK_EQUAL(ctx->options.solver, EITS_SOLVER_FISTA); /* what a file of format 1.0 has */
+    eits_options o = ctx->options;
+    o.solver = (eits_solver)2;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
+    tear_down(&b);
+}
+
+int main(void)
+{
+    looking_always_gives_the_bits_of_fista();
+    looking_always_recovers_like_fista();
+    a_wild_run_ends_as_zero();
+    the_optimum_is_that_of_all_columns();
+    same_bits_in_every_layout();
+    beside_a_basis();
+    warm_starts();
+    work_is_counted();
+    refused_options();
+    return checks_report("working set");
+}
