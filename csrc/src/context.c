@@ -19,7 +19,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
     const eits_defaults *d = model->defaults;
     const eits_options chosen = {
         .iterations = d->iterations,
-        .gap_every = 20,
+        .gap_every = 10,
         .max_touches = d->max_touches < EITS_MAX_TOUCHES ? d->max_touches : EITS_MAX_TOUCHES,
         .max_masked = model->n_rows / 2,
         .sign = EITS_SIGN_INCREASE,

@@ -10,8 +10,8 @@ enum { MAX_STEP_HALVINGS = 8 };
 uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx)
 {
     const size_t stride = EITS_STRIDE(ctx->model->rank);
-    for (size_t i = 0; i < stride; ++i)
-        ctx->residual[i] = ctx->y[i] - sx[i];
+    eits_copy(ctx->residual, ctx->y, stride);
+    eits_axpy(ctx, ctx->residual, -1, sx, stride);
     return eits_project(ctx, ctx->residual);
 }
 
@@ -112,14 +112,14 @@ static eits_real iterate(eits_context *ctx, eits_real lambda, eits_real step, ei
     return t_next;
 }
 
-/* When the working set is looked after: a look at every column after gap_every iterations, then after twice as many more,
- * and so on, for less and less changes; where a gap is to be reached, always after gap_every. In between those at rest are
- * left out every few iterations. */
+/* When the working set is looked after: a look at every column after gap_every iterations, then after LOOK_GROWTH times as many,
+ * and so on: early looks matter, later ones change little; where a gap is to be reached, always after gap_every. In between,
+ * columns at rest are left out every few iterations. */
 typedef struct schedule {
     uint32_t next_look, interval;
 } schedule;
 
-enum { PRUNE_EVERY = 5 };
+enum { PRUNE_EVERY = 5, LOOK_GROWTH = 6 };
 
 /* The gradient at z for iteration k (from 1): of every column, or of the working set as it is then. */
 static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, schedule *s, int known)
@@ -134,7 +134,7 @@ static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, sc
             take_gradient(ctx, ctx->sz);
         eits_working_set_choose(ctx, lambda);
         s->next_look = k + s->interval;
-        s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / 4 ? s->interval : 2 * s->interval;
+        s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / LOOK_GROWTH / 2 ? s->interval : LOOK_GROWTH * s->interval;
         return;
     }
     take_working_gradient(ctx, ctx->sz);

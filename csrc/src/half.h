@@ -7,10 +7,10 @@
 
 static inline float eits_half_to_float(uint16_t half)
 {
-#if defined(__ARM_FP) && (__ARM_FP & 2) && defined(__ARM_FP16_FORMAT_IEEE)
-    __fp16 value;
-    memcpy(&value, &half, sizeof value);
-    return (float)value; /* VCVTB.F32.F16 */
+#if defined(__ARM_ARCH_7EM__) && defined(__ARM_FP)
+    float value; /* both FPUs of that architecture convert halves, though GCC does not know it of fpv5-sp-d16 */
+    __asm__("vmov %0, %1\n\tvcvtb.f32.f16 %0, %0" : "=t"(value) : "r"((uint32_t)half));
+    return value;
 #else
     /* the exponent and fraction as float bits, 112 too low in the exponent, mended by an exact multiplication by 2^112 */
     const uint32_t bits = (uint32_t)(half & 0x7FFFu) << 13;

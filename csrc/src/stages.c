@@ -17,14 +17,13 @@ uint64_t eits_project(const eits_context *ctx, eits_real *v)
 eits_real eits_greatest(const eits_real *g, uint32_t count, eits_sign sign)
 {
     eits_real high = 0, low = 0;
-    for (uint32_t j = 0; j < count; ++j) {
-        high = g[j] > high ? g[j] : high;
-        low = g[j] < low ? g[j] : low;
+    if (sign != EITS_SIGN_DECREASE) {
+        for (uint32_t j = 0; j < count; ++j)
+            high = g[j] > high ? g[j] : high;
     }
-    switch (sign) {
-    case EITS_SIGN_INCREASE: return high;
-    case EITS_SIGN_DECREASE: return -low;
-    case EITS_SIGN_BOTH: break;
+    if (sign != EITS_SIGN_INCREASE) {
+        for (uint32_t j = 0; j < count; ++j)
+            low = g[j] < low ? g[j] : low;
     }
     return high > -low ? high : -low;
 }

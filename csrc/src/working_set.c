@@ -7,9 +7,20 @@
 #include "kernels.h"
 #include "vec.h"
 
-static int would_move(eits_real gradient, eits_real lambda, eits_sign sign)
+/* A column at rest moves where its gradient lies outside these. */
+typedef struct limits {
+    eits_real low, high;
+} limits;
+
+static limits limits_for(eits_real lambda, eits_sign sign)
 {
-    return (sign != EITS_SIGN_DECREASE && gradient > lambda) || (sign != EITS_SIGN_INCREASE && gradient < -lambda);
+    const eits_real none = R(INFINITY);
+    return (limits){sign == EITS_SIGN_INCREASE ? -none : -lambda, sign == EITS_SIGN_DECREASE ? none : lambda};
+}
+
+static int moves(eits_real gradient, limits rest)
+{
+    return gradient > rest.high || gradient < rest.low;
 }
 
 void eits_working_set_begin(eits_context *ctx)
@@ -28,25 +39,27 @@ void eits_working_set_begin(eits_context *ctx)
 void eits_working_set_choose(eits_context *ctx, eits_real lambda)
 {
     const uint32_t n = ctx->model->n_pixels, before = ctx->working_count;
-    const eits_sign sign = ctx->options.sign;
-    eits_real *x = ctx->x_next, *z = ctx->image; /* the image is made after the last iteration */
+    const limits rest = limits_for(lambda, ctx->options.sign);
+    eits_real *x = ctx->x_next, *z = ctx->image, *gradient = ctx->gradient; /* the image is made after the last iteration */
     uint32_t *chosen = ctx->list_index;
-    uint32_t count = 0, old = 0, next = before > 0 ? ctx->working[0] : n;
-    for (uint32_t j = 0; j < n; ++j) {
-        const eits_real gradient = ctx->gradient[j];
-        const int moves = would_move(gradient, lambda, sign);
-        if (j != next && !moves)
-            continue;
-        x[count] = z[count] = 0;
-        if (j == next) {
-            x[count] = ctx->x[old];
-            z[count] = ctx->z[old++];
-            next = old < before ? ctx->working[old] : n;
-            if (!moves && x[count] == 0 && z[count] == 0)
+    uint32_t count = 0, j = 0;
+    for (uint32_t old = 0; old <= before; ++old) {
+        const uint32_t next = old < before ? ctx->working[old] : n;
+        for (; j < next; ++j) {
+            if (!moves(gradient[j], rest))
                 continue;
+            chosen[count] = j;
+            x[count] = z[count] = 0;
+            gradient[count++] = gradient[j];
+        }
+        if (next == n || (ctx->x[old] == 0 && ctx->z[old] == 0 && !moves(gradient[next], rest))) {
+            ++j;
+            continue;
         }
         chosen[count] = j;
-        ctx->gradient[count++] = gradient;
+        x[count] = ctx->x[old];
+        z[count] = ctx->z[old];
+        gradient[count++] = gradient[j++];
     }
     ctx->working_count = count;
     memcpy(ctx->working, chosen, count * sizeof *chosen);
@@ -58,10 +71,11 @@ void eits_working_set_choose(eits_context *ctx, eits_real lambda)
 void eits_working_set_prune(eits_context *ctx, eits_real lambda)
 {
     const uint32_t before = ctx->working_count;
+    const limits rest = limits_for(lambda, ctx->options.sign);
     uint32_t count = 0;
     for (uint32_t k = 0; k < before; ++k) {
         const eits_real x = ctx->x[k], z = ctx->z[k], gradient = ctx->gradient[k];
-        if (x == 0 && z == 0 && !would_move(gradient, lambda, ctx->options.sign))
+        if (x == 0 && z == 0 && !moves(gradient, rest))
             continue;
         ctx->working[count] = ctx->working[k];
         ctx->x[count] = x;

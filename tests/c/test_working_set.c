@@ -240,8 +240,10 @@ static void work_is_counted(void)
     CHECK_EQUAL(solve(ctx, o).macs, whole + column + whole);
     o.iterations = 5; /* S'y serves the first iteration; then a column each for S'r and S x; S'r for the gap */
     CHECK_EQUAL(solve(ctx, o).macs, whole + 4 * column + 5 * column + whole);
-    o.iterations = 25; /* looks at 6 and, after twice as many, at 16 */
-    CHECK_EQUAL(solve(ctx, o).macs, whole + 2 * whole + 22 * column + 25 * column + whole);
+    o.iterations = 35; /* a look at 6 */
+    CHECK_EQUAL(solve(ctx, o).macs, whole + whole + 33 * column + 35 * column + whole);
+    o.iterations = 36; /* and, after six times as many, at 36 */
+    CHECK_EQUAL(solve(ctx, o).macs, whole + 2 * whole + 33 * column + 36 * column + whole);
     o.gap_rel = R(1e-30); /* a look at 6 likewise, and a gap at 5 and at the end */
     o.iterations = 9;
     CHECK_EQUAL(solve(ctx, o).macs, whole + whole + 7 * column + 9 * column + 2 * whole);

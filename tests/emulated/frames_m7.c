@@ -46,9 +46,9 @@ int main(void)
 {
     eits_model model;
     eits_context ctx;
-    unsigned quiet = 0, count = 0, warm = 0, sign = 0;
+    unsigned quiet = 0, count = 0, warm = 0, sign = 0, solver = 0;
     FILE *file = fopen("plan.txt", "r");
-    if (file == NULL || fscanf(file, "%u %u %u %u", &quiet, &count, &warm, &sign) != 4)
+    if (file == NULL || fscanf(file, "%u %u %u %u %u", &quiet, &count, &warm, &sign, &solver) != 5)
         return fail("plan.txt", EITS_E_ARGUMENT);
     fclose(file);
     file = fopen("model.eitm", "rb");
@@ -64,6 +64,7 @@ int main(void)
     eits_options options = ctx.options;
     options.warm_start = warm;
     options.sign = (eits_sign)sign;
+    options.solver = (eits_solver)solver;
     status = eits_set_options(&ctx, &options);
     if (status == EITS_OK)
         status = quiet >= 4 ? eits_baseline_begin(&ctx, quiet) : EITS_OK;

@@ -39,7 +39,7 @@ class Options:
     touch_change_s_per_m: float
     touch_radius_weight: float
     follow_mm: float
-    gap_every: int = 20
+    gap_every: int = 10
     sign: str = "increase"
     solver: str = "fista"
     warm_start: bool = False

@@ -21,7 +21,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 BASIS_TOLERANCE = 1e-6
 MAX_STEP_HALVINGS = 8
-PRUNE_EVERY = 5
+PRUNE_EVERY, LOOK_GROWTH = 5, 6
 DEAD = "all voltages are zero; is the skin driven and connected?"
 
 
@@ -91,7 +91,7 @@ def fista(
             moving = (x != 0) | (z != 0) | (shrink(gradient, lam, sign) != 0)
             if k >= next_look:
                 working, next_look = moving, k + interval
-                interval *= 1 if options.gap_rel > 0 else 2
+                interval *= 1 if options.gap_rel > 0 else LOOK_GROWTH
             elif k % PRUNE_EVERY == 1:
                 working = working & moving
             gradient = np.where(working, gradient, 0.0)

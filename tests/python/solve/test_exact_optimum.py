@@ -34,9 +34,7 @@ def lasso(s: np.ndarray, y: np.ndarray, lam: float, sign: str) -> np.ndarray:
 
 
 def options(sign: str, **changes: object) -> Options:
-    return replace(
-        default_options(small_model()), sign=sign, iterations=100_000, gap_rel=GAP_REL, gate_factor=0.0, gap_every=10, **changes
-    )
+    return replace(default_options(small_model()), sign=sign, iterations=100_000, gap_rel=GAP_REL, gate_factor=0.0, **changes)
 
 
 def problem(seed: int, sign: str, share: float, drift: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
