@@ -30,7 +30,7 @@ typedef struct eits_options {
     uint32_t max_masked;   /* a frame with more unusable rows than this is refused */
     eits_sign sign;
     eits_solver solver;
-    uint32_t warm_start;       /* 1: start from the last frame's coefficients, momentum reset */
+    uint32_t warm_start;       /* 1: start from the last frame's coefficients, momentum reset; see solve.h for what it does */
     uint32_t project_baseline; /* 1: ignore changes along the reference frame, that is drift of the gain */
     eits_real lambda_abs;      /* > 0: this lambda, in the units of S'y; 0: by the rule below */
     eits_real lambda_rel;      /* lambda = max(lambda_rel lambda_max, lambda_noise_factor lambda_noise) */

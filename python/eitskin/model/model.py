@@ -21,7 +21,8 @@ DATA_KINDS = ("difference", "normalised", "log-ratio")
 class Defaults:
     """What the model's maker chose, in the file's order; csrc/include/eitskin/context.h says what each does.
 
-    Lambdas, gate and thresholds are factors without unit; ``solver`` is one of ``core.results.SOLVERS``; ``mask_threshold`` is t of the mask x > t max(x).
+    Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t max(x); ``solver`` is one
+    of ``core.results.SOLVERS``.
     """
 
     iterations: int = 60

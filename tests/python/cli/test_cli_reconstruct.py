@@ -66,6 +66,11 @@ def test_options_reach_the_solver(done: Done, frames_file: Path, changed_frames:
     facts = json.loads(done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000"))
     assert {frame["info"]["stop"] for frame in facts["frames"]} == {"gap"}
     assert all(frame["info"]["gap_rel"] <= 0.001 for frame in facts["frames"])
+    macs = {}
+    for solver in ("fista", "working-set"):
+        facts = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--solver", solver))
+        macs[solver] = facts["frames"][0]["info"]["macs"]
+    assert macs["working-set"] < 0.25 * macs["fista"]
     resting = changed_frames(voltage_v=np.repeat(session().frames_v[:1], 20, axis=0))
     cold = json.loads(done("reconstruct", resting, "--json", "--iterations", "10"))["frames"]
     warm = json.loads(done("reconstruct", resting, "--json", "--iterations", "10", "--warm"))["frames"]

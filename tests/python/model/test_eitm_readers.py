@@ -255,3 +255,24 @@ def test_what_boards_ignore() -> None:
     place = sections_of(blob)["META"]
     blob[place.offset] = ord("}")
     assert accepts(sealed(blob)) == (False, True)
+
+
+def test_both_take_a_file_of_format_1_0_as_fista() -> None:
+    """It has zero where 1.1 names the solver; a number that neither knows is refused by both."""
+    blob = bytearray(tiny_blob())
+    place = sections_of(blob)["DEFS"].offset + 56
+    assert decode_model(bytes(blob), "x").defaults.solver == "working-set" and blob[place] == 1
+    blob[6] = blob[place] = 0
+    old = sealed(blob)
+    assert agreed(old, "1.0") and decode_model(old, "x").defaults.solver == "fista"
+    quiet = decode_model(old, "x").golden.reference_v.astype(np.float64)
+    frame = decode_model(old, "x").golden.frame_v.astype(np.float64)
+    macs = {}
+    for solver in (None, "fista", "working-set"):
+        reconstructor = Reconstructor(decode_model(old, "x"), blob=old)
+        reconstructor.with_options(**({} if solver is None else {"solver": solver}))
+        reconstructor.tare(quiet)
+        macs[solver] = reconstructor.reconstruct(frame).info.macs
+    assert macs[None] == macs["fista"] > macs["working-set"]
+    blob[place] = 2
+    assert not agreed(sealed(blob), "solver 2")

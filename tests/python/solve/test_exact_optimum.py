@@ -1,4 +1,4 @@
-"""Both solvers run to a small duality gap against scikit-learn's coordinate descent: the same optimum, and the gap bounds the error."""
+"""Both solvers run to a small gap against scikit-learn's coordinate descent: one optimum, and the gap bounds the error."""
 
 from __future__ import annotations
 
@@ -84,8 +84,8 @@ def test_the_gap_bounds_the_error_all_the_way(solver: str, sign: str) -> None:
         assert result.iterations == iterations
         assert result.gap >= objective(projected, y, result.x, lam) - best - 1e-12 * best
         gaps.append(result.gap)
-    assert gaps[-1] < 1e-3 * gaps[0]
-    # the working set's gap counts what its columns outside would do at the next look
+    # the working set's gap counts what the columns outside would do at the next look
+    assert gaps[-1] < (1e-3 if solver == "fista" else 1e-2) * gaps[0]
     assert gaps[5] < (0.05 if solver == "fista" else 0.25) * gaps[0]
 
 
@@ -109,7 +109,8 @@ def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
     model, blob = prebuilt()
     gap_rel = 1e-6 if width == "float64" else 1e-4
     engine = CoreEngine(blob, width)
-    engine.set_options(replace(default_options(model), iterations=100_000, gap_rel=gap_rel, project_baseline=False, solver=solver))
+    chosen = replace(default_options(model), solver=solver, iterations=100_000, gap_rel=gap_rel, project_baseline=False)
+    engine.set_options(chosen)
     frames = session().as_frames()
     engine.set_baseline(frames.reference_voltage_v)
     for frame in frames.voltage_v[:5]:
