@@ -28,6 +28,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.options import default_options
 from small_models import session as simulated_session
+from small_models import small, small_blob, small_model
 
 ROOT = Path(__file__).resolve().parents[3]
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm", "cmake", "ninja")
@@ -193,3 +194,21 @@ def test_the_other_signs_too(program: Path, tmp_path: Path, sign: str) -> None:
         expected = host.reconstruct(frame.astype(np.float32))
         assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
         assert emulated.touches == as_printed(expected)
+
+
+@pytest.mark.parametrize("rank", [5, 16, 37, 48])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_ranks_that_no_block_fits(program: Path, tmp_path: Path, solver: str, rank: int) -> None:
+    """Rows and columns that the blocks of the processor's own products leave over."""
+    model, blob = small_model(rank=rank), small_blob(rank=rank)
+    quiet, frames = small().quiet(31, 8), small().frames(30, 3)
+    frames[1, 17:25] = np.nan
+    options = replace(default_options(model), solver=solver, warm_start=True)
+    host = CoreEngine(blob)
+    host.set_options(options)
+    host.set_baseline(quiet.astype(np.float32).astype(np.float64))
+    for frame, emulated in zip(frames, run(program, tmp_path, blob, quiet, frames, options), strict=True):
+        expected = host.reconstruct(frame.astype(np.float32))
+        assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
+        assert emulated.touches == as_printed(expected)
+        assert np.abs(expected.image).max() > 0
