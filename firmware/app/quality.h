@@ -1,0 +1,36 @@
+/* What is wrong with a frame: rows and electrodes, before the solver sees it. */
+#ifndef FW_QUALITY_H
+#define FW_QUALITY_H
+
+#include "app/engine.h"
+#include "eitskin/link.h"
+
+/* A row takes part in the judgement of its electrodes where its expected magnitude is at least this share of the rms of all
+ * (and FW_OPEN_NOISE times the noise, where a tare learned it). */
+#define FW_OPEN_SIGNIFICANT 0.05f
+#define FW_OPEN_NOISE 10.0f
+/* Such a row is dead where it has fallen below this share of what is expected, or below four times the noise. */
+#define FW_OPEN_SHARE 0.1f
+#define FW_OPEN_LEAST_ROWS 3u
+/* Reciprocal rows disagree by more than this share of the frame's rms. */
+#define FW_RECIPROCITY_SHARE 0.03f
+
+typedef struct fw_findings {
+    uint32_t saturated, first_saturated; /* rows */
+    uint32_t open;                       /* bit e: electrode e is open */
+    bool checked;                        /* reciprocity could be judged */
+    uint32_t worst_row, worst_permille;  /* of the frame's rms */
+} fw_findings;
+
+/* Before all else: notes which rows the frame measured, and clears what the others hold from earlier frames. */
+void fw_quality_prepare(fw_engine *engine, fw_frame *frame);
+
+/* Judge and finish a prepared frame whose measured rows have volts and the scan's quality bits: sets the remaining bits, copies
+ * reciprocals where they are not to be used as measured, and makes rows that must not be used NaN.
+ *
+ * An electrode is open where every significant row that uses it is dead or saturated, and there are at least three of them.
+ * Without current, or with an input that floats, all of its rows fail at once; a touch, however strong, moves current
+ * about and leaves some of the rows of each electrode: those that drive one neighbour are not those that drive the other. */
+void fw_quality_judge(fw_engine *engine, fw_frame *frame, fw_findings *findings);
+
+#endif
