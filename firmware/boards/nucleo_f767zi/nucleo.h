@@ -2,7 +2,7 @@
 #ifndef NUCLEO_H
 #define NUCLEO_H
 
-#include "hal.h"
+#include "hal/hal.h"
 #include "stm32f767.h"
 
 #include <stdint.h>
