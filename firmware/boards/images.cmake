@@ -10,7 +10,7 @@ function(eitskin_add_image board)
     target_link_libraries(${name} PRIVATE fw_app ${IMAGE_LIBRARIES})
     target_compile_options(${name} PRIVATE ${EITSKIN_WARNINGS} ${EITSKIN_ARITHMETIC} -ffile-prefix-map=${PROJECT_SOURCE_DIR}=.)
     target_link_options(${name} PRIVATE -nostartfiles ${IMAGE_SPECS} -T${script} -Wl,--gc-sections -Wl,--fatal-warnings
-                        -Wl,-Map=${name}.map)
+                        -Wl,-Map=${CMAKE_CURRENT_BINARY_DIR}/${name}.map)
     set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${script})
     add_custom_command(TARGET ${name} POST_BUILD COMMAND arm-none-eabi-size $<TARGET_FILE:${name}>)
     if(IMAGE_FLASHED)
