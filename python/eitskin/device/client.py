@@ -21,7 +21,6 @@ from eitskin.device.packets import (
     BoardInfo,
     BoardStats,
     Fault,
-    MalformedPacket,
     PacketType,
     RawFrame,
     Reply,
@@ -29,8 +28,8 @@ from eitskin.device.packets import (
     SolvedImage,
     SolvedTouches,
     Stream,
-    parse,
 )
+from eitskin.device.payloads import MalformedPacket, parse
 from eitskin.device.transport import Transport
 from eitskin.errors import DeviceError, UsageError
 
@@ -41,6 +40,14 @@ TRIES = 3
 ANSWER_S = 1.0
 INBOX = 1024
 TARE_FRAMES = 16
+
+
+def _asked_millihz(info: BoardInfo) -> int:
+    """The excitation that the board was asked for: a whole number of its periods fills a burst. INFO tells what the generator
+    makes of it, which is not quite the same."""
+    rate_millihz = 1000 * info.sample_rate_hz
+    periods = round(info.excitation_millihz * info.samples / rate_millihz)
+    return periods * rate_millihz // info.samples
 
 
 class Deadline:
@@ -167,7 +174,7 @@ class Device:
         """
         now = self.board
         command = commands.Scan(
-            excitation_millihz=now.excitation_millihz if excitation_hz is None else round(1000 * excitation_hz),
+            excitation_millihz=_asked_millihz(now) if excitation_hz is None else round(1000 * excitation_hz),
             sample_rate_hz=now.sample_rate_hz if sample_rate_hz is None else sample_rate_hz,
             samples=now.samples if samples is None else samples,
             settle_us=now.settle_us if settle_us is None else settle_us,

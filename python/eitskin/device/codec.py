@@ -77,11 +77,11 @@ def encode(packet_type: int, sequence: int, payload: bytes) -> bytes:
 class Decoder:
     """Bytes of one direction of a link to packets, in order and each at most once. ``counters`` is counted into.
 
-    ``skip_to_delimiter``: what comes before the first delimiter is the rest of a packet that was cut by opening the port, and no
-    error.
+    What comes before the first delimiter is the rest of a packet that was cut by opening the port, and no error. With
+    ``numbered`` false sequence numbers are not looked at, as boards do with commands.
     """
 
-    def __init__(self, counters: LinkCounters | None = None, *, skip_to_delimiter: bool = True) -> None:
+    def __init__(self, counters: LinkCounters | None = None, *, numbered: bool = True) -> None:
         module = _core()
         self._lib, self._ffi = module.lib, module.ffi
         room = int(self._lib.EITS_LINK_MAX_PACKET)
@@ -92,8 +92,9 @@ class Decoder:
         self._packet = self._ffi.new("eits_link_packet *")
         self.counters = LinkCounters() if counters is None else counters
         self._before = self._counted()
-        self._skip_always, self._skipping = skip_to_delimiter, skip_to_delimiter
+        self._skipping = True
         self._sequence = SequenceCheck(self.counters)
+        self._numbered = numbered
 
     @property
     def other_version(self) -> int | None:
@@ -105,7 +106,7 @@ class Decoder:
         status = self._lib.eits_link_decoder_init(self._state, self._ffi.cast("uint8_t *", self._buffer), self._state.room)
         assert status == 0
         self._before = self._counted()
-        self._skipping = self._skip_always
+        self._skipping = True
         self._sequence.link_lost()
 
     def forget_sequence(self) -> None:
@@ -140,7 +141,9 @@ class Decoder:
             self.counters.packets += 1
             return Packet(packet_type, sequence, payload)
         restart = packet_type == PacketType.INFO and payload[:4] == b"\0\0\0\0"
-        lost = self._sequence.judge(sequence, zlib.crc32(payload, packet_type), restart=restart)
+        lost: int | None = 0
+        if self._numbered:
+            lost = self._sequence.judge(sequence, zlib.crc32(payload, packet_type), restart=restart)
         if lost is None:
             return None
         self.counters.packets += 1

@@ -55,7 +55,7 @@ class Link(Protocol):
 
     @property
     def ended(self) -> bool:
-        """Nothing will ever come again."""
+        """No frame will come again, and nothing is left to fetch."""
 
     def close(self) -> None:
         """Stop and let go of the port."""
@@ -73,8 +73,6 @@ class PumpedLink:
 
     def next(self, timeout_s: float) -> Packet | LinkEvent | None:
         while not self._ready:
-            if self.transport.ended:
-                return None
             data = self.transport.read(timeout_s)
             if not data:
                 return None

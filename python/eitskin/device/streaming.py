@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from eitskin.device.commands import StreamCommand
@@ -88,11 +89,8 @@ def _start(device: Device, progress: _Progress, every: int) -> None:
 
 def _stop(device: Device) -> None:
     """However the stream ended; a board that is gone cannot be stopped, and that is not what went wrong."""
-    try:
-        if not device.link.ended:
-            device.send_command(StreamCommand(0), COMMAND_S)
-    except EitskinError:
-        pass
+    with suppress(EitskinError):
+        device.send_command(StreamCommand(0), COMMAND_S)
 
 
 def _resume(device: Device, progress: _Progress, every: int) -> None:

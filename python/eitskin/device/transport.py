@@ -15,7 +15,8 @@ class Transport(Protocol):
         synchronous: the board only runs while ``read`` is called (simulated, emulated, recorded). It is then pumped by whoever
             asks, without a thread, and runs are reproducible; timeouts count in the board's own time.
         replays: it is a recording: nothing can be asked of it.
-        ended: no byte will ever come again (a scene or a recording is over); never true of a real board.
+        ended: a scene or a recording is over: no frame will come again. Commands are still answered, but by recordings. Never
+            true of a real board.
     """
 
     @property
