@@ -87,7 +87,7 @@ void mps2_slot_irq(void)
         next_burst(true); /* this interrupt came later than the next burst's end */
     if (capture.running)
         next_burst(false);
-    if (capture.running)
+    if (capture.running && !mps2_link_ended(NULL)) /* the end of the run is the end of the skin: the application comes to rest */
         await_burst();
 }
 

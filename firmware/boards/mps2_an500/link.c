@@ -53,10 +53,10 @@ static size_t read_bytes(void *ctx, uint8_t *bytes, size_t room)
     return size;
 }
 
-static bool ended(void *ctx)
+bool mps2_link_ended(void *ctx)
 {
     (void)ctx;
     return over && left == 0;
 }
 
-const fw_link_ops mps2_link_ops = {.write = write_bytes, .read = read_bytes, .ended = ended};
+const fw_link_ops mps2_link_ops = {.write = write_bytes, .read = read_bytes, .ended = mps2_link_ended};

@@ -45,6 +45,7 @@ void mps2_skin_start(void);
 /* Codes of a burst as the skin, the multiplexers and the generator make them. */
 void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us, uint32_t scanning_us);
 void mps2_link_start(void);
+bool mps2_link_ended(void *ctx);
 void mps2_store_start(void);
 
 extern const fw_spi_ops mps2_generator_ops;
@@ -53,7 +54,6 @@ extern const fw_capture_ops mps2_capture_ops;
 extern const fw_link_ops mps2_link_ops;
 extern const fw_store_ops mps2_store_ops;
 
-void mps2_tick_irq(void);
 void mps2_slot_irq(void);
 
 #endif

@@ -75,7 +75,7 @@ static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
 static void wait_ns(void *ctx, uint32_t ns)
 {
     (void)ctx;
-    for (uint32_t k = 0; k < (ns + 9u) / 10u; ++k) /* two instructions of 5 ns or more */
+    for (uint32_t k = 0; k < (ns + 14u) / 15u; ++k) /* three instructions of 5 ns, at least */
         __asm volatile("nop");
 }
 
