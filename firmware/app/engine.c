@@ -135,6 +135,7 @@ void fw_engine_keep(fw_engine *engine)
     memcpy(kept->bad, engine->ctx.bad, engine->model.n_rows);
     kept->baseline = engine->ctx.baseline;
     kept->options = engine->ctx.options;
+    kept->next_id = engine->ctx.next_id;
     kept->cosine = engine->cosine;
     kept->sine = engine->sine;
     kept->tared = engine->tared;
@@ -151,6 +152,7 @@ void fw_engine_restore(fw_engine *engine)
     engine->ctx.options = kept->options;
     memcpy(v0, kept->v0, engine->model.n_rows * sizeof(float));
     memcpy(engine->ctx.bad, kept->bad, engine->model.n_rows);
+    engine->ctx.next_id = kept->next_id;
     engine->ctx.basis_stale = 1;
     eits_forget(&engine->ctx);
     engine->cosine = kept->cosine;

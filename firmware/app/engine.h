@@ -10,6 +10,7 @@
 typedef struct fw_kept {
     eits_baseline baseline;
     eits_options options;
+    uint32_t next_id; /* of touches: ids are not used twice */
     float *v0;    /* n_rows */
     uint8_t *bad; /* n_rows */
     float cosine, sine;
