@@ -15,6 +15,7 @@ BANK_BYTES = 512 * 1024
 MAGIC = 0x4B4E4245  # "EBNK"
 ERASED = 0xFF
 _RECORD = struct.Struct("<IIIIIIII")
+RECORD_BYTES = _RECORD.size
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,7 @@ class Device:
         self._request = 0 if transport.synchronous else random.randrange(1, 2**31)
         self._inbox: deque[Streamed] = deque()
         self._connected = False
+        self._tap: Tap | None = None
         try:
             self.board = self.info()
         except BaseException:
@@ -113,8 +114,13 @@ class Device:
         self.link.close()
 
     def record(self, tap: Tap | None) -> None:
-        """Give each packet that is accepted to ``tap`` as it comes, before anything else; None stops that."""
-        self.link.tap = tap
+        """Give each packet that is accepted to ``tap`` as it comes, before anything else; None stops that. A ``Recorder`` goes
+        beside it."""
+        if self._tap is not None:
+            self.link.end_tap(self._tap)
+        self._tap = tap
+        if tap is not None:
+            self.link.begin_tap(lambda last: None, tap)
 
     # ---- commands ----
 

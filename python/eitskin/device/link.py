@@ -37,7 +37,13 @@ class Link(Protocol):
     transport: Transport
     counters: LinkCounters
     decoder: Decoder
-    tap: Tap | None
+
+    def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
+        """Call ``begin`` with the last packet's sequence number, then ``tap`` with each packet after it, before anyone else gets
+        it. An error of ``tap`` comes out of ``next``."""
+
+    def end_tap(self, tap: Tap) -> None:
+        """No more of that; nothing where it was not begun."""
 
     def next(self, timeout_s: float) -> Packet | LinkEvent | None:
         """The next packet or event; None if there is none within ``timeout_s`` (of the board's time where it is synchronous).
@@ -66,10 +72,20 @@ class PumpedLink:
 
     def __init__(self, transport: Transport) -> None:
         self.transport, self.counters = transport, LinkCounters()
-        self.tap: Tap | None = None
         self.decoder = Decoder(self.counters)
+        self._taps: list[Tap] = []
+        self._last = 0
         self._ready: deque[Packet] = deque()
         self._sequence = 0
+
+    def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
+        begin(self._last)
+        self._taps.append(tap)
+        for packet in self._ready:
+            tap(packet)
+
+    def end_tap(self, tap: Tap) -> None:
+        self._taps = [one for one in self._taps if one != tap]
 
     def next(self, timeout_s: float) -> Packet | LinkEvent | None:
         while not self._ready:
@@ -77,10 +93,12 @@ class PumpedLink:
             if not data:
                 return None
             for packet in self.decoder.feed(data):
-                if self.tap is not None:
-                    self.tap(packet)
+                for tap in self._taps:
+                    tap(packet)
                 self._ready.append(packet)
-        return self._ready.popleft()
+        packet = self._ready.popleft()
+        self._last = packet.sequence
+        return packet
 
     def send(self, packet_type: int, payload: bytes) -> None:
         self.transport.write(encode(packet_type, self._sequence, payload))
@@ -108,8 +126,10 @@ class ThreadedLink:
 
     def __init__(self, transport: Transport, *, room: int = 1024, reconnect: Reconnect | None = None) -> None:
         self.transport, self.counters = transport, LinkCounters()
-        self.tap: Tap | None = None
         self.decoder = Decoder(self.counters)
+        self._taps: list[Tap] = []
+        self._tapping = threading.Lock()
+        self._last = 0
         self._room, self._reconnect = room, reconnect or Reconnect()
         self._queue: deque[Packet | LinkEvent] = deque()
         self._changed = threading.Condition()
@@ -119,6 +139,15 @@ class ThreadedLink:
         self._sequence = 0
         self._thread = threading.Thread(target=self._run, name=f"eitskin {transport.name}", daemon=True)
         self._thread.start()
+
+    def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
+        with self._tapping:
+            begin(self._last)
+            self._taps.append(tap)
+
+    def end_tap(self, tap: Tap) -> None:
+        with self._tapping:
+            self._taps = [one for one in self._taps if one != tap]
 
     def next(self, timeout_s: float) -> Packet | LinkEvent | None:
         end = time.monotonic() + timeout_s
@@ -170,8 +199,10 @@ class ThreadedLink:
 
     def _put(self, packets: list[Packet]) -> None:
         for packet in packets:
-            if self.tap is not None:
-                self.tap(packet)
+            with self._tapping:
+                self._last = packet.sequence
+                for tap in self._taps:
+                    tap(packet)
             with self._changed:
                 self._make_room()
                 self._queue.append(packet)

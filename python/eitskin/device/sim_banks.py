@@ -25,7 +25,7 @@ class _Upload:
 
 
 class SimBanks:
-    """Two banks. ``in_use``: the one whose model is taken up, None without a model; ``active``: an upload has stopped the scan."""
+    """Two banks. ``in_use``: the one whose model is taken up, None without a model; ``active``: an upload stops the scan."""
 
     def __init__(self, banks: list[bytes], electrodes: int) -> None:
         self.banks = [bytearray(bank) for bank in banks]

@@ -37,6 +37,7 @@ from eitskin.device.payloads import build_fault, build_info, build_raw, build_re
 from eitskin.device.sim_banks import E_MODEL_MAGIC, SimBanks, golden
 from eitskin.device.sim_checks import OK, Answer, check_scan, check_size, check_solver, outside, slot_us
 from eitskin.device.sim_skin import SceneSkin
+from eitskin.model.storage import STORAGES
 
 BOARD_NAME = "simulated"
 DATA_BYTES = 4096
