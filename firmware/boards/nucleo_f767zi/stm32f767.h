@@ -33,7 +33,6 @@
 #define RCC_PLLCFGR_PLLR_POS 28u
 #define RCC_CFGR_SW_POS 0u
 #define RCC_CFGR_SWS_POS 2u
-#define RCC_CFGR_HPRE_POS 4u
 #define RCC_CFGR_PPRE1_POS 10u
 #define RCC_CFGR_PPRE2_POS 13u
 #define RCC_CFGR_MCO1_POS 21u
@@ -114,7 +113,6 @@
 #define SPI_CR2(spi) REG32((spi) + 0x04u)
 #define SPI_SR(spi) REG32((spi) + 0x08u)
 #define SPI_DR(spi) REG16((spi) + 0x0Cu)
-#define SPI_CR1_CPHA (1u << 0)
 #define SPI_CR1_CPOL (1u << 1)
 #define SPI_CR1_MSTR (1u << 2)
 #define SPI_CR1_BR_POS 3u
@@ -129,10 +127,8 @@
 /* ---- USART, chapter 34 ---- */
 #define USART3_BASE 0x40004800u
 #define USART_CR1(usart) REG32((usart) + 0x00u)
-#define USART_CR2(usart) REG32((usart) + 0x04u)
 #define USART_CR3(usart) REG32((usart) + 0x08u)
 #define USART_BRR(usart) REG32((usart) + 0x0Cu)
-#define USART_ISR(usart) REG32((usart) + 0x1Cu)
 #define USART_ICR(usart) REG32((usart) + 0x20u)
 #define USART_RDR(usart) REG32((usart) + 0x24u)
 #define USART_TDR(usart) REG32((usart) + 0x28u)
@@ -217,10 +213,8 @@
 #define TIM_CR1(tim) REG32((tim) + 0x00u)
 #define TIM_CR2(tim) REG32((tim) + 0x04u)
 #define TIM_SMCR(tim) REG32((tim) + 0x08u)
-#define TIM_SR(tim) REG32((tim) + 0x10u)
 #define TIM_EGR(tim) REG32((tim) + 0x14u)
 #define TIM_CCMR1(tim) REG32((tim) + 0x18u)
-#define TIM_CCER(tim) REG32((tim) + 0x20u)
 #define TIM_CNT(tim) REG32((tim) + 0x24u)
 #define TIM_PSC(tim) REG32((tim) + 0x28u)
 #define TIM_ARR(tim) REG32((tim) + 0x2Cu)
@@ -254,7 +248,6 @@
 
 #define NVIC_BASE 0xE000E100u
 #define NVIC_ISER(word) REG32(NVIC_BASE + 0x000u + 4u * (word))
-#define NVIC_ICER(word) REG32(NVIC_BASE + 0x080u + 4u * (word))
 #define NVIC_ICPR(word) REG32(NVIC_BASE + 0x180u + 4u * (word))
 #define NVIC_IPR(irq) (*(volatile uint8_t *)(NVIC_BASE + 0x300u + (irq)))
 
