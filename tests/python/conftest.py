@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from cross_build import ROOT, build_cortex_m7
 
 

@@ -9,11 +9,13 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
 from cross_build import ROOT, build_cortex_m7
 
 FLASH, FLASH_BYTES = 0x08000000, 256 * 1024  # of the program: models begin at 0x08040000
 DTCM, DTCM_BYTES = 0x20000000, 128 * 1024
 SRAM, SRAM_BYTES = 0x20020000, 384 * 1024
+MEMORIES = ((FLASH, FLASH_BYTES), (DTCM, DTCM_BYTES), (SRAM, SRAM_BYTES))
 IMAGE = "eitskin_nucleo_f767zi"
 HANDLERS = {
     15: "nucleo_tick_irq",
@@ -63,8 +65,8 @@ def test_vectors(elf: Path, symbols: dict[str, int]) -> None:
 
 def test_places_in_memory(sections: dict[str, tuple[int, int]], symbols: dict[str, int]) -> None:
     for name, (size, address) in sections.items():
-        start, room = next((s, r) for s, r in ((FLASH, FLASH_BYTES), (DTCM, DTCM_BYTES), (SRAM, SRAM_BYTES)) if s <= address < s + r)
-        assert address + size <= start + room, name
+        ends = [start + room for start, room in MEMORIES if start <= address < start + room]
+        assert ends and address + size <= ends[0], name
     # The stack is at the bottom of DTCM, so that what overflows it meets the MPU's guard, aligned to its 256 bytes.
     assert symbols["stack_bottom"] == DTCM and symbols["stack_top"] - symbols["stack_bottom"] >= 8 * 1024
     # DMA works on memory that no cache covers.
@@ -84,8 +86,8 @@ def test_what_the_image_does_without(symbols: dict[str, int]) -> None:
 def test_sizes(elf: Path, sections: dict[str, tuple[int, int]], symbols: dict[str, int]) -> None:
     image = elf.with_suffix(".bin").stat().st_size
     stack, workspace = symbols["stack_top"] - symbols["stack_bottom"], symbols["workspace_end"] - symbols["workspace_start"]
-    print(f"\nflash {image} of {FLASH_BYTES} bytes; stack {stack}; DMA buffers {sections['.dtcm'][0]}; statics {sections['.bss'][0]}")
-    print(f"workspace {workspace} of {SRAM_BYTES} bytes")
+    print(f"\nflash {image} of {FLASH_BYTES} bytes, stack {stack}, DMA buffers {sections['.dtcm'][0]}")
+    print(f"statics {sections['.bss'][0]}, workspace {workspace} of {SRAM_BYTES} bytes")
     assert image == sum(sections[name][0] for name in (".vectors", ".text", ".ARM.exidx", ".data") if name in sections)
     assert image <= FLASH_BYTES // 2, "half of the program's flash is kept for what is to come"
     assert workspace >= 256 * 1024
