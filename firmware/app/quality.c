@@ -48,12 +48,11 @@ static uint32_t find_open(const fw_engine *engine, const fw_frame *frame)
     const float scale = engine->tared || !(expected_rms > 0) ? 1 : rms_of_z(engine, frame) / expected_rms;
     uint32_t significant[FW_ELECTRODES] = {0}, alive = 0, open = 0;
     for (uint32_t i = 0; i < model->n_rows; ++i) {
-        const float expected = scale * engine->expected[i];
-        const float least = scale * FW_OPEN_SIGNIFICANT * expected_rms;
+        const float expected = scale * engine->expected[i], share = FW_OPEN_SHARE * expected;
+        const float limit = share > FW_OPEN_NOISE * noise ? share : FW_OPEN_NOISE * noise;
         if (engine->flags[i] == 0 || (frame->quality[i] & EITS_QUALITY_UNSETTLED) != 0 || engine->ctx.bad[i] ||
-            !(expected > least) || expected < FW_OPEN_NOISE * noise)
+            !(expected > scale * FW_OPEN_SIGNIFICANT * expected_rms) || expected < 10 * limit)
             continue;
-        const float share = FW_OPEN_SHARE * expected, floor_v = 4 * noise, limit = share > floor_v ? share : floor_v;
         const fw_iq z = frame->z[i];
         const bool dead = (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 || z.i * z.i + z.q * z.q < limit * limit;
         for (uint32_t k = 0; k < 4; ++k) {

@@ -95,7 +95,7 @@ void sheet_solve(sheet *s)
     solve_columns(matrix, columns);
     for (size_t e = 0; e < SHEET_ELECTRODES; ++e) {
         for (size_t f = 0; f < SHEET_ELECTRODES; ++f)
-            s->transfer[e][f] = 0.6 * columns[f * NODES + CELLS + e]; /* 0.6 V: as the skin's */
+            s->transfer[e][f] = 3.5 * columns[f * NODES + CELLS + e]; /* voltages like the skin's: 0.01 to 0.5 V adjacent, to 1.5 V opposite */
     }
     free(matrix);
     free(columns);
