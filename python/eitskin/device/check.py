@@ -40,6 +40,8 @@ def no_answer(link: Link, what: str, waited_s: float) -> str:
     if other is not None and not counters.packets:
         advice = FLASH if other < LINK_VERSION else f"upgrade eitskin, or {FLASH}"
         return f"{name}: the board speaks version {other} of the link protocol and this eitskin {LINK_VERSION}; {advice}"
+    if link.ended and what == "TARE":
+        return f"{name}: the scene is over, and a tare waits for frames; open the device anew"
     if counters.packets:
         return f"{name}: packets arrive, but {what} is not answered within {waited_s:g} s; reset the board, or {FLASH}"
     if counters.bytes:

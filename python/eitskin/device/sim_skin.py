@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.scene.description import Scene
-from eitskin.skin.protocol import Protocol
+from eitskin.skin.protocol import Protocol, table
 
 
 class SceneSkin:
@@ -72,6 +72,9 @@ class SceneSkin:
             from eitskin.scene.runner import simulate_frames
 
             own = self.scene.protocol.hash == protocol.hash
-            scene = self.scene if own else replace(self.scene, protocol=protocol)
+            scene = self.scene
+            if not own:  # electrodes that the protocol does not name stay unused
+                rows = protocol.drive_measure.tolist()
+                scene = replace(scene, protocol=table(self.electrodes, rows, protocol.current_a))
             self._frames[protocol.hash] = simulate_frames(compile_scene(scene)).voltage_v.astype(np.float32)
         return self._frames[protocol.hash]

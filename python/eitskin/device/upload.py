@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,8 +27,12 @@ def upload(device: Device, model: str | Path | bytes, progress: Callable[[int, i
     name, crc = device.transport.name, zlib.crc32(blob)
     done = 0
     try:
-        _demand(device, device.send_command(ModelBegin(len(blob), crc), ERASE_S))
-        done = _send_pieces(device, blob, progress)
+        begun = device.send_command(ModelBegin(len(blob), crc), ERASE_S)
+        _demand(device, begun)
+        done = begun.detail[0]  # above 0 where an upload of the same model was cut
+        for done in _send_pieces(device, blob, done):
+            if progress is not None:
+                progress(done, len(blob))
         _demand(device, device.send_command(ModelCommit(), VERIFY_S))
     except _Refused:
         raise
@@ -71,9 +75,10 @@ def _checked(device: Device, model: str | Path | bytes) -> bytes:
     return blob
 
 
-def _send_pieces(device: Device, blob: bytes, progress: Callable[[int, int], None] | None) -> int:
+def _send_pieces(device: Device, blob: bytes, done: int) -> Iterator[int]:
+    """Send from ``done`` on; yields how far the board has it."""
     size = max(min(device.board.data_bytes, MAX_PAYLOAD - ModelData.LAYOUT.size) // 4 * 4, 4)
-    done = back = 0
+    back = 0
     while done < len(blob):
         reply = device.send_command(ModelData(done, blob[done : done + size]), PIECE_S)
         if reply.status == ReplyStatus.OFFSET and 0 <= reply.detail[0] <= len(blob) and back < GOING_BACK:
@@ -81,6 +86,4 @@ def _send_pieces(device: Device, blob: bytes, progress: Callable[[int, int], Non
             continue
         _demand(device, reply)
         done += min(size, len(blob) - done)
-        if progress is not None:
-            progress(done, len(blob))
-    return done
+        yield done
