@@ -72,7 +72,7 @@ class HostTwin:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)
         self._warm = options.warm_start
         self._quiet: list[RawFrame] = []
-        self._tared = self._sure = False
+        self._tared = self._sure = self._lost = False
         self.check = HostCheck()
 
     def follow(self, items: Iterable[LiveFrame | Fault | LinkEvent]) -> HostCheck:
@@ -85,10 +85,8 @@ class HostTwin:
         return self.check
 
     def lost(self) -> None:
-        """Something is missing here."""
-        self._sure = False
-        if self._quiet:
-            self._quiet, self._tared = [], False
+        """Something is missing here: perhaps a frame from which the next solve began, perhaps a quiet one."""
+        self._sure, self._lost = False, True
 
     def take(self, frame: LiveFrame) -> Reconstruction | None:
         """The next frame; returns what this host makes of it, None where the board solved nothing."""
@@ -97,6 +95,7 @@ class HostTwin:
             return None
         if self._quiet:
             self._tare()
+        self._lost = False
         if frame.solved is None:
             return None
         if frame.raw is None:
@@ -110,6 +109,9 @@ class HostTwin:
 
     def _tare(self) -> None:
         quiet, self._quiet = self._quiet, []
+        if self._lost:
+            self._tared = False
+            return
         self._core.mask_rows(np.all([(raw.quality & Quality.MASKED) != 0 for raw in quiet], axis=0))
         try:
             self._core.tare(np.array([raw.voltage_v for raw in quiet]))
