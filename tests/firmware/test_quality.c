@@ -116,6 +116,50 @@ static void test_open_at_the_rail(void)
     bench_stop(&b);
 }
 
+/* A skin of other voltages than the model's by far: the tare says what is to be expected. */
+static double faint(void *user, const uint8_t electrodes[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    return 0.015 * sheet_volts(user, electrodes);
+}
+
+static void test_faint_skin(void)
+{
+    start(1);
+    b.board.noise_codes = 0;
+    b.board.volts = faint;
+    host_run(&b.host, 50);
+    tare();
+    host_run(&b.host, 50);
+    CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
+    bench_stop(&b);
+}
+
+/* One row that reads something whatever is connected, and is masked for that: it does not speak for its electrodes. */
+static double stuck_row(void *user, const uint8_t e[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    return e[0] == 5 && e[2] == 8 ? 0.3 : sheet_volts(user, e);
+}
+
+static void test_masked_row_is_not_judged(void)
+{
+    start(1);
+    b.board.volts = stuck_row;
+    tare();
+    for (uint16_t i = 0; i < 208; ++i) {
+        const uint8_t *row = b.open.protocol + 4 * (size_t)i;
+        eits_command_mask_row mask = {.row = i, .bad = 1};
+        if (row[0] == 5 && row[2] == 8)
+            CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+    }
+    b.sheet.detached[5] = true;
+    sheet_solve(&b.sheet);
+    host_run(&b.host, 60);
+    CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 1u << 5);
+    bench_stop(&b);
+}
+
 /* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half the skin. Nothing is open. */
 static void test_touches_are_not_open(bool tared)
 {
@@ -253,6 +297,8 @@ int main(void)
     test_open(true, 4);
     test_two_open();
     test_open_at_the_rail();
+    test_faint_skin();
+    test_masked_row_is_not_judged();
     test_touches_are_not_open(true);
     test_touches_are_not_open(false);
     test_saturation();
