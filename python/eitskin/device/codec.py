@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import asdict, dataclass
+from collections import deque
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
 from eitskin.core.engine import load_core
 from eitskin.device.packets import MAX_PAYLOAD, PacketType
-from eitskin.device.sequence import SequenceCheck
+from eitskin.device.sequence import LATE_IN_A_ROW, SequenceCheck
 from eitskin.errors import DeviceError
 
 
@@ -95,6 +96,7 @@ class Decoder:
         self._skipping = True
         self._sequence = SequenceCheck(self.counters)
         self._numbered = numbered
+        self._late: deque[Packet] = deque(maxlen=LATE_IN_A_ROW)
 
     @property
     def other_version(self) -> int | None:
@@ -123,31 +125,31 @@ class Decoder:
             if start < 0:
                 return []
             self._skipping = False
-        found = []
+        found: list[Packet] = []
         view = self._ffi.from_buffer("uint8_t[]", data)
         packet, state, feed = self._packet, self._state, self._lib.eits_link_feed
         while start < len(data):
             start += feed(state, view + start, len(data) - start, packet)
             if packet.payload:
                 payload = bytes(self._ffi.buffer(packet.payload, packet.size))
-                taken = self._take(packet.type, packet.sequence, payload)
-                if taken is not None:
-                    found.append(taken)
+                found += self._take(Packet(packet.type, packet.sequence, payload))
         self._count()
         return found
 
-    def _take(self, packet_type: int, sequence: int, payload: bytes) -> Packet | None:
-        if packet_type == PacketType.RECORDING:  # the head of a recording is outside of the numbering
+    def _take(self, packet: Packet) -> list[Packet]:
+        if packet.type == PacketType.RECORDING or not self._numbered:  # the head of a recording is outside of the numbering
             self.counters.packets += 1
-            return Packet(packet_type, sequence, payload)
-        restart = packet_type == PacketType.INFO and payload[:4] == b"\0\0\0\0"
-        lost: int | None = 0
-        if self._numbered:
-            lost = self._sequence.judge(sequence, zlib.crc32(payload, packet_type), restart=restart)
+            return [packet]
+        restart = packet.type == PacketType.INFO and packet.payload[:4] == b"\0\0\0\0"
+        lost = self._sequence.judge(packet.sequence, zlib.crc32(packet.payload, packet.type), restart=restart)
         if lost is None:
-            return None
-        self.counters.packets += 1
-        return Packet(packet_type, sequence, payload, lost)
+            if self._sequence.was_late:
+                self._late.append(packet)
+            return []
+        revived = list(self._late)[-self._sequence.revived :] if self._sequence.revived else []
+        self._late.clear()
+        self.counters.packets += 1 + len(revived)
+        return [*revived, replace(packet, lost=lost)]
 
     def _counted(self) -> tuple[int, ...]:
         s = self._state

@@ -27,7 +27,11 @@ class SequenceCounters(Protocol):
 
 
 class SequenceCheck:
-    """Judges each packet's number against those before. One for each direction of a link."""
+    """Judges each packet's number against those before. One for each direction of a link.
+
+    ``was_late``: the last one judged was refused as late. ``revived``: so many of those just before the last one judged were of
+    a new life after all.
+    """
 
     def __init__(self, counters: SequenceCounters) -> None:
         self._counters = counters
@@ -36,6 +40,7 @@ class SequenceCheck:
         self._cut = False
         self._seen: OrderedDict[int, int] = OrderedDict()
         self._late_run, self._late_next = 0, 0
+        self.revived, self.was_late = 0, False
 
     def link_lost(self) -> None:
         """The line was cut: whatever comes next is taken and counts as one gap."""
@@ -46,6 +51,7 @@ class SequenceCheck:
 
         ``fingerprint`` tells a packet that came twice from another one with its number; ``restart``: an INFO with request 0.
         """
+        self.revived, self.was_late = 0, False
         if self._next is None:
             return self._accept(sequence, fingerprint, 0)
         ahead = (sequence - self._next) % WRAP
@@ -58,6 +64,8 @@ class SequenceCheck:
         if ahead == 0:
             return self._accept(sequence, fingerprint, 0)
         if restart and ahead >= AHEAD:
+            if self._late_run and sequence == self._late_next:  # faults of its start, told before
+                return self._revive(sequence, fingerprint)
             self._after_restart = (sequence + 1) % WRAP
             return 0
         if ahead < AHEAD:
@@ -102,16 +110,22 @@ class SequenceCheck:
 
     def _late(self, sequence: int, fingerprint: int) -> int | None:
         """A number from before that was not seen: late. Many in a row, one after another, are a board that began anew and whose
-        INFO was lost."""
+        INFO was lost: then none of them was late."""
         self._late_run = self._late_run + 1 if self._late_run and sequence == self._late_next else 1
         self._late_next = (sequence + 1) % WRAP
         if self._late_run < LATE_IN_A_ROW:
             self._counters.stale += 1
+            self.was_late = True
             return None
+        self._late_run -= 1  # those before this one
+        return self._revive(sequence, fingerprint)
+
+    def _revive(self, sequence: int, fingerprint: int) -> int:
+        self.revived = self._late_run
+        self._counters.stale -= self.revived
         self._counters.restarts += 1
-        self._counters.gaps += 1
         self._seen.clear()
-        return self._accept(sequence, fingerprint, LATE_IN_A_ROW - 1)
+        return self._accept(sequence, fingerprint, 0)
 
     def _accept(self, sequence: int, fingerprint: int, lost: int) -> int:
         self._next = (sequence + 1) % WRAP

@@ -29,8 +29,8 @@ def upload(device: Device, model: str | Path | bytes, progress: Callable[[int, i
     try:
         begun = device.send_command(ModelBegin(len(blob), crc), ERASE_S)
         _demand(device, begun)
-        done = begun.detail[0]  # above 0 where an upload of the same model was cut
-        for done in _send_pieces(device, blob, done):
+        start = begun.detail[0]  # above 0 where an upload of the same model was cut
+        for done in _send_pieces(device, blob, start):
             if progress is not None:
                 progress(done, len(blob))
         _demand(device, device.send_command(ModelCommit(), VERIFY_S))

@@ -84,9 +84,8 @@ def test_a_restart_whose_info_was_lost_is_found_out() -> None:
     verdicts, counters = judged([*range(1000, 1010), *range(1, 40)], prints=list(range(49)))
     assert verdicts[:10] == [0] * 10
     assert verdicts[10 : 10 + LATE_IN_A_ROW - 1] == [None] * (LATE_IN_A_ROW - 1)
-    assert verdicts[10 + LATE_IN_A_ROW - 1] == LATE_IN_A_ROW - 1
-    assert verdicts[10 + LATE_IN_A_ROW :] == [0] * (39 - LATE_IN_A_ROW)
-    assert (counters.restarts, counters.gaps, counters.stale) == (1, 1, LATE_IN_A_ROW - 1)
+    assert verdicts[10 + LATE_IN_A_ROW - 1 :] == [0] * (40 - LATE_IN_A_ROW)
+    assert (counters.restarts, counters.gaps, counters.stale) == (1, 0, 0)
 
 
 def test_a_restart_within_the_remembered_numbers_is_found_out_too() -> None:
@@ -118,6 +117,21 @@ def test_a_cut_line_counts_one_gap() -> None:
     assert check.judge(3, 33) == 1  # begun anew: how many, nobody knows
     assert (counters.gaps, counters.missing, counters.restarts) == (2, 13, 1)
     assert check.judge(4, 34) == 0
+
+
+def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late() -> None:
+    """Faults of the start may come before the INFO that tells of it, or that INFO be lost: they are all there in the end."""
+    for said in (True, False):
+        decoder = Decoder()
+        old = b"".join(packet(n) for n in range(500, 520))
+        new = [encode(PacketType.FAULT, n, b"new life" + bytes([n])) for n in range(30)]
+        if said:
+            new[2] = packet(2, restart=True)
+        found = decoder.feed(old + b"".join(new))
+        assert [p.sequence for p in found] == [*range(500, 520), *range(30)]
+        assert [p.payload[:8] for p in found[20:22]] == [b"new life"] * 2
+        counters = decoder.counters
+        assert (counters.restarts, counters.gaps, counters.stale, counters.packets) == (1, 0, 0, 50)
 
 
 def packet(number: int, *, restart: bool = False) -> bytes:

@@ -198,12 +198,20 @@ def test_a_board_that_dies_on_a_port_that_stays() -> None:
 
 def test_a_wrong_baud_rate_is_recognised() -> None:
     wire = Wire(None)
-    noise = threading.Thread(target=lambda: [os.write(wire.master, bytes(range(256))) for _ in range(4)], daemon=True)
+    over = threading.Event()
+
+    def babble() -> None:  # again and again: opening a port throws away what was there
+        while not over.wait(0.02):
+            os.write(wire.master, bytes(range(1, 64)))
+
+    noise = threading.Thread(target=babble, daemon=True)
     noise.start()
     try:
         with pytest.raises(DeviceError, match=r"bytes arrive but no packet decodes at 115200 baud: .*serial:PORT\?baud=N"):
             open_device(f"serial:{wire.path}?baud=115200")
     finally:
+        over.set()
+        noise.join(5)
         wire.unplug()
 
 
