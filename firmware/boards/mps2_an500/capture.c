@@ -21,8 +21,9 @@ static fw_status configure(void *ctx, const fw_capture_setup *setup, void (*done
     (void)ctx;
     if (capture.running || done == NULL)
         return FW_E_ARGUMENT;
-    if (setup->sample_rate_hz == 0 || setup->sample_rate_hz > 2000000u || setup->samples == 0 || setup->samples > FW_MAX_SAMPLES ||
-        setup->samples * 1000000u % setup->sample_rate_hz != 0)
+    if (setup->sample_rate_hz == 0 || setup->sample_rate_hz > 2000000u || setup->samples == 0 || setup->samples > FW_MAX_SAMPLES)
+        return FW_E_RANGE;
+    if (setup->samples * 1000000u % setup->sample_rate_hz != 0)
         return FW_E_RANGE;
     const uint32_t burst_us = setup->samples * 1000000u / setup->sample_rate_hz;
     if (setup->slot_us <= burst_us || setup->slot_us > 65536u)

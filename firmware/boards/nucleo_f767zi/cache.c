@@ -30,7 +30,7 @@ void nucleo_cache_start(void)
     region(1, 0x00000000u, XN | NO_ACCESS | SIZE_LOG2(14u)); /* ITCM, not used: catches null pointers */
     region(2, 0x08000000u, READ_WRITE | WRITE_THROUGH | SIZE_LOG2(21u)); /* flash */
     region(3, 0x20000000u, XN | READ_WRITE | UNCACHED | SIZE_LOG2(17u)); /* DTCM */
-    region(4, 0x20000000u, XN | READ_WRITE | WRITE_BACK | LEFT_OUT(0x03u) | SIZE_LOG2(19u)); /* SRAM1, SRAM2: all but its first 128 KB */
+    region(4, 0x20000000u, XN | READ_WRITE | WRITE_BACK | LEFT_OUT(0x03u) | SIZE_LOG2(19u)); /* SRAM1 and 2: after its first 128 KB */
     region(5, 0x40000000u, XN | READ_WRITE | DEVICE | SIZE_LOG2(29u)); /* peripherals */
     region(6, (uint32_t)stack_bottom, XN | NO_ACCESS | SIZE_LOG2(8u)); /* NUCLEO_STACK_GUARD_BYTES */
     MPU_CTRL = MPU_CTRL_ENABLE | MPU_CTRL_PRIVDEFENA;

@@ -45,11 +45,13 @@ void nucleo_capture_start(void)
     ADC_SQR1(ADC1_BASE) = 0; /* one conversion, */
     ADC_SQR3(ADC1_BASE) = 3u << ADC_SQR3_SQ1_POS; /* of channel 3 */
     ADC_CR1(ADC1_BASE) = ADC_CR1_OVRIE;
-    ADC_CR2(ADC1_BASE) = ADC_CR2_ADON; /* settles within 3 us; the first slot is later than that */
     TIM_PSC(TIM3_BASE) = NUCLEO_TIMER_HZ / 1000000u - 1u;
     TIM_CR2(TIM3_BASE) = (uint32_t)MASTER_OC1REF << TIM_CR2_MMS_POS;
     TIM_CR2(TIM2_BASE) = (uint32_t)MASTER_UPDATE << TIM_CR2_MMS_POS;
-    TIM_SMCR(TIM2_BASE) = (uint32_t)SLAVE_GATED << TIM_SMCR_SMS_POS | (uint32_t)TRIGGER_ITR2 << TIM_SMCR_TS_POS;
+    /* The trigger is chosen while no mode uses it (RM0410 26.4.3). */
+    TIM_SMCR(TIM2_BASE) = (uint32_t)TRIGGER_ITR2 << TIM_SMCR_TS_POS;
+    TIM_SMCR(TIM2_BASE) |= (uint32_t)SLAVE_GATED << TIM_SMCR_SMS_POS;
+    TIM_SMCR(TIM3_BASE) = (uint32_t)TRIGGER_ITR2 << TIM_SMCR_TS_POS;
     nucleo_interrupt(IRQ_DMA2_STREAM0, NUCLEO_URGENCY_CAPTURE);
     nucleo_interrupt(IRQ_ADC, NUCLEO_URGENCY_CAPTURE);
 }
@@ -57,10 +59,10 @@ void nucleo_capture_start(void)
 /* No slot begins any more, nothing converts, no flag stays. */
 static void halt(void)
 {
-    TIM_SMCR(TIM3_BASE) = 0; /* or TIM5's next match would start it */
+    TIM_SMCR(TIM3_BASE) &= ~(7u << TIM_SMCR_SMS_POS); /* or TIM5's next match would start it */
     TIM_CR1(TIM3_BASE) = 0;
     TIM_CR1(TIM2_BASE) = 0;
-    ADC_CR2(ADC1_BASE) = ADC_CR2_ADON;
+    ADC_CR2(ADC1_BASE) = 0; /* a conversion under way is given up */
     DMA_CR(DMA2_BASE, STREAM) &= ~DMA_CR_EN;
     while ((DMA_CR(DMA2_BASE, STREAM) & DMA_CR_EN) != 0)
         ; /* until the transfer under way is over, some bus cycles (RM0410 8.3.18) */
@@ -82,6 +84,7 @@ static void arm(uint32_t start_us)
     DMA_CR(DMA2_BASE, STREAM) = (0u << DMA_CR_CHSEL_POS) | DMA_CR_DBM | (3u << DMA_CR_PL_POS) | (1u << DMA_CR_MSIZE_POS) |
                                 (1u << DMA_CR_PSIZE_POS) | DMA_CR_MINC | DMA_CR_CIRC | DMA_CR_TCIE | DMA_CR_TEIE | DMA_CR_DMEIE;
     DMA_CR(DMA2_BASE, STREAM) |= DMA_CR_EN;
+    /* On again, it needs 3 us to settle: less than until the first slot. */
     ADC_CR2(ADC1_BASE) = ADC_CR2_ADON | ADC_CR2_DMA | ADC_CR2_DDS | (1u << ADC_CR2_EXTEN_POS) |
                          ((uint32_t)ADC_EXTSEL_TIM2_TRGO << ADC_CR2_EXTSEL_POS);
 
@@ -94,7 +97,7 @@ static void arm(uint32_t start_us)
     TIM_ARR(TIM2_BASE) = capture.sample_ticks - 1u;
     TIM_CNT(TIM2_BASE) = capture.sample_ticks / 2u;
     TIM_CR1(TIM2_BASE) = TIM_CR1_CEN;
-    TIM_SMCR(TIM3_BASE) = (uint32_t)SLAVE_TRIGGER << TIM_SMCR_SMS_POS | (uint32_t)TRIGGER_ITR2 << TIM_SMCR_TS_POS;
+    TIM_SMCR(TIM3_BASE) |= (uint32_t)SLAVE_TRIGGER << TIM_SMCR_SMS_POS;
     TIM_CCR1(TIM5_BASE) = start_us - 1u;
 }
 

@@ -23,8 +23,8 @@ bool nucleo_clock_start(void)
         return false;
 
     /* 8 MHz / 4 = 2 MHz (the least jitter, 5.3.2), x 216 = 432 MHz, / 2 = 216 MHz; Q and R are not used but must be valid. */
-    RCC_PLLCFGR = (4u << RCC_PLLCFGR_PLLM_POS) | (216u << RCC_PLLCFGR_PLLN_POS) | (0u << RCC_PLLCFGR_PLLP_POS) | RCC_PLLCFGR_PLLSRC |
-                  (9u << RCC_PLLCFGR_PLLQ_POS) | (2u << RCC_PLLCFGR_PLLR_POS);
+    RCC_PLLCFGR = RCC_PLLCFGR_PLLSRC | (4u << RCC_PLLCFGR_PLLM_POS) | (216u << RCC_PLLCFGR_PLLN_POS) |
+                  (0u << RCC_PLLCFGR_PLLP_POS) | (9u << RCC_PLLCFGR_PLLQ_POS) | (2u << RCC_PLLCFGR_PLLR_POS);
     RCC_CR |= RCC_CR_PLLON;
     PWR_CR1 |= PWR_CR1_ODEN; /* over-drive, in the order of 4.1.4 */
     if (!becomes(&PWR_CSR1, PWR_CSR1_ODRDY, PWR_CSR1_ODRDY))

@@ -35,7 +35,8 @@ void nucleo_crash(const uint32_t *frame)
     const uint32_t cfsr = SCB_CFSR;
     /* Nothing was stacked, or nothing can be read, if stacking failed; r0 to r3, r12, lr, pc, xpsr otherwise. */
     const uint32_t lowest = (uint32_t)stack_bottom + NUCLEO_STACK_GUARD_BYTES, highest = (uint32_t)stack_top - 32u;
-    const bool stacked = (cfsr & (SCB_CFSR_MSTKERR | SCB_CFSR_STKERR)) == 0 && (uint32_t)frame >= lowest && (uint32_t)frame <= highest;
+    const bool inside = (uint32_t)frame >= lowest && (uint32_t)frame <= highest;
+    const bool stacked = inside && (cfsr & (SCB_CFSR_MSTKERR | SCB_CFSR_STKERR)) == 0;
     crash.words[0] = stacked ? frame[6] : 0;
     crash.words[1] = stacked ? frame[5] : 0;
     crash.words[2] = cfsr;

@@ -30,7 +30,8 @@ void nucleo_link_start(void)
     DMA_PAR(DMA1_BASE, RX) = (uint32_t)&USART_RDR(USART3_BASE);
     DMA_M0AR(DMA1_BASE, RX) = (uint32_t)rx_ring;
     DMA_NDTR(DMA1_BASE, RX) = RX_BYTES;
-    DMA_CR(DMA1_BASE, RX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (2u << DMA_CR_PL_POS) | DMA_CR_MINC | DMA_CR_CIRC | DMA_CR_TCIE;
+    DMA_CR(DMA1_BASE, RX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (2u << DMA_CR_PL_POS) | DMA_CR_MINC | DMA_CR_CIRC |
+                            DMA_CR_TCIE;
     DMA_CR(DMA1_BASE, RX) |= DMA_CR_EN;
     DMA_PAR(DMA1_BASE, TX) = (uint32_t)&USART_TDR(USART3_BASE);
 
@@ -47,11 +48,12 @@ static void send_piece(void)
     tx.sending = waiting < TX_BYTES - at ? waiting : TX_BYTES - at;
     if (tx.sending == 0)
         return;
+    DMA_CR(DMA1_BASE, TX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (1u << DMA_CR_PL_POS) | DMA_CR_MINC |
+                            (1u << DMA_CR_DIR_POS) | DMA_CR_TCIE | DMA_CR_TEIE;
     DMA_M0AR(DMA1_BASE, TX) = (uint32_t)&tx_ring[at];
     DMA_NDTR(DMA1_BASE, TX) = tx.sending;
     DSB(); /* the bytes are in memory */
-    DMA_CR(DMA1_BASE, TX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (1u << DMA_CR_PL_POS) | DMA_CR_MINC | (1u << DMA_CR_DIR_POS) |
-                            DMA_CR_TCIE | DMA_CR_TEIE | DMA_CR_EN;
+    DMA_CR(DMA1_BASE, TX) |= DMA_CR_EN;
 }
 
 static bool write_bytes(void *ctx, const uint8_t *bytes, size_t size)
@@ -76,7 +78,7 @@ void nucleo_dma1_stream3_irq(void)
     const uint32_t flags = DMA_LISR(DMA1_BASE);
     DMA_LIFCR(DMA1_BASE) = TX_FLAGS;
     nucleo_wake();
-    if ((flags & (DMA_LISR_TCIF3 | DMA_LISR_TEIF3)) != 0 && (DMA_CR(DMA1_BASE, TX) & DMA_CR_EN) == 0) {
+    if ((flags & (DMA_LISR_TCIF3 | DMA_LISR_TEIF3)) != 0) {
         tx.sent += tx.sending;
         send_piece();
     }

@@ -84,7 +84,7 @@ static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *
         uint32_t word;
         memcpy(&word, (const uint8_t *)bytes + at, sizeof word);
         REG32((uint32_t)start + at) = word;
-        DSB(); /* one word at a time: two merged would not fit the parallelism (RM0410 3.3.7) */
+        DSB(); /* one word at a time: two merged would not fit the parallelism (RM0410 3.3.7); and Arm's erratum 1259864 */
         status = finished(WORD_US);
     }
     close_flash();
