@@ -11,11 +11,6 @@ from eitskin.cli.device_options import read_mode, whole
 from eitskin.errors import EitskinError, FrameError, UsageError, VerificationError
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
-
-    from eitskin.device.link import LinkEvent
-    from eitskin.device.live import LiveFrame
-    from eitskin.device.packets import Fault
     from eitskin.study.scene_truth import SceneTruth
 
 
@@ -59,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
 def _show(options: argparse.Namespace) -> None:
     from eitskin.cli.live_output import check_picture, show
     from eitskin.device.known_model import find_model, need_model
-    from eitskin.device.live import follow
+    from eitskin.device.live import replayed
     from eitskin.device.open import open_device
     from eitskin.device.packets import Stream
 
@@ -69,23 +64,8 @@ def _show(options: argparse.Namespace) -> None:
         name = device.transport.name
         info, path = device.board, options.model
         known = need_model(info, path, name, "a picture") if options.picture is not None else find_model(info, path, name)
-        items = _without_quiet(follow(device, what), options.first)
+        items = replayed(device, what, frames=options.first or 0)
         show(options, items, device, known, _truth(options.recording) if what & (Stream.IMAGE | Stream.TOUCHES) else None)
-
-
-def _without_quiet(
-    items: Iterator[LiveFrame | Fault | LinkEvent], first: int | None
-) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
-    """What a live stream would have shown: all but the frames of the tare."""
-    from eitskin.device.live import LiveFrame, without_tare
-
-    shown = 0
-    for item in without_tare(items):
-        if isinstance(item, LiveFrame):
-            if first is not None and shown >= first:
-                return
-            shown += 1
-        yield item
 
 
 def _truth(path: Path) -> SceneTruth | None:
@@ -93,9 +73,11 @@ def _truth(path: Path) -> SceneTruth | None:
     from eitskin.cli.live_output import truth_of
     from eitskin.device.recording import read_head
     from eitskin.device.run_file import recorded_options
+    from eitskin.study.matching import match
 
     solver = recorded_options(path)
     try:
+        match([], [])  # scipy, without which nothing can be held against anything
         return truth_of(str(read_head(path).get("url", "")), "increase" if solver is None else solver.sign)
     except EitskinError:
         return None

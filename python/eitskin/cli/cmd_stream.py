@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.cli.cmd_record import check_output
     from eitskin.cli.live_output import check_picture, show, truth_of
     from eitskin.device.known_model import find_model, need_model
-    from eitskin.device.live import follow
+    from eitskin.device.live import follow, replayed
     from eitskin.device.packets import Stream
     from eitskin.fileio import refuse_unwritable
 
@@ -56,5 +56,6 @@ def run(options: argparse.Namespace) -> int:
         recorder = prepare(options, device, known, needs_reference=needed, record=options.record)
         truth = truth_of(options.device, options.sign or "increase")
         with nullcontext() if recorder is None else recorder:
-            show(options, follow(device, what, every=every, frames=frames), device, known, truth)
+            items = (replayed if device.transport.replays else follow)(device, what, every=every, frames=frames)
+            show(options, items, device, known, truth)
     return 0

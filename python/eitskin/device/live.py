@@ -196,15 +196,23 @@ def _put_together(items: Iterator[Any], what: Stream) -> Iterator[LiveFrame | Fa
         yield _frame(clock, parts)
 
 
-def without_tare(items: Iterator[LiveFrame | Fault | LinkEvent]) -> Iterator[LiveFrame | Fault | LinkEvent]:
-    """All but the quiet frames of tares, timed from the first frame that is none."""
+def replayed(
+    device: Device, what: Stream, *, every: int = 1, frames: int = 0
+) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+    """As ``follow``, of a recording: what a live stream would have shown, which is all but the quiet frames of tares, timed from
+    the first frame that is none."""
     start: int | None = None
-    for item in items:
+    count = 0
+    for item in follow(device, what):
         if not isinstance(item, LiveFrame):
             yield item
         elif item.raw is None or not item.raw.quiet:
             start = item.time_us if start is None else start
-            yield replace(item, time_us=item.time_us - start)
+            if frames and count >= frames * every:
+                return
+            if count % every == 0:
+                yield replace(item, time_us=item.time_us - start)
+            count += 1
 
 
 _KINDS = {RawFrame: "raw", SolvedImage: "image", SolvedTouches: "touches"}

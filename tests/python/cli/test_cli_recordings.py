@@ -23,7 +23,7 @@ import eitskin
 from eitskin.cli.main import main
 from eitskin.device.codec import Decoder, Packet, encode
 from eitskin.device.packets import PacketType
-from fresh_python import MAIN
+from fresh_python import MAIN, run_python, without
 
 Done = Callable[..., str]
 Change = Callable[[Packet], bytes | None]
@@ -225,3 +225,39 @@ def test_what_a_killed_recorder_has_written_can_be_read(done: Done, scene: Path,
     cut = tmp_path / "cut.eits"
     cut.write_bytes(path.read_bytes()[:-7])
     assert json.loads(done("replay", cut, "--check", "--json"))["same"] >= facts["same"] - 1
+
+
+# ---- what a base installation can do ----
+
+
+def test_a_recording_needs_no_extra(run: Path) -> None:
+    bare = without("scipy", "netgen", "matplotlib", "unicorn") + MAIN
+    for arguments, expected in (
+        (["replay", run], f"{FRAMES} frames"),
+        (["replay", run, "--check"], "same bits: yes"),
+        (["stream", "--device", f"file:{run}", "--mode", "raw,image,touches"], f"{FRAMES} frames"),
+        (["info", "--device", f"file:{run}"], "board       simulated"),
+        (["doctor", "--device", f"file:{run}"], "0 faults"),
+    ):
+        done = run_python(bare, *arguments)
+        assert (done.returncode, done.stderr) == (0, "") and expected in done.stdout, arguments
+
+
+# ---- Ctrl-C ----
+
+
+def test_ctrl_c_stops_the_board_and_sums_up(scene: Path) -> None:
+    board = board_of(scene)
+    with behind_a_port(board) as port:
+        source = str(Path(eitskin.__file__).parents[1])
+        command = [sys.executable, "-c", MAIN, "stream", "--device", f"serial:{port}", "--tare", "4"]
+        environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
+        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None and process.stderr is not None
+            for _ in range(5):
+                assert "no touch" in process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=30)
+        assert process.returncode == 0 and err.endswith("eitskin: stopped\n")
+        assert " frames, " in out.splitlines()[-1] and "0 gaps" in out.splitlines()[-1]
+        assert not board.wanted
