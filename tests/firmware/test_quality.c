@@ -240,7 +240,7 @@ static void test_reciprocity(uint16_t check_every)
     if (fault != NULL) {
         const uint8_t *row = b.open.protocol + 4 * (size_t)fault->index;
         CHECK(row[0] == 2 && row[2] == 5);
-        CHECK(fault->value > 30 && fault->value < 2000);
+        CHECK(fault->value > 100 && fault->value < 2000);
     }
     uint32_t marked = 0;
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
