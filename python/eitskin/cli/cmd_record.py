@@ -8,7 +8,17 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.device_options import add_device, add_scan, add_stream, check_scan, open_named, prepare, read_every, read_mode
+from eitskin.cli.device_options import (
+    add_device,
+    add_scan,
+    add_stream,
+    check_scan,
+    chosen_every,
+    open_named,
+    prepare,
+    read_every,
+    read_mode,
+)
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -49,12 +59,14 @@ def run(options: argparse.Namespace) -> int:
     check_output(options.output, options.overwrite)
     summary = LiveSummary()
     with open_named(options) as device:
+        if device.transport.replays:
+            raise UsageError(f"{device.transport.name} is a recording already; copy the file")
         known = find_model(device.board, options.model, device.transport.name)
         needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
         recorder = prepare(options, device, known, needs_reference=needed, record=options.output)
         assert recorder is not None
         with recorder:
-            items = follow(device, what, every=every, frames=frames)
+            items = follow(device, what, every=chosen_every(device, what, every), frames=frames)
             try:
                 _count(_until(items, options.seconds), summary, frames)
             except KeyboardInterrupt:

@@ -7,7 +7,17 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.device_options import add_device, add_scan, add_stream, check_scan, open_named, prepare, read_every, read_mode
+from eitskin.cli.device_options import (
+    add_device,
+    add_scan,
+    add_stream,
+    check_scan,
+    chosen_every,
+    open_named,
+    prepare,
+    read_every,
+    read_mode,
+)
 
 if TYPE_CHECKING:
     from eitskin.device.known_model import KnownModel
@@ -54,6 +64,7 @@ def run(options: argparse.Namespace) -> int:
             known = find_model(device.board, options.model, name)
         needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
         recorder = prepare(options, device, known, needs_reference=needed, record=options.record)
+        every = chosen_every(device, what, every)
         truth = truth_of(options.device, options.sign or "increase")
         with nullcontext() if recorder is None else recorder:
             items = (replayed if device.transport.replays else follow)(device, what, every=every, frames=frames)

@@ -75,7 +75,7 @@ def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
     parser.add_argument(
         "--mode", default=default, metavar="KIND[,KIND]", help="raw, image, touches, or several (default: %(default)s)"
     )
-    parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th frame (default: every)")
+    parser.add_argument("--every", type=int, metavar="N", help="every N-th frame (default: as many as the line carries)")
     parser.add_argument("--frames", type=int, metavar="N", help="stop after N (default: go on until Ctrl-C, or the scene ends)")
 
 
@@ -97,12 +97,25 @@ def read_mode(text: str) -> Stream:
 
 
 def read_every(options: argparse.Namespace) -> tuple[int, int]:
-    """``--every`` and ``--frames`` (0: no limit).
+    """``--every`` (0: as many as the line carries) and ``--frames`` (0: no limit).
 
     Raises:
         UsageError: one is out of range.
     """
     return whole("--every", options.every, 1, 0xFFFF), whole("--frames", options.frames, 1, 2**32 - 1) or 0
+
+
+def chosen_every(device: Device, what: Stream, every: int) -> int:
+    """``every``, or where that is 0 the least that the line carries, said on stderr where that is not every frame."""
+    from eitskin.device.bandwidth import carried_every
+
+    if every:
+        return every
+    carried = carried_every(device, what)
+    if carried > 1:
+        kinds = ",".join(kind for kind in KINDS if what & type(what)[kind.upper()])
+        say(f"the line carries every {carried}th frame of {kinds}; name another number with  --every")
+    return carried
 
 
 def whole(name: str, value: int | None, low: int, high: int) -> int:

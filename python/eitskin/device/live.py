@@ -110,6 +110,8 @@ class LiveSummary:
         if self.solve_quantiles_us is not None:
             p50, p99 = self.solve_quantiles_us
             lines.append(f"solve and touches on the board: p50 {p50 / 1e3:.2f} ms, p99 {p99 / 1e3:.2f} ms")
+        if self.faults:
+            lines.append(f"{self.faults} faults were reported")
         if self.refused:
             lines.append(f"{self.refused} frames refused by the board's core")
         return lines

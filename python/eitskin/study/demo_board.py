@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from eitskin.core.results import Touch
+from eitskin.device.bandwidth import carried_every
 from eitskin.device.host_check import HostCheck, HostTwin
 from eitskin.device.known_model import need_model
 from eitskin.device.link import LinkEvent
@@ -60,7 +61,7 @@ def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None)
         log = PacketLog(device)
         take_reference(device, TARE_FRAMES, streamed=True)
         device.start_scene()
-        for item in follow(device, EVERYTHING, frames=frames):
+        for item in follow(device, EVERYTHING, every=carried_every(device, EVERYTHING), frames=frames):
             if isinstance(item, LiveFrame):
                 summary.add(item)
                 truth.touches(item.board_us)  # the first begins the scene

@@ -164,6 +164,14 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert facts["device"] == device
 
 
+def test_a_slow_line_is_not_overrun(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with behind_a_port(board_of(scene)) as port:
+        assert main(["stream", "--device", f"serial:{port}?baud=115200", "--mode", "image", "--frames", "4", "--json"]) == 0
+        out, err = capsys.readouterr()
+        assert "the line carries every 7th frame of image; name another number with  --every" in err
+        assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
+
+
 def test_devices_asks_only_what_looks_like_a_board(
     scene: Path, done: Done, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

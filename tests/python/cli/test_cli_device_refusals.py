@@ -134,6 +134,7 @@ def test_a_recording_takes_no_settings(refused: Refused, scene: Path, tmp_path: 
     assert main(["record", "--device", f"sim:{scene}", "-o", str(path), "--frames", "1"]) == 0
     for options in (["--samples", "40"], ["--iterations", "3"], ["--tare", "4"], ["--cold"]):
         assert "is a recording" in refused(USAGE, "stream", "--device", f"file:{path}", *options)
+    assert "is a recording already" in refused(USAGE, "record", "--device", f"file:{path}", "-o", tmp_path / "again.eits")
     for command in (["tare"], ["model", "upload", write_model(tmp_path)]):
         assert "is a recording" in refused(DEVICE, *command, "--device", f"file:{path}")
 
