@@ -1,8 +1,8 @@
 """The emulated board: processor, peripherals and analog parts put together, and the loop that lets time pass.
 
 The loop executes slices that end where the next event is due, takes exceptions between them, and skips to the next event when
-the processor sleeps. While an interrupt waits behind PRIMASK or BASEPRI, slices are MASKED_SLICE instructions: so late it may
-be taken at most. Nothing in it depends on the host's clock: the same image, banks, scene and input give the same bytes.
+the processor sleeps. While nothing but PRIMASK, BASEPRI or FAULTMASK holds an interrupt back, slices are single instructions.
+Nothing in it depends on the host's clock: the same image, banks, scene and input give the same bytes.
 """
 
 from __future__ import annotations
@@ -38,7 +38,6 @@ from eitskin.device.emulator.schedule import Schedule
 from eitskin.device.emulator.serial_line import SerialLine
 from eitskin.errors import DeviceError
 
-MASKED_SLICE = 8
 LONGEST_SLICE = 5_000_000
 FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN = 2, 12, 8, 3
 SCK_PIN, MOSI_PIN, TX_PIN, RX_PIN = 10, 12, 8, 9
@@ -247,8 +246,8 @@ class EmulatedBoard:
     def _slice(self, due: int) -> None:
         cycles = -(-(due - self.clock.now) // self.clock.cycle_ticks)
         cycles = max(min(cycles, LONGEST_SLICE), 1)
-        if self.nvic.pending & self.nvic.enabled:
-            cycles = min(cycles, MASKED_SLICE)
+        if self.nvic.pending & self.nvic.enabled and self._only_masked():
+            cycles = 1  # it must be taken right after the mask is lifted (B1.5.1)
         stop = self.cpu.run(cycles, due)
         while self._later:
             self._later.pop(0)()
@@ -263,6 +262,10 @@ class EmulatedBoard:
             self.nvic.pend(SVCALL)
         elif stop is not Stop.COUNT:
             self._stopped_by(stop)
+
+    def _only_masked(self) -> bool:
+        best = self.nvic.best()
+        return best is not None and self.nvic.urgency(best) < self.nvic.running_urgency()
 
     def _return(self) -> None:
         if not self.nvic.active or not self.exceptions.leave():

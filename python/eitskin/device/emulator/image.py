@@ -1,18 +1,16 @@
-"""The firmware image that ships with eitskin."""
+"""The firmware image that runs on the emulated board: one of the user's, or the one that ships with eitskin."""
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
-from eitskin.errors import DeviceError, FileError
+from eitskin.errors import DeviceError
 from eitskin.fileio import read_bytes
 
-NAME = "nucleo_f767zi.bin"
 ELF = b"\x7fELF"
 
 
-def load_image(path: Path | None) -> bytes:
+def image_bytes(path: Path | None) -> bytes:
     """The image in ``path`` (.bin), or without it the one that ships.
 
     Raises:
@@ -20,11 +18,9 @@ def load_image(path: Path | None) -> bytes:
         DeviceError: it is an .elf.
     """
     if path is None:
-        path = Path(str(files("eitskin"))) / "firmware" / NAME
-        if not path.exists():
-            raise FileError(
-                f"{path}: the firmware image is not there; build it (CONTRIBUTING.md), give it with  --image FILE.bin"
-            )
+        from eitskin.firmware.prebuilt import load_image
+
+        return load_image()[0]
     image = read_bytes(path, "firmware image")
     if image.startswith(ELF):
         raise DeviceError(f"{path}: this is an .elf; give the .bin that is built beside it")

@@ -92,13 +92,13 @@ def open_emulated(scene: str, *, model: bytes | None = None, image: Path | None 
     except ImportError:
         raise missing_extra("emulator", "unicorn") from None
     from eitskin.device.emulator.board import EmulatedBoard
-    from eitskin.device.emulator.image import load_image
+    from eitskin.device.emulator.image import image_bytes
     from eitskin.device.emulator.scene_skin import skin_of
     from eitskin.device.open import find_device_scene
     from eitskin.model.eitm import decode_model
     from eitskin.model.prebuilt import load_prebuilt
 
-    program = load_image(image)
+    program = image_bytes(image)
     described = find_device_scene(scene)
     prebuilt, blob = load_prebuilt() if model is None else (decode_model(model, "the model"), model)
     banks = (bank_bytes(blob, 1),)

@@ -131,22 +131,22 @@ class Adc(Registers):
             self._give(codes)
 
     def _give(self, codes: Codes) -> None:
-        control, status = self.values[CR2], self.values[SR] | STRT
-        if control & DMA:
-            if not status & OVR:
-                stream = self._dma.serving("ADC1", TO_MEMORY)
-                taken = 0 if stream is None else stream.put(codes.astype("<u2").tobytes())
-                if taken < len(codes) and (control & DDS or taken + 1 < len(codes) or status & EOC):
-                    status |= OVR
-                status = status | EOC if taken < len(codes) else status & ~EOC
-                if taken:
-                    self.values[DR] = int(codes[taken - 1])
-        else:
-            if control & EOCS and (status & EOC or len(codes) > 1):
-                status |= OVR
-            status |= EOC
-            self.values[DR] = int(codes[-1])
-        self.values[SR] = status
+        control, taken = self.values[CR2], 0
+        if control & DMA and not self.values[SR] & OVR:
+            stream = self._dma.serving("ADC1", TO_MEMORY)
+            taken = 0 if stream is None else stream.put(codes.astype("<u2").tobytes())
+            if taken:
+                self.values[DR] = int(codes[taken - 1])
+                self.values[SR] &= ~EOC  # DMA has read it
+        left = len(codes) - taken
+        self.values[SR] |= STRT
+        if left:
+            watched = control & EOCS or (control & DMA and control & DDS)  # 15.8.1: without DDS requests just end
+            if watched and left + bool(self.values[SR] & EOC) > 1:
+                self.values[SR] |= OVR
+            if not self.values[SR] & OVR:
+                self.values[DR] = int(codes[-1])
+            self.values[SR] |= EOC
         self._line()
 
     def _line(self) -> None:
@@ -166,7 +166,10 @@ class Adc(Registers):
         control = self.values[CR2]
         if control & DMA and not self.values[SR] & OVR:
             stream = self._dma.serving("ADC1", TO_MEMORY)
-            number = stream.until_interrupt() if stream is not None else 1 if self.values[CR1] & OVRIE else None
+            if stream is not None:
+                number = stream.until_interrupt()
+            elif self.values[CR1] & OVRIE and control & DDS:
+                number = 1 if self.values[SR] & EOC else 2
         elif self.values[CR1] & EOCIE:
             number = 1
         if number is None:

@@ -62,7 +62,7 @@ class Timer(Registers):
     def _set_up(self) -> None:
         self.values = dict(self.reset_values)
         self.values[ARR] = self.top
-        self._prescaler, self._step = 0, 1
+        self._prescaler, self._step = 0, period_ticks(self._rcc.timer_hz(1))
         self._count = self._part = 0  # at the time _at: the counter, and ticks into its present value
         self._at = self._clock.now
         self._gate_open = True
