@@ -69,7 +69,7 @@ def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
 def _rows(info: BoardInfo) -> str:
     if info.check_every == 1:
         return "all rows"
-    return "one row of each reciprocal pair" + (f", all in every {info.check_every}th frame" if info.check_every else "")
+    return "one row of each reciprocal pair" + (f", all in one frame of {info.check_every}" if info.check_every else "")
 
 
 def _used(used: int, room: int) -> str:

@@ -51,6 +51,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.device.known_model import find_model
     from eitskin.device.live import LiveSummary, finish, follow
     from eitskin.device.packets import Stream
+    from eitskin.study.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)
     check_scan(options)
@@ -63,12 +64,13 @@ def run(options: argparse.Namespace) -> int:
             raise UsageError(f"{device.transport.name} is a recording already; copy the file")
         known = find_model(device.board, options.model, device.transport.name)
         needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
-        recorder = prepare(options, device, known, needs_reference=needed, record=options.output)
+        truth = truth_of(options.device, options.sign or "increase")
+        recorder = prepare(options, device, known, needs_reference=needed, record=options.output, truth=truth)
         assert recorder is not None
         with recorder:
             items = follow(device, what, every=chosen_every(device, what, every), frames=frames)
             try:
-                _count(_until(items, options.seconds), summary, frames)
+                _count(_until(until_over(items, None if frames else truth), options.seconds), summary, frames)
             except KeyboardInterrupt:
                 print("eitskin: stopped", file=sys.stderr)
             finally:

@@ -70,10 +70,10 @@ def _show(options: argparse.Namespace) -> None:
 
 def _truth(path: Path) -> SceneTruth | None:
     """Of the scene that the recorded board saw, where that is still to be found."""
-    from eitskin.cli.live_output import truth_of
     from eitskin.device.recording import read_head
     from eitskin.device.run_file import recorded_options
     from eitskin.study.matching import match
+    from eitskin.study.scene_truth import truth_of
 
     solver = recorded_options(path)
     try:

@@ -44,11 +44,12 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Set up, follow, sum up."""
     from eitskin.cli.cmd_record import check_output
-    from eitskin.cli.live_output import check_picture, show, truth_of
+    from eitskin.cli.live_output import check_picture, show
     from eitskin.device.known_model import find_model, need_model
     from eitskin.device.live import follow, replayed
     from eitskin.device.packets import Stream
     from eitskin.fileio import refuse_unwritable
+    from eitskin.study.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)
     check_scan(options)
@@ -63,10 +64,10 @@ def run(options: argparse.Namespace) -> int:
         else:
             known = find_model(device.board, options.model, name)
         needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
-        recorder = prepare(options, device, known, needs_reference=needed, record=options.record)
-        every = chosen_every(device, what, every)
         truth = truth_of(options.device, options.sign or "increase")
+        recorder = prepare(options, device, known, needs_reference=needed, record=options.record, truth=truth)
+        every = chosen_every(device, what, every)
         with nullcontext() if recorder is None else recorder:
             items = (replayed if device.transport.replays else follow)(device, what, every=every, frames=frames)
-            show(options, items, device, known, truth)
+            show(options, until_over(items, None if frames else truth), device, known, truth)
     return 0

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from eitskin.device.packets import Stream
     from eitskin.device.run_file import RunRecorder
     from eitskin.device.settings import ScanSettings, SolverSettings
+    from eitskin.study.scene_truth import SceneTruth
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in, default), serial:/dev/ttyACM0, sim:SCENE (simulated), emu:SCENE (the firmware on "
@@ -25,7 +26,7 @@ TARE_FRAMES = 16
 
 
 def add_device(parser: argparse.ArgumentParser, *, model: bool = True) -> None:
-    """``--device`` and ``--json``; with ``model``, also ``--model``."""
+    """``--device`` and ``--json``; with ``model``, also ``--model`` and ``--firmware``."""
     parser.add_argument("--device", default="auto", metavar="URL", help=DEVICE_HELP)
     if model:
         parser.add_argument(
@@ -34,6 +35,7 @@ def add_device(parser: argparse.ArgumentParser, *, model: bool = True) -> None:
             metavar="MODEL.eitm",
             help="the board's model where it is not the prebuilt one; a simulated or emulated board is given it",
         )
+        parser.add_argument("--firmware", type=Path, metavar="BIN", help="of an emulated board (default: the prebuilt one)")
     parser.add_argument("--json", action="store_true", help="print for programs")
 
 
@@ -114,7 +116,7 @@ def chosen_every(device: Device, what: Stream, every: int) -> int:
     carried = carried_every(device, what)
     if carried > 1:
         kinds = ",".join(kind for kind in KINDS if what & type(what)[kind.upper()])
-        say(f"the line carries every {carried}th frame of {kinds}; name another number with  --every")
+        say(f"the line carries one frame in {carried} of {kinds}; name another number with  --every")
     return carried
 
 
@@ -195,7 +197,10 @@ def open_named(options: argparse.Namespace) -> Device:
     from eitskin.model.eitm import load_model
 
     blob = load_model(options.model)[1] if getattr(options, "model", None) is not None else None
-    return open_device(options.device, model=blob)
+    firmware = getattr(options, "firmware", None)
+    if firmware is not None and not options.device.startswith("emu:"):
+        raise UsageError(f"--firmware {firmware}: only emu: runs an image; a board is given one with  eitskin flash --image")
+    return open_device(options.device, model=blob, image=firmware)
 
 
 def say(text: str) -> None:
@@ -204,15 +209,21 @@ def say(text: str) -> None:
 
 
 def prepare(
-    options: argparse.Namespace, device: Device, known: KnownModel | None, *, needs_reference: bool, record: Path | None = None
+    options: argparse.Namespace,
+    device: Device,
+    known: KnownModel | None,
+    *,
+    needs_reference: bool,
+    record: Path | None = None,
+    truth: SceneTruth | None = None,
 ) -> RunRecorder | None:
-    """Scan, solver and reference as the options say; then what is to be touched begins. Recording begins before the reference is
-    taken; the recorder is the caller's to close.
+    """Scan, solver and reference as the options say; then what is to be touched begins, and ``truth`` is told when. Recording
+    begins before the reference is taken; the recorder is the caller's to close.
 
     Raises:
         EitskinError: a setting cannot be, the board refuses it, or the recording cannot be written.
     """
-    from eitskin.device.live import set_up, take_reference
+    from eitskin.device.live import begin_scene, news_text, set_up, take_reference
     from eitskin.device.run_file import RunRecorder
 
     if device.transport.replays:
@@ -229,7 +240,11 @@ def prepare(
             take_reference(device, frames, streamed=record is not None)
             if not simulated:
                 say("touch it")
-        device.start_scene()
+        began_us, news = begin_scene(device)
+        if truth is not None and began_us is not None:
+            truth.begin(began_us)
+        for item in news:
+            say(news_text(item))
     except BaseException:
         if recorder is not None:
             recorder.close()

@@ -39,14 +39,6 @@ def check_picture(path: Path | None, what: Stream) -> None:
     load_matplotlib()
 
 
-def truth_of(url: str, sign: str) -> SceneTruth | None:
-    """The truth of a simulated or emulated board's scene; None for any other device."""
-    from eitskin.study.scene_truth import SceneTruth, scene_of
-
-    scene = scene_of(url)
-    return None if scene is None else SceneTruth(scene, sign)
-
-
 def show(
     options: argparse.Namespace,
     items: Generator[LiveFrame | Fault | LinkEvent, None, None],

@@ -20,6 +20,7 @@ from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
 from eitskin.errors import DeviceError
 
 WRAP_US = 2**32
+CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # of the emulated board: its microsecond clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +153,22 @@ def take_reference(device: Device, frames: int, *, streamed: bool = False) -> No
         device.tare(frames)
     finally:
         device.send_command(StreamCommand(0), 1.0)
+
+
+def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
+    """Let what is to be touched begin, on a simulated or emulated board, and the scan under way end, which still shows the
+    untouched skin. Returns the board's clock at the scene's time 0 (None for others), and news that came meanwhile."""
+    transport, news = device.transport, []
+    device.start_scene()
+    board = getattr(transport, "board", None)
+    if not transport.url.startswith("emu:"):
+        return (int(board.time_us) if board is not None else None), []
+    began = int(board.timers[CLOCK_TIMER].read(TIMER_COUNT, 4)) if board is not None else None
+    info = device.board
+    while (item := device.next_item(1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us))) is not None:
+        if isinstance(item, Fault | LinkEvent):
+            news.append(item)
+    return began, news
 
 
 def follow(

@@ -9,6 +9,7 @@ from typing import Any
 from eitskin.device.client import Device
 from eitskin.device.explain import fault_text
 from eitskin.device.known_model import KnownModel, scanned_protocol
+from eitskin.device.live import begin_scene
 from eitskin.device.packets import BoardInfo, BoardStats, Fault, FaultCode
 from eitskin.device.raw_frames import RawRun, as_frames, collect
 from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Report
@@ -43,7 +44,7 @@ def measure(device: Device, frames: int, *, touched: bool, before_touches: Calla
     after = RawRun()
     if touched:
         before_touches()
-        device.start_scene()
+        begin_scene(device)
         after = collect(device, frames)
     ended = device.link.ended
     return Measured(first, after, device.board if ended else device.info(), None if ended else device.stats())

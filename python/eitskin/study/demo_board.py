@@ -12,7 +12,7 @@ from eitskin.device.bandwidth import carried_every
 from eitskin.device.host_check import HostCheck, HostTwin
 from eitskin.device.known_model import need_model
 from eitskin.device.link import LinkEvent
-from eitskin.device.live import LiveFrame, LiveSummary, follow, set_up, take_reference
+from eitskin.device.live import LiveFrame, LiveSummary, begin_scene, follow, set_up, take_reference
 from eitskin.device.open import open_device
 from eitskin.device.packet_log import PacketLog
 from eitskin.device.packets import BoardInfo, Stream
@@ -20,7 +20,7 @@ from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.errors import DeviceError
 from eitskin.scene.random_touches import Touch as TrueTouch
 from eitskin.study.matching import Matching
-from eitskin.study.scene_truth import SceneTruth, scene_of
+from eitskin.study.scene_truth import truth_of
 
 TARE_FRAMES = 8
 FRAMES = 3
@@ -51,20 +51,20 @@ def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None)
         MissingExtraError: the emulator is not installed.
     """
     start = perf_counter()
-    scene = scene_of(url)
-    assert scene is not None
-    truth, summary, host = SceneTruth(scene), LiveSummary(), None
+    truth, summary, host = truth_of(url), LiveSummary(), None
+    assert truth is not None
     with open_device(url, image=image) as device:
         known = need_model(device.board, None, device.transport.name, "the comparison")
         options = set_up(device, ScanSettings(), SolverSettings(), known)
         assert options is not None
         log = PacketLog(device)
         take_reference(device, TARE_FRAMES, streamed=True)
-        device.start_scene()
+        began_us, _ = begin_scene(device)
+        if began_us is not None:
+            truth.begin(began_us)
         for item in follow(device, EVERYTHING, every=carried_every(device, EVERYTHING), frames=frames):
             if isinstance(item, LiveFrame):
                 summary.add(item)
-                truth.touches(item.board_us)  # the first begins the scene
         log.stop()
         info = device.board
     twin, last = HostTwin(known, options), None

@@ -168,7 +168,7 @@ def test_a_slow_line_is_not_overrun(scene: Path, capsys: pytest.CaptureFixture[s
     with behind_a_port(board_of(scene)) as port:
         assert main(["stream", "--device", f"serial:{port}?baud=115200", "--mode", "image", "--frames", "4", "--json"]) == 0
         out, err = capsys.readouterr()
-        assert "the line carries every 7th frame of image; name another number with  --every" in err
+        assert "the line carries one frame in 7 of image; name another number with  --every" in err
         assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
 
 
