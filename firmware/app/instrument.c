@@ -88,8 +88,11 @@ static eits_status open_bank(fw_instrument *instrument, uint32_t bank)
     if (!fw_store_record(store, bank, &instrument->record))
         return EITS_E_MODEL_MAGIC;
     eits_status status = fw_store_open(store, bank, &instrument->record, &model);
-    if (status == EITS_OK && fw_model_fits(instrument, &model).status != EITS_REPLY_OK)
-        status = EITS_E_WORKSPACE;
+    if (status == EITS_OK) {
+        const eits_reply_status fits = fw_model_fits(instrument, &model).status;
+        if (fits != EITS_REPLY_OK)
+            status = fits == EITS_REPLY_MODEL_SCAN ? EITS_E_MODEL_VALUE : EITS_E_WORKSPACE;
+    }
     if (status == EITS_OK)
         status = fw_engine_open(&instrument->engine, &model);
     instrument->bank = bank;

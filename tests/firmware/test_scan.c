@@ -189,6 +189,20 @@ static void test_reciprocal(const skin_spec *spec)
             }
         }
         CHECK(every == 0 ? checks == 0 : checks >= 1);
+        const eits_fold masked = b.open.fold[3]; /* a row that is masked has no say and no value; its reciprocal has */
+        eits_command_mask_row mask = {.row = every == 0 ? masked.second : masked.first, .bad = 1};
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+        host_run(&b.host, 60);
+        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+        float pair[2];
+        memcpy(&pair[0], packet->payload + sizeof(eits_packet_raw) + 4 * masked.first, 4);
+        memcpy(&pair[1], packet->payload + sizeof(eits_packet_raw) + 4 * masked.second, 4);
+        const uint8_t *quality = packet->payload + sizeof(eits_packet_raw) + 4 * b.open.n_rows;
+        CHECK((pair[0] != pair[0]) == (every != 0) && (pair[1] != pair[1]) == (every == 0));
+        CHECK_EQUAL(quality[masked.first], every == 0 ? 0 : EITS_QUALITY_MASKED);
+        CHECK_EQUAL(quality[masked.second], EITS_QUALITY_COPIED | (every == 0 ? EITS_QUALITY_MASKED : 0));
+        mask.bad = 0;
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
     }
     bench_stop(&b);
 }

@@ -109,6 +109,11 @@ static void test_refused(void)
     CHECK_EQUAL(reply.detail[0], 17);
     CHECK_EQUAL(reply.detail[1], 16);
     still_adjacent(1);
+    fake_put_model(&b.board, 1, 7, bad.blob, bad.size); /* by a programmer: not opened */
+    bench_restart(&b);
+    CHECK_EQUAL(host_info(&b.host).bank, 0);
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
     skin_model_free(&bad);
     spec = SKIN_ADJACENT;
     spec.wrong_golden = 1;
