@@ -164,7 +164,7 @@ static void next_burst(bool lost)
  * settles it where the clock stands at the edge. */
 static void bursts_ended(uint32_t filling)
 {
-    const uint32_t late_us = nucleo_time_us(NULL) - capture.start_us - capture.burst_us + 2u; /* 2: the end is not sharp */
+    const uint32_t late_us = nucleo_time_us(NULL) - capture.start_us - capture.burst_us;
     uint32_t missed = (int32_t)late_us < 0 ? 0 : late_us / capture.slot_us;
     if (((capture.buffer + missed) & 1u) == filling)
         missed += missed == 0 || late_us % capture.slot_us > capture.slot_us / 2u ? 1u : (uint32_t)-1;

@@ -101,6 +101,12 @@ def test_at_a_slow_rate_too_where_a_burst_ends_before_its_last_period(elf: Path,
     assert [(start - capture.first, lost) for start, _, _, lost in told] == [(0, True), (8100, False)]
 
 
+def test_where_clock_and_buffer_disagree_the_buffer_is_believed(elf: Path) -> None:
+    capture = Capture(elf)
+    told = capture.interrupt(2, capture.first + BURST_US + 1)
+    assert [lost for *_, lost in told] == [True, False] and told[-1][2] == 1
+
+
 @pytest.mark.parametrize("cause", ["transfer error", "overrun"])
 def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf: Path, cause: str) -> None:
     capture = Capture(elf)
@@ -127,6 +133,14 @@ def test_an_interrupt_of_the_converter_without_an_overrun_is_nothing(elf: Path) 
     capture.image.write(ADC_SR, 1 << 1)
     capture.image.call("nucleo_adc_irq")
     assert capture.bursts == []
+
+
+def test_an_overrun_after_stop_does_not_interrupt_for_ever(elf: Path) -> None:
+    capture = Capture(elf)
+    capture.stop()
+    capture.image.write(ADC_SR, OVR)
+    capture.image.call("nucleo_adc_irq")
+    assert capture.bursts == [] and capture.image.read(ADC_SR) == 0
 
 
 def test_after_stop_nothing_is_told(elf: Path) -> None:

@@ -59,6 +59,7 @@ def test_no_frame_is_read_where_none_is(image: BareImage, frame: str) -> None:
     bottom, top = image.symbols["stack_bottom"], image.symbols["stack_top"]
     at = {"below the guard": bottom + 128, "above the stack": top - 16, "stacking failed": top - 64}[frame]
     cfsr = STKERR if frame == "stacking failed" else 0x82
+    image.write_bytes(at, FRAME)
     crash(image, at, cfsr)
     assert last_reset(image)[:5] == (1, 0, 0, 0, cfsr)
 

@@ -21,11 +21,12 @@ def firmware_pins() -> dict[str, tuple[str, int]]:
     program = "".join((BOARD / name).read_text(encoding="utf-8") for name in sorted(path.name for path in BOARD.glob("*.c")))
     call = re.compile(r"nucleo_pin\(GPIO([A-F])_BASE, ([\w +]+), (PIN_\w+), (\d+),")
     pins: dict[str, tuple[str, int]] = {}
+    enables = int(re.findall(r"ENABLE_PIN = (\d+)", program)[0])
     for port, pin, mode, alternate in call.findall(program):
         if pin == "line":
             numbers = list(range(16))
         elif pin == "ENABLE_PIN + line":
-            numbers = list(range(12, 16))
+            numbers = list(range(enables, enables + 4))
         else:
             numbers = [CONSTANTS[pin] if pin in CONSTANTS else int(pin)]
         for number in numbers:
