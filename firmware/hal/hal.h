@@ -41,7 +41,7 @@ typedef struct fw_capture_setup {
 #define FW_MAX_SAMPLES 1024u
 
 typedef struct fw_burst {
-    const uint16_t *samples; /* right-aligned codes; valid until the next but one burst ends */
+    const uint16_t *samples; /* right-aligned codes; valid until the next burst ends */
     uint32_t start_us;       /* of its slot on the board's clock, exact: differences are multiples of slot_us */
     uint32_t next_start_us;  /* when the next slot's first sample will be taken */
     bool lost;               /* the converter overran or DMA failed: do not use it */
