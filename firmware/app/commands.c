@@ -106,7 +106,8 @@ static fw_answer check_scan(const fw_instrument *instrument, const eits_command_
         return bad;
     const uint64_t half_rate_millihz = (uint64_t)c->sample_rate_hz * 500u;
     if (c->excitation_millihz >= half_rate_millihz) /* more than two samples a period */
-        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz), (int32_t)(half_rate_millihz - 1));
+        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
+                      (int32_t)(half_rate_millihz - 1));
     if (fw_ad9833_tuning(instrument->board->mclk_hz, c->excitation_millihz) == 0)
         return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz), LEAST_EXCITATION_MILLIHZ);
     if (!fw_whole_periods(c->excitation_millihz, c->sample_rate_hz, c->samples))

@@ -13,8 +13,8 @@
 #define FW_OPEN_SHARE 0.02f
 #define FW_OPEN_NOISE 5.0f
 #define FW_OPEN_LEAST_ROWS 3u
-/* Reciprocal rows disagree by more than this share of the frame's rms. Channels whose gains differ by a few parts in a hundred, which
- * a tare takes out, give half of it (scene real_board: 0.054); electrodes that are mixed up give far more. */
+/* Reciprocal rows disagree by more than this share of the frame's rms. Channels whose gains differ by a few parts in a hundred,
+ * which a tare takes out, give half of it (scene real_board: 0.054); electrodes that are mixed up give far more. */
 #define FW_RECIPROCITY_SHARE 0.1f
 
 typedef struct fw_findings {

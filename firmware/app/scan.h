@@ -23,7 +23,8 @@ typedef struct fw_scan_settings {
     uint32_t frame_period_us; /* 0: as fast as it goes */
 } fw_scan_settings;
 
-#define FW_SCAN_DEFAULT {.excitation_millihz = 50000000u, .sample_rate_hz = 1000000u, .samples = 80, .settle_us = 16, .check_every = 1}
+#define FW_SCAN_DEFAULT \
+    {.excitation_millihz = 50000000u, .sample_rate_hz = 1000000u, .samples = 80, .settle_us = 16, .check_every = 1}
 
 typedef struct fw_frame {
     uint32_t number, time_us; /* when its first burst began */

@@ -45,5 +45,6 @@ eits_stage_stats fw_stats_of(const fw_stats *stats, eits_stage which)
         seen += stage->bin[bin++];
     const uint32_t edge = fw_stats_edge(bin);
     const bool last = bin + 1 == FW_STATS_BINS;
-    return (eits_stage_stats){stage->count, stage->last_us, edge < stage->worst_us && !last ? edge : stage->worst_us, stage->worst_us};
+    const uint32_t p99_us = edge < stage->worst_us && !last ? edge : stage->worst_us;
+    return (eits_stage_stats){stage->count, stage->last_us, p99_us, stage->worst_us};
 }
