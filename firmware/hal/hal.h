@@ -41,7 +41,7 @@ typedef struct fw_capture_setup {
 #define FW_MAX_SAMPLES 1024u
 
 typedef struct fw_burst {
-    const uint16_t *samples; /* right-aligned codes; valid until the next but one burst ends */
+    const uint16_t *samples; /* right-aligned codes; valid until the next burst ends */
     uint32_t start_us;       /* of its slot on the board's clock, exact: differences are multiples of slot_us */
     uint32_t next_start_us;  /* when the next slot's first sample will be taken */
     bool lost;               /* the converter overran or DMA failed: do not use it */
@@ -56,8 +56,8 @@ typedef struct fw_capture_ops {
 typedef struct fw_capture {
     const fw_capture_ops *ops;
     void *ctx;
-    uint32_t full_scale_code;  /* 4095 for 12 bits */
-    uint32_t reference_uv;     /* of the converter */
+    uint32_t full_scale_code;  /* 4095 for 12 bits; the bias lies at half of full_scale_code + 1 */
+    uint32_t reference_uv;     /* of the converter: full_scale_code + 1 steps (STM32 data sheets, "1 LSB ideal = VREF+ / 4096") */
     uint32_t front_end_gain_ppm; /* volts at the converter for a volt between the electrodes, in millionths */
 } fw_capture;
 
@@ -65,6 +65,7 @@ typedef struct fw_capture {
 typedef struct fw_link_ops {
     bool (*write)(void *ctx, const uint8_t *bytes, size_t size); /* all or nothing; false: no room now */
     size_t (*read)(void *ctx, uint8_t *bytes, size_t room);
+    bool (*ended)(void *ctx); /* no byte will come any more: fw_run returns. NULL: never */
 } fw_link_ops;
 typedef struct fw_link { const fw_link_ops *ops; void *ctx; } fw_link;
 

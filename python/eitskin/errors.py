@@ -66,6 +66,12 @@ class VerificationError(EitskinError):
     exit_code = 10
 
 
+class DeviceError(EitskinError):
+    """A board or its link cannot be used: no port, no answer, another version, another model, a command refused."""
+
+    exit_code = 12  # 11 is doctor's
+
+
 def missing_extra(extra: str, package: str) -> MissingExtraError:
     """The error for an absent optional ``package`` that the extra named ``extra`` brings."""
     return MissingExtraError(f"this needs {package}, which is not installed: run  pip install 'eitskin[{extra}]'")

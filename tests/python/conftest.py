@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from cross_build import ROOT, build_cortex_m7
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
@@ -14,3 +16,9 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("the measured frames are not part of the project: no ../shared/data beside its root")
     return folder
+
+
+@pytest.fixture(scope="session")
+def cortex_m7(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A build of everything for the Cortex-M7: ``firmware/eitskin_BOARD.elf``, ``.bin`` and ``.map``, ``tests/emulated``."""
+    return build_cortex_m7(ROOT, tmp_path_factory.mktemp("cortex-m7"))

@@ -8,5 +8,6 @@
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
+#include "eitskin/link.h"
 
 #endif

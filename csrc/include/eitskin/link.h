@@ -1,7 +1,8 @@
 /* eitskin: packets between a board and a host, and their framing. docs/link-protocol.md specifies the bytes.
  *
- * A packet is an 8-byte head, a payload and a CRC-32, stuffed by COBS (Cheshire and Baker, IEEE/ACM Trans. Networking 7
- * (1999) 159-172) between two zero bytes. Both sides use this codec: nothing else encodes or decodes.
+ * A packet is an 8-byte head (u8 version, u8 type, u16 bytes of payload, u32 sequence number), a payload and a CRC-32 of both,
+ * stuffed by COBS (Cheshire and Baker, IEEE/ACM Trans. Networking 7 (1999) 159-172) between two zero bytes. Both sides use
+ * this codec: nothing else encodes or decodes.
  */
 #ifndef EITSKIN_LINK_H
 #define EITSKIN_LINK_H
@@ -164,7 +165,15 @@ typedef struct eits_packet_touch {
 } eits_packet_touch;
 
 /* Stages that are timed, in microseconds. */
-enum { EITS_STAGE_SCAN, EITS_STAGE_DEMODULATE, EITS_STAGE_SOLVE, EITS_STAGE_TOUCHES, EITS_STAGE_SEND, EITS_STAGE_FRAME, EITS_STAGES };
+typedef enum eits_stage {
+    EITS_STAGE_SCAN = 0,
+    EITS_STAGE_DEMODULATE = 1,
+    EITS_STAGE_SOLVE = 2,
+    EITS_STAGE_TOUCHES = 3,
+    EITS_STAGE_SEND = 4,
+    EITS_STAGE_FRAME = 5
+} eits_stage;
+#define EITS_STAGES 6u
 
 typedef struct eits_stage_stats {
     uint32_t count, last_us, p99_us, worst_us; /* p99: upper edge of its bin, an eighth of an octave wide */
@@ -180,7 +189,7 @@ typedef struct eits_packet_stats {
     uint32_t link_packets, link_crc_errors, link_framing_errors, link_overruns;
     uint32_t stack_bytes, stack_used;       /* used: the most so far */
     uint32_t workspace_bytes, workspace_used;
-    eits_stage_stats stage[EITS_STAGES];
+    eits_stage_stats stage[6];             /* by eits_stage */
 } eits_packet_stats;
 
 typedef struct eits_packet_fault {

@@ -1,13 +1,19 @@
-"""``eitskin demo``: three simulated touches, found by the C core, beside the truth."""
+"""``eitskin demo``: three simulated touches, found by the C core and by an emulated board, beside the truth."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from eitskin.errors import UsageError
+from eitskin.errors import MissingExtraError, UsageError
+
+if TYPE_CHECKING:
+    from eitskin.study.demo_board import BoardDemo
+
+BOARD = "emu:demo"
 
 
 def add_parser(subparsers: Any) -> None:
@@ -16,12 +22,14 @@ def add_parser(subparsers: Any) -> None:
         "demo",
         help="three simulated touches, reconstructed in C, beside the truth",
         description="Simulate three touches on the paper's skin (nonlinear forward model on another, finer mesh, noise), "
-        "reconstruct them with the C core and the prebuilt model, and draw them.",
+        "reconstruct them with the C core and the prebuilt model, and draw them; then let the firmware find them on an emulated "
+        "board, and compare what it sends with this host's results bit by bit.",
     )
     parser.add_argument("--snr-db", type=float, default=60.0, metavar="DB", help="20 log10(rms(V0)/sigma) (default: %(default)g)")
     parser.add_argument("--seed", type=int, default=1, help="of noise and contacts (default: %(default)s)")
     parser.add_argument("--picture", type=Path, default=Path("demo.png"), metavar="PNG", help="default: %(default)s")
     parser.add_argument("--frames", type=Path, metavar="NPZ", help="also write the simulated frames, with their truth")
+    parser.add_argument("--no-board", action="store_true", help="leave the emulated board out")
     parser.add_argument("--json", action="store_true")
     parser.set_defaults(run=run)
 
@@ -42,8 +50,30 @@ def run(options: argparse.Namespace) -> int:
     if options.frames is not None:
         save_frames(options.frames, demo.frames)
     draw_demo(options.picture, demo)
+    if not options.json:
+        print(f"{to_text(demo)}\npicture: {options.picture}", flush=True)
+    board = None if options.no_board else _board()
     if options.json:
-        print(json.dumps({**to_json(demo), "picture": str(options.picture)}, indent=2))
-    else:
-        print(f"{to_text(demo)}\npicture: {options.picture}")
+        print(json.dumps({**to_json(demo), "picture": str(options.picture), "board": _board_json(board)}, indent=2))
+    elif board is not None:
+        from eitskin.study.demo_board import to_text as board_text
+
+        print(f"\n{board_text(board)}")
     return 0
+
+
+def _board() -> BoardDemo | None:
+    """The same touches on the emulated board; None, with a word on stderr, where the emulator is not installed."""
+    from eitskin.study.demo_board import run_board_demo
+
+    try:
+        return run_board_demo(BOARD)
+    except MissingExtraError as error:
+        print(f"eitskin: without the emulated board: {error}", file=sys.stderr)
+        return None
+
+
+def _board_json(board: BoardDemo | None) -> dict[str, Any] | None:
+    from eitskin.study.demo_board import to_json
+
+    return None if board is None else to_json(board)

@@ -1,4 +1,4 @@
-"""``eitskin doctor``: what is wrong with frames, before any image is made of them."""
+"""``eitskin doctor``: what is wrong with frames or with a board, before any image is made."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.cli.import_options import add_import_options, floats, read_options, read_protocol
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
+    from eitskin.frames.doctor.case import Case
+    from eitskin.frames.doctor.report import Report
     from eitskin.frames.doctor.subject import Subject
     from eitskin.frames.frames import Frames
+    from eitskin.skin.skin import Skin
 
 TOUCH_RADIUS_PER_SIZE = 0.05
 
@@ -22,12 +26,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add the command."""
     parser = subparsers.add_parser(
         "doctor",
-        help="say what is wrong with measured frames: order, sign, wiring, noise, gains",
+        help="say what is wrong with measured frames or a board: order, sign, wiring, noise, gains",
         description="Say what is wrong with measured frames before an image is made of them: channel order, sign, "
         "numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains, noise and drift. Takes a "
-        "frames file, or any source that import reads. Exit code 0: nothing must be mended; 11: something must.",
+        "frames file, any source that import reads, or with --device a board whose skin is not touched, and then also says "
+        "which faults the board itself reports. Exit code 0: nothing must be mended; 11: something must.",
     )
-    parser.add_argument("source", type=Path, help="frames file, or CSV, NPZ, MAT as for import")
+    parser.add_argument("source", type=Path, nargs="?", help="frames file, or CSV, NPZ, MAT as for import")
+    device = parser.add_argument_group("a board in place of a source")
+    device.add_argument("--device", metavar="URL", help=DEVICE_HELP)
+    device.add_argument("--frames", type=int, default=32, metavar="N", help="to be measured, 4 to 1024 (default: %(default)s)")
+    device.add_argument("--model", type=Path, metavar="MODEL.eitm", help="the board's, where it is not the prebuilt one")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument("--picture", type=Path, metavar="PNG", help="draw what was measured (needs matplotlib)")
     parser.add_argument(
@@ -47,11 +56,46 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.frames.doctor.examine import examine_case
     from eitskin.frames.doctor.subject import subject_from_source
 
+    if (options.source is None) == (options.device is None):
+        raise UsageError("doctor: name frames to examine, or a board with --device URL, not both")
     protocol, skin, n_electrodes = read_protocol(options)
+    if options.device is not None:
+        return _run_device(options, skin)
+    assert options.source is not None
     subject = subject_from_source(options.source, read_options(options), protocol, skin, n_electrodes)
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
     report, case = examine_case(subject)
+    return _tell(options, report, case)
+
+
+def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
+    """Measure, examine, say; with ``--touch`` the second half of the frames is of the touched skin."""
+    from eitskin.cli.device_options import open_named, say, whole
+    from eitskin.device.known_model import find_model
+    from eitskin.frames.doctor.examine import examine_case
+    from eitskin.study.board_doctor import board_findings, board_subject, measure
+
+    whole("--frames", options.frames, 4, 1024)
+    with open_named(options) as device:
+        known = find_model(device.board, options.model, device.transport.name)
+        simulated = device.transport.synchronous
+
+        def before_touches() -> None:
+            if not simulated:
+                say("now touch the skin where --touch says, and stay")
+
+        if not simulated:
+            say(f"leave the skin untouched: measuring {options.frames} frames")
+        found = measure(device, options.frames, touched=bool(options.touch), before_touches=before_touches)
+        subject = board_subject(device, found, known, skin)
+    if options.touch:
+        subject = _with_touches(subject, options.touch, options.touch_in)
+    report, case = examine_case(subject)
+    return _tell(options, board_findings(report, found), case)
+
+
+def _tell(options: argparse.Namespace, report: Report, case: Case) -> int:
     if options.picture is not None:
         from eitskin.frames.doctor.picture import draw
 

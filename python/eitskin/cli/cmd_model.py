@@ -1,12 +1,14 @@
-"""``eitskin model build | info | verify``."""
+"""``eitskin model build | info | verify | upload``."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.errors import UsageError, VerificationError
 
 if TYPE_CHECKING:
@@ -17,7 +19,7 @@ NUMPY_BOUND = 1e-4
 
 def add_parser(subparsers: Any) -> None:
     """Add ``model`` and its own subcommands."""
-    parser = subparsers.add_parser("model", help="build, describe or verify an .eitm model")
+    parser = subparsers.add_parser("model", help="build, describe, verify or upload an .eitm model")
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
     build.add_argument("skin", nargs="?", type=Path, metavar="SKIN.toml", help="skin description")
@@ -52,6 +54,16 @@ def add_parser(subparsers: Any) -> None:
     verify.add_argument("model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one")
     verify.add_argument("--json", action="store_true")
     verify.set_defaults(run=run_verify)
+    upload = actions.add_parser(
+        "upload",
+        help="put a model on a board",
+        description="Put a model into the bank of a board's flash that is not in use. The board verifies it, then swaps; "
+        "cut at any byte, it keeps its old model. The reference is forgotten.",
+    )
+    upload.add_argument("model", type=Path, metavar="MODEL.eitm")
+    upload.add_argument("--device", default="auto", metavar="URL", help=DEVICE_HELP)
+    upload.add_argument("--json", action="store_true")
+    upload.set_defaults(run=run_upload)
 
 
 def load_or_prebuilt(path: Path | None) -> tuple[Model, bytes, str]:
@@ -163,4 +175,27 @@ def run_verify(options: argparse.Namespace) -> int:
         raise VerificationError(f"{name}: the C core does not give the golden image's bits; rebuild the model with this version")
     if not within:
         raise VerificationError(f"{name}: an engine is further than {NUMPY_BOUND:g} from the golden image; report this")
+    return 0
+
+
+def run_upload(options: argparse.Namespace) -> int:
+    """Send the model, with a bar on stderr where that is a terminal."""
+    from tqdm import tqdm
+
+    from eitskin.device.open import open_device
+    from eitskin.model.eitm import load_model
+
+    _, blob = load_model(options.model)
+    with open_device(options.device) as device:
+        with tqdm(total=len(blob), desc="upload", unit="B", unit_scale=True, leave=False, disable=not sys.stderr.isatty()) as bar:
+            def show(done: int, total: int) -> None:
+                bar.update(done - bar.n)
+
+            info = device.upload_model(blob, show)
+        url = device.transport.url
+    if options.json:
+        facts = {"device": url, "model": str(options.model), "bytes": len(blob)}
+        print(json.dumps(facts | {"model_crc": f"{info.model_crc:08x}", "bank": info.bank}, indent=2))
+    else:
+        print(f"{url}: {options.model} is in bank {info.bank}, {len(blob)} bytes, checksum {info.model_crc:08x}; tare anew")
     return 0

@@ -11,7 +11,10 @@ from typing import NoReturn
 from eitskin import __version__
 from eitskin.errors import EitskinError, UsageError
 
-COMMANDS = ("demo", "model", "reconstruct", "import", "doctor", "scene", "compare", "bench")
+COMMANDS = (
+    "demo", "model", "reconstruct", "import", "doctor", "scene", "compare", "bench",
+    "devices", "info", "tare", "stream", "record", "replay", "flash",
+)  # fmt: skip
 
 
 class Parser(argparse.ArgumentParser):

@@ -1,4 +1,4 @@
-"""Every shell and Python block of the README and of the tutorial runs, in order, in one folder a page."""
+"""Every shell and Python block of the README and of pages that promise it runs, in order, in one folder a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = ("README.md", "docs/tutorial.md", "docs/scenes.md")
+PAGES = ("README.md", "docs/tutorial.md", "docs/scenes.md", "docs/board.md")
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SET_UP = {"scripts/demo", "scripts/test"}
 

@@ -20,7 +20,7 @@ from eitskin.scene.session import Bench
 
 EXPECTED = {
     *("single_press", "light_press", "two_touch", "pinch", "swipe", "ring7", "roll", "rotate", "grip", "drying_gel"),
-    *("loose_electrode", "bridged", "mains_hum", "drift", "real_board", "random_touches"),
+    *("loose_electrode", "bridged", "mains_hum", "drift", "real_board", "random_touches", "demo"),
 }
 BENCH = Bench()
 

@@ -1,4 +1,5 @@
-/* Start of a Cortex-M7 under an emulator: vectors, FPU on, zeroed memory, semihosting, main. */
+/* Start of a Cortex-M7 under QEMU's mps2-an500: vectors, FPU on, zeroed memory, semihosting, main. Programs without the
+ * interrupt leave its handler out. */
 #include <stdint.h>
 #include <stdlib.h>
 
@@ -7,13 +8,17 @@ extern void initialise_monitor_handles(void);
 extern int main(void);
 
 #define CPACR (*(volatile uint32_t *)0xE000ED88u)
+#define CORE_VECTORS 16
+#define IRQ_TIMER1 9 /* Arm DAI 0500, table 3-9 */
 
 void reset(void);
 static void fault(void);
+__attribute__((weak)) void mps2_slot_irq(void);
 
-__attribute__((section(".vectors"), used)) static const void *const vectors[16] = {
+__attribute__((section(".vectors"), used)) static const void *const vectors[CORE_VECTORS + IRQ_TIMER1 + 1] = {
     [0] = &stack_top, [1] = (const void *)reset, [2] = (const void *)fault, [3] = (const void *)fault,
-    [4] = (const void *)fault, [5] = (const void *)fault, [6] = (const void *)fault};
+    [4] = (const void *)fault, [5] = (const void *)fault, [6] = (const void *)fault,
+    [CORE_VECTORS + IRQ_TIMER1] = (const void *)mps2_slot_irq};
 
 void reset(void)
 {

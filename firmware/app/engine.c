@@ -1,0 +1,193 @@
+#include "app/engine.h"
+
+#include <string.h>
+
+void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes)
+{
+    *engine = (fw_engine){.workspace = workspace, .workspace_bytes = workspace_bytes, .cosine = 1};
+}
+
+/* From the workspace's start: the core's part. From its end: what is kept while another model is tried. Between: the rest. */
+static size_t kept_bytes(const eits_model *model)
+{
+    return EITS_ALIGN16(model->n_rows * sizeof(float)) + EITS_ALIGN16(model->n_rows);
+}
+
+static size_t frame_bytes(const eits_model *model)
+{
+    return EITS_ALIGN16(model->n_rows * sizeof(fw_iq)) + EITS_ALIGN16(model->n_rows * (sizeof(float) + 1u));
+}
+
+size_t fw_engine_needs(const eits_model *model)
+{
+    const size_t rows = model->n_rows;
+    return EITS_ALIGN16(eits_workspace_size(model, 0)) + 2 * frame_bytes(model) + EITS_ALIGN16(rows * sizeof(uint16_t)) +
+           EITS_ALIGN16(rows * sizeof(float)) + EITS_ALIGN16(rows) + kept_bytes(model);
+}
+
+static void *take(uint8_t **next, size_t bytes)
+{
+    void *taken = *next;
+    memset(taken, 0, bytes);
+    *next += EITS_ALIGN16(bytes);
+    return taken;
+}
+
+static void lay_out(fw_engine *engine)
+{
+    const size_t rows = engine->model.n_rows;
+    uint8_t *next = engine->workspace + EITS_ALIGN16(eits_workspace_size(&engine->model, 0));
+    for (int k = 0; k < 2; ++k) {
+        fw_frame *frame = &engine->frames[k];
+        *frame = (fw_frame){0};
+        frame->z = take(&next, rows * sizeof(fw_iq));
+        frame->volts = take(&next, rows * (sizeof(float) + 1u));
+        frame->quality = (uint8_t *)(frame->volts + rows);
+    }
+    engine->unique = take(&next, rows * sizeof(uint16_t));
+    engine->expected = take(&next, rows * sizeof(float));
+    engine->flags = take(&next, rows);
+    uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
+    engine->kept.bad = end - EITS_ALIGN16(rows); /* not cleared: it may hold what is to be restored */
+    engine->kept.v0 = (float *)(void *)(end - kept_bytes(&engine->model));
+}
+
+/* Rows that no fold names as a second one, in order. Rows that no fold names at all are among them. */
+static void list_unique(fw_engine *engine)
+{
+    const eits_model *model = &engine->model;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        if (model->fold[k].second != EITS_FOLD_NONE)
+            engine->flags[model->fold[k].second] = 1;
+    }
+    engine->n_unique = 0;
+    for (uint32_t i = 0; i < model->n_rows; ++i) {
+        if (!engine->flags[i])
+            engine->unique[engine->n_unique++] = (uint16_t)i;
+        engine->flags[i] = 0;
+    }
+}
+
+static eits_status start_core(fw_engine *engine)
+{
+    const eits_status status =
+        eits_init(&engine->ctx, &engine->model, engine->workspace, eits_workspace_size(&engine->model, 0));
+    engine->ctx.options.warm_start = 1;
+    return status;
+}
+
+eits_status fw_engine_open(fw_engine *engine, const eits_model *model)
+{
+    fw_engine_close(engine);
+    const size_t needs = fw_engine_needs(model);
+    if (needs > engine->workspace_bytes - engine->workspace_bytes % 16u)
+        return EITS_E_WORKSPACE;
+    engine->model = *model;
+    const eits_status status = start_core(engine);
+    if (status != EITS_OK)
+        return status;
+    lay_out(engine);
+    list_unique(engine);
+    engine->used_bytes = needs;
+    engine->open = true;
+    fw_engine_expect(engine);
+    return EITS_OK;
+}
+
+void fw_engine_close(fw_engine *engine)
+{
+    engine->open = engine->tared = engine->angle_known = false;
+    engine->cosine = 1;
+    engine->sine = 0;
+    engine->used_bytes = 0;
+}
+
+fw_scan_table fw_engine_table(const fw_engine *engine)
+{
+    return (fw_scan_table){engine->model.protocol, engine->model.n_rows, engine->unique, engine->n_unique};
+}
+
+static float magnitude(float value)
+{
+    return value < 0 ? -value : value;
+}
+
+void fw_engine_expect(fw_engine *engine)
+{
+    const eits_model *model = &engine->model;
+    const eits_baseline *baseline = &engine->ctx.baseline;
+    for (uint32_t i = 0; i < model->n_rows; ++i) {
+        const float v0 = magnitude(baseline->v0[i]);
+        engine->expected[i] = engine->tared && v0 >= 0 ? v0 : 0; /* NaN: masked at the tare */
+    }
+    for (uint32_t k = 0; !engine->tared && k < model->n_folded; ++k) {
+        const eits_fold fold = model->fold[k];
+        engine->expected[fold.first] = magnitude(model->v_ref[k]);
+        if (fold.second != EITS_FOLD_NONE)
+            engine->expected[fold.second] = magnitude(model->v_ref[k]);
+    }
+}
+
+void fw_engine_keep(fw_engine *engine)
+{
+    fw_kept *kept = &engine->kept;
+    memcpy(kept->v0, engine->ctx.baseline.v0, engine->model.n_rows * sizeof(float));
+    memcpy(kept->bad, engine->ctx.bad, engine->model.n_rows);
+    kept->baseline = engine->ctx.baseline;
+    kept->options = engine->ctx.options;
+    kept->next_id = engine->ctx.next_id;
+    kept->cosine = engine->cosine;
+    kept->sine = engine->sine;
+    kept->tared = engine->tared;
+    kept->angle_known = engine->angle_known;
+}
+
+void fw_engine_restore(fw_engine *engine)
+{
+    const fw_kept *kept = &engine->kept;
+    float *m2 = engine->ctx.baseline.m2, *v0 = engine->ctx.baseline.v0;
+    engine->ctx.baseline = kept->baseline;
+    engine->ctx.baseline.v0 = v0;
+    engine->ctx.baseline.m2 = m2;
+    engine->ctx.options = kept->options;
+    memcpy(v0, kept->v0, engine->model.n_rows * sizeof(float));
+    memcpy(engine->ctx.bad, kept->bad, engine->model.n_rows);
+    engine->ctx.next_id = kept->next_id;
+    engine->ctx.basis_stale = 1;
+    eits_forget(&engine->ctx);
+    engine->cosine = kept->cosine;
+    engine->sine = kept->sine;
+    engine->tared = kept->tared;
+    engine->angle_known = kept->angle_known;
+}
+
+eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, float *difference)
+{
+    const size_t size = eits_workspace_size(model, 0);
+    *difference = 0;
+    if (size > engine->workspace_bytes)
+        return EITS_E_WORKSPACE;
+    const uint8_t *kept_from = engine->workspace + engine->workspace_bytes;
+    if (engine->open) {
+        fw_engine_keep(engine);
+        kept_from = (const uint8_t *)engine->kept.v0;
+    }
+    eits_status status = eits_init(&engine->ctx, model, engine->workspace, size);
+    if (status == EITS_OK)
+        status = eits_self_test(&engine->ctx, difference);
+    if (!engine->open)
+        return status;
+    const bool survived = engine->workspace + size <= kept_from;
+    const bool other = model->protocol != engine->model.protocol;
+    (void)start_core(engine); /* it fitted before */
+    if (other) {
+        lay_out(engine);
+        list_unique(engine);
+    }
+    if (survived)
+        fw_engine_restore(engine);
+    else
+        engine->tared = engine->angle_known = false;
+    fw_engine_expect(engine);
+    return status;
+}

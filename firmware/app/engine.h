@@ -1,0 +1,61 @@
+/* The solver on a board: the model that is open, the core's context, and the frames, laid out in the board's workspace. */
+#ifndef FW_ENGINE_H
+#define FW_ENGINE_H
+
+#include "app/scan.h"
+#include "eitskin/eitskin.h"
+#include "hal/hal.h"
+
+/* What a baseline and its settings are, apart from the context: to go back to when a tare or a self-test fails. */
+typedef struct fw_kept {
+    eits_baseline baseline;
+    eits_options options;
+    uint32_t next_id; /* of touches: ids are not used twice */
+    float *v0;    /* n_rows */
+    uint8_t *bad; /* n_rows */
+    float cosine, sine;
+    bool tared, angle_known;
+} fw_kept;
+
+typedef struct fw_engine {
+    uint8_t *workspace;
+    size_t workspace_bytes, used_bytes; /* used by the open model */
+    eits_model model;
+    eits_context ctx;
+    bool open, tared;
+    bool angle_known;        /* learned at a tare; else it is estimated from each frame */
+    float cosine, sine;      /* of the angle that the voltages' phase has */
+    fw_frame frames[2];
+    uint16_t *unique;        /* rows that are no other's reciprocal */
+    uint32_t n_unique;
+    float *expected;         /* n_rows: magnitude of each row's voltage on the untouched skin, V; 0: unknown */
+    uint8_t *flags;          /* n_rows: bits of the frame under way */
+    fw_kept kept;
+} fw_engine;
+
+void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes);
+
+/* Workspace that a model needs here, frames included. */
+size_t fw_engine_needs(const eits_model *model);
+
+/* Take up an open model (copied) with its default options, warm start on; not tared. Whatever was open is forgotten.
+ * Errors: those of eits_init; EITS_E_WORKSPACE where memory is short; nothing is open then. */
+eits_status fw_engine_open(fw_engine *engine, const eits_model *model);
+void fw_engine_close(fw_engine *engine);
+
+/* The table that the scan measures. */
+fw_scan_table fw_engine_table(const fw_engine *engine);
+
+/* Learn what row magnitudes are to be expected from the reference frame, or untared from the model. */
+void fw_engine_expect(fw_engine *engine);
+
+/* Keep baseline, options, masks and angle; restore puts them back, the warm start forgotten. */
+void fw_engine_keep(fw_engine *engine);
+void fw_engine_restore(fw_engine *engine);
+
+/* Run the golden frame of `model`, which may be another than the open one; scanning may go on only if it is the open one.
+ * Afterwards the open model is as before but for the warm start; its tare is lost only where memory is too short to keep it
+ * beside `model`. Errors: EITS_E_WORKSPACE, those of eits_self_test. */
+eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, float *difference);
+
+#endif

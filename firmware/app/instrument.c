@@ -1,0 +1,222 @@
+/* Start-up, and the main loop. */
+#include "app/instrument.h"
+
+#include <string.h>
+
+enum { LED_ALIVE = 1, LED_TOUCH = 2, LED_FAULT = 4, ALIVE_MS = 512, DRAIN_US = 100000 };
+
+uint32_t fw_now_us(const fw_instrument *instrument)
+{
+    return instrument->board->system->time_us(instrument->board->system_ctx);
+}
+
+/* ---- scan ---- */
+
+void fw_stop_scan(fw_instrument *instrument)
+{
+    (void)fw_scan_stop(&instrument->scan);
+}
+
+/* The generator at the tuning word that the settings ask for; it is left alone where it has it already, for its phase. */
+static fw_status start_generator(fw_instrument *instrument)
+{
+    fw_ad9833 *generator = &instrument->generator;
+    const uint32_t tuning = fw_ad9833_tuning(instrument->board->mclk_hz, instrument->settings.excitation_millihz);
+    if (generator->state == FW_AD9833_RUNNING && generator->tuning == tuning)
+        return FW_OK;
+    return fw_ad9833_start(generator, tuning, 0, FW_SINE);
+}
+
+void fw_start_scan(fw_instrument *instrument)
+{
+    const fw_board *board = instrument->board;
+    const fw_scan_settings *s = &instrument->settings;
+    fw_stop_scan(instrument);
+    instrument->tried_us = fw_now_us(instrument);
+    const fw_fault_detail detail = {.frame = instrument->last_frame};
+    fw_status status = start_generator(instrument);
+    bool bus = status != FW_OK;
+    if (status == FW_OK && instrument->engine.open && !instrument->upload.active) {
+        const fw_scan_table table = fw_engine_table(&instrument->engine);
+        status = fw_demodulate_setup(&instrument->demodulator, &board->capture, board->mclk_hz, instrument->generator.tuning,
+                                     s->excitation_millihz, s->sample_rate_hz, s->samples);
+        if (status == FW_OK)
+            status = fw_scan_start(&instrument->scan, s, &table, instrument->engine.frames);
+        bus = status == FW_E_BUS;
+    }
+    fw_fault_set(&instrument->faults, EITS_FAULT_BUS, bus, detail);
+    if (status != FW_OK && !bus) /* a frame takes the fault back */
+        fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true, detail);
+    if (status != FW_OK)
+        fw_fail_tare(instrument, EITS_E_BASELINE_SHORT);
+}
+
+void fw_fail_tare(fw_instrument *instrument, eits_status why)
+{
+    if (!instrument->tare.active)
+        return;
+    fw_tare_abort(&instrument->tare, &instrument->engine);
+    fw_send_tare_reply(instrument, (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)why}});
+}
+
+/* A scan that gives nothing is started anew; so is one that could not be started. */
+static void watch_scan(fw_instrument *instrument)
+{
+    const uint32_t now_us = fw_now_us(instrument);
+    const bool wanted = instrument->engine.open && !instrument->upload.active;
+    if (fw_scan_stalled(&instrument->scan, now_us)) {
+        fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true, (fw_fault_detail){.frame = instrument->last_frame});
+        fw_fail_tare(instrument, EITS_E_BASELINE_SHORT);
+        fw_start_scan(instrument);
+    } else if (wanted && !instrument->scan.running && now_us - instrument->tried_us > FW_RETRY_US) {
+        fw_start_scan(instrument);
+    }
+}
+
+/* ---- model ---- */
+
+void fw_tell_no_model(fw_instrument *instrument)
+{
+    fw_fault_set(&instrument->faults, EITS_FAULT_NO_MODEL, !instrument->engine.open,
+                 (fw_fault_detail){.frame = instrument->last_frame, .value = (int32_t)instrument->no_model_why});
+}
+
+static eits_status open_bank(fw_instrument *instrument, uint32_t bank)
+{
+    const fw_store *store = &instrument->board->store;
+    eits_model model;
+    if (!fw_store_record(store, bank, &instrument->record))
+        return EITS_E_MODEL_MAGIC;
+    eits_status status = fw_store_open(store, bank, &instrument->record, &model);
+    if (status == EITS_OK) {
+        const eits_reply_status fits = fw_model_fits(instrument, &model).status;
+        if (fits != EITS_REPLY_OK)
+            status = fits == EITS_REPLY_MODEL_SCAN ? EITS_E_MODEL_VALUE : EITS_E_WORKSPACE;
+    }
+    if (status == EITS_OK)
+        status = fw_engine_open(&instrument->engine, &model);
+    instrument->bank = bank;
+    return status;
+}
+
+void fw_open_newest(fw_instrument *instrument)
+{
+    uint32_t banks[FW_BANKS];
+    const uint32_t count = fw_store_newest(&instrument->board->store, banks);
+    instrument->stream = (fw_stream){.every = 1};
+    instrument->no_model_why = EITS_E_MODEL_MAGIC;
+    fw_engine_close(&instrument->engine);
+    for (uint32_t k = 0; k < count && !instrument->engine.open; ++k) {
+        const eits_status status = open_bank(instrument, banks[k]);
+        if (k == 0)
+            instrument->no_model_why = status;
+    }
+    const fw_scan_table table = fw_engine_table(&instrument->engine);
+    const uint64_t least_us = (uint64_t)fw_scan_rows(&instrument->settings, &table) * fw_slot_us(&instrument->settings);
+    if (instrument->engine.open && instrument->settings.frame_period_us < least_us)
+        instrument->settings.frame_period_us = 0; /* it was for a shorter table */
+    fw_tell_no_model(instrument);
+}
+
+/* ---- main loop ---- */
+
+void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
+{
+    memset(instrument, 0, sizeof *instrument);
+    instrument->board = board;
+    instrument->settings = (fw_scan_settings)FW_SCAN_DEFAULT;
+    fw_outbox_init(&instrument->outbox, board->link);
+    fw_faults_init(&instrument->faults, &instrument->outbox);
+    fw_ad9833_init(&instrument->generator, board->generator);
+    fw_engine_init(&instrument->engine, board->workspace, board->workspace_bytes);
+    fw_scan_init(&instrument->scan, board, &instrument->demodulator);
+    (void)eits_link_decoder_init(&instrument->decoder, instrument->received, FW_RECEIVE_ROOM);
+    instrument->uptime_us = fw_now_us(instrument);
+    const fw_last_reset *last = &board->last_reset;
+    fw_fault_set(&instrument->faults, EITS_FAULT_CRASH, last->crash != 0, (fw_fault_detail){.words = last->words});
+    fw_fault_set(&instrument->faults, EITS_FAULT_WATCHDOG, last->watchdog != 0, (fw_fault_detail){0});
+    fw_open_newest(instrument);
+    fw_start_scan(instrument);
+    fw_send_info(instrument, 0);
+}
+
+/* Take what has come and run the commands in it; false: nothing has. */
+static bool read_link(fw_instrument *instrument)
+{
+    const fw_link *link = &instrument->board->link;
+    const size_t size = link->ops->read(link->ctx, instrument->chunk, sizeof instrument->chunk);
+    for (size_t at = 0; at < size;) {
+        eits_link_packet packet;
+        at += eits_link_feed(&instrument->decoder, instrument->chunk + at, size - at, &packet);
+        if (packet.payload != NULL)
+            fw_command(instrument, &packet);
+    }
+    return size > 0;
+}
+
+static void keep_time(fw_instrument *instrument)
+{
+    const uint32_t ms = (fw_now_us(instrument) - instrument->uptime_us) / 1000u;
+    instrument->uptime_ms += ms;
+    instrument->uptime_us += ms * 1000u;
+}
+
+static void show(const fw_instrument *instrument)
+{
+    const fw_board *board = instrument->board;
+    uint32_t leds = (instrument->uptime_ms & ALIVE_MS) == 0 ? LED_ALIVE : 0;
+    leds |= instrument->touched ? LED_TOUCH : 0;
+    leds |= instrument->faults.raised != 0 ? LED_FAULT : 0;
+    board->system->show(board->system_ctx, leds);
+}
+
+bool fw_instrument_turn(fw_instrument *instrument)
+{
+    const fw_board *board = instrument->board;
+    board->system->feed_watchdog(board->system_ctx);
+    keep_time(instrument);
+    bool worked = read_link(instrument);
+    fw_frame *frame = fw_scan_take(&instrument->scan);
+    if (frame != NULL) {
+        fw_process_frame(instrument, frame);
+        fw_scan_release(&instrument->scan);
+        worked = true;
+    }
+    watch_scan(instrument);
+    fw_upload_check(instrument);
+    show(instrument);
+    return worked;
+}
+
+/* The reply to RESET is on its way when the board restarts. */
+static void restart(fw_instrument *instrument)
+{
+    const fw_board *board = instrument->board;
+    const uint32_t began_us = fw_now_us(instrument);
+    fw_stop_scan(instrument);
+    (void)fw_ad9833_stop(&instrument->generator);
+    while (fw_now_us(instrument) - began_us < DRAIN_US) {
+        board->system->feed_watchdog(board->system_ctx);
+        board->system->wait(board->system_ctx);
+    }
+    board->system->reset(board->system_ctx);
+}
+
+int fw_instrument_run(fw_instrument *instrument, const fw_board *board)
+{
+    if (board->workspace == NULL || (uintptr_t)board->workspace % 16 != 0 || board->mclk_hz % 1000000u != 0)
+        return 1;
+    fw_instrument_init(instrument, board);
+    for (;;) {
+        const bool worked = fw_instrument_turn(instrument);
+        if (instrument->reset_wanted) {
+            restart(instrument);
+            return 2; /* only where reset returns */
+        }
+        if (worked)
+            continue;
+        if (board->link.ops->ended != NULL && board->link.ops->ended(board->link.ctx))
+            return 0;
+        board->system->wait(board->system_ctx);
+    }
+}

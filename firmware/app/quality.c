@@ -1,0 +1,142 @@
+#include "app/quality.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { FAILED = EITS_QUALITY_SATURATED | EITS_QUALITY_UNSETTLED, UNUSABLE = FAILED | EITS_QUALITY_OPEN | EITS_QUALITY_MASKED };
+
+static float rms(const float *values, uint32_t count)
+{
+    float sum = 0;
+    for (uint32_t i = 0; i < count; ++i)
+        sum += values[i] * values[i];
+    return count > 0 ? sqrtf(sum / (float)count) : 0;
+}
+
+static float rms_of_z(const fw_engine *engine, const fw_frame *frame)
+{
+    float sum = 0;
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < engine->model.n_rows; ++i) {
+        if (engine->flags[i] == 0)
+            continue;
+        sum += frame->z[i].i * frame->z[i].i + frame->z[i].q * frame->z[i].q;
+        ++count;
+    }
+    return count > 0 ? sqrtf(sum / (float)count) : 0;
+}
+
+void fw_quality_prepare(fw_engine *engine, fw_frame *frame)
+{
+    const bool all = (frame->flags & EITS_RAW_RECIPROCAL) == 0;
+    memset(engine->flags, all, engine->model.n_rows);
+    for (uint32_t k = 0; !all && k < engine->n_unique; ++k)
+        engine->flags[engine->unique[k]] = 1;
+    for (uint32_t i = 0; i < engine->model.n_rows; ++i) {
+        if (engine->flags[i])
+            continue;
+        frame->z[i] = (fw_iq){0, 0};
+        frame->quality[i] = 0;
+    }
+}
+
+static uint32_t find_open(const fw_engine *engine, const fw_frame *frame)
+{
+    const eits_model *model = &engine->model;
+    const float noise = engine->tared ? engine->ctx.baseline.noise_v : 0, expected_rms = rms(engine->expected, model->n_rows);
+    /* untared, the model tells shares only: the frame itself gives the scale */
+    const float scale = engine->tared || !(expected_rms > 0) ? 1 : rms_of_z(engine, frame) / expected_rms;
+    uint32_t significant[FW_ELECTRODES] = {0}, alive = 0, open = 0;
+    for (uint32_t i = 0; i < model->n_rows; ++i) {
+        const float expected = scale * engine->expected[i], share = FW_OPEN_SHARE * expected;
+        const float limit = share > FW_OPEN_NOISE * noise ? share : FW_OPEN_NOISE * noise;
+        if (engine->flags[i] == 0 || (frame->quality[i] & EITS_QUALITY_UNSETTLED) != 0 || engine->ctx.bad[i] ||
+            !(expected > scale * FW_OPEN_SIGNIFICANT * expected_rms) || expected < 10 * limit)
+            continue;
+        const fw_iq z = frame->z[i];
+        const bool dead = (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 || z.i * z.i + z.q * z.q < limit * limit;
+        for (uint32_t k = 0; k < 4; ++k) {
+            const uint32_t electrode = model->protocol[4 * (size_t)i + k];
+            ++significant[electrode];
+            alive |= (uint32_t)!dead << electrode;
+        }
+    }
+    for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
+        if (significant[e] >= FW_OPEN_LEAST_ROWS && (alive & 1u << e) == 0)
+            open |= 1u << e;
+    }
+    return open;
+}
+
+static void mark_open(const fw_engine *engine, fw_frame *frame, uint32_t open)
+{
+    for (uint32_t i = 0; open != 0 && i < engine->model.n_rows; ++i) {
+        const uint8_t *row = engine->model.protocol + 4 * (size_t)i;
+        const uint32_t uses = 1u << row[0] | 1u << row[1] | 1u << row[2] | 1u << row[3];
+        if ((uses & open) != 0)
+            frame->quality[i] |= EITS_QUALITY_OPEN;
+    }
+}
+
+static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_findings *findings)
+{
+    const eits_model *model = &engine->model;
+    const float all = rms_of_z(engine, frame);
+    float worst = 0;
+    findings->checked = all > 0;
+    for (uint32_t k = 0; k < model->n_folded && findings->checked; ++k) {
+        const eits_fold fold = model->fold[k];
+        if (fold.second == EITS_FOLD_NONE || ((frame->quality[fold.first] | frame->quality[fold.second]) & UNUSABLE) != 0)
+            continue;
+        const float off = frame->volts[fold.first] - (float)fold.sign * frame->volts[fold.second];
+        const float share = (off < 0 ? -off : off) / all;
+        if (share > FW_RECIPROCITY_SHARE) {
+            frame->quality[fold.first] |= EITS_QUALITY_RECIPROCITY;
+            frame->quality[fold.second] |= EITS_QUALITY_RECIPROCITY;
+        }
+        if (share > worst) {
+            worst = share;
+            findings->worst_row = fold.first;
+        }
+    }
+    findings->worst_permille = (uint32_t)(1000 * (worst < 1000 ? worst : 1000) + 0.5f);
+}
+
+/* Second rows get what their first ones measured. */
+static void copy_reciprocals(const fw_engine *engine, fw_frame *frame)
+{
+    for (uint32_t k = 0; k < engine->model.n_folded; ++k) {
+        const eits_fold fold = engine->model.fold[k];
+        if (fold.second == EITS_FOLD_NONE)
+            continue;
+        frame->volts[fold.second] = (float)fold.sign * frame->volts[fold.first];
+        frame->quality[fold.second] =
+            (uint8_t)((frame->quality[fold.first] & ~(unsigned)EITS_QUALITY_MASKED) | EITS_QUALITY_COPIED);
+    }
+}
+
+void fw_quality_judge(fw_engine *engine, fw_frame *frame, fw_findings *findings)
+{
+    const uint32_t rows = engine->model.n_rows;
+    *findings = (fw_findings){0};
+    for (uint32_t i = 0; i < rows; ++i) {
+        if ((frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !engine->ctx.bad[i] && findings->saturated++ == 0)
+            findings->first_saturated = i;
+    }
+    findings->open = find_open(engine, frame);
+    mark_open(engine, frame, findings->open);
+    for (uint32_t i = 0; i < rows; ++i) {
+        if (engine->ctx.bad[i])
+            frame->quality[i] |= EITS_QUALITY_MASKED;
+    }
+    if ((frame->flags & EITS_RAW_RECIPROCAL) == 0)
+        check_reciprocity(engine, frame, findings);
+    if ((frame->flags & (EITS_RAW_RECIPROCAL | EITS_RAW_CHECK)) != 0)
+        copy_reciprocals(engine, frame);
+    for (uint32_t i = 0; i < rows; ++i) {
+        if (engine->ctx.bad[i])
+            frame->quality[i] |= EITS_QUALITY_MASKED;
+        if ((frame->quality[i] & UNUSABLE) != 0)
+            frame->volts[i] = (float)NAN;
+    }
+}

@@ -1,0 +1,179 @@
+/* What becomes of a frame: judged, given to the tare or to the solver, and sent. */
+#include "app/angle.h"
+#include "app/instrument.h"
+
+static void tell_faults(fw_instrument *instrument, const fw_frame *frame, const fw_findings *findings)
+{
+    fw_faults *faults = &instrument->faults;
+    fw_fault_detail detail = {.frame = frame->number};
+    fw_fault_set(faults, EITS_FAULT_SCAN_STALLED, false, detail);
+    for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
+        detail.index = (int32_t)e;
+        fw_fault_set(faults, EITS_FAULT_ELECTRODE_OPEN, (findings->open & 1u << e) != 0, detail);
+    }
+    detail.index = (int32_t)findings->first_saturated;
+    detail.value = (int32_t)findings->saturated;
+    fw_fault_set(faults, EITS_FAULT_SATURATED, findings->saturated > 0, detail);
+    detail.index = 0;
+    detail.value = (int32_t)frame->bus_errors;
+    fw_fault_set(faults, EITS_FAULT_BUS, frame->bus_errors > 0, detail);
+    if (!findings->checked)
+        return;
+    /* one frame in which a touch moves has reciprocals that disagree too */
+    const bool doubtful = (float)findings->worst_permille > 1000.0f * FW_RECIPROCITY_SHARE;
+    instrument->doubtful = doubtful ? instrument->doubtful + 1 : 0;
+    instrument->agreeing = doubtful ? 0 : instrument->agreeing + 1;
+    detail.index = (int32_t)findings->worst_row;
+    detail.value = (int32_t)findings->worst_permille;
+    if (instrument->doubtful >= FW_RECIPROCITY_FRAMES || instrument->agreeing >= FW_RECIPROCITY_FRAMES)
+        fw_fault_set(faults, EITS_FAULT_RECIPROCITY, doubtful, detail);
+}
+
+static void send_raw(fw_instrument *instrument, const fw_frame *frame, uint32_t flags)
+{
+    const uint32_t rows = instrument->engine.model.n_rows;
+    const eits_packet_raw head = {.frame = frame->number,
+                                  .time_us = frame->time_us,
+                                  .scan_us = frame->scan_us,
+                                  .n_rows = (uint16_t)rows,
+                                  .flags = (uint16_t)(frame->flags | flags)};
+    if ((instrument->stream.what & EITS_STREAM_RAW) != 0)
+        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_RAW, &head, sizeof head, frame->volts, 5 * (size_t)rows);
+}
+
+static void take_tare(fw_instrument *instrument, const fw_frame *frame)
+{
+    eits_status status = EITS_OK;
+    const fw_tare_step step = fw_tare_add(&instrument->tare, &instrument->engine, frame, &status);
+    if (step == FW_TARE_TAKEN || step == FW_TARE_DONE)
+        send_raw(instrument, frame, EITS_RAW_QUIET);
+    if (step == FW_TARE_DONE)
+        fw_send_tare_reply(instrument, (fw_answer){0});
+    else if (step == FW_TARE_FAILED)
+        fw_send_tare_reply(instrument, (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)status}});
+}
+
+/* Whether this frame is one of those that are streamed. */
+static bool due(fw_stream *stream)
+{
+    if (stream->what == 0)
+        return false;
+    if (stream->phase > 0) {
+        --stream->phase;
+        return false;
+    }
+    stream->phase = stream->every - 1u;
+    return true;
+}
+
+static uint32_t low_word(uint64_t count)
+{
+    return count > UINT32_MAX ? UINT32_MAX : (uint32_t)count;
+}
+
+static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_packet_solved *head, const eits_touch *touches,
+                        uint32_t count)
+{
+    const eits_context *ctx = &instrument->engine.ctx;
+    const uint32_t pixels = instrument->engine.model.n_pixels;
+    if ((instrument->stream.what & EITS_STREAM_IMAGE) != 0) {
+        head->count = (uint16_t)pixels;
+        head->age_us = fw_now_us(instrument) - frame->end_us;
+        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_IMAGE, head, sizeof *head, ctx->image, pixels * sizeof(float));
+    }
+    if ((instrument->stream.what & EITS_STREAM_TOUCHES) != 0) {
+        eits_packet_touch body[EITS_MAX_TOUCHES];
+        for (uint32_t k = 0; k < count; ++k) {
+            const eits_touch t = touches[k];
+            body[k] = (eits_packet_touch){t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence};
+        }
+        head->count = (uint16_t)count;
+        head->age_us = fw_now_us(instrument) - frame->end_us;
+        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_TOUCHES, head, sizeof *head, body, count * sizeof body[0]);
+    }
+}
+
+/* Returns the microseconds that the solver took, touches included. */
+static uint32_t solve(fw_instrument *instrument, const fw_frame *frame)
+{
+    eits_context *ctx = &instrument->engine.ctx;
+    eits_touch touches[EITS_MAX_TOUCHES];
+    uint32_t count = 0;
+    const uint32_t began_us = fw_now_us(instrument);
+    const eits_status status = eits_reconstruct(ctx, frame->volts, instrument->engine.model.n_rows, NULL, NULL);
+    const uint32_t solved_us = fw_now_us(instrument);
+    const bool wanted = (instrument->stream.what & EITS_STREAM_TOUCHES) != 0;
+    if (wanted && status == EITS_OK)
+        (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
+    const uint32_t done_us = fw_now_us(instrument);
+    const eits_info *info = &ctx->info;
+    eits_packet_solved head = {.frame = frame->number,
+                               .time_us = frame->time_us,
+                               .solve_us = solved_us - began_us,
+                               .touch_us = done_us - solved_us,
+                               .status = (uint16_t)-status,
+                               .stop = (uint16_t)info->stop,
+                               .masked = (uint16_t)info->masked,
+                               .iterations = info->iterations,
+                               .nonzeros = info->nonzeros,
+                               .macs = low_word(info->macs),
+                               .touch_macs = low_word(info->touch_macs),
+                               .lambda = info->lambda,
+                               .lambda_max = info->lambda_max,
+                               .lambda_noise = info->lambda_noise,
+                               .gap_rel = info->gap_rel,
+                               .residual = info->residual,
+                               .data_norm = info->data_norm};
+    fw_stats_add(&instrument->stats, EITS_STAGE_SOLVE, head.solve_us);
+    if (wanted)
+        fw_stats_add(&instrument->stats, EITS_STAGE_TOUCHES, head.touch_us);
+    ++instrument->frames_solved;
+    instrument->touched = count > 0;
+    fw_fault_set(&instrument->faults, EITS_FAULT_SOLVER, status != EITS_OK,
+                 (fw_fault_detail){.frame = frame->number, .value = (int32_t)status});
+    send_solved(instrument, frame, &head, touches, count);
+    return done_us - began_us;
+}
+
+static void check_deadline(fw_instrument *instrument, const fw_frame *frame, uint32_t now_us)
+{
+    const uint32_t period = instrument->settings.frame_period_us, late = now_us - frame->end_us;
+    const bool missed = period != 0 && late > period;
+    instrument->deadlines_missed += missed;
+    fw_fault_set(&instrument->faults, EITS_FAULT_DEADLINE, missed,
+                 (fw_fault_detail){.frame = frame->number, .value = missed ? (int32_t)(late - period) : 0});
+}
+
+void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
+{
+    fw_engine *engine = &instrument->engine;
+    fw_stream *stream = &instrument->stream;
+    const bool quiet = fw_tare_wants(&instrument->tare, frame);
+    fw_findings findings;
+    instrument->last_frame = frame->number;
+    fw_quality_prepare(engine, frame);
+    if (quiet ? fw_tare_first(&instrument->tare) : !engine->angle_known)
+        fw_angle_learn(engine, frame);
+    fw_angle_apply(engine, frame);
+    fw_quality_judge(engine, frame, &findings);
+    tell_faults(instrument, frame, &findings);
+    fw_stats_add(&instrument->stats, EITS_STAGE_SCAN, frame->scan_us);
+    fw_stats_add(&instrument->stats, EITS_STAGE_DEMODULATE, frame->busy_us);
+    if (quiet) {
+        take_tare(instrument, frame);
+        return;
+    }
+    if (!due(stream))
+        return;
+    const uint32_t began_us = fw_now_us(instrument);
+    uint32_t solving_us = 0;
+    send_raw(instrument, frame, 0);
+    if ((stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0 && engine->tared)
+        solving_us = solve(instrument, frame);
+    const uint32_t done_us = fw_now_us(instrument);
+    fw_stats_add(&instrument->stats, EITS_STAGE_SEND, done_us - began_us - solving_us);
+    fw_stats_add(&instrument->stats, EITS_STAGE_FRAME, done_us - frame->time_us);
+    check_deadline(instrument, frame, done_us);
+    if (stream->counted && --stream->left == 0)
+        stream->what = 0;
+}

@@ -1,0 +1,23 @@
+# The images: eitskin_BOARD.elf and its map for each board, and .bin for those that are flashed. The same sources and compiler
+# give the same bytes wherever they are built.
+function(eitskin_add_image board)
+    cmake_parse_arguments(IMAGE "FLASHED" "" "SPECS;LIBRARIES" ${ARGN})
+    set(name eitskin_${board})
+    set(folder ${CMAKE_CURRENT_SOURCE_DIR}/boards/${board})
+    set(script ${folder}/${board}.ld)
+    file(GLOB sources CONFIGURE_DEPENDS ${folder}/*.c)
+    add_executable(${name} ${sources})
+    target_link_libraries(${name} PRIVATE fw_app ${IMAGE_LIBRARIES})
+    target_compile_options(${name} PRIVATE ${EITSKIN_WARNINGS} ${EITSKIN_ARITHMETIC} -ffile-prefix-map=${PROJECT_SOURCE_DIR}=.)
+    target_link_options(${name} PRIVATE -nostartfiles ${IMAGE_SPECS} -T${script} -Wl,--gc-sections -Wl,--fatal-warnings
+                        -Wl,-Map=${CMAKE_CURRENT_BINARY_DIR}/${name}.map)
+    set_target_properties(${name} PROPERTIES SUFFIX .elf LINK_DEPENDS ${script})
+    add_custom_command(TARGET ${name} POST_BUILD COMMAND arm-none-eabi-size $<TARGET_FILE:${name}>)
+    if(IMAGE_FLASHED)
+        add_custom_command(TARGET ${name} POST_BUILD COMMAND ${CMAKE_OBJCOPY} -O binary $<TARGET_FILE:${name}> ${name}.bin
+                           BYPRODUCTS ${name}.bin)
+    endif()
+endfunction()
+
+eitskin_add_image(nucleo_f767zi FLASHED SPECS --specs=nano.specs --specs=nosys.specs)
+eitskin_add_image(mps2_an500 SPECS --specs=rdimon.specs LIBRARIES m)

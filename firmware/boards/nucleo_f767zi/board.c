@@ -1,0 +1,47 @@
+/* The NUCLEO-F767ZI as the application sees it. */
+#include "nucleo.h"
+
+/* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA and 1.5 would (docs/hardware.md). */
+enum { FULL_SCALE_CODE = 4095, REFERENCE_UV = 3300000, FRONT_END_GAIN_PPM = 1500000 };
+
+/* No 8 MHz: nothing that follows would be right. The red light blinks, from the 16 MHz oscillator, and that is all. */
+__attribute__((noreturn)) static void no_clock(void)
+{
+    RCC_AHB1ENR |= RCC_AHB1ENR_GPIOBEN;
+    (void)RCC_AHB1ENR;
+    nucleo_pin(GPIOB_BASE, 14, PIN_OUTPUT, 0, 0, 0);
+    for (uint32_t on = 1;; on ^= 1u) {
+        GPIO_BSRR(GPIOB_BASE) = on != 0 ? 1u << 14 : 1u << 30;
+        for (volatile uint32_t k = 0; k < 500000; ++k)
+            ;
+    }
+}
+
+int main(void)
+{
+    if (!nucleo_clock_start())
+        no_clock();
+    nucleo_cache_start();
+    nucleo_system_start();
+    nucleo_multiplexers_start();
+    nucleo_generator_start();
+    nucleo_capture_start();
+    nucleo_link_start();
+    const fw_board board = {
+        .name = "nucleo_f767zi",
+        .serial = nucleo_serial(),
+        .f_cpu_hz = NUCLEO_SYSCLK_HZ,
+        .mclk_hz = NUCLEO_MCLK_HZ,
+        .stack_bytes = (uint32_t)((uint8_t *)stack_top - (uint8_t *)stack_bottom) - NUCLEO_STACK_GUARD_BYTES,
+        .generator = {&nucleo_generator_ops, NULL},
+        .multiplexers = {&nucleo_multiplexers_ops, NULL},
+        .capture = {&nucleo_capture_ops, NULL, FULL_SCALE_CODE, REFERENCE_UV, FRONT_END_GAIN_PPM},
+        .link = {&nucleo_link_ops, NULL},
+        .store = {&nucleo_store_ops, NULL, NUCLEO_BANK_BYTES},
+        .system = &nucleo_system_ops,
+        .last_reset = nucleo_last_reset(),
+        .workspace = workspace_start,
+        .workspace_bytes = (size_t)(workspace_end - workspace_start),
+    };
+    return fw_run(&board);
+}

@@ -1,0 +1,40 @@
+/* The four ADG1206: lines 0 to 15 (addresses) on PE0 to PE15, 16 to 19 (enables) on PF12 to PF15. */
+#include "nucleo.h"
+
+enum { ENABLE_PIN = 12, ADDRESS_LINES = 16 };
+#define ADDRESSES 0x0000FFFFu
+#define ENABLES 0x000F0000u
+
+void nucleo_multiplexers_start(void)
+{
+    GPIO_BSRR(GPIOF_BASE) = (ENABLES >> ADDRESS_LINES << ENABLE_PIN) << 16; /* off, before they are outputs */
+    for (uint32_t line = 0; line < 4; ++line)
+        nucleo_pin(GPIOF_BASE, ENABLE_PIN + line, PIN_OUTPUT, 0, 1, 0);
+    for (uint32_t line = 0; line < ADDRESS_LINES; ++line)
+        nucleo_pin(GPIOE_BASE, line, PIN_OUTPUT, 0, 1, 0);
+}
+
+static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
+{
+    (void)ctx;
+    if ((mask & ~(ADDRESSES | ENABLES)) != 0)
+        return FW_E_ARGUMENT;
+    /* One store a port: the upper half of BSRR clears, the lower sets (RM0410 6.4.7). */
+    const uint32_t high = mask & levels, low = mask & ~levels;
+    if ((mask & ADDRESSES) != 0)
+        GPIO_BSRR(GPIOE_BASE) = (high & ADDRESSES) | (low & ADDRESSES) << 16;
+    if ((mask & ENABLES) != 0)
+        GPIO_BSRR(GPIOF_BASE) = ((high >> ADDRESS_LINES) | (low >> ADDRESS_LINES << 16)) << ENABLE_PIN;
+    return FW_OK;
+}
+
+static void wait_ns(void *ctx, uint32_t ns)
+{
+    (void)ctx;
+    const uint32_t per_us = NUCLEO_SYSCLK_HZ / 1000000u;
+    const uint32_t start = DWT_CYCCNT, cycles = ns / 1000u * per_us + (ns % 1000u * per_us + 999u) / 1000u;
+    while (DWT_CYCCNT - start < cycles)
+        ;
+}
+
+const fw_lines_ops nucleo_multiplexers_ops = {write_lines, wait_ns};

@@ -1,0 +1,95 @@
+/* Two banks for models in the program's own flash: 0x08040000 (sectors 5 and 6) and 0x080C0000 (7 and 8), 512 KB each.
+ *
+ * The flash is one bank (nDBANK set, as delivered): while it erases or programs, whoever reads it waits, the processor too
+ * (RM0410 3.3.6). A sector of 256 KB takes 1 s, at most 4 (data sheet, table 52); bytes that the host sends meanwhile are kept
+ * by DMA. */
+#include "nucleo.h"
+
+#include <string.h>
+
+enum { SECTORS_A_BANK = 2, FIRST_SECTOR = 5, WORD_US = 1000, SECTOR_US = 6000000 };
+#define BANKS_START 0x08040000u
+#define SECTOR_BYTES (256u * 1024u)
+#define ERRORS (FLASH_SR_OPERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_PGPERR | FLASH_SR_ERSERR)
+#define WORDS_OF_32_BITS (2u << FLASH_CR_PSIZE_POS) /* 2.7 to 3.6 V */
+
+static const uint8_t *bank_start(void *ctx, uint32_t bank)
+{
+    (void)ctx;
+    return (const uint8_t *)(BANKS_START + bank * NUCLEO_BANK_BYTES);
+}
+
+static fw_status finished(uint32_t most_us)
+{
+    const uint32_t start = nucleo_time_us(NULL);
+    while ((FLASH_SR & FLASH_SR_BSY) != 0)
+        if (nucleo_time_us(NULL) - start > most_us)
+            return FW_E_TIMEOUT;
+    return (FLASH_SR & ERRORS) == 0 ? FW_OK : FW_E_FLASH;
+}
+
+static fw_status open_flash(void)
+{
+    if ((FLASH_OPTCR & FLASH_OPTCR_NDBANK) == 0) /* two banks: other sectors lie here */
+        return FW_E_FLASH;
+    if ((FLASH_CR & FLASH_CR_LOCK) != 0) {
+        FLASH_KEYR = FLASH_KEY1;
+        FLASH_KEYR = FLASH_KEY2;
+    }
+    const fw_status status = finished(WORD_US);
+    FLASH_SR = ERRORS | FLASH_SR_EOP; /* of the past */
+    return status == FW_E_TIMEOUT ? status : FW_OK;
+}
+
+static void close_flash(void)
+{
+    FLASH_CR = FLASH_CR_LOCK;
+}
+
+static bool all_ones(const uint8_t *start, size_t size)
+{
+    const uint32_t *word = (const uint32_t *)(const void *)start, *const end = word + size / sizeof *word;
+    while (word < end)
+        if (*word++ != 0xFFFFFFFFu)
+            return false;
+    return true;
+}
+
+static fw_status erase(void *ctx, uint32_t bank)
+{
+    if (bank >= FW_BANKS)
+        return FW_E_ARGUMENT;
+    fw_status status = open_flash();
+    for (uint32_t k = 0; k < SECTORS_A_BANK && status == FW_OK; ++k) {
+        nucleo_feed_watchdog(ctx);
+        FLASH_CR = WORDS_OF_32_BITS | FLASH_CR_SER | (FIRST_SECTOR + SECTORS_A_BANK * bank + k) << FLASH_CR_SNB_POS;
+        FLASH_CR |= FLASH_CR_STRT;
+        DSB();
+        status = finished(SECTOR_US);
+    }
+    close_flash();
+    nucleo_feed_watchdog(ctx);
+    nucleo_cache_forget(bank_start(ctx, bank), NUCLEO_BANK_BYTES);
+    return status == FW_OK && !all_ones(bank_start(ctx, bank), NUCLEO_BANK_BYTES) ? FW_E_FLASH : status;
+}
+
+static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
+{
+    if (bank >= FW_BANKS || offset % 4u != 0 || size % 4u != 0 || offset > NUCLEO_BANK_BYTES || size > NUCLEO_BANK_BYTES - offset)
+        return FW_E_ARGUMENT;
+    const uint8_t *const start = bank_start(ctx, bank) + offset;
+    fw_status status = open_flash();
+    FLASH_CR = WORDS_OF_32_BITS | FLASH_CR_PG;
+    for (size_t at = 0; at < size && status == FW_OK; at += 4) {
+        uint32_t word;
+        memcpy(&word, (const uint8_t *)bytes + at, sizeof word);
+        REG32((uint32_t)start + at) = word;
+        DSB(); /* one word at a time: two merged would not fit the parallelism (RM0410 3.3.7); and Arm's erratum 1259864 */
+        status = finished(WORD_US);
+    }
+    close_flash();
+    nucleo_cache_forget(start, size);
+    return status == FW_OK && memcmp(start, bytes, size) != 0 ? FW_E_FLASH : status;
+}
+
+const fw_store_ops nucleo_store_ops = {bank_start, erase, program};

@@ -1,0 +1,134 @@
+/* Time, sleep, interrupts, the watchdog, lights, and who this processor is. */
+#include "nucleo.h"
+
+enum { LED_GREEN = 0, LED_BLUE = 7, LED_RED = 14 }; /* of port B: LD1, LD2, LD3 (UM1974 6.5) */
+
+static volatile bool woken;
+static char serial[25];
+
+void nucleo_interrupt(uint32_t irq, uint32_t urgency)
+{
+    NVIC_IPR(irq) = (uint8_t)urgency;
+    NVIC_ICPR(irq / 32u) = 1u << (irq % 32u);
+    NVIC_ISER(irq / 32u) = 1u << (irq % 32u);
+}
+
+void nucleo_system_start(void)
+{
+    SCB_SHCSR |= SCB_SHCSR_MEMFAULTENA | SCB_SHCSR_BUSFAULTENA | SCB_SHCSR_USGFAULTENA;
+    SCB_CCR |= SCB_CCR_DIV_0_TRP;
+
+    /* TIM5 counts microseconds; its compare pulse starts the slots (capture.c). */
+    TIM_PSC(TIM5_BASE) = NUCLEO_TIMER_HZ / 1000000u - 1u;
+    TIM_ARR(TIM5_BASE) = 0xFFFFFFFFu;
+    TIM_EGR(TIM5_BASE) = TIM_EGR_UG; /* loads the prescaler */
+    TIM_CR2(TIM5_BASE) = 3u << TIM_CR2_MMS_POS;
+    TIM_CR1(TIM5_BASE) = TIM_CR1_CEN;
+
+    DCB_DEMCR |= DCB_DEMCR_TRCENA; /* the cycle counter, for waits below a microsecond */
+    DWT_LAR = 0xC5ACCE55u;
+    DWT_CYCCNT = 0;
+    DWT_CTRL |= DWT_CTRL_CYCCNTENA;
+
+    STK_LOAD = NUCLEO_SYSCLK_HZ / 1000u - 1u;
+    STK_VAL = 0;
+    SCB_SHPR3 = (SCB_SHPR3 & 0x00FFFFFFu) | ((uint32_t)NUCLEO_URGENCY_TICK << 24);
+    STK_CTRL = STK_CTRL_CLKSOURCE | STK_CTRL_TICKINT | STK_CTRL_ENABLE;
+
+    nucleo_pin(GPIOB_BASE, LED_GREEN, PIN_OUTPUT, 0, 0, 0);
+    nucleo_pin(GPIOB_BASE, LED_BLUE, PIN_OUTPUT, 0, 0, 0);
+    nucleo_pin(GPIOB_BASE, LED_RED, PIN_OUTPUT, 0, 0, 0);
+
+    /* 32 kHz / 64 / 4000: about 8 s, more than the longest erase of a sector (4 s), during which the program stands still. */
+    IWDG_KR = 0xCCCCu;
+    IWDG_KR = 0x5555u;
+    IWDG_PR = 4u;
+    IWDG_RLR = 4000u - 1u;
+    while (IWDG_SR != 0)
+        ;
+    IWDG_KR = 0xAAAAu;
+
+    for (uint32_t digit = 0; digit < 24; ++digit)
+        serial[digit] = "0123456789ABCDEF"[UID(digit / 8u) >> (28u - 4u * (digit % 8u)) & 0xFu];
+}
+
+const char *nucleo_serial(void)
+{
+    return serial;
+}
+
+void nucleo_wake(void)
+{
+    woken = true;
+}
+
+void nucleo_tick_irq(void)
+{
+    nucleo_wake();
+}
+
+uint32_t nucleo_time_us(void *ctx)
+{
+    (void)ctx;
+    return TIM_CNT(TIM5_BASE);
+}
+
+/* An interrupt that is pending ends WFI even while interrupts are off: none can slip in between the look and the sleep. */
+static void sleep_until_interrupt(void *ctx)
+{
+    (void)ctx;
+    __asm volatile("cpsid i" ::: "memory");
+    if (!woken)
+        __asm volatile("dsb\n wfi" ::: "memory");
+    __asm volatile("cpsie i\n isb" ::: "memory");
+    woken = false;
+}
+
+uint32_t nucleo_lock(void *ctx)
+{
+    (void)ctx;
+    uint32_t state;
+    __asm volatile("mrs %0, primask\n cpsid i" : "=r"(state)::"memory");
+    return state;
+}
+
+void nucleo_unlock(void *ctx, uint32_t state)
+{
+    (void)ctx;
+    __asm volatile("msr primask, %0" ::"r"(state) : "memory");
+}
+
+void nucleo_feed_watchdog(void *ctx)
+{
+    (void)ctx;
+    IWDG_KR = 0xAAAAu;
+}
+
+static void restart(void *ctx)
+{
+    (void)ctx;
+    DSB();
+    SCB_AIRCR = SCB_AIRCR_SYSRESETREQ;
+    for (;;)
+        ;
+}
+
+static uint32_t stack_used(void *ctx)
+{
+    (void)ctx;
+    const uint32_t *word = stack_bottom + NUCLEO_STACK_GUARD_BYTES / sizeof *word; /* below, a look is a fault */
+    while (word < stack_top && *word == NUCLEO_STACK_PAINT)
+        ++word;
+    return (uint32_t)(stack_top - word) * (uint32_t)sizeof *word;
+}
+
+static void show(void *ctx, uint32_t leds)
+{
+    (void)ctx;
+    const uint32_t on = (leds & 1u) << LED_GREEN | (leds >> 1 & 1u) << LED_BLUE | (leds >> 2 & 1u) << LED_RED;
+    const uint32_t all = 1u << LED_GREEN | 1u << LED_BLUE | 1u << LED_RED;
+    GPIO_BSRR(GPIOB_BASE) = on | (all & ~on) << 16;
+}
+
+const fw_system_ops nucleo_system_ops = {nucleo_time_us, sleep_until_interrupt, nucleo_lock, nucleo_unlock,
+                                         nucleo_feed_watchdog, restart, stack_used, show};

@@ -1,0 +1,86 @@
+#include "drivers/ad9833.h"
+
+enum {
+    CONTROL_B28 = 0x2000,     /* both halves of a frequency in two writes, taken over together */
+    CONTROL_OPBITEN = 0x0020, /* the accumulator's top bit to the pin instead of the converter */
+    CONTROL_DIV2 = 0x0008,    /* ... undivided */
+    CONTROL_MODE = 0x0002,    /* triangle instead of sine */
+    ADDRESS_FREQ0 = 0x4000,
+    ADDRESS_PHASE0 = 0xC000
+};
+
+#define MOST_MCLK_HZ 64000000u /* so that 2^28 times it in millihertz fits 64 bits */
+#define FULL_TURN ((uint64_t)1 << 28)
+
+uint32_t fw_ad9833_tuning(uint32_t mclk_hz, uint64_t millihertz)
+{
+    const uint64_t mclk_millihertz = (uint64_t)mclk_hz * 1000u;
+    if (mclk_hz == 0 || mclk_hz > MOST_MCLK_HZ || millihertz > mclk_millihertz / 2)
+        return 0;
+    return (uint32_t)((millihertz * FULL_TURN + mclk_millihertz / 2) / mclk_millihertz);
+}
+
+uint64_t fw_ad9833_millihertz(uint32_t mclk_hz, uint32_t tuning)
+{
+    if (mclk_hz > MOST_MCLK_HZ)
+        return 0;
+    return ((uint64_t)(tuning & (FULL_TURN - 1)) * mclk_hz * 1000u + FULL_TURN / 2) / FULL_TURN;
+}
+
+uint16_t fw_ad9833_phase(uint32_t millidegrees)
+{
+    const uint32_t angle = millidegrees % 360000u;
+    return (uint16_t)((angle * 4096u + 180000u) / 360000u & 0xFFFu);
+}
+
+static uint16_t waveform_bits(fw_waveform waveform)
+{
+    switch (waveform) {
+    case FW_SINE: break;
+    case FW_TRIANGLE: return CONTROL_MODE;
+    case FW_SQUARE: return CONTROL_OPBITEN | CONTROL_DIV2;
+    case FW_SQUARE_HALF: return CONTROL_OPBITEN;
+    }
+    return 0;
+}
+
+void fw_ad9833_words(uint32_t tuning, uint16_t phase, fw_waveform waveform, uint16_t words[FW_AD9833_WORDS])
+{
+    words[0] = FW_AD9833_RESET_WORD;
+    words[1] = (uint16_t)(ADDRESS_FREQ0 | (tuning & 0x3FFFu));
+    words[2] = (uint16_t)(ADDRESS_FREQ0 | (tuning >> 14 & 0x3FFFu));
+    words[3] = (uint16_t)(ADDRESS_PHASE0 | (phase & 0xFFFu));
+    words[4] = (uint16_t)(CONTROL_B28 | waveform_bits(waveform));
+}
+
+void fw_ad9833_init(fw_ad9833 *generator, fw_spi spi)
+{
+    *generator = (fw_ad9833){.spi = spi, .state = FW_AD9833_UNKNOWN};
+}
+
+fw_status fw_ad9833_stop(fw_ad9833 *generator)
+{
+    const uint16_t word = FW_AD9833_RESET_WORD;
+    const fw_status status = generator->spi.ops->write(generator->spi.ctx, &word, 1);
+    generator->state = status == FW_OK ? FW_AD9833_RESET : FW_AD9833_UNKNOWN;
+    return status;
+}
+
+fw_status fw_ad9833_start(fw_ad9833 *generator, uint32_t tuning, uint16_t phase, fw_waveform waveform)
+{
+    uint16_t words[FW_AD9833_WORDS];
+    if (tuning >> 28 != 0 || phase >> 12 != 0)
+        return FW_E_ARGUMENT;
+    fw_ad9833_words(tuning, phase, waveform, words);
+    generator->state = FW_AD9833_UNKNOWN;
+    for (size_t k = 0; k < FW_AD9833_WORDS; ++k) { /* one by one: what precedes a failure is known to be written */
+        const fw_status status = generator->spi.ops->write(generator->spi.ctx, &words[k], 1);
+        if (status != FW_OK) {
+            (void)fw_ad9833_stop(generator);
+            return status;
+        }
+    }
+    generator->state = FW_AD9833_RUNNING;
+    generator->tuning = tuning;
+    return FW_OK;
+}

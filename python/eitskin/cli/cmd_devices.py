@@ -1,0 +1,61 @@
+"""``eitskin devices``: serial ports, the boards that answer on them, and how everything else is named."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from eitskin.device.census import FoundPort
+
+URLS = {
+    "auto": "the one board that is plugged in",
+    "serial:PORT": "a serial port; serial:PORT?baud=N where it is not at 1000000 baud",
+    "sim:SCENE": "a simulated board that sees a scene: a file, or a name of  eitskin scene list",
+    "emu:SCENE": "the firmware itself on an emulated board that sees a scene (extra: emulator)",
+    "file:RUN.eits": "a recording, made by  eitskin record",
+}
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``devices``."""
+    parser = subparsers.add_parser(
+        "devices",
+        help="serial ports, boards that answer, and how simulated ones are named",
+        description="List the serial ports of this computer and ask those that look like a board's what they are. Ports that do "
+        "not are left alone: name one with  eitskin info --device serial:PORT.",
+    )
+    parser.add_argument("--quiet", action="store_true", help="ask no board")
+    parser.add_argument("--json", action="store_true", help="print for programs")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """List, ask, print."""
+    from eitskin.device.census import census
+
+    found = census(ask=not options.quiet)
+    if options.json:
+        print(json.dumps({"ports": [port.as_dict() for port in found], "urls": URLS}, indent=2))
+        return 0
+    if not found:
+        print("no serial port; without a board, play with  --device sim:two_touch  or  --device emu:two_touch")
+    for port in found:
+        print(_line(port))
+    print("--device takes:")
+    for url, meaning in URLS.items():
+        print(f"  {url:14} {meaning}")
+    return 0
+
+
+def _line(found: FoundPort) -> str:
+    port = found.port
+    usb = "" if port.vendor is None else f", USB {port.vendor:04x}:{port.product or 0:04x}"
+    described = "" if port.description in ("", "n/a") else f"  {port.description}"
+    line = f"serial:{port.path}{described}{usb}: "
+    if found.board is not None:
+        return f"{line}{found.board.board}, firmware {found.board.firmware_text}, serial {found.board.serial}"
+    if found.why is not None:
+        return f"{line}{found.why}"
+    return line + ("a board's, not asked" if port.is_board else "no board's")

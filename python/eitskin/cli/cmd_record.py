@@ -1,0 +1,124 @@
+"""``eitskin record``: every packet of a board into a file, for ``replay`` and for whoever has no board."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.cli.device_options import (
+    add_device,
+    add_scan,
+    add_stream,
+    check_scan,
+    chosen_every,
+    open_named,
+    prepare,
+    read_every,
+    read_mode,
+)
+from eitskin.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from eitskin.device.link import LinkEvent
+    from eitskin.device.live import LiveFrame, LiveSummary
+    from eitskin.device.packets import Fault
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``record``."""
+    parser = subparsers.add_parser(
+        "record",
+        help="write every packet of a board to a file",
+        description="Take the reference, then write every packet of a board to a file as it comes, the reference's raw frames "
+        "included. A recording that is cut, even by kill -9, can be read up to its last whole packet. Stop with Ctrl-C.",
+    )
+    add_device(parser)
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="RUN.eits")
+    parser.add_argument("--overwrite", action="store_true", help="write over a file that exists")
+    add_stream(parser, "raw,image,touches")
+    parser.add_argument("--seconds", type=float, metavar="S", help="stop after S seconds of the board's time")
+    add_scan(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Record, then say how much."""
+    from eitskin.device.known_model import find_model
+    from eitskin.device.live import LiveSummary, finish, follow
+    from eitskin.device.packets import Stream
+    from eitskin.study.scene_truth import truth_of, until_over
+
+    what, (every, frames) = read_mode(options.mode), read_every(options)
+    check_scan(options)
+    if options.seconds is not None and not 0 < options.seconds <= 1e6:
+        raise UsageError(f"--seconds {options.seconds:g} is out of range; use above 0 to 1000000")
+    check_output(options.output, options.overwrite)
+    summary = LiveSummary()
+    with open_named(options) as device:
+        if device.transport.replays:
+            raise UsageError(f"{device.transport.name} is a recording already; copy the file")
+        known = find_model(device.board, options.model, device.transport.name)
+        needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
+        truth = truth_of(options.device, options.sign or "increase")
+        recorder = prepare(options, device, known, needs_reference=needed, record=options.output, truth=truth)
+        assert recorder is not None
+        with recorder:
+            items = follow(device, what, every=chosen_every(device, what, every), frames=frames)
+            try:
+                _count(_until(until_over(items, None if frames else truth), options.seconds), summary, frames)
+            except KeyboardInterrupt:
+                print("eitskin: stopped", file=sys.stderr)
+            finally:
+                items.close()
+        finish(summary, device)
+    if options.json:
+        facts = {"recording": str(options.output), "packets": recorder.packets, "bytes": recorder.bytes}
+        print(json.dumps(facts | summary.as_dict(), indent=2))
+    else:
+        print("\n".join(summary.lines()))
+        print(f"{options.output}: {recorder.packets} packets, {recorder.bytes} bytes")
+    return 0
+
+
+def check_output(path: Path | None, overwrite: bool) -> None:
+    """Refuse a recording that could not be written, before a device is opened.
+
+    Raises:
+        FileError: its folder is not there, or it exists and may not be written over.
+    """
+    from eitskin.errors import FileError
+    from eitskin.fileio import refuse_unwritable
+
+    refuse_unwritable(path)
+    if path is not None and path.exists() and not overwrite:
+        raise FileError(f"{path}: exists already; name another file, or write over it with  --overwrite")
+
+
+def _until(items: Iterator[LiveFrame | Fault | LinkEvent], seconds: float | None) -> Iterator[LiveFrame | Fault | LinkEvent]:
+    from eitskin.device.live import LiveFrame
+
+    for item in items:
+        yield item
+        if seconds is not None and isinstance(item, LiveFrame) and item.time_us >= 1e6 * seconds:
+            return
+
+
+def _count(items: Iterable[LiveFrame | Fault | LinkEvent], summary: LiveSummary, frames: int) -> None:
+    from tqdm import tqdm
+
+    from eitskin.device.live import LiveFrame, news_text
+    from eitskin.device.packets import Fault
+
+    with tqdm(desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()) as bar:
+        for item in items:
+            if isinstance(item, LiveFrame):
+                summary.add(item)
+                bar.update()
+                continue
+            summary.faults += isinstance(item, Fault) and item.raised
+            bar.write(f"eitskin: {news_text(item)}", file=sys.stderr)

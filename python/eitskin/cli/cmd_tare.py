@@ -1,0 +1,39 @@
+"""``eitskin tare``: the reference from the untouched skin."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from eitskin.cli.device_options import TARE_FRAMES, add_device, open_named, say
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``tare``."""
+    parser = subparsers.add_parser(
+        "tare",
+        help="take a board's reference from its untouched skin",
+        description="Take a board's reference frame from its untouched skin; four frames or more also tell it the noise. It is "
+        "kept until the board is reset, the scan is changed or another model comes.",
+    )
+    add_device(parser)
+    parser.add_argument("--frames", type=int, default=TARE_FRAMES, metavar="N", help="1, or 4 to 1024 (default: %(default)s)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Tare and say so."""
+    from eitskin.device.settings import check_tare_frames
+
+    check_tare_frames(options.frames)
+    with open_named(options) as device:
+        if not device.transport.synchronous:
+            say(f"leave the skin untouched: taking the reference from {options.frames} frames")
+        device.tare(options.frames)
+        url = device.transport.url
+    if options.json:
+        print(json.dumps({"device": url, "frames": options.frames, "tared": True}))
+    else:
+        print(f"{url}: reference taken from {options.frames} frames")
+    return 0

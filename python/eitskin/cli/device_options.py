@@ -1,0 +1,267 @@
+"""The options that commands for boards share, and what they are turned into."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.errors import UsageError
+
+if TYPE_CHECKING:
+    from eitskin.device.client import Device
+    from eitskin.device.known_model import KnownModel
+    from eitskin.device.packets import Stream
+    from eitskin.device.run_file import RunRecorder
+    from eitskin.device.settings import ScanSettings, SolverSettings
+    from eitskin.study.scene_truth import SceneTruth
+
+DEVICE_HELP = (
+    "auto (the one board that is plugged in, default), serial:/dev/ttyACM0, sim:SCENE (simulated), emu:SCENE (the firmware on "
+    "an emulated board), file:RUN.eits (a recording); SCENE is a file or a scene of  eitskin scene list"
+)
+KINDS = ("raw", "image", "touches")
+TARE_FRAMES = 16
+
+
+def add_device(parser: argparse.ArgumentParser, *, model: bool = True) -> None:
+    """``--device`` and ``--json``; with ``model``, also ``--model`` and ``--firmware``."""
+    parser.add_argument("--device", default="auto", metavar="URL", help=DEVICE_HELP)
+    if model:
+        parser.add_argument(
+            "--model",
+            type=Path,
+            metavar="MODEL.eitm",
+            help="the board's model where it is not the prebuilt one; a simulated or emulated board is given it",
+        )
+        parser.add_argument("--firmware", type=Path, metavar="BIN", help="of an emulated board (default: the prebuilt one)")
+    parser.add_argument("--json", action="store_true", help="print for programs")
+
+
+def add_scan(parser: argparse.ArgumentParser) -> None:
+    """How frames are scanned and solved, and how the reference is taken."""
+    scan = parser.add_argument_group("scan; what is not named stays as the board has it")
+    scan.add_argument("--excitation-hz", type=float, metavar="HZ", help="of the generator")
+    scan.add_argument("--sample-rate-hz", type=int, metavar="HZ", help="of the converter")
+    scan.add_argument("--samples", type=int, metavar="N", help="of a measurement: a whole number of periods")
+    scan.add_argument("--settle-us", type=int, metavar="US", help="from switching the multiplexers to the first sample")
+    scan.add_argument("--frame-period-us", type=int, metavar="US", help="from frame to frame; 0: as fast as the scan goes")
+    rows = scan.add_mutually_exclusive_group()
+    rows.add_argument("--full", action="store_true", help="measure every row of the protocol")
+    rows.add_argument(
+        "--reciprocal",
+        type=int,
+        metavar="N",
+        help="measure one row of each reciprocal pair, and all rows in every N-th frame as a check (0: never)",
+    )
+    solver = parser.add_argument_group("solver")
+    solver.add_argument("--iterations", type=int, metavar="N", help="of FISTA, at most (default: the model's)")
+    solver.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
+    solver.add_argument("--sign", choices=("increase", "decrease", "both"), help="which changes to look for (default: increase)")
+    start = solver.add_mutually_exclusive_group()
+    start.add_argument("--warm", action="store_true", help="begin each frame from the last one's result (default)")
+    start.add_argument("--cold", action="store_true", help="begin each frame from nothing")
+    tare = parser.add_argument_group("reference")
+    tare.add_argument(
+        "--tare",
+        type=int,
+        metavar="N",
+        help=f"take the reference from N frames of the untouched skin first (1, or 4 to 1024); without it, from {TARE_FRAMES} "
+        "where the board has none, and always on a simulated or emulated board",
+    )
+
+
+def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
+    """What is streamed, and how much of it."""
+    parser.add_argument(
+        "--mode", default=default, metavar="KIND[,KIND]", help="raw, image, touches, or several (default: %(default)s)"
+    )
+    parser.add_argument("--every", type=int, metavar="N", help="every N-th frame (default: as many as the line carries)")
+    parser.add_argument("--frames", type=int, metavar="N", help="stop after N (default: go on until Ctrl-C, or the scene ends)")
+
+
+def read_mode(text: str) -> Stream:
+    """The kinds in "raw,touches".
+
+    Raises:
+        UsageError: one is unknown.
+    """
+    from eitskin.config import nearest
+    from eitskin.device.packets import Stream
+
+    what = Stream(0)
+    for kind in text.split(","):
+        if kind not in KINDS:
+            raise UsageError(f"--mode {text}: {nearest(kind, KINDS)}")
+        what |= Stream[kind.upper()]
+    return what
+
+
+def read_every(options: argparse.Namespace) -> tuple[int, int]:
+    """``--every`` (0: as many as the line carries) and ``--frames`` (0: no limit).
+
+    Raises:
+        UsageError: one is out of range.
+    """
+    return whole("--every", options.every, 1, 0xFFFF), whole("--frames", options.frames, 1, 2**32 - 1) or 0
+
+
+def chosen_every(device: Device, what: Stream, every: int) -> int:
+    """``every``, or where that is 0 the least that the line carries, said on stderr where that is not every frame."""
+    from eitskin.device.bandwidth import carried_every
+
+    if every:
+        return every
+    carried = carried_every(device, what)
+    if carried > 1:
+        kinds = ",".join(kind for kind in KINDS if what & type(what)[kind.upper()])
+        say(f"the line carries one frame in {carried} of {kinds}; name another number with  --every")
+    return carried
+
+
+def whole(name: str, value: int | None, low: int, high: int) -> int:
+    """``value`` (0 for None) if it lies within.
+
+    Raises:
+        UsageError: it does not.
+    """
+    if value is not None and not low <= value <= high:
+        raise UsageError(f"{name} {value} is out of range; use {low} to {high}")
+    return value or 0
+
+
+def read_scan(options: argparse.Namespace) -> ScanSettings:
+    """What is named of the scan.
+
+    Raises:
+        UsageError: a number is out of range.
+    """
+    from eitskin.device.settings import ScanSettings
+
+    if options.excitation_hz is not None and not 1 <= options.excitation_hz <= 250_000:
+        raise UsageError(f"--excitation-hz {options.excitation_hz:g} is out of range; use 1 to 250000")
+    whole("--sample-rate-hz", options.sample_rate_hz, 1000, 5_000_000)
+    whole("--samples", options.samples, 4, 1024)
+    whole("--settle-us", options.settle_us, 0, 0xFFFF)
+    whole("--frame-period-us", options.frame_period_us, 0, 2**32 - 1)
+    whole("--reciprocal", options.reciprocal, 0, 0xFFFF)
+    if options.reciprocal == 1:
+        raise UsageError("--reciprocal 1 would check every frame, which is a full scan; use --full, or at least 2 (0: no checks)")
+    return ScanSettings(
+        excitation_hz=options.excitation_hz,
+        sample_rate_hz=options.sample_rate_hz,
+        samples=options.samples,
+        settle_us=options.settle_us,
+        check_every=1 if options.full else options.reciprocal,
+        frame_period_us=options.frame_period_us,
+    )
+
+
+def read_solver(options: argparse.Namespace) -> SolverSettings:
+    """What is named of the solver.
+
+    Raises:
+        UsageError: a number is out of range.
+    """
+    from eitskin.device.settings import SolverSettings
+
+    whole("--iterations", options.iterations, 1, 1_000_000)
+    if options.gap is not None and not 0 < options.gap <= 1:
+        raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
+    warm = True if options.warm else False if options.cold else None
+    return SolverSettings(options.iterations, options.gap, warm, options.sign)
+
+
+def check_scan(options: argparse.Namespace) -> None:
+    """Refuse what scan, solver and reference cannot be, before a device is opened.
+
+    Raises:
+        UsageError: a number is out of range.
+    """
+    from eitskin.device.settings import check_tare_frames
+
+    read_scan(options)
+    read_solver(options)
+    if options.tare is not None:
+        check_tare_frames(options.tare)
+
+
+def open_named(options: argparse.Namespace) -> Device:
+    """The device of ``--device``, with the model of ``--model``.
+
+    Raises:
+        EitskinError: as ``eitskin.device.open.open_device``.
+    """
+    from eitskin.device.open import open_device
+    from eitskin.model.eitm import load_model
+
+    blob = load_model(options.model)[1] if getattr(options, "model", None) is not None else None
+    firmware = getattr(options, "firmware", None)
+    if firmware is not None and not options.device.startswith("emu:"):
+        raise UsageError(f"--firmware {firmware}: only emu: runs an image; a board is given one with  eitskin flash --image")
+    return open_device(options.device, model=blob, image=firmware)
+
+
+def say(text: str) -> None:
+    """A line on stderr for whoever looks on."""
+    print(f"eitskin: {text}", file=sys.stderr, flush=True)
+
+
+def prepare(
+    options: argparse.Namespace,
+    device: Device,
+    known: KnownModel | None,
+    *,
+    needs_reference: bool,
+    record: Path | None = None,
+    truth: SceneTruth | None = None,
+) -> RunRecorder | None:
+    """Scan, solver and reference as the options say; then what is to be touched begins, and ``truth`` is told when. Recording
+    begins before the reference is taken; the recorder is the caller's to close.
+
+    Raises:
+        EitskinError: a setting cannot be, the board refuses it, or the recording cannot be written.
+    """
+    from eitskin.device.live import begin_scene, news_text, set_up, take_reference
+    from eitskin.device.run_file import RunRecorder
+
+    if device.transport.replays:
+        _refuse_settings(options, device.transport.name)
+        return None
+    solver = set_up(device, read_scan(options), read_solver(options), known)
+    recorder = None if record is None else RunRecorder(record, device, solver, overwrite=True)
+    try:
+        simulated = device.transport.synchronous
+        if options.tare is not None or simulated or record is not None or (needs_reference and not device.board.tared):
+            frames = TARE_FRAMES if options.tare is None else options.tare
+            if not simulated:
+                say(f"leave the skin untouched: taking the reference from {frames} frames")
+            take_reference(device, frames, streamed=record is not None)
+            if not simulated:
+                say("touch it")
+        began_us, news = begin_scene(device)
+        if truth is not None and began_us is not None:
+            truth.begin(began_us)
+        for item in news:
+            say(news_text(item))
+    except BaseException:
+        if recorder is not None:
+            recorder.close()
+        raise
+    return recorder
+
+
+def _refuse_settings(options: argparse.Namespace, name: str) -> None:
+    """A recording takes no settings."""
+    settings = {**read_scan(options).named, **read_solver(options).named}
+    if settings or options.tare is not None:
+        what = next(iter(settings), "tare").replace("_", "-")
+        raise UsageError(f"{name} is a recording, {what} cannot be set any more; leave the options of scan, solver and tare out")
+
+
+def print_table(facts: dict[str, Any]) -> None:
+    """Names and values in two columns."""
+    width = max(len(name) for name in facts) + 2
+    for name, value in facts.items():
+        print(f"{name.replace('_', ' '):{width}}{value}")

@@ -1,0 +1,1 @@
+"""Boards: real ones, simulated ones, emulated ones, and recordings of them, behind one set of commands."""

@@ -1,0 +1,40 @@
+"""What a serial line carries: how many frames of which kinds, before packets must be dropped."""
+
+from __future__ import annotations
+
+from math import ceil
+
+from eitskin.device.client import Device
+from eitskin.device.packets import BoardInfo, Stream
+from eitskin.device.ports import BAUD
+
+BITS_A_BYTE = 10  # start, eight, stop
+USED = 0.9  # of the line; the rest is for replies, faults and what comes in bursts
+PACKET_BYTES = 16  # head, checksum, zeros and stuffing
+RAW_BYTES, ROW_BYTES = 16, 5
+SOLVED_BYTES, PIXEL_BYTES, TOUCHES_BYTES = 68, 4, 8 * 24
+
+
+def frame_bytes(info: BoardInfo, what: Stream) -> int:
+    """Bytes on the wire of one frame, about."""
+    kinds = {
+        Stream.RAW: RAW_BYTES + ROW_BYTES * info.n_rows,
+        Stream.IMAGE: SOLVED_BYTES + PIXEL_BYTES * info.n_pixels,
+        Stream.TOUCHES: SOLVED_BYTES + TOUCHES_BYTES,
+    }
+    return sum(size + PACKET_BYTES + size // 254 for kind, size in kinds.items() if kind & what)
+
+
+def least_every(info: BoardInfo, what: Stream, baud: int) -> int:
+    """The least N with which every N-th frame of ``what`` fits a line of ``baud``; 1 where all do."""
+    if not info.has_model:
+        return 1
+    line_us = 1e6 * frame_bytes(info, what) * BITS_A_BYTE / (USED * baud)
+    return max(ceil(line_us / max(info.frame_us, 1)), 1)
+
+
+def carried_every(device: Device, what: Stream) -> int:
+    """As ``least_every``, of the line to ``device``; 1 where there is none (simulated boards, recordings)."""
+    if device.transport.url.partition(":")[0] not in ("serial", "emu"):
+        return 1
+    return least_every(device.board, what, int(getattr(device.transport, "baud", BAUD)))

@@ -1,0 +1,77 @@
+"""The bytes of a model bank: the model from its start, and in its last 32 bytes the record that makes it valid.
+
+The firmware programs the record last, as the commit of an upload; docs/link-protocol.md, "Model banks", specifies it.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+from eitskin.errors import DeviceError
+
+BANK_BYTES = 512 * 1024
+MAGIC = 0x4B4E4245  # "EBNK"
+ERASED = 0xFF
+_RECORD = struct.Struct("<IIIIIIII")
+RECORD_BYTES = _RECORD.size
+
+
+@dataclass(frozen=True)
+class BankRecord:
+    """Which model a bank holds: ``generation`` counts uploads (mod 2^32), ``model_crc`` is zlib's CRC-32 of the whole file."""
+
+    generation: int
+    model_bytes: int
+    model_crc: int
+
+
+def record_offset(bank_bytes: int = BANK_BYTES) -> int:
+    """Where the record begins in a bank of ``bank_bytes``; a model may be as long."""
+    return bank_bytes - _RECORD.size
+
+
+def record_bytes(model: bytes, generation: int) -> bytes:
+    """The 32 bytes that make ``model`` valid."""
+    head = _RECORD.pack(MAGIC, generation % 2**32, len(model), zlib.crc32(model), 0, 0, 0, 0)[:-4]
+    return head + struct.pack("<I", zlib.crc32(head))
+
+
+def bank_bytes(model: bytes, generation: int, bank_bytes: int = BANK_BYTES) -> bytes:
+    """A whole bank of ``bank_bytes`` with ``model`` and its record; what lies between is as erased flash reads, 0xFF.
+
+    Raises:
+        DeviceError: the model is longer than the bank's room.
+    """
+    room = record_offset(bank_bytes)
+    if len(model) > room:
+        raise DeviceError(
+            f"the model has {len(model)} bytes and a bank of the board holds {room}; build it with fewer pixels, a lower rank "
+            "or a smaller storage type (eitskin model build --help)"
+        )
+    return model + bytes([ERASED]) * (room - len(model)) + record_bytes(model, generation)
+
+
+def read_record(bank: bytes) -> BankRecord | None:
+    """The record of a ``bank``, or None where there is none or it is damaged. The model itself is not looked at."""
+    if len(bank) < _RECORD.size:
+        return None
+    tail = bank[-_RECORD.size :]
+    magic, generation, size, crc, *_, check = _RECORD.unpack(tail)
+    if magic != MAGIC or check != zlib.crc32(tail[:-4]) or size > record_offset(len(bank)):
+        return None
+    return BankRecord(generation, size, crc)
+
+
+def newest_bank(banks: list[bytes]) -> int | None:
+    """The number of the bank that a board would start from: a valid record, its model's checksum right, the generation the
+    latest by a comparison that wraps. None where no bank is valid."""
+    best: tuple[int, BankRecord] | None = None
+    for number, bank in enumerate(banks):
+        record = read_record(bank)
+        if record is None or zlib.crc32(bank[: record.model_bytes]) != record.model_crc:
+            continue
+        if best is None or 0 < (record.generation - best[1].generation) % 2**32 < 2**31:
+            best = number, record
+    return None if best is None else best[0]

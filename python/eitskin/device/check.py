@@ -1,0 +1,90 @@
+"""Whether a board is the one that is meant: versions, model, identity; and why one does not answer."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+
+from eitskin import __version__
+from eitskin.device.link import Link
+from eitskin.device.packets import LINK_VERSION, BoardInfo
+from eitskin.errors import DeviceError
+from eitskin.model.model import Model
+
+FLASH = "flash this version's firmware with  eitskin flash"
+
+
+def host_major() -> int:
+    """The first number of this package's version; a firmware must have the same."""
+    return int(__version__.split(".")[0])
+
+
+def check_board(info: BoardInfo, name: str) -> None:
+    """Refuse a board whose firmware is of another major version.
+
+    Raises:
+        DeviceError: saying which versions, and what to do.
+    """
+    if info.firmware[0] != host_major():
+        newer = info.firmware[0] > host_major()
+        raise DeviceError(
+            f"{name}: the board's firmware is {info.firmware_text} and this eitskin is {__version__}; "
+            + (f"install eitskin {info.firmware[0]}.x, or {FLASH}" if newer else FLASH)
+        )
+
+
+def no_answer(link: Link, what: str, waited_s: float) -> str:
+    """Why nothing answers, from what was counted, in one line."""
+    name, counters = link.transport.name, link.counters
+    other = link.decoder.other_version
+    if other is not None and not counters.packets:
+        advice = FLASH if other < LINK_VERSION else f"upgrade eitskin, or {FLASH}"
+        return f"{name}: the board speaks version {other} of the link protocol and this eitskin {LINK_VERSION}; {advice}"
+    if link.ended and what == "TARE":
+        return f"{name}: the scene is over, and a tare waits for frames; open the device anew"
+    if counters.packets:
+        return f"{name}: packets arrive, but {what} is not answered within {waited_s:g} s; reset the board, or {FLASH}"
+    if counters.bytes:
+        baud = getattr(link.transport, "baud", None)
+        at = f" at {baud} baud" if baud else ""
+        return (
+            f"{name}: {counters.bytes} bytes arrive but no packet decodes{at}: the baud rate is another, or this is no eitskin "
+            f"board; give the rate with  serial:PORT?baud=N  or {FLASH}"
+        )
+    return f"{name}: no answer within {waited_s:g} s; is this the board's port, and its firmware running? {FLASH}"
+
+
+def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
+    """Refuse to read a board's frames with another model than it scans and solves with.
+
+    Raises:
+        DeviceError: the protocol or the model differs.
+    """
+    if not info.has_model:
+        raise DeviceError(f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm")
+    if info.protocol_hash != model.protocol.hash:
+        raise DeviceError(
+            f"{name}: the board scans protocol {info.protocol_hash:016x} ({info.n_electrodes} electrodes, {info.n_rows} rows) "
+            f"and the model here {model.protocol.hash:016x} ({model.protocol.n_electrodes} electrodes, {model.protocol.n_rows} "
+            "rows); put yours on the board with  eitskin model upload FILE  or name the board's with  --model FILE"
+        )
+    if info.model_crc != zlib.crc32(blob):
+        raise DeviceError(
+            f"{name}: the board's model has checksum {info.model_crc:08x} and the model here {zlib.crc32(blob):08x}; put yours "
+            "on the board with  eitskin model upload FILE  or name the board's with  --model FILE"
+        )
+
+
+def model_of(info: BoardInfo, path: str | Path | None, name: str) -> tuple[Model, bytes]:
+    """The board's own model on the host: the file ``path``, or the prebuilt one where that is what the board has.
+
+    Raises:
+        FileError, ModelError: the file cannot be read.
+        DeviceError: the board has another model.
+    """
+    from eitskin.model.eitm import load_model
+    from eitskin.model.prebuilt import load_prebuilt
+
+    model, blob = load_prebuilt() if path is None else load_model(path)
+    check_model(info, model, blob, name)
+    return model, blob

@@ -1,0 +1,165 @@
+"""The C codec through cffi: packets to bytes and bytes to packets, with every byte that is no packet counted."""
+
+from __future__ import annotations
+
+import zlib
+from collections import deque
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from typing import Any
+
+from eitskin.core.engine import load_core
+from eitskin.device.packets import MAX_PAYLOAD, PacketType
+from eitskin.device.sequence import LATE_IN_A_ROW, SequenceCheck
+from eitskin.errors import DeviceError
+
+
+@dataclass(frozen=True)
+class Packet:
+    """A packet whose checksum is right. ``lost``: packets that are missing just before it, by their numbers."""
+
+    type: int
+    sequence: int
+    payload: bytes
+    lost: int = 0
+
+
+@dataclass
+class LinkCounters:
+    """What came over a link, counted since it was opened.
+
+    ``skipped_bytes`` came before the first delimiter, ``malformed`` had a right checksum but a payload that is not of its type,
+    ``missing`` packets lie in ``gaps`` gaps (as far as numbers tell), ``duplicates`` and ``stale`` (late) packets were refused,
+    ``dropped`` were left out by the host's own queue because nobody fetched them.
+    """
+
+    bytes: int = 0
+    skipped_bytes: int = 0
+    packets: int = 0
+    crc_errors: int = 0
+    framing_errors: int = 0
+    overruns: int = 0
+    version_errors: int = 0
+    malformed: int = 0
+    gaps: int = 0
+    missing: int = 0
+    duplicates: int = 0
+    stale: int = 0
+    restarts: int = 0
+    reconnects: int = 0
+    dropped: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """For JSON."""
+        return asdict(self)
+
+
+@cache
+def _core() -> Any:
+    return load_core("float32")
+
+
+def encode(packet_type: int, sequence: int, payload: bytes) -> bytes:
+    """The packet's bytes on the wire.
+
+    Raises:
+        DeviceError: the payload is longer than a packet may be.
+    """
+    module = _core()
+    buffer = module.ffi.new("uint8_t[]", len(payload) + len(payload) // 254 + 32)
+    size = module.lib.eits_link_encode(
+        buffer, len(buffer), packet_type, sequence % 2**32, payload, len(payload), module.ffi.NULL, 0
+    )
+    if not size:
+        raise DeviceError(f"a packet cannot carry {len(payload)} bytes; the most is {MAX_PAYLOAD}")
+    return bytes(module.ffi.buffer(buffer, size))
+
+
+class Decoder:
+    """Bytes of one direction of a link to packets, in order and each at most once. ``counters`` is counted into.
+
+    What comes before the first delimiter is the rest of a packet that was cut by opening the port, and no error. With
+    ``numbered`` false sequence numbers are not looked at, as boards do with commands.
+    """
+
+    def __init__(self, counters: LinkCounters | None = None, *, numbered: bool = True) -> None:
+        module = _core()
+        self._lib, self._ffi = module.lib, module.ffi
+        room = int(self._lib.EITS_LINK_MAX_PACKET)
+        self._buffer = self._ffi.new("uint64_t[]", (room + 7) // 8)
+        self._state = self._ffi.new("eits_link_decoder *")
+        status = self._lib.eits_link_decoder_init(self._state, self._ffi.cast("uint8_t *", self._buffer), room)
+        assert status == 0
+        self._packet = self._ffi.new("eits_link_packet *")
+        self.counters = LinkCounters() if counters is None else counters
+        self._before = self._counted()
+        self._skipping = True
+        self._sequence = SequenceCheck(self.counters)
+        self._numbered = numbered
+        self._late: deque[Packet] = deque(maxlen=LATE_IN_A_ROW)
+
+    @property
+    def other_version(self) -> int | None:
+        """The link version of the last packet that had another than ours; None if none had."""
+        return int(self._state.other_version) if self._state.version_errors else None
+
+    def link_lost(self) -> None:
+        """The line was cut: what is half received is no error, and any packet may come next; it will count as one gap."""
+        status = self._lib.eits_link_decoder_init(self._state, self._ffi.cast("uint8_t *", self._buffer), self._state.room)
+        assert status == 0
+        self._before = self._counted()
+        self._skipping = True
+        self._sequence.link_lost()
+
+    def forget_sequence(self) -> None:
+        """The next packet is taken whatever its number; used where everything has been refused for too long."""
+        self._sequence.link_lost()
+
+    def feed(self, data: bytes) -> list[Packet]:
+        """The packets that ``data`` completes. Those that are no news (duplicates, late ones) are counted and left out."""
+        self.counters.bytes += len(data)
+        start = 0
+        if self._skipping:
+            start = data.find(0)
+            self.counters.skipped_bytes += len(data) if start < 0 else start
+            if start < 0:
+                return []
+            self._skipping = False
+        found: list[Packet] = []
+        view = self._ffi.from_buffer("uint8_t[]", data)
+        packet, state, feed = self._packet, self._state, self._lib.eits_link_feed
+        while start < len(data):
+            start += feed(state, view + start, len(data) - start, packet)
+            if packet.payload:
+                payload = bytes(self._ffi.buffer(packet.payload, packet.size))
+                found += self._take(Packet(packet.type, packet.sequence, payload))
+        self._count()
+        return found
+
+    def _take(self, packet: Packet) -> list[Packet]:
+        if packet.type == PacketType.RECORDING or not self._numbered:  # the head of a recording is outside of the numbering
+            self.counters.packets += 1
+            return [packet]
+        restart = packet.type == PacketType.INFO and packet.payload[:4] == b"\0\0\0\0"
+        lost = self._sequence.judge(packet.sequence, zlib.crc32(packet.payload, packet.type), restart=restart)
+        if lost is None:
+            if self._sequence.was_late:
+                self._late.append(packet)
+            return []
+        revived = list(self._late)[-self._sequence.revived :] if self._sequence.revived else []
+        self._late.clear()
+        self.counters.packets += 1 + len(revived)
+        return [*revived, replace(packet, lost=lost)]
+
+    def _counted(self) -> tuple[int, ...]:
+        s = self._state
+        return s.crc_errors, s.framing_errors, s.overruns, s.version_errors
+
+    def _count(self) -> None:
+        now = self._counted()
+        new = [(a - b) % 2**32 for a, b in zip(now, self._before, strict=True)]
+        self._before = now
+        self.counters.crc_errors += new[0]
+        self.counters.framing_errors += new[1]
+        self.counters.overruns += new[2]
+        self.counters.version_errors += new[3]

@@ -1,0 +1,92 @@
+"""A board's numbers in words: replies, faults, statuses; each says what to do where something can be done."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from eitskin.core.engine import load_core
+from eitskin.device.commands import COMMANDS
+from eitskin.device.packets import Fault, FaultCode, PacketType, Quality, Reply, ReplyStatus
+
+UPLOAD = "upload one with  eitskin model upload MODEL.eitm"
+
+
+def status_text(status: int) -> str:
+    """The C core's own line for an eits_status."""
+    module = load_core("float32")
+    return str(module.ffi.string(module.lib.eits_status_text(status)).decode())
+
+
+def command_name(command: int) -> str:
+    """"TARE"."""
+    return PacketType(command).name if command in list(PacketType) else f"command 0x{command:02x}"
+
+
+def field_at(command: int, offset: int) -> str:
+    """The name of the field at byte ``offset`` of a command's payload."""
+    kind = COMMANDS.get(command)
+    if kind is None:
+        return f"byte {offset}"
+    place, sizes = 0, {"I": 4, "H": 2, "f": 4}
+    names = ("request", *(one.name for one in fields(kind)))
+    for name, letter in zip(names, kind.LAYOUT.format.lstrip("<"), strict=False):
+        if place == offset:
+            return name
+        place += sizes[letter]
+    return f"byte {offset}"
+
+
+def reply_text(reply: Reply) -> str:
+    """Why a command was refused, and what to do; for a reply that is not OK."""
+    name, (first, second) = command_name(reply.command), reply.detail
+    texts = {
+        ReplyStatus.OK: "done",
+        ReplyStatus.UNKNOWN_COMMAND: "the firmware does not know this command; flash one of this version (eitskin flash)",
+        ReplyStatus.LENGTH: f"the firmware expects {first} bytes; flash one of this version (eitskin flash)",
+        ReplyStatus.RANGE: f"{field_at(reply.command, first)} is out of range, its limit is {second}",
+        ReplyStatus.NO_MODEL: f"the board has no model; {UPLOAD}",
+        ReplyStatus.NOT_TARED: "the board has no reference frame; leave the skin untouched and run  eitskin tare",
+        ReplyStatus.BUSY: f"the board is busy with {command_name(first)}; wait for it",
+        ReplyStatus.MODEL_SIZE: f"the board takes models of {first} bytes at most; build it with fewer pixels or a lower rank",
+        ReplyStatus.MODEL_INVALID: f"the board refuses the model: {status_text(first)}; the old one stays",
+        ReplyStatus.MODEL_SCAN: f"the model's protocol needs {first} electrodes and the board has {second}; the old model stays",
+        ReplyStatus.MODEL_CRC: "what arrived is not the model that was announced; the old one stays, upload again",
+        ReplyStatus.OFFSET: f"the board expects the model's bytes from {first} on; upload again",
+        ReplyStatus.FLASH: f"erasing or programming the flash failed at byte {first}; the old model stays, try again",
+        ReplyStatus.CORE: f"the core refuses: {status_text(first)}",
+        ReplyStatus.PERIODS: f"the samples are no whole number of excitation periods; the nearest that are: {first}",
+        ReplyStatus.TOO_FAST: f"this scan needs a frame period of at least {first} us",
+        ReplyStatus.SELF_TEST: f"the golden frame's image differs from the model's by {first} parts in 1e9 of its peak",
+    }
+    known = reply.status in list(ReplyStatus)
+    return f"{name}: {texts[ReplyStatus(reply.status)] if known else f'refused with the unknown status {reply.status}'}"
+
+
+def fault_text(fault: Fault) -> str:
+    """What went wrong on the board (or that it is over), and what to do."""
+    name = FaultCode(fault.code).name.lower().replace("_", " ") if fault.code in list(FaultCode) else f"fault {fault.code}"
+    if not fault.raised:
+        return f"{name}: over" + (f" (electrode {fault.index})" if fault.code == FaultCode.ELECTRODE_OPEN else "")
+    pc, lr, cfsr, hfsr, address = fault.words
+    texts = {
+        FaultCode.NO_MODEL: f"no bank holds a valid model ({status_text(fault.value)}); {UPLOAD}",
+        FaultCode.ELECTRODE_OPEN: f"electrode {fault.index} makes no contact; wet or press it, then tare",
+        FaultCode.SATURATED: f"{fault.value} rows beyond the converter's range, the first is row {fault.index}; lower the gain",
+        FaultCode.DEADLINE: f"a frame took {fault.value} us longer than the frame period; make the period longer",
+        FaultCode.RECIPROCITY: f"row {fault.index} and its reciprocal differ by {fault.value} parts per thousand of the rms "
+        "voltage; check the wiring (eitskin doctor)",
+        FaultCode.SOLVER: f"the solver refused frame {fault.frame}: {status_text(fault.value)}",
+        FaultCode.SCAN_STALLED: "the converter gave nothing in time; reset the board",
+        FaultCode.CRASH: f"the board restarted after a processor fault at pc 0x{pc:08x}, lr 0x{lr:08x}, cfsr 0x{cfsr:08x}, "
+        f"hfsr 0x{hfsr:08x}, address 0x{address:08x}; please report it",
+        FaultCode.WATCHDOG: "the board restarted because its program hung; please report it",
+        FaultCode.BUS: "the generator or the multiplexers could not be written; check their wiring",
+    }
+    return f"{name}: {texts[FaultCode(fault.code)]}" if fault.code in list(FaultCode) else f"{name}: value {fault.value}"
+
+
+def quality_text(quality: int) -> str:
+    """The names of a row's quality bits; "good" for none."""
+    return ", ".join(bit.name.lower() for bit in Quality if quality & bit and bit.name) or "good"
+
+

@@ -1,0 +1,141 @@
+"""Putting firmware, and a model beside it, on a NUCLEO-F767ZI by whichever programmer's tool is installed."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import struct
+import subprocess
+import tempfile
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from eitskin.device.bank import ERASED, RECORD_BYTES, bank_bytes, record_offset
+from eitskin.errors import DeviceError, UsageError
+from eitskin.fileio import read_bytes, write_bytes
+
+FIRMWARE_ADDRESS = 0x0800_0000
+FIRMWARE_ROOM = 0x4_0000
+BANK_ADDRESS = 0x0804_0000
+SECOND_BANK_ADDRESS = 0x080C_0000
+LEAST_IMAGE = 512
+RAM = (0x2000_0000, 0x2008_0000)
+TOOLS = ("openocd", "st-flash", "pyocd")
+INSTALL = "install one:  apt install openocd  or  apt install stlink-tools  or  pip install pyocd"
+
+
+@dataclass(frozen=True)
+class FlashPlan:
+    """What will be run, in order: ``commands`` as argument lists, for ``tool``. ``bank_file`` holds the model's bank, if one goes
+    along."""
+
+    tool: str
+    commands: tuple[tuple[str, ...], ...]
+    image: Path
+    bank_file: Path | None = None
+
+    def lines(self) -> list[str]:
+        """The commands as a shell takes them."""
+        return [shlex.join(command) for command in self.commands]
+
+
+def find_tool(wanted: str | None = None) -> str:
+    """The programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed.
+
+    Raises:
+        UsageError: it is not a known one.
+        DeviceError: it, or none of them, is installed.
+    """
+    if wanted is not None and wanted not in TOOLS:
+        raise UsageError(f"--tool {wanted}: use one of {', '.join(TOOLS)}")
+    found = [tool for tool in ([wanted] if wanted else TOOLS) if shutil.which(tool)]
+    if not found:
+        raise DeviceError(f"{wanted or 'neither ' + ', '.join(TOOLS)} is installed; {INSTALL}")
+    return found[0]
+
+
+def plan_flash(image: str | Path, model: bytes | None = None, *, tool: str | None = None, serial: str | None = None) -> FlashPlan:
+    """The commands that put the firmware ``image`` (.bin) on a board and, where given, ``model`` in its first bank; the record of
+    the second bank is then erased, so that the first one counts. ``serial``: the ST-LINK's, where several boards are plugged in.
+
+    Raises:
+        FileError: the image cannot be read.
+        DeviceError: no tool, an image that is none, or a model that does not fit.
+        UsageError: an unknown tool.
+    """
+    path = Path(image)
+    check_image(path, read_bytes(path, "firmware image"))
+    name = find_tool(tool)
+    pieces = [(path, FIRMWARE_ADDRESS)]
+    bank_file = None
+    if model is not None:
+        folder = Path(tempfile.gettempdir())
+        bank_file, no_record = folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin", folder / "eitskin-no-record.bin"
+        write_bytes(bank_file, bank_bytes(model, 1))
+        write_bytes(no_record, bytes([ERASED]) * RECORD_BYTES)
+        # the other bank may hold a model of a later generation, which would win
+        pieces += [(bank_file, BANK_ADDRESS), (no_record, SECOND_BANK_ADDRESS + record_offset())]
+    return FlashPlan(name, tuple(_MAKERS[name](pieces, serial)), path, bank_file)
+
+
+def check_image(path: Path, image: bytes) -> None:
+    """Refuse what cannot be this board's firmware.
+
+    Raises:
+        DeviceError: it is too long, an .elf, or does not begin with a Cortex-M's vectors.
+    """
+    if image[:4] == b"\x7fELF":
+        raise DeviceError(f"{path}: this is an .elf; give the .bin beside it")
+    if len(image) > FIRMWARE_ROOM:
+        raise DeviceError(f"{path}: {len(image)} bytes, but firmware has room for {FIRMWARE_ROOM}; is this the right file?")
+    stack, start = struct.unpack("<II", image[:8]) if len(image) >= LEAST_IMAGE else (0, 0)
+    in_flash = FIRMWARE_ADDRESS <= start < FIRMWARE_ADDRESS + len(image) and start & 1
+    if not (RAM[0] < stack <= RAM[1] and stack % 8 == 0 and in_flash):
+        raise DeviceError(f"{path}: no firmware image of this board (its first words are no stack and start in its memory)")
+
+
+def run_flash(plan: FlashPlan, echo: Callable[[str], None] | None = None) -> None:
+    """Run the plan; ``echo`` gets each command before it runs. The tool's own output goes where it likes.
+
+    Raises:
+        DeviceError: a command fails; the firmware may then be half written, and flashing again mends it.
+    """
+    for command, line in zip(plan.commands, plan.lines(), strict=True):
+        if echo is not None:
+            echo(line)
+        try:
+            code = subprocess.run(command, check=False).returncode
+        except OSError as error:
+            raise DeviceError(f"{plan.tool}: cannot be run ({error.strerror}); {INSTALL}") from None
+        if code:
+            raise DeviceError(
+                f"flashing failed: {line} ended with {code}; is the board plugged in by its ST-LINK port, and no debugger on it? "
+                "flash again"
+            )
+
+
+def _openocd(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple[str, ...]]:
+    words = ["openocd", "-f", "board/st_nucleo_f7.cfg"]
+    if serial is not None:
+        words += ["-c", f"adapter serial {serial}"]
+    for path, address in pieces:
+        words += ["-c", f"program {{{path}}} verify 0x{address:08x}"]
+    return [(*words, "-c", "reset run", "-c", "shutdown")]
+
+
+def _st_flash(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple[str, ...]]:
+    which = ("--serial", serial) if serial is not None else ()
+    return [("st-flash", *which, "--reset", "write", str(path), f"0x{address:08x}") for path, address in pieces]
+
+
+def _pyocd(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple[str, ...]]:
+    which = ("--uid", serial) if serial is not None else ()
+    return [
+        ("pyocd", "load", "--target", "stm32f767zi", *which, "--format", "bin", "--base-address", f"0x{address:08x}", str(path))
+        for path, address in pieces
+    ]
+
+
+_MAKERS = {"openocd": _openocd, "st-flash": _st_flash, "pyocd": _pyocd}

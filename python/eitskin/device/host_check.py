@@ -1,0 +1,188 @@
+"""Whether a board computes what this host does: its raw frames through the same core, image bits and touches held against what it
+sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import Options, Reconstruction, Touch
+from eitskin.device.known_model import KnownModel, board_options, need_model
+from eitskin.device.link import LinkEvent
+from eitskin.device.live import LiveFrame, follow
+from eitskin.device.packets import Fault, Quality, RawFrame, Stream
+from eitskin.errors import FrameError
+from eitskin.solve.reconstructor import Reconstructor
+
+
+@dataclass
+class HostCheck:
+    """How many frames were compared and how that ended.
+
+    ``same``: every bit of the image, and of the touches but their ids, which count on from whatever the board did before.
+    ``different``: numbers of frames that are not. ``untold``: frames whose solve began from one that was lost on the way, or
+    from a reference that was. ``alone``: solved on the board without its raw frame here.
+    """
+
+    same: int = 0
+    images: int = 0
+    touches: int = 0
+    different: list[int] = field(default_factory=list)
+    untold: int = 0
+    alone: int = 0
+    worst: float = 0.0
+
+    @property
+    def compared(self) -> int:
+        """Frames."""
+        return self.same + len(self.different)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self) | {"same_bits": self.compared > 0 and not self.different}
+
+    def text(self) -> str:
+        """In a line."""
+        if not self.compared:
+            line = "same bits: not told; no frame could be compared"
+        elif self.different:
+            first = self.different[0]
+            line = (
+                f"same bits: NO, {len(self.different)} of {self.compared} frames differ, the first is {first}; greatest "
+                f"difference {self.worst:.2e} of the peak"
+            )
+        else:
+            line = f"same bits: yes, {self.images} images and the touches of {self.touches} frames"
+        return line + (f"; {self.untold} frames after losses not told" if self.untold else "")
+
+
+class HostTwin:
+    """This host's core, kept in step with a board's.
+
+    Raises:
+        UsageError: an option is out of range.
+    """
+
+    def __init__(self, known: KnownModel, options: Options) -> None:
+        self._core = Reconstructor(known.model, blob=known.blob, options=options)
+        self._warm = options.warm_start
+        self._quiet: list[RawFrame] = []
+        self._tared = self._sure = self._lost = False
+        self.check = HostCheck()
+
+    def follow(self, items: Iterable[LiveFrame | Fault | LinkEvent]) -> HostCheck:
+        """Take everything of a stream or recording, tare included."""
+        for item in items:
+            if isinstance(item, LiveFrame):
+                self.take(item)
+            elif isinstance(item, LinkEvent):
+                self.lost()
+        return self.check
+
+    def lost(self) -> None:
+        """Something is missing here: perhaps a frame from which the next solve began, perhaps a quiet one."""
+        self._sure, self._lost = False, True
+
+    def take(self, frame: LiveFrame) -> Reconstruction | None:
+        """The next frame; returns what this host makes of it, None where the board solved nothing."""
+        if frame.raw is not None and frame.raw.quiet:
+            self._quiet.append(frame.raw)
+            return None
+        if self._quiet:
+            self._tare()
+        self._lost = False
+        if frame.solved is None:
+            return None
+        if frame.raw is None:
+            self.check.alone += 1
+            self._sure = False
+            return None
+        if not self._tared:
+            self.check.untold += 1
+            return None
+        return self._compare(frame, frame.raw)
+
+    def _tare(self) -> None:
+        quiet, self._quiet = self._quiet, []
+        if self._lost:
+            self._tared = False
+            return
+        self._core.mask_rows(np.all([(raw.quality & Quality.MASKED) != 0 for raw in quiet], axis=0))
+        try:
+            self._core.tare(np.array([raw.voltage_v for raw in quiet]))
+        except FrameError:
+            self._tared = False
+            return
+        self._core.forget()
+        self._tared = self._sure = True
+
+    def _compare(self, frame: LiveFrame, raw: RawFrame) -> Reconstruction | None:
+        try:
+            result = self._core.reconstruct(raw.voltage_v, touches=frame.touches is not None)
+        except FrameError:
+            self._judge(frame, frame.refused is not None, 1.0)
+            return None
+        same, difference = frame.refused is None, 1.0
+        if same and frame.image is not None:
+            same, difference = same_bits(result.image, frame.image.image), _difference(result.image, frame.image.image)
+        if same and frame.touches is not None:
+            same = same_touches(result.touches, frame.touches.touches)
+        self._judge(frame, same, difference)
+        return result
+
+    def _judge(self, frame: LiveFrame, same: bool, difference: float) -> None:
+        check = self.check
+        if same:
+            check.same += 1
+            check.images += frame.image is not None
+            check.touches += frame.touches is not None
+        elif self._sure or not self._warm:
+            check.different.append(frame.number)
+            check.worst = max(check.worst, difference)
+        else:
+            check.untold += 1
+
+
+def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
+    """The recording ``path`` held against this host's core; also whether it notes the solver's options (else the model's own are
+    taken).
+
+    Raises:
+        FileError, DeviceError, ModelError: the recording or the model cannot be read, or do not belong together.
+    """
+    from eitskin.device.client import Device
+    from eitskin.device.recording import FileTransport
+    from eitskin.device.run_file import recorded_options
+
+    options = recorded_options(path)
+    with Device(FileTransport(path)) as device:
+        known = need_model(device.board, model, str(path), "the comparison")
+        twin = HostTwin(known, board_options(known.model) if options is None else options)
+        return twin.follow(follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)), options is not None
+
+
+def same_bits(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> bool:
+    """Whether two images are the same float32 numbers, bit for bit."""
+    return one.astype("<f4").tobytes() == other.astype("<f4").tobytes()
+
+
+def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
+    """Whether two lists of touches are the same numbers in the same order, ids apart."""
+    return [_numbers(touch) for touch in one] == [_numbers(touch) for touch in other]
+
+
+def _numbers(touch: Touch) -> bytes:
+    values = (touch.x_mm, touch.y_mm, touch.radius_mm, touch.strength_s_per_m_mm2, touch.confidence)
+    return np.array(values, dtype="<f4").tobytes()
+
+
+def _difference(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> float:
+    if one.shape != other.shape:
+        return 1.0
+    peak = float(np.abs(other).max()) or 1.0
+    return float(np.abs(one.astype(np.float64) - other).max()) / peak

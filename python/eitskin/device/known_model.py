@@ -1,0 +1,92 @@
+"""The board's model on the host, where the host has it: what turns pixels into places and rows into electrodes."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from eitskin.device.check import model_of
+from eitskin.device.packets import BoardInfo
+from eitskin.errors import DeviceError, ProtocolError
+from eitskin.model.model import Model
+from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
+
+if TYPE_CHECKING:
+    from eitskin.core.results import Options
+
+NAMES_IT = "name its file with  --model FILE"
+
+
+@dataclass(frozen=True, eq=False)
+class KnownModel:
+    """A model with the bytes that the board has of it."""
+
+    model: Model
+    blob: bytes
+
+
+def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | None:
+    """The board's model: the file ``path``, or the prebuilt one where that is what the board has; None where it has another.
+
+    Raises:
+        FileError, ModelError: the file cannot be read.
+        DeviceError: ``path`` is another model than the board's.
+    """
+    from eitskin.model.prebuilt import load_prebuilt
+
+    if path is not None:
+        return KnownModel(*model_of(info, path, name))
+    model, blob = load_prebuilt()
+    return KnownModel(model, blob) if info.has_model and zlib.crc32(blob) == info.model_crc else None
+
+
+def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> KnownModel:
+    """As ``find_model``, for ``what``, which cannot do without.
+
+    Raises:
+        FileError, ModelError: the file cannot be read.
+        DeviceError: the board has no model, or another one.
+    """
+    if not info.has_model:
+        raise DeviceError(f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm")
+    known = find_model(info, path, name)
+    if known is None:
+        raise DeviceError(
+            f"{name}: {what} needs the board's model, {info.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
+        )
+    return known
+
+
+def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Protocol:
+    """The protocol that a board scans: its model's, or the usual one that has the same hash.
+
+    Raises:
+        DeviceError: it is none of the usual ones, and the model is not known.
+    """
+    if known is not None:
+        return known.model.protocol
+    for protocol in _usual(info.n_electrodes):
+        if protocol.hash == info.protocol_hash:
+            return protocol
+    raise DeviceError(f"{name}: which rows the board scans (protocol {info.protocol_hash:016x}) only its model tells; {NAMES_IT}")
+
+
+def _usual(electrodes: int) -> Iterator[Protocol]:
+    """Adjacent, opposite and skip-n, as far as there are such for so many ``electrodes``."""
+    skips = [partial(skip, skip=k) for k in range(1, (electrodes - 1) // 2)]
+    makers: list[Callable[[int], Protocol]] = [adjacent, opposite, *skips]
+    for make in makers:
+        with suppress(ProtocolError):
+            yield make(electrodes)
+
+
+def board_options(model: Model) -> Options:
+    """The options that a board starts with: the model's own, and each frame begun from the last one's result."""
+    from eitskin.solve.options import default_options
+
+    return replace(default_options(model), warm_start=True)

@@ -1,0 +1,278 @@
+"""A session with a board: set it up, take its reference, and follow its frames, each with everything that came of it."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from eitskin.core.results import Options
+from eitskin.device.client import Device
+from eitskin.device.commands import StreamCommand
+from eitskin.device.explain import fault_text, status_text
+from eitskin.device.known_model import NAMES_IT, KnownModel, board_options
+from eitskin.device.link import LinkEvent
+from eitskin.device.packets import BoardStats, Fault, RawFrame, Solved, SolvedImage, SolvedTouches, Stream
+from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
+from eitskin.errors import DeviceError
+
+WRAP_US = 2**32
+CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # of the emulated board: its microsecond clock
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrame:
+    """What came of one frame. ``time_us`` counts from the first frame of the stream and does not wrap; ``board_us`` is the
+    board's own clock when the scan began. At least one of the three packets is there."""
+
+    number: int
+    time_us: int
+    board_us: int
+    raw: RawFrame | None = None
+    image: SolvedImage | None = None
+    touches: SolvedTouches | None = None
+
+    @property
+    def solved(self) -> Solved | None:
+        """What the solver said, where the frame was solved."""
+        if self.touches is not None:
+            return self.touches.solved
+        return None if self.image is None else self.image.solved
+
+    @property
+    def refused(self) -> str | None:
+        """Why the board's core refused the frame; None where it did not."""
+        return status_text(self.solved.status) if self.solved is not None and self.solved.status else None
+
+
+@dataclass
+class LiveSummary:
+    """What a stream amounted to. Times are the board's own, in us: solve and touches of each solved frame."""
+
+    frames: int = 0
+    refused: int = 0
+    faults: int = 0
+    first_us: int = 0
+    last_us: int = 0
+    solve_us: array[int] = field(default_factory=lambda: array("L"))
+    link: dict[str, int] = field(default_factory=dict)
+    board: BoardStats | None = None
+
+    def add(self, frame: LiveFrame) -> None:
+        """Count a frame."""
+        if not self.frames:
+            self.first_us = frame.time_us
+        self.frames += 1
+        self.last_us = frame.time_us
+        if frame.solved is not None:
+            self.refused += frame.solved.status != 0
+            self.solve_us.append(frame.solved.solve_us + frame.solved.touch_us)
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Streamed frames a second of the board's time."""
+        span = self.last_us - self.first_us
+        return 1e6 * (self.frames - 1) / span if span > 0 else None
+
+    @property
+    def solve_quantiles_us(self) -> tuple[float, float] | None:
+        """Median and 99th percentile; None where nothing was solved, or the board tells no times (a simulated one)."""
+        if not self.solve_us or not max(self.solve_us):
+            return None
+        p50, p99 = np.percentile(np.asarray(self.solve_us), [50, 99])
+        return float(p50), float(p99)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        quantiles = self.solve_quantiles_us or (None, None)
+        return {
+            "frames": self.frames,
+            "refused": self.refused,
+            "faults": self.faults,
+            "frames_a_second": self.rate_hz,
+            "solve_us_p50": quantiles[0],
+            "solve_us_p99": quantiles[1],
+            "link": self.link,
+            "board": None if self.board is None else self.board.as_dict(),
+        }
+
+    def lines(self) -> list[str]:
+        """For reading."""
+        rate = "" if self.rate_hz is None else f", {self.rate_hz:.1f} a second of the board's time"
+        link = self.link
+        text = f"{self.frames} frames{rate}; {link.get('gaps', 0)} gaps ({link.get('missing', 0)} packets missing)"
+        text += f", {link.get('dropped', 0)} dropped here"
+        if self.board is not None:
+            text += f", {self.board.packets_dropped} dropped by the board"
+        lines = [text]
+        if self.solve_quantiles_us is not None:
+            p50, p99 = self.solve_quantiles_us
+            lines.append(f"solve and touches on the board: p50 {p50 / 1e3:.2f} ms, p99 {p99 / 1e3:.2f} ms")
+        if self.faults:
+            lines.append(f"{self.faults} faults were reported")
+        if self.refused:
+            lines.append(f"{self.refused} frames refused by the board's core")
+        return lines
+
+
+def set_up(device: Device, scan: ScanSettings, solver: SolverSettings, known: KnownModel | None) -> Options | None:
+    """Set scan and solver; returns the solver's options as they now are, None where the model is not known here and nothing of
+    the solver was asked for: then they stay what they are, whatever that is.
+
+    Raises:
+        UsageError: a number is out of its range.
+        DeviceError: the board refuses (it keeps what it had), or its model is not known here.
+    """
+    apply_scan(device, scan)
+    if known is None:
+        if solver.named:
+            raise DeviceError(
+                f"{device.transport.name}: changing the solver needs the defaults of the board's model, "
+                f"{device.board.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
+            )
+        return None
+    options = solver.applied(board_options(known.model))
+    device.solver(options)
+    return options
+
+
+def take_reference(device: Device, frames: int, *, streamed: bool = False) -> None:
+    """Tare; where ``streamed``, the quiet frames are sent as raw frames too, for whoever records.
+
+    Raises:
+        UsageError, DeviceError: as ``Device.tare``.
+    """
+    if not streamed:
+        device.tare(frames)
+        return
+    device.send_command(StreamCommand(int(Stream.RAW)), 1.0)
+    try:
+        device.tare(frames)
+    finally:
+        device.send_command(StreamCommand(0), 1.0)
+
+
+def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
+    """Let what is to be touched begin, on a simulated or emulated board, and the scan under way end, which still shows the
+    untouched skin. Returns the board's clock at the scene's time 0 (None for others), and news that came meanwhile."""
+    transport, news = device.transport, []
+    device.start_scene()
+    board = getattr(transport, "board", None)
+    if not transport.url.startswith("emu:"):
+        return (int(board.time_us) if board is not None else None), []
+    began = int(board.timers[CLOCK_TIMER].read(TIMER_COUNT, 4)) if board is not None else None
+    info = device.board
+    while (item := device.next_item(1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us))) is not None:
+        if isinstance(item, Fault | LinkEvent):
+            news.append(item)
+    return began, news
+
+
+def follow(
+    device: Device, what: Stream, *, every: int = 1, frames: int = 0
+) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+    """``Device.stream``, the packets of each frame put together. A frame is complete when its last kind came or another frame
+    begins.
+
+    Raises:
+        UsageError, DeviceError: as ``Device.stream``.
+    """
+    return put_together(device.stream(what, every=every, frames=frames), what)
+
+
+def put_together(items: Iterator[Any], what: Stream) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+    """Frames out of a stream's packets; ``items`` is closed with it."""
+    try:
+        yield from _put_together(items, what)
+    finally:
+        if isinstance(items, Generator):
+            items.close()
+
+
+def _put_together(items: Iterator[Any], what: Stream) -> Iterator[LiveFrame | Fault | LinkEvent]:
+    clock, wanted = _Clock(), bin(what).count("1")
+    parts: dict[str, Any] = {}
+    number: int | None = None
+    for item in items:
+        if isinstance(item, Fault | LinkEvent):
+            yield item
+            continue
+        kind = _KINDS.get(type(item))
+        if kind is None:
+            continue
+        if item.frame != number or kind in parts:
+            if parts:
+                yield _frame(clock, parts)
+            parts, number = {}, item.frame
+        parts[kind] = item
+        if len(parts) == wanted:
+            yield _frame(clock, parts)
+            parts, number = {}, None
+    if parts:
+        yield _frame(clock, parts)
+
+
+def replayed(
+    device: Device, what: Stream, *, every: int = 1, frames: int = 0
+) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+    """As ``follow``, of a recording: what a live stream would have shown, which is all but the quiet frames of tares, timed from
+    the first frame that is none."""
+    start: int | None = None
+    count = 0
+    for item in follow(device, what):
+        if not isinstance(item, LiveFrame):
+            yield item
+        elif item.raw is None or not item.raw.quiet:
+            start = item.time_us if start is None else start
+            if frames and count >= frames * every:
+                return
+            if count % every == 0:
+                yield replace(item, time_us=item.time_us - start)
+            count += 1
+
+
+_KINDS = {RawFrame: "raw", SolvedImage: "image", SolvedTouches: "touches"}
+
+
+class _Clock:
+    """The board's clock, which wraps after 71 minutes, as one that does not."""
+
+    def __init__(self) -> None:
+        self._last: int | None = None
+        self._elapsed_us = 0
+
+    def elapsed_us(self, board_us: int) -> int:
+        """Since the first time that was asked for; a restarted board goes on from where it was."""
+        if self._last is not None:
+            step = (board_us - self._last) % WRAP_US
+            self._elapsed_us += step if step < WRAP_US // 2 else 0
+        self._last = board_us
+        return self._elapsed_us
+
+
+def _frame(clock: _Clock, parts: dict[str, Any]) -> LiveFrame:
+    first = next(iter(parts.values()))
+    board_us = first.time_us if isinstance(first, RawFrame) else first.solved.time_us
+    return LiveFrame(first.frame, clock.elapsed_us(board_us), board_us, **parts)
+
+
+def news_text(news: Fault | LinkEvent) -> str:
+    """A fault or an event of the link in a line."""
+    if isinstance(news, Fault):
+        return f"fault at frame {news.frame}: {fault_text(news)}" if news.raised else fault_text(news)
+    counted = f" ({news.missing} packets)" if news.missing else ""
+    return f"link: {news.kind}{counted}" + (f": {news.text}" if news.text else "")
+
+
+def finish(summary: LiveSummary, device: Device) -> LiveSummary:
+    """Add what the link and the board counted; a board that does not answer any more leaves its part out."""
+    summary.link = device.counters.as_dict()
+    if not device.transport.replays and not device.link.ended:
+        try:
+            summary.board = device.stats()
+        except DeviceError:
+            summary.board = None
+    return summary

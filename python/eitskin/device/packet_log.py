@@ -1,0 +1,40 @@
+"""Every packet of a session kept in memory, the tare's included, for whoever looks at them afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+from eitskin.device.client import Device
+from eitskin.device.codec import Packet
+from eitskin.device.link import LinkEvent
+from eitskin.device.live import LiveFrame, put_together
+from eitskin.device.packets import Fault, RawFrame, SolvedImage, SolvedTouches, Stream
+from eitskin.device.payloads import MalformedPacket, parse
+
+
+class PacketLog:
+    """What ``device`` sends from now on, until ``stop``."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self.packets: list[Packet] = []
+        self._tap = self.packets.append
+        device.link.begin_tap(lambda sequence: None, self._tap)
+
+    def stop(self) -> None:
+        """Keep no more."""
+        self._device.link.end_tap(self._tap)
+
+    def frames(self, what: Stream) -> Iterator[LiveFrame | Fault | LinkEvent]:
+        """The frames so far, faults and gaps between them; ``what`` was streamed."""
+        return put_together(self._contents(), what)
+
+    def _contents(self) -> Iterator[RawFrame | SolvedImage | SolvedTouches | Fault | LinkEvent]:
+        for packet in self.packets:
+            if packet.lost:
+                yield LinkEvent("gap", packet.lost)
+            with suppress(MalformedPacket):
+                content = parse(packet.type, packet.payload)
+                if isinstance(content, RawFrame | SolvedImage | SolvedTouches | Fault):
+                    yield content

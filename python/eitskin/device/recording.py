@@ -1,0 +1,197 @@
+"""Recordings (.eits): the packets of a link as they were received, one after another, flushed each, so that a killed recorder
+loses at most the last. Reading one goes through the live decoder. docs/link-protocol.md, "Recordings", specifies the file.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from eitskin import __version__
+from eitskin.device.codec import Decoder, Packet, encode
+from eitskin.device.packets import PacketType
+from eitskin.device.payloads import build_info
+from eitskin.errors import DeviceError, FileError
+
+if TYPE_CHECKING:
+    from eitskin.device.client import Device
+    from eitskin.frames.frames import Frames
+
+FORMAT = "eits"
+VERSION = 1
+CHUNK = 1 << 16
+MOST_HEAD = 4096
+
+
+class Recorder:
+    """Writes every packet that ``device`` receives to the new file ``path`` until it is closed. ``packets`` and ``bytes`` count.
+
+    Raises:
+        FileError: the file exists already, or cannot be written.
+        DeviceError: the board does not answer.
+    """
+
+    def __init__(self, path: str | Path, device: Device, *, overwrite: bool = False) -> None:
+        self.path, self._device = Path(path), device
+        self.packets = self.bytes = 0
+        info = device.board if device.transport.replays else device.info()
+        try:
+            self._file = self.path.open("wb" if overwrite else "xb", buffering=0)
+        except FileExistsError:
+            raise FileError(f"{path}: exists already; name another file, or remove it") from None
+        except OSError as error:
+            raise FileError(f"{path}: cannot write it ({error.strerror})") from None
+        head = {
+            "format": FORMAT,
+            "version": VERSION,
+            "eitskin": __version__,
+            "url": device.transport.url,
+            "model_crc": f"{info.model_crc:08x}",
+        }
+        try:
+            self._write(PacketType.RECORDING, 0, json.dumps(head).encode())
+
+            def begin(last_sequence: int) -> None:
+                self._write(PacketType.INFO, last_sequence, build_info(info))
+
+            device.link.begin_tap(begin, self._take)
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop recording; may be called twice."""
+        self._device.link.end_tap(self._take)
+        self._file.close()
+
+    def _take(self, packet: Packet) -> None:
+        self._write(packet.type, packet.sequence, packet.payload)
+        self.packets += 1
+
+    def _write(self, packet_type: int, sequence: int, payload: bytes) -> None:
+        data = encode(packet_type, sequence, payload)
+        try:
+            written = self._file.write(data)
+        except (OSError, ValueError) as error:
+            raise FileError(f"{self.path}: cannot go on recording ({error}); what was recorded can be read") from None
+        if written != len(data):
+            raise FileError(f"{self.path}: cannot go on recording (the disk is full); what was recorded can be read")
+        self.bytes += len(data)
+
+
+class FileTransport:
+    """A recording in place of a board: its bytes, and nothing to be asked.
+
+    Raises:
+        FileError: it cannot be read, or is no recording.
+        DeviceError: it is of a newer version.
+    """
+
+    synchronous = True
+    replays = True
+
+    def __init__(self, path: str | Path) -> None:
+        self.url, self.name = f"file:{path}", str(path)
+        self.head = read_head(path)
+        self._file = Path(path).open("rb")  # noqa: SIM115 -- open as long as the device is
+        self.ended = False
+
+    def read(self, timeout_s: float) -> bytes:
+        """The next bytes; at the end once a zero, so that a packet cut short is counted."""
+        if self.ended:
+            return b""
+        try:
+            data = self._file.read(CHUNK)
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"{self.name}: cannot be read any more ({error})") from None
+        if not data:
+            self.ended = True
+            return b"\0"
+        return data
+
+    def write(self, data: bytes) -> None:
+        raise DeviceError(f"{self.name} is a recording and takes no commands")
+
+    def reopen(self) -> bool:
+        return False
+
+    def begin_scene(self) -> None:
+        """What was touched was touched."""
+
+    def close(self) -> None:
+        self.ended = True
+        self._file.close()
+
+
+def read_head(path: str | Path) -> dict[str, Any]:
+    """What the recording in ``path`` says of itself.
+
+    Raises:
+        FileError: it cannot be read, or is no recording.
+        DeviceError: it is of a newer version.
+    """
+    try:
+        with Path(path).open("rb") as stream:
+            data = stream.read(MOST_HEAD)
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such recording; check the path") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot read this recording ({error.strerror})") from None
+    packets = Decoder().feed(data)
+    if not packets or packets[0].type != PacketType.RECORDING:
+        raise FileError(f"{path}: no eitskin recording (.eits), or cut in its first bytes; make one with  eitskin record")
+    try:
+        head = json.loads(packets[0].payload)
+    except ValueError:
+        head = None
+    if not isinstance(head, dict) or head.get("format") != FORMAT or not isinstance(head.get("version"), int):
+        raise FileError(f"{path}: no eitskin recording (.eits): its first packet says something else")
+    if head["version"] > VERSION:
+        raise DeviceError(f"{path}: recording version {head['version']}, this eitskin reads up to {VERSION}; upgrade eitskin")
+    return head
+
+
+def frames_of(path: str | Path, model: Path | None = None) -> Frames:
+    """The raw frames of a recording as frames, the quiet ones of its last tare as their reference; rows that were masked or could
+    not be measured are NaN. ``model``: the board's, where its protocol is none of the usual.
+
+    Raises:
+        FileError, DeviceError: it cannot be read, or the model is another.
+        FrameError: no raw frames were recorded, or no quiet ones.
+    """
+    from eitskin.device.client import Device
+    from eitskin.device.known_model import find_model, scanned_protocol
+    from eitskin.device.live import follow
+    from eitskin.device.packets import Stream
+    from eitskin.device.raw_frames import as_frames, gather
+    from eitskin.errors import FrameError
+
+    with Device(FileTransport(path)) as device:
+        name = str(path)
+        known = find_model(device.board, model, name)
+        protocol = scanned_protocol(device.board, known, name)
+        run = gather(follow(device, Stream.RAW))
+        if not run.frames:
+            raise FrameError(f"{name}: holds no raw frames; record with raw streaming (eitskin record does by default)")
+        return as_frames(run.quiet, run.frames, protocol, device.board, known, allow_nonfinite=True)
+
+
+def export_frames(path: str | Path, target: str | Path, model: Path | None = None) -> int:
+    """Write the raw frames of the recording ``path`` to ``target`` (.npz); returns how many.
+
+    Raises:
+        as ``frames_of`` and ``save_frames``.
+    """
+    from eitskin.frames.frames import save_frames
+
+    frames = frames_of(path, model)
+    save_frames(target, frames)
+    return frames.n_frames

@@ -1,0 +1,73 @@
+"""What a user asks of a board's scan and solver: only what is named is changed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from eitskin.core.results import Options
+from eitskin.device.client import Device
+from eitskin.errors import UsageError
+
+MOST_TARE = 1024
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    """How frames are scanned; None stays as it is. ``check_every`` as in ``commands.Scan``: 1 scans every row, n > 1 one of each
+    reciprocal pair with every n-th frame whole, 0 never whole."""
+
+    excitation_hz: float | None = None
+    sample_rate_hz: int | None = None
+    samples: int | None = None
+    settle_us: int | None = None
+    check_every: int | None = None
+    frame_period_us: int | None = None
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """What is to be changed."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """The board's solver; None stays at the model's own, ``warm_start`` at on."""
+
+    iterations: int | None = None
+    gap_rel: float | None = None
+    warm_start: bool | None = None
+    sign: str | None = None
+    lambda_rel: float | None = None
+    max_touches: int | None = None
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """What is to be changed."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+    def applied(self, options: Options) -> Options:
+        """``options`` with these changes."""
+        return replace(options, **self.named)
+
+
+def check_tare_frames(frames: int) -> int:
+    """``frames`` if a board can take its reference from so many.
+
+    Raises:
+        UsageError: it cannot.
+    """
+    if frames != 1 and not 4 <= frames <= MOST_TARE:
+        raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to {MOST_TARE}")
+    return frames
+
+
+def apply_scan(device: Device, scan: ScanSettings) -> None:
+    """Change the scan where something is named; the board forgets its reference then.
+
+    Raises:
+        UsageError: a number is out of its range.
+        DeviceError: the board cannot do it; it keeps what it had.
+    """
+    if scan.named:
+        device.scan(**scan.named)

@@ -1,0 +1,85 @@
+"""A board's frames as a picture: one frame at large, or a panel a frame."""
+
+from __future__ import annotations
+
+from math import ceil, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from eitskin.model.model import Model
+from eitskin.study.watch import Seen, spread
+from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels
+
+MOST_PANELS = 36
+MOST_KEPT = 20 * MOST_PANELS
+
+
+class Album:
+    """Keeps frames for a picture: all of them, or of a long stream evenly spaced ones and the last."""
+
+    def __init__(self) -> None:
+        self._kept: list[Seen] = []
+        self._step, self._count = 1, 0
+        self._last: Seen | None = None
+
+    def add(self, seen: Seen) -> None:
+        """Another frame."""
+        if self._count % self._step == 0:
+            self._kept.append(seen)
+            if len(self._kept) >= MOST_KEPT:
+                self._kept, self._step = self._kept[::2], 2 * self._step
+        self._count += 1
+        self._last = seen
+
+    @property
+    def frames(self) -> list[Seen]:
+        """At most 36, the first and the last among them."""
+        kept = self._kept if self._last is None or self._kept[-1] is self._last else [*self._kept, self._last]
+        return spread(kept, MOST_PANELS)
+
+    @property
+    def count(self) -> int:
+        """How many were added."""
+        return self._count
+
+
+def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> None:
+    """The album as a PNG: circles are true touches, crosses what was found, dashed circles the found touches' sizes.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+        ConfigError: the model does not say which skin it is for.
+    """
+    frames = album.frames
+    if len(frames) == 1:
+        seen = frames[0]
+        values = np.zeros(model.grid.n_pixels) if seen.frame.image is None else seen.frame.image.image
+        draw_frame(path, model.skin, model.grid, values, truth=_true_marks(model, seen), found=_found_marks(seen), title=title)
+        return
+    panels = [
+        Panel(
+            f"frame {seen.frame.number}, {seen.frame.time_us / 1e6:.2f} s",
+            None if seen.frame.image is None else seen.frame.image.image,
+            _true_marks(model, seen),
+            _found_marks(seen),
+        )
+        for seen in frames
+    ]
+    note = "crosses: found" + ("; circles: true touches" if any(seen.true for seen in frames) else "")
+    if album.count > len(frames):
+        note += f"; {len(frames)} of {album.count} frames"
+    draw_panels(path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note)
+
+
+def _true_marks(model: Model, seen: Seen) -> tuple[Mark, ...]:
+    conductivity = model.skin.conductivity_s_per_m
+    return tuple(Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * conductivity) for t in seen.true or ())
+
+
+def _found_marks(seen: Seen) -> tuple[Mark, ...]:
+    if seen.frame.touches is not None:
+        return tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in seen.frame.touches.touches)
+    places = seen.found_mm
+    return () if places is None else tuple(Mark(float(x), float(y)) for x, y in places)

@@ -1,0 +1,369 @@
+/* The link's codec: what is encoded is decoded, and nothing else is ever taken for a packet. */
+#include "check.h"
+
+#include "eitskin/link.h"
+#include "eitskin/model.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST = (int)EITS_LINK_MAX_PAYLOAD, ROOM = (int)EITS_LINK_ENCODED(EITS_LINK_MAX_PAYLOAD) };
+
+static _Alignas(8) uint8_t buffer[EITS_LINK_MAX_PACKET];
+static uint8_t payload[MOST], wire[ROOM], other[ROOM];
+
+static uint32_t state = 1;
+
+static uint32_t next_random(void) /* xorshift32 */
+{
+    state ^= state << 13;
+    state ^= state >> 17;
+    state ^= state << 5;
+    return state;
+}
+
+static eits_link_decoder fresh(void)
+{
+    eits_link_decoder d;
+    CHECK_EQUAL(eits_link_decoder_init(&d, buffer, sizeof buffer), EITS_OK);
+    return d;
+}
+
+/* Feed all; the number of packets, the last of them in `last` (its payload is only valid until the next byte). */
+static int feed_all(eits_link_decoder *d, const uint8_t *bytes, size_t size, eits_link_packet *last)
+{
+    int found = 0;
+    while (size > 0) {
+        eits_link_packet packet;
+        const size_t taken = eits_link_feed(d, bytes, size, &packet);
+        CHECK(taken > 0 && taken <= size);
+        bytes += taken;
+        size -= taken;
+        if (packet.payload) {
+            ++found;
+            *last = packet;
+        }
+    }
+    return found;
+}
+
+static uint32_t errors(const eits_link_decoder *d)
+{
+    return d->crc_errors + d->framing_errors + d->overruns + d->version_errors;
+}
+
+/* The wire's bytes by a second, plain implementation: build the packet, stuff it block by block. */
+static size_t plainly(uint8_t *out, uint8_t version, uint8_t type, uint32_t sequence, const uint8_t *bytes, size_t size)
+{
+    static uint8_t packet[EITS_LINK_MAX_PACKET];
+    const uint8_t head[8] = {version, type, (uint8_t)size, (uint8_t)(size >> 8), (uint8_t)sequence, (uint8_t)(sequence >> 8),
+                             (uint8_t)(sequence >> 16), (uint8_t)(sequence >> 24)};
+    memcpy(packet, head, 8);
+    memcpy(packet + 8, bytes, size);
+    const uint32_t crc = eits_crc32(0, packet, size + 8);
+    for (int k = 0; k < 4; ++k)
+        packet[size + 8 + (size_t)k] = (uint8_t)(crc >> (8 * k));
+    const size_t total = size + 12;
+    size_t at = 0, from = 0;
+    out[at++] = 0;
+    for (;;) {
+        size_t run = 0;
+        while (from + run < total && run < 254 && packet[from + run] != 0)
+            ++run;
+        out[at++] = (uint8_t)(run + 1);
+        memcpy(out + at, packet + from, run);
+        at += run;
+        from += run;
+        if (from == total)
+            break;
+        if (run < 254)
+            ++from; /* the zero */
+    }
+    out[at++] = 0;
+    return at;
+}
+
+static void fill(size_t size, int kind)
+{
+    for (size_t i = 0; i < size; ++i)
+        payload[i] = kind == 0 ? 0 : kind == 1 ? (uint8_t)(1 + i % 255) : kind == 2 ? 0xFF : (uint8_t)(next_random() >> 24);
+}
+
+static void one_round_trip(size_t size, size_t head_size)
+{
+    const uint8_t type = (uint8_t)next_random();
+    const uint32_t sequence = next_random();
+    const size_t made = eits_link_encode(wire, sizeof wire, type, sequence, payload, head_size, payload + head_size, size - head_size);
+    CHECK(made > 0 && made <= EITS_LINK_ENCODED(size));
+    CHECK_EQUAL(made, plainly(other, EITS_LINK_VERSION, type, sequence, payload, size));
+    CHECK(memcmp(wire, other, made) == 0);
+    CHECK(wire[0] == 0 && wire[made - 1] == 0 && memchr(wire + 1, 0, made - 2) == NULL);
+    eits_link_decoder d = fresh();
+    eits_link_packet packet = {.type = 0};
+    CHECK_EQUAL(feed_all(&d, wire, made, &packet), 1);
+    CHECK_EQUAL(packet.type, type);
+    CHECK_EQUAL(packet.sequence, sequence);
+    CHECK_EQUAL(packet.size, size);
+    CHECK(packet.payload == buffer + EITS_LINK_HEAD && memcmp(packet.payload, payload, size) == 0);
+    CHECK_EQUAL(d.packets, 1);
+    CHECK_EQUAL(errors(&d), 0);
+}
+
+static void round_trips(void)
+{
+    for (size_t size = 0; size <= 2000; ++size) {
+        for (int kind = 0; kind < 4; ++kind) {
+            fill(size, kind);
+            one_round_trip(size, size < 68 ? size / 2 : 68);
+        }
+    }
+    for (int kind = 0; kind < 4; ++kind) {
+        fill((size_t)MOST, kind);
+        one_round_trip((size_t)MOST, 0);
+        one_round_trip((size_t)MOST, (size_t)MOST);
+        one_round_trip((size_t)MOST - 1, 16);
+    }
+}
+
+static void limits_of_room(void)
+{
+    fill((size_t)MOST, 1);
+    CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, (size_t)MOST, payload, 1), 0);
+    CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, SIZE_MAX, payload, 2), 0);
+    CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, 2, payload, SIZE_MAX), 0);
+    CHECK_EQUAL(eits_link_encode(NULL, sizeof wire, 1, 1, payload, 1, NULL, 0), 0);
+    CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, NULL, 1, NULL, 0), 0);
+    CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, NULL, 0, NULL, 1), 0);
+    CHECK(eits_link_encode(wire, sizeof wire, 1, 1, NULL, 0, NULL, 0) > 0);
+    for (size_t size = 0; size <= 600; ++size) {
+        const size_t room = EITS_LINK_ENCODED(size);
+        memset(wire, 0xAA, room + 1);
+        CHECK_EQUAL(eits_link_encode(wire, room - 1, 1, 1, payload, size, NULL, 0), 0);
+        CHECK(wire[0] == 0xAA); /* refused before it is begun */
+        CHECK(eits_link_encode(wire, room, 1, 1, payload, size, NULL, 0) <= room);
+        CHECK(wire[room] == 0xAA);
+    }
+}
+
+static void bad_decoders(void)
+{
+    eits_link_decoder d;
+    CHECK_EQUAL(eits_link_decoder_init(NULL, buffer, sizeof buffer), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_link_decoder_init(&d, NULL, sizeof buffer), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_link_decoder_init(&d, buffer + 4, sizeof buffer - 4), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_link_decoder_init(&d, buffer, EITS_LINK_HEAD + 3), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_link_decoder_init(&d, buffer, EITS_LINK_HEAD + 4), EITS_OK);
+}
+
+/* Whatever happens to one byte of a packet: no packet, one error counted, and the next packet is there. */
+static void one_damage(const uint8_t *damaged, size_t size, const uint8_t *good, size_t good_size)
+{
+    eits_link_decoder d = fresh();
+    eits_link_packet packet = {.type = 0};
+    CHECK_EQUAL(feed_all(&d, damaged, size, &packet), 0);
+    CHECK_EQUAL(feed_all(&d, good, good_size, &packet), 1);
+    CHECK_EQUAL(packet.type, 0x77);
+    CHECK(errors(&d) >= 1);
+    CHECK_EQUAL(d.packets, 1);
+}
+
+static void every_byte_damaged(void)
+{
+    static uint8_t damaged[ROOM], good[64];
+    const size_t good_size = eits_link_encode(good, sizeof good, 0x77, 9, "next", 4, NULL, 0);
+    static const size_t sizes[] = {0, 4, 36, 253, 300};
+    for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
+        fill(sizes[s], 3);
+        const size_t made = eits_link_encode(wire, sizeof wire, EITS_PACKET_RAW, 5, payload, sizes[s], NULL, 0);
+        for (size_t at = 1; at + 1 < made; ++at) { /* the zeros at both ends: see delimiters() */
+            for (unsigned value = 0; value < 256; ++value) {
+                if (value == wire[at])
+                    continue;
+                memcpy(damaged, wire, made);
+                damaged[at] = (uint8_t)value;
+                one_damage(damaged, made, good, good_size);
+            }
+            memcpy(damaged, wire, at); /* byte lost */
+            memcpy(damaged + at, wire + at + 1, made - at - 1);
+            if (memcmp(damaged, wire, made - 1) != 0) /* or one of a run of equals: then it is another's loss */
+                one_damage(damaged, made - 1, good, good_size);
+            if (at + 2 < made) /* cut: the next packet's leading zero ends it */
+                one_damage(wire, at + 1, good, good_size);
+        }
+    }
+}
+
+static void delimiters(void)
+{
+    uint8_t bytes[256];
+    eits_link_packet packet = {.type = 0};
+    eits_link_decoder d = fresh();
+    const size_t made = eits_link_encode(wire, sizeof wire, 3, 4, "abc", 3, NULL, 0);
+    memset(bytes, 0, sizeof bytes); /* any number of zeros between packets */
+    memcpy(bytes + 7, wire, made);
+    CHECK_EQUAL(feed_all(&d, bytes, 7 + made + 20, &packet), 1);
+    CHECK_EQUAL(feed_all(&d, wire + 1, made - 1, &packet), 1); /* one zero between two packets is enough */
+    CHECK_EQUAL(feed_all(&d, wire + 1, made - 2, &packet), 0);
+    CHECK_EQUAL(feed_all(&d, wire, made, &packet), 2); /* its leading zero ends the one before */
+    CHECK_EQUAL(d.packets, 4);
+    CHECK_EQUAL(errors(&d), 0);
+    memcpy(bytes, wire, made - 1); /* the zero between two packets lost: both are, and counted once */
+    memcpy(bytes + made - 1, wire + 1, made - 1);
+    CHECK_EQUAL(feed_all(&d, bytes, 2 * made - 2, &packet), 0);
+    CHECK_EQUAL(errors(&d), 1);
+}
+
+static void finds_its_way_back(void)
+{
+    eits_link_decoder d = fresh();
+    eits_link_packet packet = {.type = 0};
+    uint32_t wanted = 0, seen = 0;
+    for (uint32_t k = 0; k < 2000; ++k) {
+        const size_t garbage = next_random() % 40;
+        uint8_t bytes[40];
+        for (size_t i = 0; i < garbage; ++i)
+            bytes[i] = (uint8_t)(next_random() >> 24);
+        seen += (uint32_t)feed_all(&d, bytes, garbage, &packet);
+        const size_t made = eits_link_encode(wire, sizeof wire, 1, k, bytes, garbage / 2, NULL, 0);
+        const int found = feed_all(&d, wire, made, &packet);
+        wanted += 1;
+        seen += (uint32_t)found;
+        CHECK(found == 1 && packet.sequence == k && packet.size == garbage / 2);
+    }
+    CHECK_EQUAL(seen, wanted);
+    CHECK_EQUAL(d.packets, wanted);
+    CHECK(errors(&d) > 1000);
+}
+
+static void longer_than_the_buffer(void)
+{
+    static _Alignas(8) uint8_t small[8 + 4 + 32];
+    eits_link_decoder d;
+    eits_link_packet packet = {.type = 0};
+    CHECK_EQUAL(eits_link_decoder_init(&d, small, sizeof small), EITS_OK);
+    for (size_t size = 30; size <= 500; ++size) {
+        fill(size, size % 2 ? 3 : 0);
+        const uint32_t before = d.overruns, packets = d.packets;
+        const size_t made = eits_link_encode(wire, sizeof wire, 1, 1, payload, size, NULL, 0);
+        CHECK_EQUAL(feed_all(&d, wire, made, &packet), size <= 32);
+        CHECK_EQUAL(d.overruns - before, size > 32);
+        CHECK_EQUAL(d.packets - packets, size <= 32);
+    }
+    CHECK_EQUAL(d.crc_errors + d.framing_errors + d.version_errors, 0);
+    memset(other, 1, sizeof other); /* a line that never falls silent */
+    const uint32_t before = d.overruns;
+    for (int k = 0; k < 10; ++k)
+        CHECK_EQUAL(feed_all(&d, other, sizeof other, &packet), 0);
+    CHECK_EQUAL(d.overruns - before, 1);
+    const size_t made = eits_link_encode(wire, sizeof wire, 8, 1, payload, 32, NULL, 0);
+    CHECK_EQUAL(feed_all(&d, wire, made, &packet), 1);
+}
+
+static void other_versions(void)
+{
+    eits_link_decoder d = fresh();
+    eits_link_packet packet = {.type = 0};
+    for (unsigned version = 0; version < 256; ++version) {
+        const size_t made = plainly(wire, (uint8_t)version, 1, 1, (const uint8_t *)"text", 4);
+        CHECK_EQUAL(feed_all(&d, wire, made, &packet), version == EITS_LINK_VERSION);
+        CHECK(version == EITS_LINK_VERSION || d.other_version == version);
+    }
+    CHECK_EQUAL(d.version_errors, 255);
+    CHECK_EQUAL(errors(&d), 255);
+}
+
+/* The length in the head is another check; the checksum alone would let these pass. */
+static void wrong_length_in_the_head(void)
+{
+    uint8_t packet_bytes[16] = {EITS_LINK_VERSION, 1, 5, 0, 0, 0, 0, 0, 1, 2, 3, 4};
+    const uint32_t crc = eits_crc32(0, packet_bytes, 12);
+    for (int k = 0; k < 4; ++k)
+        packet_bytes[12 + k] = (uint8_t)(crc >> (8 * k));
+    size_t at = 0, from = 0;
+    wire[at++] = 0;
+    while (from <= 16) { /* blocks end at zeros, and at the packet's end */
+        size_t run = 0;
+        while (from + run < 16 && packet_bytes[from + run] != 0)
+            ++run;
+        wire[at++] = (uint8_t)(run + 1);
+        memcpy(wire + at, packet_bytes + from, run);
+        at += run;
+        from += run + 1;
+    }
+    wire[at++] = 0;
+    eits_link_decoder d = fresh();
+    eits_link_packet packet = {.type = 0};
+    CHECK_EQUAL(feed_all(&d, wire, at, &packet), 0);
+    CHECK_EQUAL(d.framing_errors, 1);
+    CHECK_EQUAL(errors(&d), 1);
+}
+
+static void shorter_than_a_packet(void)
+{
+    eits_link_decoder d = fresh();
+    eits_link_packet packet = {.type = 0};
+    for (size_t size = 1; size <= 11; ++size) {
+        memset(wire, 7, sizeof wire);
+        wire[0] = (uint8_t)(size + 1);
+        wire[size + 1] = 0;
+        CHECK_EQUAL(feed_all(&d, wire, size + 2, &packet), 0);
+        CHECK_EQUAL(d.framing_errors, (int)size);
+    }
+    CHECK_EQUAL(errors(&d), 11);
+}
+
+/* However the bytes come, what comes out is the same. */
+static void by_bytes_and_by_blocks(void)
+{
+    static uint8_t line[60000];
+    size_t length = 0;
+    while (length + 1200 < sizeof line) {
+        const size_t size = next_random() % 900;
+        fill(size, 3);
+        length += eits_link_encode(line + length, sizeof line - length, (uint8_t)size, next_random(), payload, size, NULL, 0);
+        if (next_random() % 4 == 0)
+            line[length - 2 - next_random() % 10] ^= (uint8_t)(1 + next_random() % 255);
+    }
+    static _Alignas(8) uint8_t second[EITS_LINK_MAX_PACKET];
+    eits_link_decoder bytes, blocks = fresh();
+    CHECK_EQUAL(eits_link_decoder_init(&bytes, second, sizeof second), EITS_OK);
+    size_t at = 0, by_bytes = 0;
+    while (at < length) {
+        eits_link_packet packet, single = {.payload = NULL};
+        const size_t most = 1 + next_random() % 700;
+        const size_t taken = eits_link_feed(&blocks, line + at, at + most < length ? most : length - at, &packet);
+        for (size_t k = 0; k < taken; ++k) {
+            CHECK_EQUAL(eits_link_feed(&bytes, line + at + k, 1, &single), 1);
+            CHECK(k + 1 == taken || !single.payload);
+        }
+        at += taken;
+        CHECK((packet.payload != NULL) == (single.payload != NULL));
+        if (packet.payload && single.payload) {
+            ++by_bytes;
+            CHECK(packet.type == single.type && packet.sequence == single.sequence && packet.size == single.size);
+            CHECK(memcmp(packet.payload, single.payload, packet.size) == 0);
+        }
+    }
+    CHECK(by_bytes > 50 && bytes.packets == by_bytes && blocks.packets == by_bytes);
+    CHECK(errors(&bytes) == errors(&blocks) && errors(&bytes) > 5);
+    CHECK(bytes.crc_errors == blocks.crc_errors && bytes.framing_errors == blocks.framing_errors);
+    eits_link_packet packet = {.type = 1};
+    CHECK_EQUAL(eits_link_feed(&bytes, line, 0, &packet), 0);
+    CHECK(packet.payload == NULL);
+}
+
+int main(void)
+{
+    round_trips();
+    limits_of_room();
+    bad_decoders();
+    every_byte_damaged();
+    delimiters();
+    finds_its_way_back();
+    longer_than_the_buffer();
+    other_versions();
+    wrong_length_in_the_head();
+    shorter_than_a_packet();
+    by_bytes_and_by_blocks();
+    return checks_report("link");
+}

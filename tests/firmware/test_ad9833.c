@@ -1,0 +1,140 @@
+/* AD9833: words against the data sheet's and AN-1070's worked examples, the sequence, and buses that fail. */
+#include "check.h"
+#include "fake_board.h"
+
+static fake_board board;
+static fake_write written[FAKE_SPI_LOG];
+
+static void test_tuning(void)
+{
+    /* AN-1070, "Programming the AD9833": 400 Hz from 25 MHz is 0x10C7 = 4295 */
+    CHECK_EQUAL(fw_ad9833_tuning(25000000, 400000), 0x10C7);
+    /* 5 MHz from 25 MHz, a fifth of 2^28; 2.5 MHz from 10 MHz, a quarter */
+    CHECK_EQUAL(fw_ad9833_tuning(25000000, 5000000000u), 0x3333333);
+    CHECK_EQUAL(fw_ad9833_tuning(10000000, 2500000000u), 0x4000000);
+    /* 50 kHz from 8 MHz: 1677721.6, where truncation in single precision is a unit low */
+    CHECK_EQUAL(fw_ad9833_tuning(8000000, 50000000), 1677722);
+    /* 1 Hz from 25 MHz: 10.737; half a unit is rounded up */
+    CHECK_EQUAL(fw_ad9833_tuning(25000000, 1000), 11);
+    CHECK_EQUAL(fw_ad9833_tuning(64000000, 119), 0); /* 0.4991 */
+    CHECK_EQUAL(fw_ad9833_tuning(64000000, 120), 1); /* 0.5033 */
+    CHECK_EQUAL(fw_ad9833_tuning(25000000, 0), 0);
+    CHECK_EQUAL(fw_ad9833_tuning(25000000, 12500000000u), 1 << 27);
+    CHECK_EQUAL(fw_ad9833_tuning(25000000, 12500000001u), 0);
+    CHECK_EQUAL(fw_ad9833_tuning(0, 0), 0);
+    CHECK_EQUAL(fw_ad9833_tuning(64000001, 1000), 0);
+}
+
+static void test_inverse(void)
+{
+    CHECK_EQUAL(fw_ad9833_millihertz(8000000, 1677722), 50000012);
+    CHECK_EQUAL(fw_ad9833_millihertz(25000000, 1 << 28), 0); /* 28 bits */
+    CHECK_EQUAL(fw_ad9833_millihertz(64000001, 1), 0);
+    /* back and forth within half a unit: 8 MHz / 2^28 is 29.8 mHz */
+    for (uint32_t millihertz = 1000; millihertz < 250000000; millihertz += millihertz / 3 + 17) {
+        const uint64_t back = fw_ad9833_millihertz(8000000, fw_ad9833_tuning(8000000, millihertz));
+        CHECK_NEAR((double)back, millihertz, 15.41);
+        CHECK_EQUAL(fw_ad9833_tuning(8000000, back), fw_ad9833_tuning(8000000, millihertz));
+    }
+}
+
+static void test_phase(void)
+{
+    CHECK_EQUAL(fw_ad9833_phase(0), 0);
+    CHECK_EQUAL(fw_ad9833_phase(90000), 1024);
+    CHECK_EQUAL(fw_ad9833_phase(180000), 2048);
+    CHECK_EQUAL(fw_ad9833_phase(360000), 0);
+    CHECK_EQUAL(fw_ad9833_phase(450000), 1024);
+    CHECK_EQUAL(fw_ad9833_phase(359990), 0); /* nearer to the whole turn than to its last unit */
+    CHECK_EQUAL(fw_ad9833_phase(359900), 4095);
+    CHECK_EQUAL(fw_ad9833_phase(44), 1);
+    CHECK_EQUAL(fw_ad9833_phase(43), 0);
+}
+
+static void test_words(void)
+{
+    uint16_t words[FW_AD9833_WORDS];
+    fw_ad9833_words(0x10C7, 0, FW_SINE, words); /* AN-1070's sequence */
+    const uint16_t note[] = {0x2100, 0x50C7, 0x4000, 0xC000, 0x2000};
+    for (int k = 0; k < 5; ++k)
+        CHECK_EQUAL(words[k], note[k]);
+    fw_ad9833_words(0xFFFFFFF, 0xABC, FW_TRIANGLE, words);
+    CHECK_EQUAL(words[1], 0x7FFF);
+    CHECK_EQUAL(words[2], 0x7FFF);
+    CHECK_EQUAL(words[3], 0xCABC);
+    CHECK_EQUAL(words[4], 0x2002);
+    fw_ad9833_words(0x4000, 0, FW_SQUARE, words); /* the first bit of the upper half */
+    CHECK_EQUAL(words[1], 0x4000);
+    CHECK_EQUAL(words[2], 0x4001);
+    CHECK_EQUAL(words[4], 0x2028);
+    fw_ad9833_words(1, 0, FW_SQUARE_HALF, words);
+    CHECK_EQUAL(words[4], 0x2020);
+}
+
+static fw_ad9833 fresh(void)
+{
+    fw_ad9833 generator;
+    fake_init(&board, 0);
+    board.log = written;
+    board.log_room = FAKE_SPI_LOG;
+    fw_ad9833_init(&generator, board.board.generator);
+    return generator;
+}
+
+static void test_start(void)
+{
+    fw_ad9833 generator = fresh();
+    CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
+    CHECK_EQUAL(fw_ad9833_start(&generator, 0x10C7, 0, FW_SINE), FW_OK);
+    const uint16_t note[] = {0x2100, 0x50C7, 0x4000, 0xC000, 0x2000};
+    CHECK_EQUAL(board.writes, 5);
+    for (uint32_t k = 0; k < 5; ++k) {
+        CHECK_EQUAL(written[k].a, note[k]);
+        CHECK(k == 0 || written[k].at_ns > written[k - 1].at_ns);
+    }
+    CHECK_EQUAL(generator.state, FW_AD9833_RUNNING);
+    CHECK_EQUAL(generator.tuning, 0x10C7);
+    CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 77, FW_SINE), FW_OK);
+    CHECK_NEAR(fake_generator_hz(&board), 50000, 0.02);
+    CHECK_EQUAL(board.dds_phase, 77);
+    CHECK_EQUAL(fw_ad9833_stop(&generator), FW_OK);
+    CHECK_EQUAL(generator.state, FW_AD9833_RESET);
+    CHECK_NEAR(fake_generator_hz(&board), 0, 0);
+    CHECK_EQUAL(fw_ad9833_start(&generator, 1u << 28, 0, FW_SINE), FW_E_ARGUMENT);
+    CHECK_EQUAL(fw_ad9833_start(&generator, 1, 1u << 12, FW_SINE), FW_E_ARGUMENT);
+    CHECK_EQUAL(generator.state, FW_AD9833_RESET); /* nothing was written */
+    CHECK_EQUAL(board.writes, 11);
+}
+
+static void test_bus_fails_at_each_word(void)
+{
+    for (uint32_t at = 0; at < FW_AD9833_WORDS; ++at) {
+        fw_ad9833 generator = fresh();
+        CHECK_EQUAL(fw_ad9833_start(&generator, 999, 0, FW_SINE), FW_OK);
+        board.spi_fail_from = FW_AD9833_WORDS + at;
+        board.spi_fails = 1;
+        CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
+        CHECK_EQUAL(generator.state, FW_AD9833_RESET); /* the write after the failure got through */
+        CHECK_EQUAL(board.dds_control, 0x2100);
+        CHECK_NEAR(fake_generator_hz(&board), 0, 0);
+        board.spi_fails = 100; /* from here on nothing gets through */
+        CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
+        CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
+        CHECK_EQUAL(fw_ad9833_stop(&generator), FW_E_BUS);
+        CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
+        board.spi_fails = 0;
+        CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_OK);
+        CHECK_NEAR(fake_generator_hz(&board), 50000, 0.02);
+    }
+}
+
+int main(void)
+{
+    test_tuning();
+    test_inverse();
+    test_phase();
+    test_words();
+    test_start();
+    test_bus_fails_at_each_word();
+    return checks_report("ad9833");
+}

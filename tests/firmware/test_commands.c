@@ -1,0 +1,386 @@
+/* Commands: each status can be had, ranges and lengths hold, what is sent again is answered again and not run again. */
+#include "bench.h"
+#include "check.h"
+#include "small_model.h"
+
+#include <math.h>
+#include <string.h>
+
+static bench b;
+
+static void check_reply(eits_packet_reply reply, eits_reply_status status, int32_t a, int32_t c, int line)
+{
+    check_equal(reply.status, status, __FILE__, line, "status");
+    check_equal(reply.detail[0], a, __FILE__, line, "detail[0]");
+    check_equal(reply.detail[1], c, __FILE__, line, "detail[1]");
+}
+#define REPLY(reply, status, a, c) check_reply(reply, status, a, c, __LINE__)
+
+static eits_packet_reply scan_with(eits_command_scan scan)
+{
+    return host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
+}
+
+static void test_lengths(void)
+{
+    const struct { eits_packet_type type; uint32_t size; } expected[] = {
+        {EITS_PACKET_GET_INFO, 4},      {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},      {EITS_PACKET_SCAN, 24},
+        {EITS_PACKET_SOLVER, 28},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
+        {EITS_PACKET_MASK_ROW, 8},      {EITS_PACKET_RESET, 4},     {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
+    for (size_t k = 0; k < sizeof expected / sizeof expected[0]; ++k) {
+        uint8_t payload[64] = {0};
+        for (uint32_t size = 4; size <= 32; ++size) {
+            if (size != expected[k].size)
+                REPLY(host_command(&b.host, expected[k].type, payload, size), EITS_REPLY_LENGTH, (int32_t)expected[k].size, 0);
+        }
+    }
+    uint8_t payload[16] = {0};
+    REPLY(host_command(&b.host, EITS_PACKET_MODEL_DATA, payload, 8), EITS_REPLY_LENGTH, 12, 0);
+    /* without a request number the answer has number 0 */
+    host_forget(&b.host);
+    host_send(&b.host, EITS_PACKET_STREAM, payload, 3);
+    const eits_packet_reply short_one = host_reply(&b.host, 0);
+    CHECK_EQUAL(short_one.status, EITS_REPLY_LENGTH);
+    CHECK_EQUAL(short_one.command, EITS_PACKET_STREAM);
+    CHECK_EQUAL(b.board.resets, 0);
+}
+
+static void test_unknown(void)
+{
+    eits_command_plain c = {0};
+    REPLY(host_command(&b.host, (eits_packet_type)0x8D, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
+    REPLY(host_command(&b.host, (eits_packet_type)0xFF, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
+    host_forget(&b.host);
+    host_send(&b.host, EITS_PACKET_REPLY, &c, sizeof c); /* a board's own packet, echoed */
+    host_send(&b.host, EITS_PACKET_INFO, &c, sizeof c);
+    host_run(&b.host, 5);
+    CHECK_EQUAL(b.host.packets, 0);
+}
+
+static void test_stream_ranges(void)
+{
+    REPLY(host_stream(&b.host, 8, 1, 0), EITS_REPLY_RANGE, 4, 7);
+    REPLY(host_stream(&b.host, 1, 0, 0), EITS_REPLY_RANGE, 6, 1);
+    REPLY(host_stream(&b.host, EITS_STREAM_TOUCHES, 1, 0), EITS_REPLY_NOT_TARED, 0, 0);
+    CHECK_EQUAL(host_info(&b.host).streaming, 0);
+}
+
+static void test_tare_ranges(void)
+{
+    REPLY(host_tare(&b.host, 0), EITS_REPLY_RANGE, 4, 1);
+    REPLY(host_tare(&b.host, 2), EITS_REPLY_RANGE, 4, 4);
+    REPLY(host_tare(&b.host, 3), EITS_REPLY_RANGE, 4, 4);
+    REPLY(host_tare(&b.host, 1025), EITS_REPLY_RANGE, 4, 1024);
+    CHECK_EQUAL(host_info(&b.host).tared, 0);
+}
+
+static void test_scan_ranges(void)
+{
+    eits_command_scan s = host_default_scan();
+    s.excitation_millihz = 999;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 1000);
+    s.excitation_millihz = 250000001;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 250000000);
+    s = host_default_scan();
+    s.sample_rate_hz = 999;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 1000);
+    s.sample_rate_hz = 5000001;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 5000000);
+    s.sample_rate_hz = 5000000; /* in range, but more than this board's converter does */
+    s.samples = 400;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 0);
+    s = host_default_scan();
+    s.sample_rate_hz = 100000; /* two samples a period: not enough */
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 4, 49999999);
+    s = host_default_scan();
+    s.samples = 3;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 12, 4);
+    s.samples = 1025;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 12, 1024);
+    s.samples = 90;
+    REPLY(scan_with(s), EITS_REPLY_PERIODS, 100, 0);
+    s.samples = 89;
+    REPLY(scan_with(s), EITS_REPLY_PERIODS, 80, 0);
+    s = host_default_scan();
+    s.settle_us = 50001;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 14, 50000);
+    s = host_default_scan();
+    s.reserved = 1;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 18, 0);
+    s = host_default_scan();
+    s.frame_period_us = 600000001;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 20, 600000000);
+    s.frame_period_us = 1;
+    REPLY(scan_with(s), EITS_REPLY_TOO_FAST, 20800, 0);
+    s.check_every = 0; /* half the rows only */
+    REPLY(scan_with(s), EITS_REPLY_TOO_FAST, 10400, 0);
+    s.frame_period_us = 10400;
+    REPLY(scan_with(s), EITS_REPLY_OK, 0, 0);
+    const eits_packet_info info = host_info(&b.host);
+    CHECK_EQUAL(info.check_every, 0);
+    CHECK_EQUAL(info.frame_period_us, 10400);
+    REPLY(scan_with(host_default_scan()), EITS_REPLY_OK, 0, 0);
+}
+
+/* What is refused changes nothing: tare, settings and frames go on. What is taken forgets the tare. */
+static void test_scan_and_tare(void)
+{
+    REPLY(host_tare(&b.host, 4), EITS_REPLY_OK, 0, 0);
+    REPLY(host_stream(&b.host, 7, 1, 0), EITS_REPLY_OK, 0, 0);
+    eits_command_scan s = host_default_scan();
+    s.sample_rate_hz = 5000000;
+    s.samples = 400;
+    REPLY(scan_with(s), EITS_REPLY_RANGE, 8, 0);
+    CHECK_EQUAL(host_info(&b.host).tared, 1);
+    CHECK_EQUAL(host_info(&b.host).sample_rate_hz, 1000000);
+    host_forget(&b.host);
+    host_run(&b.host, 100);
+    CHECK(host_count(&b.host, EITS_PACKET_IMAGE) >= 3);
+    s = host_default_scan();
+    s.excitation_millihz = 25000000;
+    REPLY(scan_with(s), EITS_REPLY_OK, 0, 0);
+    CHECK_NEAR(fake_generator_hz(&b.board), 25000, 0.02);
+    CHECK_EQUAL(host_info(&b.host).tared, 0);
+    CHECK_EQUAL(host_info(&b.host).streaming, EITS_STREAM_RAW);
+    CHECK_EQUAL(host_info(&b.host).excitation_millihz, 25000006);
+    REPLY(scan_with(host_default_scan()), EITS_REPLY_OK, 0, 0);
+    REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
+}
+
+static eits_packet_reply solver_with(eits_command_solver c)
+{
+    return host_command(&b.host, EITS_PACKET_SOLVER, &c, sizeof c);
+}
+
+static void test_solver(void)
+{
+    const eits_command_solver good = {.iterations = 7, .max_touches = 3, .warm_start = 0, .sign = 2, .lambda_rel = 0.05f, .gap_rel = 0.01f};
+    eits_command_solver c = good;
+    c.iterations = 0;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1);
+    c.iterations = 1001;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1000);
+    c = good;
+    c.max_touches = 17;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 8, 16);
+    c = good;
+    c.warm_start = 2;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 12, 1);
+    c = good;
+    c.sign = 3;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 16, 2);
+    c = good;
+    c.lambda_rel = 1.5f;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 20, 1);
+    c.lambda_rel = (float)NAN;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 20, 0);
+    c = good;
+    c.gap_rel = -0.1f;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 24, 0);
+    const eits_options *options = &b.host.instrument.engine.ctx.options;
+    CHECK_EQUAL(options->warm_start, 1); /* on a board, warm is the default */
+    CHECK_EQUAL(options->iterations, 30);
+    REPLY(solver_with(good), EITS_REPLY_OK, 0, 0);
+    CHECK_EQUAL(options->iterations, 7);
+    CHECK_EQUAL(options->max_touches, 3);
+    CHECK_EQUAL(options->warm_start, 0);
+    CHECK_EQUAL(options->sign, EITS_SIGN_BOTH);
+    CHECK_NEAR(options->lambda_rel, 0.05f, 0);
+    CHECK_NEAR(options->gap_rel, 0.01f, 0);
+}
+
+static void test_mask_row(void)
+{
+    eits_command_mask_row c = {.row = 208, .bad = 1};
+    REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_RANGE, 4, 207);
+    c.row = 207;
+    c.bad = 2;
+    REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_RANGE, 6, 1);
+    for (uint16_t bad = 1; bad < 2; --bad) {
+        c.bad = bad;
+        REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_OK, 0, 0);
+        REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 2), EITS_REPLY_OK, 0, 0);
+        host_run(&b.host, 70);
+        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+        float volts;
+        memcpy(&volts, packet->payload + sizeof(eits_packet_raw) + 4 * 207, 4);
+        CHECK_EQUAL(packet->payload[packet->size - 1], bad ? EITS_QUALITY_MASKED : 0);
+        CHECK_EQUAL(volts != volts, bad);
+    }
+}
+
+/* A request sent again gives the same answer and nothing else; another number does it anew. */
+static void test_sent_again(void)
+{
+    eits_command_stream c = {.request = 5000, .what = EITS_STREAM_RAW, .every = 1, .frames = 3};
+    host_forget(&b.host);
+    host_send(&b.host, EITS_PACKET_STREAM, &c, sizeof c);
+    host_run(&b.host, 120);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_RAW), 3);
+    host_send(&b.host, EITS_PACKET_STREAM, &c, sizeof c);
+    host_run(&b.host, 120);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_RAW), 3);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_REPLY), 2);
+    const host_packet *first = host_packet_of(&b.host, EITS_PACKET_REPLY, 0), *second = host_packet_of(&b.host, EITS_PACKET_REPLY, 1);
+    CHECK(memcmp(first->payload, second->payload, sizeof(eits_packet_reply)) == 0);
+    CHECK_EQUAL(second->sequence, first->sequence + 4); /* but it is another packet */
+    eits_command_plain other = {5000}; /* the same number with another command is another command */
+    host_send(&b.host, EITS_PACKET_CLEAR_FAULTS, &other, sizeof other);
+    host_run(&b.host, 5);
+    const eits_packet_reply *last = (const void *)host_last(&b.host, EITS_PACKET_REPLY)->payload;
+    CHECK_EQUAL(last->command, EITS_PACKET_CLEAR_FAULTS);
+    /* a tare under way is not restarted, and its answer comes once, and again when asked again */
+    eits_command_tare tare = {.request = 6000, .frames = 10};
+    host_forget(&b.host);
+    host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
+    for (int k = 0; k < 9; ++k) {
+        host_run(&b.host, 20);
+        host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
+    }
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_REPLY), 0);
+    CHECK(b.host.instrument.tare.taken >= 7);
+    REPLY(host_reply(&b.host, 6000), EITS_REPLY_OK, 0, 0);
+    (void)host_info(&b.host);
+    REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
+    const uint32_t scanned = b.host.instrument.last_frame;
+    host_forget(&b.host);
+    host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
+    REPLY(host_reply(&b.host, 6000), EITS_REPLY_OK, 0, 0);
+    CHECK(b.host.instrument.last_frame - scanned <= 1); /* at once */
+}
+
+static void test_stats_again(void)
+{
+    host_run(&b.host, 100);
+    eits_command_get_stats c = {7000, 1};
+    host_forget(&b.host);
+    host_send(&b.host, EITS_PACKET_GET_STATS, &c, sizeof c);
+    host_run(&b.host, 60);
+    host_send(&b.host, EITS_PACKET_GET_STATS, &c, sizeof c);
+    host_run(&b.host, 5);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_STATS), 2);
+    const host_packet *first = host_packet_of(&b.host, EITS_PACKET_STATS, 0), *second = host_packet_of(&b.host, EITS_PACKET_STATS, 1);
+    CHECK(memcmp(first->payload, second->payload, sizeof(eits_packet_stats)) == 0);
+    const eits_packet_stats *stats = (const void *)first->payload;
+    CHECK(stats->stage[EITS_STAGE_SCAN].count > 4);
+    CHECK_EQUAL(stats->stage[EITS_STAGE_SCAN].worst_us, 20780);
+    CHECK_EQUAL(stats->stage[EITS_STAGE_SCAN].p99_us, 20780);
+    CHECK_EQUAL(stats->stack_bytes, 8192);
+    CHECK_EQUAL(stats->stack_used, 1234);
+    CHECK_EQUAL(stats->workspace_bytes, FAKE_WORKSPACE);
+    CHECK(stats->workspace_used > 10000 && stats->workspace_used <= FAKE_WORKSPACE);
+    const eits_packet_stats after = host_stats(&b.host, 0);
+    CHECK(after.stage[EITS_STAGE_SCAN].count >= 1 && after.stage[EITS_STAGE_SCAN].count <= 5); /* forgotten at the first */
+    CHECK(after.uptime_ms > stats->uptime_ms + 50);
+    CHECK(after.frames_scanned > 20);
+    eits_command_get_stats wrong = {.reset = 2};
+    REPLY(host_command(&b.host, EITS_PACKET_GET_STATS, &wrong, sizeof wrong), EITS_REPLY_RANGE, 4, 1);
+}
+
+/* While a tare is under way. */
+static void test_busy(void)
+{
+    eits_command_tare tare = {.request = 8000, .frames = 50};
+    host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
+    host_run(&b.host, 30);
+    REPLY(host_tare(&b.host, 4), EITS_REPLY_BUSY, EITS_PACKET_TARE, 0);
+    REPLY(scan_with(host_default_scan()), EITS_REPLY_BUSY, EITS_PACKET_TARE, 0);
+    REPLY(host_plain(&b.host, EITS_PACKET_SELF_TEST), EITS_REPLY_BUSY, EITS_PACKET_TARE, 0);
+    eits_command_model_begin begin = {.bytes = 1000};
+    REPLY(host_command(&b.host, EITS_PACKET_MODEL_BEGIN, &begin, sizeof begin), EITS_REPLY_BUSY, EITS_PACKET_TARE, 0);
+    REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 0), EITS_REPLY_OK, 0, 0);
+    REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
+    REPLY(host_reply(&b.host, 8000), EITS_REPLY_OK, 0, 0);
+    REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
+}
+
+/* Bytes that are no packets are counted, and what follows them is understood. */
+static void test_bad_bytes(void)
+{
+    const eits_packet_stats before = host_stats(&b.host, 0);
+    eits_command_plain c = {9000};
+    fake_board *f = &b.board;
+    host_send(&b.host, EITS_PACKET_RESET, &c, sizeof c);
+    f->to_board[f->to_board_size - 5] ^= 0x10; /* a bit of its checksum or end */
+    host_run(&b.host, 3);
+    host_send(&b.host, EITS_PACKET_RESET, &c, sizeof c);
+    f->to_board_size -= 6; /* cut short by the next packet */
+    REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
+    static uint8_t long_one[EITS_LINK_MAX_PAYLOAD];
+    host_send(&b.host, EITS_PACKET_MODEL_DATA, long_one, sizeof long_one); /* longer than the board ever takes */
+    for (uint32_t k = 0; k < 20000; ++k)
+        f->to_board[f->to_board_size++] = (uint8_t)(k * 2654435761u >> 24);
+    REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
+    const eits_packet_stats after = host_stats(&b.host, 0);
+    CHECK(after.link_crc_errors + after.link_framing_errors > before.link_crc_errors + before.link_framing_errors + 1);
+    CHECK(after.link_overruns > before.link_overruns);
+    CHECK(after.link_packets >= before.link_packets + 3);
+    CHECK_EQUAL(f->resets, 0);
+    CHECK(!b.host.instrument.reset_wanted);
+}
+
+/* Any command with anything in it: each is answered, and afterwards the board is as good as before. */
+static void test_random_commands(void)
+{
+    uint64_t state = 20240918;
+    uint32_t silent = 0, taken = 0;
+    for (int n = 0; n < 4000; ++n) {
+        uint8_t payload[64] = {0};
+        const uint32_t pick = (uint32_t)(100 * (1 + small_random(&state)));
+        const eits_packet_type type = (eits_packet_type)(EITS_PACKET_GET_INFO + pick % 15u);
+        const size_t sizes[] = {4, 12, 8, 24, 28, 12, 16, 4, 8, 8, 4, 4, 4, 4, 4};
+        for (size_t k = 4; k < sizeof payload; ++k) { /* small numbers, great ones, zeros */
+            const double value = small_random(&state);
+            payload[k] = (uint8_t)(k % 4u < 2 ? 127 * (1 + value) * (value > 0) : (value > 0.9 ? 255 : 0));
+        }
+        if (type == EITS_PACKET_GET_INFO || type == EITS_PACKET_GET_STATS || type == EITS_PACKET_TARE || type == EITS_PACKET_RESET)
+            host_send(&b.host, (uint8_t)type, payload, n % 7 == 0 ? 6 : (type == EITS_PACKET_RESET ? 5 : sizes[pick % 15u]));
+        else {
+            const eits_packet_reply reply = host_command(&b.host, type, payload, n % 5 == 0 ? pick % 40u + 4 : sizes[pick % 15u]);
+            silent += reply.status == 0xFFFF;
+            taken += reply.status == EITS_REPLY_OK;
+        }
+        if (b.host.packets > HOST_PACKETS / 2)
+            host_forget(&b.host);
+    }
+    CHECK_EQUAL(silent, 0);
+    CHECK(taken > 300);
+    host_forget(&b.host);
+    host_run(&b.host, 11000); /* an upload that was left, if any, is given up; a tare fails or is done */
+    for (int wait = 0; wait < 200 && b.host.instrument.tare.active; ++wait)
+        host_run(&b.host, 1000);
+    for (uint16_t i = 0; i < 208; ++i) {
+        eits_command_mask_row mask = {.row = i};
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+    }
+    REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
+    REPLY(scan_with(host_default_scan()), EITS_REPLY_OK, 0, 0);
+    REPLY(host_plain(&b.host, EITS_PACKET_SELF_TEST), EITS_REPLY_OK, 0, 0);
+    REPLY(host_tare(&b.host, 4), EITS_REPLY_OK, 0, 0);
+    REPLY(host_stream(&b.host, 7, 1, 3), EITS_REPLY_OK, 0, 0);
+    host_forget(&b.host);
+    host_run(&b.host, 200);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_IMAGE), 3);
+    CHECK_EQUAL(host_info(&b.host).model_crc, b.model.crc);
+    CHECK_EQUAL(b.board.resets, 0);
+}
+
+int main(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    test_lengths();
+    test_unknown();
+    test_stream_ranges();
+    test_tare_ranges();
+    test_scan_ranges();
+    test_scan_and_tare();
+    test_solver();
+    test_mask_row();
+    test_sent_again();
+    test_stats_again();
+    test_busy();
+    test_bad_bytes();
+    test_random_commands();
+    bench_stop(&b);
+    return checks_report("commands");
+}

@@ -1,0 +1,144 @@
+/* Faults: told once when they rise and once when they go; buses that fail and recover; what the board says of its last end. */
+#include "bench.h"
+#include "check.h"
+
+static bench b;
+
+static uint32_t told(eits_fault code, bool raised)
+{
+    uint32_t count = 0;
+    while (host_fault(&b.host, code, raised, count) != NULL)
+        ++count;
+    return count;
+}
+
+static void test_last_reset(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    fake_restart(&b.board);
+    b.board.board.last_reset = (fw_last_reset){.crash = 1, .watchdog = 1, .words = {0x08001234, 0x08005679, 0x400, 0x40000000, 0x20}};
+    host_start(&b.host, &b.board);
+    const eits_packet_fault *crash = host_fault(&b.host, EITS_FAULT_CRASH, true, 0);
+    CHECK(crash != NULL);
+    for (int k = 0; crash != NULL && k < 5; ++k)
+        CHECK_EQUAL(crash->words[k], b.board.board.last_reset.words[k]);
+    CHECK_EQUAL(told(EITS_FAULT_WATCHDOG, true), 1);
+    host_run(&b.host, 100);
+    CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_CRASH | 1u << EITS_FAULT_WATCHDOG); /* until they are cleared */
+    CHECK((b.board.leds & 4u) != 0);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    CHECK_EQUAL(told(EITS_FAULT_CRASH, false), 1);
+    CHECK_EQUAL(told(EITS_FAULT_WATCHDOG, false), 1);
+    CHECK_EQUAL(host_info(&b.host).faults, 0);
+    host_run(&b.host, 5);
+    CHECK((b.board.leds & 4u) == 0);
+    bench_stop(&b);
+}
+
+/* What is cleared by command and still there rises again. */
+static void test_cleared_but_there(void)
+{
+    bench_start(&b, NULL);
+    CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 1);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, false), 1);
+    CHECK_EQUAL(told(EITS_FAULT_NO_MODEL, true), 2);
+    bench_stop(&b);
+    bench_start(&b, &SKIN_ADJACENT);
+    b.sheet.detached[9] = true;
+    sheet_solve(&b.sheet);
+    host_run(&b.host, 200);
+    CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, true), 1);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
+    host_run(&b.host, 60);
+    CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, true), 2);
+    CHECK_EQUAL(told(EITS_FAULT_ELECTRODE_OPEN, false), 1);
+    bench_stop(&b);
+}
+
+/* The generator cannot be written at start-up: told, tried again, and the scan begins when it can. */
+static void test_generator_bus(void)
+{
+    for (uint32_t at = 0; at < 5; ++at) {
+        bench_start(&b, &SKIN_ADJACENT);
+        fake_restart(&b.board);
+        b.board.spi_calls = 0;
+        b.board.spi_fail_from = at;
+        b.board.spi_fails = 1000;
+        host_start(&b.host, &b.board);
+        CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
+        host_run(&b.host, 1200);
+        CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
+        CHECK_EQUAL(b.board.bursts, 0);
+        CHECK_NEAR(fake_generator_hz(&b.board), 0, 0);
+        CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_BUS);
+        b.board.spi_fails = 0;
+        host_run(&b.host, 600);
+        CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
+        CHECK_NEAR(fake_generator_hz(&b.board), 50000, 0.02);
+        CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+        bench_stop(&b);
+    }
+}
+
+/* Multiplexers that cannot be switched: once is measured again, always is told; then rows are no numbers. */
+static void test_multiplexer_bus(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 30);
+    for (uint32_t at = 0; at < 3; ++at) {
+        const uint32_t repeated = b.host.instrument.scan.slots_repeated;
+        host_forget(&b.host);
+        b.board.lines_fail_from = b.board.lines_calls + at;
+        b.board.lines_fails = 1;
+        host_run(&b.host, 70);
+        CHECK(b.host.instrument.scan.slots_repeated > repeated);
+        CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
+        CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
+        for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
+            const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
+            for (uint32_t i = 0; i < 208; ++i)
+                CHECK_EQUAL(packet->payload[sizeof(eits_packet_raw) + 4 * 208 + i], 0);
+        }
+    }
+    host_forget(&b.host);
+    b.board.lines_fail_from = b.board.lines_calls;
+    b.board.lines_fails = 1000000;
+    host_run(&b.host, 500);
+    CHECK_EQUAL(told(EITS_FAULT_BUS, true), 1);
+    CHECK_EQUAL(told(EITS_FAULT_SOLVER, true), 1);
+    CHECK_EQUAL(b.board.address_while_enabled, 0);
+    b.board.lines_fails = 0;
+    host_run(&b.host, 500);
+    CHECK_EQUAL(told(EITS_FAULT_BUS, false), 1);
+    CHECK_EQUAL(told(EITS_FAULT_SOLVER, false), 1);
+    CHECK_EQUAL(host_info(&b.host).faults, 0);
+    bench_stop(&b);
+}
+
+static void test_watchdog_is_fed(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    const uint32_t before = b.board.feeds;
+    host_run(&b.host, 100);
+    CHECK(b.board.feeds >= before + 100); /* each wait is a millisecond at most */
+    uint32_t lit = 0;
+    for (int k = 0; k < 20; ++k) {
+        host_run(&b.host, 100);
+        lit += b.board.leds & 1u;
+    }
+    CHECK(lit >= 8 && lit <= 12); /* alive: blinks */
+    bench_stop(&b);
+}
+
+int main(void)
+{
+    test_last_reset();
+    test_cleared_but_there();
+    test_generator_bus();
+    test_multiplexer_bus();
+    test_watchdog_is_fed();
+    return checks_report("faults");
+}

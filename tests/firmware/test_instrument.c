@@ -1,0 +1,320 @@
+/* From tare to stream: the reference, images with the core's own bits, streaming every n-th frame, back-pressure. */
+#include "bench.h"
+#include "check.h"
+
+#include <string.h>
+
+static bench b;
+
+/* The core as a host runs it beside the board, on the frames that the board sends. */
+static struct mirror {
+    eits_context ctx;
+    _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
+    uint32_t taken; /* packets seen */
+    uint32_t images, touches, different;
+    float volts[256];
+    uint32_t frame;
+} mirror;
+
+static void mirror_start(uint32_t quiet)
+{
+    memset(&mirror, 0, sizeof mirror);
+    CHECK_EQUAL(eits_init(&mirror.ctx, &b.open, mirror.workspace, eits_workspace_size(&b.open, 0)), EITS_OK);
+    eits_options options = mirror.ctx.options;
+    options.warm_start = 1;
+    CHECK_EQUAL(eits_set_options(&mirror.ctx, &options), EITS_OK);
+    if (quiet > 1)
+        CHECK_EQUAL(eits_baseline_begin(&mirror.ctx, quiet), EITS_OK);
+}
+
+static int same_bits(const void *a, const void *c, size_t size)
+{
+    return memcmp(a, c, size) == 0;
+}
+
+static void mirror_image(const host_packet *packet)
+{
+    const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
+    const eits_info *info = &mirror.ctx.info;
+    CHECK_EQUAL(head->frame, mirror.frame);
+    const eits_status status = eits_reconstruct(&mirror.ctx, mirror.volts, b.open.n_rows, NULL, NULL);
+    ++mirror.images;
+    mirror.different += head->status != (uint16_t)-status || head->count != b.open.n_pixels ||
+                        !same_bits(packet->payload + sizeof *head, mirror.ctx.image, 4 * b.open.n_pixels) ||
+                        head->iterations != info->iterations || head->macs != info->macs || head->stop != (uint16_t)info->stop ||
+                        head->masked != info->masked || !same_bits(&head->residual, &info->residual, 4) ||
+                        !same_bits(&head->lambda, &info->lambda, 4) || !same_bits(&head->data_norm, &info->data_norm, 4);
+}
+
+static void mirror_touches(const host_packet *packet)
+{
+    const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
+    eits_touch touches[EITS_MAX_TOUCHES];
+    uint32_t count = 0;
+    if (mirror.ctx.info.stop != EITS_STOP_GATE || head->status == 0)
+        CHECK_EQUAL(eits_find_touches(&mirror.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    ++mirror.touches;
+    mirror.different += head->count != count || packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
+                        !same_bits(packet->payload + sizeof *head, touches, count * sizeof(eits_packet_touch));
+}
+
+/* Take the packets that have come since the last call. */
+static void mirror_follow(void)
+{
+    for (; mirror.taken < b.host.packets; ++mirror.taken) {
+        const host_packet *packet = &b.host.packet[mirror.taken];
+        const eits_packet_raw *head = (const eits_packet_raw *)(const void *)packet->payload;
+        if (packet->type == EITS_PACKET_RAW) {
+            memcpy(mirror.volts, packet->payload + sizeof *head, 4 * b.open.n_rows);
+            mirror.frame = head->frame;
+            if ((head->flags & EITS_RAW_QUIET) != 0)
+                CHECK_EQUAL(mirror.ctx.baseline.wanted > 0 ? eits_baseline_add(&mirror.ctx, mirror.volts, b.open.n_rows)
+                                                          : eits_baseline_set(&mirror.ctx, mirror.volts, b.open.n_rows),
+                            EITS_OK);
+        } else if (packet->type == EITS_PACKET_REPLY && ((const eits_packet_reply *)(const void *)head)->command == EITS_PACKET_TARE) {
+            if (mirror.ctx.baseline.wanted > 0)
+                CHECK_EQUAL(eits_baseline_finish(&mirror.ctx), EITS_OK);
+            eits_forget(&mirror.ctx);
+        } else if (packet->type == EITS_PACKET_IMAGE) {
+            mirror_image(packet);
+        } else if (packet->type == EITS_PACKET_TOUCHES) {
+            mirror_touches(packet);
+        }
+    }
+}
+
+static void touch(double x, double y, double factor)
+{
+    sheet_touch(&b.sheet, x, y, 1.6, factor);
+    sheet_solve(&b.sheet);
+}
+
+/* Images and touches have the bits of the core run on the frames that were sent; warm starts included, whatever is masked. */
+static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every, uint16_t check_every, uint32_t busy_ms)
+{
+    bench_start(&b, spec);
+    b.board.noise_codes = 2;
+    b.board.write_cost_ns = busy_ms * 1000000u; /* meanwhile the scan goes on, as far as it may */
+    if (check_every != 1) {
+        eits_command_scan scan = host_default_scan();
+        scan.check_every = check_every;
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+    }
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    host_forget(&b.host);
+    mirror_start(quiet);
+    CHECK_EQUAL(host_tare(&b.host, quiet).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
+    mirror_follow();
+    CHECK(b.host.instrument.engine.ctx.baseline.correlation > 0.99f);
+    CHECK(same_bits(mirror.ctx.baseline.v0, b.host.instrument.engine.ctx.baseline.v0, 4 * b.open.n_rows));
+    CHECK(same_bits(&mirror.ctx.baseline.lambda_noise, &b.host.instrument.engine.ctx.baseline.lambda_noise, 4));
+    const uint32_t ms = busy_ms > 0 ? 1500 : 150;
+    touch(2, -3, 4);
+    host_run(&b.host, ms);
+    touch(-4, 1, 3);
+    host_run(&b.host, ms);
+    mirror_follow();
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    if (quiet > 1)
+        CHECK_EQUAL(eits_baseline_begin(&mirror.ctx, quiet), EITS_OK);
+    CHECK_EQUAL(host_tare(&b.host, quiet).status, EITS_REPLY_OK); /* with the touches: they are gone, and their ids */
+    CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
+    touch(4, -2, 3);
+    host_run(&b.host, ms);
+    mirror_follow();
+    eits_command_mask_row mask = {.row = 17, .bad = 1};
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+    host_run(&b.host, ms);
+    mirror_follow(); /* the row comes as not a number: nothing else is to be told */
+    sheet_init(&b.sheet);
+    host_run(&b.host, ms);
+    mirror_follow();
+    CHECK(mirror.images >= 25u / every);
+    CHECK_EQUAL(mirror.images, mirror.touches);
+    CHECK_EQUAL(mirror.different, 0);
+    CHECK_EQUAL(b.host.gaps, 0);
+    CHECK_EQUAL(host_info(&b.host).tared, 1);
+    bench_stop(&b);
+}
+
+/* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the angle. */
+static void test_angle(void)
+{
+    for (int k = 0; k < 9; ++k) {
+        bench_start(&b, &SKIN_ADJACENT);
+        b.board.extra_turn = k / 9.0;
+        CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+        CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+        CHECK_NEAR(b.host.instrument.engine.ctx.baseline.gain, 1, 1e-3);
+        CHECK(b.host.instrument.engine.ctx.baseline.correlation > 0.9999f);
+        host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
+        float volts[256];
+        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw), sizeof(float) * 208);
+        for (uint32_t i = 0; i < 208; ++i)
+            CHECK_NEAR(volts[i], bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
+        b.board.extra_turn += 1 / 6.0; /* what turns after the tare is not followed: half of a voltage is left */
+        host_run(&b.host, 60);
+        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw), sizeof(float) * 208);
+        for (uint32_t i = 0; i < 208; ++i)
+            CHECK_NEAR(volts[i], 0.5 * bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
+        bench_stop(&b);
+    }
+}
+
+static void test_streaming(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_TOUCHES, 3, 5).status, EITS_REPLY_OK);
+    host_forget(&b.host);
+    host_run(&b.host, 600);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 5);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_IMAGE) + host_count(&b.host, EITS_PACKET_RAW), 0);
+    for (uint32_t k = 1; k < 5; ++k) {
+        const eits_packet_solved *now = (const void *)host_packet_of(&b.host, EITS_PACKET_TOUCHES, k)->payload;
+        const eits_packet_solved *last = (const void *)host_packet_of(&b.host, EITS_PACKET_TOUCHES, k - 1)->payload;
+        CHECK_EQUAL(now->frame - last->frame, 3);
+        CHECK(now->age_us < 1000);
+    }
+    CHECK_EQUAL(host_info(&b.host).streaming, 0); /* five, and no more */
+    CHECK_EQUAL(host_stats(&b.host, 0).frames_solved, 5);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_IMAGE, 2, 0).status, EITS_REPLY_OK);
+    const eits_packet_info info = host_info(&b.host);
+    CHECK_EQUAL(info.streaming, EITS_STREAM_IMAGE);
+    CHECK_EQUAL(info.every, 2);
+    CHECK_EQUAL(host_stream(&b.host, 0, 1, 0).status, EITS_REPLY_OK);
+    host_forget(&b.host);
+    host_run(&b.host, 200);
+    CHECK_EQUAL(b.host.packets, 0);
+    bench_stop(&b);
+}
+
+/* Where the link takes no more, whole packets are dropped and counted, and nothing waits. */
+static void test_back_pressure(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    const uint32_t sent = b.host.instrument.outbox.sent;
+    b.host.gaps = 0;
+    b.board.host_room = 3000;
+    host_run(&b.host, 200);
+    const uint32_t frames = b.host.instrument.last_frame;
+    b.board.host_room = SIZE_MAX;
+    host_run(&b.host, 200);
+    CHECK(b.host.instrument.last_frame >= frames + 9);
+    const eits_packet_stats stats = host_stats(&b.host, 0);
+    CHECK(stats.packets_dropped >= 15);
+    CHECK_EQUAL(b.host.gaps, stats.packets_dropped);
+    CHECK(stats.packets_sent > sent);
+    CHECK_EQUAL(b.host.decoder.crc_errors + b.host.decoder.framing_errors, 0);
+    bench_stop(&b);
+}
+
+/* A tare that fails leaves the last reference, its angle and its images. */
+static void test_failed_tare(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_tare(&b.host, 16).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status, EITS_REPLY_OK);
+    mirror_start(0);
+    const fw_engine *engine = &b.host.instrument.engine;
+    static float v0[256];
+    memcpy(v0, engine->ctx.baseline.v0, sizeof(float) * 208);
+    const eits_baseline before = engine->ctx.baseline;
+    const float cosine = engine->cosine;
+    touch(0, 0, 5);
+    eits_command_tare tare = {.request = ++b.host.request, .frames = 16};
+    host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
+    host_run(&b.host, 180); /* half of it */
+    b.sheet.detached[3] = true;
+    b.board.extra_turn += 0.1;
+    const eits_packet_reply reply = host_reply(&b.host, tare.request);
+    CHECK_EQUAL(reply.status, EITS_REPLY_CORE);
+    CHECK_EQUAL(reply.detail[0], EITS_E_FRAME_CHANNELS);
+    CHECK(same_bits(v0, engine->ctx.baseline.v0, sizeof(float) * 208));
+    CHECK_EQUAL(engine->ctx.baseline.ready, 1);
+    CHECK(same_bits(&before.noise_v, &engine->ctx.baseline.noise_v, 4));
+    CHECK(same_bits(&before.gain, &engine->ctx.baseline.gain, 4));
+    CHECK(engine->cosine == cosine);
+    CHECK_EQUAL(host_info(&b.host).tared, 1);
+    b.sheet.detached[3] = false;
+    b.board.extra_turn -= 0.1;
+    sheet_init(&b.sheet);
+    host_forget(&b.host);
+    host_run(&b.host, 100);
+    const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
+    CHECK(image != NULL);
+    float peak = 0;
+    for (uint32_t j = 0; image != NULL && j < b.open.n_pixels; ++j) {
+        float value;
+        memcpy(&value, image->payload + sizeof(eits_packet_solved) + 4 * j, 4);
+        peak = value > peak ? value : peak;
+    }
+    CHECK(peak < 1e-5f);
+    bench_stop(&b);
+}
+
+/* Frames whose scan began before the command are not quiet ones; frames of a tare are all sent, whatever `every` is. */
+static void test_quiet_frames(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 5, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 31);
+    host_forget(&b.host);
+    const uint32_t asked_us = (uint32_t)(b.board.now_ns / 1000);
+    CHECK_EQUAL(host_tare(&b.host, 6).status, EITS_REPLY_OK);
+    uint32_t quiet = 0, last = 0;
+    for (uint32_t k = 0; k < b.host.packets; ++k) {
+        const eits_packet_raw *head = (const void *)b.host.packet[k].payload;
+        if (b.host.packet[k].type != EITS_PACKET_RAW || (head->flags & EITS_RAW_QUIET) == 0)
+            continue;
+        CHECK((int32_t)(head->time_us - asked_us) >= 0);
+        CHECK(quiet == 0 || head->frame == last + 1);
+        last = head->frame;
+        ++quiet;
+    }
+    CHECK_EQUAL(quiet, 6);
+    CHECK_EQUAL(b.host.packet[b.host.packets - 1].type, EITS_PACKET_REPLY);
+    bench_stop(&b);
+}
+
+static void test_self_test_keeps_the_tare(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    host_forget(&b.host);
+    mirror_start(4);
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    touch(3, 3, 4);
+    host_run(&b.host, 100);
+    mirror_follow();
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    mirror_follow();
+    eits_forget(&mirror.ctx);     /* a self-test forgets the warm start */
+    mirror.ctx.basis_stale = 1; /* and the basis, which costs MACs to build anew */
+    host_run(&b.host, 100);
+    mirror_follow();
+    CHECK(mirror.images >= 8);
+    CHECK_EQUAL(mirror.different, 0);
+    bench_stop(&b);
+}
+
+int main(void)
+{
+    test_same_bits(&SKIN_ADJACENT, 8, 1, 1, 0);
+    test_same_bits(&SKIN_ADJACENT, 1, 2, 1, 0);
+    test_same_bits(&SKIN_OPPOSITE, 5, 1, 4, 0);
+    test_same_bits(&SKIN_ADJACENT, 4, 1, 1, 50);
+    test_angle();
+    test_streaming();
+    test_back_pressure();
+    test_failed_tare();
+    test_quiet_frames();
+    test_self_test_keeps_the_tare();
+    return checks_report("instrument");
+}

@@ -1,0 +1,309 @@
+/* Quality: open electrodes by name within one frame and never for touches, saturation, reciprocity, on frames of the sheet. */
+#include "bench.h"
+#include "check.h"
+
+#include <math.h>
+#include <string.h>
+
+static bench b;
+
+static void start(uint16_t check_every)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    b.board.noise_codes = 4;
+    eits_command_scan scan = host_default_scan();
+    scan.check_every = check_every;
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+}
+
+static void tare(void)
+{
+    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+}
+
+static bool uses(uint32_t row, uint32_t electrode)
+{
+    return memchr(b.open.protocol + 4 * (size_t)row, (int)electrode, 4) != NULL;
+}
+
+/* An electrode comes off, with and without a tare, in full and reciprocal scans: named in the first frame that is wholly so. */
+static void test_open(bool tared, uint16_t check_every)
+{
+    start(check_every);
+    if (tared)
+        tare();
+    for (uint32_t e = 0; e < 16; e += 5) {
+        host_run(&b.host, 50);
+        host_forget(&b.host);
+        b.sheet.detached[e] = true;
+        sheet_solve(&b.sheet);
+        const uint32_t off_us = (uint32_t)(b.board.now_ns / 1000);
+        host_run(&b.host, 60);
+        const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
+        CHECK(fault != NULL && fault->index == (int32_t)e);
+        CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 1) == NULL); /* that one alone, and once */
+        uint32_t whole = 0;
+        for (uint32_t k = 0; fault != NULL && k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
+            const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
+            const eits_packet_raw *head = (const void *)packet->payload;
+            const uint8_t *quality = packet->payload + sizeof *head + 4 * 208;
+            if ((int32_t)(head->time_us - off_us) < 0)
+                continue;
+            if (whole++ == 0)
+                CHECK(fault->frame == head->frame || fault->frame + 1 == head->frame);
+            for (uint32_t i = 0; i < 208; ++i) {
+                float volts;
+                memcpy(&volts, packet->payload + sizeof *head + 4 * i, 4);
+                CHECK_EQUAL((quality[i] & EITS_QUALITY_OPEN) != 0, uses(i, e));
+                CHECK_EQUAL(volts != volts, uses(i, e));
+            }
+        }
+        CHECK(whole >= 1);
+        if (tared) { /* the image goes on, without those rows */
+            const eits_packet_solved *image = (const void *)host_last(&b.host, EITS_PACKET_IMAGE)->payload;
+            CHECK_EQUAL(image->status, 0);
+            uint32_t lost = 0;
+            for (uint32_t i = 0; i < 208; ++i)
+                lost += uses(i, e);
+            CHECK_EQUAL(image->masked, lost);
+        }
+        b.sheet.detached[e] = false;
+        sheet_solve(&b.sheet);
+        host_run(&b.host, 60);
+        const eits_packet_fault *gone = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0);
+        CHECK(gone != NULL && gone->index == (int32_t)e);
+        CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_ELECTRODE_OPEN, 0);
+    }
+    bench_stop(&b);
+}
+
+/* Two at once, neighbours or not. */
+static void test_two_open(void)
+{
+    start(1);
+    tare();
+    for (uint32_t other = 4; other < 12; other += 4) {
+        b.sheet.detached[3] = b.sheet.detached[other] = true;
+        sheet_solve(&b.sheet);
+        host_run(&b.host, 60);
+        CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 1u << 3 | 1u << other);
+        b.sheet.detached[3] = b.sheet.detached[other] = false;
+        sheet_solve(&b.sheet);
+        host_run(&b.host, 60);
+        CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 0);
+    }
+    bench_stop(&b);
+}
+
+/* An electrode behind an amplifier that runs into its limit is open too. */
+static double to_the_rail(void *user, const uint8_t electrodes[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    return memchr(electrodes, 6, 4) != NULL ? 9.0 : sheet_volts(user, electrodes);
+}
+
+static void test_open_at_the_rail(void)
+{
+    start(1);
+    tare();
+    b.board.volts = to_the_rail;
+    host_run(&b.host, 60);
+    CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 1u << 6);
+    const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_SATURATED, true, 0);
+    CHECK(fault != NULL);
+    bench_stop(&b);
+}
+
+/* A skin of other voltages than the model's by far: the tare says what is to be expected. */
+static double faint(void *user, const uint8_t electrodes[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    return 0.015 * sheet_volts(user, electrodes);
+}
+
+static void test_faint_skin(void)
+{
+    start(1);
+    b.board.noise_codes = 0;
+    b.board.volts = faint;
+    host_run(&b.host, 50);
+    tare();
+    host_run(&b.host, 50);
+    CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
+    bench_stop(&b);
+}
+
+/* One row that reads something whatever is connected, and is masked for that: it does not speak for its electrodes. */
+static double stuck_row(void *user, const uint8_t e[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    return e[0] == 5 && e[2] == 8 ? 0.3 : sheet_volts(user, e);
+}
+
+static void test_masked_row_is_not_judged(void)
+{
+    start(1);
+    b.board.volts = stuck_row;
+    tare();
+    for (uint16_t i = 0; i < 208; ++i) {
+        const uint8_t *row = b.open.protocol + 4 * (size_t)i;
+        eits_command_mask_row mask = {.row = i, .bad = 1};
+        if (row[0] == 5 && row[2] == 8)
+            CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+    }
+    b.sheet.detached[5] = true;
+    sheet_solve(&b.sheet);
+    host_run(&b.host, 60);
+    CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 1u << 5);
+    bench_stop(&b);
+}
+
+/* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half the skin. Nothing is open. */
+static void test_touches_are_not_open(bool tared)
+{
+    start(1);
+    if (tared)
+        tare();
+    const double factors[] = {0.02, 0.3, 3, 10};
+    for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
+        for (int place = 0; place < 5; ++place) {
+            sheet_init(&b.sheet);
+            sheet_touch(&b.sheet, 1.7 * place, -0.4 * place, place == 4 ? 2.5 : 1 + place, factors[f]);
+            sheet_solve(&b.sheet);
+            host_run(&b.host, 45);
+            CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 0);
+        }
+    }
+    CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
+    bench_stop(&b);
+}
+
+static double one_row_saturates(void *user, const uint8_t e[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    const bool it = (e[0] == 2 && e[2] == 9) || (e[0] == 9 && e[2] == 2);
+    return it ? 1.7 : sheet_volts(user, e);
+}
+
+static void test_saturation(void)
+{
+    start(1);
+    tare();
+    b.board.volts = one_row_saturates;
+    host_run(&b.host, 60);
+    const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_SATURATED, true, 0);
+    CHECK(fault != NULL);
+    if (fault != NULL) {
+        const uint8_t *row = b.open.protocol + 4 * (size_t)fault->index;
+        CHECK(row[0] == 2 && row[2] == 9);
+        CHECK(fault->value == 2 || fault->value == 1); /* the frame of the change may have one */
+    }
+    const host_packet *raw = host_last(&b.host, EITS_PACKET_RAW);
+    uint32_t marked = 0;
+    for (uint32_t i = 0; i < 208; ++i) {
+        const uint8_t *row = b.open.protocol + 4 * (size_t)i;
+        const bool it = (row[0] == 2 && row[2] == 9) || (row[0] == 9 && row[2] == 2);
+        const uint8_t quality = raw->payload[sizeof(eits_packet_raw) + 4 * 208 + i];
+        float volts;
+        memcpy(&volts, raw->payload + sizeof(eits_packet_raw) + 4 * i, 4);
+        CHECK_EQUAL(quality, it ? EITS_QUALITY_SATURATED : 0);
+        CHECK_EQUAL(volts != volts, it);
+        marked += it;
+    }
+    CHECK_EQUAL(marked, 2);
+    const eits_packet_solved *image = (const void *)host_last(&b.host, EITS_PACKET_IMAGE)->payload;
+    CHECK_EQUAL(image->masked, 2);
+    bench_stop(&b);
+}
+
+static double broken_reciprocity(void *user, const uint8_t e[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    return sheet_volts(user, e) * (e[0] == 2 && e[2] == 5 ? 1.6 : 1);
+}
+
+/* Reciprocal rows that disagree are marked at once, and told when it lasts. */
+static void test_reciprocity(uint16_t check_every)
+{
+    start(check_every);
+    tare();
+    host_run(&b.host, 200);
+    CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) == NULL);
+    b.board.volts = broken_reciprocity;
+    host_run(&b.host, 30);
+    CHECK(host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0) == NULL); /* not for a frame */
+    host_run(&b.host, 70u * check_every + 30);
+    const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_RECIPROCITY, true, 0);
+    CHECK(fault != NULL);
+    if (fault != NULL) {
+        const uint8_t *row = b.open.protocol + 4 * (size_t)fault->index;
+        CHECK(row[0] == 2 && row[2] == 5);
+        CHECK(fault->value > 100 && fault->value < 2000);
+    }
+    uint32_t marked = 0;
+    for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
+        const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
+        const eits_packet_raw *head = (const void *)packet->payload;
+        if ((head->flags & EITS_RAW_RECIPROCAL) != 0 || head->frame + 1 < fault->frame)
+            continue;
+        for (uint32_t i = 0; i < 208; ++i) {
+            const uint8_t *row = b.open.protocol + 4 * (size_t)i;
+            const bool it = (row[0] == 2 && row[2] == 5) || (row[0] == 5 && row[2] == 2);
+            const uint8_t quality = packet->payload[sizeof *head + 4 * 208 + i];
+            CHECK_EQUAL((quality & EITS_QUALITY_RECIPROCITY) != 0, it);
+            marked += it;
+        }
+    }
+    CHECK(marked >= 2);
+    bench_stop(&b);
+}
+
+/* A dead front end: no voltage at all. */
+static double nothing(void *user, const uint8_t e[4], uint64_t at_ns)
+{
+    (void)user;
+    (void)e;
+    (void)at_ns;
+    return 0;
+}
+
+static void test_dead(void)
+{
+    start(1);
+    tare();
+    b.board.volts = nothing;
+    host_run(&b.host, 60);
+    CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 0xFFFF); /* a cable unplugged looks like this */
+    CHECK(host_fault(&b.host, EITS_FAULT_SOLVER, true, 0) != NULL);
+    const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
+    const eits_packet_solved *head = (const void *)image->payload;
+    CHECK_EQUAL((int16_t)head->status, -EITS_E_FRAME_CHANNELS);
+    for (uint32_t j = 0; j < b.open.n_pixels; ++j) {
+        float value;
+        memcpy(&value, image->payload + sizeof *head + 4 * j, 4);
+        CHECK(value == 0);
+    }
+    const eits_packet_solved *touches = (const void *)host_last(&b.host, EITS_PACKET_TOUCHES)->payload;
+    CHECK_EQUAL(touches->count, 0);
+    bench_stop(&b);
+}
+
+int main(void)
+{
+    test_open(false, 1);
+    test_open(true, 1);
+    test_open(true, 4);
+    test_two_open();
+    test_open_at_the_rail();
+    test_faint_skin();
+    test_masked_row_is_not_judged();
+    test_touches_are_not_open(true);
+    test_touches_are_not_open(false);
+    test_saturation();
+    test_reciprocity(1);
+    test_reciprocity(3);
+    test_dead();
+    return checks_report("quality");
+}

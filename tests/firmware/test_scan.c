@@ -1,0 +1,329 @@
+/* The scan: order of rows, break before make, settling, repeated slots, reciprocal scans, periods, two buffers, stalls. */
+#include "bench.h"
+#include "check.h"
+
+#include <string.h>
+
+static bench b;
+
+static const eits_packet_raw *raw_head(uint32_t k)
+{
+    const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
+    return packet == NULL ? NULL : (const eits_packet_raw *)(const void *)packet->payload;
+}
+
+/* Rows are measured in the table's order, each with its own four electrodes, and never is one made before another broke. */
+static void test_order(const skin_spec *spec, uint32_t rows)
+{
+    bench_start(&b, spec);
+    CHECK_EQUAL(b.open.n_rows, rows);
+    host_run(&b.host, 60);
+    CHECK(b.board.bursts > rows);
+    uint32_t wrong = 0;
+    for (uint32_t k = 0; k < b.board.bursts; ++k) /* at its interrupt, a burst's own electrodes are still selected */
+        wrong += memcmp(b.board.selected[k], b.open.protocol + 4 * (size_t)(k % rows), 4) != 0;
+    CHECK_EQUAL(wrong, 0);
+    CHECK_EQUAL(b.board.address_while_enabled, 0);
+    CHECK_EQUAL(b.board.enabled_too_soon, 0);
+    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, 0);
+    CHECK_EQUAL(b.board.setup.slot_us, 100);
+    bench_stop(&b);
+}
+
+/* Voltages of untouched and touched skins within half a step of the converter, on every row. */
+static void test_voltages(const skin_spec *spec)
+{
+    bench_start(&b, spec);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    for (int touched = 0; touched < 2; ++touched) {
+        if (touched) {
+            CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+            sheet_touch(&b.sheet, -3, 2, 2, 6);
+            sheet_solve(&b.sheet);
+        }
+        host_run(&b.host, 60); /* the frame under way is neither */
+        host_forget(&b.host);
+        host_run(&b.host, 60);
+        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+        CHECK(packet != NULL);
+        if (packet == NULL)
+            continue;
+        float volts[256];
+        memcpy(volts, packet->payload + sizeof(eits_packet_raw), 4 * b.open.n_rows);
+        CHECK_EQUAL(packet->size, sizeof(eits_packet_raw) + 5 * b.open.n_rows);
+        for (uint32_t i = 0; i < b.open.n_rows; ++i) {
+            CHECK_NEAR(volts[i], bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
+            CHECK_EQUAL(packet->payload[sizeof(eits_packet_raw) + 4 * b.open.n_rows + i], 0);
+        }
+    }
+    bench_stop(&b);
+}
+
+/* With settling as long as what the multiplexers take, what was before is not seen; without it, it would be. */
+static void test_settling(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    b.board.tau_ns = 3000;
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    for (int settled = 0; settled < 2; ++settled) {
+        eits_command_scan scan = host_default_scan();
+        scan.settle_us = settled ? 36 : 1; /* twelve time constants, or a few */
+        scan.samples = 20;
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+        host_run(&b.host, 60);
+        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+        float volts[256];
+        double worst = 0;
+        memcpy(volts, packet->payload + sizeof(eits_packet_raw), 4 * b.open.n_rows);
+        for (uint32_t i = 0; i < b.open.n_rows; ++i) {
+            const double off = (double)volts[i] - bench_volts(&b, i);
+            worst = off > worst ? off : (-off > worst ? -off : worst);
+        }
+        CHECK(settled ? worst < 0.5 * fake_lsb_v(&b.board) : worst > 2 * fake_lsb_v(&b.board));
+    }
+    bench_stop(&b);
+}
+
+/* A switch that comes too late costs a slot, and the row is measured again. */
+static void test_late_switch(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 30);
+    const uint32_t before = b.host.instrument.scan.slots_repeated;
+    b.board.late_once_ns = 5000; /* of 20 us from burst to burst, 16 are for settling */
+    host_run(&b.host, 2);
+    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 1);
+    b.board.late_once_ns = 3440; /* made 84.3 us after the slot's start: 15.7 us, though the clock says 84 */
+    host_run(&b.host, 2);
+    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 2);
+    b.board.late_once_ns = 2900; /* 16.2 us */
+    host_run(&b.host, 2);
+    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 2);
+    b.board.lose = 2;
+    host_run(&b.host, 2);
+    CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 4);
+    host_run(&b.host, 60);
+    uint32_t wrong = 0;
+    const host_packet *packet = NULL;
+    for (uint32_t k = 0; (packet = host_packet_of(&b.host, EITS_PACKET_RAW, k)) != NULL; ++k) {
+        float volts[256];
+        memcpy(volts, packet->payload + sizeof(eits_packet_raw), 4 * b.open.n_rows);
+        for (uint32_t i = 0; i < b.open.n_rows; ++i) {
+            const double off = (double)volts[i] - bench_volts(&b, i);
+            wrong += !(off < 0.5 * fake_lsb_v(&b.board) && off > -0.5 * fake_lsb_v(&b.board));
+        }
+    }
+    CHECK_EQUAL(wrong, 0);
+    CHECK_EQUAL(host_stats(&b.host, 0).slots_repeated, before + 4);
+    bench_stop(&b);
+}
+
+/* Rows that cannot be measured at all are given up, marked, and are not a number. */
+static void test_never_settles(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    b.board.latency_ns = 10000; /* every switch is 6 us late */
+    host_run(&b.host, 400);
+    const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+    CHECK(packet != NULL);
+    if (packet != NULL) {
+        float first;
+        memcpy(&first, packet->payload + sizeof(eits_packet_raw), 4);
+        /* a row measured again has been selected for a whole slot: settled */
+        CHECK(first == first);
+    }
+    b.board.latency_ns = 600;
+    b.board.lose = 1000000;
+    host_forget(&b.host);
+    host_run(&b.host, 400);
+    packet = host_last(&b.host, EITS_PACKET_RAW);
+    CHECK(packet != NULL);
+    for (uint32_t i = 0; packet != NULL && i < b.open.n_rows; ++i) {
+        float volts;
+        memcpy(&volts, packet->payload + sizeof(eits_packet_raw) + 4 * i, 4);
+        CHECK(volts != volts);
+        CHECK_EQUAL(packet->payload[sizeof(eits_packet_raw) + 4 * b.open.n_rows + i], EITS_QUALITY_UNSETTLED);
+    }
+    bench_stop(&b);
+}
+
+static void set_check_every(uint16_t every)
+{
+    eits_command_scan scan = host_default_scan();
+    scan.check_every = every;
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+    host_run(&b.host, 30);
+    host_forget(&b.host);
+}
+
+/* Reciprocal scans take half the rows; the others are copies with their sign. */
+static void test_reciprocal(const skin_spec *spec)
+{
+    bench_start(&b, spec);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    for (uint16_t every = 0; every <= 3; every += 3) {
+        set_check_every(every);
+        host_run(&b.host, 110);
+        const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
+        CHECK(frames >= 5);
+        uint32_t checks = 0;
+        for (uint32_t k = 0; k < frames; ++k) {
+            const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
+            const eits_packet_raw *head = raw_head(k);
+            const bool check = every != 0 && head->frame % every == 0;
+            float volts[256];
+            memcpy(volts, packet->payload + sizeof *head, 4 * b.open.n_rows);
+            CHECK_EQUAL(head->flags, check ? EITS_RAW_CHECK : EITS_RAW_RECIPROCAL);
+            CHECK_EQUAL(head->scan_us, ((check ? b.open.n_rows : b.open.n_folded) - 1) * 100 + 80);
+            checks += check;
+            for (uint32_t i = 0; i < b.open.n_rows; ++i)
+                CHECK_NEAR(volts[i], bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
+            for (uint32_t f = 0; f < b.open.n_folded; ++f) {
+                const eits_fold fold = b.open.fold[f];
+                const uint8_t *quality = packet->payload + sizeof *head + 4 * b.open.n_rows;
+                CHECK(volts[fold.second] == (float)fold.sign * volts[fold.first]);
+                CHECK_EQUAL(quality[fold.first], 0);
+                CHECK_EQUAL(quality[fold.second], EITS_QUALITY_COPIED);
+            }
+        }
+        CHECK(every == 0 ? checks == 0 : checks >= 1);
+        const eits_fold masked = b.open.fold[3]; /* a row that is masked has no say and no value; its reciprocal has */
+        eits_command_mask_row mask = {.row = every == 0 ? masked.second : masked.first, .bad = 1};
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+        host_run(&b.host, 60);
+        const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
+        float pair[2];
+        memcpy(&pair[0], packet->payload + sizeof(eits_packet_raw) + 4 * masked.first, 4);
+        memcpy(&pair[1], packet->payload + sizeof(eits_packet_raw) + 4 * masked.second, 4);
+        const uint8_t *quality = packet->payload + sizeof(eits_packet_raw) + 4 * b.open.n_rows;
+        CHECK((pair[0] != pair[0]) == (every != 0) && (pair[1] != pair[1]) == (every == 0));
+        CHECK_EQUAL(quality[masked.first], every == 0 ? 0 : EITS_QUALITY_MASKED);
+        CHECK_EQUAL(quality[masked.second], EITS_QUALITY_COPIED | (every == 0 ? EITS_QUALITY_MASKED : 0));
+        mask.bad = 0;
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+    }
+    bench_stop(&b);
+}
+
+static void test_frame_period(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    eits_command_scan scan = host_default_scan();
+    scan.frame_period_us = 20799;
+    eits_packet_reply reply = host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
+    CHECK_EQUAL(reply.status, EITS_REPLY_TOO_FAST);
+    CHECK_EQUAL(reply.detail[0], 20800);
+    scan.frame_period_us = 33333;
+    reply = host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan);
+    CHECK_EQUAL(reply.status, EITS_REPLY_OK);
+    host_run(&b.host, 50);
+    host_forget(&b.host);
+    host_run(&b.host, 1100); /* over the wrap of the clock */
+    const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
+    CHECK(frames >= 32);
+    for (uint32_t k = 1; k < frames; ++k) {
+        CHECK_EQUAL(raw_head(k)->frame, raw_head(k - 1)->frame + 1);
+        CHECK_NEAR(raw_head(k)->time_us - raw_head(k - 1)->time_us, 33333, 100);
+    }
+    /* nothing is lost in the long run: slots are 100 us, periods are not */
+    CHECK_NEAR((double)(raw_head(frames - 1)->time_us - raw_head(0)->time_us), 33333.0 * (frames - 1), 100);
+    CHECK_EQUAL(host_stats(&b.host, 0).deadlines_missed, 0);
+    b.board.clock_cost_ns = 15000000; /* the solver, as it were */
+    CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
+    host_run(&b.host, 1000);
+    CHECK(host_stats(&b.host, 0).deadlines_missed > 0);
+    CHECK(host_fault(&b.host, EITS_FAULT_DEADLINE, true, 0) != NULL);
+    b.board.clock_cost_ns = 0;
+    host_run(&b.host, 1000);
+    CHECK(host_fault(&b.host, EITS_FAULT_DEADLINE, false, 0) != NULL);
+    bench_stop(&b);
+}
+
+/* While the main loop is busy, one frame is filled, then the scan waits; no frame is half old and half new. */
+static void test_two_buffers(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    b.board.write_cost_ns = 90000000; /* four frames' time */
+    host_run(&b.host, 2000);
+    const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
+    CHECK(frames >= 15 && frames <= 30);
+    for (uint32_t k = 0; k < frames; ++k) {
+        const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
+        CHECK(k == 0 || raw_head(k)->frame == raw_head(k - 1)->frame + 1); /* scanned frames are all there */
+        CHECK_EQUAL(raw_head(k)->scan_us, 20780);
+        float volts;
+        memcpy(&volts, packet->payload + sizeof(eits_packet_raw) + 4 * 207, 4);
+        CHECK_NEAR(volts, bench_volts(&b, 207), 0.5 * fake_lsb_v(&b.board));
+    }
+    bench_stop(&b);
+}
+
+static void test_stall(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    host_run(&b.host, 50);
+    b.board.stalled = true;
+    host_run(&b.host, 60);
+    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);
+    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 1) == NULL); /* said once */
+    eits_command_tare tare = {.frames = 4};
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_TARE, &tare, sizeof tare).status, EITS_REPLY_CORE);
+    CHECK_EQUAL(host_info(&b.host).tared, 1); /* by the last one */
+    b.board.stalled = false;
+    host_forget(&b.host);
+    host_run(&b.host, 600);
+    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, false, 0) != NULL);
+    CHECK(host_count(&b.host, EITS_PACKET_RAW) > 10);
+    float volts[256]; /* the generator was not touched: its phase is the one that the tare knows */
+    memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw), sizeof(float) * 208);
+    for (uint32_t i = 0; i < 208; ++i)
+        CHECK_NEAR(volts[i], bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
+    b.board.configure_status = FW_E_TIMEOUT; /* the converter does not even start */
+    b.board.stalled = true;
+    host_forget(&b.host);
+    host_run(&b.host, 2000);
+    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);
+    b.board.configure_status = FW_OK;
+    b.board.stalled = false;
+    host_run(&b.host, 2000);
+    CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, false, 0) != NULL);
+    CHECK_EQUAL(host_info(&b.host).faults, 0);
+    bench_stop(&b);
+}
+
+static void test_slots(void)
+{
+    fw_scan_settings s = FW_SCAN_DEFAULT;
+    CHECK_EQUAL(fw_slot_us(&s), 100);
+    s.settle_us = 20;
+    CHECK_EQUAL(fw_slot_us(&s), 120); /* 103 to the next whole period */
+    s.samples = 20;
+    s.settle_us = 16;
+    CHECK_EQUAL(fw_slot_us(&s), 40);
+    s.excitation_millihz = 1000000; /* periods of 1 ms: too long to wait for */
+    CHECK_EQUAL(fw_slot_us(&s), 39);
+}
+
+int main(void)
+{
+    test_slots();
+    test_order(&SKIN_ADJACENT, 208);
+    test_order(&SKIN_OPPOSITE, 192);
+    test_voltages(&SKIN_ADJACENT);
+    test_voltages(&SKIN_OPPOSITE);
+    test_settling();
+    test_late_switch();
+    test_never_settles();
+    test_reciprocal(&SKIN_ADJACENT);
+    test_reciprocal(&SKIN_OPPOSITE);
+    test_frame_period();
+    test_two_buffers();
+    test_stall();
+    return checks_report("scan");
+}

@@ -1,0 +1,309 @@
+/* Model banks: which one is opened, uploads, and power that goes at every step of one. */
+#include "bench.h"
+#include "check.h"
+
+#include <string.h>
+
+static bench b;
+static skin_model adjacent, opposite;
+
+static eits_packet_reply begin_with(uint32_t bytes, uint32_t crc)
+{
+    eits_command_model_begin c = {.bytes = bytes, .crc = crc};
+    return host_command(&b.host, EITS_PACKET_MODEL_BEGIN, &c, sizeof c);
+}
+
+static void start_with_adjacent(void)
+{
+    bench_start(&b, NULL);
+    fake_put_model(&b.board, 0, 1, adjacent.blob, adjacent.size);
+    bench_restart(&b);
+}
+
+static void test_newest(void)
+{
+    const struct { uint32_t first, second, bank; } cases[] = {
+        {1, 2, 1}, {2, 1, 0}, {0xFFFFFFFFu, 0, 1}, {0, 0xFFFFFFFFu, 0}, {0x80000006u, 5, 1}, {0x80000001u, 5, 0}, {7, 7, 0}};
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+        bench_start(&b, NULL);
+        fake_put_model(&b.board, 0, cases[k].first, adjacent.blob, adjacent.size);
+        fake_put_model(&b.board, 1, cases[k].second, opposite.blob, opposite.size);
+        bench_restart(&b);
+        CHECK_EQUAL(host_info(&b.host).bank, cases[k].bank);
+        CHECK_EQUAL(host_info(&b.host).n_rows, cases[k].bank == 0 ? 208 : 192);
+        /* the newest's content or record is damaged: the other one is opened */
+        b.board.bank[cases[k].bank][k % 2 ? 4000 : FAKE_BANK - 20] ^= 1;
+        bench_restart(&b);
+        CHECK_EQUAL(host_info(&b.host).bank, 1 - cases[k].bank);
+        CHECK_EQUAL(host_info(&b.host).faults, 0);
+        b.board.bank[1 - cases[k].bank][k % 3 ? 5000 : 6] ^= 1; /* byte 6 is under no other checksum than the record's */
+        bench_restart(&b);
+        CHECK_EQUAL(host_info(&b.host).n_rows, 0);
+        CHECK(host_fault(&b.host, EITS_FAULT_NO_MODEL, true, 0) != NULL);
+    }
+}
+
+static void test_upload(size_t piece)
+{
+    start_with_adjacent();
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, piece).status, EITS_REPLY_OK);
+    CHECK_EQUAL(b.board.rewrites, 0);
+    CHECK_EQUAL(b.board.erases, 1);
+    CHECK_EQUAL(host_info(&b.host).n_rows, 192);
+    CHECK(memcmp(b.board.bank[0], adjacent.blob, adjacent.size) == 0); /* the old one is still there */
+    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, piece).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_info(&b.host).bank, 0);
+    bench_restart(&b);
+    CHECK_EQUAL(host_info(&b.host).n_rows, 208);
+    CHECK_EQUAL(host_info(&b.host).bank, 0);
+}
+
+static void still_adjacent(int tared)
+{
+    const eits_packet_info info = host_info(&b.host);
+    CHECK_EQUAL(info.n_rows, 208);
+    CHECK_EQUAL(info.model_crc, adjacent.crc);
+    CHECK_EQUAL(info.bank, 0);
+    CHECK_EQUAL(info.tared, tared);
+    host_forget(&b.host);
+    host_run(&b.host, 60);
+    CHECK(host_count(&b.host, EITS_PACKET_RAW) >= 2); /* scanning, and still streamed */
+    if (tared)
+        CHECK(host_count(&b.host, EITS_PACKET_IMAGE) >= 2);
+    const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
+    if (image != NULL)
+        CHECK_EQUAL(((const eits_packet_solved *)(const void *)image->payload)->status, 0);
+}
+
+/* What is wrong with an upload leaves the model, the tare and the stream as they were. */
+static void test_refused(void)
+{
+    start_with_adjacent();
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    eits_packet_reply reply = begin_with(FAKE_BANK - 31, 0);
+    CHECK_EQUAL(reply.status, EITS_REPLY_MODEL_SIZE);
+    CHECK_EQUAL(reply.detail[0], FAKE_BANK - 32);
+    CHECK_EQUAL(begin_with(63, 0).status, EITS_REPLY_RANGE);
+    reply = host_model_data(&b.host, 0, adjacent.blob, 100);
+    CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET); /* nothing has begun */
+    CHECK_EQUAL(reply.detail[0], -1);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_MODEL_COMMIT).status, EITS_REPLY_OFFSET);
+    still_adjacent(1);
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc + 1, 4096).status, EITS_REPLY_MODEL_CRC);
+    still_adjacent(1);
+    /* a model that is damaged, but announced so */
+    static uint8_t damaged[FAKE_BANK];
+    memcpy(damaged, opposite.blob, opposite.size);
+    damaged[1000] ^= 4;
+    reply = host_upload(&b.host, damaged, opposite.size, eits_crc32(0, damaged, opposite.size), 4096);
+    CHECK_EQUAL(reply.status, EITS_REPLY_MODEL_INVALID);
+    CHECK_EQUAL(reply.detail[0], EITS_E_MODEL_CRC);
+    still_adjacent(1);
+    skin_spec spec = SKIN_ADJACENT;
+    spec.electrodes = 17;
+    skin_model bad = skin_model_make(&spec);
+    reply = host_upload(&b.host, bad.blob, bad.size, bad.crc, 4096);
+    CHECK_EQUAL(reply.status, EITS_REPLY_MODEL_SCAN);
+    CHECK_EQUAL(reply.detail[0], 17);
+    CHECK_EQUAL(reply.detail[1], 16);
+    still_adjacent(1);
+    fake_put_model(&b.board, 1, 7, bad.blob, bad.size); /* by a programmer: not opened */
+    bench_restart(&b);
+    CHECK_EQUAL(host_info(&b.host).bank, 0);
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    skin_model_free(&bad);
+    spec = SKIN_ADJACENT;
+    spec.wrong_golden = 1;
+    bad = skin_model_make(&spec);
+    reply = host_upload(&b.host, bad.blob, bad.size, bad.crc, 4096);
+    CHECK_EQUAL(reply.status, EITS_REPLY_SELF_TEST);
+    CHECK(reply.detail[0] > 0);
+    still_adjacent(1);
+    fake_put_model(&b.board, 1, 9, bad.blob, bad.size); /* by a programmer: nothing tests it but its own command */
+    fake_restart(&b.board);
+    host_start(&b.host, &b.board);
+    reply = host_plain(&b.host, EITS_PACKET_SELF_TEST);
+    CHECK_EQUAL(reply.status, EITS_REPLY_SELF_TEST);
+    skin_model_free(&bad);
+}
+
+/* More memory than the board has: refused at once, and at start-up the other bank is opened. */
+static void test_memory(void)
+{
+    start_with_adjacent();
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    skin_spec spec = SKIN_ADJACENT;
+    spec.rank = 60;
+    spec.side = 16;
+    skin_model big = skin_model_make(&spec);
+    eits_model model;
+    CHECK_EQUAL(eits_model_open(&model, big.blob, big.size), EITS_OK);
+    CHECK_EQUAL(host_upload(&b.host, big.blob, big.size, big.crc, 4096).status, EITS_REPLY_OK);
+    const size_t needs = fw_engine_needs(&model);
+    CHECK(needs < FAKE_WORKSPACE);
+    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status, EITS_REPLY_OK);
+    for (int fits = 1; fits >= 0; --fits) {
+        b.board.board.workspace_bytes = (needs + 15) / 16 * 16 - (fits ? 0 : 16);
+        bench_restart(&b);
+        const eits_packet_reply reply = host_upload(&b.host, big.blob, big.size, big.crc, 4096);
+        CHECK_EQUAL(reply.status, fits ? EITS_REPLY_OK : EITS_REPLY_MODEL_SIZE);
+        CHECK_EQUAL(host_info(&b.host).rank, fits ? 60 : 24);
+        if (fits)
+            CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status, EITS_REPLY_OK);
+        else
+            CHECK_EQUAL(reply.detail[0], (long long)b.board.board.workspace_bytes);
+    }
+    fake_put_model(&b.board, 0, 100, big.blob, big.size);
+    fake_put_model(&b.board, 1, 99, adjacent.blob, adjacent.size);
+    bench_restart(&b);
+    CHECK_EQUAL(host_info(&b.host).rank, 24);
+    CHECK_EQUAL(host_info(&b.host).faults, 0);
+    fake_put_model(&b.board, 1, 99, big.blob, big.size);
+    bench_restart(&b);
+    const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_NO_MODEL, true, 0);
+    CHECK(fault != NULL && fault->value == EITS_E_WORKSPACE);
+    skin_model_free(&big);
+}
+
+static void test_offsets(void)
+{
+    start_with_adjacent();
+    const uint32_t size = (uint32_t)opposite.size;
+    CHECK_EQUAL(begin_with(size, opposite.crc).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 1000).status, EITS_REPLY_OK);
+    eits_packet_reply reply = host_model_data(&b.host, 0, opposite.blob, 1000);
+    CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET);
+    CHECK_EQUAL(reply.detail[0], 1000);
+    reply = host_model_data(&b.host, 2000, opposite.blob + 2000, 1000);
+    CHECK_EQUAL(reply.detail[0], 1000);
+    CHECK_EQUAL(host_model_data(&b.host, 1000, opposite.blob + 1000, 1001).status, EITS_REPLY_LENGTH);
+    reply = host_plain(&b.host, EITS_PACKET_MODEL_COMMIT);
+    CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET);
+    CHECK_EQUAL(reply.detail[0], 1000);
+    CHECK_EQUAL(host_stream(&b.host, 1, 1, 0).status, EITS_REPLY_BUSY);
+    reply = host_tare(&b.host, 1);
+    CHECK_EQUAL(reply.status, EITS_REPLY_BUSY);
+    CHECK_EQUAL(reply.detail[0], EITS_PACKET_MODEL_BEGIN);
+    /* left for ten seconds: the old model goes on; then the host comes back and goes on where it was */
+    host_run(&b.host, 9000);
+    CHECK_EQUAL(b.host.instrument.scan.running, 0);
+    host_run(&b.host, 1500);
+    CHECK_EQUAL(b.host.instrument.scan.running, 1);
+    CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
+    reply = begin_with(size, opposite.crc);
+    CHECK_EQUAL(reply.status, EITS_REPLY_OK);
+    CHECK_EQUAL(reply.detail[0], 1000);
+    CHECK_EQUAL(b.board.erases, 1);
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, size, opposite.crc, 3000).status, EITS_REPLY_OK);
+    CHECK_EQUAL(b.board.erases, 1);
+    CHECK_EQUAL(b.board.rewrites, 0);
+    CHECK_EQUAL(host_info(&b.host).n_rows, 192);
+    /* another announcement starts over */
+    CHECK_EQUAL(begin_with(size, opposite.crc).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 1000).status, EITS_REPLY_OK);
+    reply = begin_with(size, opposite.crc ^ 1);
+    CHECK_EQUAL(reply.detail[0], 0);
+    CHECK_EQUAL(b.board.erases, 3);
+    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(begin_with(100, 7).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 104).status, EITS_REPLY_RANGE);
+    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 100).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_MODEL_COMMIT).status, EITS_REPLY_MODEL_CRC);
+    CHECK_EQUAL(host_info(&b.host).n_rows, 192);
+}
+
+/* The last piece may be any number of bytes. */
+static void test_odd_end(void)
+{
+    start_with_adjacent();
+    static uint8_t longer[FAKE_BANK];
+    memcpy(longer, opposite.blob, opposite.size);
+    memset(longer + opposite.size, 0x5A, 3); /* bytes behind the model are not its own */
+    const size_t size = opposite.size + 3;
+    CHECK_EQUAL(host_upload(&b.host, longer, size, eits_crc32(0, longer, size), 4096).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_info(&b.host).n_rows, 192);
+    CHECK_EQUAL(host_info(&b.host).model_bytes, (long long)size);
+    CHECK_EQUAL(b.board.bank[1][size], 0xFF);
+    bench_restart(&b);
+    CHECK_EQUAL(host_info(&b.host).n_rows, 192);
+}
+
+static void test_flash_fails(void)
+{
+    start_with_adjacent();
+    CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+    b.board.erase_status = FW_E_FLASH;
+    CHECK_EQUAL(begin_with((uint32_t)opposite.size, opposite.crc).status, EITS_REPLY_FLASH);
+    still_adjacent(1);
+    b.board.erase_status = FW_OK;
+    CHECK_EQUAL(begin_with((uint32_t)opposite.size, opposite.crc).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_model_data(&b.host, 0, opposite.blob, 400).status, EITS_REPLY_OK);
+    b.board.program_status = FW_E_FLASH;
+    const eits_packet_reply reply = host_model_data(&b.host, 400, opposite.blob + 400, 400);
+    CHECK_EQUAL(reply.status, EITS_REPLY_FLASH);
+    CHECK_EQUAL(reply.detail[0], 400);
+    still_adjacent(1);
+    b.board.program_status = FW_OK;
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status, EITS_REPLY_OK);
+    CHECK_EQUAL(b.board.rewrites, 0);
+    CHECK_EQUAL(host_info(&b.host).n_rows, 192);
+}
+
+/* Power goes at one step of an upload; the board starts again. Returns whether it went. */
+static int cut_upload(uint32_t step)
+{
+    start_with_adjacent();
+    b.board.flash_steps = 0;
+    b.board.cut_at = step;
+    if (setjmp(b.board.cut) == 0) {
+        CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status, EITS_REPLY_OK);
+        return 0;
+    }
+    bench_restart(&b);
+    return 1;
+}
+
+/* At each step of erasing, programming and committing: the old model is there until the record is whole. */
+static void test_cut_everywhere(void)
+{
+    CHECK_EQUAL(cut_upload(0), 0);
+    const uint32_t steps = b.board.flash_steps;
+    CHECK_EQUAL(steps, 2 + opposite.size / 4 + 8); /* sectors, words, and the record's */
+    uint32_t old_one = 0, new_one = 0, scanning = 0;
+    for (uint32_t step = 1; step <= steps; step += step < 20 || step > steps - 30 ? 1 : 53) {
+        CHECK_EQUAL(cut_upload(step), 1);
+        const eits_packet_info info = host_info(&b.host);
+        old_one += info.model_crc == adjacent.crc && info.bank == 0 && info.faults == 0;
+        new_one += info.model_crc == opposite.crc;
+        scanning += b.host.instrument.scan.running;
+        if (step % 7 == 0 || step > steps - 9) /* and it can be done again */
+            CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status, EITS_REPLY_OK);
+    }
+    CHECK(old_one > 60);
+    CHECK_EQUAL(new_one, 0);
+    CHECK_EQUAL(scanning, old_one);
+    CHECK_EQUAL(b.board.rewrites, 0);
+}
+
+int main(void)
+{
+    adjacent = skin_model_make(&SKIN_ADJACENT);
+    opposite = skin_model_make(&SKIN_OPPOSITE);
+    test_newest();
+    test_upload(4096);
+    test_upload(52);
+    test_refused();
+    test_memory();
+    test_offsets();
+    test_odd_end();
+    test_flash_fails();
+    test_cut_everywhere();
+    skin_model_free(&adjacent);
+    skin_model_free(&opposite);
+    return checks_report("store");
+}

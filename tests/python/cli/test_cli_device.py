@@ -1,0 +1,322 @@
+"""Commands for boards, before a simulated one: what they print, for readers and for programs."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("netgen")
+
+from board_cases import behind_a_port, board_of, write_scene
+
+from eitskin.cli.main import main
+from eitskin.device.packets import BoardInfo
+from eitskin.device.ports import Port
+from eitskin.frames.frames import load_frames
+from eitskin.model.model import Model
+from fresh_python import run_python
+from small_models import prebuilt, small_blob
+
+Done = Callable[..., str]
+
+PNG = b"\x89PNG\r\n\x1a\n"
+FRAMES = 6
+OFF_BY = re.compile(r"off by (\d+\.\d\d) mm")
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_scene(tmp_path_factory.mktemp("scene") / "one.toml", FRAMES)
+
+
+def strict(text: str) -> Any:
+    """JSON as the standard has it: NaN and Infinity are none."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def json_lines(text: str) -> list[dict[str, Any]]:
+    return [strict(line) for line in text.splitlines()]
+
+
+# ---- stream ----
+
+
+def test_two_touches_within_two_millimetres_of_the_scene(done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The issue's own words, before the simulated board; the emulated one has the same test."""
+    monkeypatch.chdir(tmp_path)
+    out = done("stream", "--device", "sim:two_touch.toml", "--mode", "touches", "--frames", "20")
+    lines = out.splitlines()
+    assert len(lines) == 22
+    for line in lines[:20]:
+        errors = [float(error) for error in OFF_BY.findall(line)]
+        assert len(errors) == 2 and max(errors) < 2.0, line
+    assert lines[20].startswith("20 frames, 20.0 a second of the board's time; 0 gaps (0 packets missing)")
+    assert "40 of 40 touches found, 0 false" in lines[21]
+
+
+def test_image_places_and_picture(done: Done, tmp_path: Path) -> None:
+    picture = tmp_path / "images.png"
+    out = done("stream", "--device", "sim:two_touch", "--mode", "image", "--frames", "20", "--picture", picture)
+    errors = [float(error) for error in OFF_BY.findall(out)]
+    assert len(errors) == 40 and max(errors) < 2.0
+    assert picture.read_bytes()[:8] == PNG and f"picture: {picture}" in out
+
+
+def test_stream_for_programs(done: Done, scene: Path) -> None:
+    *frames, last = json_lines(done("stream", "--device", f"sim:{scene}", "--mode", "raw,image,touches", "--json"))
+    assert len(frames) == FRAMES
+    numbers = [frame["frame"] for frame in frames]
+    assert numbers == list(range(numbers[0], numbers[0] + FRAMES))
+    assert [frame["time_s"] for frame in frames] == pytest.approx(0.05 * np.arange(FRAMES))
+    for frame in frames:
+        assert len(frame["voltage_v"]) == 208 and len(frame["quality"]) == 208 and len(frame["image_s_per_m"]) == 812
+        assert frame["touches"][0]["error_mm"] < 3.0 and frame["touches"][0]["id"] == 1
+        assert frame["true"] == [{"x_mm": -40.0, "y_mm": 10.0, "radius_mm": 9.0, "contrast": 9.0}]
+        assert frame["info"]["status"] == 0 and frame["info"]["iterations"] >= 1
+        assert frame["peak_s_per_m"] == max(frame["image_s_per_m"], key=abs)
+    summary = last["summary"]
+    assert (summary["frames"], summary["refused"], summary["link"]["gaps"]) == (FRAMES, 0, 0)
+    assert summary["truth"]["found"] == FRAMES and summary["frames_a_second"] == pytest.approx(20.0)
+
+
+def test_raw_lines_tell_of_the_scan(done: Done, scene: Path) -> None:
+    full = done("stream", "--device", f"sim:{scene}", "--mode", "raw", "--frames", "2").splitlines()
+    assert all("raw: 208 rows in 20.78 ms" in line and "copied" not in line for line in full[:2])
+    halved = done("stream", "--device", f"sim:{scene}", "--mode", "raw", "--frames", "2", "--reciprocal", "0", "--tare", "4")
+    assert halved.count("raw: 208 rows in 10.38 ms") == halved.count("104 copied") == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--samples", "40"], {"samples": 40}),
+        (["--excitation-hz", "25000"], {"excitation_millihz": 25_000_000}),
+        (["--settle-us", "40"], {"settle_us": 40}),
+        (["--frame-period-us", "60000"], {"frame_period_us": 60_000}),
+        (["--reciprocal", "4"], {"check_every": 4}),
+        (["--full"], {"check_every": 1}),
+    ],
+)
+def test_scan_options_reach_the_board(
+    options: list[str], expected: dict[str, int], done: Done, scene: Path, tmp_path: Path
+) -> None:
+    """What a recording says of the board was asked after the scan was set."""
+    run = tmp_path / "run.eits"
+    done("record", "--device", f"sim:{scene}", "-o", run, "--frames", "1", *options)
+    board = strict(done("info", "--device", f"file:{run}", "--json"))["board"]
+    assert {name: board[name] for name in expected} == expected
+
+
+def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
+    def infos(*options: str) -> list[dict[str, Any]]:
+        return [line["info"] for line in json_lines(done("stream", "--device", f"sim:{scene}", "--json", *options))[:-1]]
+
+    assert {info["iterations"] for info in infos("--iterations", "7", "--cold")} == {7}
+    assert {info["stop"] for info in infos("--gap", "0.05", "--iterations", "1000")} == {"gap"}
+    warm, cold = infos("--iterations", "10"), infos("--iterations", "10", "--cold")
+    assert warm[0]["gap_rel"] == cold[0]["gap_rel"] and warm[-1]["gap_rel"] < 0.5 * cold[-1]["gap_rel"]
+    assert infos("--sign", "decrease", "--iterations", "3")[0]["nonzeros"] != infos("--iterations", "3")[0]["nonzeros"]
+
+
+def test_every_other_frame(done: Done, scene: Path) -> None:
+    frames = json_lines(done("stream", "--device", f"sim:{scene}", "--every", "2", "--json"))[:-1]
+    assert np.diff([frame["frame"] for frame in frames]).tolist() == [2] * (FRAMES // 2 - 1)
+
+
+def test_another_model_than_the_prebuilt_one(done: Done, scene: Path, tmp_path: Path) -> None:
+    model = tmp_path / "small.eitm"
+    model.write_bytes(small_blob())
+    frames = json_lines(done("stream", "--device", f"sim:{scene}", "--model", model, "--mode", "image", "--json"))
+    assert len(frames) == FRAMES + 1 and len(frames[0]["image_s_per_m"]) < 812
+
+
+# ---- a serial port ----
+
+
+def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    board = board_of(scene)
+    with behind_a_port(board) as port:
+        device = f"serial:{port}"
+        assert main(["stream", "--device", device, "--frames", "3"]) == 0
+        out, err = capsys.readouterr()
+        assert "leave the skin untouched: taking the reference from 16 frames" in err and "touch it" in err
+        assert [line.split(maxsplit=3)[3] for line in out.splitlines()[:3]] == ["no touch"] * 3
+        assert main(["stream", "--device", device, "--frames", "3"]) == 0  # it has its reference already
+        out, err = capsys.readouterr()
+        assert err == "" and out.startswith("     ")
+        assert main(["tare", "--device", device, "--frames", "4", "--json"]) == 0
+        assert strict(capsys.readouterr().out) == {"device": device, "frames": 4, "tared": True}
+        assert main(["info", "--device", device, "--json"]) == 0
+        facts = strict(capsys.readouterr().out)
+        assert facts["board"]["tared"] == 1 and facts["statistics"]["frames_scanned"] >= 26
+        assert facts["device"] == device
+
+
+def test_a_slow_line_is_not_overrun(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with behind_a_port(board_of(scene)) as port:
+        assert main(["stream", "--device", f"serial:{port}?baud=115200", "--mode", "image", "--frames", "4", "--json"]) == 0
+        out, err = capsys.readouterr()
+        assert "the line carries one frame in 7 of image; name another number with  --every" in err
+        assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
+
+
+def test_devices_asks_only_what_looks_like_a_board(
+    scene: Path, done: Done, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with behind_a_port(board_of(scene)) as path:
+        found = [
+            Port("/dev/ttyS0", "n/a"),
+            Port(path, "STM32 STLink", 0x0483, 0x374B, "066AFF"),
+            Port(str(tmp_path / "gone"), "STM32 STLink", 0x0483, 0x374B, "066BFF"),
+        ]
+        monkeypatch.setattr("eitskin.device.open.ports", lambda: found)
+        monkeypatch.setattr("eitskin.device.ports.ports", lambda: found)
+        listed = strict(done("devices", "--json"))
+        text = done("devices")
+        quiet = done("devices", "--quiet")
+    by_path = {port["path"]: port for port in listed["ports"]}
+    assert by_path[path]["board"]["board"] == "simulated" and by_path[path]["why"] is None
+    assert by_path["/dev/ttyS0"]["board"] is by_path["/dev/ttyS0"]["why"] is None
+    assert "no such port" in by_path[str(tmp_path / "gone")]["why"]
+    assert set(listed["urls"]) == {"auto", "serial:PORT", "sim:SCENE", "emu:SCENE", "file:RUN.eits"}
+    assert f"serial:{path}  STM32 STLink, USB 0483:374b: simulated, firmware 0.1.0" in text
+    assert "serial:/dev/ttyS0: no board's" in text
+    assert quiet.count("a board's, not asked") == 2
+
+
+def test_no_port_at_all(done: Done, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("eitskin.device.open.ports", lambda: [])
+    assert done("devices").startswith("no serial port; without a board, play with")
+
+
+# ---- info, tare ----
+
+
+def test_info_of_a_simulated_board(done: Done) -> None:
+    text = done("info", "--device", "sim:two_touch")
+    assert "board       simulated" in text and "812 pixels, rank 64, f32" in text
+    assert "reference   none; leave the skin untouched and run  eitskin tare" in text
+    facts = strict(done("info", "--device", "sim:two_touch", "--json"))
+    assert facts["board"]["protocol_hash"] == f"{prebuilt()[0].protocol.hash:016x}"
+    assert set(facts["statistics"]["stages"]) == {"scan", "demodulate", "solve", "touches", "send", "frame"}
+
+
+def test_tare(done: Done, scene: Path) -> None:
+    assert done("tare", "--device", f"sim:{scene}", "--frames", "4") == f"sim:{scene}: reference taken from 4 frames\n"
+
+
+# ---- model upload ----
+
+
+def test_model_upload(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model, board = tmp_path / "small.eitm", board_of(scene)
+    model.write_bytes(small_blob())
+    with behind_a_port(board) as port:
+        assert main(["model", "upload", str(model), "--device", f"serial:{port}", "--json"]) == 0
+        facts = strict(capsys.readouterr().out)
+        assert (facts["bank"], facts["bytes"]) == (1, len(small_blob()))
+        assert main(["info", "--device", f"serial:{port}", "--json"]) == 0
+        assert strict(capsys.readouterr().out)["board"]["model_crc"] == facts["model_crc"]
+        # what needs its pixels now needs the file
+        assert main(["stream", "--device", f"serial:{port}", "--mode", "image", "--frames", "1"]) == 12
+        assert "needs the board's model" in capsys.readouterr().err
+        assert main(["stream", "--device", f"serial:{port}", "--mode", "image", "--frames", "1", "--model", str(model)]) == 0
+        # touches are millimetres already
+        assert main(["stream", "--device", f"serial:{port}", "--frames", "1"]) == 0
+
+
+# ---- flash ----
+
+
+def fake_tool(folder: Path, name: str, code: int = 0) -> Path:
+    """A programmer's tool that notes its arguments."""
+    log = folder / f"{name}.log"
+    tool = folder / name
+    tool.write_text(f'#!/bin/sh\nprintf "%s\\n" "$*" >> {log}\nexit {code}\n', encoding="utf-8")
+    tool.chmod(0o755)
+    return log
+
+
+def image_file(path: Path) -> Path:
+    """Something that begins as firmware does."""
+    words = np.array([0x2008_0000, 0x0800_0201], dtype="<u4")
+    path.write_bytes(words.tobytes() + bytes(1016))
+    return path
+
+
+def test_flash_prints_what_it_runs_and_runs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, image = fake_tool(tmp_path, "st-flash"), image_file(tmp_path / "firmware.bin")
+    monkeypatch.setenv("PATH", str(tmp_path) + os.pathsep + "/bin")
+    flash = ["flash", "--image", str(image), "--tool", "st-flash"]
+    assert main([*flash, "--dry-run"]) == 0
+    planned = capsys.readouterr().out.splitlines()
+    assert not log.exists() and str(image) in planned[0] and "0x08000000" in planned[0] and "0x08040000" in planned[1]
+    assert main(flash) == 0
+    out, err = capsys.readouterr()
+    assert err.splitlines() == planned and "eitskin info" in out
+    assert [f"st-flash {line}" for line in log.read_text().splitlines()] == planned
+    assert main([*flash, "--no-model", "--dry-run", "--json"]) == 0
+    assert len(strict(capsys.readouterr().out)["commands"]) == 1
+    fake_tool(tmp_path, "st-flash", code=3)
+    assert main(flash) == 12
+    assert "ended with 3" in capsys.readouterr().err.splitlines()[-1]
+
+
+# ---- doctor ----
+
+
+def test_doctor_on_a_healthy_board(done: Done, scene: Path) -> None:
+    facts = strict(done("doctor", "--device", f"sim:{scene}", "--frames", "8", "--json"))
+    assert facts["healthy"] and facts["source"] == f"sim:{scene}"
+    assert facts["measured"]["quiet_frames"] == 8 and facts["measured"]["board_frames_scanned"] == 8
+    touched = strict(done("doctor", "--device", f"sim:{scene}", "--frames", "6", "--touch=-40,10,9", "--json"))
+    assert touched["healthy"] and "numbering_by_touch" in touched["measured"]
+
+
+def test_doctor_on_a_board_that_reports_a_fault(
+    done: Done, scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    as_it_is = BoardInfo.fault_codes.fget  # type: ignore[attr-defined]
+    assert as_it_is is not None
+    monkeypatch.setattr(BoardInfo, "fault_codes", property(lambda info: as_it_is(type(info)(**{**vars(info), "faults": 1 << 2}))))
+    assert main(["doctor", "--device", f"sim:{scene}", "--frames", "4", "--json"]) == 11
+    findings = strict(capsys.readouterr().out)["findings"]
+    assert [finding["name"] for finding in findings] == ["board-electrode-open"] and findings[0]["mend"] == ""
+
+
+# ---- start-up ----
+
+
+def test_the_parser_imports_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\n"
+        "print([name for name in ('numpy', 'scipy', 'serial', 'cffi', 'matplotlib', 'unicorn') if name in sys.modules])"
+    )
+    assert run_python(code).stdout.strip() == "[]"
+
+
+def test_frames_of_a_recording_give_the_boards_touches(done: Done, scene: Path, tmp_path: Path) -> None:
+    run, exported = tmp_path / "run.eits", tmp_path / "run.npz"
+    done("record", "--device", f"sim:{scene}", "-o", run)
+    assert done("replay", run, "--frames", exported) == f"{exported}: {FRAMES} frames, 16 quiet\n"
+    frames = load_frames(exported)
+    assert frames.n_frames == FRAMES and len(frames.reference_voltage_v) == 16
+    model: Model = prebuilt()[0]
+    assert frames.protocol.hash == model.protocol.hash and frames.meta["board"]["board"] == "simulated"
+    board = json_lines(done("replay", run, "--json"))[:-1]
+    host = strict(done("reconstruct", exported, "--warm", "--json"))["frames"]
+    assert [[t["x_mm"] for t in f["touches"]] for f in host] == [[t["x_mm"] for t in f["touches"]] for f in board]

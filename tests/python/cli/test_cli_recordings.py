@@ -1,0 +1,263 @@
+"""Recording and replaying: what was seen live, exported, and held against this host's core bit by bit."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("netgen")
+
+from board_cases import behind_a_port, board_of, write_scene
+
+import eitskin
+from eitskin.cli.main import main
+from eitskin.device.codec import Decoder, Packet, encode
+from eitskin.device.packets import PacketType
+from fresh_python import MAIN, run_python, without
+
+Done = Callable[..., str]
+Change = Callable[[Packet], bytes | None]
+
+FRAMES = 6
+SOLVED_HEAD = 68
+RAW_HEAD = 16
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_scene(tmp_path_factory.mktemp("scene") / "one.toml", FRAMES)
+
+
+@pytest.fixture(scope="module")
+def run(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of everything."""
+    path = tmp_path_factory.mktemp("run") / "run.eits"
+    assert main(["record", "--device", f"sim:{scene}", "-o", str(path)]) == 0
+    return path
+
+
+def packets(path: Path) -> list[Packet]:
+    return Decoder().feed(path.read_bytes())
+
+
+def changed(path: Path, target: Path, change: Change) -> Path:
+    """The recording with the payload of each packet as ``change`` gives it, without those where it gives None."""
+    kept = ((p, change(p)) for p in packets(path))
+    target.write_bytes(b"".join(encode(p.type, p.sequence, payload) for p, payload in kept if payload is not None))
+    return target
+
+
+def nth(kind: PacketType, number: int, change: Callable[[bytes], bytes | None]) -> Change:
+    """Change the ``number``-th packet (from 0) of ``kind``."""
+    counted = iter(range(10**6))
+
+    def one(packet: Packet) -> bytes | None:
+        if packet.type == kind and next(counted) == number:
+            return change(packet.payload)
+        return packet.payload
+
+    return one
+
+
+def flipped(place: int) -> Callable[[bytes], bytes]:
+    """The lowest bit of a byte turned round."""
+    return lambda payload: payload[:place] + bytes([payload[place] ^ 1]) + payload[place + 1 :]
+
+
+def test_replay_shows_what_was_seen_live(done: Done, scene: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.eits"
+    live = done("stream", "--device", f"sim:{scene}", "--mode", "image,touches", "--record", path)
+    assert done("replay", path, "--mode", "image,touches") == live
+    lines = done("replay", path, "--mode", "image,touches", "--first", "2").splitlines()
+    assert lines[:2] == live.splitlines()[:2] and lines[2].startswith("2 frames")
+
+
+def test_a_recording_is_a_device_too(done: Done, run: Path) -> None:
+    assert done("stream", "--device", f"file:{run}").splitlines()[0] == done("replay", run).splitlines()[0].split(", off by")[0]
+    assert json.loads(done("info", "--device", f"file:{run}", "--json"))["statistics"] is None
+    assert json.loads(done("doctor", "--device", f"file:{run}", "--json"))["measured"]["quiet_frames"] == 16
+
+
+def test_record_says_how_much(done: Done, scene: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.eits"
+    facts = json.loads(done("record", "--device", f"sim:{scene}", "-o", path, "--frames", "3", "--json"))
+    assert facts["frames"] == 3 and facts["bytes"] >= path.stat().st_size > 10_000
+    assert facts["packets"] == sum(p.type not in (PacketType.RECORDING,) for p in packets(path)) - 1
+    assert len([p for p in packets(path) if p.type == PacketType.RAW]) == 16 + 3
+    again = json.loads(done("record", "--device", f"sim:{scene}", "-o", path, "--seconds", "0.1", "--overwrite", "--json"))
+    assert again["frames"] == 3
+
+
+# ---- the same bits ----
+
+
+def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
+    assert done("replay", run, "--check") == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
+    facts = json.loads(done("replay", run, "--check", "--json"))
+    assert facts["same_bits"] and facts["solver_noted"] and (facts["same"], facts["untold"]) == (FRAMES, 0)
+
+
+@pytest.mark.parametrize(
+    "options", [["--cold"], ["--iterations", "9"], ["--sign", "both"], ["--tare", "1"], ["--reciprocal", "0"]]
+)
+def test_whatever_the_solver_was_told(options: list[str], done: Done, scene: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.eits"
+    done("record", "--device", f"sim:{scene}", "-o", path, *options)
+    assert json.loads(done("replay", path, "--check", "--json"))["same"] == FRAMES
+
+
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        (PacketType.IMAGE, SOLVED_HEAD + 4 * 400),
+        (PacketType.TOUCHES, SOLVED_HEAD + 4),
+        (PacketType.RAW, RAW_HEAD + 4 * 60 + 1),
+    ],
+)
+def test_one_bit_that_differs_is_found(
+    kind: PacketType, place: int, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    number = 16 + 2 if kind == PacketType.RAW else 2
+    other = changed(run, tmp_path / "other.eits", nth(kind, number, flipped(place)))
+    assert main(["replay", str(other), "--check", "--json"]) == 10
+    out, err = capsys.readouterr()
+    facts = json.loads(out)
+    different = facts["different"]
+    # what the host makes of a changed raw frame it begins the next one from
+    assert not facts["same_bits"] and different[0] == 18 and (len(different) == 1 or kind == PacketType.RAW)
+    assert err == f"eitskin: {other}: this host's images are not the board's\n"
+
+
+def test_a_changed_bit_in_the_reference_shows_everywhere(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 3, flipped(RAW_HEAD + 4 * 60 + 2)))
+    assert main(["replay", str(other), "--check", "--json"]) == 10
+    assert len(json.loads(capsys.readouterr().out)["different"]) == FRAMES
+
+
+def test_frames_after_a_loss_are_not_called_different(done: Done, run: Path, tmp_path: Path) -> None:
+    """A warm solve begins from the last one: without it, the host's has other bits and nobody's fault it is."""
+    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
+    facts = json.loads(done("replay", other, "--check", "--json"))
+    assert facts["different"] == [] and facts["same"] == 1 and facts["untold"] == FRAMES - 2 and facts["alone"] == 1
+
+
+def test_a_loss_in_the_tare_leaves_nothing_to_compare(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 5, lambda payload: None))
+    assert main(["replay", str(other), "--check"]) == 8
+    assert "nothing to compare" in capsys.readouterr().err
+
+
+def test_without_its_note_the_models_own_options_are_taken(
+    done: Done, scene: Path, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    without = changed(run, tmp_path / "plain.eits", nth(PacketType.RECORDING, 1, lambda payload: None))
+    facts = json.loads(done("replay", without, "--check", "--json"))
+    assert facts["same"] == FRAMES and not facts["solver_noted"]
+    odd = tmp_path / "odd.eits"
+    done("record", "--device", f"sim:{scene}", "-o", odd, "--iterations", "5")
+    without = changed(odd, tmp_path / "plain2.eits", nth(PacketType.RECORDING, 1, lambda payload: None))
+    assert main(["replay", str(without), "--check"]) == 10
+    assert "the recording does not note the solver's options" in capsys.readouterr().err
+
+
+# ---- export ----
+
+
+def test_rows_that_could_not_be_measured_are_not_exported(done: Done, run: Path, tmp_path: Path) -> None:
+    def with_nan(payload: bytes) -> bytes:
+        return payload[:RAW_HEAD] + np.float32(np.nan).tobytes() + payload[RAW_HEAD + 4 :]
+
+    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 3, with_nan))
+    exported = tmp_path / "run.npz"
+    facts = json.loads(done("replay", other, "--frames", exported, "--json"))
+    assert (facts["frames"], facts["quiet_frames"], facts["left_out"]) == (FRAMES - 1, 16, 1)
+    assert done("reconstruct", exported).count("\n") == FRAMES - 1 + 2
+    raw = done("replay", other, "--mode", "raw").splitlines()[3]
+    assert "1 not usable" in raw
+
+
+# ---- kill -9 ----
+
+
+def recording_process(device: str, path: Path) -> subprocess.Popen[bytes]:
+    source = os.pathsep.join([str(Path(eitskin.__file__).parents[1])])
+    environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", MAIN, "record", "--device", device, "-o", str(path), "--tare", "4"]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def seconds(most: float) -> Iterator[None]:
+    end = time.monotonic() + most
+    while time.monotonic() < end:
+        yield
+        time.sleep(0.02)
+    raise AssertionError("it took too long")
+
+
+def test_what_a_killed_recorder_has_written_can_be_read(done: Done, scene: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.eits"
+    with behind_a_port(board_of(scene)) as port:
+        process = recording_process(f"serial:{port}", path)
+        for _ in seconds(60):
+            if path.exists() and path.stat().st_size > 100_000:
+                break
+        process.send_signal(signal.SIGKILL)
+        process.wait(timeout=10)
+    whole = packets(path)
+    assert len(whole) > 20
+    facts = json.loads(done("replay", path, "--check", "--json"))
+    solved = sum(packet.type == PacketType.IMAGE for packet in whole)
+    assert facts["same_bits"] and facts["same"] >= solved - 1 > 0
+    cut = tmp_path / "cut.eits"
+    cut.write_bytes(path.read_bytes()[:-7])
+    assert json.loads(done("replay", cut, "--check", "--json"))["same"] >= facts["same"] - 1
+
+
+# ---- what a base installation can do ----
+
+
+def test_a_recording_needs_no_extra(run: Path) -> None:
+    bare = without("scipy", "netgen", "matplotlib", "unicorn") + MAIN
+    for arguments, expected in (
+        (["replay", run], f"{FRAMES} frames"),
+        (["replay", run, "--check"], "same bits: yes"),
+        (["stream", "--device", f"file:{run}", "--mode", "raw,image,touches"], f"{FRAMES} frames"),
+        (["info", "--device", f"file:{run}"], "board       simulated"),
+        (["doctor", "--device", f"file:{run}"], "0 faults"),
+    ):
+        done = run_python(bare, *arguments)
+        assert (done.returncode, done.stderr) == (0, "") and expected in done.stdout, arguments
+
+
+# ---- Ctrl-C ----
+
+
+def test_ctrl_c_stops_the_board_and_sums_up(scene: Path) -> None:
+    board = board_of(scene)
+    with behind_a_port(board) as port:
+        source = str(Path(eitskin.__file__).parents[1])
+        command = [sys.executable, "-c", MAIN, "stream", "--device", f"serial:{port}", "--tare", "4"]
+        environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
+        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None and process.stderr is not None
+            for _ in range(5):
+                assert "no touch" in process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=30)
+        assert process.returncode == 0 and err.endswith("eitskin: stopped\n")
+        assert " frames, " in out.splitlines()[-1] and "0 gaps" in out.splitlines()[-1]
+        assert not board.wanted

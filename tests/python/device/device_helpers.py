@@ -1,0 +1,119 @@
+"""Small scenes, boards before them, and transports that damage what goes through."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+
+from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
+from eitskin.device.client import Device
+from eitskin.device.packets import BoardInfo
+from eitskin.device.sim import SimTransport
+from eitskin.device.sim_board import SimBoard
+from eitskin.device.sim_skin import SceneSkin
+from eitskin.scene.description import Scene
+from eitskin.scene.touch_path import Keyframe, TouchTrack
+from small_models import prebuilt
+
+QUIET = 8
+FRAMES = 10
+
+
+@cache
+def scene() -> Scene:
+    """One touch at (-40, 10) on the paper's skin, with noise at 60 dB; ten frames."""
+    touch = TouchTrack((Keyframe(-1e9, -40.0, 10.0, 9.0, 9.0),), hold=True)
+    return Scene("one", touches=(touch,), frames=FRAMES, quiet_frames=QUIET, elements=2500, effects={"noise": {"snr_db": 60.0}})
+
+
+@cache
+def simulated_skin() -> SceneSkin:
+    """Shared, so that the scene is simulated once; its state is reset by ``fresh_skin``."""
+    return SceneSkin(scene())
+
+
+def fresh_skin() -> SceneSkin:
+    """The scene, not begun, its frames already simulated."""
+    shared = simulated_skin()
+    shared.frame(prebuilt()[0].protocol, 0)
+    skin = SceneSkin(scene())
+    skin._frames = shared._frames
+    return skin
+
+
+def empty_bank() -> bytes:
+    return bytes([ERASED]) * BANK_BYTES
+
+
+def sim_board(model: bytes | None = None, *, no_model: bool = False) -> SimBoard:
+    """A board with ``model`` (the prebuilt one) in bank 0."""
+    first = empty_bank() if no_model else bank_bytes(model or prebuilt()[1], 1)
+    return SimBoard(fresh_skin(), [first, empty_bank()])
+
+
+@contextmanager
+def sim_device(board: SimBoard | None = None) -> Iterator[Device]:
+    with Device(SimTransport("test", board or sim_board())) as device:
+        yield device
+
+
+class Damaging:
+    """A transport that puts every piece of bytes through ``there`` (to the board) or ``back`` (from it)."""
+
+    def __init__(self, inner: SimTransport, there: Callable[[bytes], bytes], back: Callable[[bytes], bytes]) -> None:
+        self._inner, self._there, self._back = inner, there, back
+        self.url = self.name = inner.name
+        self.synchronous, self.replays = True, False
+
+    @property
+    def ended(self) -> bool:
+        return self._inner.ended
+
+    def read(self, timeout_s: float) -> bytes:
+        return self._back(self._inner.read(timeout_s))
+
+    def write(self, data: bytes) -> None:
+        self._inner.write(self._there(data))
+
+    def reopen(self) -> bool:
+        return True
+
+    def begin_scene(self) -> None:
+        self._inner.begin_scene()
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+def dropping(generator: random.Random, share: float) -> Callable[[bytes], bytes]:
+    """Whole pieces lost, or one byte of them changed, each with probability ``share`` / 2."""
+
+    def damage(data: bytes) -> bytes:
+        chance = generator.random()
+        if not data or chance >= share:
+            return data
+        if chance < share / 2:
+            return b""
+        place = generator.randrange(len(data))
+        return data[:place] + bytes([data[place] ^ (1 + generator.randrange(255))]) + data[place + 1 :]
+
+    return damage
+
+
+def same(data: bytes) -> bytes:
+    return data
+
+
+def board_info(**changes: object) -> BoardInfo:
+    """What a board might say."""
+    values: dict[str, object] = {
+        "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi", "serial": "0123456789ABCDEF01234567",
+        "f_cpu_hz": 216_000_000, "electrodes": 16, "bank_bytes": 524256, "data_bytes": 4096, "model_bytes": 1000,
+        "model_crc": 0xDEADBEEF, "protocol_hash": 2**63 + 5, "n_electrodes": 16, "n_rows": 208, "n_folded": 104, "rank": 64,
+        "n_pixels": 812, "nx": 32, "ny": 32, "storage": 0, "bank": 1, "excitation_millihz": 50_000_012,
+        "sample_rate_hz": 1_000_000, "samples": 80, "settle_us": 16, "slot_us": 100, "check_every": 1, "streaming": 0, "every": 1,
+        "tared": 0, "frame_period_us": 0, "faults": 0, "volts_per_code_nv": 805664,
+    }  # fmt: skip
+    return BoardInfo(**(values | changes))  # type: ignore[arg-type]

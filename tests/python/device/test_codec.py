@@ -1,0 +1,139 @@
+"""The codec through cffi: what is sent arrives, what is damaged does not, and every byte is accounted for."""
+
+from __future__ import annotations
+
+import zlib
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eitskin.device.codec import Decoder, Packet, encode
+from eitskin.device.packets import MAX_PAYLOAD, PacketType
+from eitskin.errors import DeviceError
+
+
+def packets_of(wire: bytes, decoder: Decoder | None = None) -> list[Packet]:
+    return (decoder or Decoder()).feed(wire)
+
+
+@given(st.integers(0, 255).filter(lambda t: t != PacketType.RECORDING), st.integers(0, 2**32 - 1), st.binary(max_size=1000))
+def test_round_trip(packet_type: int, sequence: int, payload: bytes) -> None:
+    wire = encode(packet_type, sequence, payload)
+    assert wire[0] == wire[-1] == 0
+    assert 0 not in wire[1:-1]
+    assert packets_of(wire) == [Packet(packet_type, sequence, payload)]
+
+
+def test_the_bytes_are_the_documented_ones() -> None:
+    """Worked out by hand in docs/link-protocol.md."""
+    head = bytes([1, 0x80, 4, 0, 7, 0, 0, 0])
+    payload = bytes([1, 2, 0, 3])
+    checksum = zlib.crc32(head + payload).to_bytes(4, "little")
+    assert 0 not in checksum
+    plain = head + payload + checksum
+    stuffed = bytes([4]) + plain[:3] + bytes([2]) + plain[4:5] + bytes([1, 1, 3]) + plain[8:10] + bytes([6]) + plain[11:]
+    assert encode(0x80, 7, payload) == b"\0" + stuffed + b"\0"
+
+
+@pytest.mark.parametrize("size", [0, 1, 241, 242, 243, 253, 254, 255, 508, 1000, MAX_PAYLOAD - 1, MAX_PAYLOAD])
+@pytest.mark.parametrize("fill", [0, 1, 255])
+def test_sizes_at_the_edges(size: int, fill: int) -> None:
+    payload = bytes([fill]) * size
+    assert packets_of(encode(1, 1, payload)) == [Packet(1, 1, payload)]
+
+
+def test_too_long_a_payload_is_refused() -> None:
+    with pytest.raises(DeviceError, match="cannot carry 16385 bytes; the most is 16384"):
+        encode(1, 1, bytes(MAX_PAYLOAD + 1))
+
+
+ORIGINALS = [(k % 200 + 1, k, bytes((k * 37 + i * i) % 256 for i in range(k % 90))) for k in range(40)]
+WIRE = b"".join(encode(*one) for one in ORIGINALS)
+
+
+@st.composite
+def damaged_wires(draw: st.DrawFn) -> bytes:
+    """The wire with bytes changed, removed, put in, and pieces doubled or moved."""
+    wire = bytearray(WIRE)
+    for _ in range(draw(st.integers(0, 12))):
+        place = draw(st.integers(0, len(wire) - 1))
+        kind = draw(st.sampled_from(["change", "remove", "insert", "double", "move"]))
+        if kind == "change":
+            wire[place] ^= draw(st.integers(1, 255))
+        elif kind == "remove":
+            del wire[place : place + draw(st.integers(1, 30))]
+        elif kind == "insert":
+            wire[place:place] = draw(st.binary(min_size=1, max_size=30))
+        else:
+            piece = bytes(wire[place : place + draw(st.integers(1, 300))])
+            if kind == "move":
+                del wire[place : place + len(piece)]
+            other = draw(st.integers(0, len(wire)))
+            wire[other:other] = piece
+        if len(wire) < 10:
+            break
+    return bytes(wire)
+
+
+@settings(max_examples=300, deadline=None)
+@given(damaged_wires(), st.lists(st.integers(1, 700), min_size=1, max_size=8))
+def test_a_link_under_fire_takes_only_what_was_sent_and_in_order(wire: bytes, cuts: list[int]) -> None:
+    decoder, found, place = Decoder(), [], 0
+    k = 0
+    while place < len(wire):
+        cut = cuts[k % len(cuts)]
+        found += decoder.feed(wire[place : place + cut])
+        place, k = place + cut, k + 1
+    sent = {sequence: (packet_type, payload) for packet_type, sequence, payload in ORIGINALS}
+    assert all(sent[p.sequence] == (p.type, p.payload) for p in found)  # no wrong packet, ever
+    counters = decoder.counters
+    if counters.restarts == 0:
+        numbers = [p.sequence for p in found]
+        assert numbers == sorted(set(numbers))
+        if numbers:  # every gap is counted
+            assert sum(p.lost for p in found) == counters.missing == numbers[-1] - numbers[0] + 1 - len(numbers)
+    assert counters.packets == len(found)
+    assert counters.bytes == len(wire)
+    decoder.feed(b"\0")
+    tail = encode(77, 5000, b"after all that")  # and it has not lost its way
+    last = decoder.feed(tail)
+    assert [p.payload for p in last] == [b"after all that"]
+
+
+@given(st.binary(max_size=3000))
+def test_garbage_is_no_packet(garbage: bytes) -> None:
+    decoder = Decoder()
+    assert decoder.feed(garbage) == []
+    assert decoder.counters.packets == 0
+
+
+def test_a_port_opened_in_the_middle_of_a_packet() -> None:
+    first, second = encode(1, 1, b"half of this is gone"), encode(1, 2, b"whole")
+    decoder = Decoder()
+    assert [p.payload for p in decoder.feed(first[5:] + second)] == [b"whole"]
+    assert decoder.counters.skipped_bytes == len(first) - 6
+    assert (decoder.counters.crc_errors, decoder.counters.framing_errors, decoder.counters.gaps) == (0, 0, 0)
+
+
+def test_another_version_is_told_apart_from_damage() -> None:
+    from eitskin.core import _core_f32 as core
+
+    plain = bytes([2, 1, 0, 0, 1, 1, 1, 1])
+    plain += zlib.crc32(plain).to_bytes(4, "little")
+    stuffed = bytes([3]) + plain[:2] + bytes([1, 9]) + plain[4:]
+    assert core.lib.EITS_LINK_VERSION == 1
+    decoder = Decoder()
+    assert decoder.feed(b"\0" + stuffed + b"\0") == []
+    assert decoder.counters.version_errors == 1
+    assert decoder.other_version == 2
+
+
+def test_what_was_half_received_before_a_cut_is_no_error() -> None:
+    decoder = Decoder()
+    decoder.feed(encode(1, 1, b"a") + encode(1, 2, b"b")[:-4])
+    decoder.link_lost()
+    found = decoder.feed(encode(1, 5, b"c"))
+    assert [(p.payload, p.lost) for p in found] == [(b"c", 3)]
+    assert decoder.counters.framing_errors == decoder.counters.crc_errors == 0
+    assert decoder.counters.gaps == 1

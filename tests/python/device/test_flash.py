@@ -1,0 +1,140 @@
+"""Flashing: the exact command lines of each tool, what goes where, and what is refused. No board is touched."""
+
+from __future__ import annotations
+
+import os
+import struct
+from pathlib import Path
+
+import pytest
+
+from eitskin.device import flash
+from eitskin.device.bank import bank_bytes
+from eitskin.device.flash import TOOLS, FlashPlan, find_tool, plan_flash, run_flash
+from eitskin.errors import DeviceError, FileError, UsageError
+from small_models import tiny_blob
+
+IMAGE = struct.pack("<II", 0x2000_4000, 0x0800_0201) + bytes(2000)
+
+
+@pytest.fixture
+def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the path with all three tools, which write down how they were called."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    for name in TOOLS:
+        (folder / name).write_text(f'#!/bin/sh\nprintf "%s\\n" "{name} $*" >> {tmp_path}/called\nexit ${{FAIL:-0}}\n')
+        (folder / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:/usr/bin:/bin")
+    return folder
+
+
+@pytest.fixture
+def image(tmp_path: Path) -> Path:
+    path = tmp_path / "firmware image.bin"
+    path.write_bytes(IMAGE)
+    return path
+
+
+def test_openocd(image: Path, tools: Path) -> None:
+    plan = plan_flash(image, tool="openocd")
+    assert plan.commands == (
+        (
+            "openocd", "-f", "board/st_nucleo_f7.cfg", "-c", f"program {{{image}}} verify 0x08000000",
+            "-c", "reset run", "-c", "shutdown",
+        ),
+    )  # fmt: skip
+    assert plan.bank_file is None
+
+
+def test_st_flash(image: Path, tools: Path) -> None:
+    plan = plan_flash(image, tool="st-flash", serial="0667FF")
+    assert plan.commands == (("st-flash", "--serial", "0667FF", "--reset", "write", str(image), "0x08000000"),)
+    assert plan.lines() == [f"st-flash --serial 0667FF --reset write '{image}' 0x08000000"]
+
+
+def test_pyocd(image: Path, tools: Path) -> None:
+    plan = plan_flash(image, tool="pyocd")
+    assert plan.commands == (
+        ("pyocd", "load", "--target", "stm32f767zi", "--format", "bin", "--base-address", "0x08000000", str(image)),
+    )
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(tool: str, image: Path, tools: Path) -> None:
+    plan = plan_flash(image, tiny_blob(), tool=tool)
+    assert plan.bank_file is not None
+    assert plan.bank_file.read_bytes() == bank_bytes(tiny_blob(), 1)
+    text = " ".join(plan.lines())
+    assert [word for word in ("0x08000000", "0x08040000", "0x0813ffe0") if word in text] == [
+        "0x08000000", "0x08040000", "0x0813ffe0"
+    ]  # fmt: skip
+    assert (plan.bank_file.parent / "eitskin-no-record.bin").read_bytes() == b"\xff" * 32
+
+
+def test_the_first_tool_that_is_there_is_taken(tools: Path) -> None:
+    assert find_tool() == "openocd"
+    (tools / "openocd").unlink()
+    assert find_tool() == "st-flash"
+    (tools / "st-flash").unlink()
+    assert find_tool() == "pyocd"
+    with pytest.raises(DeviceError, match="openocd is installed; install one:  apt install openocd"):
+        find_tool("openocd")
+    (tools / "pyocd").unlink()
+    with pytest.raises(DeviceError, match="neither openocd, st-flash, pyocd is installed; install one"):
+        find_tool()
+    with pytest.raises(UsageError, match="--tool dfu: use one of openocd, st-flash, pyocd"):
+        find_tool("dfu")
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_the_plan_is_what_is_run(tool: str, image: Path, tools: Path, tmp_path: Path) -> None:
+    said: list[str] = []
+    plan = plan_flash(image, tiny_blob(), tool=tool)
+    assert not (tmp_path / "called").exists()  # planning runs nothing
+    run_flash(plan, said.append)
+    assert said == plan.lines()
+    assert (tmp_path / "called").read_text().splitlines() == [" ".join(command) for command in plan.commands]
+
+
+def test_a_tool_that_fails_is_said(image: Path, tools: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FAIL", "3")
+    with pytest.raises(DeviceError, match=r"flashing failed: st-flash .* ended with 3; is the board plugged in") as caught:
+        run_flash(plan_flash(image, tool="st-flash"))
+    assert "\n" not in str(caught.value)
+    with pytest.raises(DeviceError, match="cannot be run"):
+        run_flash(FlashPlan("pyocd", (("/no/such/pyocd",),), image))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"\x7fELF" + bytes(600), r"this is an \.elf; give the \.bin"),
+        (b"", "no firmware image of this board"),
+        (bytes(4000), "no firmware image of this board"),
+        (struct.pack("<II", 0x2000_4000, 0x0800_0200) + bytes(2000), "no firmware image"),  # not Thumb
+        (struct.pack("<II", 0x2000_4000, 0x0900_0001) + bytes(2000), "no firmware image"),
+        (struct.pack("<II", 0x1000_0000, 0x0800_0201) + bytes(2000), "no firmware image"),
+        (IMAGE + bytes(256 * 1024), "but firmware has room for 262144"),
+    ],
+)
+def test_what_is_no_firmware_is_refused(content: bytes, message: str, tmp_path: Path, tools: Path) -> None:
+    (tmp_path / "bad.bin").write_bytes(content)
+    with pytest.raises(DeviceError, match=message):
+        plan_flash(tmp_path / "bad.bin")
+
+
+def test_an_image_that_is_not_there(tmp_path: Path, tools: Path) -> None:
+    with pytest.raises(FileError, match="no such firmware image"):
+        plan_flash(tmp_path / "none.bin")
+
+
+def test_a_model_too_large_is_refused(image: Path, tools: Path) -> None:
+    with pytest.raises(DeviceError, match="a bank of the board holds 524256"):
+        plan_flash(image, bytes(600_000))
+
+
+def test_the_map_is_the_firmwares() -> None:
+    assert (flash.FIRMWARE_ADDRESS, flash.BANK_ADDRESS, flash.SECOND_BANK_ADDRESS) == (0x08000000, 0x08040000, 0x080C0000)
+    assert flash.FIRMWARE_ADDRESS + flash.FIRMWARE_ROOM == flash.BANK_ADDRESS
+    assert os.sep not in "".join(TOOLS)

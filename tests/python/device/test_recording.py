@@ -1,0 +1,287 @@
+"""Recordings: what was received is read back, after a kill too; damage is counted; frames come out for the other tools."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from device_helpers import FRAMES, QUIET, fresh_skin, sim_board, sim_device
+
+from eitskin.device.client import Device
+from eitskin.device.codec import Decoder, Packet, encode
+from eitskin.device.commands import StreamCommand
+from eitskin.device.open import open_device
+from eitskin.device.packets import PacketType, RawFrame, SolvedImage, SolvedTouches, Stream
+from eitskin.device.recording import Recorder, export_frames, frames_of, read_head
+from eitskin.device.sim import SimTransport
+from eitskin.errors import DeviceError, EitskinError, FileError, FrameError
+from eitskin.frames.frames import load_frames
+from eitskin.solve.reconstructor import Reconstructor
+from small_models import prebuilt, tiny_blob
+
+ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
+
+
+def record(path: Path, *, tare_first: bool = False) -> tuple[list[object], list[Packet]]:
+    """Record a run with its tare; the items that the live run gave, and the packets."""
+    packets: list[Packet] = []
+    with sim_device() as device:
+        if tare_first:
+            device.tare(QUIET)
+        with Recorder(path, device):
+            device.record(packets.append)
+            if not tare_first:
+                device.send_command(StreamCommand(Stream.RAW, 0xFFFF), 1.0)
+                device.tare(QUIET)
+            device.start_scene()
+            items = list(device.stream(ALL))
+    return items, packets
+
+
+def contents(item: object) -> tuple[object, ...]:
+    if isinstance(item, RawFrame):
+        return ("raw", item.frame, item.time_us, item.flags, item.voltage_v.tobytes(), item.quality.tobytes())
+    if isinstance(item, SolvedImage):
+        return ("image", item.solved, item.image.tobytes())
+    assert isinstance(item, SolvedTouches)
+    return ("touches", item)
+
+
+def test_replay_equals_the_live_run(tmp_path: Path) -> None:
+    live, packets = record(tmp_path / "run.eits", tare_first=True)
+    with open_device(f"file:{tmp_path / 'run.eits'}") as device:
+        assert device.board.tared == 1
+        replayed = list(device.stream(ALL))
+        assert device.counters.gaps == device.counters.crc_errors == device.counters.framing_errors == 0
+    assert [contents(item) for item in replayed] == [contents(item) for item in live]
+    assert len(live) == 3 * FRAMES
+    read = Decoder().feed((tmp_path / "run.eits").read_bytes())
+    assert read[0].type == PacketType.RECORDING
+    assert read[1].type == PacketType.INFO
+    assert read[2:] == packets
+
+
+def test_the_head_says_where_it_comes_from(tmp_path: Path) -> None:
+    record(tmp_path / "run.eits")
+    head = read_head(tmp_path / "run.eits")
+    assert head == {
+        "format": "eits", "version": 1, "eitskin": head["eitskin"], "url": "sim:test", "model_crc": "717032ad",
+    }  # fmt: skip
+    assert (tmp_path / "run.eits").read_bytes()[0] == 0
+
+
+def test_kinds_and_every_nth_of_a_recording(tmp_path: Path) -> None:
+    live, _ = record(tmp_path / "run.eits", tare_first=True)
+    raws = [item.frame for item in live if isinstance(item, RawFrame)]
+    with open_device(f"file:{tmp_path / 'run.eits'}") as device:
+        touches = list(device.stream(Stream.TOUCHES, every=3, frames=2))
+    assert [type(item) for item in touches] == [SolvedTouches, SolvedTouches]
+    assert [item.frame for item in touches] == [raws[0], raws[3]]  # type: ignore[union-attr]
+
+
+KILLED = """
+    import sys
+    sys.path[:0] = {paths!r}
+    from device_helpers import QUIET, sim_board
+    from eitskin.device.client import Device
+    from eitskin.device.packets import Stream
+    from eitskin.device.recording import Recorder
+    from eitskin.device.sim import SimTransport
+
+    with Device(SimTransport("test", sim_board())) as device:
+        device.tare(QUIET)
+        with Recorder(sys.argv[1], device):
+            for item in device.stream(Stream(7)):  # the scene is not begun: it goes on for ever
+                print(type(item).__name__, flush=True)
+"""
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_killed_recorder_loses_at_most_the_last_packet(seed: int, tmp_path: Path) -> None:
+    path = tmp_path / "killed.eits"
+    here = Path(__file__).resolve().parent
+    script = textwrap.dedent(KILLED).format(paths=[str(here), str(here.parent)])
+    child = subprocess.Popen([sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None
+    told = [child.stdout.readline().strip() for _ in range(30 + 20 * seed)]
+    time.sleep(0.001 * random.Random(seed).random())
+    os.kill(child.pid, signal.SIGKILL)
+    told += child.stdout.read().split()
+    child.stdout.close()
+    assert child.wait() == -signal.SIGKILL
+    with open_device(f"file:{path}") as device:
+        replayed = list(device.stream(ALL))
+        assert device.counters.gaps == device.counters.crc_errors == 0
+        assert device.counters.framing_errors <= 1  # the packet that was being written
+    assert [type(item).__name__ for item in replayed][: len(told)] == told
+    with Device(SimTransport("test", sim_board())) as device:  # the same run again, live
+        device.tare(QUIET)
+        live = []
+        for item in device.stream(ALL):
+            live.append(contents(item))
+            if len(live) == len(replayed):
+                break
+    assert [contents(item) for item in replayed] == live
+
+
+def test_cut_at_any_byte_the_rest_is_read_and_the_cut_is_counted(tmp_path: Path) -> None:
+    _, packets = record(tmp_path / "run.eits")
+    whole = (tmp_path / "run.eits").read_bytes()
+    all_read = Decoder().feed(whole)
+    ends, place = [], 0
+    for packet in all_read:
+        place += len(encode(packet.type, packet.sequence, packet.payload))
+        ends.append(place)
+    assert place == len(whole)
+    cuts = random.Random(1).sample(range(ends[1], len(whole)), 60)
+    for cut in [*cuts, *ends[1:8], ends[3] + 1, ends[4] - 1]:
+        (tmp_path / "cut.eits").write_bytes(whole[:cut])
+        with open_device(f"file:{tmp_path / 'cut.eits'}") as device:
+            list(device.stream(ALL))
+            complete = sum(end <= cut or end == cut + 1 for end in ends)  # but for its last zero it is whole
+            assert device.counters.packets == complete
+            inside = cut not in ends and cut + 1 not in ends and cut - 1 not in ends
+            assert device.counters.framing_errors + device.counters.crc_errors == inside
+    assert len(packets) > 30
+
+
+def test_damage_inside_is_counted_and_told_as_a_gap(tmp_path: Path) -> None:
+    record(tmp_path / "run.eits", tare_first=True)
+    data = bytearray((tmp_path / "run.eits").read_bytes())
+    data[len(data) // 2] ^= 0x55
+    (tmp_path / "hurt.eits").write_bytes(data)
+    with open_device(f"file:{tmp_path / 'hurt.eits'}") as device:
+        items = list(device.stream(ALL))
+        assert device.counters.crc_errors + device.counters.framing_errors >= 1
+        assert device.counters.gaps == 1
+    assert sum(type(item).__name__ == "LinkEvent" for item in items) == 1
+    assert 3 * FRAMES - 2 <= len(items) <= 3 * FRAMES
+
+
+def test_gaps_of_the_live_run_are_in_the_recording(tmp_path: Path) -> None:
+    board = sim_board()
+    with sim_device(board) as device, Recorder(tmp_path / "run.eits", device):
+        for k, _ in enumerate(device.stream(Stream.RAW, frames=6)):
+            if k == 2:
+                board._sequence += 5
+        live = device.counters.missing
+    assert live == 5
+    with open_device(f"file:{tmp_path / 'run.eits'}") as device:
+        list(device.stream(Stream.RAW))
+        assert (device.counters.missing, device.counters.gaps) == (5, 1)
+
+
+def test_frames_of_a_recording_reconstruct_as_the_board_did(tmp_path: Path) -> None:
+    live, _ = record(tmp_path / "run.eits")
+    frames = frames_of(tmp_path / "run.eits")
+    assert frames.voltage_v.shape == (FRAMES, 208)
+    assert frames.reference_voltage_v.shape == (QUIET, 208)
+    assert frames.time_s is not None
+    assert np.allclose(frames.time_s, np.arange(FRAMES) * 0.05)
+    model, blob = prebuilt()
+    skin = Reconstructor(model, blob=blob)
+    skin.check_protocol(frames.protocol)
+    skin.with_options(warm_start=True)
+    skin.tare(frames.reference_voltage_v)
+    images = [item.image for item in live if isinstance(item, SolvedImage)]
+    assert all(
+        skin.reconstruct(frame).image.astype(np.float32).tobytes() == image.tobytes()
+        for frame, image in zip(frames.voltage_v, images, strict=True)
+    )
+    assert export_frames(tmp_path / "run.eits", tmp_path / "out.npz") == FRAMES
+    assert np.array_equal(load_frames(tmp_path / "out.npz").voltage_v, frames.voltage_v)
+
+
+def test_frames_of_a_recording_without_raw_or_quiet_frames(tmp_path: Path) -> None:
+    with sim_device() as device:
+        device.tare(QUIET)
+        with Recorder(tmp_path / "touches.eits", device):
+            list(device.stream(Stream.TOUCHES, frames=2))
+        with Recorder(tmp_path / "unquiet.eits", device):
+            list(device.stream(Stream.RAW, frames=2))
+    with pytest.raises(FrameError, match="holds no raw frames"):
+        frames_of(tmp_path / "touches.eits")
+    with pytest.raises(FrameError, match="no quiet frame"):
+        frames_of(tmp_path / "unquiet.eits")
+
+
+def test_a_recording_takes_no_commands(tmp_path: Path) -> None:
+    record(tmp_path / "run.eits")
+    with open_device(f"file:{tmp_path / 'run.eits'}") as device:
+        for act in (lambda: device.tare(4), device.stats, device.reset, lambda: device.upload_model(tiny_blob())):
+            with pytest.raises(DeviceError, match=r"is a recording: .* needs a board"):
+                act()
+
+
+def test_another_model_than_the_recorded_boards_is_refused(tmp_path: Path) -> None:
+    record(tmp_path / "run.eits")
+    with pytest.raises(DeviceError, match="--model FILE"):
+        open_device(f"file:{tmp_path / 'run.eits'}", model=tiny_blob())
+    with open_device(f"file:{tmp_path / 'run.eits'}", model=prebuilt()[1]) as device:
+        assert device.board.has_model
+
+
+def head_packet(**changes: object) -> bytes:
+    return encode(PacketType.RECORDING, 0, json.dumps({"format": "eits", "version": 1} | changes).encode())
+
+
+@pytest.mark.parametrize(
+    ("content", "kind", "message"),
+    [
+        (b"", FileError, "no eitskin recording"),
+        (b"text that is none\n" * 100, FileError, "no eitskin recording"),
+        (bytes(5000), FileError, "no eitskin recording"),
+        (encode(PacketType.INFO, 0, b"1234"), FileError, "no eitskin recording"),
+        (encode(PacketType.RECORDING, 0, b"{"), FileError, "first packet says something else"),
+        (encode(PacketType.RECORDING, 0, b"[1]"), FileError, "first packet says something else"),
+        (head_packet(format="edf"), FileError, "first packet says something else"),
+        (head_packet(version="1"), FileError, "first packet says something else"),
+        (head_packet(version=2), DeviceError, "recording version 2, this eitskin reads up to 1; upgrade eitskin"),
+        (head_packet(), DeviceError, "holds no INFO of its board"),
+        (head_packet()[:-3], FileError, "cut in its first bytes"),
+    ],
+)
+def test_what_is_no_recording(content: bytes, kind: type[EitskinError], message: str, tmp_path: Path) -> None:
+    (tmp_path / "bad.eits").write_bytes(content)
+    with pytest.raises(kind) as caught:
+        open_device(f"file:{tmp_path / 'bad.eits'}")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no such recording"):
+        open_device(f"file:{tmp_path / 'none.eits'}")
+    with pytest.raises(FileError, match="cannot read this recording"):
+        open_device(f"file:{tmp_path}")
+    (tmp_path / "there.eits").write_bytes(b"precious")
+    with sim_device() as device:
+        with pytest.raises(FileError, match="exists already; name another file"):
+            Recorder(tmp_path / "there.eits", device)
+        with pytest.raises(FileError, match="cannot write it"):
+            Recorder(tmp_path / "no" / "such.eits", device)
+        Recorder(tmp_path / "there.eits", device, overwrite=True).close()
+    assert (tmp_path / "there.eits").read_bytes() != b"precious"
+
+
+def test_a_full_disk_ends_the_recording_with_an_error() -> None:
+    with sim_device() as device, pytest.raises(FileError, match="what was recorded can be read"):
+        Recorder("/dev/full", device, overwrite=True)
+
+
+def test_a_recording_of_a_recording_is_its_equal(tmp_path: Path) -> None:
+    record(tmp_path / "one.eits")
+    with open_device(f"file:{tmp_path / 'one.eits'}") as device, Recorder(tmp_path / "two.eits", device):
+        list(device.stream(ALL))
+    one, two = (Decoder().feed((tmp_path / name).read_bytes())[2:] for name in ("one.eits", "two.eits"))
+    assert one == two
+    assert fresh_skin()

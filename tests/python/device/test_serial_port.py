@@ -1,0 +1,314 @@
+"""Serial ports on pseudo-terminals: a board behind one, ports that are not there, busy, forbidden, slow to be read, unplugged."""
+
+from __future__ import annotations
+
+import os
+import pty
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from device_helpers import sim_board
+
+from eitskin.device import ports as ports_module
+from eitskin.device.client import Device
+from eitskin.device.commands import Tare
+from eitskin.device.link import LinkEvent, Reconnect
+from eitskin.device.open import list_devices, open_device, open_transport
+from eitskin.device.packets import RawFrame, Stream
+from eitskin.device.ports import Port, SerialTransport
+from eitskin.device.sim import SimTransport
+from eitskin.device.sim_board import SimBoard
+from eitskin.errors import DeviceError, UsageError
+
+SOON = Reconnect(tries=40, every_s=0.05)
+
+
+class Wire:
+    """A simulated board at the far end of a pseudo-terminal, kept going by a thread. ``path`` is the near end."""
+
+    def __init__(self, board: SimBoard | None, *, frame_s: float = 0.0) -> None:
+        self.master, slave = pty.openpty()
+        tty.setraw(slave)
+        tty.setraw(self.master)
+        self.path = os.ttyname(slave)
+        self._slave: int | None = slave
+        self._board, self._frame_s = board, frame_s
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        if board is not None:
+            self._thread.start()
+
+    def _run(self) -> None:
+        assert self._board is not None
+        os.set_blocking(self.master, False)
+        transport = SimTransport("wire", self._board)
+        while not self._stop.is_set():
+            try:
+                transport.write(os.read(self.master, 4096))
+            except BlockingIOError:
+                pass
+            except OSError:
+                return
+            data = transport.read(0.0)
+            while data and not self._stop.is_set():
+                try:
+                    data = data[os.write(self.master, data) :]
+                except BlockingIOError:
+                    time.sleep(0.001)
+                except OSError:
+                    return
+            time.sleep(self._frame_s or 0.001)
+
+    def unplug(self) -> None:
+        """Pull it out: what is open gets errors, and the path is gone."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join(5)
+        if self._slave is not None:
+            os.close(self._slave)
+            self._slave = None
+            os.close(self.master)
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    made = Wire(sim_board())
+    yield made
+    made.unplug()
+
+
+def quick(url: str, **more: object) -> Device:
+    return open_device(url, reconnect=SOON, **more)  # type: ignore[arg-type]
+
+
+def test_a_board_on_a_port(wire: Wire) -> None:
+    with quick(f"serial:{wire.path}") as device:
+        assert device.board.board == "simulated"
+        device.tare(8)
+        frames = [item.frame for item in device.stream(Stream.RAW, frames=20) if isinstance(item, RawFrame)]
+        assert len(frames) == 20
+        assert frames == list(range(frames[0], frames[0] + 20))
+        assert device.counters.gaps == device.counters.crc_errors == 0
+        assert not device.transport.synchronous
+
+
+def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire: Wire) -> None:
+    with quick(f"serial:{wire.path}", room=16) as device:
+        stream = device.stream(Stream.RAW)
+        items = [next(stream)]
+        end = time.monotonic() + 20
+        while device.counters.dropped < 50 and time.monotonic() < end:
+            time.sleep(0.01)
+        for _ in range(200):
+            items.append(next(stream))
+        stats = device.stats()  # an answer is not lost among the frames
+        counters = device.counters
+        stream.close()
+        assert stats.frames_scanned > 200
+        told = sum(item.missing for item in items if isinstance(item, LinkEvent) and item.kind == "dropped")
+        frames = [item.frame for item in items if isinstance(item, RawFrame)]
+        assert frames == sorted(set(frames))
+        assert told >= 50
+        assert frames[-1] - frames[0] + 1 - len(frames) == told  # exactly those that are missing
+        assert counters.gaps == counters.crc_errors == counters.framing_errors == 0  # the port itself never waited
+
+
+def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    board = sim_board()
+    first, there = Wire(board, frame_s=0.005), []
+
+    def ports() -> list[Port]:
+        return [Port(path, "STLink", 0x0483, 0x374B, "SERIAL1") for path in there]
+
+    monkeypatch.setattr(ports_module, "ports", ports)
+    there.append(first.path)
+    second: Wire | None = None
+    try:
+        with quick(f"serial:{first.path}") as device:
+            events, frames = [], []
+            for item in device.stream(Stream.RAW, frames=60):
+                if isinstance(item, LinkEvent):
+                    events.append(item.kind)
+                elif isinstance(item, RawFrame):
+                    frames.append(item.frame)
+                if len(frames) == 10 and second is None:
+                    there.clear()
+                    first.unplug()
+                    second = Wire(board, frame_s=0.005)
+                    there.append(second.path)
+            assert device.transport.name == second.path  # type: ignore[union-attr]
+            assert events[:2] == ["unplugged", "reconnected"]
+            assert device.counters.reconnects == 1
+            assert frames == sorted(set(frames))
+            assert len(frames) >= 55
+    finally:
+        if second is not None:
+            second.unplug()
+
+
+def test_another_board_in_its_place_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from device_helpers import fresh_skin
+
+    first, there = Wire(sim_board(), frame_s=0.005), []
+    monkeypatch.setattr(ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there])
+    there.append(first.path)
+    other = sim_board()
+    skin = fresh_skin()
+    monkeypatch.setattr(type(skin), "serial", property(lambda self: "OTHER" if self is other.skin else "FIRST"))
+    second = Wire(other)
+    try:
+        with quick(f"serial:{first.path}") as device, pytest.raises(DeviceError, match="another board came back"):
+            for k, _ in enumerate(device.stream(Stream.RAW)):
+                if k == 5:
+                    there[:] = [second.path]
+                    first.unplug()
+                assert k < 1000
+    finally:
+        second.unplug()
+
+
+def test_unplugged_for_good_is_an_error_and_no_hang() -> None:
+    wire = Wire(sim_board())
+    with open_device(f"serial:{wire.path}", reconnect=Reconnect(tries=3, every_s=0.02)) as device:
+        began = time.monotonic()
+        with pytest.raises(DeviceError, match=r"the port is gone .*; it did not come back within 0\.06 s: plug it in"):
+            for k, _ in enumerate(device.stream(Stream.RAW)):
+                if k == 3:
+                    wire.unplug()
+        assert time.monotonic() - began < 10
+        with pytest.raises(DeviceError, match="the port is gone"):
+            device.info()
+
+
+def test_a_board_that_dies_on_a_port_that_stays() -> None:
+    wire = Wire(sim_board())
+    try:
+        with open_device(f"serial:{wire.path}") as device:
+            wire._stop.set()
+            wire._thread.join(5)
+            with pytest.raises(DeviceError, match="TARE is not answered within"):
+                device.send_command(Tare(4), 0.1)
+    finally:
+        wire.unplug()
+
+
+def test_a_wrong_baud_rate_is_recognised() -> None:
+    wire = Wire(None)
+    over = threading.Event()
+
+    def babble() -> None:  # again and again: opening a port throws away what was there
+        while not over.wait(0.02):
+            os.write(wire.master, bytes(range(1, 64)))
+
+    noise = threading.Thread(target=babble, daemon=True)
+    noise.start()
+    try:
+        with pytest.raises(DeviceError, match=r"bytes arrive but no packet decodes at 115200 baud: .*serial:PORT\?baud=N"):
+            open_device(f"serial:{wire.path}?baud=115200")
+    finally:
+        over.set()
+        noise.join(5)
+        wire.unplug()
+
+
+def test_a_port_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ports_module, "ports", lambda: [Port("/dev/ttyS9", "old thing")])
+    with pytest.raises(DeviceError, match=r"/dev/ttyNONE: no such port; there are: /dev/ttyS9 \(old thing\)"):
+        open_device("serial:/dev/ttyNONE")
+
+
+def test_a_busy_port(wire: Wire) -> None:
+    first = SerialTransport(wire.path)
+    try:
+        with pytest.raises(DeviceError, match=f"{wire.path}: another program uses it; close that"):
+            SerialTransport(wire.path)
+    finally:
+        first.close()
+    SerialTransport(wire.path).close()  # and free again
+
+
+def test_a_port_without_permission(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Superusers may open anything, so the refusal itself is put in by hand."""
+    import errno
+
+    import serial
+
+    def refuse(*args: object, **kinds: object) -> None:
+        raise serial.SerialException(errno.EACCES, "could not open port: Permission denied")
+
+    monkeypatch.setattr(serial, "Serial", refuse)
+    with pytest.raises(DeviceError) as caught:
+        open_device(f"serial:{wire.path}")
+    text = str(caught.value)
+    assert "no permission to open it" in text
+    assert """'SUBSYSTEM=="tty", ATTRS{idVendor}=="0483", MODE="0660", TAG+="uaccess"'""" in text
+    assert "sudo usermod -aG dialout $USER" in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize("kind", ["file", "folder", "null"])
+def test_what_is_no_serial_port(kind: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"x")
+    path = {"file": tmp_path / "file", "folder": tmp_path, "null": Path("/dev/null")}[kind]
+    with pytest.raises(DeviceError) as caught:
+        open_device(f"serial:{path}")
+    assert "no serial port" in str(caught.value) or "cannot open it" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+BOARD = Port("/dev/ttyACM0", "STM32 STLink", 0x0483, 0x374B, "A")
+OTHER = Port("/dev/ttyUSB0", "adapter", 0x0403, 0x6001, "B")
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        ([], r"no ST-LINK port is there \(serial ports: none\)"),
+        ([OTHER], r"no ST-LINK port is there \(serial ports: /dev/ttyUSB0 \(adapter\)\)"),
+        ([BOARD, Port("/dev/ttyACM1", "STM32 STLink", 0x0483, 0x374E, "C"), OTHER], r"several boards .*ttyACM0.*ttyACM1"),
+    ],
+)
+def test_auto_needs_exactly_one_board(found: list[Port], message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ports_module, "ports", lambda: found)
+    with pytest.raises(DeviceError, match=message):
+        open_device("auto")
+
+
+def test_auto_takes_the_one_board(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ports_module, "ports", lambda: [OTHER, Port(wire.path, "STLink", 0x0483, 0x374B, "A")])
+    with open_device("auto") as device:
+        assert device.transport.name == wire.path
+
+
+def test_devices_are_listed_boards_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("eitskin.device.open.ports", lambda: [Port("/dev/ttyACM9"), BOARD, OTHER])
+    assert [port.path for port in list_devices()] == ["/dev/ttyACM0", "/dev/ttyACM9", "/dev/ttyUSB0"]
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("", "device ''"),
+        ("seral:/dev/ttyACM0", "serial"),
+        ("/dev/ttyACM0", "write  serial:/dev/ttyACM0"),
+        ("COM3", "write  serial:COM3"),
+        ("serial", "serial:/dev/ttyACM0"),
+        ("serial:", "something must follow the colon"),
+        ("auto:x", "as in auto"),
+        ("sim:", "something must follow the colon"),
+        ("serial:/dev/ttyACM0?baud=0", "baud=N"),
+        ("serial:/dev/ttyACM0?baud=fast", "baud=N"),
+        ("serial:/dev/ttyACM0?speed=9600", "baud=N"),
+        ("serial:/dev/ttyACM0?baud=99999999", "baud=N"),
+        ("serial:?baud=9600", "baud=N"),
+    ],
+)
+def test_urls_that_cannot_be_read(url: str, message: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        open_transport(url)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

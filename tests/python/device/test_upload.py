@@ -1,0 +1,234 @@
+"""Models over the wire: whole, cut anywhere, resumed, damaged, refused. The old model stays until the new one is proven."""
+
+from __future__ import annotations
+
+import random
+import zlib
+from pathlib import Path
+
+import pytest
+from device_helpers import QUIET, Damaging, dropping, empty_bank, fresh_skin, same, sim_board, sim_device
+
+from eitskin.device import commands as cmd
+from eitskin.device.bank import bank_bytes, newest_bank, read_record
+from eitskin.device.client import Device
+from eitskin.device.packets import RawFrame, ReplyStatus, Stream
+from eitskin.device.sim import SimTransport
+from eitskin.device.sim_board import SimBoard
+from eitskin.errors import DeviceError, FileError, ModelError
+from small_models import prebuilt, small_blob, tiny_blob
+
+OLD = zlib.crc32(prebuilt()[1])
+
+
+def new_blob() -> bytes:
+    """A model of some pieces."""
+    return small_blob(rank=21)
+
+
+def works(board: SimBoard, crc: int) -> bool:
+    """Whether the board, opened anew, has the model and scans."""
+    with Device(SimTransport("again", board)) as device:
+        device.tare(4)
+        frames = [item for item in device.stream(Stream.RAW, frames=1) if isinstance(item, RawFrame)]
+        return device.board.model_crc == crc and len(frames) == 1
+
+
+def test_a_model_is_taken_up() -> None:
+    tiny = new_blob()
+    seen: list[tuple[int, int]] = []
+    board = sim_board()
+    with sim_device(board) as device:
+        device.tare(QUIET)
+        info = device.upload_model(tiny, lambda done, total: seen.append((done, total)))
+        assert (info.model_crc, info.model_bytes, info.bank, info.tared) == (zlib.crc32(tiny), len(tiny), 1, 0)
+        assert seen[-1] == (len(tiny), len(tiny))
+        assert len(seen) > 3
+        assert [done for done, _ in seen] == [*range(4096, len(tiny), 4096), len(tiny)]
+        back = device.upload_model(prebuilt()[1])
+        assert (back.model_crc, back.bank) == (OLD, 0)
+    assert [read_record(bytes(bank)).generation for bank in board.banks.banks] == [3, 2]  # type: ignore[union-attr]
+    assert works(board, OLD)
+
+
+def test_into_a_board_without_a_model() -> None:
+    with sim_device(sim_board(no_model=True)) as device:
+        info = device.upload_model(tiny_blob())
+        assert (info.model_crc, info.bank, info.fault_codes) == (zlib.crc32(tiny_blob()), 0, ())
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed: int) -> None:
+    generator, tiny = random.Random(seed), new_blob()
+    board, whole = sim_board(), len(tiny) + 2000
+    left = generator.randrange(1, whole)
+
+    def there(data: bytes) -> bytes:
+        nonlocal left
+        passed, left = data[: max(left, 0)], left - len(data)
+        return passed
+
+    with Device(Damaging(SimTransport("cut", board), same, same)) as device:
+        device.transport._there = there  # type: ignore[attr-defined]
+        try:
+            device.upload_model(tiny)
+            cut = False
+        except DeviceError as error:
+            cut = True
+            assert "the upload was cut after" in str(error) or "not answered" in str(error)
+            assert "\n" not in str(error)
+    new = zlib.crc32(tiny)
+    if cut:
+        assert newest_bank([bytes(bank) for bank in board.banks.banks]) == 0
+        rebooted = SimBoard(fresh_skin(), [bytes(bank) for bank in board.banks.banks])
+        assert works(rebooted, OLD)
+    with Device(SimTransport("again", board)) as device:  # without a reboot: goes on where it was cut, or begins anew
+        assert device.board.model_crc in (OLD, new)
+        if device.board.model_crc == OLD:
+            assert device.upload_model(tiny).model_crc == new
+    assert works(board, new)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_over_a_lossy_line(seed: int) -> None:
+    generator, tiny = random.Random(100 + seed), new_blob()
+    board = sim_board()
+    with Device(Damaging(SimTransport("lossy", board), same, same)) as device:
+        transport = device.transport
+        transport._there, transport._back = dropping(generator, 0.15), dropping(generator, 0.15)  # type: ignore[attr-defined]
+        for _ in range(20):
+            try:
+                device.upload_model(tiny)
+                break
+            except DeviceError as error:
+                assert "not answered" in str(error) or "cut after" in str(error)
+    with Device(SimTransport("again", board)) as device:
+        assert device.board.model_crc == zlib.crc32(tiny)
+    bank = board.banks.banks[board.banks.in_use or 0]
+    assert bytes(bank[: len(tiny)]) == tiny
+
+
+def test_an_upload_goes_on_where_it_was_cut() -> None:
+    tiny, board = new_blob(), sim_board()
+    with sim_device(board) as device:
+        assert device.send_command(cmd.ModelBegin(len(tiny), zlib.crc32(tiny)), 1.0).ok
+        assert device.send_command(cmd.ModelData(0, tiny[:2048]), 1.0).ok
+    with sim_device(board) as device:
+        seen: list[int] = []
+        device.upload_model(tiny, lambda done, total: seen.append(done))
+        assert seen[0] == 2048 + 4096
+        assert device.board.model_crc == zlib.crc32(tiny)
+
+
+def test_the_scan_waits_while_a_model_comes() -> None:
+    tiny = tiny_blob()
+    with sim_device() as device:
+        device.send_command(cmd.ModelBegin(len(tiny), zlib.crc32(tiny)), 1.0)
+        for act in (lambda: device.tare(4), lambda: next(device.stream(Stream.RAW)), device.self_test):
+            with pytest.raises(DeviceError, match="the board is busy with MODEL_BEGIN; wait for it"):
+                act()
+
+
+def status(device: Device, command: cmd.Command) -> tuple[ReplyStatus, int]:
+    reply = device.send_command(command, 1.0)
+    return ReplyStatus(reply.status), reply.detail[0]
+
+
+def test_data_out_of_order_or_too_long_are_refused() -> None:
+    tiny = tiny_blob()
+    with sim_device() as device:
+        assert status(device, cmd.ModelBegin(len(tiny), zlib.crc32(tiny))) == (ReplyStatus.OK, 0)
+        assert status(device, cmd.ModelData(4, b"1234")) == (ReplyStatus.OFFSET, 0)
+        assert status(device, cmd.ModelData(0, tiny[:5])) == (ReplyStatus.LENGTH, 12)
+        assert status(device, cmd.ModelData(0, tiny[:8])) == (ReplyStatus.OK, 0)
+        assert status(device, cmd.ModelData(0, tiny[:8])) == (ReplyStatus.OFFSET, 8)
+        assert status(device, cmd.ModelData(8, bytes(len(tiny) - 4))) == (ReplyStatus.RANGE, 4)
+        assert status(device, cmd.ModelCommit()) == (ReplyStatus.OFFSET, 8)
+        assert device.info().model_crc == OLD
+
+
+def sent(device: Device, blob: bytes, crc: int | None = None) -> tuple[ReplyStatus, int]:
+    """Send ``blob`` past the host's own checks; how the board took it."""
+    reply = device.send_command(cmd.ModelBegin(len(blob), zlib.crc32(blob) if crc is None else crc), 1.0)
+    done = reply.detail[0]
+    while reply.ok and done < len(blob):
+        reply = device.send_command(cmd.ModelData(done, blob[done : done + 4096]), 1.0)
+        done += 4096
+    return status(device, cmd.ModelCommit()) if reply.ok else (ReplyStatus(reply.status), reply.detail[0])
+
+
+def reseal(blob: bytearray) -> bytes:
+    blob[12:16] = zlib.crc32(bytes(blob[16:])).to_bytes(4, "little")
+    return bytes(blob)
+
+
+def test_the_board_itself_refuses_what_is_no_model() -> None:
+    tiny = tiny_blob()
+    wrong_bit = bytearray(tiny)
+    wrong_bit[len(tiny) // 2] ^= 1
+    with sim_device() as device:
+        assert sent(device, tiny, crc=123) == (ReplyStatus.MODEL_CRC, 0)
+        assert sent(device, b"x" * 400) == (ReplyStatus.MODEL_INVALID, -4)
+        assert sent(device, bytes(wrong_bit)) == (ReplyStatus.MODEL_INVALID, -6)
+        assert device.info().model_crc == OLD
+        device.tare(4)
+        assert sent(device, tiny) == (ReplyStatus.OK, 0)
+
+
+def test_a_model_whose_golden_frame_gives_other_bits_is_refused() -> None:
+    from eitskin.model.eitm import decode_model, encode_model
+
+    model = decode_model(tiny_blob(), "tiny")
+    from dataclasses import replace
+
+    image = model.golden.image.copy()
+    image[image.argmax()] *= 1.5
+    with sim_device() as device:
+        kind, parts = sent(device, encode_model(replace(model, golden=replace(model.golden, image=image))))
+        assert kind == ReplyStatus.SELF_TEST
+        assert parts > 10**8
+        assert device.info().model_crc == OLD
+        with pytest.raises(DeviceError, match="golden frame's image differs from the model's by"):
+            device.upload_model(encode_model(replace(model, golden=replace(model.golden, image=image))))
+
+
+def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path: Path) -> None:
+    board = sim_board()
+    with sim_device(board) as device:
+        before = board._decoder.counters.packets
+        with pytest.raises(FileError, match="no such model"):
+            device.upload_model(tmp_path / "none.eitm")
+        (tmp_path / "bad.eitm").write_bytes(b"no model at all")
+        with pytest.raises(ModelError):
+            device.upload_model(tmp_path / "bad.eitm")
+        with pytest.raises(ModelError):
+            device.upload_model(b"")
+        with pytest.raises(DeviceError, match="needs 32 electrodes and the board has 16"):
+            device.upload_model(small_blob(electrodes=32))
+        assert board._decoder.counters.packets == before
+
+
+def test_a_model_too_large_for_the_bank_is_refused_by_the_host_and_by_the_board() -> None:
+    room = len(tiny_blob()) + 32 - 16
+    board = SimBoard(fresh_skin(), [bytes([0xFF]) * room, bytes([0xFF]) * room])
+    with sim_device(board) as device:
+        with pytest.raises(DeviceError, match=f"has {len(tiny_blob())} bytes and the board takes {room - 32}"):
+            device.upload_model(tiny_blob())
+        assert status(device, cmd.ModelBegin(room - 31, 0)) == (ReplyStatus.MODEL_SIZE, room - 32)
+
+
+def test_the_scan_of_more_electrodes_than_the_board_has_is_refused_by_the_board() -> None:
+    with sim_device() as device:
+        reply = sent(device, small_blob(electrodes=32))
+        assert reply == (ReplyStatus.MODEL_SCAN, 32)
+        assert device.info().model_crc == OLD
+
+
+def test_generations_wrap() -> None:
+    banks = [bank_bytes(prebuilt()[1], 2**32 - 1), empty_bank()]
+    board = SimBoard(fresh_skin(), banks)
+    with sim_device(board) as device:
+        device.upload_model(tiny_blob())
+    again = SimBoard(fresh_skin(), [bytes(bank) for bank in board.banks.banks])
+    with sim_device(again) as device:
+        assert device.board.model_crc == zlib.crc32(tiny_blob())

@@ -1,0 +1,166 @@
+"""The board's own register header agrees with SVD files that others made: bases, offsets and bits of everything they share.
+
+There is no SVD file of the STM32F7 in a package; the F429's has its older peripherals, the L4's those that came between (USART,
+SPI with a FIFO) and the core's. What neither has is listed here, each with its section of RM0410 or PM0253.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+from svd_files import Device, Register, load_svd
+
+BOARD = Path(__file__).resolve().parents[3] / "firmware" / "boards" / "nucleo_f767zi"
+HEADER = BOARD / "stm32f767.h"
+F4, L4 = "STM32F429x.svd", "STM32L4x2.svd"
+
+# Prefix in the header: file, peripheral there, and other instances whose bases the header names.
+PERIPHERALS = {
+    "RCC": (F4, "RCC"), "PWR": (F4, "PWR"), "FLASH": (F4, "FLASH"), "GPIO": (F4, "GPIOA"), "ADC": (F4, "ADC1"),
+    "DMA": (F4, "DMA2"), "TIM": (F4, "TIM2"), "IWDG": (F4, "IWDG"), "SPI": (L4, "SPI3"), "USART": (L4, "USART3"),
+    "STK": (L4, "STK"), "NVIC": (L4, "NVIC"), "SCB": (L4, "SCB"), "MPU": (L4, "MPU"),
+}  # fmt: skip
+# Registers and fields that have another name there; CTRL and the like of the MPU bear their unit's name.
+RENAMED = {
+    "PWR_CR1": "CR", "PWR_CSR1": "CSR", "SCB_CFSR": "CFSR_UFSR_BFSR_MMFSR", "TIM_CCMR1": "CCMR1_Output",
+    "MPU_CTRL": "MPU_CTRL", "MPU_RNR": "MPU_RNR", "MPU_RBAR": "MPU_RBAR", "MPU_RASR": "MPU_RASR",
+    "NVIC_ISER": "ISER0", "NVIC_ICER": "ICER0", "NVIC_ICPR": "ICPR0", "NVIC_IPR": "IPR0",
+    "DMA_CR": "S0CR", "DMA_NDTR": "S0NDTR", "DMA_PAR": "S0PAR", "DMA_M0AR": "S0M0AR", "DMA_M1AR": "S0M1AR", "DMA_FCR": "S0FCR",
+    "RCC_CFGR_SW": "SW0", "RCC_CFGR_SWS": "SWS0", "RCC_PLLCFGR_PLLM": "PLLM0", "RCC_PLLCFGR_PLLN": "PLLN0",
+    "RCC_PLLCFGR_PLLP": "PLLP0", "RCC_PLLCFGR_PLLQ": "PLLQ0", "RCC_AHB1ENR_DTCMRAMEN": "CCMDATARAMEN",
+    "FLASH_ACR_ARTEN": "ICEN", "FLASH_SR_ERSERR": "PGSERR",
+}  # fmt: skip
+# In neither file.
+ONLY_F7 = {
+    "RCC_PLLCFGR_PLLR": 28,        # RM0410 5.3.2
+    "FLASH_OPTCR_NDBANK": 29,      # RM0410 3.7.6
+    "ADC_SMPR2_SMP3": 9,           # RM0410 15.13.5; the file has no fields there
+    "SCB_CCR_DC": 16,              # PM0253 4.3.7
+    "SCB_CCR_IC": 17,              # PM0253 4.3.7
+    "SCB_CSSELR": 0x84,            # PM0253 4.5.4
+    "SCB_CPACR": 0x88,             # PM0253 4.6.1; checked below against FPU_CPACR
+    "SCB_ICIALLU": 0x250,          # PM0253 4.8
+    "SCB_DCIMVAC": 0x25C,          # PM0253 4.8
+    "SCB_DCISW": 0x260,            # PM0253 4.8
+}  # fmt: skip
+# Not of a peripheral with an SVD: the trace unit and the identifier (Armv7-M C1.8.7, C1.6.5; RM0410 45.1).
+ADDRESSES = {"DWT": 0xE0001000, "UID": 0x1FF0F420, "ADC_COMMON": 0x40012300}
+DWT_OFFSETS = {"DWT_CTRL": 0x00, "DWT_CYCCNT": 0x04, "DWT_LAR": 0xFB0}
+INTERRUPTS = {
+    "DMA1_STREAM1": "DMA1_Stream1", "DMA1_STREAM3": "DMA1_Stream3", "DMA2_STREAM0": "DMA2_Stream0", "ADC": "ADC",
+    "USART3": "USART3",
+}  # fmt: skip
+
+TEXT = HEADER.read_text(encoding="utf-8")
+BASES = {name: int(value, 16) for name, value in re.findall(r"^#define (\w+)_BASE (0x[0-9A-F]+)u", TEXT, re.M)}
+ACCESS = r"(?:REG32|REG16|\(\*\(volatile uint8_t \*\))"
+REGISTER = re.compile(rf"^#define (\w+?)(?:\([\w, ]+\))? {ACCESS}\(\(?(\w+)\)? \+ 0x([0-9A-F]+)u", re.M)
+REGISTERS = {name: (owner, int(offset, 16)) for name, owner, offset in REGISTER.findall(TEXT)}
+BITS = {name: int(bit) for name, bit in re.findall(r"^#define (\w+) \(1u << (\d+)\)", TEXT, re.M)}
+POSITIONS = {name: int(bit) for name, bit in re.findall(r"^#define (\w+)_POS (\d+)u", TEXT, re.M)}
+
+
+@cache
+def device(name: str) -> Device:
+    return load_svd(name)
+
+
+def peripheral_of(name: str) -> tuple[Device, str]:
+    file, key = PERIPHERALS[name.split("_")[0]]
+    if name.startswith("ADC_CCR"):
+        key = "C_ADC"
+    return device(file), key
+
+
+def register_of(name: str) -> tuple[str, Register] | None:
+    """The header's register that ``name`` is or is a field of, and the SVD file's."""
+    parts = name.split("_")
+    ours = "_".join(parts[:2])
+    if parts[0] not in PERIPHERALS:
+        return None
+    source, key = peripheral_of(name)
+    return ours, source.peripherals[key].registers[RENAMED.get(ours, parts[1])]
+
+
+def test_everything_in_the_header_was_read() -> None:
+    defined = set(re.findall(r"^#define (\w+)", TEXT, re.M)) - {"STM32F767_H", "REG32", "REG16"}
+    read = {f"{name}_BASE" for name in BASES} | set(REGISTERS) | set(BITS) | {f"{name}_POS" for name in POSITIONS}
+    constants = {"FLASH_KEY1", "FLASH_KEY2", "SCB_AIRCR_SYSRESETREQ", "UID", "DCB_DEMCR"}
+    assert {name for name in defined - read - constants if not name.startswith("IRQ_")} == set()
+    assert len(REGISTERS) > 80 and len(BITS) > 80 and len(POSITIONS) > 20
+
+
+def test_everything_in_the_header_is_used() -> None:
+    program = "".join(path.read_text(encoding="utf-8") for path in sorted(BOARD.glob("*.c")))
+    program += (BOARD / "nucleo.h").read_text(encoding="utf-8")
+    lines = TEXT.splitlines()
+    for name in re.findall(r"^#define (\w+)", TEXT, re.M):
+        elsewhere = "\n".join(line for line in lines if not line.startswith(f"#define {name}"))
+        assert re.search(rf"\b{name}\b", program + elsewhere) or name == "STM32F767_H", f"{name} is not used"
+
+
+@pytest.mark.parametrize("name", sorted(BASES))
+def test_base(name: str) -> None:
+    if name in ADDRESSES:
+        assert BASES[name] == ADDRESSES[name]
+        return
+    prefix = next(key for key in PERIPHERALS if name.startswith(key))
+    assert BASES[name] == device(PERIPHERALS[prefix][0]).peripherals[name].base
+
+
+@pytest.mark.parametrize("name", sorted(REGISTERS))
+def test_register(name: str) -> None:
+    owner, offset = REGISTERS[name]
+    if name in DWT_OFFSETS:
+        assert (owner, offset) == ("DWT_BASE", DWT_OFFSETS[name])
+    elif name in ONLY_F7:
+        assert offset == ONLY_F7[name]
+    else:
+        found = register_of(name)
+        assert found is not None, f"{name} is checked against nothing"
+        assert offset == found[1].offset
+        if owner.endswith("_BASE"):  # of the peripheral whose name it bears
+            assert owner == ("ADC_COMMON_BASE" if name == "ADC_CCR" else f"{name.split('_')[0]}_BASE")
+
+
+@pytest.mark.parametrize("name", sorted(BITS | POSITIONS))
+def test_field(name: str) -> None:
+    bit = (BITS | POSITIONS)[name]
+    if name in ONLY_F7:
+        assert bit == ONLY_F7[name]
+        return
+    if name.startswith(("DWT_", "DCB_")):
+        assert bit == {"DWT_CTRL_CYCCNTENA": 0, "DCB_DEMCR_TRCENA": 24}[name]  # Armv7-M C1.8.7, C1.6.5
+        return
+    found = register_of(name)
+    assert found is not None, f"{name} is checked against nothing"
+    field = RENAMED.get(name, name.removeprefix(found[0] + "_"))
+    lowest, width = found[1].fields[field]
+    assert bit == lowest
+    assert name in RENAMED or (width == 1) == (name in BITS), f"{field} has {width} bits"
+
+
+def test_registers_of_one_stream_are_0x18_apart() -> None:
+    registers = device(F4).peripherals["DMA2"].registers
+    for stream in range(4):
+        assert registers[f"S{stream}CR"].offset == 0x10 + 0x18 * stream
+    assert TEXT.count("+ 0x18u * (stream)") == 6
+
+
+def test_access_control_of_the_fpu() -> None:
+    assert BASES["SCB"] + REGISTERS["SCB_CPACR"][1] == device(L4).peripherals["FPU_CPACR"].base
+
+
+def test_reset_request() -> None:
+    """The key 0x05FA in the upper half, and SYSRESETREQ (PM0253 4.3.5)."""
+    bit = device(L4).peripherals["SCB"].registers["AIRCR"].fields["SYSRESETREQ"][0]
+    assert f"0x05FA0000u | (1u << {bit})" in TEXT
+
+
+def test_interrupts() -> None:
+    numbers = {name: int(value) for name, value in re.findall(r"^#define IRQ_(\w+) (\d+)u", TEXT, re.M)}
+    assert numbers.pop("COUNT") == 110  # RM0410 table 46
+    assert numbers == {name: device(F4).interrupts[theirs] for name, theirs in INTERRUPTS.items()}

@@ -1,0 +1,112 @@
+"""What frames show in words: lines, JSON, and the error to the scene's truth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+
+from eitskin.core.results import Touch
+from eitskin.device.known_model import KnownModel
+from eitskin.device.live import LiveFrame
+from eitskin.device.packets import Quality, RawFrame, Solved, SolvedImage, SolvedTouches
+from eitskin.scene.library_scenes import find_scene
+from eitskin.study.scene_truth import SceneTruth
+from eitskin.study.watch import Watcher, line, spread, table
+from small_models import prebuilt
+
+SOLVED = Solved(7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0)
+
+
+def touches(*places: tuple[float, float], status: int = 0, time_us: int = 1000) -> LiveFrame:
+    found = tuple(Touch(k + 1, x, y, 8.0, 3.0, 0.5) for k, (x, y) in enumerate(places))
+    return LiveFrame(7, 0, time_us, touches=SolvedTouches(replace(SOLVED, status=status, count=len(found)), found))
+
+
+def image(*places: tuple[float, float], sign: float = 1.0) -> LiveFrame:
+    """An image with a disc at each place."""
+    centres = prebuilt()[0].grid.centres_mm()
+    values = sum((np.linalg.norm(centres - place, axis=1) < 10 for place in places), np.zeros(len(centres)))
+    return LiveFrame(7, 0, 1000, image=SolvedImage(SOLVED, (0.01 * sign * values).astype(np.float32)))
+
+
+def watcher(scene: str = "two_touch", sign: str = "increase") -> Watcher:
+    return Watcher(KnownModel(*prebuilt()), SceneTruth(find_scene(scene), sign))
+
+
+def test_touches_are_paired_with_the_true_ones() -> None:
+    look = watcher()
+    seen = look.see(touches((30.0, -24.0), (-40.0, 13.0), (0.0, 0.0)))
+    assert seen.errors_mm == {0: pytest.approx(1.0), 1: pytest.approx(3.0)}
+    text = line(seen)
+    assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text and text.endswith("3.00 S/m mm2, false")
+    facts = table(seen)
+    assert [touch["error_mm"] for touch in facts["touches"]] == [pytest.approx(1.0), pytest.approx(3.0), None]
+    assert len(facts["true"]) == 2
+    assert look.score.as_dict() == {
+        "frames": 1, "true": 2, "found": 2, "false": 1, "position_median_mm": pytest.approx(2.0),
+        "position_worst_mm": pytest.approx(3.0),
+    }  # fmt: skip
+    assert "2 of 2 touches found, 1 false; position error median 2.00 mm, worst 3.00 mm" in look.score.text()
+
+
+def test_nothing_found_is_no_error_of_zero() -> None:
+    look = watcher()
+    assert line(look.see(touches())).endswith("no touch")
+    assert look.score.as_dict()["position_worst_mm"] is None and "position error" not in look.score.text()
+    assert look.score.missed == 2
+
+
+def test_touches_that_are_not_looked_for_are_not_missed() -> None:
+    look = watcher(sign="decrease")
+    look.see(touches())
+    assert look.score.missed == 0
+
+
+def test_a_moving_touch_is_where_it_is_at_the_boards_time() -> None:
+    truth = SceneTruth(find_scene("swipe"))
+    truth.begin(2**32 - 500_000)
+    times = np.linspace(0, 1.95, 40)
+    found = [truth.touches(int(2**32 - 500_000 + 1e6 * t) % 2**32) for t in times]
+    x = np.array([one[0].x_mm for one in found if one])
+    assert len(x) > 30 and (np.diff(x) > 0).all()
+    assert truth.touches(int(1e9)) == truth.touches(int(2e9))  # the last frame stays
+
+
+def test_a_refused_frame_says_why_and_is_not_scored() -> None:
+    look = watcher()
+    seen = look.see(touches(status=-5))
+    assert "refused: " in line(seen) and "refused" in table(seen) and look.score.frames == 0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_image_in_brief(sign: float) -> None:
+    seen = Watcher(KnownModel(*prebuilt()), None).see(image((-40.0, 10.0), (30.0, -25.0), sign=sign))
+    assert seen.view is not None and seen.view.places_mm is not None
+    distance = np.linalg.norm(seen.view.places_mm[:, None] - np.array([(-40.0, 10.0), (30.0, -25.0)]), axis=2)
+    assert (distance.min(axis=0) < 3).all() and len(distance) == 2
+    assert seen.view.peak == pytest.approx(0.01 * sign) and seen.errors_mm is None
+    assert "off by" not in line(seen)
+    assert Watcher(KnownModel(*prebuilt()), None).see(image()).view is not None
+    assert line(Watcher(KnownModel(*prebuilt()), None).see(image())).endswith("image: flat")
+
+
+def test_raw_rows_that_are_missing_become_null() -> None:
+    volts = np.linspace(1, 2, 5).astype(np.float32)
+    volts[2] = np.nan
+    quality = np.array([0, 0, Quality.OPEN | Quality.SATURATED, Quality.COPIED, 0], dtype=np.uint8)
+    seen = Watcher(None, None).see(LiveFrame(3, 250_000, 9, raw=RawFrame(3, 9, 20_800, 0, volts, quality)))
+    facts = json.loads(json.dumps(table(seen), allow_nan=False))
+    assert facts["voltage_v"][2] is None and facts["voltage_v"][0] == 1.0 and facts["time_s"] == 0.25
+    assert "5 rows in 20.80 ms" in line(seen) and "1 not usable" in line(seen) and "nan" not in line(seen)
+
+
+def test_spread_keeps_the_ends() -> None:
+    seen = [Watcher(None, None).see(touches()) for _ in range(100)]
+    kept = spread(seen, 36)
+    assert len(kept) == 36 and kept[0] is seen[0] and kept[-1] is seen[-1]
+    assert spread(seen[:3], 36) == seen[:3]

@@ -1,0 +1,50 @@
+"""Pictures of a stream: one frame, many, and more than are kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("scipy")
+
+from eitskin.device.live import LiveFrame
+from eitskin.device.packets import Solved, SolvedImage
+from eitskin.scene.random_touches import Touch
+from eitskin.study.watch import Seen
+from eitskin.view.stream_picture import MOST_KEPT, MOST_PANELS, Album, draw_stream
+from small_models import prebuilt
+
+PNG = b"\x89PNG\r\n\x1a\n"
+SOLVED = Solved(7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0)
+
+
+def seen(number: int) -> Seen:
+    values = np.zeros(812, dtype=np.float32)
+    values[number % 812] = 1.0
+    return Seen(LiveFrame(number, 1000 * number, 0, image=SolvedImage(SOLVED, values)), true=(Touch(0.0, 0.0, 9.0, 5.0),))
+
+
+def album(count: int) -> Album:
+    kept = Album()
+    for number in range(count):
+        kept.add(seen(number))
+    return kept
+
+
+@pytest.mark.parametrize("count", [1, 2, 50])
+def test_pictures(count: int, tmp_path: Path) -> None:
+    path = tmp_path / "picture.png"
+    draw_stream(path, prebuilt()[0], album(count), title="a board")
+    assert path.read_bytes()[:8] == PNG and path.stat().st_size > 5000
+
+
+def test_a_long_stream_is_thinned_and_its_last_frame_kept() -> None:
+    long = album(5 * MOST_KEPT + 3)
+    numbers = [one.frame.number for one in long.frames]
+    assert len(numbers) == MOST_PANELS and numbers[0] == 0 and numbers[-1] == 5 * MOST_KEPT + 2
+    assert len(long._kept) < MOST_KEPT and long.count == 5 * MOST_KEPT + 3
+    steps = np.diff(numbers)
+    assert steps.max() < 2 * steps.min() + 20
