@@ -70,10 +70,7 @@ static void list_unique(fw_engine *engine)
 
 static eits_status start_core(fw_engine *engine)
 {
-    const eits_status status =
-        eits_init(&engine->ctx, &engine->model, engine->workspace, eits_workspace_size(&engine->model, 0));
-    engine->ctx.options.warm_start = 1;
-    return status;
+    return eits_init(&engine->ctx, &engine->model, engine->workspace, eits_workspace_size(&engine->model, 0));
 }
 
 eits_status fw_engine_open(fw_engine *engine, const eits_model *model)

@@ -154,7 +154,7 @@ static eits_packet_reply solver_with(eits_command_solver c)
 
 static void test_solver(void)
 {
-    const eits_command_solver good = {.iterations = 7, .max_touches = 3, .warm_start = 0, .sign = 2, .lambda_rel = 0.05f, .gap_rel = 0.01f};
+    const eits_command_solver good = {.iterations = 7, .max_touches = 3, .warm_start = 1, .sign = 2, .lambda_rel = 0.05f, .gap_rel = 0.01f};
     eits_command_solver c = good;
     c.iterations = 0;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1);
@@ -178,12 +178,12 @@ static void test_solver(void)
     c.gap_rel = -0.1f;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 24, 0);
     const eits_options *options = &b.host.instrument.engine.ctx.options;
-    CHECK_EQUAL(options->warm_start, 1); /* on a board, warm is the default */
+    CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->iterations, 30);
     REPLY(solver_with(good), EITS_REPLY_OK, 0, 0);
     CHECK_EQUAL(options->iterations, 7);
     CHECK_EQUAL(options->max_touches, 3);
-    CHECK_EQUAL(options->warm_start, 0);
+    CHECK_EQUAL(options->warm_start, 1);
     CHECK_EQUAL(options->sign, EITS_SIGN_BOTH);
     CHECK_NEAR(options->lambda_rel, 0.05f, 0);
     CHECK_NEAR(options->gap_rel, 0.01f, 0);

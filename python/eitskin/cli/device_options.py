@@ -60,8 +60,8 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     solver.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
     solver.add_argument("--sign", choices=("increase", "decrease", "both"), help="which changes to look for (default: increase)")
     start = solver.add_mutually_exclusive_group()
-    start.add_argument("--warm", action="store_true", help="begin each frame from the last one's result (default)")
-    start.add_argument("--cold", action="store_true", help="begin each frame from nothing")
+    start.add_argument("--warm", action="store_true", help="begin each frame from the last one's result")
+    start.add_argument("--cold", action="store_true", help="begin each frame from nothing (default)")
     tare = parser.add_argument_group("reference")
     tare.add_argument(
         "--tare",

@@ -86,7 +86,7 @@ def _usual(electrodes: int) -> Iterator[Protocol]:
 
 
 def board_options(model: Model) -> Options:
-    """The options that a board starts with: the model's own, and each frame begun from the last one's result."""
+    """The options that a board starts with: the model's own."""
     from eitskin.solve.options import default_options
 
-    return replace(default_options(model), warm_start=True)
+    return default_options(model)

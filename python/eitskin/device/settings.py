@@ -32,7 +32,7 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """The board's solver; None stays at the model's own, ``warm_start`` at on."""
+    """The board's solver; None stays at the model's own, ``warm_start`` at off."""
 
     iterations: int | None = None
     gap_rel: float | None = None

@@ -35,7 +35,7 @@ def core_status(error: EitskinError) -> int:
 
 
 class SimSolver:
-    """A model taken up by the core, warm start on, as the firmware has it; not tared.
+    """A model taken up by the core, as the firmware does; not tared.
 
     Raises:
         ModelError: the core refuses the model.
@@ -45,7 +45,7 @@ class SimSolver:
         self.blob = blob
         self.engine = CoreEngine(blob)
         self.model = decode_model(blob, "the model")
-        self.options = replace(default_options(self.model), warm_start=True)
+        self.options = default_options(self.model)
         self.engine.set_options(self.options)
         self.masked = np.zeros(self.model.protocol.n_rows, dtype=np.bool_)
         self.tared = False

@@ -123,9 +123,9 @@ def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     def infos(*options: str) -> list[dict[str, Any]]:
         return [line["info"] for line in json_lines(done("stream", "--device", f"sim:{scene}", "--json", *options))[:-1]]
 
-    assert {info["iterations"] for info in infos("--iterations", "7", "--cold")} == {7}
+    assert {info["iterations"] for info in infos("--iterations", "7")} == {7}
     assert {info["stop"] for info in infos("--gap", "0.05", "--iterations", "1000")} == {"gap"}
-    warm, cold = infos("--iterations", "10"), infos("--iterations", "10", "--cold")
+    warm, cold = infos("--iterations", "10", "--warm"), infos("--iterations", "10", "--cold")
     assert warm[0]["gap_rel"] == cold[0]["gap_rel"] and warm[-1]["gap_rel"] < 0.5 * cold[-1]["gap_rel"]
     assert infos("--sign", "decrease", "--iterations", "3")[0]["nonzeros"] != infos("--iterations", "3")[0]["nonzeros"]
 
@@ -318,5 +318,5 @@ def test_frames_of_a_recording_give_the_boards_touches(done: Done, scene: Path, 
     model: Model = prebuilt()[0]
     assert frames.protocol.hash == model.protocol.hash and frames.meta["board"]["board"] == "simulated"
     board = json_lines(done("replay", run, "--json"))[:-1]
-    host = strict(done("reconstruct", exported, "--warm", "--json"))["frames"]
+    host = strict(done("reconstruct", exported, "--json"))["frames"]
     assert [[t["x_mm"] for t in f["touches"]] for f in host] == [[t["x_mm"] for t in f["touches"]] for f in board]

@@ -146,8 +146,10 @@ def test_a_changed_bit_in_the_reference_shows_everywhere(
     assert len(json.loads(capsys.readouterr().out)["different"]) == FRAMES
 
 
-def test_frames_after_a_loss_are_not_called_different(done: Done, run: Path, tmp_path: Path) -> None:
+def test_frames_after_a_loss_are_not_called_different(done: Done, scene: Path, tmp_path: Path) -> None:
     """A warm solve begins from the last one: without it, the host's has other bits and nobody's fault it is."""
+    run = tmp_path / "warm.eits"
+    done("record", "--device", f"sim:{scene}", "-o", run, "--warm")
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
     facts = json.loads(done("replay", other, "--check", "--json"))
     assert facts["different"] == [] and facts["same"] == 1 and facts["untold"] == FRAMES - 2 and facts["alone"] == 1

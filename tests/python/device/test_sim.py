@@ -40,7 +40,7 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit() -> None:
     assert [type(item) for item in items[:3]] == [RawFrame, SolvedImage, SolvedTouches]
     true = simulate_frames(compile_scene(scene())).voltage_v.astype(np.float32)
     assert all(raw.voltage_v.tobytes() == frame.tobytes() for raw, frame in zip(raws, true[QUIET:], strict=True))
-    skin = Reconstructor(model, blob=blob, options=replace(default_options(model), warm_start=True))
+    skin = Reconstructor(model, blob=blob, options=default_options(model))
     skin.tare(true[:QUIET])
     for raw, image, found in zip(raws, images, touches, strict=True):
         result = skin.reconstruct(raw.voltage_v)
@@ -303,7 +303,7 @@ def test_options_of_the_solver_are_taken() -> None:
     with sim_device() as device:
         device.tare(QUIET)
         device.start_scene()
-        device.solver(replace(options, iterations=7, warm_start=False))
+        device.solver(replace(options, iterations=7, warm_start=True))
         image = by_kind(list(device.stream(Stream.IMAGE, frames=1)), SolvedImage)[0]
         assert image.solved.iterations == 7
         with pytest.raises(UsageError):

@@ -103,7 +103,7 @@ def test_the_voltages_are_the_skins(run: Run) -> None:
 def test_the_same_bits_as_the_host(run: Run) -> None:
     model, blob = load_prebuilt()
     host = CoreEngine(blob)
-    host.set_options(replace(default_options(model), warm_start=True))
+    host.set_options(default_options(model))
     raws = of(RawFrame, run.packets)
     host.set_baseline(np.array([raw.voltage_v for raw in raws if raw.quiet], dtype=np.float64))
     images = {one.solved.frame: one for one in of(SolvedImage, run.packets)}
