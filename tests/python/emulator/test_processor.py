@@ -44,7 +44,8 @@ def test_where_slices_end_changes_neither_results_nor_time_nor_counts(monkeypatc
 def test_an_instruction_takes_a_cycle() -> None:
     """CYCCNT read twice around 100 NOPs: 100, and what the read itself takes, which is found without them."""
     nops = '__asm volatile(".rept %d\\n nop\\n .endr");'
-    source = CLOCK + "void program(void) { %s cycle_counter(); uint32_t a = DWT_CYCCNT; %s uint32_t b = DWT_CYCCNT; OUT[0] = b - a; }"
+    timed = "uint32_t a = DWT_CYCCNT; %s uint32_t b = DWT_CYCCNT; OUT[0] = b - a;"
+    source = CLOCK + "void program(void) { %s cycle_counter(); " + timed + " }"
     for clock in ("", "clock_216();"):
         with_them, without = (out(run_program(source % (clock, nops % n), 1000), 1)[0] for n in (100, 0))
         assert with_them - without == 100
@@ -97,7 +98,8 @@ __attribute__((naked)) void svcall(void) {
 void program(void) {
     uint32_t before, after; float f = 2.5f;
     %s
-    __asm volatile("mov %%0, sp\\n movs r0, #11\\n movs r1, #12\\n svc #0\\n mov %%1, sp\\n" : "=r"(before), "=r"(after) :: "r0", "r1", "memory");
+    __asm volatile("mov %%0, sp\\n movs r0, #11\\n movs r1, #12\\n svc #0\\n mov %%1, sp\\n"
+                   : "=r"(before), "=r"(after) :: "r0", "r1", "memory");
     OUT[3] = before; OUT[4] = after; OUT[5] = *(volatile uint32_t *)OUT[0]; OUT[6] = ((volatile uint32_t *)OUT[0])[1];
     %s
 }
@@ -119,7 +121,11 @@ def test_a_frame_has_8_words_or_26_after_floating_point() -> None:
 
 def test_floating_point_registers_survive_a_handler_that_uses_them() -> None:
     source = """
-    void systick(void) { __asm volatile("vmov.f32 s0, #1.0\\n vmov.f32 s15, #1.0\\n vcmp.f32 s0, s0\\n vmrs APSR_nzcv, FPSCR\\n" ::: "s0", "s15"); ++OUT[1]; }
+    void systick(void) {
+        __asm volatile("vmov.f32 s0, #1.0\\n vmov.f32 s15, #1.0\\n" ::: "s0", "s15");
+        __asm volatile("vcmp.f32 s0, s0\\n vmrs APSR_nzcv, FPSCR\\n" ::: "s0");
+        ++OUT[1];
+    }
     void program(void) {
         float sum = 0; OUT[1] = 0;
         STK_LOAD = 777; STK_VAL = 0; STK_CTRL = 7;
@@ -201,7 +207,8 @@ FAULT = """
 static void tell(uint32_t which, uint32_t *frame) {
     OUT[0] = which; OUT[1] = frame[6]; OUT[2] = SCB_CFSR; OUT[3] = SCB_HFSR; OUT[4] = SCB_BFAR; OUT[5] = SCB_MMFAR; for (;;) ;
 }
-#define TELL(name, number) __attribute__((naked)) void name(void) { __asm volatile("mov r1, sp\\n movs r0, #" #number "\\n b tell_all\\n"); }
+#define TELL(name, number) \\
+    __attribute__((naked)) void name(void) { __asm volatile("mov r1, sp\\n movs r0, #" #number "\\n b tell_all\\n"); }
 __attribute__((used)) void tell_all(uint32_t which, uint32_t *frame) { tell(which, frame); }
 TELL(hard_fault, 3) TELL(memory_fault, 4) TELL(bus_fault, 5) TELL(usage_fault, 6)
 __attribute__((noinline)) uint32_t load(uint32_t at) { return *(volatile uint32_t *)at; }
@@ -211,7 +218,7 @@ void program(void) {
     OUT[8] = 1;
 }
 """
-BUS, MEM, USAGE = 1 << 17, 1 << 16, 1 << 18
+DENY = "SCB_SHCSR |= 7u << 16; MPU_RBAR = %s; MPU_RASR = %du << 1 | 1; MPU_CTRL = 5;"
 
 
 @pytest.mark.parametrize(
@@ -222,8 +229,8 @@ BUS, MEM, USAGE = 1 << 17, 1 << 16, 1 << 18
         ("SCB_SHCSR |= 7u << 16; REG32(0x08000100u) = 1;", 5, 1 << 15 | 1 << 9, 0),
         ('SCB_SHCSR |= 7u << 16; __asm volatile("udf #0");', 6, 1 << 16, 0),
         ("SCB_SHCSR |= 7u << 16; ((void (*)(void))0x60000001u)();", 5, 1 << 8, 0),
-        ("SCB_SHCSR |= 7u << 16; MPU_RBAR = 0; MPU_RASR = 13u << 1 | 1; MPU_CTRL = 5; load(0x10);", 4, 1 << 7 | 1 << 1, 0),
-        ("SCB_SHCSR |= 7u << 16; MPU_RBAR = 0x20000000u; MPU_RASR = 7u << 1 | 1; MPU_CTRL = 5; REG32(0x20000010u) = 1;", 4, 1 << 7 | 1 << 1, 0),
+        (DENY % ("0", 13) + "load(0x10);", 4, 1 << 7 | 1 << 1, 0),
+        (DENY % ("0x20000000u", 7) + "REG32(0x20000010u) = 1;", 4, 1 << 7 | 1 << 1, 0),
     ],
     ids=["hard", "load", "flash", "undefined", "fetch", "null pointer", "guard"],
 )

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
 OUT = 0x20010000  # where programs leave what they found
 STACK_TOP = 0x20008000
-FLAGS = ("-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard", "-O1", "-ffreestanding", "-nostdlib", "-fno-builtin", "-fno-tree-loop-distribute-patterns")
+FLAGS = "-mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard -O1 -ffreestanding -nostdlib -fno-builtin".split()
 LINK = """
 SECTIONS {
     . = 0x08000000;
@@ -38,6 +38,8 @@ HEAD = """
 #define T_CR1(tim) REG32((tim) + 0x00u)
 #define T_DIER(tim) REG32((tim) + 0x0Cu)
 #define T_SR(tim) REG32((tim) + 0x10u)
+#define U_ISR(usart) REG32((usart) + 0x1Cu)
+#define U_RDR(usart) REG32((usart) + 0x24u)
 """
 START = """
 #define WEAK __attribute__((weak, alias("unexpected")))

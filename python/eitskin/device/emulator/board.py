@@ -106,6 +106,7 @@ class EmulatedBoard:
     def _wire(self) -> None:
         rcc, ports = self.rcc, self.ports
         self.schedule.earlier = self.cpu.shorten
+        self.line.host_sends = self.usart.plan
         rcc.over_drive, rcc.wait_states, rcc.mco_changed = lambda: self.pwr.ready(17), self.flash.wait_states, self._mco
         for number, timer in self.timers.items():
             timer.masters = {itr: self.timers[master] for itr, master in MASTERS[number].items()}
@@ -163,6 +164,15 @@ class EmulatedBoard:
         """Power goes and comes back: RAM and what is on the wire are lost, flash is not."""
         self.line.clear()
         self.reset("power")
+
+    def send(self, data: bytes) -> None:
+        """The host sends ``data``: at 1 Mbaud from now on, or when what it sent before has left."""
+        self.line.send(data)
+
+    def receive(self) -> bytes:
+        """What the host has received whole and not taken before."""
+        self.usart.bring_up_to_date()
+        return self.line.receive(self.clock.now)
 
     def bank(self, number: int) -> bytes:
         """What a model bank holds."""

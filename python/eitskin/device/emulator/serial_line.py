@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from eitskin.device.emulator.clocktime import TICKS_PER_S, BoardClock
@@ -32,7 +33,7 @@ class Run:
 
 
 class SerialLine:
-    """Both directions."""
+    """Both directions; ``host_sends`` is called when the host begins to send."""
 
     def __init__(self, clock: BoardClock, baud: int = BAUD) -> None:
         self._clock = clock
@@ -40,6 +41,7 @@ class SerialLine:
         self._down: deque[Run] = deque()
         self._up: deque[Run] = deque()
         self._host_free_at = 0
+        self.host_sends: Callable[[], None] = lambda: None
 
     def agrees(self, frame_ticks: int) -> bool:
         """Whether a side with frames of this length understands the line."""
@@ -53,6 +55,7 @@ class SerialLine:
             start = max(self._clock.now, self._host_free_at)
             self._host_free_at = start + len(data) * self.frame_ticks
             self._down.append(Run(data, start + self.frame_ticks, self.frame_ticks))
+            self.host_sends()
 
     def receive(self, at: int) -> bytes:
         """What the board sent and the host has whole by ``at``."""

@@ -52,7 +52,7 @@ class EmulatedTransport:
         board.run_until(until, enough)
         if line.up_next_end() <= board.clock.now:
             board.run_until(min(board.clock.now + GATHER_TICKS, until))
-        return line.receive(board.clock.now)
+        return board.receive()
 
     def write(self, data: bytes) -> None:
         """Send ``data``: it reaches the board at 1 Mbaud from now on.
@@ -61,7 +61,7 @@ class EmulatedTransport:
             DeviceError: it is closed.
         """
         self._check_open()
-        self.board.line.send(data)
+        self.board.send(data)
 
     def reopen(self) -> bool:
         return not self._closed

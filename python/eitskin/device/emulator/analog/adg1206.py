@@ -31,7 +31,7 @@ class Multiplexers:
 
     def __init__(self) -> None:
         self._address = self._enable = 0
-        self._off_at = [0] * 4
+        self._off_at = [-OFF_TICKS] * 4
         self.switched: Callable[[Switching], None] = lambda switching: None
         self.joined: tuple[int | None, int | None, int | None, int | None] = (None,) * 4
         self.log: list[Switching] = []

@@ -58,6 +58,8 @@ class Stream:
         """Items from here to the next flag that interrupts; None: none does."""
         if not self.enabled:
             return None
+        if self.control & TEIE and self.dma.memories.find(self._address(), self.item_bytes) is None:
+            return 1
         half = self.left - self.whole // 2
         if self.control & HTIE and half > 0:
             return half
