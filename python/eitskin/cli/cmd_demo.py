@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.errors import MissingExtraError, UsageError
+from eitskin.errors import FileError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
     from eitskin.study.demo_board import BoardDemo
@@ -63,12 +63,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _board() -> BoardDemo | None:
-    """The same touches on the emulated board; None, with a word on stderr, where the emulator is not installed."""
+    """The same touches on the emulated board; None, with a word on stderr, where emulator or firmware are not installed."""
     from eitskin.study.demo_board import run_board_demo
 
     try:
         return run_board_demo(BOARD)
-    except MissingExtraError as error:
+    except (MissingExtraError, FileError) as error:
         print(f"eitskin: without the emulated board: {error}", file=sys.stderr)
         return None
 
