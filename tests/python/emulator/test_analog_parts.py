@@ -46,8 +46,8 @@ def test_the_output_follows_the_accumulator() -> None:
     times = 1000 + np.arange(0, 40 * TICKS_PER_US, 97)
     cycles = (times - 1000) // MCLK_TICKS
     exact = np.sin(2 * np.pi * (STEP * cycles % FULL_TURN) / FULL_TURN)
-    assert np.abs(generator.output(times) - exact).max() < 2 * np.pi / 4096 + 1 / 511
-    assert abs(generator.output(times)[0]) < 2e-3
+    assert np.abs(generator.output(times) - exact).max() < 1e-9
+    assert abs(generator.output(times)[0]) < 1e-9
 
 
 def test_phase_register_waveforms_and_reset() -> None:

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
 OUT = 0x20010000  # where programs leave what they found
 STACK_TOP = 0x20008000
-FLAGS = "-mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard -O1 -ffreestanding -nostdlib -fno-builtin".split()
+FLAGS = ["-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard", "-O1", "-ffreestanding"]
 LINK = """
 SECTIONS {
     . = 0x08000000;
@@ -72,7 +72,8 @@ def compile_program(source: str, irqs: tuple[int, ...] = ()) -> bytes:
         (folder / "start.c").write_text(HEAD + START % (declared, entries))
         (folder / "program.c").write_text(HEAD + source)
         (folder / "link.ld").write_text(LINK)
-        command = ["arm-none-eabi-gcc", *FLAGS, f"-I{BOARD}", "-T", "link.ld", "start.c", "program.c", "-o", "a.elf", "-lgcc"]
+        flags = [*FLAGS, "-nostdlib", "-fno-builtin", f"-I{BOARD}"]
+        command = ["arm-none-eabi-gcc", *flags, "-T", "link.ld", "start.c", "program.c", "-o", "a.elf", "-lgcc"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", "a.elf", "a.bin"], cwd=folder, check=True)

@@ -1,7 +1,8 @@
 """The emulated board: processor, peripherals and analog parts put together, and the loop that lets time pass.
 
 The loop executes slices that end where the next event is due, takes exceptions between them, and skips to the next event when
-the processor sleeps. While nothing but PRIMASK, BASEPRI or FAULTMASK holds an interrupt back, slices are single instructions.
+the processor sleeps. While nothing but PRIMASK, BASEPRI or FAULTMASK holds an interrupt back, slices are single instructions, and
+longer and longer only where that lasts for over a thousand: a program that hangs with interrupts off must end too.
 Nothing in it depends on the host's clock: the same image, banks, scene and input give the same bytes.
 """
 
@@ -39,6 +40,7 @@ from eitskin.device.emulator.serial_line import SerialLine
 from eitskin.errors import DeviceError
 
 LONGEST_SLICE = 5_000_000
+EXACTLY_MASKED = 1000
 FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN = 2, 12, 8, 3
 SCK_PIN, MOSI_PIN, TX_PIN, RX_PIN = 10, 12, 8, 9
 MCO_FUNCTION, SPI3_FUNCTION, USART3_FUNCTION = 0, 6, 7
@@ -74,6 +76,7 @@ class EmulatedBoard:
         self._wire()
         self._reset_cause: str | None = "power"
         self._asleep = self.locked_up = False
+        self._masked = 0  # slices since an interrupt waits behind a mask
         self._later: list[Callable[[], None]] = []
 
     # ---- construction ----
@@ -257,7 +260,10 @@ class EmulatedBoard:
         cycles = -(-(due - self.clock.now) // self.clock.cycle_ticks)
         cycles = max(min(cycles, LONGEST_SLICE), 1)
         if self.nvic.pending & self.nvic.enabled and self._only_masked():
-            cycles = 1  # it must be taken right after the mask is lifted (B1.5.1)
+            self._masked += 1  # it must be taken right after the mask is lifted (B1.5.1)
+            cycles = min(cycles, max(self._masked - EXACTLY_MASKED, 1))
+        else:
+            self._masked = 0
         stop = self.cpu.run(cycles, due)
         while self._later:
             self._later.pop(0)()

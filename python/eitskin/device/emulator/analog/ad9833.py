@@ -5,16 +5,16 @@ A bit is taken at each falling edge of SCLK while FSYNC is low; 16 make a word, 
 (mode 3), either of which garbles every word. SCLK must be high when FSYNC falls (t11): mode 1 is decoded, and counted in
 ``early_clocks``.
 
-The accumulator takes 28 bits, the sine ROM its upper 12, the converter 10 bits. It runs from MCLK in the board's time;
-changes take effect when the word's last bit is in (7 or 8 MCLK cycles later on silicon). After power-up it holds what no
-program may rely on: here RESET clear and a frequency of 1 kHz. What follows the pin (filter, amplifier, current source) is
-linear and without delay.
+The accumulator takes 28 bits and runs from MCLK in the board's time; changes take effect when the word's last bit is in (7 or 8
+MCLK cycles later on silicon). The output is the sine itself: the steps of the part's ROM (12 bits of phase) and converter (10
+bits) are harmonics that alias onto the excitation only from 950 kHz on, where front end and filter have ended. After power-up the
+registers hold what no program may rely on: here RESET clear and a frequency of 1 kHz. What follows the pin is linear.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -25,20 +25,25 @@ from eitskin.device.emulator.peripherals.spi import SpiFrame
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-B28, HLB, FSELECT, PSELECT, RESET, SLEEP1, SLEEP12, OPBITEN, DIV2, MODE = (1 << k for k in (13, 12, 11, 10, 8, 7, 6, 5, 3, 1))
+B28, HLB, FSELECT, PSELECT, RESET, SLEEP1, SLEEP12, OPBITEN, MODE = (1 << k for k in (13, 12, 11, 10, 8, 7, 6, 5, 1))
 FULL_TURN = 1 << 28
 WORD_BITS = 16
+WAVEFORMS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "sine": lambda turn: np.sin(2 * np.pi * turn),
+    "triangle": lambda turn: 1 - 4 * np.abs(turn - 0.5),
+    "square": lambda turn: np.where(turn < 0.5, -1.0, 1.0),  # the top bit; halved in frequency (DIV2 = 0) is not told apart
+}
 
 
 @dataclass(frozen=True)
 class Course:
-    """From ``start`` on the accumulator is ``phase`` + ``step`` a cycle of MCLK, plus ``offset``; ``table`` is what it gives."""
+    """From ``start`` on the accumulator is ``phase`` + ``step`` a cycle of MCLK, plus ``offset``, and gives ``waveform``."""
 
     start: int
     phase: int
     step: int
     offset: int
-    table: str
+    waveform: str
     running: bool
 
 
@@ -170,25 +175,12 @@ class Ad9833:
             first = 0 if k == 0 else int(np.searchsorted(times, course.start))
             last = len(times) if k + 1 == len(courses) else int(np.searchsorted(times, courses[k + 1].start))
             if course.running and first < last:
-                upper = (self.phases(times[first:last], course) + course.offset) % FULL_TURN >> 16
-                out[first:last] = table(course.table)[upper]
+                phase = (self.phases(times[first:last], course) + course.offset) % FULL_TURN
+                out[first:last] = WAVEFORMS[course.waveform](phase / FULL_TURN)
         return out
 
 
 def _waveform(control: int) -> str:
     if control & OPBITEN:
-        return "square" if control & DIV2 else "half square"
+        return "square"
     return "triangle" if control & MODE else "sine"
-
-
-@lru_cache(maxsize=4)
-def table(kind: str) -> FloatArray:
-    """The output (4096,) over the accumulator's upper 12 bits, as a 10-bit converter gives it."""
-    turn = np.arange(4096) / 4096
-    if kind == "sine":
-        wave = np.sin(2 * np.pi * turn)
-    elif kind == "triangle":
-        wave = 1 - 4 * np.abs(turn - 0.5)
-    else:
-        wave = np.where(turn < 0.5, -1.0, 1.0)  # its top bit; halved in frequency is not told apart
-    return np.asarray(np.round(511.5 * wave + 511.5) / 511.5 - 1.0)

@@ -1,0 +1,15 @@
+"""The firmware image, built once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from emulated import image_of
+
+
+@pytest.fixture(scope="session")
+def image(cortex_m7: Path) -> bytes:
+    """The image that the sources give now."""
+    return image_of(cortex_m7)

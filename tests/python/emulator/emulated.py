@@ -1,0 +1,96 @@
+"""The real firmware image on the emulated board, before scenes without noise or with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eitskin.device.bank import bank_bytes
+from eitskin.device.client import Device
+from eitskin.device.emulator.board import EmulatedBoard
+from eitskin.device.emulator.clocktime import TICKS_PER_S
+from eitskin.device.emulator.scene_skin import skin_of
+from eitskin.device.emulator.transport import EmulatedTransport
+from eitskin.device.host_check import HostCheck, HostTwin
+from eitskin.device.known_model import KnownModel, board_options
+from eitskin.device.live import LiveFrame, put_together
+from eitskin.device.packets import RawFrame, Stream
+from eitskin.device.transport import Transport
+from eitskin.model.eitm import decode_model
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.scene.library_scenes import find_scene
+
+IMAGE = "firmware/eitskin_nucleo_f767zi.bin"
+EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
+
+
+def power_up(image: bytes, *, scene: str = "two_touch", noisy: bool = True, model: bytes | None = None) -> EmulatedBoard:
+    """A board that has just got power, with ``model`` (or the prebuilt one) in bank 0."""
+    decoded, blob = load_prebuilt() if model is None else (decode_model(model, "the model"), model)
+    described = find_scene(scene)
+    if not noisy:
+        described = replace(described, effects={})
+    return EmulatedBoard(image, skin_of(described, decoded.protocol), (bank_bytes(blob, 1),))
+
+
+def connect(board: EmulatedBoard) -> Device:
+    """The host on the board's line, once it speaks."""
+    transport: Transport = EmulatedTransport("test", board)
+    board.run_until(board.clock.now + TICKS_PER_S, lambda: board.line.up_next_end() <= board.clock.now)
+    return Device(transport)
+
+
+def board_of(device: Device) -> EmulatedBoard:
+    """The emulated board behind ``device``."""
+    transport: Any = device.transport
+    return transport.board  # type: ignore[no-any-return]
+
+
+def raw_frames(device: Device, count: int) -> list[RawFrame]:
+    """Raw frames of scans that begin from now on: two were under way."""
+    frames = [item for item in device.stream(Stream.RAW, frames=count + 2) if isinstance(item, RawFrame)]
+    return frames[2:]
+
+
+def twin_check(device: Device, blob: bytes, frames: int, quiet: int = 4) -> tuple[HostCheck, list[LiveFrame]]:
+    """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core."""
+    from eitskin.device import commands
+
+    taken: list[Any] = []
+    device.send_command(commands.StreamCommand(int(Stream.RAW)), 1.0)
+    device.tare(quiet)
+    device.send_command(commands.StreamCommand(0), 1.0)
+    while (item := device.next_item(0.05)) is not None:
+        taken.append(item)
+    device.start_scene()
+    model = decode_model(blob, "the model")
+    twin = HostTwin(KnownModel(model, blob), board_options(model))
+    for item in taken:
+        if isinstance(item, RawFrame) and item.quiet:
+            twin.take(LiveFrame(item.frame, 0, item.time_us, raw=item))
+    seen = [item for item in put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING) if isinstance(item, LiveFrame)]
+    for frame in seen:
+        twin.take(frame)
+    return twin.check, seen
+
+
+def clean(board: EmulatedBoard) -> None:
+    """Nothing that the firmware did was wrong, unknown or dangerous."""
+    record = board.record
+    assert (record.unmodelled, record.clock_off, record.hazards, record.faults) == ({}, {}, {}, [])
+    assert board.multiplexers.violations == []
+    assert board.generator.ignored_bits == board.generator.early_clocks == 0
+    assert board.flash.not_erased == 0
+    assert board.usart.bytes_lost == 0
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def image_of(build: Path) -> bytes:
+    """The firmware image of a build."""
+    return (build / IMAGE).read_bytes()

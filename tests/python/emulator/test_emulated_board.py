@@ -1,0 +1,243 @@
+"""The unmodified firmware image of the NUCLEO-F767ZI on the emulated board: what it drives, measures, computes and sends."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+import pytest
+
+from eitskin.device.client import Device
+from eitskin.device.emulator.analog.converter import STEP_V
+from eitskin.device.emulator.board import EmulatedBoard
+from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.device.emulator.scene_skin import skin_of
+from eitskin.device.packets import Fault, FaultCode, Quality, RawFlags, RawFrame, SolvedTouches, Stream
+from eitskin.errors import DeviceError, ProtocolError
+from eitskin.model.build import BuildSettings, linearise, make_model
+from eitskin.model.eitm import encode_model
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.scene.library_scenes import find_scene
+from eitskin.skin.protocol import opposite
+from eitskin.skin.skin import paper_skin
+from emulated import EVERYTHING, board_of, clean, connect, power_up, raw_frames, twin_check
+from small_models import small
+
+
+@pytest.fixture(scope="module")
+def quiet(image: bytes) -> Device:
+    """A board before an untouched skin without noise."""
+    return connect(power_up(image, noisy=False))
+
+
+def joined_order(board: EmulatedBoard, first: int) -> list[tuple[int | None, ...]]:
+    return [one.joined for one in board.multiplexers.log[first:] if None not in one.joined]
+
+
+def test_the_board_says_what_it_is(quiet: Device) -> None:
+    info, (model, blob) = quiet.board, load_prebuilt()
+    assert (info.board, info.f_cpu_hz, info.electrodes) == ("nucleo_f767zi", 216_000_000, 16)
+    assert (info.model_bytes, info.model_crc, info.bank) == (len(blob), zlib.crc32(blob), 0)
+    assert info.protocol_hash == model.protocol.hash
+    assert info.volts_per_code_nv == pytest.approx(STEP_V * 1e9, abs=1)
+    assert (info.faults, info.tared, info.streaming) == (0, 0, 0)
+    assert bytes.fromhex(info.serial.strip("\0")) != b""
+
+
+def test_the_generator_runs_at_50_khz(quiet: Device) -> None:
+    generator = board_of(quiet).generator
+    assert generator.mclk_hz == 8_000_000
+    assert abs(generator.frequency_hz - 50_000) < 0.02
+    assert generator.words == [0x2100, 0x4000 | 0x199A, 0x4000 | 0x66, 0xC000, 0x2000]
+    assert abs(quiet.board.excitation_millihz / 1000 - generator.frequency_hz) < 0.001
+
+
+def test_rows_are_joined_in_the_order_of_the_table(quiet: Device) -> None:
+    board = board_of(quiet)
+    raw_frames(quiet, 1)
+    table = [tuple(int(k) for k in row) for row in load_prebuilt()[0].protocol.drive_measure]
+    order = joined_order(board, 0)
+    start = order.index(table[0])
+    whole = order[start : start + 3 * len(table)]
+    assert len(whole) >= 2 * len(table)
+    assert whole == (table * 3)[: len(whole)]
+
+
+def amplitude_errors_lsb(device: Device) -> np.ndarray:
+    exact = board_of(device).skin.quiet_v[0]
+    frames = raw_frames(device, 2)
+    assert all(frame.quality.max() & ~Quality.RECIPROCITY == 0 for frame in frames)
+    return np.concatenate([frame.voltage_v - exact for frame in frames]) / STEP_V
+
+
+def test_amplitudes_are_within_half_a_step(quiet: Device) -> None:
+    errors = amplitude_errors_lsb(quiet)
+    print(f"adjacent: worst {np.abs(errors).max():.3f} LSB, rms {np.sqrt(np.mean(errors**2)):.3f} LSB")
+    assert np.abs(errors).max() < 0.5
+
+
+def test_times_of_samples_and_switches(quiet: Device) -> None:
+    """Every sample is taken at least the settling time after the switch before it."""
+    board, info = board_of(quiet), quiet.board
+    at: list[int] = []
+    sample = board.front_end.sample
+
+    def watched(times: np.ndarray, channel: int) -> np.ndarray:
+        at.append(int(times[0]))
+        return sample(times, channel)
+
+    board.multiplexers.log.clear()
+    board.adc.sample = watched  # type: ignore[assignment]
+    board.run_until(board.clock.now + 30_000 * TICKS_PER_US)
+    board.adc.sample = sample
+    made = np.array([one.at for one in board.multiplexers.log if None not in one.joined])
+    starts = np.array(at)
+    starts = starts[starts > made[0]]
+    settled = (starts - made[np.searchsorted(made, starts) - 1]) / TICKS_PER_US
+    slots = np.diff(starts) / TICKS_PER_US
+    assert len(starts) > 250
+    assert settled.min() >= info.settle_us
+    assert set(np.round(slots, 6)) == {float(info.slot_us)}
+
+
+def test_the_same_session_gives_the_same_bytes(image: bytes) -> None:
+    runs = []
+    for _ in range(2):
+        board = power_up(image)
+        device = connect(board)
+        device.tare(4)
+        device.start_scene()
+        items = [repr(item) for item in device.stream(EVERYTHING, frames=2)]
+        runs.append((items, board.record.instructions, board.clock.now, board.memories.ram[:]))
+    assert runs[0] == runs[1]
+
+
+def test_touches_and_images_are_the_host_s_to_the_bit(image: bytes) -> None:
+    board = power_up(image)
+    device = connect(board)
+    check, seen = twin_check(device, load_prebuilt()[1], 6, quiet=16)
+    assert (check.same, check.different, check.untold, check.alone) == (6, [], 0, 0)
+    assert check.images == check.touches == 6
+    truth = np.array([[-40.0, 10.0], [30.0, -25.0]])
+    for frame in seen[2:]:
+        assert frame.touches is not None
+        found = np.array([[touch.x_mm, touch.y_mm] for touch in frame.touches.touches])
+        assert found.shape == (2, 2), frame
+        away = np.linalg.norm(found[None] - truth[:, None], axis=2).min(axis=1)
+        assert away.max() < 2.0
+    clean(board)
+
+
+def test_an_opposite_protocol(image: bytes) -> None:
+    """Another protocol: the model's table is scanned, and each row has its voltage."""
+    skin, protocol = paper_skin(), opposite(16, 0.5e-3)  # at 1 mA its voltages would saturate this front end
+    model = make_model(skin, protocol, linearise(skin, protocol, pixels_across=14, elements=900), BuildSettings(rank=40))
+    board = power_up(image, noisy=False, model=encode_model(model))
+    device = connect(board)
+    assert device.board.protocol_hash == protocol.hash
+    errors = amplitude_errors_lsb(device)
+    table = [tuple(int(k) for k in row) for row in protocol.drive_measure]
+    order = joined_order(board, 0)
+    start = order.index(table[0])
+    assert order[start : start + len(table)] == table
+    print(f"opposite: worst {np.abs(errors).max():.3f} LSB")
+    assert np.abs(errors).max() < 0.5
+    clean(board)
+
+
+def periods_us(device: Device, frames: int) -> tuple[float, float]:
+    """From frame to frame, by the board's clock: of scans alone, and with solves."""
+    raw = [item.time_us for item in device.stream(Stream.RAW, frames=frames) if isinstance(item, RawFrame)]
+    solved = [item.solved.time_us for item in device.stream(Stream.TOUCHES, frames=frames) if isinstance(item, SolvedTouches)]
+    return float(np.diff(raw)[2:].mean()), float(np.diff(solved)[2:].mean())
+
+
+def test_frame_rates(image: bytes) -> None:
+    """208 and 104 measurements of 80 samples, the solve overlapped: the slower of scan and solve is what bounds the rate."""
+    board = power_up(image)
+    device = connect(board)
+    for check_every, rows in ((1, 208), (0, 104)):
+        device.scan(check_every=check_every)
+        device.tare(4)
+        board.skin.begin(board.clock.now)
+        device.stats(reset=True)
+        scan_us, frame_us = periods_us(device, 8)
+        stages = device.stats().stages
+        work_us = sum(stages[name].last_us for name in ("solve", "touches", "demodulate"))
+        bound = "the solve" if frame_us > 1.05 * scan_us else "the scan"
+        print(
+            f"{rows} rows: scan {scan_us / 1000:.2f} ms, frame {frame_us / 1000:.2f} ms ({1e6 / frame_us:.1f} Hz), "
+            f"solve {stages['solve'].last_us / 1000:.2f} ms, touches {stages['touches'].last_us / 1000:.2f} ms, "
+            f"demodulation {stages['demodulate'].last_us / 1000:.2f} ms: {bound} bounds it"
+        )
+        assert abs(scan_us - rows * device.board.slot_us) <= 2 * device.board.slot_us
+        assert frame_us >= scan_us - 1
+        assert frame_us <= max(scan_us, work_us) * 1.15 + 2000  # they overlap: it is not their sum
+    clean(board)
+
+
+def test_reciprocal_scans_measure_half_and_check_now_and_then(image: bytes) -> None:
+    board = power_up(image, noisy=False)
+    device = connect(board)
+    device.scan(check_every=3)
+    frames = raw_frames(device, 4)
+    copied = [int(np.count_nonzero(frame.quality & Quality.COPIED)) for frame in frames]
+    checks = [bool(frame.flags & RawFlags.CHECK) for frame in frames]
+    assert sorted(set(copied)) == [0, 104] or set(copied) == {104}
+    assert any(checks)
+    exact = board.skin.quiet_v[0]
+    assert max(np.abs(frame.voltage_v - exact).max() for frame in frames) < 0.5 * STEP_V
+    clean(board)
+
+
+def test_another_frequency(image: bytes) -> None:
+    device = connect(power_up(image, noisy=False))
+    board = board_of(device)
+    device.scan(excitation_hz=25_000)
+    assert abs(board.generator.frequency_hz - 25_000) < 0.02
+    frame = raw_frames(device, 1)[0]
+    assert np.abs(frame.voltage_v - board.skin.quiet_v[0]).max() < 0.5 * STEP_V
+    with pytest.raises(DeviceError):
+        device.scan(excitation_hz=33_333)
+    assert abs(board.generator.frequency_hz - 25_000) < 0.02
+    clean(board)
+
+
+def test_a_saturated_row_is_told(image: bytes) -> None:
+    board = power_up(image, noisy=False)
+    board.skin.quiet_v[:, 7] = 1.3  # the converter ends at 1.1 V
+    device = connect(board)
+    items = list(device.stream(Stream.RAW, frames=3))
+    raw = [item for item in items if isinstance(item, RawFrame)]
+    assert raw[-1].quality[7] & Quality.SATURATED
+    assert np.isnan(raw[-1].voltage_v[7])
+    faults = [item for item in items if isinstance(item, Fault)]
+    assert any(fault.code == FaultCode.SATURATED and fault.raised and fault.index == 7 for fault in faults) or (
+        FaultCode.SATURATED in device.info().fault_codes
+    )
+
+
+def test_no_model_no_scan_but_answers(image: bytes) -> None:
+    board = EmulatedBoard(image, power_up(image, noisy=False).skin)
+    device = connect(board)
+    assert device.board.model_bytes == 0
+    assert FaultCode.NO_MODEL in device.board.fault_codes
+    assert board.front_end.samples == 0
+    with pytest.raises(DeviceError):
+        device.tare(4)
+    clean(board)
+
+
+def test_without_the_8_mhz_the_red_light_blinks(image: bytes) -> None:
+    board = EmulatedBoard(image, power_up(image, noisy=False).skin, hse_hz=None)
+    lights = set()
+    for _ in range(40):
+        board.run_until(board.clock.now + TICKS_PER_S // 10)
+        lights.add(board.ports["B"].levels)
+    assert lights >= {0, 1 << 14}
+    assert board.receive() == b""
+
+
+def test_a_scene_for_other_electrodes_is_refused() -> None:
+    with pytest.raises(ProtocolError, match=r"its skin has 16 electrodes, the model is for 8; build a model"):
+        skin_of(find_scene("two_touch"), small("disk", "adjacent", 8).protocol)
