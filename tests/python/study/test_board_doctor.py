@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +26,7 @@ def info(**changes: object) -> BoardInfo:
     model, blob = prebuilt()
     values: dict[str, object] = {
         "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi", "serial": "01", "f_cpu_hz": 216_000_000, "electrodes": 16,
-        "bank_bytes": 524256, "data_bytes": 4096, "model_bytes": len(blob), "model_crc": 0x717032AD,
+        "bank_bytes": 524256, "data_bytes": 4096, "model_bytes": len(blob), "model_crc": zlib.crc32(blob),
         "protocol_hash": model.protocol.hash, "n_electrodes": 16, "n_rows": 208, "n_folded": 104, "rank": 64, "n_pixels": 812,
         "nx": 32, "ny": 32, "storage": 0, "bank": 0, "excitation_millihz": 50_000_000, "sample_rate_hz": 1_000_000, "samples": 80,
         "settle_us": 16, "slot_us": 100, "check_every": 1, "streaming": 0, "every": 1, "tared": 0, "frame_period_us": 0,
