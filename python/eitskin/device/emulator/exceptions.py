@@ -16,6 +16,7 @@ from eitskin.device.emulator.memory import RAM, RAM_BYTES, Memories
 ENTRY_CYCLES, RETURN_CYCLES = 12, 10
 SMALL, LARGE = struct.Struct("<8I"), struct.Struct("<8I8Q2I")
 FPCA = 4
+FP_CONTEXT = 0xC  # FPCA and SFPA: Unicorn's core counts as secure; without SFPA its next FPU instruction would begin anew
 TO_THREAD = 8  # bits of EXC_RETURN
 SMALL_FRAME = 0x10
 ALIGNED = 1 << 9  # of the stacked xPSR: a word was left out to align the frame
@@ -81,7 +82,7 @@ class Exceptions:
         sp = (sp + shape.size + (4 if frame[7] & ALIGNED else 0)) & 0xFFFFFFFF
         if large:
             self._fpu.write(frame[8:17])
-        self._back.write((*frame[:6], frame[7] & ~ALIGNED, sp, (control & 3) | (FPCA if large else 0)))
+        self._back.write((*frame[:6], frame[7] & ~ALIGNED, sp, (control & 3) | (FP_CONTEXT if large else 0)))
         self._cpu.pc = frame[6]
         self._cpu.clock.skip(RETURN_CYCLES * self._cpu.clock.cycle_ticks)
         return True
