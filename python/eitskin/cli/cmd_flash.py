@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     model = None
     if not options.no_model:
         model = (load_prebuilt() if options.model is None else load_model(options.model))[1]
-    plan = plan_flash(image, model, tool=options.tool, serial=options.serial)
+    plan = plan_flash(image, model, tool=options.tool, serial=options.serial, installed=not options.dry_run)
     if options.dry_run:
         facts = {"tool": plan.tool, "commands": [list(command) for command in plan.commands]}
         print(json.dumps(facts, indent=2) if options.json else "\n".join(plan.lines()))

@@ -41,24 +41,34 @@ class FlashPlan:
         return [shlex.join(command) for command in self.commands]
 
 
-def find_tool(wanted: str | None = None) -> str:
-    """The programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed.
+def find_tool(wanted: str | None = None, *, installed: bool = True) -> str:
+    """The programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed; where it need not be ``installed``, else
+    the first of them.
 
     Raises:
         UsageError: it is not a known one.
-        DeviceError: it, or none of them, is installed.
+        DeviceError: it is not installed, or none of them is.
     """
     if wanted is not None and wanted not in TOOLS:
         raise UsageError(f"--tool {wanted}: use one of {', '.join(TOOLS)}")
-    found = [tool for tool in ([wanted] if wanted else TOOLS) if shutil.which(tool)]
+    choice = [wanted] if wanted else list(TOOLS)
+    found = [tool for tool in choice if shutil.which(tool)] or ([] if installed else choice)
     if not found:
-        raise DeviceError(f"{wanted or 'neither ' + ', '.join(TOOLS)} is installed; {INSTALL}")
+        raise DeviceError(f"{wanted + ' is not' if wanted else 'none of ' + ', '.join(TOOLS) + ' is'} installed; {INSTALL}")
     return found[0]
 
 
-def plan_flash(image: str | Path, model: bytes | None = None, *, tool: str | None = None, serial: str | None = None) -> FlashPlan:
+def plan_flash(
+    image: str | Path,
+    model: bytes | None = None,
+    *,
+    tool: str | None = None,
+    serial: str | None = None,
+    installed: bool = True,
+) -> FlashPlan:
     """The commands that put the firmware ``image`` (.bin) on a board and, where given, ``model`` in its first bank; the record of
     the second bank is then erased, so that the first one counts. ``serial``: the ST-LINK's, where several boards are plugged in.
+    ``installed``: the tool must be there; not to show only what would be run.
 
     Raises:
         FileError: the image cannot be read.
@@ -67,7 +77,7 @@ def plan_flash(image: str | Path, model: bytes | None = None, *, tool: str | Non
     """
     path = Path(image)
     check_image(path, read_bytes(path, "firmware image"))
-    name = find_tool(tool)
+    name = find_tool(tool, installed=installed)
     pieces = [(path, FIRMWARE_ADDRESS)]
     bank_file = None
     if model is not None:

@@ -78,13 +78,15 @@ def test_the_first_tool_that_is_there_is_taken(tools: Path) -> None:
     assert find_tool() == "st-flash"
     (tools / "st-flash").unlink()
     assert find_tool() == "pyocd"
-    with pytest.raises(DeviceError, match="openocd is installed; install one:  apt install openocd"):
+    with pytest.raises(DeviceError, match="openocd is not installed; install one:  apt install openocd"):
         find_tool("openocd")
     (tools / "pyocd").unlink()
-    with pytest.raises(DeviceError, match="neither openocd, st-flash, pyocd is installed; install one"):
+    with pytest.raises(DeviceError, match="none of openocd, st-flash, pyocd is installed; install one"):
         find_tool()
     with pytest.raises(UsageError, match="--tool dfu: use one of openocd, st-flash, pyocd"):
         find_tool("dfu")
+    assert find_tool(installed=False) == "openocd"
+    assert find_tool("pyocd", installed=False) == "pyocd"
 
 
 @pytest.mark.parametrize("tool", TOOLS)

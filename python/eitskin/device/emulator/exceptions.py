@@ -29,7 +29,9 @@ _FRAME = (
     *(arm.UC_ARM_REG_SP, arm.UC_ARM_REG_CONTROL),
 )
 _INTO = (arm.UC_ARM_REG_SP, arm.UC_ARM_REG_CONTROL, arm.UC_ARM_REG_LR, arm.UC_ARM_REG_XPSR)
-_BACK = (*_FRAME[:6], arm.UC_ARM_REG_XPSR, arm.UC_ARM_REG_SP, arm.UC_ARM_REG_CONTROL)
+# Unicorn leaves the GE flags as they are when xPSR is written; APSR_nzcvqg sets them
+_BACK = (*_FRAME[:6], arm.UC_ARM_REG_XPSR, arm.UC_ARM_REG_APSR_NZCVQG, arm.UC_ARM_REG_SP, arm.UC_ARM_REG_CONTROL)
+APSR_BITS = 0xF80F0000
 _FPU = _FRAME[8:17]
 
 
