@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.core.results import Reconstruction
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.emulator.board import EmulatedBoard
@@ -55,8 +56,10 @@ def raw_frames(device: Device, count: int) -> list[RawFrame]:
     return frames[2:]
 
 
-def twin_check(device: Device, blob: bytes, frames: int, quiet: int = 4) -> tuple[HostCheck, list[LiveFrame]]:
-    """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core."""
+def twin_check(
+    device: Device, blob: bytes, frames: int, quiet: int = 4
+) -> tuple[HostCheck, list[LiveFrame], list[Reconstruction | None]]:
+    """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core and its results."""
     from eitskin.device import commands
 
     taken: list[Any] = []
@@ -72,9 +75,7 @@ def twin_check(device: Device, blob: bytes, frames: int, quiet: int = 4) -> tupl
         if isinstance(item, RawFrame) and item.quiet:
             twin.take(LiveFrame(item.frame, 0, item.time_us, raw=item))
     seen = [item for item in put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING) if isinstance(item, LiveFrame)]
-    for frame in seen:
-        twin.take(frame)
-    return twin.check, seen
+    return twin.check, seen, [twin.take(frame) for frame in seen]
 
 
 def clean(board: EmulatedBoard) -> None:

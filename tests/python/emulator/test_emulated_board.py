@@ -115,9 +115,13 @@ def test_the_same_session_gives_the_same_bytes(image: bytes) -> None:
 def test_touches_and_images_are_the_host_s_to_the_bit(image: bytes) -> None:
     board = power_up(image)
     device = connect(board)
-    check, seen = twin_check(device, load_prebuilt()[1], 6, quiet=16)
+    check, seen, host = twin_check(device, load_prebuilt()[1], 6, quiet=16)
     assert (check.same, check.different, check.untold, check.alone) == (6, [], 0, 0)
     assert check.images == check.touches == 6
+    for frame, result in zip(seen, host, strict=True):
+        assert frame.solved is not None
+        assert result is not None
+        assert (frame.solved.macs, frame.solved.iterations) == (result.info.macs, result.info.iterations)
     truth = np.array([[-40.0, 10.0], [30.0, -25.0]])
     for frame in seen[2:]:
         assert frame.touches is not None

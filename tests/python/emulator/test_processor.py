@@ -119,26 +119,47 @@ def test_a_frame_has_8_words_or_26_after_floating_point() -> None:
     assert bits == 0x40A00000
 
 
-def test_floating_point_registers_survive_a_handler_that_uses_them() -> None:
-    source = """
-    void systick(void) {
-        __asm volatile("vmov.f32 s0, #1.0\\n vmov.f32 s15, #1.0\\n" ::: "s0", "s15");
-        __asm volatile("vcmp.f32 s0, s0\\n vmrs APSR_nzcv, FPSCR\\n" ::: "s0");
-        ++OUT[1];
+# A handler that spoils all that it may, and a program that needs all of it: flags (GE, Q and the FPU's too), registers, 64-bit sums
+SPOILING = """
+__attribute__((naked)) void systick(void) {
+    __asm volatile("vmov.f32 s0, #1.0\\n vmov.f32 s1, s0\\n vmov.f32 s2, s0\\n vmov.f32 s3, s0\\n vmov.f32 s4, s0\\n vmov.f32 s5, s0\\n"
+                   "vmov.f32 s6, s0\\n vmov.f32 s7, s0\\n vmov.f32 s8, s0\\n vmov.f32 s9, s0\\n vmov.f32 s10, s0\\n vmov.f32 s11, s0\\n"
+                   "vmov.f32 s12, s0\\n vmov.f32 s13, s0\\n vmov.f32 s14, s0\\n vmov.f32 s15, s0\\n vcmp.f32 s0, #0.0\\n"
+                   "ldr r0, =0x20010004\\n ldr r1, [r0]\\n add r1, #1\\n str r1, [r0]\\n mvn r2, #0\\n uadd8 r3, r2, r2\\n"
+                   "mov r12, #77\\n movs r1, #%d\\n lsls r1, #31\\n bx lr\\n");
+}
+void program(void) {
+    uint64_t sum = 1; uint32_t c = 0, g = 0x01020304; float f[8];
+    OUT[1] = OUT[2] = 0;
+    for (int k = 0; k < 8; ++k) f[k] = (float)k;
+    STK_LOAD = %d; STK_VAL = 0; STK_CTRL = %d;
+    for (uint32_t n = 0; n < 4000; ++n) {
+        uint32_t r;
+        sum = sum * 6364136223846793005ull + 1442695040888963407ull + c; sum -= (uint64_t)n << 20;
+        __asm volatile("uadd8 %%0, %%1, %%2\\n nop\\n nop\\n nop\\n sel %%0, %%1, %%2\\n" : "=&r"(r) : "r"((uint32_t)sum), "r"(g));
+        g = r ^ (uint32_t)(sum >> 32);
+        for (int k = 0; k < 8; ++k) {
+            f[k] = __builtin_fmaf(f[k], 0.875f, (float)(int)(g >> (k + 8)) * 1e-6f);
+            if (f[k] > 7.0f) f[k] -= 3.25f;
+            if (f[k] < (float)k) c += k; else c ^= n;
+        }
+        int32_t s = (int32_t)(sum >> 40);
+        if (s > 0 && sum & 8) c = c * 3 + 1; else if (s < -5) c ^= 0x5555;
     }
-    void program(void) {
-        float sum = 0; OUT[1] = 0;
-        STK_LOAD = 777; STK_VAL = 0; STK_CTRL = 7;
-        for (int k = 0; k < 20000; ++k) sum = sum * 0.5f + (float)k;
-        STK_CTRL = 0;
-        union { float f; uint32_t u; } bits = {sum};
-        OUT[0] = bits.u; OUT[2] = 1;
-    }"""
-    board = run_program(source, 40_000)
-    alone = run_program(source.replace("STK_CTRL = 7", "STK_CTRL = 0"), 40_000)
-    assert out(board, 3)[2] == out(alone, 3)[2] == 1
-    assert out(board, 1) == out(alone, 1)
-    assert out(board, 2)[1] > 100
+    STK_CTRL = 0;
+    for (int k = 0; k < 8; ++k) { union { float f; uint32_t u; } bits = {f[k]}; OUT[6 + k] = bits.u; }
+    OUT[3] = c; OUT[4] = (uint32_t)sum; OUT[5] = g; OUT[2] = 1;
+}
+"""
+
+
+def test_an_interrupt_at_any_place_changes_nothing() -> None:
+    undisturbed = out(run_program(SPOILING % (0, 100, 0), 400_000), 14)
+    assert undisturbed[1:3] == [0, 1]
+    for period, carry in ((60, 1), (97, 0), (100, 1), (211, 0)):
+        found = out(run_program(SPOILING % (carry, period, 7), 2_000_000), 14)
+        assert found[1] > 2000
+        assert found[2:] == undisturbed[2:]
 
 
 MASKS = """

@@ -84,7 +84,8 @@ class Exceptions:
         sp = (sp + shape.size + (4 if frame[7] & ALIGNED else 0)) & 0xFFFFFFFF
         if large:
             self._fpu.write(frame[8:17])
-        self._back.write((*frame[:6], frame[7] & ~ALIGNED, sp, (control & 3) | (FP_CONTEXT if large else 0)))
+        back = (control & 3) | (FP_CONTEXT if large else 0)
+        self._back.write((*frame[:6], frame[7] & ~ALIGNED, frame[7] & APSR_BITS, sp, back))
         self._cpu.pc = frame[6]
         self._cpu.clock.skip(RETURN_CYCLES * self._cpu.clock.cycle_ticks)
         return True
@@ -95,7 +96,7 @@ class Exceptions:
 
     def reset(self, stack_pointer: int, entry: int) -> None:
         """Start as after a reset."""
-        self._back.write((0, 0, 0, 0, 0, 0xFFFFFFFF, 1 << 24, stack_pointer & ~3, 0))
+        self._back.write((0, 0, 0, 0, 0, 0xFFFFFFFF, 1 << 24, 0, stack_pointer & ~3, 0))
         self._fpu.write((0,) * 9)
         self._cpu.masks.write((0, 0, 0))
         self._cpu.pc = entry
