@@ -119,12 +119,11 @@ def test_a_frame_has_8_words_or_26_after_floating_point() -> None:
     assert bits == 0x40A00000
 
 
-# A handler that spoils all that it may, and a program that needs all of it: flags (GE, Q and the FPU's too), registers, 64-bit sums
+# A handler that spoils all that it may, and a program that needs all of it: flags (GE and the FPU's too), registers, 64-bit sums
 SPOILING = """
 __attribute__((naked)) void systick(void) {
-    __asm volatile("vmov.f32 s0, #1.0\\n vmov.f32 s1, s0\\n vmov.f32 s2, s0\\n vmov.f32 s3, s0\\n vmov.f32 s4, s0\\n vmov.f32 s5, s0\\n"
-                   "vmov.f32 s6, s0\\n vmov.f32 s7, s0\\n vmov.f32 s8, s0\\n vmov.f32 s9, s0\\n vmov.f32 s10, s0\\n vmov.f32 s11, s0\\n"
-                   "vmov.f32 s12, s0\\n vmov.f32 s13, s0\\n vmov.f32 s14, s0\\n vmov.f32 s15, s0\\n vcmp.f32 s0, #0.0\\n"
+    __asm volatile("vmov.f32 s0, #1.0\\n .irp n, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15\\n vmov.f32 s\\\\n, s0\\n .endr\\n"
+                   "vcmp.f32 s0, #0.0\\n"
                    "ldr r0, =0x20010004\\n ldr r1, [r0]\\n add r1, #1\\n str r1, [r0]\\n mvn r2, #0\\n uadd8 r3, r2, r2\\n"
                    "mov r12, #77\\n movs r1, #%d\\n lsls r1, #31\\n bx lr\\n");
 }
@@ -136,7 +135,8 @@ void program(void) {
     for (uint32_t n = 0; n < 4000; ++n) {
         uint32_t r;
         sum = sum * 6364136223846793005ull + 1442695040888963407ull + c; sum -= (uint64_t)n << 20;
-        __asm volatile("uadd8 %%0, %%1, %%2\\n nop\\n nop\\n nop\\n sel %%0, %%1, %%2\\n" : "=&r"(r) : "r"((uint32_t)sum), "r"(g));
+        __asm volatile("uadd8 %%0, %%1, %%2\\n nop\\n nop\\n nop\\n sel %%0, %%1, %%2\\n"
+                       : "=&r"(r) : "r"((uint32_t)sum), "r"(g));
         g = r ^ (uint32_t)(sum >> 32);
         for (int k = 0; k < 8; ++k) {
             f[k] = __builtin_fmaf(f[k], 0.875f, (float)(int)(g >> (k + 8)) * 1e-6f);

@@ -2,7 +2,7 @@
 
 The loop executes slices that end where the next event is due, takes exceptions between them, and skips to the next event when
 the processor sleeps. While nothing but PRIMASK, BASEPRI or FAULTMASK holds an interrupt back, slices are single instructions, and
-longer and longer only where that lasts for over a thousand: a program that hangs with interrupts off must end too.
+longer and longer only where that lasts for over ten thousand: a program that hangs with interrupts off must end too.
 Nothing in it depends on the host's clock: the same image, banks, scene and input give the same bytes.
 """
 
@@ -40,7 +40,7 @@ from eitskin.device.emulator.serial_line import SerialLine
 from eitskin.errors import DeviceError
 
 LONGEST_SLICE = 5_000_000
-EXACTLY_MASKED = 1000
+EXACTLY_MASKED = 10_000
 FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN = 2, 12, 8, 3
 SCK_PIN, MOSI_PIN, TX_PIN, RX_PIN = 10, 12, 8, 9
 MCO_FUNCTION, SPI3_FUNCTION, USART3_FUNCTION = 0, 6, 7
