@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.cli.device_options import add_device, open_named, print_table
 
 if TYPE_CHECKING:
-    from eitskin.device.packets import BoardInfo, BoardStats
+    from eitskin.device.wire.packets import BoardInfo, BoardStats
 
 
 def add_parser(subparsers: Any) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from eitskin.device.link import LinkEvent
     from eitskin.device.live import LiveFrame, LiveSummary
-    from eitskin.device.packets import Fault
+    from eitskin.device.wire.packets import Fault
 
 
 def add_parser(subparsers: Any) -> None:
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     """Record, then say how much."""
     from eitskin.device.known_model import find_model
     from eitskin.device.live import LiveSummary, finish, follow
-    from eitskin.device.packets import Stream
+    from eitskin.device.wire.packets import Stream
     from eitskin.study.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)
@@ -112,7 +112,7 @@ def _count(items: Iterable[LiveFrame | Fault | LinkEvent], summary: LiveSummary,
     from tqdm import tqdm
 
     from eitskin.device.live import LiveFrame, news_text
-    from eitskin.device.packets import Fault
+    from eitskin.device.wire.packets import Fault
 
     with tqdm(desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()) as bar:
         for item in items:

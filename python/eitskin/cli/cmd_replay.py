@@ -56,7 +56,7 @@ def _show(options: argparse.Namespace) -> None:
     from eitskin.device.known_model import find_model, need_model
     from eitskin.device.live import replayed
     from eitskin.device.open import open_device
-    from eitskin.device.packets import Stream
+    from eitskin.device.wire.packets import Stream
 
     what = read_mode(options.mode or "touches")
     check_picture(options.picture, what)
@@ -70,8 +70,8 @@ def _show(options: argparse.Namespace) -> None:
 
 def _truth(path: Path) -> SceneTruth | None:
     """Of the scene that the recorded board saw, where that is still to be found."""
-    from eitskin.device.recording import read_head
-    from eitskin.device.run_file import recorded_options
+    from eitskin.device.recordings.recording import read_head
+    from eitskin.device.recordings.run_file import recorded_options
     from eitskin.study.matching import match
     from eitskin.study.scene_truth import truth_of
 
@@ -84,8 +84,8 @@ def _truth(path: Path) -> SceneTruth | None:
 
 
 def _export(options: argparse.Namespace) -> None:
-    from eitskin.device.raw_frames import finite_only
-    from eitskin.device.recording import frames_of
+    from eitskin.device.recordings.raw_frames import finite_only
+    from eitskin.device.recordings.recording import frames_of
     from eitskin.frames.frames import save_frames
 
     frames = frames_of(options.recording, options.model)
@@ -101,7 +101,7 @@ def _export(options: argparse.Namespace) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    from eitskin.device.host_check import check_recording
+    from eitskin.device.recordings.host_check import check_recording
 
     check, noted = check_recording(options.recording, options.model)
     if not check.compared:

@@ -12,9 +12,9 @@ from eitskin.errors import UsageError
 if TYPE_CHECKING:
     from eitskin.device.client import Device
     from eitskin.device.known_model import KnownModel
-    from eitskin.device.packets import Stream
-    from eitskin.device.run_file import RunRecorder
+    from eitskin.device.recordings.run_file import RunRecorder
     from eitskin.device.settings import ScanSettings, SolverSettings
+    from eitskin.device.wire.packets import Stream
     from eitskin.study.scene_truth import SceneTruth
 
 DEVICE_HELP = (
@@ -88,7 +88,7 @@ def read_mode(text: str) -> Stream:
         UsageError: one is unknown.
     """
     from eitskin.config import nearest
-    from eitskin.device.packets import Stream
+    from eitskin.device.wire.packets import Stream
 
     what = Stream(0)
     for kind in text.split(","):
@@ -224,7 +224,7 @@ def prepare(
         EitskinError: a setting cannot be, the board refuses it, or the recording cannot be written.
     """
     from eitskin.device.live import begin_scene, news_text, set_up, take_reference
-    from eitskin.device.run_file import RunRecorder
+    from eitskin.device.recordings.run_file import RunRecorder
 
     if device.transport.replays:
         _refuse_settings(options, device.transport.name)

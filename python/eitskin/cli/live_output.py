@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from eitskin.device.known_model import KnownModel
     from eitskin.device.link import LinkEvent
     from eitskin.device.live import LiveFrame, LiveSummary
-    from eitskin.device.packets import Fault, Stream
+    from eitskin.device.wire.packets import Fault, Stream
     from eitskin.study.scene_truth import SceneTruth
     from eitskin.study.watch import Watcher
 
@@ -29,7 +29,7 @@ def check_picture(path: Path | None, what: Stream) -> None:
         UsageError: neither images nor touches are asked for.
         MissingExtraError: matplotlib is not installed.
     """
-    from eitskin.device.packets import Stream
+    from eitskin.device.wire.packets import Stream
     from eitskin.view.pictures import load_matplotlib
 
     if path is None:
@@ -52,7 +52,7 @@ def show(
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
     from eitskin.device.live import LiveFrame, LiveSummary, finish, news_text
-    from eitskin.device.packets import Fault
+    from eitskin.device.wire.packets import Fault
     from eitskin.study.watch import Watcher, line, table
     from eitskin.view.stream_picture import Album, draw_stream
 

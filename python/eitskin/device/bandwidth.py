@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import ceil
 
 from eitskin.device.client import Device
-from eitskin.device.packets import BoardInfo, Stream
 from eitskin.device.ports import BAUD
+from eitskin.device.wire.packets import BoardInfo, Stream
 
 BITS_A_BYTE = 10  # start, eight, stop
 USED = 0.9  # of the line; the rest is for replies, faults and what comes in bursts

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from eitskin.device.open import list_devices, open_device
-from eitskin.device.packets import BoardInfo
 from eitskin.device.ports import Port
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import EitskinError
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from eitskin import __version__
 from eitskin.device.link import Link
-from eitskin.device.packets import LINK_VERSION, BoardInfo
+from eitskin.device.wire.packets import LINK_VERSION, BoardInfo
 from eitskin.errors import DeviceError
 from eitskin.model.model import Model
 

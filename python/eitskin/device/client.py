@@ -11,13 +11,14 @@ from pathlib import Path
 from types import TracebackType
 
 from eitskin.core.results import SIGNS, Options, check_options
-from eitskin.device import commands
 from eitskin.device.check import check_board, no_answer
-from eitskin.device.codec import LinkCounters, Packet
-from eitskin.device.commands import Command
-from eitskin.device.explain import command_name, reply_text
 from eitskin.device.link import Link, LinkEvent, PumpedLink, Reconnect, Tap, ThreadedLink
-from eitskin.device.packets import (
+from eitskin.device.transport import Transport
+from eitskin.device.wire import commands
+from eitskin.device.wire.codec import LinkCounters, Packet
+from eitskin.device.wire.commands import Command
+from eitskin.device.wire.explain import command_name, reply_text
+from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
@@ -29,8 +30,7 @@ from eitskin.device.packets import (
     SolvedTouches,
     Stream,
 )
-from eitskin.device.payloads import MalformedPacket, parse
-from eitskin.device.transport import Transport
+from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.errors import DeviceError, UsageError
 
 Answer = Reply | BoardInfo | BoardStats

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from eitskin.device.check import model_of
-from eitskin.device.packets import BoardInfo
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import DeviceError, ProtocolError
 from eitskin.model.model import Model
 from eitskin.skin.protocol import Protocol, adjacent, opposite, skip

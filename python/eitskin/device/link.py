@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from eitskin.device.codec import Decoder, LinkCounters, Packet, encode
-from eitskin.device.packets import PacketType
 from eitskin.device.transport import Transport
+from eitskin.device.wire.codec import Decoder, LinkCounters, Packet, encode
+from eitskin.device.wire.packets import PacketType
 from eitskin.errors import DeviceError, EitskinError
 
 FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES))

@@ -11,12 +11,12 @@ import numpy as np
 
 from eitskin.core.results import Options
 from eitskin.device.client import Device
-from eitskin.device.commands import StreamCommand
-from eitskin.device.explain import fault_text, status_text
 from eitskin.device.known_model import NAMES_IT, KnownModel, board_options
 from eitskin.device.link import LinkEvent
-from eitskin.device.packets import BoardStats, Fault, RawFrame, Solved, SolvedImage, SolvedTouches, Stream
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
+from eitskin.device.wire.commands import StreamCommand
+from eitskin.device.wire.explain import fault_text, status_text
+from eitskin.device.wire.packets import BoardStats, Fault, RawFrame, Solved, SolvedImage, SolvedTouches, Stream
 from eitskin.errors import DeviceError
 
 WRAP_US = 2**32

@@ -64,7 +64,7 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
     if scheme == "serial":
         return SerialTransport(*_path_and_baud(url, rest))
     if scheme == "sim":
-        from eitskin.device.sim import open_simulated
+        from eitskin.device.simulated.transport import open_simulated
 
         return open_simulated(rest, model=model)
     if scheme == "emu":
@@ -72,7 +72,7 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
 
         transport: Transport = open_emulated(rest, model=model, image=image)
         return transport
-    from eitskin.device.recording import FileTransport
+    from eitskin.device.recordings.recording import FileTransport
 
     return FileTransport(rest)
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from eitskin.device.commands import StreamCommand
-from eitskin.device.explain import reply_text
 from eitskin.device.link import LinkEvent
-from eitskin.device.packets import RawFrame, SolvedImage, SolvedTouches, Stream
+from eitskin.device.wire.commands import StreamCommand
+from eitskin.device.wire.explain import reply_text
+from eitskin.device.wire.packets import RawFrame, SolvedImage, SolvedTouches, Stream
 from eitskin.errors import DeviceError, EitskinError
 
 if TYPE_CHECKING:

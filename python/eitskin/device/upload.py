@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eitskin.device.commands import ModelBegin, ModelCommit, ModelData
-from eitskin.device.explain import reply_text
-from eitskin.device.packets import MAX_PAYLOAD, Reply, ReplyStatus
+from eitskin.device.wire.commands import ModelBegin, ModelCommit, ModelData
+from eitskin.device.wire.explain import reply_text
+from eitskin.device.wire.packets import MAX_PAYLOAD, Reply, ReplyStatus
 from eitskin.errors import DeviceError
 
 if TYPE_CHECKING:

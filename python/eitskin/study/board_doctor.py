@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from eitskin.device.client import Device
-from eitskin.device.explain import fault_text
 from eitskin.device.known_model import KnownModel, scanned_protocol
 from eitskin.device.live import begin_scene
-from eitskin.device.packets import BoardInfo, BoardStats, Fault, FaultCode
-from eitskin.device.raw_frames import RawRun, as_frames, collect
+from eitskin.device.recordings.raw_frames import RawRun, as_frames, collect
+from eitskin.device.wire.explain import fault_text
+from eitskin.device.wire.packets import BoardInfo, BoardStats, Fault, FaultCode
 from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Report
 from eitskin.frames.doctor.subject import AS_GIVEN, Subject
 from eitskin.skin.skin import Skin

@@ -9,14 +9,14 @@ from typing import Any
 
 from eitskin.core.results import Touch
 from eitskin.device.bandwidth import carried_every
-from eitskin.device.host_check import HostCheck, HostTwin
 from eitskin.device.known_model import need_model
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, LiveSummary, begin_scene, follow, set_up, take_reference
 from eitskin.device.open import open_device
-from eitskin.device.packet_log import PacketLog
-from eitskin.device.packets import BoardInfo, Stream
+from eitskin.device.recordings.host_check import HostCheck, HostTwin
+from eitskin.device.recordings.packet_log import PacketLog
 from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.wire.packets import BoardInfo, Stream
 from eitskin.errors import DeviceError
 from eitskin.scene.random_touches import Touch as TrueTouch
 from eitskin.study.matching import Matching

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame
 from eitskin.device.open import find_device_scene
-from eitskin.device.packets import Fault
+from eitskin.device.wire.packets import Fault
 from eitskin.scene.description import Scene
 from eitskin.scene.random_touches import Touch
 from eitskin.scene.touch_path import touches_at

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.device.explain import quality_text
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
+from eitskin.device.wire.explain import quality_text
 from eitskin.errors import MissingExtraError
 from eitskin.scene.random_touches import Touch as TrueTouch
 from eitskin.study.image_touches import touches_in_image

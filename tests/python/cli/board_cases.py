@@ -12,8 +12,8 @@ from pathlib import Path
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.open import find_device_scene
-from eitskin.device.sim_board import SimBoard
-from eitskin.device.sim_skin import SceneSkin
+from eitskin.device.simulated.board import SimBoard
+from eitskin.device.simulated.skin import SceneSkin
 from eitskin.model.prebuilt import load_prebuilt
 
 SCENE = """

@@ -18,8 +18,8 @@ pytest.importorskip("netgen")
 from board_cases import behind_a_port, board_of, write_scene
 
 from eitskin.cli.main import main
-from eitskin.device.packets import BoardInfo
 from eitskin.device.ports import Port
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.frames.frames import load_frames
 from eitskin.model.model import Model
 from fresh_python import run_python

@@ -14,8 +14,8 @@ pytest.importorskip("netgen")
 from board_cases import behind_a_port, board_of, write_scene
 
 from eitskin.cli.main import main
-from eitskin.device.codec import encode
 from eitskin.device.ports import Port
+from eitskin.device.wire.codec import encode
 from fresh_python import MAIN, run_python, without
 from small_models import small_blob
 

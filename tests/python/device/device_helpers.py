@@ -9,10 +9,10 @@ from functools import cache
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.packets import BoardInfo
-from eitskin.device.sim import SimTransport
-from eitskin.device.sim_board import SimBoard
-from eitskin.device.sim_skin import SceneSkin
+from eitskin.device.simulated.board import SimBoard
+from eitskin.device.simulated.skin import SceneSkin
+from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.scene.description import Scene
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from small_models import prebuilt

@@ -11,11 +11,11 @@ from device_helpers import FRAMES, QUIET, Damaging, board_info, dropping, same, 
 
 from eitskin.device.check import check_board, check_model, host_major
 from eitskin.device.client import Device
-from eitskin.device.codec import encode
 from eitskin.device.link import LinkEvent
-from eitskin.device.packets import PacketType, RawFrame, SolvedTouches, Stream
-from eitskin.device.payloads import build_info
-from eitskin.device.sim import SimTransport
+from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.wire.codec import encode
+from eitskin.device.wire.packets import PacketType, RawFrame, SolvedTouches, Stream
+from eitskin.device.wire.payloads import build_info
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
 from small_models import prebuilt, tiny_blob

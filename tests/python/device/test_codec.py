@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eitskin.device.codec import Decoder, Packet, encode
-from eitskin.device.packets import MAX_PAYLOAD, PacketType
+from eitskin.device.wire.codec import Decoder, Packet, encode
+from eitskin.device.wire.packets import MAX_PAYLOAD, PacketType
 from eitskin.errors import DeviceError
 
 

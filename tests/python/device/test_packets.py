@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from eitskin.core import _core_f32 as core
 from eitskin.core.results import Touch
-from eitskin.device import commands as cmd
-from eitskin.device import packets as pk
-from eitskin.device import payloads as pl
+from eitskin.device.wire import commands as cmd
+from eitskin.device.wire import packets as pk
+from eitskin.device.wire import payloads as pl
 
 LAYOUTS = {
     "eits_packet_info": pl.INFO_STRUCT,

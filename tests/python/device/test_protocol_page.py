@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from eitskin.core import _core_f32 as core
-from eitskin.device import packets as pk
-from eitskin.device.codec import encode
-from eitskin.device.commands import COMMANDS, ModelData
+from eitskin.device.wire import packets as pk
+from eitskin.device.wire.codec import encode
+from eitskin.device.wire.commands import COMMANDS, ModelData
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "link-protocol.md").read_text(encoding="utf-8")
 

@@ -18,12 +18,12 @@ import pytest
 from device_helpers import FRAMES, QUIET, fresh_skin, sim_board, sim_device
 
 from eitskin.device.client import Device
-from eitskin.device.codec import Decoder, Packet, encode
-from eitskin.device.commands import StreamCommand
 from eitskin.device.open import open_device
-from eitskin.device.packets import PacketType, RawFrame, SolvedImage, SolvedTouches, Stream
-from eitskin.device.recording import Recorder, export_frames, frames_of, read_head
-from eitskin.device.sim import SimTransport
+from eitskin.device.recordings.recording import Recorder, export_frames, frames_of, read_head
+from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.wire.codec import Decoder, Packet, encode
+from eitskin.device.wire.commands import StreamCommand
+from eitskin.device.wire.packets import PacketType, RawFrame, SolvedImage, SolvedTouches, Stream
 from eitskin.errors import DeviceError, EitskinError, FileError, FrameError
 from eitskin.frames.frames import load_frames
 from eitskin.model.prebuilt import load_prebuilt
@@ -96,9 +96,9 @@ KILLED = """
     sys.path[:0] = {paths!r}
     from device_helpers import QUIET, sim_board
     from eitskin.device.client import Device
-    from eitskin.device.packets import Stream
-    from eitskin.device.recording import Recorder
-    from eitskin.device.sim import SimTransport
+    from eitskin.device.wire.packets import Stream
+    from eitskin.device.recordings.recording import Recorder
+    from eitskin.device.simulated.transport import SimTransport
 
     with Device(SimTransport("test", sim_board())) as device:
         device.tare(QUIET)

@@ -6,10 +6,10 @@ import random
 
 import pytest
 
-from eitskin.device.codec import Decoder, LinkCounters, encode
-from eitskin.device.packets import PacketType
-from eitskin.device.payloads import build_info
-from eitskin.device.sequence import LATE_IN_A_ROW, REMEMBERED, SequenceCheck
+from eitskin.device.wire.codec import Decoder, LinkCounters, encode
+from eitskin.device.wire.packets import PacketType
+from eitskin.device.wire.payloads import build_info
+from eitskin.device.wire.sequence import LATE_IN_A_ROW, REMEMBERED, SequenceCheck
 
 TOP = 2**32
 

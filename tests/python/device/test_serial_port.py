@@ -15,13 +15,13 @@ from device_helpers import sim_board
 
 from eitskin.device import ports as ports_module
 from eitskin.device.client import Device
-from eitskin.device.commands import Tare
 from eitskin.device.link import LinkEvent, Reconnect
 from eitskin.device.open import list_devices, open_device, open_transport
-from eitskin.device.packets import RawFrame, Stream
 from eitskin.device.ports import Port, SerialTransport
-from eitskin.device.sim import SimTransport
-from eitskin.device.sim_board import SimBoard
+from eitskin.device.simulated.board import SimBoard
+from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.wire.commands import Tare
+from eitskin.device.wire.packets import RawFrame, Stream
 from eitskin.errors import DeviceError, UsageError
 
 SOON = Reconnect(tries=40, every_s=0.05)

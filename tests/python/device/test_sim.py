@@ -9,12 +9,22 @@ import numpy as np
 import pytest
 from device_helpers import FRAMES, QUIET, empty_bank, fresh_skin, scene, sim_board, sim_device
 
-from eitskin.device import commands as cmd
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.packets import Fault, FaultCode, Quality, RawFlags, RawFrame, ReplyStatus, SolvedImage, SolvedTouches, Stream
-from eitskin.device.sim import SimTransport
-from eitskin.device.sim_board import SimBoard
+from eitskin.device.simulated.board import SimBoard
+from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.wire import commands as cmd
+from eitskin.device.wire.packets import (
+    Fault,
+    FaultCode,
+    Quality,
+    RawFlags,
+    RawFrame,
+    ReplyStatus,
+    SolvedImage,
+    SolvedTouches,
+    Stream,
+)
 from eitskin.errors import DeviceError, UsageError
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.runner import simulate_frames
@@ -246,9 +256,9 @@ def test_commands_out_of_range_are_refused_and_change_nothing(
 
 
 def test_unknown_commands_and_wrong_lengths_are_refused() -> None:
-    from eitskin.device.codec import Decoder, encode
-    from eitskin.device.packets import PacketType
-    from eitskin.device.payloads import parse_reply
+    from eitskin.device.wire.codec import Decoder, encode
+    from eitskin.device.wire.packets import PacketType
+    from eitskin.device.wire.payloads import parse_reply
 
     board = sim_board()
     board.take_output()
@@ -267,7 +277,7 @@ def test_unknown_commands_and_wrong_lengths_are_refused() -> None:
 
 
 def test_a_command_that_is_sent_again_is_answered_again_and_not_done_again() -> None:
-    from eitskin.device.codec import encode
+    from eitskin.device.wire.codec import encode
 
     board = sim_board()
     board.take_output()

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from device_helpers import QUIET, Damaging, dropping, empty_bank, fresh_skin, same, sim_board, sim_device
 
-from eitskin.device import commands as cmd
 from eitskin.device.bank import bank_bytes, newest_bank, read_record
 from eitskin.device.client import Device
-from eitskin.device.packets import RawFrame, ReplyStatus, Stream
-from eitskin.device.sim import SimTransport
-from eitskin.device.sim_board import SimBoard
+from eitskin.device.simulated.board import SimBoard
+from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.wire import commands as cmd
+from eitskin.device.wire.packets import RawFrame, ReplyStatus, Stream
 from eitskin.errors import DeviceError, FileError, ModelError
 from small_models import prebuilt, small_blob, tiny_blob
 

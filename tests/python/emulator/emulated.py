@@ -15,11 +15,11 @@ from eitskin.device.emulator.board import EmulatedBoard
 from eitskin.device.emulator.clocktime import TICKS_PER_S
 from eitskin.device.emulator.scene_skin import skin_of
 from eitskin.device.emulator.transport import EmulatedTransport
-from eitskin.device.host_check import HostCheck, HostTwin
 from eitskin.device.known_model import KnownModel, board_options
 from eitskin.device.live import LiveFrame, put_together
-from eitskin.device.packets import RawFrame, Stream
+from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.transport import Transport
+from eitskin.device.wire.packets import RawFrame, Stream
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.library_scenes import find_scene
@@ -60,7 +60,7 @@ def twin_check(
     device: Device, blob: bytes, frames: int, quiet: int = 4
 ) -> tuple[HostCheck, list[LiveFrame], list[Reconstruction | None]]:
     """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core and its results."""
-    from eitskin.device import commands
+    from eitskin.device.wire import commands
 
     taken: list[Any] = []
     device.send_command(commands.StreamCommand(int(Stream.RAW)), 1.0)

@@ -12,7 +12,7 @@ from eitskin.device.emulator.analog.converter import STEP_V
 from eitskin.device.emulator.board import EmulatedBoard
 from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin.device.emulator.scene_skin import skin_of
-from eitskin.device.packets import Fault, FaultCode, Quality, RawFlags, RawFrame, SolvedTouches, Stream
+from eitskin.device.wire.packets import Fault, FaultCode, Quality, RawFlags, RawFrame, SolvedTouches, Stream
 from eitskin.errors import DeviceError, ProtocolError
 from eitskin.model.build import BuildSettings, linearise, make_model
 from eitskin.model.eitm import encode_model

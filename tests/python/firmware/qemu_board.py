@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from eitskin.device.codec import Decoder, LinkCounters, encode
-from eitskin.device.commands import Command
-from eitskin.device.packets import FromBoard
-from eitskin.device.payloads import parse
+from eitskin.device.wire.codec import Decoder, LinkCounters, encode
+from eitskin.device.wire.commands import Command
+from eitskin.device.wire.packets import FromBoard
+from eitskin.device.wire.payloads import parse
 
 
 @dataclass

@@ -14,8 +14,8 @@ from qemu_board import Run, Script, run_board, skin_bytes
 
 from eitskin.core.engine import CoreEngine
 from eitskin.device.bank import bank_bytes
-from eitskin.device.commands import GetInfo, GetStats, ModelBegin, ModelCommit, ModelData, StreamCommand, Tare
-from eitskin.device.packets import (
+from eitskin.device.wire.commands import GetInfo, GetStats, ModelBegin, ModelCommit, ModelData, StreamCommand, Tare
+from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,

@@ -12,8 +12,8 @@ pytest.importorskip("scipy")
 
 from eitskin.device.bandwidth import least_every
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
-from eitskin.device.packets import BoardInfo, Fault, FaultCode, Quality, RawFrame, Stream
-from eitskin.device.raw_frames import RawRun, as_frames, finite_only, gather
+from eitskin.device.recordings.raw_frames import RawRun, as_frames, finite_only, gather
+from eitskin.device.wire.packets import BoardInfo, Fault, FaultCode, Quality, RawFrame, Stream
 from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.doctor.examine import examine
 from eitskin.frames.doctor.subject import subject_from_frames

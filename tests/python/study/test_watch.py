@@ -13,7 +13,7 @@ pytest.importorskip("scipy")
 from eitskin.core.results import Touch
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
-from eitskin.device.packets import Quality, RawFrame, Solved, SolvedImage, SolvedTouches
+from eitskin.device.wire.packets import Quality, RawFrame, Solved, SolvedImage, SolvedTouches
 from eitskin.scene.library_scenes import find_scene
 from eitskin.study.scene_truth import SceneTruth
 from eitskin.study.watch import Watcher, line, spread, table

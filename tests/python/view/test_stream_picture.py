@@ -11,7 +11,7 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("scipy")
 
 from eitskin.device.live import LiveFrame
-from eitskin.device.packets import Solved, SolvedImage
+from eitskin.device.wire.packets import Solved, SolvedImage
 from eitskin.scene.random_touches import Touch
 from eitskin.study.watch import Seen
 from eitskin.view.stream_picture import MOST_KEPT, MOST_PANELS, Album, draw_stream

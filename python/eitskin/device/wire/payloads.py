@@ -8,7 +8,7 @@ from dataclasses import asdict
 import numpy as np
 
 from eitskin.core.results import STOPS, Touch
-from eitskin.device.packets import (
+from eitskin.device.wire.packets import (
     STAGES,
     BoardInfo,
     BoardStats,

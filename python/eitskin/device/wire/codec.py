@@ -9,8 +9,8 @@ from functools import cache
 from typing import Any
 
 from eitskin.core.engine import load_core
-from eitskin.device.packets import MAX_PAYLOAD, PacketType
-from eitskin.device.sequence import LATE_IN_A_ROW, SequenceCheck
+from eitskin.device.wire.packets import MAX_PAYLOAD, PacketType
+from eitskin.device.wire.sequence import LATE_IN_A_ROW, SequenceCheck
 from eitskin.errors import DeviceError
 
 

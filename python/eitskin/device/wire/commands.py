@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass, fields
 from typing import ClassVar, TypeVar
 
-from eitskin.device.packets import PacketType
+from eitskin.device.wire.packets import PacketType
 
 
 @dataclass(frozen=True)

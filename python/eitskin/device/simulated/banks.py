@@ -5,12 +5,12 @@ from __future__ import annotations
 import zlib
 
 from eitskin.device.bank import ERASED, newest_bank, read_record, record_bytes, record_offset
-from eitskin.device.commands import ModelBegin, ModelData
-from eitskin.device.packets import MAX_PAYLOAD
-from eitskin.device.packets import ReplyStatus as Status
-from eitskin.device.payloads import RAW_STRUCT, SOLVED_STRUCT
-from eitskin.device.sim_checks import OK, Answer
-from eitskin.device.sim_solve import SimSolver, core_status
+from eitskin.device.simulated.checks import OK, Answer
+from eitskin.device.simulated.solve import SimSolver, core_status
+from eitskin.device.wire.commands import ModelBegin, ModelData
+from eitskin.device.wire.packets import MAX_PAYLOAD
+from eitskin.device.wire.packets import ReplyStatus as Status
+from eitskin.device.wire.payloads import RAW_STRUCT, SOLVED_STRUCT
 from eitskin.errors import EitskinError, ModelError
 
 LEAST_MODEL = 64

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 
 from eitskin.core.engine import load_core
-from eitskin.device.commands import COMMANDS
-from eitskin.device.packets import Fault, FaultCode, PacketType, Quality, Reply, ReplyStatus
+from eitskin.device.wire.commands import COMMANDS
+from eitskin.device.wire.packets import Fault, FaultCode, PacketType, Quality, Reply, ReplyStatus
 
 UPLOAD = "upload one with  eitskin model upload MODEL.eitm"
 

@@ -15,7 +15,7 @@ from eitskin.core.results import Options, Reconstruction, Touch
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, follow
-from eitskin.device.packets import Fault, Quality, RawFrame, Stream
+from eitskin.device.wire.packets import Fault, Quality, RawFrame, Stream
 from eitskin.errors import FrameError
 from eitskin.solve.reconstructor import Reconstructor
 
@@ -156,8 +156,8 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
         FileError, DeviceError, ModelError: the recording or the model cannot be read, or do not belong together.
     """
     from eitskin.device.client import Device
-    from eitskin.device.recording import FileTransport
-    from eitskin.device.run_file import recorded_options
+    from eitskin.device.recordings.recording import FileTransport
+    from eitskin.device.recordings.run_file import recorded_options
 
     options = recorded_options(path)
     with Device(FileTransport(path)) as device:

@@ -16,9 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin import __version__
-from eitskin.device import commands as cmd
-from eitskin.device.codec import Decoder, Packet, encode
-from eitskin.device.packets import (
+from eitskin.device.simulated.banks import E_MODEL_MAGIC, SimBanks, golden
+from eitskin.device.simulated.checks import OK, Answer, check_scan, check_size, check_solver, outside, slot_us
+from eitskin.device.simulated.skin import SceneSkin
+from eitskin.device.wire import commands as cmd
+from eitskin.device.wire.codec import Decoder, Packet, encode
+from eitskin.device.wire.packets import (
     STAGES,
     BoardInfo,
     BoardStats,
@@ -32,11 +35,8 @@ from eitskin.device.packets import (
     StageStats,
     Stream,
 )
-from eitskin.device.packets import ReplyStatus as Status
-from eitskin.device.payloads import build_fault, build_info, build_raw, build_reply, build_stats
-from eitskin.device.sim_banks import E_MODEL_MAGIC, SimBanks, golden
-from eitskin.device.sim_checks import OK, Answer, check_scan, check_size, check_solver, outside, slot_us
-from eitskin.device.sim_skin import SceneSkin
+from eitskin.device.wire.packets import ReplyStatus as Status
+from eitskin.device.wire.payloads import build_fault, build_info, build_raw, build_reply, build_stats
 from eitskin.model.storage import STORAGES
 
 BOARD_NAME = "simulated"

@@ -12,7 +12,7 @@ from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, follow
-from eitskin.device.packets import BoardInfo, Fault, RawFrame, Stream
+from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame, Stream
 from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.frames import Frames
 from eitskin.skin.protocol import Protocol

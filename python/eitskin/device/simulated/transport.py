@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
-from eitskin.device.sim_board import SimBoard
-from eitskin.device.sim_skin import SceneSkin
+from eitskin.device.simulated.board import SimBoard
+from eitskin.device.simulated.skin import SceneSkin
 
 
 class SimTransport:

@@ -10,9 +10,9 @@ from typing import Any
 
 from eitskin.core.results import Options, check_options
 from eitskin.device.client import Device
-from eitskin.device.codec import Decoder
-from eitskin.device.packets import PacketType
-from eitskin.device.recording import CHUNK, Recorder, read_head
+from eitskin.device.recordings.recording import CHUNK, Recorder, read_head
+from eitskin.device.wire.codec import Decoder
+from eitskin.device.wire.packets import PacketType
 from eitskin.errors import EitskinError, FileError
 
 LOOKED_THROUGH = 64 * CHUNK  # the note is among the first packets

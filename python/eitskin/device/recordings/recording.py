@@ -10,9 +10,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from eitskin import __version__
-from eitskin.device.codec import Decoder, Packet, encode
-from eitskin.device.packets import PacketType
-from eitskin.device.payloads import build_info
+from eitskin.device.wire.codec import Decoder, Packet, encode
+from eitskin.device.wire.packets import PacketType
+from eitskin.device.wire.payloads import build_info
 from eitskin.errors import DeviceError, FileError
 
 if TYPE_CHECKING:
@@ -170,8 +170,8 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
     from eitskin.device.client import Device
     from eitskin.device.known_model import find_model, scanned_protocol
     from eitskin.device.live import follow
-    from eitskin.device.packets import Stream
-    from eitskin.device.raw_frames import as_frames, gather
+    from eitskin.device.recordings.raw_frames import as_frames, gather
+    from eitskin.device.wire.packets import Stream
     from eitskin.errors import FrameError
 
     with Device(FileTransport(path)) as device:

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from eitskin.device.client import Device
-from eitskin.device.codec import Packet
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, put_together
-from eitskin.device.packets import Fault, RawFrame, SolvedImage, SolvedTouches, Stream
-from eitskin.device.payloads import MalformedPacket, parse
+from eitskin.device.wire.codec import Packet
+from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches, Stream
+from eitskin.device.wire.payloads import MalformedPacket, parse
 
 
 class PacketLog:

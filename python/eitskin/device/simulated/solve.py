@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SIGNS, Info
-from eitskin.device.commands import Solver
-from eitskin.device.packets import (
+from eitskin.device.wire.commands import Solver
+from eitskin.device.wire.packets import (
     PacketType,
     RawFrame,
     Solved,
@@ -19,7 +19,7 @@ from eitskin.device.packets import (
     SolvedTouches,
     Stream,
 )
-from eitskin.device.payloads import build_image, build_touches
+from eitskin.device.wire.payloads import build_image, build_touches
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.options import default_options

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from eitskin.core.results import MAX_TOUCHES
-from eitskin.device.commands import Command, ModelData, Scan, Solver
-from eitskin.device.packets import ReplyStatus as Status
+from eitskin.device.wire.commands import Command, ModelData, Scan, Solver
+from eitskin.device.wire.packets import ReplyStatus as Status
 
 SWITCH_US = 3
 MOST_INT = 2**31 - 1

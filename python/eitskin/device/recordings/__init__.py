@@ -1,0 +1,1 @@
+"""Runs kept: as packets on disk or in memory, as frames, and held against this host bit by bit."""

@@ -1,0 +1,1 @@
+"""The link: packets, their layouts and codec, sequence numbers, and what numbers mean in words."""
