@@ -110,8 +110,10 @@ def to_text(demo: BoardDemo) -> str:
         "        board x      y  radius |   host x      y  radius | error mm",
     ]
     true_of = {found: d for (_, found), d in zip(demo.matching.pairs, demo.matching.distances_mm, strict=True)}
-    for k, touch in enumerate(demo.board):
-        row = f"touch {k + 1} {touch.x_mm:7.2f} {touch.y_mm:6.2f} {touch.radius_mm:7.2f} |"
+    place = {found: true for true, found in demo.matching.pairs}
+    for n, k in enumerate(sorted(range(len(demo.board)), key=lambda k: place.get(k, len(demo.true)))):
+        touch = demo.board[k]
+        row = f"touch {n + 1} {touch.x_mm:7.2f} {touch.y_mm:6.2f} {touch.radius_mm:7.2f} |"
         other = demo.host[k] if k < len(demo.host) else None
         row += "      none               |" if other is None else f" {other.x_mm:8.2f} {other.y_mm:6.2f} {other.radius_mm:7.2f} |"
         lines.append(row + (f" {true_of[k]:8.2f}" if k in true_of else "    false"))
