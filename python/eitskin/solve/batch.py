@@ -38,10 +38,10 @@ def check_threads(threads: int | None) -> int:
 
 
 class Batch:
-    """Contexts of the C core, one a thread, that share a model, options and reference.
+    """Contexts of the C core, one a thread, with the same model, options and reference.
 
-    Each frame is reconstructed anew, as :meth:`Reconstructor.forget` before each would do it: the same bits and counts
-    and, in the order of the frames, the same ids, however many threads there are. ``engine`` is "c" or "c64"; ``threads`` None: all processors.
+    Each frame is reconstructed anew, as :meth:`Reconstructor.forget` before each would do it: the same bits, counts and, in the
+    order of the frames, ids, however many threads there are. ``engine`` is "c" or "c64"; ``threads`` None: all processors.
 
     Raises:
         UsageError: an unknown engine, an option out of range, too many threads, or the core is not built.
