@@ -1,6 +1,7 @@
 /* The context: its workspace, options and start. */
 #include "eitskin/context.h"
 
+#include "columns.h"
 #include "kernels.h"
 #include "vec.h"
 
@@ -105,6 +106,13 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->atoms = take_reals(a, EITS_MAX_TOUCHES * stride);
     ctx->cell = (uint16_t *)(void *)take_bytes(a, (size_t)ctx->model->nx * ctx->model->ny * 2);
     map_cells(ctx);
+    const size_t room = EITS_HELD(pixels);
+    ctx->held = (float *)(void *)take_bytes(a, room * stride * 4);
+    ctx->held_at = (uint16_t *)(void *)take_bytes(a, pixels * 2);
+    ctx->held_column = (uint16_t *)(void *)take_bytes(a, room * 2);
+    ctx->held_wanted = take_bytes(a, room);
+    ctx->working_slot = (uint32_t *)(void *)take_bytes(a, room * 4);
+    eits_drop_columns(ctx);
     if (prepared) {
         ctx->panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);
         ctx->working_panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);

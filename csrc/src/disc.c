@@ -1,13 +1,15 @@
 #include "disc.h"
 
+#include "columns.h"
 #include "kernels.h"
 #include "stages.h"
 #include "vec.h"
 
-/* The kept pixels that the disc covers: their numbers into list_index, their covers and the covers' derivative by distance. */
+/* The kept pixels that the disc covers: their columns in `matrix` into list_index, their covers and the covers' derivative by distance. */
 typedef struct covered {
     uint32_t count;
-    const uint32_t *index;
+    uint32_t *index;
+    eits_matrix matrix; /* the held columns, or S */
     eits_real *cover;  /* over the column weight, times the column scale */
     eits_real *ramp;   /* minus the derivative by distance, likewise */
     eits_real *toward_x, *toward_y; /* unit vector from centre to pixel; later the derivatives */
@@ -34,7 +36,7 @@ static covered cover(eits_context *ctx, const eits_disc *disc)
     const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / pixel;
     const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / pixel;
     const eits_real radius = disc->radius_mm / pixel, reach = radius + R(0.5);
-    covered c = {0, ctx->list_index, ctx->list_value, ctx->gradient, ctx->z, ctx->x_next};
+    covered c = {0, ctx->list_index, model->sensitivity, ctx->list_value, ctx->gradient, ctx->z, ctx->x_next};
     uint32_t x0, x1, y0, y1;
     cell_range(x, reach, model->nx, &x0, &x1);
     cell_range(y, reach, model->ny, &y0, &y1);
@@ -57,12 +59,16 @@ static covered cover(eits_context *ctx, const eits_disc *disc)
             ++c.count;
         }
     }
+    if (eits_hold_columns(ctx, c.index, c.count)) {
+        eits_slots_of(ctx, c.index, c.count, c.index);
+        c.matrix = eits_held_columns(ctx);
+    }
     return c;
 }
 
 static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *value, eits_real *out)
 {
-    ctx->kernels->mul(&ctx->model->sensitivity, c->index, value, c->count, out);
+    ctx->kernels->mul(&c->matrix, c->index, value, c->count, out);
     return (uint64_t)c->count * ctx->model->rank + eits_project(ctx, out);
 }
 

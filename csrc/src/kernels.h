@@ -22,6 +22,8 @@ typedef struct eits_kernels {
     /* The same from panels that hold just these columns (eits_make_panels, eits_pack_panels). */
     void (*mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const uint32_t *index, uint32_t count,
                          const eits_real *v, eits_real *out);
+    /* out = the `count` stored numbers from place `first` on, both multiples of 8, as floats without scales. */
+    void (*unpack)(const eits_matrix *matrix, size_t first, size_t count, float *out);
     /* Small vector sums: eight lanes, each a chain of fused multiply-adds, then a fixed tree (vec.h). */
     eits_real (*dot)(const eits_real *a, const eits_real *b, size_t count);
     /* out += factor * a */
@@ -51,8 +53,9 @@ void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real
 /* out = S x, x being that of the working set; returns the number of non-zeros. Uses the context's list. */
 uint32_t eits_apply_working(const eits_context *ctx, const eits_real *x, eits_real *out);
 
-/* Copy the working set's panels out of those of S; nothing to do for a context that is not prepared. */
-void eits_pack_panels(const eits_context *ctx);
+/* Keep the working set's columns at hand: those of S that are not held yet are unpacked, and in a prepared context their
+ * panels copied. Needed after each change of ctx->working. */
+void eits_pack_panels(eits_context *ctx);
 
 /* out = S x; returns the number of non-zeros. Uses the context's list. */
 uint32_t eits_apply(const eits_context *ctx, const eits_real *x, eits_real *out);

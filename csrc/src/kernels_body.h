@@ -1,10 +1,12 @@
 /* The matrix products, included once for each processor that they are built for (kernels_portable.c, kernels_avx2.c).
- * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this:
+ * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this, and KERNELS_OWN_PRODUCTS or
+ * KERNELS_OWN_VECTORS where it has its own mul, mul_t and unpack, or dot and axpy:
  *     sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the EITS_PANEL lanes l */
 #include "half.h"
 #include "kernels.h"
 #include "vec.h"
 
+#ifndef KERNELS_OWN_PRODUCTS
 /* One function for each storage type, from one text. */
 #define DEFINE_PRODUCTS(TAG, TYPE, READ)                                                                                   \
     static void NAME(mul_##TAG)(const eits_matrix *matrix, const uint32_t *index, const eits_real *value, uint32_t count, \
@@ -58,15 +60,29 @@
         }                                                                                                                  \
     }
 
+#define DEFINE_UNPACK(TAG, TYPE, READ)                                                                                     \
+    static void NAME(unpack_##TAG)(const eits_matrix *matrix, size_t first, size_t count, float *restrict out)             \
+    {                                                                                                                      \
+        const TYPE *restrict data = (const TYPE *)matrix->data + first;                                                    \
+        for (size_t i = 0; i < count; ++i)                                                                                 \
+            out[i] = READ(data[i]);                                                                                        \
+    }
+
 #define READ_PLAIN(x) ((eits_real)(x))
 #define READ_HALF(x) ((eits_real)eits_half_to_float(x))
 DEFINE_PRODUCTS(f32, float, READ_PLAIN)
 DEFINE_PRODUCTS(f16, uint16_t, READ_HALF)
 DEFINE_PRODUCTS(i16, int16_t, READ_PLAIN)
 DEFINE_PRODUCTS(i8, int8_t, READ_PLAIN)
+DEFINE_UNPACK(f32, float, )
+DEFINE_UNPACK(f16, uint16_t, eits_half_to_float)
+DEFINE_UNPACK(i16, int16_t, (float))
+DEFINE_UNPACK(i8, int8_t, (float))
 #undef READ_PLAIN
 #undef READ_HALF
 #undef DEFINE_PRODUCTS
+#undef DEFINE_UNPACK
+#endif
 
 static void NAME(scale)(const eits_matrix *matrix, const uint32_t *index, uint32_t count, eits_real *out)
 {
@@ -74,6 +90,17 @@ static void NAME(scale)(const eits_matrix *matrix, const uint32_t *index, uint32
         return;
     for (uint32_t k = 0; k < count; ++k)
         out[k] *= (eits_real)matrix->scale[index == NULL ? k : index[k]];
+}
+
+#ifndef KERNELS_OWN_PRODUCTS
+static void NAME(unpack)(const eits_matrix *matrix, size_t first, size_t count, float *out)
+{
+    switch (matrix->storage) {
+    case EITS_STORAGE_F32: NAME(unpack_f32)(matrix, first, count, out); break;
+    case EITS_STORAGE_F16: NAME(unpack_f16)(matrix, first, count, out); break;
+    case EITS_STORAGE_I16: NAME(unpack_i16)(matrix, first, count, out); break;
+    case EITS_STORAGE_I8: NAME(unpack_i8)(matrix, first, count, out); break;
+    }
 }
 
 static void NAME(mul)(const eits_matrix *matrix, const uint32_t *index, const eits_real *value, uint32_t count, eits_real *out)
@@ -96,6 +123,7 @@ static void NAME(mul_t)(const eits_matrix *matrix, const uint32_t *index, uint32
     }
     NAME(scale)(matrix, index, count, out);
 }
+#endif
 
 static void NAME(mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const uint32_t *index, uint32_t count,
                                const eits_real *v, eits_real *out)
@@ -151,6 +179,6 @@ static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restri
 /* This build's table. */
 #define KERNELS_TABLE(TEXT)                                                                                                \
     {                                                                                                                      \
-        .name = TEXT, .mul = NAME(mul), .mul_t = NAME(mul_t), .mul_t_panels = NAME(mul_t_panels), .dot = NAME(dot),        \
-        .axpy = NAME(axpy), .prox = NAME(prox)                                                                             \
+        .name = TEXT, .mul = NAME(mul), .mul_t = NAME(mul_t), .mul_t_panels = NAME(mul_t_panels),                       \
+        .unpack = NAME(unpack), .dot = NAME(dot), .axpy = NAME(axpy), .prox = NAME(prox)                                   \
     }

@@ -34,8 +34,8 @@ static void sizes_agree(void)
                     eits_context ctx;
                     uint8_t *workspace = small_aligned(&memory, size);
                     CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
-                    const uint8_t *cells_end = (uint8_t *)ctx.cell + EITS_ALIGN16(m.nx * m.ny * 2);
-                    const uint8_t *end = prepared ? (uint8_t *)ctx.working_panels + EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank) : cells_end;
+                    const uint8_t *held_end = (uint8_t *)ctx.working_slot + EITS_ALIGN16(EITS_HELD(m.n_pixels) * 4);
+                    const uint8_t *end = prepared ? (uint8_t *)ctx.working_panels + EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank) : held_end;
                     CHECK(end == workspace + size); /* nothing is missing and nothing is wasted */
                     CHECK((ctx.panels != NULL) == prepared && (ctx.working_panels != NULL) == prepared);
                     CHECK((uint8_t *)ctx.baseline.v0 == workspace);

@@ -73,13 +73,13 @@ static void area(void)
                                     .radius_mm = (eits_real)radius};
             eits_real atom[EITS_STRIDE(RANK)];
             (void)eits_disc_atom(ctx, &disc, atom, NULL);
-            /* the first row of S is constant, but the weights are not: their covers are in list_value */
+            /* the first row of S is constant, but the weights are not: their covers are in list_value, columns where they are held */
             const double reach = radius / pixel + 0.5;
             uint32_t k = 0;
             for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) {
                 const double dx = (double)b.c.model.pixel[j].ix + 0.5 - SIDE / 2.0 - place % 24 / 24.0;
                 const double dy = (double)b.c.model.pixel[j].iy + 0.5 - SIDE / 2.0 - place / 24 / 24.0;
-                if (hypot(dx, dy) >= reach - 1e-6 || k >= ctx->model->n_pixels || ctx->list_index[k] != j)
+                if (hypot(dx, dy) >= reach - 1e-6 || k >= ctx->model->n_pixels || ctx->held_column[ctx->list_index[k]] != j)
                     continue;
                 sum += (double)ctx->list_value[k++] * (double)b.c.model.column_weight[j] * pixel * pixel / (24 * 24);
             }

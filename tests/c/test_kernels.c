@@ -187,6 +187,26 @@ static void check_mul_t(const sample *s, uint64_t *state)
     free(v), free(expected), free(out), free(panels), free(column);
 }
 
+/* Stored numbers as floats, from any block of eight on: the numbers themselves, padding included, and nothing beside them. */
+static void check_unpack(const sample *s)
+{
+    const eits_matrix *m = &s->matrix;
+    const size_t whole = (size_t)m->stride * m->cols;
+    float *out = memory_of((whole + 1) * sizeof *out);
+    for (int b = 0; b < build_count; ++b) {
+        for (size_t first = 0; first < whole; first += 8 * (1 + whole / 64)) {
+            memset(out, 0xFF, (whole + 1) * sizeof *out);
+            builds[b]->unpack(m, first, whole - first, out);
+            for (size_t i = 0; i < whole - first; ++i) {
+                const size_t row = (first + i) % m->stride, column = (first + i) / m->stride;
+                CHECK(out[i] == (float)(row < m->rows ? dense_entry(m, (uint32_t)column, (uint32_t)row) : 0));
+            }
+            CHECK(isnan(out[whole - first]));
+        }
+    }
+    free(out);
+}
+
 static void products_of_all_storages_and_sizes(void)
 {
     static const uint32_t rows[] = {1, 3, 7, 8, 9, 13, 24, 33}, cols[] = {1, 2, 3, 4, 5, 7, 31, 32, 33, 64, 99};
@@ -197,6 +217,7 @@ static void products_of_all_storages_and_sizes(void)
                 sample s = make_sample((eits_storage)storage, rows[r], cols[c], &state);
                 check_mul(&s, &state);
                 check_mul_t(&s, &state);
+                check_unpack(&s);
                 free_sample(&s);
             }
         }

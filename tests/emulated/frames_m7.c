@@ -1,6 +1,7 @@
 /* Reads "model.eitm" and "frames.f32" (quiet frames, then frames; counts on "plan.txt") from the host's folder, runs them as a
- * board would, and prints for each frame: why the solve stopped, iterations, MACs, instructions of the solve and of the touches,
- * the image's CRC-32, and the touches' numbers as hexadecimal bits. Floats are printed as bits: there is nothing to round. */
+ * board would, and prints for each frame: why the solve stopped, iterations, MACs and instructions of the solve and of the
+ * touches, the stack that they took, the image's CRC-32, and the touches' numbers as hexadecimal bits. Floats are printed as
+ * bits: there is nothing to round. */
 #include "eitskin/eitskin.h"
 
 #include <stdio.h>
@@ -29,6 +30,29 @@ static unsigned long instructions_since(uint32_t start)
     return (unsigned long)((uint64_t)(start - TIMER_VALUE) * 5u / 8u);
 }
 
+/* The stack below here is painted before the calls and looked at after them. */
+enum { PAINTED_WORDS = 16 * 1024 / 4, LEAVE_FREE_WORDS = 64 };
+static const uint32_t PAINT = 0x5AC7A57Eu;
+
+static volatile uint32_t *lowest_painted(void)
+{
+    return (volatile uint32_t *)__builtin_frame_address(0) - LEAVE_FREE_WORDS - PAINTED_WORDS;
+}
+
+__attribute__((noinline)) static void paint_stack(volatile uint32_t *from)
+{
+    for (int k = 0; k < PAINTED_WORDS; ++k)
+        from[k] = PAINT;
+}
+
+static unsigned long stack_used(volatile const uint32_t *from)
+{
+    unsigned long words = PAINTED_WORDS;
+    for (; words > 0 && *from == PAINT; ++from)
+        --words;
+    return (words + LEAVE_FREE_WORDS) * 4;
+}
+
 static unsigned long bits_of(float value)
 {
     uint32_t bits;
@@ -46,9 +70,9 @@ int main(void)
 {
     eits_model model;
     eits_context ctx;
-    unsigned quiet = 0, count = 0, warm = 0, sign = 0, solver = 0;
+    unsigned quiet = 0, count = 0, warm = 0, sign = 0, solver = 0, portable = 0;
     FILE *file = fopen("plan.txt", "r");
-    if (file == NULL || fscanf(file, "%u %u %u %u %u", &quiet, &count, &warm, &sign, &solver) != 5)
+    if (file == NULL || fscanf(file, "%u %u %u %u %u %u", &quiet, &count, &warm, &sign, &solver, &portable) != 6)
         return fail("plan.txt", EITS_E_ARGUMENT);
     fclose(file);
     file = fopen("model.eitm", "rb");
@@ -67,6 +91,8 @@ int main(void)
     options.solver = (eits_solver)solver;
     status = eits_set_options(&ctx, &options);
     if (status == EITS_OK)
+        status = eits_use_portable_kernels(&ctx, (int)portable);
+    if (status == EITS_OK)
         status = quiet >= 4 ? eits_baseline_begin(&ctx, quiet) : EITS_OK;
     if (status != EITS_OK)
         return fail("baseline", status);
@@ -84,6 +110,8 @@ int main(void)
                 return fail("quiet frame", status);
             continue;
         }
+        volatile uint32_t *const painted = lowest_painted();
+        paint_stack(painted);
         uint32_t start = TIMER_VALUE;
         status = eits_reconstruct(&ctx, frame, model.n_rows, NULL, NULL);
         const unsigned long solve = instructions_since(start);
@@ -92,9 +120,10 @@ int main(void)
         start = TIMER_VALUE;
         (void)eits_find_touches(&ctx, touches, EITS_MAX_TOUCHES, &found);
         const unsigned long touch = instructions_since(start);
-        printf("frame %u status %d stop %d iterations %lu macs %lu solve %lu touch %lu image %08lx touches %lu", k - quiet, (int)status,
-               (int)ctx.info.stop, (unsigned long)ctx.info.iterations, (unsigned long)(ctx.info.macs + ctx.info.touch_macs), solve,
-               touch, (unsigned long)eits_crc32(0, ctx.image, (size_t)model.n_pixels * sizeof ctx.image[0]), (unsigned long)found);
+        const unsigned long stack = stack_used(painted);
+        printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu stack %lu image %08lx touches %lu",
+               k - quiet, (int)status, (int)ctx.info.stop, (unsigned long)ctx.info.iterations, (unsigned long)ctx.info.macs,
+               (unsigned long)ctx.info.touch_macs, solve, touch, stack, (unsigned long)eits_crc32(0, ctx.image, (size_t)model.n_pixels * sizeof ctx.image[0]), (unsigned long)found);
         for (uint32_t t = 0; t < found; ++t)
             printf(" %lu:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)touches[t].id, bits_of(touches[t].x_mm), bits_of(touches[t].y_mm),
                    bits_of(touches[t].radius_mm), bits_of(touches[t].strength_s_per_m_mm2), bits_of(touches[t].confidence));

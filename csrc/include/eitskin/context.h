@@ -125,6 +125,13 @@ typedef struct eits_context {
     uint16_t *cell;          /* ny x nx: which kept pixel a cell of the image is; EITS_NO_PIXEL for none */
     eits_real *panels;       /* S again, in panels of EITS_PANEL columns; NULL: not prepared */
     eits_real *working_panels; /* the working set's columns likewise; NULL: not prepared */
+    float *held;             /* EITS_HELD(n_pixels) x stride: columns of S in use, unpacked (columns.h) */
+    uint16_t *held_at;       /* n_pixels: where a column is held; EITS_NO_PIXEL: nowhere */
+    uint16_t *held_column;   /* EITS_HELD(n_pixels): which column is held there */
+    uint8_t *held_wanted;    /* as many: scratch */
+    uint32_t held_next;      /* where to look for room */
+    uint32_t *working_slot;  /* EITS_HELD(n_pixels): where the working set's columns are held */
+    uint32_t working_held;   /* 1: all of them are */
     eits_touch last[EITS_MAX_TOUCHES];
     uint32_t last_count, next_id;
     uint32_t warm; /* x holds the last frame's coefficients */
@@ -133,6 +140,8 @@ typedef struct eits_context {
 
 #define EITS_PANEL 32u
 #define EITS_NO_PIXEL 0xFFFFu
+#define EITS_MOST_HELD 256u
+#define EITS_HELD(n_pixels) ((size_t)((n_pixels) < EITS_MOST_HELD ? (n_pixels) : EITS_MOST_HELD))
 #define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
 #define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
 #define EITS_REALS(count) EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
@@ -146,6 +155,8 @@ typedef struct eits_context {
      (8 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
      EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_ALIGN16((size_t)(n_cells) * 2u) +                                        \
+     EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \
+     EITS_ALIGN16(EITS_HELD(n_pixels) * 2u) + EITS_ALIGN16(EITS_HELD(n_pixels)) + EITS_ALIGN16(EITS_HELD(n_pixels) * 4u) + \
      ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) : 0u))
 
 /* The same number for an open model, as a function. Returns 0 for a null model. */

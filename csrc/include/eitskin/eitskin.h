@@ -8,6 +8,7 @@
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
+#include "eitskin/batch.h"
 #include "eitskin/link.h"
 
 #endif

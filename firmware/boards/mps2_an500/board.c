@@ -155,5 +155,7 @@ int main(void)
         .workspace = workspace,
         .workspace_bytes = sizeof workspace,
     };
-    return fw_run(&board);
+    const int status = fw_run(&board);
+    (void)mps2_lock(NULL); /* a slot's interrupt during exit would find the board gone */
+    return status;
 }

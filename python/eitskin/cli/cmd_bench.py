@@ -1,4 +1,4 @@
-"""``eitskin bench frame | jacobian | effects | scenes``: speed, side by side in one run."""
+"""``eitskin bench frame | jacobian | effects | scenes | board``: speed, side by side in one run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from eitskin.errors import UsageError
@@ -22,6 +23,19 @@ def add_parser(subparsers: Any) -> None:
     jacobian = what.add_parser("jacobian", help="building: Jacobian beside pyEIT's, and the whole model")
     jacobian.add_argument("--json", action="store_true")
     jacobian.set_defaults(run=run_jacobian)
+    board = what.add_parser(
+        "board",
+        help="a frame on the emulated board: exact instructions, memory, frame rate; needs a checkout",
+        description="Build the Cortex-M7 program and both firmware images from the source checkout, run random scenes under QEMU "
+        "in every storage with the M7's kernels and with plain C, and the firmware itself on the emulated NUCLEO-F767ZI.",
+    )
+    board.add_argument("--scenes", type=int, default=60, help="random scenes (default: %(default)s)")
+    board.add_argument("--seed", type=int, default=1, help="of the scenes (default: %(default)s)")
+    board.add_argument("--frames", type=int, default=8, help="on the emulated NUCLEO, 0 for none (default: %(default)s)")
+    board.add_argument("--build", type=Path, metavar="DIR", help="keep the build there, or take up an earlier one")
+    board.add_argument("--markdown", type=Path, metavar="FILE.md", help="write the page docs/board-cost.md is")
+    board.add_argument("--json", action="store_true")
+    board.set_defaults(run=run_board)
     effects = what.add_parser("effects", help="scenes: the time with no effect, with each alone, with all")
     effects.add_argument("--frames", type=int, default=100, help="default: %(default)s")
     effects.add_argument("--json", action="store_true")
@@ -51,6 +65,24 @@ def run_jacobian(options: argparse.Namespace) -> int:
 
     times = bench_jacobian.run()
     print(json.dumps(times, indent=2) if options.json else bench_jacobian.text(times))
+    return 0
+
+
+def run_board(options: argparse.Namespace) -> int:
+    """Count what a frame costs on the emulated board."""
+    from eitskin.fileio import refuse_unwritable, write_bytes
+    from eitskin.study import bench_board
+
+    _within("--scenes", options.scenes, 1, 2000)
+    _within("--seed", options.seed, 0, 2**31)
+    if options.frames:
+        _within("--frames", options.frames, 2, 1000)
+    refuse_unwritable(options.markdown)
+    result = bench_board.run(options.scenes, options.seed, frames=options.frames, build=options.build, progress=_progress)
+    if options.markdown is not None:
+        command = f"eitskin bench board --scenes {options.scenes} --seed {options.seed} --frames {options.frames} --markdown"
+        write_bytes(options.markdown, bench_board.as_markdown(result, f"{command} {options.markdown.as_posix()}").encode("utf-8"))
+    print(json.dumps(result.as_dict(), indent=2) if options.json else bench_board.as_text(result))
     return 0
 
 

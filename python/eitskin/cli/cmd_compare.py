@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ def add_parser(subparsers: Any) -> None:
         choices=("nearest", "bilinear"),
         help="what a cell of MIoU's raster shows: the nearest pixel, or one interpolated (default: bilinear)",
     )
+    parser.add_argument("--threads", metavar="N", type=int, default=1, help="of the C core's frames (default: %(default)s)")
     parser.add_argument("--json", action="store_true", help="print JSON, with the curves over the threshold")
     parser.add_argument("--csv", metavar="FILE", type=Path, help="write the numbers of every scene")
     parser.add_argument("--picture", metavar="PNG", type=Path, help="draw test scenes as each method shows them")
@@ -48,6 +50,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.study import metrics
     from eitskin.study.compare import Settings, compare
     from eitskin.study.compare_table import to_csv, to_json, to_text
+    from eitskin.study.methods import methods
 
     _check(options)
     skin, protocol = (paper_skin(), adjacent(16)) if options.skin is None else load_skin(options.skin)
@@ -58,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         measurement=Measurement(snr_db=options.snr_db),
         lookup=options.lookup or metrics.LOOKUP,
     )
-    comparison = compare(skin, protocol, settings, progress=progress)
+    comparison = compare(skin, protocol, settings, families=partial(methods, threads=options.threads), progress=progress)
     if options.csv is not None:
         write_bytes(options.csv, to_csv(comparison).encode("utf-8"))
     if options.picture is not None or options.curves is not None:
@@ -74,8 +77,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> None:
     """Refuse before the work what would fail after it."""
+    from eitskin.solve.batch import check_threads
+
     if not -20 <= options.snr_db <= 200:
         raise UsageError(f"--snr-db {options.snr_db:g} is out of range; use -20 to 200")
+    check_threads(options.threads)
     if options.seed < 0:
         raise UsageError(f"--seed {options.seed} must be 0 or above")
     for path in (options.csv, options.picture, options.curves):

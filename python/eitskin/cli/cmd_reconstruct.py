@@ -35,6 +35,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--iterations", type=int, metavar="N", help="of FISTA, at most (default: the model's)")
     parser.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
     parser.add_argument("--warm", action="store_true", help="start each frame from the last one's result")
+    parser.add_argument(
+        "--threads", type=int, default=1, metavar="N", help="frames side by side, the same results (default: 1; not with --warm)"
+    )
     parser.add_argument("--saturation-v", type=float, metavar="V", help="leave channels at or beyond +-V out")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT.npz", help="write images, touches and solver info")
     parser.add_argument("--picture", type=Path, metavar="PNG", help="draw all frames, with the truth where known")
@@ -49,6 +52,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.frames.frames import load_frames
     from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
 
+    _check_threads(options)
     refuse_unwritable(options.output, options.picture)
     if options.picture is not None:
         from eitskin.view.pictures import load_matplotlib
@@ -74,7 +78,11 @@ def run(options: argparse.Namespace) -> int:
             f"run  eitskin doctor {options.frames}",
             file=sys.stderr,
         )
-    results, refused = _reconstruct_all(reconstructor, frames, _chosen(frames, options.only), options.warm)
+    chosen = _chosen(frames, options.only)
+    if options.threads > 1:
+        results, refused = _reconstruct_threaded(reconstructor, blob, frames, chosen, options.threads)
+    else:
+        results, refused = _reconstruct_all(reconstructor, frames, chosen, options.warm)
     scores = _scores(reconstructor, frames, results, options.sign)
     if options.output is not None and results:
         from eitskin.frames.results_file import save_results
@@ -137,6 +145,35 @@ def _reconstruct_all(
             results[number] = reconstructor.reconstruct(frames.voltage_v[number])
         except FrameError as error:
             refused[number] = str(error)
+    return results, refused
+
+
+def _check_threads(options: argparse.Namespace) -> None:
+    from eitskin.solve.batch import check_threads
+
+    if check_threads(options.threads) > 1 and (options.warm or options.engine == "numpy"):
+        what = "--warm starts each frame from the last one" if options.warm else "the numpy engine has one"
+        raise UsageError(f"--threads {options.threads}: {what}; use --threads 1")
+
+
+def _reconstruct_threaded(
+    reconstructor: Reconstructor, blob: bytes, frames: Frames, chosen: list[int], threads: int
+) -> tuple[dict[int, Reconstruction], dict[int, str]]:
+    from tqdm import tqdm
+
+    from eitskin.solve.batch import Batch
+
+    batch = Batch(reconstructor.model, threads=threads, engine=reconstructor.engine, options=reconstructor.options, blob=blob)
+    batch.tare(frames.reference_voltage_v)
+    results: dict[int, Reconstruction] = {}
+    refused: dict[int, str] = {}
+    hidden = not sys.stderr.isatty()
+    shown = tqdm(batch.each(frames.voltage_v[chosen]), desc="frames", total=len(chosen), leave=False, disable=hidden)
+    for number, result in zip(chosen, shown, strict=True):
+        if isinstance(result, FrameError):
+            refused[number] = str(result)
+        else:
+            results[number] = result
     return results, refused
 
 

@@ -80,8 +80,11 @@ class CoreEngine:
 
     def _check(self, status: int, what: str, kind: type[EitskinError]) -> None:
         if status != 0:
-            text = self._ffi.string(self._lib.eits_status_text(status)).decode()
-            raise kind(f"{what}: {text} (C core, status {int(status)})")
+            raise kind(f"{what}: {self._status_text(status)}")
+
+    def _status_text(self, status: int) -> str:
+        text = self._ffi.string(self._lib.eits_status_text(status)).decode()
+        return f"{text} (C core, status {int(status)})"
 
     def set_options(self, options: Options) -> None:
         """Replace the options.
@@ -164,14 +167,51 @@ class CoreEngine:
             self._lib.eits_find_touches(self._context, self._touches, len(self._touches), self._touch_count)
             found = tuple(_touch(self._touches[k]) for k in range(self._touch_count[0]))
         coefficients = self._view(self._context.x, self.n_pixels).copy()
-        return Reconstruction(self._image.copy(), coefficients, found, self._read_info())
+        return Reconstruction(self._image.copy(), coefficients, found, _info(self._info))
 
-    def _read_info(self) -> Info:
-        i = self._info
-        return Info(
-            i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs, i.touch_macs,
-            getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual, i.data_norm,
-        )  # fmt: skip
+    def follow(self, frames: npt.NDArray[np.floating[Any]]) -> None:
+        """Be as after ``frames`` (k, m) volts, the last that can be used, so that the next frame costs what it costs there: the
+        directions to ignore are built anew where other rows are usable than in the frame before."""
+        masked, macs = self._ffi.new("uint32_t *"), self._ffi.new("uint64_t *")
+        for frame in frames[::-1]:
+            self._frame[:] = frame
+            status = self._lib.eits_frame_stage(self._context, self._frame_pointer, self.n_rows, masked, macs)
+            if status in (self._lib.EITS_OK, self._lib.EITS_E_NOT_FINITE):
+                return
+
+    def reconstruct_block(
+        self, frames: npt.NDArray[np.floating[Any]], *, touches: bool = True
+    ) -> list[Reconstruction | FrameError]:
+        """Frames (k, m) volts, each as after :meth:`forget`, in one call of C, which runs without Python's lock; a frame that
+        cannot be used gives its error, and the others are done.
+
+        Raises:
+            FrameError: frames of another length than the model's.
+        """
+        if frames.ndim != 2 or frames.shape[1] != self.n_rows:
+            raise FrameError(f"frames: have shape {frames.shape}, but the model's protocol has {self.n_rows} rows")
+        count = len(frames)
+        given = np.ascontiguousarray(frames, dtype=self.dtype)
+        images, coefficients = (np.empty((count, self.n_pixels), dtype=self.dtype) for _ in range(2))
+        results = self._ffi.new("eits_result[]", max(count, 1))
+        room = int(self._lib.EITS_MAX_TOUCHES)
+        found = self._ffi.new("eits_touch[]", max(count, 1) * room) if touches else self._null
+        status = self._lib.eits_reconstruct_batch(
+            self._context, self._reals(given), self.n_rows, count, self._reals(images), self._reals(coefficients), found, results
+        )
+        self._check(status, "batch", UsageError)
+        done: list[Reconstruction | FrameError] = []
+        for k in range(count):
+            r = results[k]
+            if r.status != 0:
+                done.append(FrameError(f"frame: {self._status_text(r.status)}"))
+                continue
+            each = tuple(_touch(found[room * k + i]) for i in range(r.count))
+            done.append(Reconstruction(images[k], coefficients[k], each, _info(r.info)))
+        return done
+
+    def _reals(self, array: npt.NDArray[Any]) -> Any:
+        return self._ffi.from_buffer("eits_real[]", array)
 
     def self_test(self) -> float:
         """Run the model's golden frame; the greatest difference to its image, relative to the peak.
@@ -186,6 +226,13 @@ class CoreEngine:
 
 def _plain(value: Any) -> Any:
     return int(value) if isinstance(value, bool) else value
+
+
+def _info(i: Any) -> Info:
+    return Info(
+        i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs, i.touch_macs,
+        getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual, i.data_norm,
+    )  # fmt: skip
 
 
 def _touch(t: Any) -> Touch:

@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.results import Reconstruction
-from eitskin.errors import UsageError
+from eitskin.errors import FrameError, UsageError
 from eitskin.model.build import BuildSettings, Linearisation, make_model
+from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.study.methods import Family, Setup
 from eitskin.study.metrics import pixel_cover
@@ -21,17 +22,19 @@ class CoreMethod:
     Args:
         solver: with the model and the options to compare.
         painted: judge the touches, painted as discs, instead of the image.
+        threads: how many frames at once; the results are the same.
     """
 
-    def __init__(self, solver: Reconstructor, painted: bool = False) -> None:
+    def __init__(self, solver: Reconstructor, painted: bool = False, threads: int = 1) -> None:
         self._solver, self._painted = solver, painted
+        self._batch = Batch(solver.model, threads=threads, engine=solver.engine, options=solver.options)
         self._reference: FloatArray | None = None
         self._solved: tuple[FloatArray, list[Reconstruction]] | None = None
         self.name = f"eitskin {solver.options.iterations}, {'touches as discs' if painted else 'image'}"
 
     def learn(self, quiet_v: FloatArray) -> None:
         """Reference and noise from quiet frames (q, m) in V."""
-        self._solver.tare(quiet_v)
+        self._batch.tare(quiet_v)
         self._reference, self._solved = np.asarray(quiet_v.mean(axis=0)), None
 
     def reconstruct(self, dv: FloatArray) -> FloatArray:
@@ -56,14 +59,15 @@ class CoreMethod:
             raise UsageError(f"{self.name}: no quiet frames were given; call learn first")
         if self._solved is None or self._solved[0] is not dv:
             results = []
-            for difference in dv:
-                self._solver.forget()
-                results.append(self._solver.reconstruct(self._reference + difference))
+            for result in self._batch.each(self._reference + dv):
+                if isinstance(result, FrameError):
+                    raise result
+                results.append(result)
             self._solved = dv, results
         return self._solved[1]
 
 
-def core_methods(setup: Setup) -> tuple[Family, ...]:
+def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     """The image after 30 and after 60 iterations, and the touches after 60; all else are the model's defaults.
 
     The model is made from the same Jacobian as every other method. Nothing is trained but thresholds.
@@ -78,7 +82,7 @@ def core_methods(setup: Setup) -> tuple[Family, ...]:
         def make(_: float) -> CoreMethod:
             solver = Reconstructor(model)
             solver.with_options(iterations=iterations)
-            return CoreMethod(solver, painted)
+            return CoreMethod(solver, painted, threads)
 
         return Family("", (0.0,), make)
 

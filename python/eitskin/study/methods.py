@@ -102,15 +102,15 @@ def setup_for(skin: Skin, protocol: Scan, *, elements: int, pixels_across: int =
     return Setup(skin, protocol, grid, jacobian, voltages, mesh.n_nodes, mesh.n_elements)
 
 
-def methods(setup: Setup) -> tuple[Family, ...]:
-    """All that ``eitskin compare`` compares, in the order of its table.
+def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
+    """All that ``eitskin compare`` compares, in the order of its table; the C core's frames over ``threads``.
 
     Raises:
         UsageError: the C core is not built.
     """
     from eitskin.study.core_method import core_methods
 
-    return (*baseline_methods(setup.jacobian), *core_methods(setup))
+    return (*baseline_methods(setup.jacobian), *core_methods(setup, threads))
 
 
 def baseline_methods(jacobian: FloatArray) -> tuple[Family, ...]:

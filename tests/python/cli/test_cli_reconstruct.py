@@ -62,6 +62,18 @@ def test_what_it_says_is_what_the_reconstructor_does(done: Done, frames_file: Pa
         assert [(t["x_mm"], t["y_mm"]) for t in listed] == [(t.x_mm, t.y_mm) for t in touches]
 
 
+def test_threads_change_nothing(done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one = done("reconstruct", frames_file, "--json")
+    assert done("reconstruct", frames_file, "--json", "--threads", "3") == one
+    for arguments, text in (
+        (("--threads", "0"), "use 1 to 256"),
+        (("--threads", "2", "--warm"), "--warm starts each frame from the last one"),
+        (("--threads", "2", "--engine", "numpy"), "the numpy engine has one"),
+    ):
+        assert main(["reconstruct", str(frames_file), *arguments]) == 2
+        assert text in capsys.readouterr().err
+
+
 def test_options_reach_the_solver(done: Done, frames_file: Path, changed_frames: Callable[..., Path]) -> None:
     facts = json.loads(done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000"))
     assert {frame["info"]["stop"] for frame in facts["frames"]} == {"gap"}

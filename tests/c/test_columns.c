@@ -1,0 +1,147 @@
+/* Columns held in the workspace: the right numbers wherever they stand, each unpacked once while it is held, products with the
+ * same bits as from S itself. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "columns.h"
+#include "kernels.h"
+
+#include <string.h>
+
+enum { SIDE = 20, N = SIDE * SIDE, RANK = 13, ROOM = 256 };
+
+static unsigned unpacked;
+static const eits_kernels *real_kernels;
+
+static void count_and_unpack(const eits_matrix *matrix, size_t first, size_t count, float *out)
+{
+    ++unpacked;
+    real_kernels->unpack(matrix, first, count, out);
+}
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    eits_kernels kernels;
+} bench;
+
+static eits_context *set_up(bench *b, eits_storage storage, int prepared)
+{
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .storage = storage});
+    small_context_open(&b->c, &b->made, prepared);
+    real_kernels = b->c.ctx.kernels;
+    b->kernels = *real_kernels;
+    b->kernels.unpack = count_and_unpack;
+    b->c.ctx.kernels = &b->kernels;
+    unpacked = 0;
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+/* `count` columns from `first`, every `step`-th. */
+static void list(uint32_t first, uint32_t step, uint32_t count, uint32_t *index)
+{
+    for (uint32_t k = 0; k < count; ++k)
+        index[k] = first + step * k;
+}
+
+static void check_held(const eits_context *ctx, const uint32_t *index, uint32_t count)
+{
+    uint32_t slot[ROOM];
+    const eits_matrix held = eits_held_columns(ctx), *s = &ctx->model->sensitivity;
+    CHECK(held.scale == NULL && held.storage == EITS_STORAGE_F32 && held.rows == RANK && held.cols == ROOM);
+    eits_slots_of(ctx, index, count, slot);
+    for (uint32_t k = 0; k < count; ++k) {
+        CHECK(slot[k] < ROOM);
+        for (uint32_t i = 0; i < held.stride; ++i) {
+            const float expected = i < RANK ? (float)dense_entry(s, index[k], i) : 0.0f;
+            CHECK(((const float *)held.data)[(size_t)held.stride * slot[k] + i] == expected);
+        }
+    }
+}
+
+static void held_once_and_given_up(eits_storage storage)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, storage, 0);
+    uint32_t index[N];
+    list(3, 1, 100, index);
+    CHECK_EQUAL(eits_hold_columns(ctx, index, 100), 1);
+    CHECK_EQUAL(unpacked, 100);
+    CHECK_EQUAL(eits_hold_columns(ctx, index + 20, 60), 1); /* all there */
+    CHECK_EQUAL(unpacked, 100);
+    list(53, 1, 200, index); /* 50 there, 150 new: 250 in all */
+    CHECK_EQUAL(eits_hold_columns(ctx, index, 200), 1);
+    CHECK_EQUAL(unpacked, 250);
+    check_held(ctx, index, 200);
+    list(3, 1, 50, index); /* the first ones still are */
+    CHECK_EQUAL(eits_hold_columns(ctx, index, 50), 1);
+    CHECK_EQUAL(unpacked, 250);
+    list(0, 1, ROOM, index); /* 253 of 256 are there; those that are wanted do not give way */
+    CHECK_EQUAL(eits_hold_columns(ctx, index, ROOM), 1);
+    CHECK_EQUAL(unpacked, 256);
+    check_held(ctx, index, ROOM);
+    list(N - 10, 1, 10, index);
+    CHECK_EQUAL(eits_hold_columns(ctx, index, 10), 1);
+    CHECK_EQUAL(unpacked, 266);
+    check_held(ctx, index, 10);
+    list(0, 1, ROOM + 1, index);
+    CHECK_EQUAL(eits_hold_columns(ctx, index, ROOM + 1), 0); /* too many */
+    CHECK_EQUAL(unpacked, 266);
+    CHECK_EQUAL(eits_hold_columns(ctx, index, 0), 1);
+    eits_drop_columns(ctx);
+    list(0, 2, 5, index);
+    CHECK_EQUAL(eits_hold_columns(ctx, index, 5), 1);
+    CHECK_EQUAL(unpacked, 271);
+    check_held(ctx, index, 5);
+    tear_down(&b);
+}
+
+/* The working set's products from held columns and from S. */
+static void same_products(eits_storage storage, int prepared)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, storage, prepared);
+    uint64_t state = 5;
+    for (uint32_t count = 0; count <= 300; count += 30) {
+        list(1, 1, count, ctx->working);
+        ctx->working_count = count;
+        eits_pack_panels(ctx);
+        CHECK_EQUAL(ctx->working_held, count <= ROOM);
+        eits_real v[EITS_STRIDE(RANK)] = {0}, x[N], by_held[N], by_s[N], sum_held[EITS_STRIDE(RANK)], sum_s[EITS_STRIDE(RANK)];
+        for (uint32_t i = 0; i < RANK; ++i)
+            v[i] = (eits_real)small_random(&state);
+        for (uint32_t k = 0; k < count; ++k)
+            x[k] = small_random(&state) < 0 ? 0 : (eits_real)small_random(&state);
+        eits_real *const panels = ctx->working_panels;
+        eits_apply_t_working(ctx, v, by_s);
+        ctx->working_panels = NULL;
+        eits_apply_t_working(ctx, v, by_held);
+        CHECK(memcmp(by_s, by_held, count * sizeof *by_s) == 0);
+        CHECK(eits_apply_working(ctx, x, sum_held) <= count);
+        ctx->working_held = 0;
+        eits_apply_t_working(ctx, v, by_s);
+        CHECK(memcmp(by_s, by_held, count * sizeof *by_s) == 0);
+        (void)eits_apply_working(ctx, x, sum_s);
+        CHECK(memcmp(sum_s, sum_held, sizeof sum_s) == 0);
+        ctx->working_panels = panels;
+    }
+    tear_down(&b);
+}
+
+int main(void)
+{
+    for (int storage = 0; storage < 4; ++storage) {
+        held_once_and_given_up((eits_storage)storage);
+        same_products((eits_storage)storage, 0);
+        same_products((eits_storage)storage, 1);
+    }
+    return checks_report("columns");
+}
