@@ -32,6 +32,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .lambda_noise_factor = (eits_real)d->lambda_noise_factor,
         .gate_factor = (eits_real)d->gate_factor,
         .gap_rel = 0,
+        .mac_limit = 0,
         .saturation_v = 0,
         .touch_threshold = (eits_real)d->touch_threshold,
         .touch_share = (eits_real)d->touch_share,
@@ -102,6 +103,7 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->list_value = take_reals(a, EITS_LIST(pixels, folded));
     ctx->list_index = (uint32_t *)(void *)take_bytes(a, EITS_LIST(pixels, folded) * 4);
     ctx->working = (uint32_t *)(void *)take_bytes(a, pixels * 4);
+    ctx->factor = take_reals(a, EITS_TRIANGLE(ctx->model->rank));
     ctx->image = take_reals(a, pixels);
     ctx->atoms = take_reals(a, EITS_MAX_TOUCHES * stride);
     ctx->cell = (uint16_t *)(void *)take_bytes(a, (size_t)ctx->model->nx * ctx->model->ny * 2);
@@ -144,7 +146,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
     const eits_real huge = R(1e30);
     const int right = o->iterations >= 1 && o->gap_every >= 1 && o->max_touches <= EITS_MAX_TOUCHES &&
                       (uint32_t)o->sign <= (uint32_t)EITS_SIGN_BOTH &&
-                      (uint32_t)o->solver <= (uint32_t)EITS_SOLVER_WORKING_SET && o->warm_start <= 1 && o->project_baseline <= 1 &&
+                      (uint32_t)o->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET && o->warm_start <= 1 && o->project_baseline <= 1 &&
                       in_range(o->lambda_abs, 0, huge) && in_range(o->lambda_rel, 0, 1) &&
                       in_range(o->lambda_noise_factor, 0, huge) && in_range(o->gate_factor, 0, huge) &&
                       in_range(o->gap_rel, 0, 1) && in_range(o->saturation_v, 0, huge) && in_range(o->touch_threshold, 0, 1) &&

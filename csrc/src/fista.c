@@ -1,19 +1,11 @@
 /* FISTA with non-negative, non-positive or signed shrinkage; solve.h has the problem and its source. */
-#include "fista.h"
-
+#include "certificate.h"
 #include "kernels.h"
-#include "stages.h"
+#include "solvers.h"
 #include "vec.h"
+#include "working_set.h"
 
 enum { MAX_STEP_HALVINGS = 8 };
-
-uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx)
-{
-    const size_t stride = EITS_STRIDE(ctx->model->rank);
-    eits_copy(ctx->residual, ctx->y, stride);
-    eits_axpy(ctx, ctx->residual, -1, sx, stride);
-    return eits_project(ctx, ctx->residual);
-}
 
 static int by_working_set(const eits_context *ctx)
 {
@@ -26,50 +18,11 @@ static uint32_t held(const eits_context *ctx)
     return by_working_set(ctx) ? ctx->working_count : ctx->model->n_pixels;
 }
 
-/* gradient = S'(y - sx), of every column. */
-static void take_gradient(eits_context *ctx, const eits_real *sx)
-{
-    ctx->info.macs += eits_take_residual(ctx, sx);
-    eits_apply_t(ctx, ctx->residual, ctx->gradient);
-    ctx->info.macs += (uint64_t)ctx->model->n_pixels * ctx->model->rank;
-}
-
 static void take_working_gradient(eits_context *ctx, const eits_real *sx)
 {
     ctx->info.macs += eits_take_residual(ctx, sx);
     eits_apply_t_working(ctx, ctx->residual, ctx->gradient);
     ctx->info.macs += (uint64_t)ctx->working_count * ctx->model->rank;
-}
-
-typedef struct certificate {
-    eits_real gap;
-    eits_real objective;
-    eits_real residual_squared;
-} certificate;
-
-/* Objective and duality gap at ctx->x. With r = y - S x, c = S' r and s = min(1, lambda / max c), the dual point s r gives
- *     gap = (1 - s)^2 |r|^2 / 2 + sum_j (lambda |x_j| - s x_j c_j),
- * a sum of terms that are not negative, so that nothing cancels (from Kim et al., IEEE J. Sel. Top. Signal Process. 1 (2007)
- * 606, doi 10.1109/JSTSP.2007.910971, with |y|^2 / 2 - |y - s r|^2 / 2 written out). Leaves c in ctx->gradient. */
-static certificate certify(eits_context *ctx, eits_real lambda)
-{
-    take_gradient(ctx, ctx->sx);
-    const eits_real largest = eits_greatest(ctx->gradient, ctx->model->n_pixels, ctx->options.sign);
-    const eits_real s = largest > lambda ? lambda / largest : 1;
-    const uint32_t count = held(ctx);
-    eits_real lane[8] = {0}, lane_l1[8] = {0};
-    for (uint32_t k = 0; k < count; ++k) { /* columns that are not held add zero to their lanes */
-        const uint32_t j = by_working_set(ctx) ? ctx->working[k] : k;
-        const eits_real weight = lambda * eits_fabs(ctx->x[k]);
-        const eits_real slack = eits_fma(-s * ctx->x[k], ctx->gradient[j], weight);
-        lane[j % 8] += slack > 0 ? slack : 0; /* below zero by rounding only */
-        lane_l1[j % 8] += weight;
-    }
-    certificate c;
-    c.residual_squared = eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
-    c.gap = eits_fma(R(0.5) * (1 - s) * (1 - s), c.residual_squared, eits_tree8(lane));
-    c.objective = eits_fma(R(0.5), c.residual_squared, eits_tree8(lane_l1));
-    return c;
 }
 
 /* The extrapolated point starts at x, momentum forgotten. */
@@ -82,6 +35,7 @@ static void restart_momentum(eits_context *ctx)
 static void start_over_from_zero(eits_context *ctx)
 {
     ctx->working_count = 0;
+    ctx->info.nonzeros = 0;
     eits_zero(ctx->x, ctx->model->n_pixels);
     eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
     restart_momentum(ctx);
@@ -94,13 +48,27 @@ static void swap(eits_real **a, eits_real **b)
     *b = kept;
 }
 
-/* One iteration from z with the given step, ctx->gradient being that at z; returns the next momentum number. */
-static eits_real iterate(eits_context *ctx, eits_real lambda, eits_real step, eits_real t)
+/* Whether S x_next, and the gap after it, are still to be had. */
+static int affords_product(const eits_context *ctx)
 {
-    const eits_real t_next = R(0.5) * (1 + eits_sqrt(eits_fma(4 * t, t, 1)));
-    const eits_real beta = (t - 1) / t_next;
+    if (ctx->options.mac_limit == 0)
+        return 1;
+    uint64_t count = 0;
+    for (uint32_t k = 0; k < held(ctx); ++k)
+        count += ctx->x_next[k] != 0;
+    return eits_affords(ctx, count * ctx->model->rank + eits_gradient_macs(ctx));
+}
+
+/* One iteration from z with the given step, ctx->gradient being that at z; *t is the momentum number. 0 where the limit of
+ * multiply-accumulates allows it no longer; x is as it was then. */
+static int iterate(eits_context *ctx, eits_real lambda, eits_real step, eits_real *t)
+{
+    const eits_real t_next = R(0.5) * (1 + eits_sqrt(eits_fma(4 * *t, *t, 1)));
+    const eits_real beta = (*t - 1) / t_next;
     const eits_prox how = {.step = step, .threshold = step * lambda, .beta = beta, .sign = ctx->options.sign};
     ctx->kernels->prox(&how, held(ctx), ctx->gradient, ctx->x, ctx->x_next, ctx->z);
+    if (!affords_product(ctx))
+        return 0;
     ctx->info.nonzeros = by_working_set(ctx) ? eits_apply_working(ctx, ctx->x_next, ctx->sx_next)
                                              : eits_apply(ctx, ctx->x_next, ctx->sx_next);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
@@ -109,7 +77,8 @@ static eits_real iterate(eits_context *ctx, eits_real lambda, eits_real step, ei
         ctx->sz[i] = eits_fma(beta, ctx->sx_next[i] - ctx->sx[i], ctx->sx_next[i]);
     swap(&ctx->x, &ctx->x_next);
     swap(&ctx->sx, &ctx->sx_next);
-    return t_next;
+    *t = t_next;
+    return 1;
 }
 
 /* When the working set is looked after: a look at every column after gap_every iterations, then after LOOK_GROWTH times as many,
@@ -121,17 +90,27 @@ typedef struct schedule {
 
 enum { PRUNE_EVERY = 5, LOOK_GROWTH = 6 };
 
+static int looks_at_every_column(const eits_context *ctx, uint32_t k, const schedule *s)
+{
+    return !by_working_set(ctx) || k >= s->next_look;
+}
+
+/* Whether the gradient for iteration k, and the gap after it, are still to be had. */
+static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule *s)
+{
+    const uint64_t whole = eits_gradient_macs(ctx);
+    const uint64_t some = ((uint64_t)ctx->working_count + 2u * ctx->basis_count) * ctx->model->rank;
+    return eits_affords(ctx, whole + (looks_at_every_column(ctx, k, s) ? whole : some));
+}
+
 /* The gradient at z for iteration k (from 1): of every column, or of the working set as it is then. */
 static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, schedule *s, int known)
 {
-    if (!by_working_set(ctx)) {
+    if (looks_at_every_column(ctx, k, s)) {
         if (!known)
-            take_gradient(ctx, ctx->sz);
-        return;
-    }
-    if (k >= s->next_look) {
-        if (!known)
-            take_gradient(ctx, ctx->sz);
+            eits_take_gradient(ctx, ctx->sz);
+        if (!by_working_set(ctx))
+            return;
         eits_working_set_choose(ctx, lambda);
         s->next_look = k + s->interval;
         s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / LOOK_GROWTH / 2 ? s->interval : LOOK_GROWTH * s->interval;
@@ -145,22 +124,33 @@ static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, sc
 static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient_known)
 {
     const eits_options *o = &ctx->options;
+    const eits_layout layout = by_working_set(ctx) ? EITS_LAYOUT_WORKING : EITS_LAYOUT_FULL;
     const eits_real scale = R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
-    const eits_real ceiling = scale * (1 + R(1e-3)); /* at x = 0; above it nothing was won */
+    const eits_real ceiling = eits_ceiling(ctx);
     eits_real step = 1 / (eits_real)ctx->model->lipschitz, t = 1;
-    certificate c = {0};
+    eits_certificate c = {0};
+    int certified = 0; /* c is that of x as it is */
     schedule looks = {.next_look = 1, .interval = o->gap_every};
     restart_momentum(ctx);
     ctx->info.stop = EITS_STOP_ITERATIONS;
     for (uint32_t k = 1; k <= o->iterations; ++k) {
-        prepare_gradient(ctx, lambda, k, &looks, gradient_known && k == 1);
-        t = iterate(ctx, lambda, step, t);
+        const int known = gradient_known && k == 1;
+        if (!known && !affords_gradient(ctx, k, &looks))
+            ctx->info.stop = EITS_STOP_MACS;
+        else
+            prepare_gradient(ctx, lambda, k, &looks, known);
+        if (ctx->info.stop == EITS_STOP_MACS || !iterate(ctx, lambda, step, &t)) {
+            ctx->info.stop = EITS_STOP_MACS;
+            break;
+        }
         ctx->info.iterations = k;
+        certified = 0;
         if (k != o->iterations && k % o->gap_every != 0)
             continue;
         if (k != o->iterations && !(o->gap_rel > 0) && eits_dot(ctx, ctx->sx, ctx->sx, ctx->model->rank) <= 4 * 2 * scale)
             continue; /* |Sx| <= 2 |y| wherever the objective is below its value at zero */
-        c = certify(ctx, lambda);
+        c = eits_certify(ctx, lambda, layout);
+        certified = 1;
         if (!(c.objective <= ceiling)) {
             if (ctx->info.step_halvings == MAX_STEP_HALVINGS || k == o->iterations) {
                 ctx->info.stop = EITS_STOP_DIVERGED;
@@ -171,6 +161,7 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
             t = 1;
             start_over_from_zero(ctx);
             looks = (schedule){.next_look = k + 1, .interval = o->gap_every};
+            c = eits_certify_zero(ctx, lambda);
             continue;
         }
         if (o->gap_rel > 0 && c.gap <= o->gap_rel * scale) {
@@ -178,9 +169,12 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
             break;
         }
     }
-    ctx->info.gap = c.gap;
-    ctx->info.gap_rel = c.gap / scale;
-    ctx->info.residual = eits_sqrt(c.residual_squared);
+    if (ctx->info.stop == EITS_STOP_MACS && !certified) {
+        c = ctx->info.iterations == 0 && gradient_known ? eits_certify_zero(ctx, lambda) : eits_certify(ctx, lambda, layout);
+        if (!(c.objective <= ceiling))
+            ctx->info.stop = EITS_STOP_DIVERGED;
+    }
+    eits_report(ctx, c);
 }
 
 void eits_run_fista(eits_context *ctx, eits_real lambda, int gradient_known)

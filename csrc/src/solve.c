@@ -1,9 +1,10 @@
-/* One frame's solve: lambda, gate, start, image; fista.c iterates. */
+/* One frame's solve: lambda, gate, start, image; the solvers iterate. */
 #include "eitskin/solve.h"
 
 #include "eitskin/frame.h"
-#include "fista.h"
+#include "certificate.h"
 #include "kernels.h"
+#include "solvers.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -45,13 +46,29 @@ static void make_image(eits_context *ctx)
  * frame's numbers too, but is taken anew: it costs little, and rounding cannot gather over a million frames. */
 static int warm_start(eits_context *ctx)
 {
-    const uint32_t count = eits_apply(ctx, ctx->x, ctx->sx);
+    uint32_t count = 0;
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
+        count += ctx->x[j] != 0;
+    if (!eits_affords(ctx, 2u * (uint64_t)count * ctx->model->rank + 2u * eits_gradient_macs(ctx)))
+        return 0;
+    ctx->info.nonzeros = eits_apply(ctx, ctx->x, ctx->sx);
     ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_take_residual(ctx, ctx->sx);
     eits_real l1 = 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         l1 += eits_fabs(ctx->x[j]);
     const eits_real twice = eits_fma(2 * ctx->info.lambda, l1, eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank));
     return twice < ctx->info.data_norm * ctx->info.data_norm;
+}
+
+static void run(eits_context *ctx, int gradient_known)
+{
+    const eits_real lambda = ctx->info.lambda;
+    switch (ctx->options.solver) {
+    case EITS_SOLVER_FISTA:
+    case EITS_SOLVER_WORKING_SET: eits_run_fista(ctx, lambda, gradient_known); break;
+    case EITS_SOLVER_COORDINATE: eits_run_coordinate(ctx, lambda, gradient_known); break;
+    case EITS_SOLVER_ACTIVE_SET: eits_run_active_set(ctx, lambda, gradient_known); break;
+    }
 }
 
 /* ctx->info holds what the frame stage counted, and zeros. */
@@ -61,6 +78,10 @@ static eits_status solve(eits_context *ctx)
     const uint32_t rank = ctx->model->rank;
     ctx->info.data_norm = eits_sqrt(eits_dot(ctx, ctx->y, ctx->y, rank));
     ctx->info.lambda_noise = ctx->baseline.lambda_noise;
+    if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank)) {
+        answer_zero(ctx, EITS_STOP_MACS);
+        return EITS_OK;
+    }
     eits_apply_t(ctx, ctx->y, ctx->gradient);
     ctx->info.macs += (uint64_t)ctx->model->n_pixels * rank;
     ctx->info.lambda_max = eits_greatest(ctx->gradient, ctx->model->n_pixels, o->sign);
@@ -79,9 +100,11 @@ static eits_status solve(eits_context *ctx)
         return EITS_OK;
     }
     const int warm = o->warm_start && ctx->warm && warm_start(ctx);
-    if (!warm)
+    if (!warm) {
         start_from_zero(ctx);
-    eits_run_fista(ctx, ctx->info.lambda, !warm);
+        ctx->info.nonzeros = 0;
+    }
+    run(ctx, !warm);
     if (ctx->info.stop == EITS_STOP_DIVERGED) {
         answer_zero(ctx, EITS_STOP_DIVERGED);
         return EITS_OK;

@@ -357,7 +357,8 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         return EITS_E_ARGUMENT;
     fit f = {.count = 0};
     eits_touch found[EITS_MAX_TOUCHES];
-    if (ctx->info.stop <= EITS_STOP_GAP) {
+    const eits_stop stop = ctx->info.stop;
+    if (stop != EITS_STOP_GATE && stop != EITS_STOP_ZERO && stop != EITS_STOP_DIVERGED) {
         seed(ctx, &f);
         fit_strengths(ctx, &f);
         if (ctx->options.touch_change_s_per_m > 0) {

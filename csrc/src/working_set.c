@@ -2,7 +2,7 @@
  * those whose correlation with the residual exceeds lambda. All others stay zero, so between two looks at every column the
  * products run over these alone, and over fewer and fewer of them as they come to rest at zero. A column that would have moved
  * meanwhile does so after the next look; with a look in every iteration the bits are those of FISTA on every column. */
-#include "fista.h"
+#include "working_set.h"
 
 #include "kernels.h"
 #include "vec.h"
@@ -21,6 +21,11 @@ static limits limits_for(eits_real lambda, eits_sign sign)
 static int moves(eits_real gradient, limits rest)
 {
     return gradient > rest.high || gradient < rest.low;
+}
+
+int eits_moves(eits_real gradient, eits_real lambda, eits_sign sign)
+{
+    return moves(gradient, limits_for(lambda, sign));
 }
 
 void eits_working_set_begin(eits_context *ctx)

@@ -171,8 +171,8 @@ static void defaults(void)
         CHECK_EQUAL(with_number(TINY, "DEFS", ranges[i].at, INFINITY), EITS_E_MODEL_VALUE);
     }
     CHECK_EQUAL(with_number(TINY, "DEFS", 32, 1e-7f), EITS_E_MODEL_VALUE); /* less than an option may be */
-    for (uint32_t solver = 0; solver < 4; ++solver)
-        CHECK_EQUAL(with_word(TINY, "DEFS", 56, solver), solver <= EITS_SOLVER_WORKING_SET ? EITS_OK : EITS_E_MODEL_VALUE);
+    for (uint32_t solver = 0; solver < 6; ++solver)
+        CHECK_EQUAL(with_word(TINY, "DEFS", 56, solver), solver <= EITS_SOLVER_ACTIVE_SET ? EITS_OK : EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_number(TINY, "DEFS", 60, 5.0f), EITS_OK); /* what is reserved is not looked at */
 }
 

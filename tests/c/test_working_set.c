@@ -256,7 +256,7 @@ static void refused_options(void)
     eits_context *ctx = set_up(&b, RANDOM, 0);
     CHECK_EQUAL(ctx->options.solver, EITS_SOLVER_FISTA); /* what a file of format 1.0 has */
     eits_options o = ctx->options;
-    o.solver = (eits_solver)2;
+    o.solver = (eits_solver)(EITS_SOLVER_ACTIVE_SET + 1);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
     tear_down(&b);
 }

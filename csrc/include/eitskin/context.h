@@ -45,6 +45,7 @@ typedef struct eits_options {
     eits_real touch_radius_weight; /* how much the radius so told counts against the data, relative to the touch's energy */
     uint32_t touch_sweeps; /* sweeps of the off-grid fit over all touches; 0: peaks with their strengths only */
     eits_real follow_mm;   /* a touch that moved at most so far since the last frame keeps its id */
+    uint32_t mac_limit;    /* > 0: stop where the next step and the gap after it would take info.macs beyond this; see solve.h */
 } eits_options;
 
 /* Why the solver stopped. */
@@ -53,7 +54,9 @@ typedef enum eits_stop {
     EITS_STOP_GAP = 1,        /* the duality gap was small enough */
     EITS_STOP_GATE = 2,       /* lambda_max lies within the noise: no touch, the image is zero */
     EITS_STOP_ZERO = 3,       /* lambda >= lambda_max: zero is the exact optimum */
-    EITS_STOP_DIVERGED = 4    /* the objective rose although the step was halved again and again; the image is zero */
+    EITS_STOP_DIVERGED = 4,   /* the objective rose although the step was halved again and again; the image is zero */
+    EITS_STOP_MACS = 5,       /* the next step would have passed mac_limit: the image is the best until then */
+    EITS_STOP_OPTIMUM = 6     /* no coefficient moves any more but by rounding: coordinate descent and active set */
 } eits_stop;
 
 /* What a reconstruction cost and how it ended. */
@@ -64,12 +67,14 @@ typedef struct eits_info {
     uint32_t masked;   /* protocol rows that were left out of this frame */
     uint32_t step_halvings;
     uint32_t touches;         /* set by eits_find_touches */
-    uint64_t macs;            /* multiply-accumulates with a stored matrix or a basis vector; vector sums not counted */
+    uint64_t macs;            /* multiply-accumulates with a stored matrix, a basis vector or the active set's factor; vector
+                               * sums not counted */
     uint64_t touch_macs;      /* the same for eits_find_touches */
     eits_real lambda;
     eits_real lambda_max;
     eits_real lambda_noise;
-    eits_real gap;        /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED */
+    eits_real gap;        /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED, and where MACS came
+                           * before anything was known */
     eits_real gap_rel;    /* gap / (|y|^2 / 2) */
     eits_real residual;   /* |y - S x| */
     eits_real data_norm;  /* |y| */
@@ -118,8 +123,9 @@ typedef struct eits_context {
     eits_real *gradient;     /* n_pixels */
     eits_real *list_value;   /* max(n_pixels, n_folded): numbers to multiply columns by, scales included */
     uint32_t *list_index;    /* as many: those columns */
-    uint32_t *working;       /* n_pixels: the working set's columns, ascending; x, x_next, z hold theirs only while it runs */
+    uint32_t *working;       /* n_pixels: the working set's columns; x, x_next, z hold theirs only while it runs */
     uint32_t working_count;
+    eits_real *factor;       /* EITS_TRIANGLE(rank): the active set's triangular factor, row after row */
     eits_real *image;        /* n_pixels: S/m */
     eits_real *atoms;        /* EITS_MAX_TOUCHES x stride: responses of the touches */
     uint16_t *cell;          /* ny x nx: which kept pixel a cell of the image is; EITS_NO_PIXEL for none */
@@ -146,6 +152,7 @@ typedef struct eits_context {
 #define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
 #define EITS_REALS(count) EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
 #define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
+#define EITS_TRIANGLE(rank) ((size_t)(rank) * ((size_t)(rank) + 1u) / 2u)
 #define EITS_PANEL_COLUMNS(n_pixels) (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
 
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise copies of S and of
@@ -154,7 +161,7 @@ typedef struct eits_context {
     (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + EITS_REALS(n_folded) +                   \
      (8 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
-     EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_ALIGN16((size_t)(n_cells) * 2u) +                                        \
+     EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_REALS(EITS_TRIANGLE(rank)) + EITS_ALIGN16((size_t)(n_cells) * 2u) +       \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \
      EITS_ALIGN16(EITS_HELD(n_pixels) * 2u) + EITS_ALIGN16(EITS_HELD(n_pixels)) + EITS_ALIGN16(EITS_HELD(n_pixels) * 4u) + \
      ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) : 0u))

@@ -56,8 +56,10 @@ typedef struct eits_pixel {
 /* How an image is found; each minimises the same objective (solve.h). */
 typedef enum eits_solver {
     EITS_SOLVER_FISTA = 0,      /* every column in every iteration */
-    EITS_SOLVER_WORKING_SET = 1 /* FISTA on the columns that may differ from zero, chosen anew after gap_every iterations, then ever
-                                * more rarely, or always so often where gap_rel asks for a gap */
+    EITS_SOLVER_WORKING_SET = 1, /* FISTA on the columns that may differ from zero, chosen anew after gap_every iterations, then ever
+                                 * more rarely, or always so often where gap_rel asks for a gap */
+    EITS_SOLVER_COORDINATE = 2,  /* coordinate descent on such columns; an iteration is a sweep over them */
+    EITS_SOLVER_ACTIVE_SET = 3   /* to the optimum of the columns chosen, then more columns; an iteration is such a round */
 } eits_solver;
 
 /* Defaults that the model's maker chose; eits_options_default() starts from them. */

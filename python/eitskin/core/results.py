@@ -11,10 +11,10 @@ import numpy.typing as npt
 from eitskin.errors import FrameError, UsageError
 
 SIGNS = ("increase", "decrease", "both")
-SOLVERS = ("fista", "working-set")
+SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
-STOPS = ("iterations", "gap", "gate", "zero", "diverged")
+STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,9 @@ class Options:
     """The solver's options; csrc/include/eitskin/context.h documents each. Lambdas in the units of S'y.
 
     ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both". ``solver`` is "fista"
-    (every column in every iteration) or "working-set" (FISTA on the columns that may differ from zero).
+    (every column in every iteration), "working-set" (FISTA on the columns that may differ from zero), "coordinate" (sweeps of
+    coordinate descent) or "active-set" (rounds to the exact optimum). ``mac_limit`` (0: none): the best so far when the next
+    step would take the solve beyond so many multiply-accumulates.
     """
 
     iterations: int
@@ -48,6 +50,7 @@ class Options:
     gap_rel: float = 0.0
     saturation_v: float = 0.0
     touch_sweeps: int = 6
+    mac_limit: int = 0
 
 
 WHOLE = {
@@ -56,6 +59,7 @@ WHOLE = {
     "max_touches": (0, MAX_TOUCHES),
     "max_masked": (0, 2**32 - 1),
     "touch_sweeps": (0, 1000),
+    "mac_limit": (0, 2**32 - 1),
 }
 SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_share")
 

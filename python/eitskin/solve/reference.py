@@ -1,68 +1,28 @@
 """The numpy reference: the same mathematics as the C core, in float64, written for reading; the core is judged against it.
 
-minimise |y - S g|^2 / 2 + lambda |g|_1 by FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183, doi 10.1137/080716542).
+minimise |y - S x|^2 / 2 + lambda |x|_1 by FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183, doi 10.1137/080716542);
+``reference_exact`` has the other solvers.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.results import Baseline, Info, Options, Reconstruction, Touch, check_quiet
-from eitskin.errors import FrameError
+from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
+from eitskin.solve.reference_exact import ActiveSet, coordinate
+from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, certify, greatest, project, shrink
 from eitskin.solve.reference_touches import find_touches
 
-FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 BASIS_TOLERANCE = 1e-6
 MAX_STEP_HALVINGS = 8
 PRUNE_EVERY, LOOK_GROWTH = 5, 6
 DEAD = "all voltages are zero; is the skin driven and connected?"
-
-
-@dataclass(frozen=True, eq=False)
-class FistaResult:
-    """Coefficients ``x`` (n,), S x (r,), and how it went; ``gap`` is the absolute duality gap at ``x``."""
-
-    x: FloatArray
-    sx: FloatArray
-    iterations: int
-    stop: str
-    gap: float
-    residual: float
-    step_halvings: int
-
-
-def shrink(v: FloatArray, threshold: float, sign: str) -> FloatArray:
-    """The proximal step of threshold |x|_1 under the sign rule."""
-    up, down = np.maximum(v - threshold, 0.0), np.minimum(v + threshold, 0.0)
-    if sign == "increase":
-        return up
-    return down if sign == "decrease" else up + down
-
-
-def greatest(g: FloatArray, sign: str) -> float:
-    """The greatest correlation under the sign rule, not below 0."""
-    value = {"increase": g.max(), "decrease": -g.min(), "both": np.abs(g).max()}[sign]
-    return max(0.0, float(value))
-
-
-def certify(
-    s: FloatArray, y: FloatArray, x: FloatArray, sx: FloatArray, lam: float, sign: str, basis: FloatArray
-) -> tuple[float, float, float]:
-    """Duality gap, objective and |residual| at ``x``; the formula is in csrc/src/solve.c."""
-    residual = project(y - sx, basis)
-    correlation = s.T @ residual
-    largest = greatest(correlation, sign)
-    scale = lam / largest if largest > lam else 1.0
-    slack = np.maximum(lam * np.abs(x) - scale * x * correlation, 0.0)
-    squared = float(residual @ residual)
-    return 0.5 * (1 - scale) ** 2 * squared + float(slack.sum()), 0.5 * squared + lam * float(np.abs(x).sum()), squared**0.5
 
 
 def fista(
@@ -73,7 +33,7 @@ def fista(
     options: Options,
     basis: FloatArray,
     start: FloatArray | None = None,
-) -> FistaResult:
+) -> Result:
     """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the misfit.
 
     With the solver "working-set", columns outside the working set see no gradient until it is chosen anew.
@@ -84,7 +44,7 @@ def fista(
     z, sz = x.copy(), sx.copy()
     scale = 0.5 * float(y @ y)
     working, next_look, interval = np.ones(s.shape[1], dtype=np.bool_), 1, options.gap_every
-    stop, gap, residual, k = "iterations", 0.0, float(np.linalg.norm(y)), 0
+    stop, certificate, k = "iterations", Certificate(0.0, scale, float(np.linalg.norm(y))), 0
     for k in range(1, options.iterations + 1):
         gradient = s.T @ project(y - sz, basis)
         if options.solver == "working-set":
@@ -106,8 +66,8 @@ def fista(
             continue
         if not last and options.gap_rel == 0 and float(sx @ sx) <= 8 * scale:
             continue
-        gap, objective, residual = certify(s, y, x, sx, lam, sign, basis)
-        if not objective <= scale * (1 + 1e-3):
+        certificate = certify(s, y, x, sx, lam, sign, basis)
+        if not certificate.objective <= scale * (1 + 1e-3):
             if halvings == MAX_STEP_HALVINGS or last:
                 stop = "diverged"
                 break
@@ -116,15 +76,10 @@ def fista(
             z, sz = x.copy(), sx.copy()
             next_look, interval = k + 1, options.gap_every
             continue
-        if options.gap_rel > 0 and gap <= options.gap_rel * scale:
+        if options.gap_rel > 0 and certificate.gap <= options.gap_rel * scale:
             stop = "gap"
             break
-    return FistaResult(x, sx, k, stop, gap, residual, halvings)
-
-
-def project(v: FloatArray, basis: FloatArray) -> FloatArray:
-    """``v`` (r,) without its part in the span of the orthonormal rows of ``basis`` (k, r)."""
-    return v - basis.T @ (basis @ v)
+    return Result(x, k, stop, certificate, halvings)
 
 
 def orthonormal(candidates: list[FloatArray], rank: int) -> FloatArray:
@@ -159,7 +114,13 @@ class ReferenceEngine:
         self._next_id = 1
 
     def set_options(self, options: Options) -> None:
-        """Replace the options."""
+        """Replace the options.
+
+        Raises:
+            UsageError: a limit of multiply-accumulates, which are not counted here.
+        """
+        if options.mac_limit:
+            raise UsageError("options: the numpy reference counts no multiply-accumulates; give no mac_limit, or use the C core")
         if options.sign != self.options.sign:
             self._warm = None
         self.options = options
@@ -291,16 +252,17 @@ class ReferenceEngine:
         lambda_max = greatest(self._s.T @ y, o.sign)
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * self._lambda_noise)
         n = self.model.grid.n_pixels
-        zero = FistaResult(np.zeros(n), np.zeros_like(y), 0, "zero", 0.0, norm, 0)
+        nothing = Certificate(0.0, 0.5 * norm**2, norm)
+        zero = Result(np.zeros(n), 0, "zero", nothing, 0)
         if o.gate_factor > 0 and lambda_max < o.gate_factor * self._lambda_noise:
-            result = FistaResult(zero.x, zero.sx, 0, "gate", 0.0, norm, 0)
+            result = Result(zero.x, 0, "gate", nothing, 0)
         elif not lambda_max > lam:
             result = zero
         else:
-            result = fista(self._s, y, lam, self.model.lipschitz, o, basis, self._start(y, lam, basis))
+            result = self._run(Problem(self._s, y, lam, o.sign, basis))
             if result.stop == "diverged":
-                result = FistaResult(zero.x, zero.sx, result.iterations, "diverged", 0.0, norm, result.step_halvings)
-        self._warm = result.x if result.stop in ("iterations", "gap") else None
+                result = Result(zero.x, result.iterations, "diverged", nothing, result.step_halvings)
+        self._warm = result.x if result.stop in ("iterations", "gap", "optimum") else None
         image = result.x * self.model.column_weight.astype(np.float64)
         found: tuple[Touch, ...] = ()
         if touches:
@@ -308,16 +270,26 @@ class ReferenceEngine:
                 self.model, image, y, basis, o, self._lambda_noise, self._last, self._next_id
             )
             self._last = found
+        gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,
-            lam, lambda_max, self._lambda_noise, result.gap, result.gap / max(0.5 * norm**2, 1e-300), result.residual, norm,
+            lam, lambda_max, self._lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300), result.certificate.residual, norm,
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)
 
-    def _start(self, y: FloatArray, lam: float, basis: FloatArray) -> FloatArray | None:
+    def _run(self, problem: Problem) -> Result:
+        """The chosen solver, from the last frame's coefficients or from zero."""
+        start, o = self._start(problem), self.options
+        if o.solver == "coordinate":
+            return coordinate(problem, o, start)
+        if o.solver == "active-set":
+            return ActiveSet(problem, o, self.model.grid, self.model.lipschitz).run(start)
+        return fista(problem.s, problem.y, problem.lam, self.model.lipschitz, o, problem.basis, start)
+
+    def _start(self, problem: Problem) -> FloatArray | None:
         """The last frame's coefficients, unless zero is the better start."""
         if not self.options.warm_start or self._warm is None:
             return None
-        residual = project(y - self._s @ self._warm, basis)
-        worse = residual @ residual + 2 * lam * np.abs(self._warm).sum() >= y @ y
+        residual = problem.residual(self._warm)
+        worse = residual @ residual + 2 * problem.lam * np.abs(self._warm).sum() >= problem.y @ problem.y
         return None if worse else self._warm

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from eitm_bytes import ENTRY_SIZE, entry_place, sealed, sections_of
 from eitskin.core.engine import CoreEngine
+from eitskin.core.results import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import Reconstructor
@@ -274,5 +275,5 @@ def test_both_take_a_file_of_format_1_0_as_fista() -> None:
         reconstructor.tare(quiet)
         macs[solver] = reconstructor.reconstruct(frame).info.macs
     assert macs[None] == macs["fista"] > macs["working-set"]
-    blob[place] = 2
-    assert not agreed(sealed(blob), "solver 2")
+    blob[place] = len(SOLVERS)
+    assert not agreed(sealed(blob), "solver 4")

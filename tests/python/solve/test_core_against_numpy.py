@@ -17,7 +17,9 @@ from small_models import DATA_KINDS, SIGNS, STORAGES, small, small_blob, small_m
 FRAMES = 20
 F64_BOUND = 1e-12
 # relative to a frame's own peak; the worst, .8e-4 and 1.1e-4, is a frame that is noise, its peak a tenth of the others'
-F32_BOUND = {"fista": 1e-4, "working-set": 1.2e-4}
+F32_BOUND = {"fista": 1e-4, "working-set": 1.2e-4, "coordinate": 1.5e-4, "active-set": 1.5e-4}
+FISTAS = ("fista", "working-set")
+SOLVED = ("iterations", "optimum")
 
 
 @pytest.fixture(params=SOLVERS)
@@ -51,9 +53,11 @@ def narrow(frames: np.ndarray) -> np.ndarray:
 def difference(result: Reconstruction, expected: Reconstruction) -> float:
     """The greatest difference of the images over the expected peak; a zero image must be zero in both."""
     peak = float(np.abs(expected.image).max())
-    assert (peak > 0) == bool(np.abs(result.image).max() > 0) == (expected.info.stop == "iterations")
-    assert result.info.iterations == expected.info.iterations
-    assert result.info.stop == expected.info.stop
+    assert (peak > 0) == bool(np.abs(result.image).max() > 0) == (expected.info.stop in SOLVED)
+    if "optimum" not in (result.info.stop, expected.info.stop):  # which rounding ends, a little sooner or later
+        assert result.info.iterations == expected.info.iterations
+        assert result.info.stop == expected.info.stop
+    assert (result.info.stop in SOLVED) == (expected.info.stop in SOLVED)
     assert result.info.masked == expected.info.masked
     return float(np.abs(result.image - expected.image).max()) / (peak or 1.0)
 
@@ -67,7 +71,9 @@ def agree(made: dict[str, Reconstructor], frames: np.ndarray, *, keep: bool = Fa
             for reconstructor in made.values():
                 reconstructor.forget()
         results = {name: reconstructor.reconstruct(frame, touches=False) for name, reconstructor in made.items()}
-        assert results["numpy"].info.iterations == 60 or (keep and results["numpy"].info.stop == "zero")
+        solver, info = made["numpy"].options.solver, results["numpy"].info
+        assert info.iterations == 60 or info.stop == "optimum" or (keep and info.stop == "zero")
+        assert info.stop != "optimum" or solver not in FISTAS
         for name in worst:
             worst[name] = max(worst[name], difference(results[name], results["numpy"]))
     return worst
@@ -135,6 +141,7 @@ def test_same_images_from_a_warm_start(data_kind: str, solver: str) -> None:
 
 
 @pytest.mark.parametrize(("factor", "halvings"), [(1 / 3, 1), (1 / 16, 4), (1e-9, 8)])
+@pytest.mark.parametrize("solver", FISTAS)
 def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver: str) -> None:
     """A model that understates its Lipschitz constant: the step is halved and the run starts over, or is given up as zero."""
     blob = bytearray(small_blob())
@@ -172,8 +179,10 @@ def test_same_facts(data_kind: str, solver: str) -> None:
             # what is a small difference of voltages keeps fewer figures in float32
             loose = 20 if name == "c" and field in ("noise_v", "lambda_noise") else 1
             assert getattr(baselines[name], field) == pytest.approx(expected, rel=loose * bound), field
+        nothing = {"gap": bound**1.5 * infos["numpy"].data_norm ** 2, "gap_rel": bound**1.5}  # at the optimum it is rounding
         for field in ("lambda_", "lambda_max", "gap", "gap_rel", "residual", "data_norm"):
-            assert getattr(infos[name], field) == pytest.approx(getattr(infos["numpy"], field), rel=30 * bound), field
+            expected = pytest.approx(getattr(infos["numpy"], field), rel=30 * bound, abs=nothing.get(field, 0.0))
+            assert getattr(infos[name], field) == expected, field
         assert infos[name].nonzeros == infos["numpy"].nonzeros
         assert infos[name].touches == infos["numpy"].touches
 
