@@ -206,8 +206,8 @@ def measure_rate(blob: bytes, storage: str, image: Path, check_every: int, frame
     """
     from eitskin.device.live import LiveFrame, begin_scene, follow, take_reference
     from eitskin.device.open import open_device
-    from eitskin.device.packets import Stream
     from eitskin.device.settings import ScanSettings, apply_scan
+    from eitskin.device.wire.packets import Stream
 
     solved: list[tuple[int, int]] = []
     with open_device(SCENE, model=blob, image=image) as device:
