@@ -221,6 +221,7 @@ class EmulatedBoard:
         self.adc.reset()
         for dma in self.dmas.values():
             dma.reset()
+        self.multiplexers.release(self.clock.now)
         for port in self.ports.values():
             port.reset()
         self._mco()

@@ -58,6 +58,12 @@ class Multiplexers:
         self._enable = enable
         self._follow(at)
 
+    def release(self, at: int) -> None:
+        """All lines float at once: the processor is reset. That is no switching order of the program's."""
+        self._address = self._enable = 0
+        self._off_at = [at] * 4
+        self._follow(at)
+
     def _follow(self, at: int) -> None:
         on = [(self._address >> 4 * k & 0xF) if self._enable >> k & 1 else None for k in range(4)]
         joined = (on[0], on[1], on[2], on[3])

@@ -27,7 +27,10 @@ RESET_VALUES = {ACR: 0, KEYR: 0, OPTKEYR: 0, SR: 0, CR: LOCK, OPTCR: 0xFFFFAAFD,
 
 
 class FlashInterface(Registers):
-    """0x40023C00. ``stall`` stops the processor for so many ticks; ``after_slice`` ends the slice, then calls its argument."""
+    """0x40023C00. ``stall`` stops the processor for so many ticks; ``after_slice`` ends the slice, then calls its argument.
+
+    ``word_programmed`` is called after each word.
+    """
 
     name, base = "FLASH", 0x40023C00
 
@@ -40,6 +43,7 @@ class FlashInterface(Registers):
         self._open_pieces = False
         self._barred = False
         self.words_programmed = self.sectors_erased = self.not_erased = 0
+        self.word_programmed: Callable[[], None] = lambda: None
 
     def reset(self) -> None:
         """As after a reset."""
@@ -129,5 +133,6 @@ class FlashInterface(Registers):
             flash[at : at + width] = (old & value).to_bytes(width, "little")
             self.words_programmed += 1
             self._stall(WORD_TICKS)
+            self.word_programmed()
 
         return load, store

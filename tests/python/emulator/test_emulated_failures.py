@@ -1,0 +1,218 @@
+"""What the firmware does when things go wrong: uploads cut at any byte, a program that crashes or hangs, noise on the line."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+import pytest
+
+from eitskin.device.bank import newest_bank
+from eitskin.device.client import Device
+from eitskin.device.emulator.board import EmulatedBoard
+from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.device.emulator.memory import RAM
+from eitskin.device.wire import commands
+from eitskin.device.wire.packets import Fault, FaultCode, SolvedTouches, Stream
+from eitskin.model.prebuilt import load_prebuilt
+from emulated import board_of, clean, connect, power_up
+from small_models import small_blob
+
+
+def restarted(device: Device) -> Device:
+    """The same board after it lost its power, and the host that connects anew."""
+    board = board_of(device)
+    board.lose_power()
+    return connect(board)
+
+
+def test_a_model_over_the_wire(image: bytes) -> None:
+    """It is programmed, verified and swapped in; a restart finds it, and the bank before it is as it was."""
+    board = power_up(image)
+    device = connect(board)
+    before, model = board.bank(0), small_blob()
+    info = device.upload_model(model)
+    assert (info.model_crc, info.bank, info.tared) == (zlib.crc32(model), 1, 0)
+    assert board.bank(1)[: len(model)] == model
+    assert board.bank(0) == before
+    assert newest_bank([board.bank(0), board.bank(1)]) == 1
+    assert board.flash.words_programmed == -(-len(model) // 4) + 8
+    device.self_test()
+    clean(board)
+    again = restarted(device)
+    assert (again.board.model_crc, again.board.bank) == (zlib.crc32(model), 1)
+    clean(board)
+
+
+class PowerLost(Exception):
+    """Noticed by the host at once, to spare the test the host's patience."""
+
+
+def upload_until(device: Device, model: bytes, words: int) -> None:
+    """Upload until so many words have been programmed; then the power goes."""
+    board, transport = board_of(device), device.transport
+    last, read = board.flash.words_programmed + words, transport.read
+
+    def watched() -> None:
+        if board.flash.words_programmed == last:
+            board.lose_power()
+
+    def read_while_there_is_power(timeout_s: float) -> bytes:
+        data = read(min(timeout_s, 0.05))
+        if board.flash.words_programmed >= last:
+            raise PowerLost
+        return data
+
+    board.flash.word_programmed = watched
+    transport.read = read_while_there_is_power  # type: ignore[method-assign]
+    with pytest.raises(PowerLost):
+        device.upload_model(model)
+    board.flash.word_programmed = lambda: None
+    assert board.flash.words_programmed == last
+
+
+def test_an_upload_cut_at_any_word_leaves_the_old_model(image: bytes) -> None:
+    """Power goes during the erase, in the middle, at the last word of the model and in each word of the record but its last."""
+    model, (_, old) = small_blob(), load_prebuilt()
+    total = -(-len(model) // 4) + 8
+    chosen = np.random.default_rng(4).integers(2, total - 8, 3).tolist()
+    board = power_up(image)
+    for words in (1, *chosen, total - 8, total - 7, total - 4, total - 1):
+        device = connect(board)
+        assert device.board.model_crc == zlib.crc32(old)
+        upload_until(device, model, words)
+        assert newest_bank([board.bank(0), board.bank(1)]) == 0, words
+        board.run_until(board.clock.now + TICKS_PER_US)
+    device = connect(board)
+    assert device.board.model_crc == zlib.crc32(old)
+    assert device.upload_model(model).model_crc == zlib.crc32(model)
+    assert board.flash.not_erased == 0
+
+
+def test_power_lost_while_erasing(image: bytes) -> None:
+    board = power_up(image)
+    device = connect(board)
+    model = small_blob()
+    request = commands.ModelBegin(len(model), zlib.crc32(model)).payload(77)
+    device.link.send(commands.ModelBegin.TYPE, request)
+    board.run_until(board.clock.now + 2 * TICKS_PER_S, lambda: board.flash.sectors_erased == 1)
+    board.lose_power()
+    assert connect(board).board.model_crc == zlib.crc32(load_prebuilt()[1])
+
+
+def test_a_wrong_checksum_is_refused_and_the_old_model_stays(image: bytes) -> None:
+    board = power_up(image)
+    device = connect(board)
+    model = small_blob()
+    assert device.send_command(commands.ModelBegin(len(model), zlib.crc32(model) ^ 1), 15.0).ok
+    for at in range(0, len(model), 4096):
+        assert device.send_command(commands.ModelData(at, model[at : at + 4096]), 2.0).ok
+    assert not device.send_command(commands.ModelCommit(), 20.0).ok
+    assert device.info().model_crc == zlib.crc32(load_prebuilt()[1])
+    device.tare(4)
+
+
+def hang(board: EmulatedBoard, code: bytes) -> None:
+    """Let the processor execute ``code`` at the end of RAM, where the program has nothing."""
+    at = board.memories.ram
+    at[-64 : -64 + len(code)] = code
+    board.cpu.pc = RAM + len(at) - 64
+    board.cpu.masks.write((0, 0, 0))
+
+
+WFI_LOOP = bytes.fromhex("30bffde7")  # wfi; b .-2
+LOAD_NOWHERE = bytes.fromhex("4ff0c0400068fee7")  # mov.w r0, #0x60000000; ldr r0, [r0]; b .
+
+
+def faults_of(device: Device) -> list[Fault]:
+    """What the board tells of its own accord now."""
+    told = []
+    while (item := device.next_item(0.1)) is not None:
+        if isinstance(item, Fault):
+            told.append(item)
+    return told
+
+
+def test_a_program_that_hangs_is_restarted_and_says_so(image: bytes) -> None:
+    board = EmulatedBoard(image, power_up(image).skin)
+    connect(board)
+    hang(board, WFI_LOOP)
+    stuck = board.now_s
+    board.run_until(board.clock.now + 20 * TICKS_PER_S, lambda: len(board.record.resets) > 1)
+    assert board.record.resets == ["power", "watchdog"]
+    assert 4 < board.now_s - stuck < 10
+    device = connect(board)
+    assert FaultCode.WATCHDOG in device.board.fault_codes
+    device.clear_faults()
+    assert FaultCode.WATCHDOG not in device.info().fault_codes
+
+
+def test_a_program_that_crashes_says_where(image: bytes) -> None:
+    board = power_up(image)
+    device = connect(board)
+    board.run_until(board.clock.now + 1000 * TICKS_PER_US, lambda: board._asleep)
+    hang(board, LOAD_NOWHERE)
+    board.run_until(board.clock.now + TICKS_PER_S, lambda: len(board.record.resets) > 1)
+    assert board.record.resets == ["power", "software"]
+    told = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
+    assert told
+    pc, _, cfsr, _, address = told[0].words
+    assert pc == RAM + len(board.memories.ram) - 64 + 4
+    assert address == 0x60000000
+    assert cfsr & (1 << 15 | 1 << 7)
+    assert FaultCode.CRASH in device.info().fault_codes
+
+
+def test_the_stack_is_guarded(image: bytes) -> None:
+    """A store below the stack is a memory fault."""
+    board = power_up(image)
+    device = connect(board)
+    board.run_until(board.clock.now + 1000 * TICKS_PER_US, lambda: board._asleep)
+    hang(board, bytes.fromhex("4ff000500160fee7"))  # mov.w r0, #0x20000000; str r1, [r0]; b .
+    board.run_until(board.clock.now + TICKS_PER_S, lambda: len(board.record.resets) > 1)
+    told = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
+    assert told
+    assert told[0].words[4] == 0x20000000
+
+
+def test_noise_on_the_line_is_counted_and_nothing_else(image: bytes) -> None:
+    board = power_up(image)
+    device = connect(board)
+    generator = np.random.default_rng(8)
+    for size in (1, 30, 400, 3000):
+        board.send(generator.integers(0, 256, size, dtype=np.uint8).tobytes())
+        board.run_until(board.clock.now + (10 * size + 3000) * TICKS_PER_US)
+        assert device.info().faults == 0
+    stats = device.stats()
+    assert stats.link_crc_errors + stats.link_framing_errors + stats.link_overruns > 0
+    clean(board)
+
+
+def test_a_slow_line_drops_whole_packets_and_counts_them(image: bytes) -> None:
+    """Images and raw frames of every frame are more than 1 Mbaud carries at 48 frames a second."""
+    board = power_up(image)
+    device = connect(board)
+    device.tare(4)
+    device.link.send(commands.StreamCommand.TYPE, commands.StreamCommand(7).payload(4711))
+    board.run_until(board.clock.now + TICKS_PER_S)
+    stats = device.stats()
+    gaps = device.counters
+    assert (gaps.crc_errors, gaps.framing_errors) == (0, 0)
+    assert stats.link_crc_errors == 0
+    assert stats.packets_dropped > 0
+    assert gaps.missing <= stats.packets_dropped
+    device.send_command(commands.StreamCommand(0), 1.0)
+    clean(board)
+
+
+def test_a_restart_on_request(image: bytes) -> None:
+    board = power_up(image)
+    device = connect(board)
+    device.tare(4)
+    info = device.reset()
+    assert board.record.resets == ["power", "software"]
+    assert (info.tared, info.faults) == (0, 0)
+    device.tare(4)
+    touches = [item for item in device.stream(Stream.TOUCHES, frames=2) if isinstance(item, SolvedTouches)]
+    assert len(touches) == 2
+    clean(board)
