@@ -6,6 +6,7 @@
 #include "certificate.h"
 #include "column.h"
 #include "factor.h"
+#include "missing.h"
 #include "solvers.h"
 #include "stages.h"
 #include "vec.h"
@@ -211,50 +212,6 @@ static void settle(eits_context *ctx, active *a)
     }
 }
 
-/* How far a correlation lies beyond zero under the sign rule. */
-static eits_real beyond(eits_real gradient, eits_sign sign)
-{
-    return sign == EITS_SIGN_INCREASE ? gradient : sign == EITS_SIGN_DECREASE ? -gradient : eits_fabs(gradient);
-}
-
-/* 1 where column j's correlation is the greatest among its up to eight neighbours in the image. */
-static int is_peak(const eits_context *ctx, uint32_t j)
-{
-    const eits_model *m = ctx->model;
-    const eits_sign sign = ctx->options.sign;
-    const eits_real own = beyond(ctx->gradient[j], sign);
-    const uint32_t ix = m->pixel[j].ix, iy = m->pixel[j].iy;
-    const uint32_t left = ix > 0 ? ix - 1 : 0, low = iy > 0 ? iy - 1 : 0;
-    for (uint32_t y = low; y <= iy + 1 && y < m->ny; ++y) {
-        for (uint32_t x = left; x <= ix + 1 && x < m->nx; ++x) {
-            const uint32_t other = ctx->cell[(size_t)y * m->nx + x];
-            if (other == EITS_NO_PIXEL || other == j)
-                continue;
-            const eits_real there = beyond(ctx->gradient[other], sign);
-            if (there > own || (there == own && other < j))
-                return 0;
-        }
-    }
-    return 1;
-}
-
-/* List the columns to take in, greatest correlation first; returns their number. ctx->gradient of those held is zero. */
-static uint32_t list_missing(const eits_context *ctx, const active *a)
-{
-    const eits_sign sign = ctx->options.sign;
-    uint32_t count = 0, *list = ctx->list_index;
-    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
-        const eits_real own = beyond(ctx->gradient[j], sign);
-        if (!(own > a->lambda + a->tolerance) || !is_peak(ctx, j))
-            continue;
-        uint32_t at = count++;
-        for (; at > 0 && beyond(ctx->gradient[list[at - 1]], sign) < own; --at)
-            list[at] = list[at - 1];
-        list[at] = j;
-    }
-    return count;
-}
-
 /* The pull of the columns held, from ctx->gradient, which is zero for them afterwards; returns the greatest. */
 static eits_real take_pulls(eits_context *ctx, active *a)
 {
@@ -331,7 +288,7 @@ static int rounds(eits_context *ctx, active *a, eits_certificate *c)
             return 1;
         }
         const eits_real pull = take_pulls(ctx, a), before = c->objective;
-        const uint32_t missing = list_missing(ctx, a);
+        const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance);
         if (stalls == 2 || (missing == 0 && pull <= a->tolerance)) {
             ctx->info.stop = EITS_STOP_OPTIMUM;
             return 1;

@@ -79,6 +79,7 @@ eits_certificate eits_certify_zero(const eits_context *ctx, eits_real lambda)
 void eits_report(eits_context *ctx, eits_certificate c)
 {
     ctx->info.gap = c.gap;
-    ctx->info.gap_rel = c.gap / half_square_of_data(ctx);
+    const eits_real half = half_square_of_data(ctx);
+    ctx->info.gap_rel = half > 0 ? c.gap / half : 0;
     ctx->info.residual = eits_sqrt(c.residual_squared);
 }

@@ -120,7 +120,7 @@ static void choose(eits_context *ctx, const descent *d)
 static eits_real rounding(const eits_context *ctx)
 {
     const eits_real epsilon = R(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
-    return 16 * epsilon * epsilon * ctx->info.data_norm * ctx->info.data_norm;
+    return 64 * epsilon * epsilon * ctx->info.data_norm * ctx->info.data_norm;
 }
 
 /* Sweeps until a look is due: after sweep `last`, or once a sweep is worth little beside the first, when a look is better. Returns

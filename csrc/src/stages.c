@@ -14,17 +14,41 @@ uint64_t eits_project(const eits_context *ctx, eits_real *v)
     return (uint64_t)ctx->basis_count * 2u * rank;
 }
 
+/* Eight at a time: which of them is the greatest does not depend on the order. */
+static eits_real most_of(const eits_real *g, uint32_t count)
+{
+    eits_real lane[8] = {0};
+    uint32_t j = 0;
+    for (; j + 8 <= count; j += 8) {
+        for (uint32_t l = 0; l < 8; ++l)
+            lane[l] = g[j + l] > lane[l] ? g[j + l] : lane[l];
+    }
+    for (; j < count; ++j)
+        lane[0] = g[j] > lane[0] ? g[j] : lane[0];
+    for (uint32_t l = 1; l < 8; ++l)
+        lane[0] = lane[l] > lane[0] ? lane[l] : lane[0];
+    return lane[0];
+}
+
+static eits_real least_of(const eits_real *g, uint32_t count)
+{
+    eits_real lane[8] = {0};
+    uint32_t j = 0;
+    for (; j + 8 <= count; j += 8) {
+        for (uint32_t l = 0; l < 8; ++l)
+            lane[l] = g[j + l] < lane[l] ? g[j + l] : lane[l];
+    }
+    for (; j < count; ++j)
+        lane[0] = g[j] < lane[0] ? g[j] : lane[0];
+    for (uint32_t l = 1; l < 8; ++l)
+        lane[0] = lane[l] < lane[0] ? lane[l] : lane[0];
+    return lane[0];
+}
+
 eits_real eits_greatest(const eits_real *g, uint32_t count, eits_sign sign)
 {
-    eits_real high = 0, low = 0;
-    if (sign != EITS_SIGN_DECREASE) {
-        for (uint32_t j = 0; j < count; ++j)
-            high = g[j] > high ? g[j] : high;
-    }
-    if (sign != EITS_SIGN_INCREASE) {
-        for (uint32_t j = 0; j < count; ++j)
-            low = g[j] < low ? g[j] : low;
-    }
+    const eits_real high = sign != EITS_SIGN_DECREASE ? most_of(g, count) : 0;
+    const eits_real low = sign != EITS_SIGN_INCREASE ? least_of(g, count) : 0;
     return high > -low ? high : -low;
 }
 

@@ -155,7 +155,8 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
         outside(&bad, offsetof(eits_command_solver, warm_start), c.warm_start, 0, 1) ||
         outside(&bad, offsetof(eits_command_solver, sign), c.sign, 0, EITS_SIGN_BOTH) ||
         share_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
-        share_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel))
+        share_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
+        outside(&bad, offsetof(eits_command_solver, solver), c.solver, 0, EITS_SOLVER_ACTIVE_SET))
         return bad;
     if (!instrument->engine.open)
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
@@ -166,6 +167,8 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
     options.sign = (eits_sign)c.sign;
     options.lambda_rel = c.lambda_rel;
     options.gap_rel = c.gap_rel;
+    options.solver = (eits_solver)c.solver;
+    options.mac_limit = c.mac_limit;
     const eits_status status = eits_set_options(&instrument->engine.ctx, &options);
     return status == EITS_OK ? ok() : answer(EITS_REPLY_CORE, (int32_t)status, 0);
 }

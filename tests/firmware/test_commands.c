@@ -25,7 +25,7 @@ static void test_lengths(void)
 {
     const struct { eits_packet_type type; uint32_t size; } expected[] = {
         {EITS_PACKET_GET_INFO, 4},      {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},      {EITS_PACKET_SCAN, 24},
-        {EITS_PACKET_SOLVER, 28},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
+        {EITS_PACKET_SOLVER, 36},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
         {EITS_PACKET_MASK_ROW, 8},      {EITS_PACKET_RESET, 4},     {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
     for (size_t k = 0; k < sizeof expected / sizeof expected[0]; ++k) {
         uint8_t payload[64] = {0};
@@ -154,7 +154,8 @@ static eits_packet_reply solver_with(eits_command_solver c)
 
 static void test_solver(void)
 {
-    const eits_command_solver good = {.iterations = 7, .max_touches = 3, .warm_start = 1, .sign = 2, .lambda_rel = 0.05f, .gap_rel = 0.01f};
+    const eits_command_solver good = {.iterations = 7, .max_touches = 3, .warm_start = 1, .sign = 2, .lambda_rel = 0.05f, .gap_rel = 0.01f,
+                                      .solver = EITS_SOLVER_COORDINATE, .mac_limit = 123456};
     eits_command_solver c = good;
     c.iterations = 0;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1);
@@ -177,8 +178,12 @@ static void test_solver(void)
     c = good;
     c.gap_rel = -0.1f;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 24, 0);
+    c = good;
+    c.solver = 4;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 28, 3);
     const eits_options *options = &b.host.instrument.engine.ctx.options;
     CHECK_EQUAL(options->warm_start, 0);
+    CHECK_EQUAL(options->mac_limit, 0);
     CHECK_EQUAL(options->iterations, 30);
     REPLY(solver_with(good), EITS_REPLY_OK, 0, 0);
     CHECK_EQUAL(options->iterations, 7);
@@ -187,6 +192,8 @@ static void test_solver(void)
     CHECK_EQUAL(options->sign, EITS_SIGN_BOTH);
     CHECK_NEAR(options->lambda_rel, 0.05f, 0);
     CHECK_NEAR(options->gap_rel, 0.01f, 0);
+    CHECK_EQUAL(options->solver, EITS_SOLVER_COORDINATE);
+    CHECK_EQUAL(options->mac_limit, 123456);
 }
 
 static void test_mask_row(void)
@@ -328,7 +335,7 @@ static void test_random_commands(void)
         uint8_t payload[64] = {0};
         const uint32_t pick = (uint32_t)(100 * (1 + small_random(&state)));
         const eits_packet_type type = (eits_packet_type)(EITS_PACKET_GET_INFO + pick % 15u);
-        const size_t sizes[] = {4, 12, 8, 24, 28, 12, 16, 4, 8, 8, 4, 4, 4, 4, 4};
+        const size_t sizes[] = {4, 12, 8, 24, 36, 12, 16, 4, 8, 8, 4, 4, 4, 4, 4};
         for (size_t k = 4; k < sizeof payload; ++k) { /* small numbers, great ones, zeros */
             const double value = small_random(&state);
             payload[k] = (uint8_t)(k % 4u < 2 ? 127 * (1 + value) * (value > 0) : (value > 0.9 ? 255 : 0));

@@ -226,6 +226,8 @@ typedef struct eits_command_solver {
     uint32_t request;
     uint32_t iterations, max_touches, warm_start, sign;
     float lambda_rel, gap_rel;
+    uint32_t solver;    /* eits_solver */
+    uint32_t mac_limit; /* 0: none */
 } eits_command_solver;
 
 typedef struct eits_command_model_begin { uint32_t request, bytes, crc; } eits_command_model_begin; /* stops the scan */

@@ -1,4 +1,4 @@
-"""``eitskin bench frame | jacobian | effects | scenes | board``: speed, side by side in one run."""
+"""``eitskin bench frame | solve | jacobian | effects | scenes | board``: speed, side by side in one run."""
 
 from __future__ import annotations
 
@@ -20,6 +20,13 @@ def add_parser(subparsers: Any) -> None:
     frame.add_argument("--runs", type=int, default=2000, help="default: %(default)s")
     frame.add_argument("--json", action="store_true")
     frame.set_defaults(run=run_frame)
+    solve = what.add_parser("solve", help="the solve alone: time to a suboptimality, beside other solvers")
+    solve.add_argument("--scenes", type=int, default=20, help="problems of each model (default: %(default)s)")
+    solve.add_argument("--seed", type=int, default=3, help="of the scenes (default: %(default)s)")
+    solve.add_argument("--rounds", type=int, default=21, help="interleaved rounds (default: %(default)s)")
+    solve.add_argument("--picture", type=Path, metavar="PNG", help="draw suboptimality against MIoU instead")
+    solve.add_argument("--json", action="store_true")
+    solve.set_defaults(run=run_solve)
     jacobian = what.add_parser("jacobian", help="building: Jacobian beside pyEIT's, and the whole model")
     jacobian.add_argument("--json", action="store_true")
     jacobian.set_defaults(run=run_jacobian)
@@ -56,6 +63,29 @@ def run_frame(options: argparse.Namespace) -> int:
         raise UsageError(f"bench frame: --runs {options.runs} is out of range; use 100 to 10000000")
     times = bench_frame.run(options.runs)
     print(json.dumps(times.as_dict(), indent=2) if options.json else bench_frame.to_text(times))
+    return 0
+
+
+def run_solve(options: argparse.Namespace) -> int:
+    """Time the solvers, or draw what their suboptimality means for images."""
+    from eitskin.fileio import refuse_unwritable
+
+    _within("--scenes", options.scenes, 4, 1000)
+    _within("--seed", options.seed, 0, 2**31 - 1)
+    _within("--rounds", options.rounds, 3, 10_000)
+    refuse_unwritable(options.picture)
+    if options.picture is not None:
+        from eitskin.study import suboptimality
+        from eitskin.view.suboptimality_picture import draw
+
+        curves = suboptimality.run(options.scenes, options.seed, _progress)
+        draw(options.picture, curves)
+        print(json.dumps(curves.as_dict(), indent=2) if options.json else suboptimality.text(curves))
+        return 0
+    from eitskin.study import bench_solve
+
+    result = bench_solve.run(options.scenes, options.seed, options.rounds, _progress)
+    print(json.dumps(result, indent=2) if options.json else bench_solve.text(result))
     return 0
 
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.device_options import add_solver, check_solver
 from eitskin.config import nearest
 from eitskin.errors import ConfigError, EitskinError, FrameError, MissingExtraError, UsageError
 
@@ -31,8 +32,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--engine", choices=("c", "c64", "numpy"), default="c", help="default: c, float32 as on a board")
     parser.add_argument("--sign", choices=("increase", "decrease", "both"), default="increase", help="which changes to look for")
     parser.add_argument("--only", metavar="NAME,...", help="frames with these names only")
-    parser.add_argument("--solver", choices=("fista", "working-set"), help="default: the model's; both find the same image")
-    parser.add_argument("--iterations", type=int, metavar="N", help="of FISTA, at most (default: the model's)")
+    add_solver(parser)
     parser.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
     parser.add_argument("--warm", action="store_true", help="start each frame from the last one's result")
     parser.add_argument(
@@ -105,10 +105,11 @@ def _apply(options: argparse.Namespace, reconstructor: Reconstructor) -> None:
     changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
     if options.solver is not None:
         changes["solver"] = options.solver
+    check_solver(options)
     if options.iterations is not None:
-        if not 1 <= options.iterations <= 1_000_000:
-            raise UsageError(f"--iterations {options.iterations} is out of range; use 1 to 1000000")
         changes["iterations"] = options.iterations
+    if options.mac_limit is not None:
+        changes["mac_limit"] = options.mac_limit
     if options.gap is not None:
         if not 0 < options.gap <= 1:
             raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")

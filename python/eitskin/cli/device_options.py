@@ -56,7 +56,7 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
         help="measure one row of each reciprocal pair, and all rows in every N-th frame as a check (0: never)",
     )
     solver = parser.add_argument_group("solver")
-    solver.add_argument("--iterations", type=int, metavar="N", help="of FISTA, at most (default: the model's)")
+    add_solver(solver)
     solver.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
     solver.add_argument("--sign", choices=("increase", "decrease", "both"), help="which changes to look for (default: increase)")
     start = solver.add_mutually_exclusive_group()
@@ -70,6 +70,26 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
         help=f"take the reference from N frames of the untouched skin first (1, or 4 to 1024); without it, from {TARE_FRAMES} "
         "where the board has none, and always on a simulated or emulated board",
     )
+
+
+def add_solver(parser: Any) -> None:
+    """Which solver, and what ends it."""
+    known = ("fista", "working-set", "coordinate", "active-set")
+    parser.add_argument("--solver", choices=known, help="default: the model's; all minimise the same objective")
+    parser.add_argument("--iterations", type=int, metavar="N", help="of FISTA, sweeps or rounds, at most (default: the model's)")
+    parser.add_argument(
+        "--mac-limit", type=int, metavar="N", help="return the best so far when the next step would pass N multiply-accumulates"
+    )
+
+
+def check_solver(options: argparse.Namespace) -> None:
+    """Refuse what ``add_solver``'s options cannot be.
+
+    Raises:
+        UsageError: a number is out of range.
+    """
+    whole("--iterations", options.iterations, 1, 1_000_000)
+    whole("--mac-limit", options.mac_limit, 1, 2**32 - 1)
 
 
 def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
@@ -166,11 +186,13 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
     """
     from eitskin.device.settings import SolverSettings
 
-    whole("--iterations", options.iterations, 1, 1_000_000)
+    check_solver(options)
     if options.gap is not None and not 0 < options.gap <= 1:
         raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
     warm = True if options.warm else False if options.cold else None
-    return SolverSettings(options.iterations, options.gap, warm, options.sign)
+    return SolverSettings(
+        options.iterations, options.gap, warm, options.sign, solver=options.solver, mac_limit=options.mac_limit
+    )
 
 
 def check_scan(options: argparse.Namespace) -> None:

@@ -149,6 +149,17 @@ class CoreEngine:
             lambda: lib.eits_find_touches(context, self._touches, len(self._touches), self._touch_count),
         )
 
+    def bare_solve(self, y: npt.NDArray[np.floating[Any]]) -> Callable[[], Any]:
+        """The solver's C call alone on reduced data ``y`` (r,), which it takes now; the result is in ``coefficients``. For
+        benchmarks."""
+        self._view(self._context.y, int(self._model.rank))[:] = y
+        lib, context = self._lib, self._context
+        return lambda: lib.eits_solve(context)
+
+    def coefficients(self) -> npt.NDArray[Any]:
+        """x of the last solve, (n,)."""
+        return self._view(self._context.x, self.n_pixels).copy()
+
     def reduced_data(self) -> npt.NDArray[Any]:
         """y of the last frame as the solver saw it, projected, (stride,)."""
         return self._view(self._context.y, (int(self._model.rank) + 7) // 8 * 8).copy()

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
-from eitskin.core.results import SIGNS, Options, check_options
+from eitskin.core.results import SIGNS, SOLVERS, Options, check_options
 from eitskin.device.check import check_board, no_answer
 from eitskin.device.link import Link, LinkEvent, PumpedLink, Reconnect, Tap, ThreadedLink
 from eitskin.device.transport import Transport
@@ -192,7 +192,8 @@ class Device:
         return self.info()
 
     def solver(self, options: Options) -> None:
-        """Give the board's solver these of ``options``: iterations, max_touches, warm_start, sign, lambda_rel, gap_rel.
+        """Give the board's solver these of ``options``: iterations, max_touches, warm_start, sign, lambda_rel, gap_rel, solver,
+        mac_limit.
 
         Raises:
             UsageError: one is out of its range.
@@ -202,7 +203,7 @@ class Device:
         self._command(
             commands.Solver(
                 options.iterations, options.max_touches, int(options.warm_start), SIGNS.index(options.sign),
-                options.lambda_rel, options.gap_rel,
+                options.lambda_rel, options.gap_rel, SOLVERS.index(options.solver), options.mac_limit,
             ),
             ANSWER_S,
         )  # fmt: skip

@@ -32,7 +32,7 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """The board's solver; None stays at the model's own, ``warm_start`` at off."""
+    """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at none."""
 
     iterations: int | None = None
     gap_rel: float | None = None
@@ -40,6 +40,8 @@ class SolverSettings:
     sign: str | None = None
     lambda_rel: float | None = None
     max_touches: int | None = None
+    solver: str | None = None
+    mac_limit: int | None = None
 
     @property
     def named(self) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def coordinate(problem: Problem, options: Options, start: FloatArray | None = No
     p, lam = problem, problem.lam
     x = np.zeros(p.n) if start is None else start.copy()
     norms = np.einsum("ij,ij->j", p.s, p.s)
-    least = 16 * EPSILON**2 * float(p.y @ p.y)
+    least = 64 * EPSILON**2 * float(p.y @ p.y)
     certificate, gradient = p.certify(x)
     sweeps, stop, interval = done, "iterations", options.gap_every
     while sweeps < options.iterations:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from eitskin.cli.main import main
+from eitskin.core.results import SOLVERS
 from eitskin.frames.frames import load_frames, save_frames
 from eitskin.model.eitm import load_model
 from eitskin.scene.random_touches import TouchRules, random_touches
@@ -78,11 +79,14 @@ def test_options_reach_the_solver(done: Done, frames_file: Path, changed_frames:
     facts = json.loads(done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000"))
     assert {frame["info"]["stop"] for frame in facts["frames"]} == {"gap"}
     assert all(frame["info"]["gap_rel"] <= 0.001 for frame in facts["frames"])
-    macs = {}
-    for solver in ("fista", "working-set"):
+    infos = {}
+    for solver in SOLVERS:
         facts = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--solver", solver))
-        macs[solver] = facts["frames"][0]["info"]["macs"]
-    assert macs["working-set"] < 0.25 * macs["fista"]
+        infos[solver] = facts["frames"][0]["info"]
+    assert infos["working-set"]["macs"] < 0.25 * infos["fista"]["macs"]
+    assert infos["active-set"]["stop"] == "optimum" and infos["active-set"]["gap_rel"] < 1e-5
+    facts = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--mac-limit", "200000"))
+    assert facts["frames"][0]["info"]["stop"] == "macs" and facts["frames"][0]["info"]["macs"] <= 200000
     resting = changed_frames(voltage_v=np.repeat(session().frames_v[:1], 20, axis=0))
     cold = json.loads(done("reconstruct", resting, "--json", "--iterations", "10"))["frames"]
     warm = json.loads(done("reconstruct", resting, "--json", "--iterations", "10", "--warm"))["frames"]

@@ -345,6 +345,7 @@ def test_a_folder_that_cannot_be_written(refused: Refused, tmp_path: Path, monke
         (["--iterations", "0"], "--iterations 0 is out of range; use 1 to 1000000"),
         (["--iterations", "-5"], "--iterations -5 is out of range"),
         (["--iterations", "2000000"], "--iterations 2000000 is out of range"),
+        (["--mac-limit", "0"], "--mac-limit 0 is out of range; use 1 to 4294967295"),
         (["--gap", "0"], "--gap 0 is out of range"),
         (["--gap", "1.5"], "--gap 1.5 is out of range"),
         (["--gap", "nan"], "--gap nan is out of range"),

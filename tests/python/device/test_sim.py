@@ -204,7 +204,7 @@ def refused(device: Device, command: cmd.Command) -> tuple[ReplyStatus, tuple[in
 
 
 SCAN = cmd.Scan(50_000_000, 1_000_000, 80, 16, 1, 0, 0)
-SOLVER = cmd.Solver(30, 5, 1, 0, 0.03, 0.0)
+SOLVER = cmd.Solver(30, 5, 1, 0, 0.03, 0.0, 1, 0)
 RANGE = ReplyStatus.RANGE
 REFUSALS = [
     (cmd.StreamCommand(8, 1), RANGE, (4, 7)),
@@ -234,6 +234,7 @@ REFUSALS = [
     (replace(SOLVER, lambda_rel=1.5), RANGE, (20, 1)),
     (replace(SOLVER, lambda_rel=float("nan")), RANGE, (20, 0)),
     (replace(SOLVER, gap_rel=-0.1), RANGE, (24, 0)),
+    (replace(SOLVER, solver=4), RANGE, (28, 3)),
     (cmd.MaskRow(208, 1), RANGE, (4, 207)),
     (cmd.MaskRow(0, 2), RANGE, (6, 1)),
     (cmd.GetStats(2), RANGE, (4, 1)),

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import SIGNS, Info
+from eitskin.core.results import SIGNS, SOLVERS, Info
 from eitskin.device.wire.commands import Solver
 from eitskin.device.wire.packets import (
     PacketType,
@@ -60,6 +60,8 @@ class SimSolver:
             sign=SIGNS[command.sign],
             lambda_rel=command.lambda_rel,
             gap_rel=command.gap_rel,
+            solver=SOLVERS[command.solver],
+            mac_limit=command.mac_limit,
         )
         try:
             self.engine.set_options(options)

@@ -88,16 +88,18 @@ class Scan(Command):
 
 @dataclass(frozen=True)
 class Solver(Command):
-    """Options of the solver; ``sign`` is its place in ``core.results.SIGNS``."""
+    """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and ``SOLVERS``."""
 
     TYPE = PacketType.SOLVER
-    LAYOUT = struct.Struct("<IIIIIff")
+    LAYOUT = struct.Struct("<IIIIIffII")
     iterations: int
     max_touches: int
     warm_start: int
     sign: int
     lambda_rel: float
     gap_rel: float
+    solver: int
+    mac_limit: int
 
 
 @dataclass(frozen=True)

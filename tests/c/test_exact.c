@@ -1,0 +1,327 @@
+/* Coordinate descent and active set: the optimum as a certificate written apart from the core sees it, whatever the columns are
+ * like; the same bits in every layout; whatever they start from. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 9, N = SIDE * SIDE, RANK = 12, MANY = 200000 };
+
+static const eits_solver SOLVERS[] = {EITS_SOLVER_COORDINATE, EITS_SOLVER_ACTIVE_SET};
+static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+} bench;
+
+static void new_data(eits_context *ctx, uint64_t state)
+{
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        ctx->y[i] = (eits_real)small_random(&state);
+}
+
+static eits_context *open_made(bench *b, int prepared)
+{
+    small_context_open(&b->c, &b->made, prepared);
+    new_data(&b->c.ctx, 61);
+    return &b->c.ctx;
+}
+
+static eits_context *set_up(bench *b, small_spec spec, int prepared)
+{
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make(spec);
+    return open_made(b, prepared);
+}
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+/* lambda: a share of the greatest correlation. */
+static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign, double lambda, double gap)
+{
+    eits_options o = ctx->options;
+    o.solver = solver;
+    o.iterations = iterations;
+    o.sign = sign;
+    o.lambda_abs = 0;
+    o.lambda_rel = (eits_real)lambda;
+    o.lambda_noise_factor = 0;
+    o.gap_rel = (eits_real)gap;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return ctx->info;
+}
+
+/* The gap at the result, in double. */
+static void check_gap(const eits_context *ctx, double most_rel)
+{
+    dense d = dense_of(ctx->model);
+    const uint32_t n = ctx->model->n_pixels, rank = ctx->model->rank;
+    double *x = dense_copy(ctx->x, n), *y = dense_copy(ctx->y, rank);
+    const double gap = dense_gap(&d, y, x, (double)ctx->info.lambda, ctx->options.sign), scale = 0.5 * dense_dot(y, y, rank);
+    CHECK_NEAR(gap, ctx->info.gap, 300 * EPS * scale);
+    CHECK(gap <= most_rel * scale);
+    for (uint32_t j = 0; j < n; ++j)
+        CHECK(ctx->options.sign == EITS_SIGN_BOTH || (ctx->options.sign == EITS_SIGN_INCREASE ? x[j] >= 0 : x[j] <= 0));
+    dense_free(&d);
+    free(x), free(y);
+}
+
+static void the_optimum(void)
+{
+    static const double lambdas[] = {1e-3, 0.03, 0.5, 0.999};
+    for (int s = 0; s < 2; ++s) {
+        for (int storage = 0; storage < 4; ++storage) {
+            for (int sign = 0; sign < 3; ++sign) {
+                for (int l = 0; l < 4; ++l) {
+                    bench b;
+                    eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, l % 2);
+                    const eits_info info = solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, lambdas[l], 0);
+                    CHECK_EQUAL(info.stop, EITS_STOP_OPTIMUM);
+                    CHECK(info.nonzeros >= 1 && info.nonzeros <= RANK);
+                    check_gap(ctx, s == 1 ? BOTH_WIDTHS(2e-6, 1e-14) : BOTH_WIDTHS(2e-4, 1e-10));
+                    tear_down(&b);
+                }
+            }
+        }
+    }
+}
+
+static void a_gap_that_is_asked_for(void)
+{
+    for (int s = 0; s < 2; ++s) {
+        bench b;
+        eits_context *ctx = set_up(&b, RANDOM, 1);
+        const eits_info info = solve(ctx, SOLVERS[s], MANY, EITS_SIGN_BOTH, 0.03, 1e-3);
+        CHECK_EQUAL(info.stop, EITS_STOP_GAP);
+        CHECK(info.gap_rel <= R(1e-3));
+        check_gap(ctx, 1.001e-3);
+        tear_down(&b);
+    }
+}
+
+/* lambda 0: without a sign rule the support fills the rank and the residual is zero. */
+static void the_support_reaches_the_rank(void)
+{
+    for (int s = 0; s < 2; ++s) {
+        for (int sign = 0; sign < 3; ++sign) {
+            bench b;
+            eits_context *ctx = set_up(&b, RANDOM, 1);
+            const eits_info info = solve(ctx, SOLVERS[s], s == 1 ? 200 : 2000, (eits_sign)sign, 0, 0);
+            CHECK(info.stop != EITS_STOP_DIVERGED);
+            CHECK(s == 0 || info.nonzeros <= RANK);
+            if (sign == EITS_SIGN_BOTH)
+                CHECK(info.residual <= R(BOTH_WIDTHS(1e-3, 1e-6)) * info.data_norm);
+            for (int j = 0; j < N; ++j)
+                CHECK(isfinite((double)ctx->x[j]));
+            tear_down(&b);
+        }
+    }
+}
+
+/* Every third column the one before, every seventh zero; and columns that nearly depend on their neighbours. */
+static void columns_that_depend(void)
+{
+    for (int s = 0; s < 2; ++s) {
+        for (int near = 0; near < 2; ++near) {
+            for (int sign = 0; sign < 3; ++sign) {
+                for (int l = 0; l < 3; ++l) {
+                    bench b;
+                    memset(&b, 0, sizeof b);
+                    b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
+                    uint32_t size;
+                    uint8_t *sens = small_model_section(&b.made, "SENS", &size);
+                    const size_t column = size / N;
+                    for (size_t j = 0; j < N; ++j) {
+                        float *values = (float *)(void *)(sens + column * j);
+                        if (j % 7 == 0)
+                            memset(values, 0, column);
+                        else if (j % 3 != 0)
+                            memcpy(values, values - column / sizeof *values, column);
+                        values[j % RANK] *= near ? 1.0001f : 1.0f;
+                    }
+                    small_model_seal(&b.made);
+                    eits_context *ctx = open_made(&b, l % 2);
+                    const eits_info info = solve(ctx, SOLVERS[s], 50000, (eits_sign)sign, l == 0 ? 1e-4 : l == 1 ? 0.02 : 0.3, 0);
+                    CHECK(info.stop != EITS_STOP_DIVERGED && info.nonzeros >= 1);
+                    /* descent by single coordinates hardly moves along what nearly cancels */
+                    check_gap(ctx, s == 0 && near ? BOTH_WIDTHS(0.5, 0.05) : BOTH_WIDTHS(1e-3, 1e-4));
+                    tear_down(&b);
+                }
+            }
+        }
+    }
+}
+
+/* More directions than pixels, and one pixel. */
+static void few_pixels(void)
+{
+    for (int s = 0; s < 2; ++s) {
+        for (uint32_t side = 1; side <= 3; ++side) {
+            bench b;
+            eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = side}, 1);
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, EITS_SIGN_BOTH, 0.02, 0).stop, EITS_STOP_OPTIMUM);
+            check_gap(ctx, BOTH_WIDTHS(1e-5, 1e-12));
+            tear_down(&b);
+        }
+    }
+}
+
+static void same_bits_in_every_layout(void)
+{
+    for (int s = 0; s < 2; ++s) {
+        for (int storage = 0; storage < 4; ++storage) {
+            bench b[4];
+            for (int way = 0; way < 4; ++way) {
+                eits_context *ctx = set_up(&b[way], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, way % 2);
+                CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
+                (void)solve(ctx, SOLVERS[s], 30, EITS_SIGN_BOTH, 0.005, 0);
+                CHECK(memcmp(ctx->x, b[0].c.ctx.x, N * sizeof *ctx->x) == 0);
+                CHECK(memcmp(&ctx->info, &b[0].c.ctx.info, sizeof ctx->info) == 0);
+            }
+            for (int way = 0; way < 4; ++way)
+                tear_down(&b[way]);
+        }
+    }
+}
+
+/* From FISTA's many coefficients, from other data's, from the optimum, each solver comes to the same one. */
+static void warm_starts(void)
+{
+    for (int s = 0; s < 2; ++s) {
+        for (int sign = 0; sign < 3; ++sign) {
+            bench b;
+            eits_context *ctx = set_up(&b, RANDOM, sign % 2);
+            ctx->options.warm_start = 1;
+            (void)solve(ctx, EITS_SOLVER_FISTA, 2, (eits_sign)sign, 0.001, 0);
+            const uint32_t many = ctx->info.nonzeros;
+            CHECK(many > RANK);
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
+            check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
+            new_data(ctx, 62);
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
+            check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
+            const eits_info again = solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0);
+            CHECK_EQUAL(again.stop, EITS_STOP_OPTIMUM);
+            CHECK(again.iterations <= 3);
+            check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
+            for (uint32_t i = 0; i < RANK; ++i)
+                ctx->y[i] = -ctx->y[i]; /* where zero is the better start */
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
+            check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
+            tear_down(&b);
+        }
+    }
+}
+
+static double objective(const eits_context *ctx)
+{
+    dense d = dense_of(ctx->model);
+    double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
+    const double value = dense_objective(&d, y, x, (double)ctx->info.lambda);
+    dense_free(&d);
+    free(x), free(y);
+    return value;
+}
+
+/* Each further round or sweep lowers the objective. */
+static void it_never_rises(void)
+{
+    for (int s = 0; s < 2; ++s) {
+        double before = INFINITY;
+        for (uint32_t count = 1; count <= 25; ++count) {
+            bench b;
+            eits_context *ctx = set_up(&b, RANDOM, 0);
+            const eits_info info = solve(ctx, SOLVERS[s], count, EITS_SIGN_INCREASE, 0.003, 0);
+            CHECK(info.iterations <= count);
+            const double now = objective(ctx);
+            CHECK(now <= before * (1 + 20 * EPS));
+            before = now;
+            tear_down(&b);
+        }
+    }
+}
+
+/* One direction, several, all but one ignored. */
+static void beside_a_basis(void)
+{
+    static const int lost[] = {0, 1, 4, RANK - 2};
+    for (int s = 0; s < 2; ++s) {
+        for (int k = 0; k < 4; ++k) {
+            bench b;
+            eits_context *ctx = set_up(&b, RANDOM, k % 2);
+            eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+            uint64_t state = 63;
+            small_reference(&b.c.model, 1, reference);
+            for (int i = 0; i < SMALL_ROWS; ++i)
+                frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+            for (int i = 0; i < lost[k]; ++i)
+                frame[b.c.model.fold[i].first] = frame[b.c.model.fold[i].second > SMALL_ROWS ? b.c.model.fold[i].first : b.c.model.fold[i].second] = R(NAN);
+            CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+            eits_options o = ctx->options;
+            o.solver = SOLVERS[s];
+            o.iterations = MANY;
+            o.max_masked = SMALL_ROWS;
+            o.sign = EITS_SIGN_BOTH;
+            o.lambda_rel = R(0.01);
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_EQUAL(ctx->basis_count, lost[k] + 1);
+            CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+            CHECK(ctx->info.nonzeros >= 1 && ctx->info.gap_rel <= R(BOTH_WIDTHS(1e-4, 1e-10)));
+            CHECK(s == 0 || ctx->info.nonzeros <= (uint32_t)(RANK - 1 - lost[k]));
+            tear_down(&b);
+        }
+    }
+}
+
+static void numbers_that_cannot_be(void)
+{
+    static const double wild[] = {NAN, INFINITY, BOTH_WIDTHS(1e25, 1e200), BOTH_WIDTHS(1e-25, 1e-200), 0};
+    for (int s = 0; s < 2; ++s) {
+        for (size_t k = 0; k < sizeof wild / sizeof wild[0]; ++k) {
+            for (int whole = 0; whole < 2; ++whole) {
+                bench b;
+                eits_context *ctx = set_up(&b, RANDOM, 0);
+                for (uint32_t i = 0; i < (whole ? RANK : 1u); ++i)
+                    ctx->y[i] = (eits_real)(wild[k] * (i % 2 ? 1 : 0.7));
+                eits_options o = ctx->options;
+                o.solver = SOLVERS[s];
+                CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+                const eits_status status = eits_solve(ctx);
+                CHECK(k > 1 || status == EITS_E_NOT_FINITE);
+                for (int j = 0; j < N; ++j)
+                    CHECK(isfinite((double)ctx->image[j]) && isfinite((double)ctx->x[j]) && (k > 1 || ctx->image[j] == 0));
+                CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.gap_rel) && isfinite((double)ctx->info.residual));
+                tear_down(&b);
+            }
+        }
+    }
+}
+
+int main(void)
+{
+    the_optimum();
+    a_gap_that_is_asked_for();
+    the_support_reaches_the_rank();
+    columns_that_depend();
+    few_pixels();
+    same_bits_in_every_layout();
+    warm_starts();
+    it_never_rises();
+    beside_a_basis();
+    numbers_that_cannot_be();
+    return checks_report("exact solvers");
+}

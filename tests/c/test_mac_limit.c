@@ -1,0 +1,201 @@
+/* The limit of multiply-accumulates: whatever it is, it holds, and the image is finite and no worse than zero. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 7, N = SIDE * SIDE, RANK = 12, SOLVERS = 4 };
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    dense d;
+} bench;
+
+static void new_data(eits_context *ctx, uint64_t state)
+{
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        ctx->y[i] = (eits_real)small_random(&state);
+}
+
+static eits_context *set_up(bench *b)
+{
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
+    small_context_open(&b->c, &b->made, 0);
+    b->d = dense_of(&b->c.model);
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    dense_free(&b->d);
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+typedef struct way {
+    eits_solver solver;
+    eits_sign sign;
+    int warm;
+    double gap_rel;
+} way;
+
+static eits_info solve(eits_context *ctx, way w, uint32_t limit)
+{
+    eits_options o = ctx->options;
+    o.solver = w.solver;
+    o.sign = w.sign;
+    o.iterations = 40;
+    o.gap_every = 5;
+    o.gap_rel = (eits_real)w.gap_rel;
+    o.lambda_rel = R(0.01);
+    o.warm_start = (uint32_t)w.warm;
+    o.mac_limit = 0;
+    eits_forget(ctx);
+    if (w.warm) {
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        new_data(ctx, 71);
+        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    }
+    new_data(ctx, 72);
+    for (uint32_t i = 0; w.warm && i < RANK; ++i) { /* near what the start is for */
+        eits_real kept = ctx->y[i];
+        uint64_t state = 71;
+        for (uint32_t k = 0; k <= i; ++k)
+            kept = (eits_real)small_random(&state);
+        ctx->y[i] = kept + R(0.2) * ctx->y[i];
+    }
+    o.mac_limit = limit;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return ctx->info;
+}
+
+static void check_result(const bench *b, const eits_info *info)
+{
+    const eits_context *ctx = &b->c.ctx;
+    double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
+    uint32_t nonzeros = 0;
+    for (int j = 0; j < N; ++j) {
+        CHECK(isfinite((double)ctx->image[j]) && isfinite(x[j]));
+        nonzeros += x[j] != 0;
+    }
+    CHECK_EQUAL(nonzeros, info->nonzeros);
+    if (info->lambda > 0) {
+        const double scale = 0.5 * dense_dot(y, y, RANK);
+        CHECK_NEAR(dense_gap(&b->d, y, x, (double)info->lambda, ctx->options.sign), info->gap, 300 * EPS * scale);
+        CHECK(dense_objective(&b->d, y, x, (double)info->lambda) <= scale * (1 + 1e-3));
+    }
+    free(x), free(y);
+}
+
+static void every_limit_holds(void)
+{
+    for (int solver = 0; solver < SOLVERS; ++solver) {
+        for (int warm = 0; warm < 2; ++warm) {
+            for (int gap = 0; gap < 2; ++gap) {
+                bench b;
+                eits_context *ctx = set_up(&b);
+                const way w = {(eits_solver)solver, warm ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH, warm, gap ? 1e-6 : 0};
+                const eits_info free_run = solve(ctx, w, 0);
+                CHECK(free_run.stop != EITS_STOP_MACS);
+                uint64_t spent = 0;
+                for (uint32_t limit = 1; limit <= 2 * free_run.macs + 1; limit += 1 + limit / 97) {
+                    const eits_info info = solve(ctx, w, limit);
+                    CHECK(info.macs <= limit);
+                    CHECK(info.stop == EITS_STOP_MACS || info.stop == free_run.stop || info.stop == EITS_STOP_OPTIMUM);
+                    CHECK(info.stop != EITS_STOP_MACS || limit < 2 * free_run.macs);
+                    if (limit < N * RANK)
+                        CHECK(info.macs == 0 && info.stop == EITS_STOP_MACS && info.nonzeros == 0);
+                    spent = info.macs > spent ? info.macs : spent;
+                    check_result(&b, &info);
+                }
+                CHECK(spent == free_run.macs || warm);
+                const eits_info enough = solve(ctx, w, (uint32_t)(2 * free_run.macs));
+                CHECK(enough.macs == free_run.macs && enough.gap == free_run.gap && enough.stop == free_run.stop);
+                tear_down(&b);
+            }
+        }
+    }
+}
+
+/* Cold FISTA needs just what it spends; and more MACs give no worse an image, so far as FISTA goes down at all. */
+static void to_the_last_mac(void)
+{
+    for (int solver = 0; solver < 2; ++solver) {
+        bench b;
+        eits_context *ctx = set_up(&b);
+        const way w = {(eits_solver)solver, EITS_SIGN_INCREASE, 0, 0};
+        const eits_info free_run = solve(ctx, w, 0);
+        CHECK_EQUAL(solve(ctx, w, (uint32_t)free_run.macs).stop, EITS_STOP_ITERATIONS);
+        const eits_info less = solve(ctx, w, (uint32_t)free_run.macs - 1);
+        CHECK_EQUAL(less.stop, EITS_STOP_MACS);
+        CHECK_EQUAL(less.iterations, free_run.iterations - 1);
+        tear_down(&b);
+    }
+}
+
+/* A step that is too long starts over from zero: the limit holds there too. */
+static void beside_step_halvings(void)
+{
+    bench b;
+    memset(&b, 0, sizeof b);
+    b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 1.0 / 16});
+    small_context_open(&b.c, &b.made, 0);
+    b.d = dense_of(&b.c.model);
+    for (int solver = 0; solver < 2; ++solver) {
+        const way w = {(eits_solver)solver, EITS_SIGN_BOTH, 0, 0};
+        for (uint32_t limit = 1; limit < 60000; limit += 1 + limit / 53) {
+            const eits_info info = solve(&b.c.ctx, w, limit);
+            CHECK(info.macs <= limit);
+            for (int j = 0; j < N; ++j)
+                CHECK(isfinite((double)b.c.ctx.image[j]));
+            CHECK(info.stop == EITS_STOP_DIVERGED || info.stop == EITS_STOP_MACS || info.stop == EITS_STOP_ITERATIONS);
+        }
+    }
+    tear_down(&b);
+}
+
+/* A frame's own multiply-accumulates are always spent; what is left of the limit is the solver's. */
+static void of_a_whole_frame(void)
+{
+    for (int solver = 0; solver < SOLVERS; ++solver) {
+        bench b;
+        eits_context *ctx = set_up(&b);
+        eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+        uint64_t state = 63;
+        small_reference(&b.c.model, 1, reference);
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
+        CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        uint64_t least = 0;
+        for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
+            eits_options o = ctx->options;
+            o.solver = (eits_solver)solver;
+            o.mac_limit = limit;
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            eits_info info;
+            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info), EITS_OK);
+            least = limit == 2 ? info.macs : least; /* the first frame also builds the basis */
+            CHECK(limit <= 2 || info.macs <= (limit > least ? limit : least));
+        }
+        tear_down(&b);
+    }
+}
+
+int main(void)
+{
+    every_limit_holds();
+    to_the_last_mac();
+    beside_step_halvings();
+    of_a_whole_frame();
+    return checks_report("mac limit");
+}
