@@ -6,8 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from eitskin.core.results import Reconstruction
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
@@ -80,16 +78,11 @@ def twin_check(
 
 def clean(board: EmulatedBoard) -> None:
     """Nothing that the firmware did was wrong, unknown or dangerous."""
-    record = board.record
-    assert (record.unmodelled, record.clock_off, record.hazards, record.faults) == ({}, {}, {}, [])
-    assert board.multiplexers.violations == []
+    report = board.report()
+    assert report.clean, report
     assert board.generator.ignored_bits == board.generator.early_clocks == 0
     assert board.flash.not_erased == 0
     assert board.usart.bytes_lost == 0
-
-
-def rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def image_of(build: Path) -> bytes:

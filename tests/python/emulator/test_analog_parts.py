@@ -104,7 +104,7 @@ def test_making_before_breaking_is_told() -> None:
     assert muxes.violations == ["0.023 us: I- changed its address while enabled"]
     muxes.set_enables(20, 0)
     muxes.set_addresses(20 + OFF_TICKS - 1, 0)
-    assert muxes.violations[1:] == ["0.118 us: I- changed its address before it was open"]
+    assert muxes.violations[1:] == ["0.183 us: I- changed its address before it was open"]
     muxes.set_enables(1000, 0xF)
     muxes.set_enables(2000, 0)
     muxes.set_addresses(2000 + OFF_TICKS, 0xFFFF)

@@ -15,7 +15,7 @@ from eitskin.device.emulator.analog.adg1206 import Multiplexers
 from eitskin.device.emulator.analog.front_end import FrontEnd
 from eitskin.device.emulator.analog.skin import Skin
 from eitskin.device.emulator.bus import Bus, Peripheral
-from eitskin.device.emulator.clocktime import BoardClock
+from eitskin.device.emulator.clocktime import TICKS_PER_S, BoardClock
 from eitskin.device.emulator.cpu import Cpu, Stop
 from eitskin.device.emulator.exceptions import Exceptions
 from eitskin.device.emulator.memory import BANK_BYTES, BANKS, FLASH, PROGRAM_BYTES, Memories
@@ -35,6 +35,7 @@ from eitskin.device.emulator.peripherals.systick import SysTick
 from eitskin.device.emulator.peripherals.tim import MASTERS, Timer
 from eitskin.device.emulator.peripherals.usart import Usart
 from eitskin.device.emulator.record import Record
+from eitskin.device.emulator.report import BoardReport
 from eitskin.device.emulator.schedule import Schedule
 from eitskin.device.emulator.serial_line import SerialLine
 from eitskin.errors import DeviceError
@@ -157,6 +158,28 @@ class EmulatedBoard:
     def now_s(self) -> float:
         """The board's time since power came first."""
         return self.clock.now_s
+
+    def report(self) -> BoardReport:
+        """What has happened so far."""
+        record = self.record
+        return BoardReport(
+            time_s=self.now_s,
+            asleep_s=record.asleep_ticks / TICKS_PER_S,
+            instructions=record.instructions,
+            generator_hz=self.generator.frequency_hz,
+            mclk_hz=self.generator.mclk_hz,
+            scans=self.skin.scans,
+            samples=self.front_end.samples,
+            switches=self.multiplexers.changes,
+            violations=tuple(self.multiplexers.violations),
+            unknown_rows={str(row): count for row, count in self.skin.unknown_rows.items()},
+            interrupts=dict(record.interrupts),
+            unmodelled=dict(record.unmodelled),
+            clock_off=dict(record.clock_off),
+            hazards=dict(record.hazards),
+            faults=tuple(record.faults),
+            resets=tuple(record.resets),
+        )
 
     def reset(self, cause: str) -> None:
         """Start the processor again before it executes another instruction: "pin", "software", "watchdog" or "power"."""

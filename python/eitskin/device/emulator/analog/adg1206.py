@@ -2,7 +2,7 @@
 
 Address and enable come as the levels that pins drive; a pin that drives nothing counts as low (the board's pull-downs). The
 part's own transition time (at most 140 ns) is part of the settling. An address that changes while its enable is high, or
-sooner after it went low than the switches take to open (tOFF(EN)), may join two electrodes: both are recorded.
+sooner after it went low than the slowest part takes to open (tOFF(EN)), may join two electrodes: both are recorded.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from eitskin.device.emulator.clocktime import TICKS_PER_S
 
 NAMES = ("I+", "I-", "V+", "V-")
-# typical tOFF(EN) at 25 C, +-15 V (table 1); the driver waits longer than the worst case
-OFF_TICKS = 75 * TICKS_PER_S // 10**9
+OFF_TICKS = 140 * TICKS_PER_S // 10**9  # the longest tOFF(EN), -40 to 125 C on +-15 V (table 1)
 MOST_LOGGED = 20_000
 
 

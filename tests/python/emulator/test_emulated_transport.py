@@ -1,0 +1,96 @@
+"""``emu:SCENE``: opening it, its time, its refusals."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from eitskin.device.emulator import transport as transport_module
+from eitskin.device.emulator.clocktime import TICKS_PER_S
+from eitskin.device.emulator.transport import EmulatedTransport, open_emulated
+from eitskin.device.open import open_device
+from eitskin.device.transport import Transport
+from eitskin.device.wire.packets import SolvedTouches, Stream
+from eitskin.errors import DeviceError, FileError, MissingExtraError, ProtocolError
+from emulated import IMAGE
+from small_models import small_blob
+
+
+@pytest.fixture(scope="module")
+def built(cortex_m7: Path) -> Path:
+    return cortex_m7 / IMAGE
+
+
+@pytest.mark.parametrize("scene", ["two_touch", "two_touch.toml"])
+def test_a_device_by_its_url(built: Path, scene: str) -> None:
+    with open_device(f"emu:{scene}", image=built) as device:
+        assert device.transport.url == f"emu:{scene}"
+        assert isinstance(device.transport, Transport)
+        device.tare(4)
+        device.start_scene()
+        touches = [item for item in device.stream(Stream.TOUCHES, frames=3) if isinstance(item, SolvedTouches)]
+        assert len(touches[-1].touches) == 2
+        assert not device.transport.ended
+
+
+def test_time_is_the_board_s(built: Path) -> None:
+    transport = open_emulated("two_touch", image=built)
+    board = transport.board
+    assert transport.synchronous
+    while transport.read(0.001):
+        pass
+    began = board.now_s
+    assert transport.read(0.04) == b""
+    assert board.now_s - began == pytest.approx(0.04, abs=1e-6)
+    transport.begin_scene()
+    assert board.skin.frame_number(board.clock.now + TICKS_PER_S) == 20
+
+
+def test_a_closed_one_is_refused(built: Path) -> None:
+    transport = open_emulated("two_touch", image=built)
+    assert transport.reopen()
+    transport.close()
+    transport.close()
+    assert not transport.reopen()
+    for use in (lambda: transport.read(0.1), lambda: transport.write(b"x")):
+        with pytest.raises(DeviceError, match="has been closed"):
+            use()
+
+
+def test_an_image_that_hangs_does_not_hang_its_user(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    transport = open_emulated("two_touch", image=built)
+    while transport.read(0.001):
+        pass
+    monkeypatch.setattr(transport_module, "MOST_WALL_S", -1.0)
+    with pytest.raises(DeviceError, match="said nothing"):
+        transport.read(1.0)
+
+
+def test_refusals(built: Path, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no such scene"):
+        open_emulated("two_tuch", image=built)
+    with pytest.raises(FileError, match="no such firmware image"):
+        open_emulated("two_touch", image=tmp_path / "none.bin")
+    elf = built.with_suffix(".elf")
+    with pytest.raises(DeviceError, match=r"this is an \.elf; give the \.bin"):
+        open_emulated("two_touch", image=elf)
+    with pytest.raises(ProtocolError, match="its skin has 16 electrodes, the model is for 8"):
+        open_emulated("two_touch", image=built, model=small_blob(electrodes=8, rank=12))
+
+
+def test_without_unicorn_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "unicorn", None)
+    with pytest.raises(MissingExtraError, match=r"eitskin\[emulator\]"):
+        open_emulated("two_touch")
+
+
+def test_the_image_that_ships_runs() -> None:
+    transport: EmulatedTransport = open_emulated("two_touch")
+    assert transport.read(0.5)
+    report = transport.board.report()
+    assert report.clean
+    assert (report.resets, report.mclk_hz, report.interrupts[15] > 5) == (("power",), 8_000_000, True)
+    assert json.dumps(report.as_dict())
