@@ -213,6 +213,10 @@ class CoreEngine:
     def _reals(self, array: npt.NDArray[Any]) -> Any:
         return self._ffi.from_buffer("eits_real[]", array)
 
+    def last_info(self) -> Info:
+        """Of the last frame, however it was run."""
+        return _info(self._info)
+
     def self_test(self) -> float:
         """Run the model's golden frame; the greatest difference to its image, relative to the peak.
 
