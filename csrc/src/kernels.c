@@ -15,7 +15,7 @@ extern const eits_kernels eits_kernels_m7;
 const eits_kernels *eits_kernels_best(void)
 {
 #ifdef EITS_BUILD_AVX2
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c"))
         return &eits_kernels_avx2;
 #endif
 #ifdef EITS_BUILD_M7

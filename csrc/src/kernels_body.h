@@ -1,6 +1,7 @@
 /* The matrix products, included once for each processor that they are built for (kernels_portable.c, kernels_avx2.c).
  * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this, and KERNELS_OWN_PRODUCTS or
- * KERNELS_OWN_VECTORS where it has its own mul, mul_t and unpack, or dot and axpy:
+ * KERNELS_OWN_VECTORS where it has its own mul, mul_t and unpack, or dot and axpy, or
+ * KERNELS_OWN_PROX:
  *     sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the EITS_PANEL lanes l */
 #include "half.h"
 #include "kernels.h"
@@ -160,6 +161,7 @@ static void NAME(axpy)(eits_real *out, eits_real factor, const eits_real *a, siz
 
 #endif
 
+#ifndef KERNELS_OWN_PROX
 /* The proximal step of threshold |x|_1: of the two halves one is zero, or both. v - v is zero, and NaN where v is not finite:
  * a run that overflows must not end as a zero. */
 static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restrict gradient, const eits_real *restrict x,
@@ -175,6 +177,7 @@ static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restri
         z[j] = eits_fma(beta, moved - x[j], moved);
     }
 }
+#endif
 
 /* This build's table. */
 #define KERNELS_TABLE(TEXT)                                                                                                \

@@ -24,7 +24,7 @@ static void find_builds(void)
     builds[build_count++] = &eits_kernels_portable;
     CHECK(strcmp(eits_kernels_portable.name, "portable") == 0);
 #ifdef EITS_BUILD_AVX2
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c")) {
         builds[build_count++] = &eits_kernels_avx2;
         CHECK(best == &eits_kernels_avx2 && strcmp(best->name, "avx2") == 0);
         return;

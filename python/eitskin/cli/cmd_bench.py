@@ -1,4 +1,4 @@
-"""``eitskin bench frame | solve | jacobian | effects | scenes | board``: speed, side by side in one run."""
+"""``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes, boards, kernels, growth, batches."""
 
 from __future__ import annotations
 
@@ -43,6 +43,29 @@ def add_parser(subparsers: Any) -> None:
     board.add_argument("--markdown", type=Path, metavar="FILE.md", help="write the page docs/board-cost.md is")
     board.add_argument("--json", action="store_true")
     board.set_defaults(run=run_board)
+    kernels = what.add_parser(
+        "kernels",
+        help="each C kernel beside the machine's measured peaks; needs a checkout",
+        description="Build a C program from the source checkout that times every kernel beside this machine's peaks of memory "
+        "and arithmetic, in turns, and say how far from its limit each is.",
+    )
+    kernels.add_argument("--rank", type=int, default=64, help="numbers of a column (default: %(default)s)")
+    kernels.add_argument("--columns", type=int, default=812, help="default: %(default)s")
+    kernels.add_argument("--rounds", type=int, default=41, help="default: %(default)s")
+    _add_page(kernels, "Kernels")
+    kernels.set_defaults(run=run_kernels)
+    growth = what.add_parser("growth", help="a frame's time and MACs against pixels, rows, rank, touches and electrodes")
+    growth.add_argument("--rounds", type=int, default=15, help="default: %(default)s")
+    growth.add_argument("--cache", type=Path, metavar="DIR", help="keeps the models (default: beside other temporary files)")
+    growth.add_argument("--picture", type=Path, metavar="PNG", help="draw it")
+    _add_page(growth, "Growth")
+    growth.set_defaults(run=run_growth)
+    batches = what.add_parser("batches", help="batches of frames over threads, beside one after another")
+    batches.add_argument("--frames", type=int, default=1000, help="default: %(default)s")
+    batches.add_argument("--rounds", type=int, default=9, help="default: %(default)s")
+    batches.add_argument("--threads", type=int, nargs="+", default=[1, 2], metavar="N", help="default: 1 2")
+    _add_page(batches, "Batches")
+    batches.set_defaults(run=run_batches)
     effects = what.add_parser("effects", help="scenes: the time with no effect, with each alone, with all")
     effects.add_argument("--frames", type=int, default=100, help="default: %(default)s")
     effects.add_argument("--json", action="store_true")
@@ -53,6 +76,77 @@ def add_parser(subparsers: Any) -> None:
     scenes.add_argument("--elements", type=int, default=3000, help="of the mesh (default: %(default)s)")
     scenes.add_argument("--json", action="store_true")
     scenes.set_defaults(run=run_scenes)
+
+
+def _add_page(parser: argparse.ArgumentParser, title: str) -> None:
+    parser.add_argument("--markdown", type=Path, metavar="FILE.md", help=f'write the section "{title}" of that page')
+    parser.add_argument("--json", action="store_true")
+
+
+PAGE = "Kernels, growth, batches"
+
+
+def _show(options: argparse.Namespace, title: str, result: Any, text: str, section: str) -> int:
+    from eitskin.study.sections import put_section
+
+    if options.markdown is not None:
+        put_section(options.markdown, title, section, PAGE)
+    print(json.dumps(result.as_dict(), indent=2) if options.json else text)
+    return 0
+
+
+def run_kernels(options: argparse.Namespace) -> int:
+    """Time each kernel beside the machine's peaks."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.study import bench_kernels
+
+    _within("--rank", options.rank, 8, 1024)
+    _within("--columns", options.columns, 48, 20_000)
+    _within("--rounds", options.rounds, 1, 200)
+    refuse_unwritable(options.markdown)
+    result = bench_kernels.run(options.rank, options.columns, options.rounds)
+    command = f"eitskin bench kernels --rank {options.rank} --columns {options.columns} --rounds {options.rounds}"
+    return _show(options, "Kernels", result, bench_kernels.as_text(result), bench_kernels.as_markdown(result, command))
+
+
+def run_growth(options: argparse.Namespace) -> int:
+    """Time frames of growing models."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.study import bench_growth
+
+    _within("--rounds", options.rounds, 1, 1000)
+    refuse_unwritable(options.markdown, options.picture)
+    if options.picture is not None:
+        from eitskin.view.pictures import load_matplotlib
+
+        load_matplotlib()
+    result = bench_growth.run(options.rounds, options.cache, progress=_progress)
+    picture = None
+    if options.picture is not None:
+        from eitskin.view.growth_picture import draw_growth
+
+        draw_growth(options.picture, result)
+        beside = options.markdown is not None and options.picture.resolve().is_relative_to(options.markdown.resolve().parent)
+        folder = options.markdown.resolve().parent if beside else Path.cwd()
+        picture = options.picture.resolve().relative_to(folder).as_posix() if beside else options.picture.as_posix()
+    command = f"eitskin bench growth --rounds {options.rounds}"
+    return _show(options, "Growth", result, bench_growth.as_text(result), bench_growth.as_markdown(result, command, picture))
+
+
+def run_batches(options: argparse.Namespace) -> int:
+    """Time batches over threads."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.solve.batch import check_threads
+    from eitskin.study import bench_batches
+
+    _within("--frames", options.frames, 8, 1_000_000)
+    _within("--rounds", options.rounds, 1, 1000)
+    for count in options.threads:
+        check_threads(count)
+    refuse_unwritable(options.markdown)
+    result = bench_batches.run(options.frames, options.rounds, options.threads)
+    command = f"eitskin bench batches --frames {options.frames} --rounds {options.rounds}"
+    return _show(options, "Batches", result, bench_batches.as_text(result), bench_batches.as_markdown(result, command))
 
 
 def run_frame(options: argparse.Namespace) -> int:

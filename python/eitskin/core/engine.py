@@ -221,8 +221,23 @@ class CoreEngine:
             done.append(Reconstruction(images[k], coefficients[k], each, _info(r.info)))
         return done
 
+    def bare_block(self, frames: npt.NDArray[np.floating[Any]]) -> Callable[[], Any]:
+        """The one C call of :meth:`reconstruct_block` for ``frames`` (k, m), with nothing of Python around it. For benchmarks."""
+        given, count = np.ascontiguousarray(frames, dtype=self.dtype), len(frames)
+        images, coefficients = (np.empty((count, self.n_pixels), dtype=self.dtype) for _ in range(2))
+        found = self._ffi.new("eits_touch[]", count * int(self._lib.EITS_MAX_TOUCHES))
+        results = self._ffi.new("eits_result[]", count)
+        pointers = [self._reals(array) for array in (given, images, coefficients)]
+        return lambda: self._lib.eits_reconstruct_batch(
+            self._context, pointers[0], self.n_rows, count, pointers[1], pointers[2], found, results
+        )
+
     def _reals(self, array: npt.NDArray[Any]) -> Any:
         return self._ffi.from_buffer("eits_real[]", array)
+
+    def last_info(self) -> Info:
+        """Of the last frame, however it was run."""
+        return _info(self._info)
 
     def self_test(self) -> float:
         """Run the model's golden frame; the greatest difference to its image, relative to the peak.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from queue import SimpleQueue
 from typing import TypeVar
 
@@ -13,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Baseline, Options, Reconstruction, check_options
+from eitskin.core.results import Baseline, Options, Reconstruction, Touch, check_options
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
@@ -119,10 +118,14 @@ class Batch:
                         yield result
                         continue
                     last = frames[number - 1 : number].copy()
-                    numbered = tuple(replace(touch, id=next_id + k) for k, touch in enumerate(result.touches))
+                    numbered = tuple(_numbered(touch, next_id + k) for k, touch in enumerate(result.touches))
                     next_id += len(numbered)
-                    yield replace(result, touches=numbered)
+                    yield Reconstruction(result.image, result.coefficients, numbered, result.info)
         self._last = last
+
+
+def _numbered(t: Touch, number: int) -> Touch:
+    return Touch(number, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence)
 
 
 def reconstruct_many(

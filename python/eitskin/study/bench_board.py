@@ -29,6 +29,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.options import default_options
 from eitskin.study.emulated import PROGRAM, build_cortex_m7, checkout_root, need_tools, run_frames
+from eitskin.study.sections import markdown_table, text_table
 
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
@@ -286,15 +287,8 @@ def as_text(result: BoardCost) -> str:
     parts = [f"{result.scenes} random scenes, seed {result.seed}; {result.compiler}; {result.qemu}"]
     for head, rows in ((COST_HEAD, cost_rows(result)), (IMAGE_HEAD, image_rows(result)), (RATE_HEAD, rate_rows(result))):
         if rows:
-            widths = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
-            table = (head, *rows)
-            parts.append("\n".join("  ".join(f"{word:>{w}}" for word, w in zip(row, widths, strict=True)) for row in table))
+            parts.append(text_table(head, rows))
     return "\n\n".join(parts)
-
-
-def _markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
 
 
 def as_markdown(result: BoardCost, command: str) -> str:
@@ -313,20 +307,20 @@ def as_markdown(result: BoardCost, command: str) -> str:
         "the same bits of images and touches. *Warm* starts from the scene before, which has nothing to do with it. Milliseconds "
         "are an **estimate**: an instruction a cycle at 216 MHz. A Cortex-M7 issues up to two a cycle, and waits for flash; no "
         "silicon was measured.",
-        _markdown_table(COST_HEAD, cost_rows(result)),
+        markdown_table(COST_HEAD, cost_rows(result)),
         f"Cold, by the M7 kernels, relative to f32: {ratios}. Columns in use are unpacked to float once and held in the "
-        "workspace (64 KiB of it at rank 64, 256 columns), so that only the three products a frame with every column convert. Solve and "
-        f"touches take at most {stack} bytes of stack.",
+        "workspace (64 KiB of it at rank 64, 256 columns), so that only the three products a frame with every column convert. "
+        f"Solve and touches take at most {stack} bytes of stack.",
         "## Firmware",
         "Bytes of the images. The NUCLEO's workspace is what its SRAM has left.",
-        _markdown_table(IMAGE_HEAD, image_rows(result)),
+        markdown_table(IMAGE_HEAD, image_rows(result)),
     ]
     if result.rates:
         parts += [
             "## Frame rate",
             f"The unmodified image on the emulated NUCLEO-F767ZI (`{SCENE}`), whose clock takes an instruction a cycle: the "
-            "same estimate. 104 rows are one of each reciprocal pair (`--reciprocal 0`). Solve and touches run while the next frame is "
-            "acquired, and include its interrupts: demodulating a burst takes part of each 100 us slot.",
-            _markdown_table(RATE_HEAD, rate_rows(result)),
+            "same estimate. 104 rows are one of each reciprocal pair (`--reciprocal 0`). Solve and touches run while the next "
+            "frame is acquired, and include its interrupts: demodulating a burst takes part of each 100 us slot.",
+            markdown_table(RATE_HEAD, rate_rows(result)),
         ]
     return "\n\n".join(parts) + "\n"

@@ -16,7 +16,7 @@ MOST_LINES = 400
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
 ARITHMETIC = {"f32": {"fmaf", "sqrtf"}, "f64": {"fma", "sqrt"}}
 # what a compiler refers to by itself: the processor's features, position-independent code, hardening
-PROCESSOR = {"__cpu_model", "__cpu_indicator_init"}
+PROCESSOR = {"__cpu_model", "__cpu_features2", "__cpu_indicator_init"}
 OF_THE_COMPILER = PROCESSOR | {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail", "__memcpy_chk", "__memset_chk"}
 WIDTHS = ("f32", "f64")
 
