@@ -1,6 +1,6 @@
 /* Active set: the exact optimum over a few columns by Newton's step on a factor of their products, which grows and shrinks with
  * them; then those columns join whose correlation exceeds lambda and is the greatest among their neighbours in the image; and
- * again until none is missing (Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23, with several columns at a
+ * again until none is missing; between two looks at every column, looks nearby (Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23, with several columns at a
  * time). Each step keeps signs and lowers the objective. A column that depends on those held moves with them, along what leaves
  * S x as it is, until one of them is zero and makes room: the factor never has more rows than there are directions. */
 #include "certificate.h"
@@ -24,11 +24,14 @@ typedef struct active {
     int limited; /* the next step is not to be had for the MACs */
     int loose;   /* a column is held that the factor does not have */
     int broken;  /* the factor is of no use */
-    int moved;   /* x is not as it was before the round */
+    int moved;   /* x is not as it was before the last columns were taken in */
 } active;
 
 static const eits_real EPSILON = (eits_real)(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
 static const eits_real INDEPENDENT = (eits_real)(sizeof(eits_real) == 4 ? 1e-5 : 1e-10); /* least share of a column's square */
+
+static const eits_real WORTHWHILE = R(1e-6); /* a share of the objective: what a look nearby must have won to be followed by one */
+enum { LOOKS_NEARBY = 20 };
 
 static uint64_t macs_to_finish(const eits_context *ctx, uint32_t count)
 {
@@ -260,17 +263,52 @@ static void start_over_from_zero(eits_context *ctx)
     eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
 }
 
-/* One round; *c becomes the certificate after it. */
-static void round_of(eits_context *ctx, active *a, uint32_t missing, eits_certificate *c)
+/* Take in the first `missing` columns listed, and step to the optimum with them. Returns whether anything moved. */
+static int take_in(eits_context *ctx, active *a, uint32_t missing)
 {
     a->moved = 0;
-    ++ctx->info.iterations;
     for (uint32_t k = 0; k < missing && !a->limited && !a->loose; ++k)
         add(ctx, a, ctx->list_index[k]);
     if (!a->loose)
         settle(ctx, a);
-    if (a->moved)
+    return a->moved;
+}
+
+/* What joins next is mostly beside what is held: look there only. *objective is the last one known. Returns whether anything
+ * moved. */
+static int look_nearby(eits_context *ctx, active *a, eits_real *objective)
+{
+    const uint64_t rank = ctx->model->rank;
+    if (a->limited || a->loose || a->broken ||
+        !eits_affords(ctx, (ctx->working_count + 2u * ctx->basis_count) * rank + ctx->model->n_pixels * rank +
+                               macs_to_finish(ctx, ctx->working_count)))
+        return 0;
+    ctx->info.macs += rank * eits_apply_working(ctx, ctx->x, ctx->sx);
+    ctx->info.macs += eits_take_residual(ctx, ctx->sx);
+    eits_real now = R(0.5) * eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
+    for (uint32_t k = 0; k < ctx->working_count; ++k)
+        now = eits_fma(a->lambda, eits_fabs(ctx->x[k]), now);
+    if (!(now < *objective * (1 - WORTHWHILE)))
+        return 0;
+    *objective = now;
+    uint8_t *marks = (uint8_t *)(void *)ctx->z;
+    ctx->info.macs += eits_gradient_nearby(ctx, marks);
+    (void)take_pulls(ctx, a);
+    const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, marks);
+    return missing > 0 && take_in(ctx, a, missing);
+}
+
+/* One round; *c becomes the certificate after it. */
+static int round_of(eits_context *ctx, active *a, uint32_t missing, eits_certificate *c)
+{
+    eits_real objective = c->objective;
+    ++ctx->info.iterations;
+    const int moved = take_in(ctx, a, missing);
+    for (int looks = 0; moved && looks < LOOKS_NEARBY && look_nearby(ctx, a, &objective); ++looks)
+        ;
+    if (moved)
         *c = certify(ctx, a);
+    return moved;
 }
 
 /* Rounds until something ends them; 0 where another solver has to go on. */
@@ -288,12 +326,12 @@ static int rounds(eits_context *ctx, active *a, eits_certificate *c)
             return 1;
         }
         const eits_real pull = take_pulls(ctx, a), before = c->objective;
-        const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance);
+        const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, NULL);
         if (stalls == 2 || (missing == 0 && pull <= a->tolerance)) {
             ctx->info.stop = EITS_STOP_OPTIMUM;
             return 1;
         }
-        round_of(ctx, a, stalls > 0 && missing > 1 ? 1 : missing, c);
+        const int moved = round_of(ctx, a, stalls > 0 && missing > 1 ? 1 : missing, c);
         if (a->broken || (a->loose && !a->limited) || !(c->objective <= before * (1 + R(1e-3))))
             return 0;
         if (a->limited) {
@@ -301,7 +339,7 @@ static int rounds(eits_context *ctx, active *a, eits_certificate *c)
             return 1;
         }
         stalls = c->objective < before * (1 - EPSILON) ? 0 : stalls + 1;
-        if (!a->moved) /* the gradient is as it was, but for the columns held */
+        if (!moved) /* the gradient is as it was, but for the columns held */
             stalls = 2;
     }
 }

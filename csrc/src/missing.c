@@ -1,5 +1,6 @@
 #include "missing.h"
 
+#include "kernels.h"
 #include "vec.h"
 
 /* How far the correlations lie beyond zero under the sign rule, into ctx->list_value. */
@@ -37,11 +38,15 @@ static int is_peak_of_row(const eits_context *ctx, const eits_real *v, uint32_t 
     return !(j + 1 < ctx->model->n_pixels && p[1].iy == p->iy && p[1].ix == p->ix + 1u && v[j + 1] > v[j]);
 }
 
-uint32_t eits_list_missing(const eits_context *ctx, eits_real least)
+uint32_t eits_list_missing(const eits_context *ctx, eits_real least, const uint8_t *marks)
 {
     const eits_real *v = beyond(ctx);
     uint32_t count = 0, *list = ctx->list_index;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
+        if (marks != NULL && !marks[j / EITS_PANEL]) {
+            j |= EITS_PANEL - 1;
+            continue;
+        }
         if (!(v[j] > least) || !is_peak_of_row(ctx, v, j) || !is_peak(ctx, v, j))
             continue;
         uint32_t at = count++;
@@ -50,4 +55,44 @@ uint32_t eits_list_missing(const eits_context *ctx, eits_real least)
         list[at] = j;
     }
     return count;
+}
+
+enum { NEAR = 1 };
+
+/* Mark the panels with a pixel near that of column j. */
+static void mark_near(const eits_context *ctx, uint32_t j, uint8_t *marks)
+{
+    const eits_model *m = ctx->model;
+    const uint32_t ix = m->pixel[j].ix, iy = m->pixel[j].iy;
+    for (uint32_t y = iy > NEAR ? iy - NEAR : 0; y <= iy + NEAR && y < m->ny; ++y) {
+        for (uint32_t x = ix > NEAR ? ix - NEAR : 0; x <= ix + NEAR && x < m->nx; ++x) {
+            const uint32_t other = ctx->cell[(size_t)y * m->nx + x];
+            if (other != EITS_NO_PIXEL)
+                marks[other / EITS_PANEL] = 1;
+        }
+    }
+}
+
+uint64_t eits_gradient_nearby(eits_context *ctx, uint8_t *marks)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    uint64_t columns = 0;
+    memset(marks, 0, EITS_PANEL_COLUMNS(s->cols) / EITS_PANEL);
+    for (uint32_t k = 0; k < ctx->working_count; ++k)
+        mark_near(ctx, ctx->working[k], marks);
+    eits_zero(ctx->gradient, s->cols);
+    for (uint32_t first = 0; first < s->cols; first += EITS_PANEL) {
+        if (!marks[first / EITS_PANEL])
+            continue;
+        const uint32_t count = s->cols - first < EITS_PANEL ? s->cols - first : EITS_PANEL;
+        uint32_t index[EITS_PANEL];
+        for (uint32_t l = 0; l < count; ++l)
+            index[l] = first + l;
+        if (ctx->panels != NULL)
+            ctx->kernels->mul_t_panels(s, ctx->panels + (size_t)first * s->rows, index, count, ctx->residual, ctx->gradient + first);
+        else
+            ctx->kernels->mul_t(s, index, count, ctx->residual, ctx->gradient + first);
+        columns += count;
+    }
+    return columns * s->rows;
 }

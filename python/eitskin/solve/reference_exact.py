@@ -21,6 +21,7 @@ EPSILON = 2.3e-16
 INDEPENDENT = 1e-10
 LOOK_GROWTH = 6
 SETTLED = 0.001
+WORTHWHILE, LOOKS_NEARBY, NEAR, PANEL = 1e-6, 20, 1, 32
 
 
 def coordinate(problem: Problem, options: Options, start: FloatArray | None = None, done: int = 0) -> Result:
@@ -95,7 +96,7 @@ class ActiveSet:
         self.p, self.options, self.held = problem, options, Held()
         self.most = min(len(problem.y) - len(problem.basis), problem.n)
         self.tolerance = 2 * EPSILON * np.sqrt(lipschitz) * float(np.linalg.norm(problem.y))
-        self.near = neighbours(grid)
+        self.near, self.index = neighbours(grid), grid.index
 
     def _left(self, j: int) -> tuple[float, float, FloatArray]:
         """The square of column ``j``'s part that counts (0: rounding), what the columns held leave of it, and the
@@ -176,6 +177,32 @@ class ActiveSet:
         peaks = np.flatnonzero((beyond > self.p.lam + self.tolerance) & ~higher.any(axis=1))
         return [int(j) for j in peaks[np.argsort(-beyond[peaks], kind="stable")]]
 
+    def _take_in(self, columns: list[int], gradient: FloatArray) -> tuple[bool, bool]:
+        """Take ``columns`` in and step to the optimum with them; whether anything moved, and whether that failed half way."""
+        before = self.held.spread(self.p.n)
+        failed = any(not self._add(j, float(gradient[j])) for j in columns)
+        moved = not failed and self._settle()
+        return moved or bool((self.held.spread(self.p.n) != before).any()), failed
+
+    def _look_nearby(self, objective: float) -> tuple[float, bool, bool]:
+        """Columns near those held, if the last step was worth it: the objective, whether anything moved, whether it failed."""
+        p, held = self.p, self.held
+        residual = p.residual(held.spread(p.n))
+        now = 0.5 * float(residual @ residual) + p.lam * float(np.abs(held.x).sum())
+        if not now < objective * (1 - WORTHWHILE):
+            return objective, False, False
+        gradient = np.where(self._nearby(), p.s.T @ residual, 0.0)
+        held.pull = [float(gradient[j]) - s * p.lam for j, s in zip(held.columns, held.sign, strict=True)]
+        gradient[held.columns] = 0.0
+        missing = self._missing(gradient)
+        return (now, *self._take_in(missing, gradient)) if missing else (now, False, False)
+
+    def _nearby(self) -> npt.NDArray[np.bool_]:
+        """Columns (n,) in panels that show pixels beside those held."""
+        distance = np.abs(self.index[:, None, :] - self.index[None, self.held.columns, :]).max(axis=2)
+        panels = np.unique(np.flatnonzero((distance <= NEAR).any(axis=1)) // PANEL)
+        return np.asarray(np.isin(np.arange(self.p.n) // PANEL, panels))
+
     def run(self, start: FloatArray | None) -> Result:
         """Rounds until something ends them; where they fail, coordinate descent goes on."""
         p, o, held = self.p, self.options, self.held
@@ -198,9 +225,11 @@ class ActiveSet:
             if stalls == 2 or (not missing and pull <= self.tolerance):
                 return Result(held.spread(p.n), rounds, "optimum", c, 0)
             rounds += 1
-            before_x = held.spread(p.n)
-            failed = any(not self._add(j, float(gradient[j])) for j in missing[: 1 if stalls else None])
-            moved = (not failed and self._settle()) or (held.spread(p.n) != before_x).any()
+            moved, failed = self._take_in(missing[: 1 if stalls else None], gradient)
+            objective, looks, more = c.objective, 0, moved and not failed
+            while more and looks < LOOKS_NEARBY:
+                objective, more, failed = self._look_nearby(objective)
+                looks, more = looks + 1, more and not failed
             if moved:
                 c, gradient = p.certify(held.spread(p.n))
             if failed or not c.objective <= before * (1 + 1e-3):

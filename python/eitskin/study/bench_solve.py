@@ -75,8 +75,7 @@ def _least_effort(problems: Problems, candidate: Candidate, k: int, levels: Sequ
 
 
 def _plan(problems: Problems, candidate: Candidate) -> list[Timed]:
-    warm = candidate.prepare(0, candidate.ladder[0])
-    warm()  # what compiles when first called
+    candidate.prepare(0, candidate.ladder[len(candidate.ladder) // 2])()  # what compiles does so now
     numbers = [0] if candidate.batch else range(len(problems))
     efforts = [_least_effort(problems, candidate, k, LEVELS) for k in numbers]
     plans = []
@@ -184,9 +183,8 @@ def text(result: dict[str, Any]) -> str:
     """Tables of microseconds a problem and ratios to the active set in float32."""
     known = {name: number for name, number in result["versions"].items() if number}
     lines = [
-        f"time to (F - F*) / F*, microseconds a problem: medians of {result['rounds']} interleaved rounds (fewer where slow, 3 at "
-        "least), one thread, seed "
-        f"{result['seed']}, 60 dB; {result['machine']}",
+        f"time to (F - F*) / F*, microseconds a problem: medians of {result['rounds']} interleaved rounds (fewer where slow, 3 "
+        f"at least), one thread, seed {result['seed']}, 60 dB; {result['machine']}",
         ", ".join(f"{name} {number}" for name, number in known.items()),
         *(f"not installed: {name}; run  pip install {name}" for name, number in result["versions"].items() if number is None),
     ]
@@ -194,7 +192,8 @@ def text(result: dict[str, Any]) -> str:
         rows = table["rows"]
         names = list(dict.fromkeys(row["solver"] for row in rows))
         rank, n = table["shape"]
-        lines += ["", f"{table['problems']}, {rank} x {n}, {table['count']} problems, {table['nonzeros']:.1f} non-zeros at the optimum"]
+        facts = f"{table['count']} problems, {table['nonzeros']:.1f} non-zeros at the optimum"
+        lines += ["", f"{table['problems']}, {rank} x {n}, {facts}"]
         lines.append(f"{'':44}" + "".join(f"{level:>8.0e} us {'ratio':>9}" for level in LEVELS))
         for name in names:
             cells = []
@@ -205,5 +204,6 @@ def text(result: dict[str, Any]) -> str:
         lines.append("FISTA at equal iterations, us and ratio to the C core's on every column in float32")
         for count in EQUAL_ITERATIONS:
             same = [r for r in table["equal_iterations"] if r["iterations"] == count]
-            lines.append(f"  {count:4}: " + "; ".join(f"{r['solver'].removeprefix('eitskin ')} {r['us']:.0f} ({r['ratio']:.2f})" for r in same))
+            cells = [f"{r['solver'].removeprefix('eitskin ')} {r['us']:.0f} ({r['ratio']:.2f})" for r in same]
+            lines.append(f"  {count:4}: " + "; ".join(cells))
     return "\n".join(lines)

@@ -20,6 +20,7 @@ from eitskin.study.bench_solve_problems import Problems, bench_options
 Floats = npt.NDArray[np.floating[Any]]
 
 COUNTS = (1, 2, 3, 5, 7, 10, 14, 20, 30, 45, 60, 90, 140, 200, 300, 500, 800, 1300, 2000, 4000, 8000, 16000, 32000)
+LARS = {"lambda1": 1.0, "mode": 2, "pos": True, "numThreads": 1}
 TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(2, 29))
 
 
@@ -59,8 +60,8 @@ def _ours(problems: Problems, solver: str, width: str) -> Candidate:
 
 def numpy_fista(problems: Problems, dtype: Any) -> Candidate:
     """FISTA in numpy, plain: two products an iteration."""
-    s = np.ascontiguousarray(problems.s, dtype=dtype)
-    st = np.ascontiguousarray(s.T)
+    s: Floats = np.ascontiguousarray(problems.s, dtype=dtype)
+    st: Floats = np.ascontiguousarray(s.T)
     step = dtype(1 / (np.linalg.norm(problems.s, 2) ** 2))
 
     def prepare(k: int, count: int) -> Callable[[], Any]:
@@ -87,20 +88,19 @@ def spams(problems: Problems) -> list[Candidate]:
 
     found = []
     for dtype in (np.float32, np.float64):
-        s = np.asfortranarray(problems.s, dtype=dtype)
+        s: Any = np.asfortranarray(problems.s, dtype=dtype)
         gram = np.asfortranarray(s.T @ s)
         scaled = np.asfortranarray((problems.y / problems.lam[:, None]).T, dtype=dtype)
         many = np.asfortranarray(np.tile(scaled, (1, -(-240 // len(problems)))))
-        how = {"lambda1": 1.0, "mode": 2, "pos": True, "numThreads": 1}
 
         def alone(k: int, cholesky: bool, s: Any = s, scaled: Any = scaled, gram: Any = gram) -> Callable[[], Any]:
             y, lam = np.asfortranarray(scaled[:, k : k + 1]), problems.lam[k]
             if cholesky:
-                return lambda: lam * package.lasso(y, D=s, cholesky=True, **how).toarray()[:, 0]
-            return lambda: lam * package.lasso(y, Q=gram, q=np.asfortranarray(s.T @ y), **how).toarray()[:, 0]
+                return lambda: lam * package.lasso(y, D=s, cholesky=True, **LARS).toarray()[:, 0]
+            return lambda: lam * package.lasso(y, Q=gram, q=np.asfortranarray(s.T @ y), **LARS).toarray()[:, 0]
 
         def together(_: int, cholesky: bool, s: Any = s, many: Any = many) -> Callable[[], Any]:
-            return lambda: package.lasso(many, D=s, cholesky=cholesky, **how)
+            return lambda: package.lasso(many, D=s, cholesky=cholesky, **LARS)
 
         def spread(x: Any) -> Floats:
             return np.asarray(x[:, : len(problems)].toarray().T * problems.lam[:, None])

@@ -56,13 +56,13 @@ class Problems:
     def suboptimality(self, k: int, x: npt.NDArray[np.floating], *, signed: bool = False) -> float:
         """(F(x) - F*) / F*; values below zero count as zero unless ``signed``."""
         best = (self.best_signed if signed else self.best)[k]
-        return (self.objective(k, x if signed else np.maximum(x, 0)) - best) / best
+        return float((self.objective(k, x if signed else np.maximum(x, 0)) - best) / best)
 
 
 def bench_options(model: Model, **changes: object) -> Options:
     """The model's defaults with the plain problem's lambda and no ignored direction."""
-    plain = replace(default_options(model), project_baseline=False, lambda_rel=LAMBDA_REL, lambda_noise_factor=0.0, gate_factor=0.0)
-    return replace(plain, **changes)  # type: ignore[arg-type]
+    plain = replace(default_options(model), project_baseline=False, lambda_rel=LAMBDA_REL)
+    return replace(plain, lambda_noise_factor=0.0, gate_factor=0.0, **changes)  # type: ignore[arg-type]
 
 
 def sessions(scenes: int, seed: int, role: str = "test") -> Simulated:

@@ -1,0 +1,45 @@
+"""``eitskin bench solve``: each solver really gets to the level that its time is given for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.study import bench_solve, bench_solve_peers
+from eitskin.study.bench_solve_problems import Problems, make_problems
+from small_models import prebuilt, session
+
+OWN = {f"eitskin {solver}, {width}" for solver in ("active-set", "coordinate", "working-set", "fista") for width in ("float32", "float64")}
+
+
+@pytest.fixture(scope="module")
+def problems() -> Problems:
+    """Two scenes."""
+    model, blob = prebuilt()
+    return make_problems("rank 64", model, blob, session(scenes=2))
+
+
+def test_suboptimality_is_judged_in_float64(problems: Problems) -> None:
+    zero = np.zeros(problems.s.shape[1])
+    assert problems.objective(0, zero) == pytest.approx(0.5 * problems.y[0] @ problems.y[0], rel=1e-14)
+    assert problems.suboptimality(0, zero) > 1
+    assert (problems.best_signed <= problems.best).all()
+
+
+def test_all_that_is_installed_reaches_its_level(problems: Problems, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench_solve, "LEVELS", (1e-2,))
+    seen = set()
+    for candidate in bench_solve_peers.candidates(problems):
+        seen.add(candidate.name)
+        (plan,) = bench_solve._plan(problems, candidate)
+        assert plan.calls is not None and plan.worst <= 1e-2, candidate.name
+        bench_solve._round(plan)
+        assert plan.median_us > 0
+    assert seen >= OWN | {"numpy FISTA, float32", "numpy FISTA, float64"}
+    for name, number in bench_solve_peers.versions().items():
+        assert (number is not None) == (name == "numpy" or any(name.split("-")[0].lower() in s.lower() for s in seen)), name
+
+
+def test_what_is_absent_is_named() -> None:
+    result = {"machine": "m", "versions": {"numpy": "2", "celer": None}, "seed": 1, "rounds": 3, "tables": []}
+    assert "not installed: celer; run  pip install celer" in bench_solve.text(result)
