@@ -1,12 +1,12 @@
-/* Reads "model.eitm" and "frames.f32" (quiet frames, then frames; counts on "plan.txt") from the host's folder, runs them as a
- * board would, and prints for each frame: why the solve stopped, iterations, MACs, instructions of the solve and of the touches,
+/* Reads "model.eitm" and "frames.f32" (quiet frames, then frames; counts on "plan.txt") from the host's folder, and "options.txt"
+ * if it is there (a name and a value a line, which replace the model's own), runs them as a board would, and prints for each frame: why the solve stopped, iterations, MACs, instructions of the solve and of the touches,
  * the image's CRC-32, and the touches' numbers as hexadecimal bits. Floats are printed as bits: there is nothing to round. */
 #include "eitskin/eitskin.h"
 
 #include <stdio.h>
 #include <string.h>
 
-enum { MOST_MODEL = 700 * 1024, MOST_WORKSPACE = 512 * 1024, MOST_ROWS = 4096 };
+enum { MOST_MODEL = 2048 * 1024, MOST_WORKSPACE = 1024 * 1024, MOST_ROWS = 4096 };
 
 static _Alignas(16) uint8_t model_bytes[MOST_MODEL];
 static _Alignas(16) uint8_t workspace[MOST_WORKSPACE];
@@ -42,6 +42,30 @@ static int fail(const char *what, eits_status status)
     return 1;
 }
 
+/* Options by name; a name that is none of these is refused. */
+static int read_options(eits_options *options)
+{
+    char name[32];
+    float value;
+    FILE *file = fopen("options.txt", "r");
+    int known = 1;
+    while (known && file != NULL && fscanf(file, "%31s %f", name, &value) == 2) {
+        if (strcmp(name, "iterations") == 0)
+            options->iterations = (uint32_t)value;
+        else if (strcmp(name, "touch_sweeps") == 0)
+            options->touch_sweeps = (uint32_t)value;
+        else if (strcmp(name, "gap_rel") == 0)
+            options->gap_rel = value;
+        else if (strcmp(name, "lambda_rel") == 0)
+            options->lambda_rel = value;
+        else
+            known = 0;
+    }
+    if (file != NULL)
+        fclose(file);
+    return known;
+}
+
 int main(void)
 {
     eits_model model;
@@ -65,7 +89,7 @@ int main(void)
     options.warm_start = warm;
     options.sign = (eits_sign)sign;
     options.solver = (eits_solver)solver;
-    status = eits_set_options(&ctx, &options);
+    status = read_options(&options) ? eits_set_options(&ctx, &options) : EITS_E_ARGUMENT;
     if (status == EITS_OK)
         status = quiet >= 4 ? eits_baseline_begin(&ctx, quiet) : EITS_OK;
     if (status != EITS_OK)
