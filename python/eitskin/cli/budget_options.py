@@ -97,7 +97,7 @@ def settings_text(point: Point, board: str) -> str:
     from eitskin.study.tradeoff.front import Where
 
     one = point.configuration
-    score, typical, most = point.accuracy(Where()), point.typical_us(board), point.cost("us", board, Where())
+    score, typical, most = point.accuracy(Where()), point.cost("us", board, Where()), point.cost("us", board, Where(), True)
     text = f"settings of {point.name!r}: {one.solver}, {one.iterations} iterations at most, lambda_rel {one.lambda_rel:g}"
     text += f", gap {one.gap:g}" if one.gap else ""
     text += f", at most {one.mac_limit} MACs" if one.mac_limit else ""

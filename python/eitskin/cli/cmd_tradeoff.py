@@ -37,6 +37,7 @@ def add_parser(subparsers: Any) -> None:
     run.add_argument("--elements", type=int, default=11_000, metavar="N", help="of the frames' mesh (default: %(default)s)")
     run.add_argument("--counted", type=int, default=24, metavar="N", help="scenes emulated to count instructions; 0: none")
     run.add_argument("--rounds", type=int, default=25, metavar="N", help="in which times are taken on this host; 0: none")
+    run.add_argument("--front", type=Path, metavar="FRONT.json", help="also write what the package ships of the results")
     run.add_argument("--no-pictures", action="store_true", help="tables only")
     run.add_argument("--json", action="store_true", help="print the results as JSON")
     run.set_defaults(run=run_run)
@@ -44,7 +45,8 @@ def add_parser(subparsers: Any) -> None:
         "recommend",
         help="the point to take for a budget or an accuracy, and its model",
         description="Choose from measured results: the most accurate point within --budget, or the cheapest that reaches "
-        "--accuracy. The budget holds for solve and touches of the costliest of the frames that were counted or timed.",
+        "--accuracy. The budget holds for solve and touches of the mean frame (host: the median), with --worst of the costliest "
+        "that was counted or timed.",
     )
     add_wish(recommend)
     recommend.add_argument("--board", choices=("f767", "host"), default="f767", help="default: %(default)s")
@@ -53,6 +55,7 @@ def add_parser(subparsers: Any) -> None:
     recommend.add_argument("--snr-db", type=float, default=60.0, metavar="DB", help="default: %(default)g")
     recommend.add_argument("--by", choices=("image", "discs"), default="image", help="whose MIoU (default: %(default)s)")
     recommend.add_argument("--period", metavar="TIME", help="to measure a frame, as 12ms (default: the budget, or 20.8ms)")
+    recommend.add_argument("--worst", action="store_true", help="hold the costliest frame to the budget, not the mean one")
     recommend.add_argument("--warm", action="store_true", help="also points that begin each frame from the last's image")
     recommend.add_argument("-o", "--output", type=Path, metavar="MODEL.eitm", help="build and write the model to use")
     recommend.add_argument("--skin", type=Path, metavar="SKIN.toml", help="of the model (default: the paper's 194 mm disk)")
@@ -63,13 +66,14 @@ def add_parser(subparsers: Any) -> None:
 def run_run(options: argparse.Namespace) -> int:
     """Measure, and write tables and pictures."""
     from eitskin.cli.cmd_compare import progress
-    from eitskin.fileio import write_bytes
+    from eitskin.fileio import refuse_unwritable, write_bytes
     from eitskin.study.tradeoff.configuration import load_set
     from eitskin.study.tradeoff.default_set import default_set
-    from eitskin.study.tradeoff.front import Where
+    from eitskin.study.tradeoff.front import Where, for_package
     from eitskin.study.tradeoff.run import RunSettings, run
     from eitskin.study.tradeoff.table import to_csv, to_json, to_text
 
+    refuse_unwritable(options.front)
     if options.output.exists() and not options.output.is_dir():
         raise UsageError(f"-o {options.output}: this is a file; name a folder")
     configurations = default_set() if options.set is None else load_set(options.set)
@@ -82,6 +86,8 @@ def run_run(options: argparse.Namespace) -> int:
         load_matplotlib()
     front = run(configurations, settings, options.output, progress)
     write_bytes(options.output / "front.json", to_json(front).encode())
+    if options.front is not None:
+        write_bytes(options.front, to_json(for_package(front)).encode())
     write_bytes(options.output / "table.csv", to_csv(front).encode())
     if not options.no_pictures:
         from eitskin.view.tradeoff_pictures import draw_all
@@ -141,7 +147,8 @@ def read_wish(options: argparse.Namespace, board: str, where: Where | None = Non
     frame = None if period is None else read_budget(period)
     if frame is not None and frame.unit != "us":
         raise UsageError(f"--period {period}: give a time, such as 12ms")
-    wish = Wish(budget, options.accuracy, board, where or Place(), None if frame is None else frame.value)
+    period_us, worst = None if frame is None else frame.value, getattr(options, "worst", False)
+    wish = Wish(budget, options.accuracy, board, where or Place(), period_us, worst)
     return check_wish(wish)
 
 

@@ -49,7 +49,7 @@ def draw_front(path: Path, front: Front) -> None:
         how = front.settings
         figure.suptitle(
             f"What accuracy costs: {how.get('scenes')} scenes of 1 to 3 random touches, 60 dB, seed {how.get('seed')}; "
-            "line: nothing measured costs no more and is as accurate"
+            "line: the front"
         )
         save_png(figure, path)
 
@@ -59,7 +59,7 @@ def _draw_one_front(axes: Axes, points: Sequence[Point], where: Where, counted: 
     named = {one.name for one in best}
     for point in points:
         x, y = x_of(point, where), point.accuracy(where)
-        if x is not None and y is not None and point.name not in named:
+        if x is not None and y is not None and point.name not in named and not point.configuration.warm_start:
             axes.plot(x / 1e6, y, "o", color=GREY, markersize=3.5, alpha=0.8)
     xs = [(x_of(one, where) or 1.0) / 1e6 for one in best]
     ys = [one.accuracy(where) or 0.0 for one in best]
@@ -78,7 +78,15 @@ def _draw_one_front(axes: Axes, points: Sequence[Point], where: Where, counted: 
     if counted:
         ms = axes.secondary_xaxis("top", functions=(_to_ms, _to_instructions))
         ms.set_xlabel("ms at 216 MHz and an instruction a cycle (an estimate)")
-    _plain_ticks(axes.xaxis)
+        ms.set_xticks([1, 2, 5, 10, 20, 50, 100], ["1", "2", "5", "10", "20", "50", "100"])
+        ms.minorticks_off()
+    axes.set_xticks([0.2, 0.5, 1, 2, 5, 10, 20], ["0.2", "0.5", "1", "2", "5", "10", "20"])
+    axes.minorticks_off()
+    warm = [(x, y) for one in points if one.configuration.warm_start and (x := x_of(one, where)) and (y := one.accuracy(where))]
+    if warm:
+        axes.plot([x / 1e6 for x, _ in warm], [y for _, y in warm], "^", color="#7a3b8f", markersize=5, fillstyle="none",
+                  linestyle="none", label="warm, touches held for four frames")  # fmt: skip
+        axes.legend(frameon=False, fontsize=8, loc="lower right")
 
 
 def _to_ms(millions: Any) -> Any:
@@ -107,7 +115,7 @@ def _name(axes: Axes, best: Sequence[Point], xs: Sequence[float], ys: Sequence[f
         )
     if xs:
         left, right = axes.get_xlim()
-        axes.set_xlim(left, max(right, max(xs) * 6))
+        axes.set_xlim(min(left, min(xs) / 1.3), max(right, max(xs) * 4))
 
 
 def _plain_ticks(axis: Any) -> None:
@@ -178,8 +186,8 @@ def _draw_knob(axes: Axes, groups: Sequence[Sequence[Point]], knob: str) -> None
 
 
 def _base_name(group: Sequence[Point]) -> str:
-    """The shortest name of a family, which the others are named after."""
-    return min((one.name for one in group), key=len)
+    """The name of a family's member that most of the others are named after."""
+    return max((one.name for one in group), key=lambda name: (sum(one.name.startswith(name) for one in group), -len(name)))
 
 
 def draw_samples(path: Path, front: Front) -> None:

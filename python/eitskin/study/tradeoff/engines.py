@@ -64,18 +64,24 @@ class ModelShop:
         self._judges: dict[int, metrics.Judge] = {}
         self._raster = metrics.raster_inside(skin.outline)
 
+    def refuse(self, one: Configuration) -> None:
+        """Refuse a configuration whose model could not be made.
+
+        Raises:
+            UsageError: its rank exceeds what protocol and grid allow.
+        """
+        most = min(len(self.protocol.reciprocal_pairs().first), grid_for(self.skin.outline, one.pixels).n_pixels)
+        if one.rank > most:
+            raise UsageError(f"configuration {one.name!r}: rank = {one.rank} is out of range; use 1 to {most}")
+
     def build(self, one: Configuration) -> Built:
         """The model of a configuration.
 
         Raises:
-            UsageError: the model cannot be, such as a rank above the Jacobian's.
+            UsageError: the model cannot be; see ``refuse``.
             GeometryError, MissingExtraError: from meshing.
         """
-        linear = self._linearise(one.pixels)
-        try:
-            model = make_model(self.skin, self.protocol, linear, build_settings(one, self.skin))
-        except UsageError as error:
-            raise UsageError(f"configuration {one.name!r}: {error}") from None
+        model = make_model(self.skin, self.protocol, self._linearise(one.pixels), build_settings(one, self.skin))
         return Built(model, encode_model(model), self._judge(one.pixels))
 
     def _linearise(self, pixels: int) -> Linearisation:

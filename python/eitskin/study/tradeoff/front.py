@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,10 @@ F767_RAM = 256 * 1024  # the linker script promises the workspace as much
 BOARDS = ("f767", "host")
 JUDGED = ("image", "discs")
 DEFAULT_PERIOD_US = 20_800  # of the default scan
+LEAST_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost of the discs
+SHIPPED_SCORES = (
+    "scenes", "image", "discs", "exact_count", "position_mm", "force_error", "solve_macs", "touch_macs", "most_macs",
+)  # fmt: skip
 MODEL_HOLDS = {"solver", "iterations", "lambda_rel"}  # of the solver's settings
 
 
@@ -35,8 +39,8 @@ class Budget:
 
     def __str__(self) -> str:
         if self.unit == "us":
-            return f"{self.value / 1000:g} ms"
-        return f"{self.value / 1e6:g} million {self.unit}"
+            return f"{self.value / 1000:.3g} ms"
+        return f"{self.value / 1e6:.3g} million {self.unit}"
 
 
 UNITS = {
@@ -100,22 +104,17 @@ class Point:
         score = self.score(where)
         return None if score is None else (score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"])
 
-    def cost(self, unit: str, board: str, where: Where) -> float | None:
-        """What a budget of ``unit`` bounds: that of the costliest frame that was counted or timed; None if unknown."""
+    def cost(self, unit: str, board: str, where: Where, worst: bool = False) -> float | None:
+        """Solve and touches of a frame in ``unit``: the mean (host: the median), or of the costliest frame that was counted or
+        timed; None if unknown. Times of the F767 are estimates: an instruction a cycle."""
         if unit == "MACs":
             macs = self.macs(where)
-            return None if macs is None else macs[1]
+            return None if macs is None else macs[worst]
         if unit == "us" and board == "host":
-            return None if self.host_us is None else float(self.host_us["most"])
+            return None if self.host_us is None else float(self.host_us["most" if worst else "p50"])
         if self.instructions is None:
             return None
-        return float(self.instructions["most"]) / (1 if unit == "instructions" else F767_MHZ)
-
-    def typical_us(self, board: str) -> float | None:
-        """Solve and touches of a frame on average (F767: an estimate, an instruction a cycle) or at the median (host)."""
-        if board == "host":
-            return None if self.host_us is None else float(self.host_us["p50"])
-        return None if self.instructions is None else float(self.instructions["mean"]) / F767_MHZ
+        return float(self.instructions["most" if worst else "mean"]) / (1 if unit == "instructions" else F767_MHZ)
 
     @property
     def fits_f767(self) -> bool:
@@ -173,6 +172,29 @@ class Front:
         return {"format": FORMAT, "version": VERSION, "settings": self.settings, "points": listed}
 
 
+def for_package(front: Front) -> Front:
+    """What ships: of the sets beside "random" 60 dB only, of each cell what ``choose`` and its answer need."""
+    kept = []
+    for one in front.points:
+        scores = {
+            name: {
+                snr: {key: _rounded(score[key]) for key in SHIPPED_SCORES}
+                for snr, score in cells.items()
+                if name == "random" or snr == "60"
+            }
+            for name, cells in one.scores.items()
+        }
+        kept.append(replace(one, scores=scores))
+    return Front(front.settings, tuple(kept), front.where_from)
+
+
+def _rounded(value: Any) -> Any:
+    """Numbers to four decimals."""
+    if isinstance(value, dict):
+        return {key: _rounded(one) for key, one in value.items()}
+    return round(value, 4) if isinstance(value, float) else value
+
+
 def front_from(values: Any, where: str) -> Front:
     """Results from JSON values.
 
@@ -213,13 +235,17 @@ def load_front(path: Path | None = None) -> Front:
 
 
 def pareto(
-    points: Sequence[Point], cost: Callable[[Point], float | None], accuracy: Callable[[Point], float | None]
+    points: Sequence[Point],
+    cost: Callable[[Point], float | None],
+    accuracy: Callable[[Point], float | None],
+    least_gain: float = 0.0,
 ) -> list[Point]:
-    """Those that no other beats: none that costs no more is as accurate. Cheapest first."""
+    """Those that no other beats: none that costs no more is as accurate, less ``least_gain``. Cheapest first."""
     known = [(c, -a, k) for k, p in enumerate(points) if (c := cost(p)) is not None and (a := accuracy(p)) is not None]
-    best, kept = float("-inf"), []
+    best = float("-inf")
+    kept: list[Point] = []
     for _, negative, k in sorted(known):
-        if -negative > best:
+        if -negative > best + (least_gain if kept else 0.0):
             best = -negative
             kept.append(points[k])
     return kept
@@ -227,13 +253,15 @@ def pareto(
 
 @dataclass(frozen=True)
 class Wish:
-    """What is asked for: at most ``budget``, at least ``accuracy``, on ``board``; a frame measured within ``period_us``."""
+    """What is asked for: at most ``budget``, for the mean frame or the ``worst``, at least ``accuracy``, on ``board``; a frame
+    measured within ``period_us``."""
 
     budget: Budget | None
     accuracy: float | None
     board: str
     where: Where
     period_us: float | None = None
+    worst: bool = False
 
     @property
     def acquisition_us(self) -> float:
@@ -268,15 +296,16 @@ def check_wish(wish: Wish) -> Wish:
 
 def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") -> Point:
     """With a budget the most accurate point within it; with an accuracy the cheapest that reaches it; with both the cheapest
-    that does both. ``what`` names the points in the refusal.
+    that does both. Points that save on the fit of touches are left out. ``what`` names the points in the refusal.
 
     Raises:
         UsageError: none does; the text says how near one comes.
     """
     known = []
     for one in points:
-        cost, accuracy = one.cost(wish.unit, wish.board, wish.where), one.accuracy(wish.where)
-        if cost is not None and accuracy is not None and (wish.board == "host" or one.fits_f767):
+        cost, accuracy = one.cost(wish.unit, wish.board, wish.where, wish.worst), one.accuracy(wish.where)
+        usable = one.configuration.touch_sweeps >= LEAST_SWEEPS and (wish.board == "host" or one.fits_f767)
+        if cost is not None and accuracy is not None and usable:
             known.append((cost, accuracy, one))
     if not known:
         raise UsageError(f"no {what} has {wish.where} and a cost in {wish.unit} on the {wish.board}; run  eitskin tradeoff run")

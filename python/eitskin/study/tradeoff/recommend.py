@@ -21,7 +21,7 @@ class Recommendation:
     @property
     def frame_us(self) -> float | None:
         """From frame to frame: the longer of measuring and solving, which go on at the same time."""
-        solve = self.point.typical_us(self.wish.board)
+        solve = self.point.cost("us", self.wish.board, self.wish.where)
         return None if solve is None else max(solve, self.point.costs["acquisition_us"])
 
     @property
@@ -48,10 +48,11 @@ class Recommendation:
             "score": point.score(wish.where),
             "board": wish.board,
             "budget": None if wish.budget is None else {"value": wish.budget.value, "unit": wish.budget.unit},
-            "most": point.cost(wish.unit, wish.board, wish.where),
+            "cost": point.cost(wish.unit, wish.board, wish.where, wish.worst),
+            "worst": wish.worst,
             "unit": wish.unit,
-            "solve_us": point.typical_us(wish.board),
-            "solve_most_us": point.cost("us", wish.board, wish.where),
+            "solve_us": point.cost("us", wish.board, wish.where),
+            "solve_most_us": point.cost("us", wish.board, wish.where, True),
             "acquisition_us": point.costs["acquisition_us"],
             "frame_us": self.frame_us,
             "instructions": point.instructions,
@@ -66,7 +67,7 @@ class Recommendation:
         score = point.score(wish.where)
         assert score is not None
         image, discs = score["image"], score["discs"]
-        solve, most = point.typical_us(wish.board), point.cost("us", wish.board, wish.where)
+        solve, most = (point.cost("us", wish.board, wish.where, worst) for worst in (False, True))
         acquisition = point.costs["acquisition_us"]
         lines = [
             f"{point.name}: image MIoU {image['mean']:.3f} ({image['low']:.3f} to {image['high']:.3f}; worst tenth "

@@ -109,21 +109,22 @@ def run(configurations: Sequence[Configuration], settings: RunSettings, folder: 
         GeometryError, MissingExtraError: from meshing.
         VerificationError: the emulated core disagrees with this host's.
     """
+    skin, protocol = paper_skin(), adjacent(16)
+    shop = ModelShop(skin, protocol)
+    for one in configurations:  # what cannot be is refused before anything is written
+        shop.refuse(one)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"{folder}: cannot make this folder ({error.strerror}); name another with -o") from None
-    skin, protocol = paper_skin(), adjacent(16)
     desk = _Desk(
         settings,
         Store(folder / RESULTS),
         Workshop(skin, protocol, settings.seed, settings.simulated_elements, folder / "frames"),
-        ModelShop(skin, protocol),
+        shop,
         _world(settings, skin, protocol),
         progress,
     )
-    for one in configurations:  # what cannot be built is refused before the work
-        desk.built(one)
     for name in (TRAIN, HEADLINE, *settings.sets):
         desk.session(name)
     trained = {one.name: _train(desk, one) for one in progress(configurations, "choosing thresholds")}
