@@ -38,6 +38,7 @@ def add_parser(subparsers: Any) -> None:
     run.add_argument("--counted", type=int, default=24, metavar="N", help="scenes emulated to count instructions; 0: none")
     run.add_argument("--rounds", type=int, default=25, metavar="N", help="in which times are taken on this host; 0: none")
     run.add_argument("--front", type=Path, metavar="FRONT.json", help="also write what the package ships of the results")
+    run.add_argument("--page", type=Path, metavar="PAGE.md", help="also put tables and pictures into this page")
     run.add_argument("--no-pictures", action="store_true", help="tables only")
     run.add_argument("--json", action="store_true", help="print the results as JSON")
     run.set_defaults(run=run_run)
@@ -73,7 +74,7 @@ def run_run(options: argparse.Namespace) -> int:
     from eitskin.study.tradeoff.run import RunSettings, run
     from eitskin.study.tradeoff.table import to_csv, to_json, to_text
 
-    refuse_unwritable(options.front)
+    refuse_unwritable(options.front, options.page)
     if options.output.exists() and not options.output.is_dir():
         raise UsageError(f"-o {options.output}: this is a file; name a folder")
     configurations = default_set() if options.set is None else load_set(options.set)
@@ -93,6 +94,11 @@ def run_run(options: argparse.Namespace) -> int:
         from eitskin.view.tradeoff_pictures import draw_all
 
         draw_all(options.output, front)
+    if options.page is not None:
+        from eitskin.study.tradeoff.page import fill_page
+        from eitskin.view.tradeoff_pictures import PICTURES
+
+        fill_page(options.page, for_package(front), options.output, PICTURES)
     print(to_json(front) if options.json else to_text(front, Where()))
     return 0
 

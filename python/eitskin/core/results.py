@@ -161,7 +161,7 @@ class Info:
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:
     """How a solve ended and what it and the touches cost, in a line; a time of 0 is not known."""
-    text = f"{iterations} iterations ({stop}), gap {gap_rel:.1e}"
+    text = f"{iterations} iterations ({stop})" + (f", gap {gap_rel:.1e}" if iterations else "")
     text += f", {macs / 1e6:.2f} MMAC" if macs else ""
     return text + (f", {time_us / 1000:.2f} ms" if time_us else "")
 

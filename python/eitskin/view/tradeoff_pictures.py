@@ -14,17 +14,21 @@ from eitskin.view.pictures import INK, STYLE, load_matplotlib, save_png
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PICTURES = ("front.png", "knobs.png", "samples.png", "scenes.png", "objective.png")
+PICTURES = ("front.png", "knobs.png", "noise.png", "samples.png", "scenes.png", "objective.png")
 KNOBS = {
     "iterations": "iterations at most",
     "rank": "rank of the reduced Jacobian",
     "pixels": "pixels along the skin",
     "storage": "storage of the Jacobian",
     "lambda_rel": "lambda / lambda_max, at least",
+    "floor": "mu, the floor of the whitening",
     "touch_sweeps": "sweeps of the off-grid fit",
+    "solver": "solver",
 }
+WORDS = ("storage", "touch_sweeps", "solver")
+NOISY_KNOBS = ("rank", "floor", "lambda_rel")
 GREY, IMAGE, DISCS = "#9a9a9a", "#1f5fa8", "#b35c00"
-LOGARITHMIC = ("iterations", "lambda_rel")
+LOGARITHMIC = ("iterations", "lambda_rel", "floor")
 
 
 def draw_all(folder: Path, front: Front) -> None:
@@ -34,7 +38,7 @@ def draw_all(folder: Path, front: Front) -> None:
         MissingExtraError: matplotlib is not installed.
         FileError: one cannot be written.
     """
-    for name, draw in zip(PICTURES, (draw_front, draw_knobs, draw_samples, draw_scenes, draw_objective), strict=True):
+    for name, draw in zip(PICTURES, (draw_front, draw_knobs, draw_noise, draw_samples, draw_scenes, draw_objective), strict=True):
         draw(folder / name, front)
 
 
@@ -125,8 +129,8 @@ def _plain_ticks(axis: Any) -> None:
 
 
 def families(points: Sequence[Point], knob: str, free: tuple[str, ...] = ()) -> list[list[Point]]:
-    """Points that differ in ``knob`` alone (and their names, and the fields in ``free``), three values or more each; the largest
-    family first."""
+    """Points that differ in ``knob`` alone (and their names, and the fields in ``free``), three values or more each (of solvers
+    two); the largest family first."""
     groups: dict[tuple[Any, ...], list[Point]] = {}
     for one in points:
         fields = one.configuration.as_dict()
@@ -134,7 +138,7 @@ def families(points: Sequence[Point], knob: str, free: tuple[str, ...] = ()) -> 
     kept = [
         sorted(group, key=lambda p: _order(getattr(p.configuration, knob)))
         for group in groups.values()
-        if len({getattr(one.configuration, knob) for one in group}) >= 3
+        if len({getattr(one.configuration, knob) for one in group}) >= (2 if knob == "solver" else 3)
     ]
     return sorted(kept, key=len, reverse=True)
 
@@ -148,8 +152,8 @@ def draw_knobs(path: Path, front: Front) -> None:
     """Accuracy against each knob, all else held: images and discs with the 95 % interval of their means."""
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(11.0, 6.4), layout="constrained")
-        for axes, (knob, label) in zip(figure.subplots(2, 3).ravel(), KNOBS.items(), strict=True):
+        figure = matplotlib.figure.Figure(figsize=(14.0, 6.4), layout="constrained")
+        for axes, (knob, label) in zip(figure.subplots(2, 4).ravel(), KNOBS.items(), strict=True):
             _draw_knob(axes, families(front.points, knob)[:2], knob)
             axes.set_xlabel(label)
             axes.set_ylabel("mean MIoU")
@@ -162,7 +166,7 @@ def draw_knobs(path: Path, front: Front) -> None:
 def _draw_knob(axes: Axes, groups: Sequence[Sequence[Point]], knob: str) -> None:
     for number, group in enumerate(groups):
         values = [getattr(one.configuration, knob) for one in group]
-        places = list(range(len(values))) if knob in ("storage", "touch_sweeps") else values
+        places = list(range(len(values))) if knob in WORDS else values
         base = _base_name(group)
         for judged, colour in (("image", IMAGE), ("discs", DISCS)):
             scores = [one.score(Where()) for one in group]
@@ -174,20 +178,52 @@ def _draw_knob(axes: Axes, groups: Sequence[Sequence[Point]], knob: str) -> None
             style = ("o-", "s--")[number]
             axes.errorbar(places, means, yerr=spread, fmt=style, color=colour, markersize=4, linewidth=1.1, elinewidth=0.6,
                           capsize=1.5, label=f"{judged}, {base}")  # fmt: skip
-        if knob in ("storage", "touch_sweeps"):
+        if knob in WORDS:
             axes.set_xticks(places, [str(value) for value in values])
+            axes.margins(x=0.15)
     if not groups:
         axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", color=GREY)
         return
     if knob in LOGARITHMIC:
         axes.set_xscale("log")
         _plain_ticks(axes.xaxis)
+    if knob in ("storage", "solver"):  # level lines leave no room
+        low, high = axes.get_ylim()
+        axes.set_ylim(low - 0.4 * (high - low), high)
     axes.legend(frameon=False, fontsize=7)
 
 
 def _base_name(group: Sequence[Point]) -> str:
     """The name of a family's member that most of the others are named after."""
     return max((one.name for one in group), key=lambda name: (sum(one.name.startswith(name) for one in group), -len(name)))
+
+
+def draw_noise(path: Path, front: Front) -> None:
+    """The knobs that noise turns: images and discs at each SNR against rank, floor and lambda."""
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(12.0, 4.4), layout="constrained")
+        columns = figure.subplots(1, len(NOISY_KNOBS), sharey=True)
+        for axes, knob in zip(columns, NOISY_KNOBS, strict=True):
+            group = next(iter(families(front.points, knob)), [])
+            snrs = sorted({float(snr) for one in group for snr in one.scores.get("random", {})})
+            for number, snr_db in enumerate(snrs):
+                for judged, style in (("image", "o-"), ("discs", "s--")):
+                    ys = [one.accuracy(Where(snr_db=snr_db, judged=judged)) for one in group]
+                    axes.plot([getattr(one.configuration, knob) for one in group], ys, style, color=f"C{number}", markersize=4,
+                              linewidth=1.1, label=f"{judged}, {snr_db:g} dB")  # fmt: skip
+            if knob in LOGARITHMIC:
+                axes.set_xscale("log")
+                _plain_ticks(axes.xaxis)
+            if group:
+                axes.set_title(f"around {_base_name(group)!r}", fontsize=9)
+            axes.set_xlabel(KNOBS[knob])
+            axes.grid(linewidth=0.4, alpha=0.5)
+        columns[0].set_ylabel("mean MIoU")
+        if columns[0].lines:
+            columns[0].legend(frameon=False, fontsize=7)
+        figure.suptitle("What noise asks for: fewer directions, a higher floor; t is that of training scenes at 60 dB")
+        save_png(figure, path)
 
 
 def draw_samples(path: Path, front: Front) -> None:

@@ -32,7 +32,7 @@ def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
     out = done("tradeoff", "run", "-o", tmp_path / "out", *TINY_RUN, "--front", tmp_path / "small.json")
     assert "standard rank 32" in out and "* " in out
     found = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
-    pictures = {"front.png", "knobs.png", "samples.png", "scenes.png", "objective.png"}
+    pictures = {"front.png", "knobs.png", "noise.png", "samples.png", "scenes.png", "objective.png"}
     assert found == {"results.jsonl", "front.json", "table.csv"} | pictures
     assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     assert len(load_front(tmp_path / "out" / "front.json").points) == 3

@@ -28,7 +28,9 @@ from eitskin.study.tradeoff.front import (
     pareto,
     read_budget,
 )
+from eitskin.study.tradeoff.page import PICTURES, TABLES, fill_page
 from eitskin.study.tradeoff.table import best_points, to_json
+from eitskin.view.tradeoff_pictures import PICTURES as DRAWN
 
 HERE = Where()
 
@@ -209,3 +211,19 @@ def test_what_ships_is_smaller_and_reads_the_same() -> None:
     again = front_from(json.loads(to_json(for_package(front))), "file")
     assert [one.name for one in again.points] == [one.name for one in POINTS]
     assert choose(again.points[:-1], wish("10ms")).name == "c"
+
+
+def test_the_page_shows_the_shipped_results(tmp_path: Path) -> None:
+    page = Path(__file__).resolve().parents[3] / "docs" / "tradeoff.md"
+    text, front = page.read_text(encoding="utf-8"), load_front()
+    for name, make in TABLES.items():
+        marked = f"<!-- {name} -->\n{make(front)}\n<!-- end {name} -->"
+        assert marked in text, f"the table {name!r} is old: run  eitskin tradeoff run  as the page says"
+    assert all((page.parent / PICTURES / name).is_file() for name in DRAWN)
+    copy = tmp_path / "page.md"
+    copy.write_text(text.replace("| fine |", "| dull |"))
+    fill_page(copy, front, tmp_path, ())
+    assert copy.read_text() == text
+    copy.write_text("no marks")
+    with pytest.raises(ConfigError, match="conditions"):
+        fill_page(copy, front, tmp_path, ())

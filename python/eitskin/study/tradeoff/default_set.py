@@ -32,7 +32,9 @@ SCALE = (
     Configuration("keen", pixels=28, lambda_rel=0.005, iterations=90),
     FINE,
     Configuration("finer", pixels=36, floor=0.03, lambda_rel=0.005, iterations=120),
-    Configuration("best", rank=80, pixels=40, floor=0.03, lambda_rel=0.003, iterations=120),
+    Configuration("best", rank=80, pixels=40, floor=0.05, lambda_rel=0.003, iterations=150),
+    Configuration("calm", floor=0.1, lambda_rel=0.01, iterations=120),
+    Configuration("calm light", rank=48, pixels=24, floor=0.1),
 )
 
 KNOBS = {
@@ -64,7 +66,7 @@ KNOBS = {
         Configuration("warm 10", warm_start=True, iterations=10),
         Configuration("warm 20", warm_start=True, iterations=20),
     ),
-    "floor": _turned(FINE, "floor", (0.003, 0.03), "mu {}"),
+    "floor": (*_turned(STANDARD, "floor", (0.003, 0.03, 0.1, 0.3), "mu {}"), *_turned(FINE, "floor", (0.003, 0.03), "mu {}")),
     "column_power": _turned(FINE, "column_power", (0.25, 0.75), "p {}"),
 }
 
