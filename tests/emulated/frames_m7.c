@@ -1,6 +1,7 @@
-/* Reads "model.eitm" and "frames.f32" (quiet frames, then frames; counts on "plan.txt") from the host's folder, and "options.txt"
- * if it is there (a name and a value a line, which replace the model's own), runs them as a board would, and prints for each frame: why the solve stopped, iterations, MACs, instructions of the solve and of the touches,
- * the image's CRC-32, and the touches' numbers as hexadecimal bits. Floats are printed as bits: there is nothing to round. */
+/* Reads "model.eitm" and "frames.f32" (quiet frames, then frames; counts on "plan.txt") from the host's folder, runs them as a
+ * board would, and prints for each frame: why the solve stopped, iterations, MACs, instructions of the solve and of the touches,
+ * the image's CRC-32, and the touches' numbers as hexadecimal bits. Floats are printed as bits: there is nothing to round.
+ * Options in "options.txt", a name and a value a line, replace the model's own; the file may be absent. */
 #include "eitskin/eitskin.h"
 
 #include <stdio.h>

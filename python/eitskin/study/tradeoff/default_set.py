@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
-from eitskin.core.results import SOLVERS
+from eitskin.core.results import SOLVERS, Options
 from eitskin.study.tradeoff.configuration import Configuration, checked_set
 
 STANDARD = Configuration("standard")
 FINE = Configuration("fine", lambda_rel=0.005, iterations=90)
+HAS_LIMIT = any(one.name == "mac_limit" for one in fields(Options))
+MAC_LIMITS = (600_000, 900_000, 1_200_000, 1_800_000)
 OTHER_SOLVERS = tuple(name for name in SOLVERS if name != STANDARD.solver)
 
 
@@ -61,6 +63,7 @@ KNOBS = {
         Configuration("standard gap 0.01", gap=1e-2, iterations=1000),
         Configuration("standard gap 0.003", gap=3e-3, iterations=1000),
     ),
+    "mac_limit": _turned(FINE, "mac_limit", MAC_LIMITS, "limit {}") if HAS_LIMIT else (),
     "warm_start": (
         Configuration("warm 5", warm_start=True, iterations=5),
         Configuration("warm 10", warm_start=True, iterations=10),
