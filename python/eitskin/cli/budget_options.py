@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from eitskin.study.tradeoff.configuration import Configuration
     from eitskin.study.tradeoff.front import Point
 
-EXCLUDED = ("solver", "iterations", "gap")
+EXCLUDED = ("solver", "iterations", "gap", "mac_limit", "macs")
 
 
 def add_wish(parser: Any) -> None:
@@ -32,7 +32,7 @@ def wished(options: argparse.Namespace) -> bool:
         return False
     for name in EXCLUDED:
         if getattr(options, name, None) is not None:
-            raise UsageError(f"--{name} is chosen by --budget and --accuracy; leave one or the other out")
+            raise UsageError(f"--{name.replace('_', '-')} is chosen by --budget and --accuracy; leave one or the other out")
     return True
 
 

@@ -22,7 +22,9 @@ from eitskin.study.tradeoff.scene_sets import Measured
 
 TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm", "cmake", "ninja")
 PROGRAM = "tests/emulated/frames_m7.c"
-LINE = re.compile(r"frame (\d+) status (-?\d+) stop (\d+) iterations (\d+) macs (\d+) solve (\d+) touch (\d+) ")
+LINE = re.compile(
+    r"frame (\d+) status (-?\d+) stop (\d+) iterations (\d+) macs (\d+) (?:touchmacs (\d+) )?solve (\d+) touch (\d+) "
+)
 TIMEOUT_S = 600
 
 
@@ -122,4 +124,4 @@ def _run(emulator: Emulator, one: Configuration, built: Built, quiet_v: Any, fra
     if done.returncode or len(rows) != len(frames_v) or any(row[1] != "0" for row in rows):
         last = (done.stdout + done.stderr).strip().splitlines()[-1:]
         raise VerificationError(f"configuration {one.name!r}: the emulated core gave no result: {' '.join(last) or 'no output'}")
-    return [(int(row[3]), int(row[4]), int(row[5]), int(row[6])) for row in rows]
+    return [(int(row[3]), int(row[4]) + int(row[5] or 0), int(row[6]), int(row[7])) for row in rows]
