@@ -1,13 +1,14 @@
 /* Reads "model.eitm" and "frames.f32" (quiet frames, then frames; counts on "plan.txt") from the host's folder, runs them as a
  * board would, and prints for each frame: why the solve stopped, iterations, MACs and instructions of the solve and of the
  * touches, the stack that they took, the image's CRC-32, and the touches' numbers as hexadecimal bits. Floats are printed as
- * bits: there is nothing to round. */
+ * bits: there is nothing to round. Options in "options.txt", a name and a value a line, replace the model's own; the file may
+ * be absent. */
 #include "eitskin/eitskin.h"
 
 #include <stdio.h>
 #include <string.h>
 
-enum { MOST_MODEL = 700 * 1024, MOST_WORKSPACE = 512 * 1024, MOST_ROWS = 4096 };
+enum { MOST_MODEL = 2048 * 1024, MOST_WORKSPACE = 1024 * 1024, MOST_ROWS = 4096 };
 
 static _Alignas(16) uint8_t model_bytes[MOST_MODEL];
 static _Alignas(16) uint8_t workspace[MOST_WORKSPACE];
@@ -66,6 +67,32 @@ static int fail(const char *what, eits_status status)
     return 1;
 }
 
+/* Options by name; a name that is none of these is refused. */
+static int read_options(eits_options *options)
+{
+    char name[32];
+    float value;
+    FILE *file = fopen("options.txt", "r");
+    int known = 1;
+    while (known && file != NULL && fscanf(file, "%31s %f", name, &value) == 2) {
+        if (strcmp(name, "iterations") == 0)
+            options->iterations = (uint32_t)value;
+        else if (strcmp(name, "touch_sweeps") == 0)
+            options->touch_sweeps = (uint32_t)value;
+        else if (strcmp(name, "gap_rel") == 0)
+            options->gap_rel = value;
+        else if (strcmp(name, "lambda_rel") == 0)
+            options->lambda_rel = value;
+        else if (strcmp(name, "mac_limit") == 0)
+            options->mac_limit = (uint32_t)value;
+        else
+            known = 0;
+    }
+    if (file != NULL)
+        fclose(file);
+    return known;
+}
+
 int main(void)
 {
     eits_model model;
@@ -89,7 +116,7 @@ int main(void)
     options.warm_start = warm;
     options.sign = (eits_sign)sign;
     options.solver = (eits_solver)solver;
-    status = eits_set_options(&ctx, &options);
+    status = read_options(&options) ? eits_set_options(&ctx, &options) : EITS_E_ARGUMENT;
     if (status == EITS_OK)
         status = eits_use_portable_kernels(&ctx, (int)portable);
     if (status == EITS_OK)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.budget_options import add_wish, wished
 from eitskin.cli.device_options import add_solver, check_solver
 from eitskin.config import nearest
 from eitskin.errors import ConfigError, EitskinError, FrameError, MissingExtraError, UsageError
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from eitskin.frames.frames import Frames
     from eitskin.solve.reconstructor import Reconstructor
     from eitskin.study.score import FrameScore
+    from eitskin.study.tradeoff.front import Point
 
 
 def add_parser(subparsers: Any) -> None:
@@ -34,6 +37,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--only", metavar="NAME,...", help="frames with these names only")
     add_solver(parser)
     parser.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
+    add_wish(parser)
     parser.add_argument("--warm", action="store_true", help="start each frame from the last one's result")
     parser.add_argument(
         "--threads", type=int, default=1, metavar="N", help="frames side by side, the same results (default: 1; not with --warm)"
@@ -53,6 +57,8 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
 
     _check_threads(options)
+    if wished(options) and options.engine != "c":
+        raise UsageError(f"--budget and --accuracy are of the C core in float32; leave  --engine {options.engine}  out")
     refuse_unwritable(options.output, options.picture)
     if options.picture is not None:
         from eitskin.view.pictures import load_matplotlib
@@ -68,6 +74,7 @@ def run(options: argparse.Namespace) -> int:
     except EitskinError as error:
         raise type(error)(f"{options.frames} and {name}: {error}") from None
     _apply(options, reconstructor)
+    point = _point(options, reconstructor)
     try:
         baseline = reconstructor.tare(frames.reference_voltage_v)
     except FrameError as error:
@@ -83,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
         results, refused = _reconstruct_threaded(reconstructor, blob, frames, chosen, options.threads)
     else:
         results, refused = _reconstruct_all(reconstructor, frames, chosen, options.warm)
-    scores = _scores(reconstructor, frames, results, options.sign)
+    scores = _scores(reconstructor, frames, results, options.sign, None if point is None else point.threshold)
     if options.output is not None and results:
         from eitskin.frames.results_file import save_results
 
@@ -93,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
 
         draw_results(options.picture, model, frames, results, scores)
     if options.json:
-        print(json.dumps(_as_json(frames, results, scores, refused, name, options.engine), indent=2))
+        print(json.dumps(_as_json(frames, results, scores, refused, name, options.engine, point), indent=2))
     else:
         _print(frames, results, scores, refused)
     for number, reason in refused.items():
@@ -119,6 +126,18 @@ def _apply(options: argparse.Namespace, reconstructor: Reconstructor) -> None:
             raise UsageError(f"--saturation-v {options.saturation_v:g} must be above 0")
         changes["saturation_v"] = options.saturation_v
     reconstructor.with_options(**changes)
+
+
+def _point(options: argparse.Namespace, reconstructor: Reconstructor) -> Point | None:
+    """The measured point that ``--budget`` and ``--accuracy`` choose, its settings applied and said; None without them."""
+    if not wished(options):
+        return None
+    from eitskin.cli.budget_options import chosen_point, settings_text
+
+    point = chosen_point(options, reconstructor.model, reconstructor.options, "host")
+    reconstructor.with_options(**point.configuration.solver_settings)
+    print(f"eitskin: {settings_text(point, 'host')}", file=sys.stderr)
+    return point
 
 
 def _chosen(frames: Frames, only: str | None) -> list[int]:
@@ -179,14 +198,17 @@ def _reconstruct_threaded(
 
 
 def _scores(
-    reconstructor: Reconstructor, frames: Frames, results: dict[int, Reconstruction], sign: str
+    reconstructor: Reconstructor, frames: Frames, results: dict[int, Reconstruction], sign: str, threshold: float | None
 ) -> dict[int, FrameScore]:
     if frames.touch_frame is None and frames.truth_mask is None:
         return {}
     from eitskin.study.score import scorer_for
 
+    model = reconstructor.model
+    if threshold is not None:
+        model = replace(model, defaults=replace(model.defaults, mask_threshold=threshold))
     try:
-        scorer = scorer_for(reconstructor.model)
+        scorer = scorer_for(model)
         scored = {number: scorer.score(frames, number, result, sign) for number, result in results.items()}
     except (ConfigError, MissingExtraError) as error:
         print(f"eitskin: warning: not held against the truth in the frames: {error}", file=sys.stderr)
@@ -199,18 +221,19 @@ def _print(
 ) -> None:
     import numpy as np
 
-    print("frame       touch    x mm     y mm  radius mm  strength S/m mm2   error mm")
+    print("frame       touch    x mm     y mm  radius mm  strength S/m mm2   error mm  solve")
     for number, result in results.items():
         score = scores.get(number)
         errors = {} if score is None else errors_by_touch(score)
         label = frames.frame_name[number][:11]
         if not result.touches:
-            print(f"{label:11} none ({'no change above the noise' if result.info.stop == 'gate' else result.info.stop})")
+            why = "no change above the noise" if result.info.stop == "gate" else result.info.stop
+            print(f"{label:11} none ({why}); {_solve(result)}")
         for k, touch in enumerate(result.touches):
-            error = f"{errors[k]:10.2f}" if k in errors else ("     false" if score is not None else "")
+            error = f"{errors[k]:10.2f}" if k in errors else ("     false" if score is not None else 10 * " ")
             print(
                 f"{label if k == 0 else '':11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f} {touch.radius_mm:9.2f} "
-                f"{touch.strength_s_per_m_mm2:16.3f}  {error}"
+                f"{touch.strength_s_per_m_mm2:16.3f}  {error}{f'  {_solve(result)}' if k == 0 else ''}".rstrip()
             )
     macs = [result.info.macs + result.info.touch_macs for result in results.values()]
     cost = f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""
@@ -223,6 +246,13 @@ def _print(
             f"worst {facts['position_worst_mm']:.2f} mm; "
             f"MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
         )
+
+
+def _solve(result: Reconstruction) -> str:
+    from eitskin.core.results import solve_text
+
+    info = result.info
+    return solve_text(info.iterations, info.stop, info.gap_rel, info.macs + info.touch_macs, info.solve_us + info.touch_us)
 
 
 def errors_by_touch(score: FrameScore) -> dict[int, float]:
@@ -255,6 +285,7 @@ def _as_json(
     refused: dict[int, str],
     model: str,
     engine: str,
+    point: Point | None,
 ) -> dict[str, Any]:
     from dataclasses import asdict
 
@@ -273,6 +304,8 @@ def _as_json(
             entry["position_errors_mm"] = list(score.matching.distances_mm)
         listed.append(entry)
     whole: dict[str, Any] = {"model": model, "engine": engine, "frames": listed}
+    if point is not None:
+        whole["settings"] = point.configuration.as_dict() | {"mask_threshold": point.threshold}
     if scores:
         whole["summary"] = {key: None if value != value else value for key, value in summary(scores).items()}
     return whole

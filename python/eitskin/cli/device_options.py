@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.budget_options import add_wish, wished
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     solver = parser.add_argument_group("solver")
     add_solver(solver)
     solver.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
+    add_wish(solver)
     solver.add_argument("--sign", choices=("increase", "decrease", "both"), help="which changes to look for (default: increase)")
     start = solver.add_mutually_exclusive_group()
     start.add_argument("--warm", action="store_true", help="begin each frame from the last one's result")
@@ -205,6 +207,10 @@ def check_scan(options: argparse.Namespace) -> None:
 
     read_scan(options)
     read_solver(options)
+    if wished(options):
+        from eitskin.cli.cmd_tradeoff import read_wish
+
+        read_wish(options, "f767")
     if options.tare is not None:
         check_tare_frames(options.tare)
 
@@ -251,7 +257,8 @@ def prepare(
     if device.transport.replays:
         _refuse_settings(options, device.transport.name)
         return None
-    solver = set_up(device, read_scan(options), read_solver(options), known)
+    settings = _wished_solver(options, device, known) if wished(options) else read_solver(options)
+    solver = set_up(device, read_scan(options), settings, known)
     recorder = None if record is None else RunRecorder(record, device, solver, overwrite=True)
     try:
         simulated = device.transport.synchronous
@@ -274,9 +281,33 @@ def prepare(
     return recorder
 
 
+def _wished_solver(options: argparse.Namespace, device: Device, known: KnownModel | None) -> SolverSettings:
+    """The settings of the measured point that ``--budget`` and ``--accuracy`` choose for the board's model.
+
+    Raises:
+        UsageError: no point does what is asked for.
+        DeviceError: the board's model is not known here.
+    """
+    from dataclasses import replace
+
+    from eitskin.cli.budget_options import chosen_point, settings_text
+    from eitskin.device.known_model import board_options, need_model
+    from eitskin.device.settings import SolverSettings
+    from eitskin.study.tradeoff.front import board_takes
+
+    if known is None:
+        known = need_model(device.board, options.model, device.transport.name, "a budget")
+    named = read_solver(options)
+    point = chosen_point(options, known.model, named.applied(board_options(known.model)), "f767", board_takes())
+    say(settings_text(point, "f767"))
+    kept = {name: value for name, value in point.configuration.solver_settings.items() if name in board_takes()}
+    return replace(SolverSettings(**kept), sign=named.sign, warm_start=named.warm_start)
+
+
 def _refuse_settings(options: argparse.Namespace, name: str) -> None:
     """A recording takes no settings."""
-    settings = {**read_scan(options).named, **read_solver(options).named}
+    settings: dict[str, Any] = {**read_scan(options).named, **read_solver(options).named}
+    settings |= {name: True for name in ("budget", "accuracy") if getattr(options, name) is not None}
     if settings or options.tare is not None:
         what = next(iter(settings), "tare").replace("_", "-")
         raise UsageError(f"{name} is a recording, {what} cannot be set any more; leave the options of scan, solver and tare out")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable
 from dataclasses import asdict
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
@@ -176,13 +177,17 @@ class CoreEngine:
         """
         if frame.shape != (self.n_rows,):
             raise FrameError(f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows")
+        began_ns = perf_counter_ns()
         self._check_frame(self.solve_frame(frame), "frame")
+        solved_ns = found_ns = perf_counter_ns()
         found: tuple[Touch, ...] = ()
         if touches:
             self._lib.eits_find_touches(self._context, self._touches, len(self._touches), self._touch_count)
+            found_ns = perf_counter_ns()
             found = tuple(_touch(self._touches[k]) for k in range(self._touch_count[0]))
         coefficients = self._view(self._context.x, self.n_pixels).copy()
-        return Reconstruction(self._image.copy(), coefficients, found, _info(self._info))
+        info = _info(self._info, solved_ns - began_ns, found_ns - solved_ns)
+        return Reconstruction(self._image.copy(), coefficients, found, info)
 
     def follow(self, frames: npt.NDArray[np.floating[Any]]) -> None:
         """Be as after ``frames`` (k, m) volts, the last that can be used, so that the next frame costs what it costs there: the
@@ -258,10 +263,11 @@ def _plain(value: Any) -> Any:
     return int(value) if isinstance(value, bool) else value
 
 
-def _info(i: Any) -> Info:
+def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
     return Info(
         i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs, i.touch_macs,
         getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual, i.data_norm,
+        solve_us=solve_ns / 1000, touch_us=touch_ns / 1000,
     )  # fmt: skip
 
 

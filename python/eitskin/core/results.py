@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -137,7 +137,8 @@ class Touch:
 
 @dataclass(frozen=True)
 class Info:
-    """What a frame cost and how its solve ended (eits_info in csrc/include/eitskin/context.h)."""
+    """What a frame cost and how its solve ended (eits_info in csrc/include/eitskin/context.h). ``solve_us`` and ``touch_us`` are
+    this host's, by its clock, the frame stage with the solve; two runs that differ in nothing else are equal."""
 
     iterations: int
     stop: str
@@ -154,10 +155,19 @@ class Info:
     gap_rel: float
     residual: float
     data_norm: float
+    solve_us: float = field(default=0.0, compare=False)
+    touch_us: float = field(default=0.0, compare=False)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: the same names, without the underscore of ``lambda_``."""
         return {key.rstrip("_"): value for key, value in asdict(self).items()}
+
+
+def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:
+    """How a solve ended and what it and the touches cost, in a line; a time of 0 is not known."""
+    text = f"{iterations} iterations ({stop})" + (f", gap {gap_rel:.1e}" if iterations else "")
+    text += f", {macs / 1e6:.2f} MMAC" if macs else ""
+    return text + (f", {time_us / 1000:.2f} ms" if time_us else "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,8 +183,8 @@ def simulate(
     span_v = how.adc_headroom * float(np.abs(quiet).max())
     lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
     converter = (noise_v, lsb_v, span_v, own_seed)
-    quiet_v, quiet_clipped = _measure(np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}")
-    frames_v, clipped = _measure(exact, *converter, f"frame {role}")
+    quiet_v, quiet_clipped = measure(np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}")
+    frames_v, clipped = measure(exact, *converter, f"frame {role}")
     return Simulated(
         skin=skin,
         protocol=protocol,
@@ -204,10 +204,16 @@ def simulate(
     )
 
 
-def _measure(
+def measure(
     exact_v: FloatArray, noise_v: float, lsb_v: float, span_v: float, seed: int, name: str
 ) -> tuple[FloatArray, int]:
-    """Noise, then the converter: measured frames and how many values clipped. Each frame has its own stream."""
+    """Noise, then the converter: measured frames and how many values clipped. Each frame has its own stream.
+
+    Args:
+        exact_v: (k, m) V.
+        noise_v, lsb_v, span_v: sigma of the noise, a step of the converter (0: none), half its range; V.
+        seed, name: of the streams.
+    """
     rows = [stream(seed, f"noise {name}", k).standard_normal(exact_v.shape[1]) for k in range(len(exact_v))]
     noisy = exact_v + noise_v * np.array(rows)
     if not lsb_v:

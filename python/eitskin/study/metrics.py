@@ -76,8 +76,9 @@ def disc_mask(points_mm: FloatArray, centres_mm: npt.ArrayLike, radii_mm: npt.Ar
     centres = np.asarray(centres_mm, dtype=np.float64).reshape(-1, 2)
     radii = np.broadcast_to(np.asarray(radii_mm, dtype=np.float64), (len(centres),))
     inside = np.zeros(len(points_mm), dtype=np.bool_)
-    for centre, radius in zip(centres, radii, strict=True):
-        inside |= ((points_mm - centre) ** 2).sum(axis=1) <= radius**2
+    along_x, along_y = np.ascontiguousarray(points_mm.T)
+    for (x, y), radius in zip(centres, radii, strict=True):
+        inside |= (along_x - x) ** 2 + (along_y - y) ** 2 <= radius**2
     return inside
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.results import solve_text
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import quality_text
@@ -91,10 +92,18 @@ def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
 def line(seen: Seen) -> str:
     """A frame in a line."""
     frame = seen.frame
-    parts = [part for part in (_touches_text(seen), _image_text(seen), _raw_text(frame)) if part]
+    parts = [part for part in (_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame)) if part]
     if frame.refused:
         parts = [f"refused: {frame.refused}", *([_raw_text(frame)] if frame.raw is not None else [])]
     return f"{frame.number:7d} {frame.time_us / 1e6:9.3f} s  " + "; ".join(parts)
+
+
+def _solve_text(frame: LiveFrame) -> str:
+    solved = frame.solved
+    if solved is None:
+        return ""
+    macs, time_us = solved.macs + solved.touch_macs, solved.solve_us + solved.touch_us
+    return solve_text(solved.iterations, solved.stop, solved.gap_rel, macs, time_us)
 
 
 def _error(seen: Seen, number: int) -> str:

@@ -152,7 +152,7 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert main(["stream", "--device", device, "--frames", "3"]) == 0
         out, err = capsys.readouterr()
         assert "leave the skin untouched: taking the reference from 16 frames" in err and "touch it" in err
-        assert [line.split(maxsplit=3)[3] for line in out.splitlines()[:3]] == ["no touch"] * 3
+        assert all(line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (gate)") for line in out.splitlines()[:3])
         assert main(["stream", "--device", device, "--frames", "3"]) == 0  # it has its reference already
         out, err = capsys.readouterr()
         assert err == "" and out.startswith("     ")

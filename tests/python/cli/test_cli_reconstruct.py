@@ -25,7 +25,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence"}
 INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs", "lambda", "lambda_max",
-    "lambda_noise", "gap", "gap_rel", "residual", "data_norm",
+    "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",
 }  # fmt: skip
 SUMMARY = {
     "frames", "found", "true", "false", "position_median_mm", "position_worst_mm", "miou_image", "miou_touches",
@@ -39,6 +39,7 @@ def test_json(engine: str, done: Done, frames_file: Path) -> None:
     for number, frame in enumerate(facts["frames"]):
         assert frame["frame"] == number and frame["name"] == f"test-s3-{number}"
         assert set(frame["info"]) == INFO and frame["info"]["iterations"] == 60
+        assert frame["info"]["solve_us"] > 0
         assert all(set(touch) == TOUCH for touch in frame["touches"])
         assert len(frame["touches"]) == frame["info"]["touches"]
         assert 0.4 < frame["miou_image"] < 1 and 0.4 < frame["miou_touches"] < 1
@@ -102,7 +103,8 @@ def test_options_reach_the_solver(done: Done, frames_file: Path, changed_frames:
 def test_for_people(done: Done, frames_file: Path) -> None:
     text = done("reconstruct", frames_file)
     lines = text.splitlines()
-    assert lines[0].split() == ["frame", "touch", "x", "mm", "y", "mm", "radius", "mm", "strength", "S/m", "mm2", "error", "mm"]
+    assert " ".join(lines[0].split()) == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
+    assert text.count("60 iterations (iterations), gap ") == 20
     assert "20 frames, 0 refused; median " in text and " of " in lines[-1] and lines[-1].startswith("against the truth of 20")
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 

@@ -43,7 +43,8 @@ def test_touches_are_paired_with_the_true_ones() -> None:
     seen = look.see(touches((30.0, -24.0), (-40.0, 13.0), (0.0, 0.0)))
     assert seen.errors_mm == {0: pytest.approx(1.0), 1: pytest.approx(3.0)}
     text = line(seen)
-    assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text and text.endswith("3.00 S/m mm2, false")
+    assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text
+    assert "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text and text.endswith(" ms")
     facts = table(seen)
     assert [touch["error_mm"] for touch in facts["touches"]] == [pytest.approx(1.0), pytest.approx(3.0), None]
     assert len(facts["true"]) == 2
@@ -56,7 +57,7 @@ def test_touches_are_paired_with_the_true_ones() -> None:
 
 def test_nothing_found_is_no_error_of_zero() -> None:
     look = watcher()
-    assert line(look.see(touches())).endswith("no touch")
+    assert " s  no touch; 60 iterations" in line(look.see(touches()))
     assert look.score.as_dict()["position_worst_mm"] is None and "position error" not in look.score.text()
     assert look.score.missed == 2
 
@@ -92,7 +93,7 @@ def test_an_image_in_brief(sign: float) -> None:
     assert seen.view.peak == pytest.approx(0.01 * sign) and seen.errors_mm is None
     assert "off by" not in line(seen)
     assert Watcher(KnownModel(*prebuilt()), None).see(image()).view is not None
-    assert line(Watcher(KnownModel(*prebuilt()), None).see(image())).endswith("image: flat")
+    assert " s  image: flat; 60 iterations" in line(Watcher(KnownModel(*prebuilt()), None).see(image()))
 
 
 def test_raw_rows_that_are_missing_become_null() -> None:

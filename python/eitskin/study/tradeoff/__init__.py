@@ -1,0 +1,1 @@
+"""What accuracy costs in time: configurations over one scale, measured on the same scenes, and which to choose."""

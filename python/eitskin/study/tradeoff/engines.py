@@ -1,0 +1,100 @@
+"""A configuration's model and core: each model is made once, from one Jacobian a grid on one mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from eitskin.errors import UsageError
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.grid import grid_for
+from eitskin.fem.mesh import mesh_for_elements
+from eitskin.fem.sensitivity import sensitivity
+from eitskin.model.build import BuildSettings, Linearisation, make_model, scaled_defaults
+from eitskin.model.eitm import encode_model
+from eitskin.model.model import Model
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.study import metrics
+from eitskin.study.tradeoff.configuration import Configuration
+
+ELEMENTS = 3000
+
+
+def build_settings(one: Configuration, skin: Skin, mask_threshold: float | None = None) -> BuildSettings:
+    """How the model of a configuration is built; its solver's settings and t become the model's defaults, as far as a model has
+    them: not the gap, a limit of MACs, the warm start and the sweeps."""
+    usual = scaled_defaults(skin, "difference")
+    defaults = replace(usual, solver=one.solver, iterations=one.iterations, lambda_rel=one.lambda_rel)
+    if mask_threshold is not None:
+        defaults = replace(defaults, mask_threshold=mask_threshold)
+    return BuildSettings(
+        rank=one.rank,
+        pixels_across=one.pixels,
+        storage=one.storage,
+        floor=one.floor,
+        column_power=one.column_power,
+        elements=ELEMENTS,
+        defaults=defaults,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A configuration made ready: its model, the file's bytes, and the judge of its images."""
+
+    model: Model
+    blob: bytes
+    judge: metrics.Judge
+
+    def reconstructor(self, one: Configuration) -> Reconstructor:
+        """The C core in float32 with the configuration's settings."""
+        solver = Reconstructor(self.model, blob=self.blob)
+        solver.with_options(**one.solver_settings)
+        return solver
+
+
+class ModelShop:
+    """Makes the models of configurations for one skin, on one mesh of about 3,000 elements, as ``eitskin model build`` does."""
+
+    def __init__(self, skin: Skin, protocol: Protocol) -> None:
+        self.skin, self.protocol = skin, protocol
+        self._forward: ForwardModel | None = None
+        self._linear: dict[int, Linearisation] = {}
+        self._judges: dict[int, metrics.Judge] = {}
+        self._raster = metrics.raster_inside(skin.outline)
+
+    def refuse(self, one: Configuration) -> None:
+        """Refuse a configuration whose model could not be made.
+
+        Raises:
+            UsageError: its rank exceeds what protocol and grid allow.
+        """
+        most = min(len(self.protocol.reciprocal_pairs().first), grid_for(self.skin.outline, one.pixels).n_pixels)
+        if one.rank > most:
+            raise UsageError(f"configuration {one.name!r}: rank = {one.rank} is out of range; use 1 to {most}")
+
+    def build(self, one: Configuration) -> Built:
+        """The model of a configuration.
+
+        Raises:
+            UsageError: the model cannot be; see ``refuse``.
+            GeometryError, MissingExtraError: from meshing.
+        """
+        model = make_model(self.skin, self.protocol, self._linearise(one.pixels), build_settings(one, self.skin))
+        return Built(model, encode_model(model), self._judge(one.pixels))
+
+    def _linearise(self, pixels: int) -> Linearisation:
+        if self._forward is None:
+            self._forward = ForwardModel(mesh_for_elements(self.skin, ELEMENTS), self.skin, self.protocol)
+        if pixels not in self._linear:
+            grid = grid_for(self.skin.outline, pixels)
+            jacobian, v0_v = sensitivity(self._forward, self.skin.conductivity_s_per_m, grid)
+            self._linear[pixels] = Linearisation(grid, jacobian, v0_v, self._forward.mesh.n_elements)
+        return self._linear[pixels]
+
+    def _judge(self, pixels: int) -> metrics.Judge:
+        if pixels not in self._judges:
+            grid = self._linearise(pixels).grid
+            self._judges[pixels] = metrics.Judge(self._raster, metrics.lookup_for(self._raster.points_mm, grid), grid.n_pixels)
+        return self._judges[pixels]

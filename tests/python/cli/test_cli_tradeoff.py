@@ -1,0 +1,159 @@
+"""``eitskin tradeoff``, and ``--budget`` and ``--accuracy`` on frames and boards."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("netgen")
+
+from board_cases import write_scene
+
+from eitskin.cli.main import main
+from eitskin.model.eitm import load_model
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.study.tradeoff.engines import ModelShop
+from eitskin.study.tradeoff.front import Where, load_front
+from small_models import prebuilt
+
+Done = Callable[..., str]
+Refused = Callable[..., str]
+
+TINY_RUN = ["--scenes", "3", "--train", "2", "--set-scenes", "2", "--sets", "pairs", "--snr-db", "60", "--elements", "1200"]
+TINY_RUN += ["--counted", "0", "--rounds", "1", "--only", "tiny,mini,standard rank 32"]
+
+
+def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    out = done("tradeoff", "run", "-o", tmp_path / "out", *TINY_RUN, "--front", tmp_path / "small.json")
+    assert "standard rank 32" in out and "* " in out
+    found = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
+    pictures = {"front.png", "knobs.png", "noise.png", "samples.png", "scenes.png", "objective.png"}
+    assert found == {"results.jsonl", "front.json", "table.csv"} | pictures
+    assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
+    assert len(load_front(tmp_path / "out" / "front.json").points) == 3
+    front = tmp_path / "small.json"
+    assert "MIoU" in done("tradeoff", "recommend", "--front", front, "--budget", "1s", "--board", "host")
+
+
+def test_the_recommended_model_is_the_measured_one(done: Done, tmp_path: Path) -> None:
+    path = tmp_path / "model.eitm"
+    facts = json.loads(done("tradeoff", "recommend", "--budget", "5ms", "-o", path, "--json"))
+    assert facts["solve_us"] <= 5000 < facts["frame_us"] == facts["acquisition_us"] == 20_800
+    assert facts["options"] == ["--samples 80", "--full"]
+    model, _ = load_model(path)
+    one = next(p for p in load_front().points if p.name == facts["name"])
+    settings = one.configuration
+    assert (model.rank, model.stored.storage, model.grid.n_pixels) == (settings.rank, settings.storage, one.costs["pixels_kept"])
+    assert (model.defaults.iterations, model.defaults.solver) == (settings.iterations, settings.solver)
+    assert model.defaults.mask_threshold == pytest.approx(one.threshold)
+    measured = ModelShop(paper_skin(), adjacent(16)).build(settings).model
+    assert (measured.stored.columns == model.stored.columns).all() and (measured.projection == model.projection).all()
+
+
+def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:
+    slow = done("tradeoff", "recommend", "--accuracy", "0.88", "--board", "f767")
+    assert "an estimate" in slow and "frames a second" in slow
+    assert "measuring bounds the rate" in done("tradeoff", "recommend", "--budget", "2ms")
+    assert "host: solve and touches median" in done("tradeoff", "recommend", "--budget", "1ms", "--board", "host")
+    facts = json.loads(done("tradeoff", "recommend", "--budget", "10ms", "--period", "11ms", "--json"))
+    assert facts["acquisition_us"] <= 11_000 and facts["configuration"]["scan"] == "reciprocal"
+    discs = json.loads(done("tradeoff", "recommend", "--budget", "10ms", "--by", "discs", "--json"))
+    assert discs["judged"].startswith("discs") and discs["accuracy"] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("code", "arguments", "said"),
+    [
+        (2, ["recommend"], "--budget 10ms"),
+        (2, ["recommend", "--budget", "ten"], "--budget ten"),
+        (2, ["recommend", "--budget", "1us"], "the cheapest"),
+        (2, ["recommend", "--accuracy", "0.99"], "the best"),
+        (2, ["recommend", "--budget", "9ms", "--skin", "a.toml"], "-o MODEL.eitm"),
+        (2, ["recommend", "--budget", "9ms", "--scenes", "quads"], "quads"),
+        (2, ["recommend", "--budget", "9ms", "--period", "9kMACs"], "--period"),
+        (3, ["recommend", "--budget", "9ms", "--front", "nowhere.json"], "nowhere.json"),
+        (3, ["recommend", "--budget", "9ms", "-o", "nowhere/model.eitm"], "does not exist"),
+        (3, ["run", "--set", "nowhere.toml"], "nowhere.toml"),
+        (2, ["run", "--only", "standrad"], "did you mean 'standard'"),
+        (2, ["run", "--snr-db", "60;80"], "--snr-db"),
+        (2, ["run", "--sets", "quads"], "quads"),
+        (2, ["run", "--scenes", "0"], "scenes"),
+        (2, ["run", "--seed", "-1"], "--seed"),
+        (2, ["run", "--elements", "3"], "--elements"),
+    ],
+)
+def test_refusals(refused: Refused, code: int, arguments: list[str], said: str) -> None:
+    assert said in refused(code, "tradeoff", *arguments)
+
+
+def test_reconstruct_within_a_budget(done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    usual = json.loads(done("reconstruct", frames_file, "--json"))
+    assert main(["reconstruct", str(frames_file), "--accuracy", "0.87", "--json"]) == 0
+    out, err = capsys.readouterr()
+    fine = json.loads(out)
+    assert "settings of" in err and fine["settings"]["rank"] == prebuilt()[0].rank
+    point = next(one for one in load_front().points if one.name == fine["settings"]["name"])
+    assert (point.accuracy(Where()) or 0) >= 0.87
+    assert max(f["info"]["iterations"] for f in fine["frames"]) == fine["settings"]["iterations"] != 60
+    assert fine["summary"]["miou_image"] > usual["summary"]["miou_image"]
+    assert all(f["info"]["solve_us"] > 0 and f["info"]["touch_us"] >= 0 for f in fine["frames"] + usual["frames"])
+    assert main(["reconstruct", str(frames_file), "--budget", "450kMACs", "--json"]) == 0
+    quick = json.loads(capsys.readouterr().out)
+    assert sum(f["info"]["macs"] for f in quick["frames"]) < sum(f["info"]["macs"] for f in usual["frames"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--budget", "1ms", "--iterations", "5"], "--iterations"),
+        (["--accuracy", "0.8", "--gap", "0.1"], "--gap"),
+        (["--accuracy", "0.8", "--solver", "fista"], "--solver"),
+        (["--accuracy", "0.8", "--engine", "numpy"], "--engine numpy"),
+        (["--accuracy", "0.99"], "the best"),
+        (["--budget", "1Minstructions"], "instructions"),
+    ],
+)
+def test_reconstruct_refuses(refused: Refused, frames_file: Path, arguments: list[str], said: str) -> None:
+    assert said in refused(2, "reconstruct", frames_file, *arguments)
+
+
+def test_a_model_that_nothing_was_measured_with(refused: Refused, done: Done, frames_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "odd.eitm"
+    done("model", "build", "--paper", "--rank", "33", "--pixels", "12", "-o", path)
+    assert "tradeoff recommend" in refused(2, "reconstruct", frames_file, "--model", path, "--accuracy", "0.7")
+
+
+def test_boards_are_told_the_settings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path / "one.toml", frames=2)
+    assert main(["stream", "--device", f"sim:{scene}", "--accuracy", "0.87", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert "on the F767 (an estimate)" in err
+    frames = [json.loads(line) for line in out.splitlines()][:2]
+    assert all(frame["info"]["iterations"] > 60 and frame["info"]["gap_rel"] > 0 for frame in frames)
+    assert main(["stream", "--device", f"sim:{scene}", "--budget", "5.5ms"]) == 0
+    line = capsys.readouterr().out.splitlines()[0]
+    assert "30 iterations (iterations), gap" in line and "MMAC" in line
+
+
+def test_boards_refuse(refused: Refused, tmp_path: Path) -> None:
+    scene = write_scene(tmp_path / "one.toml", frames=1)
+    assert "--iterations" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "5ms", "--iterations", "9")
+    assert "takes" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "1ms")
+    assert "--budget x" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "x")
+
+
+def test_a_recording_takes_no_budget_but_keeps_what_it_chose(
+    refused: Refused, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, run = write_scene(tmp_path / "one.toml", frames=2), tmp_path / "run.eits"
+    assert main(["record", "--device", f"sim:{scene}", "-o", str(run), "--accuracy", "0.87"]) == 0
+    assert main(["replay", str(run), "--check"]) == 0
+    assert main(["replay", str(run), "--json"]) == 0
+    first = json.loads(capsys.readouterr().out.splitlines()[-2])
+    assert first["info"]["iterations"] > 60
+    assert "recording" in refused(2, "stream", "--device", f"file:{run}", "--budget", "5ms")

@@ -1,0 +1,47 @@
+"""Instructions of a configuration, counted: what is not in a model's defaults reaches the emulated core too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.study.tradeoff.accuracy import solve_session
+from eitskin.study.tradeoff.configuration import Configuration
+from eitskin.study.tradeoff.emulation import Emulator, chosen_scenes, count_instructions
+from eitskin.study.tradeoff.engines import ModelShop
+from eitskin.study.tradeoff.scene_sets import Workshop
+
+
+def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
+    return items
+
+
+def test_counts_are_exact_and_follow_every_setting(cortex_m7: Path) -> None:
+    emulator = Emulator(cortex_m7 / "tests" / "emulated" / "frames_m7.elf")
+    session = Workshop(paper_skin(), adjacent(16), 5, 1200).session("random", 6, plain)
+    shop = ModelShop(paper_skin(), adjacent(16))
+    base = Configuration("base", rank=32, pixels=16, iterations=20)
+    counted = {}
+    for one in (
+        base,
+        replace(base, name="again"),
+        replace(base, name="sweeps", touch_sweeps=1),
+        replace(base, name="gap", gap=0.05),
+        replace(base, name="warm", warm_start=True),
+    ):
+        built = shop.build(one)
+        solved = solve_session(one, built, session, 60.0)
+        measured = session.measured(60.0, one.samples, one.scan, one.held)
+        counted[one.name] = count_instructions(emulator, one, built, measured, solved, 3, 2)
+    assert counted["base"] == counted["again"]
+    assert counted["base"]["mean"] == counted["base"]["solve_mean"] + counted["base"]["touch_mean"] <= counted["base"]["most"]
+    assert counted["sweeps"]["touch_mean"] < counted["base"]["touch_mean"]
+    assert counted["sweeps"]["solve_mean"] == counted["base"]["solve_mean"]
+    assert counted["gap"]["solve_mean"] != counted["base"]["solve_mean"]
+    assert counted["warm"]["kind"] == "counted"
+    even, costly = chosen_scenes(solved, 3, 2)
+    assert len(even) == 3 and len(costly) == 2 and even[0] == 0 and even[-1] == 5
