@@ -161,10 +161,6 @@ class CoreEngine:
         """x of the last solve, (n,)."""
         return self._view(self._context.x, self.n_pixels).copy()
 
-    def reconstruction_info(self) -> Info:
-        """How the last solve went."""
-        return self._read_info()
-
     def reduced_data(self) -> npt.NDArray[Any]:
         """y of the last frame as the solver saw it, projected, (stride,)."""
         return self._view(self._context.y, (int(self._model.rank) + 7) // 8 * 8).copy()

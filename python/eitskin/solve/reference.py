@@ -7,6 +7,7 @@ minimise |y - S x|^2 / 2 + lambda |x|_1 by FISTA (Beck and Teboulle, SIAM J. Ima
 from __future__ import annotations
 
 from time import perf_counter_ns
+
 import numpy as np
 import numpy.typing as npt
 

@@ -27,7 +27,7 @@ def solved(problems: Problems, width: str, **options: object) -> list[tuple[np.n
     for k in range(len(problems)):
         engine.set_options(bench_options(problems.model, lambda_abs=float(problems.lam[k]), **options))
         engine.bare_solve(problems.y[k])()
-        found.append((engine.coefficients(), engine.reconstruction_info().stop))
+        found.append((engine.coefficients(), engine.last_info().stop))
     return found
 
 
@@ -70,7 +70,7 @@ def test_more_macs_give_a_lower_objective(problems: Problems, solver: str) -> No
                 bench_options(problems.model, lambda_abs=float(problems.lam[k]), solver=solver, iterations=200, mac_limit=limit)
             )
             engine.bare_solve(problems.y[k])()
-            info = engine.reconstruction_info()
+            info = engine.last_info()
             assert info.macs <= limit
             values.append(problems.suboptimality(k, engine.coefficients()))
         means.append(float(np.mean(values)))

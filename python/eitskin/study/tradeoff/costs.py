@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from eitskin.core.engine import CoreEngine
-from eitskin.device.commands import Scan
-from eitskin.device.sim_checks import slot_us
+from eitskin.device.simulated.checks import slot_us
+from eitskin.device.wire.commands import Scan
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.engines import Built
 
