@@ -309,8 +309,8 @@ def as_markdown(result: BoardCost, command: str) -> str:
         "silicon was measured.",
         markdown_table(COST_HEAD, cost_rows(result)),
         f"Cold, by the M7 kernels, relative to f32: {ratios}. Columns in use are unpacked to float once and held in the "
-        "workspace (64 KiB of it at rank 64, 256 columns), so that only the three products a frame with every column convert. "
-        f"Solve and touches take at most {stack} bytes of stack.",
+        "workspace (64 KiB of it at rank 64, 256 columns), so that only the three products a frame with every column convert, "
+        f"and those of a working set that is greater. Solve and touches take at most {stack} bytes of stack.",
         "## Firmware",
         "Bytes of the images. The NUCLEO's workspace is what its SRAM has left.",
         markdown_table(IMAGE_HEAD, image_rows(result)),

@@ -242,8 +242,7 @@ def as_markdown(result: GrowthTimes, command: str, picture: str | None) -> str:
         f"60 dB); {result.machine}. MACs are exact.",
         *([f"![time and multiply-accumulates of a frame as it grows]({picture})"] if picture else []),
         markdown_table(HEAD, rows(result)),
-        f"Fitted exponents: {summary(result)}. The iterations run on a working set, of as many columns as the touches' edges "
-        "take on the grid; three products a frame take every column; rows enter only where a frame is reduced to the rank, and "
-        "pairs of reciprocal rows as one.",
+        f"Fitted exponents: {summary(result)}. The iterations run on a working set of columns; three products a frame "
+        "take every column; rows enter only where a frame is reduced to the rank, and pairs of reciprocal rows as one.",
     ]
     return "\n\n".join(parts)
