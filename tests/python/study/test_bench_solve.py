@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from eitskin.core.results import SOLVERS
 from eitskin.study import bench_solve, bench_solve_peers
 from eitskin.study.bench_solve_problems import Problems, make_problems
 from small_models import prebuilt, session
 
-OWN = {f"eitskin {solver}, {width}" for solver in ("active-set", "coordinate", "working-set", "fista") for width in ("float32", "float64")}
+OWN = {f"eitskin {solver}, {width}" for solver in SOLVERS for width in ("float32", "float64")}
 
 
 @pytest.fixture(scope="module")
