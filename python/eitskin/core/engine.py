@@ -157,6 +157,16 @@ class CoreEngine:
         lib, context = self._lib, self._context
         return lambda: lib.eits_solve(context)
 
+    def bare_solves(self, many: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:
+        """``bare_solve`` of each of ``many`` (k, r), one after another: their x (k, n)."""
+        y, x = self._view(self._context.y, int(self._model.rank)), np.empty((len(many), self.n_pixels), dtype=self.dtype)
+        solve, context = self._lib.eits_solve, self._context
+        for k in range(len(many)):
+            y[:] = many[k]
+            solve(context)
+            x[k] = self._view(context.x, self.n_pixels)
+        return x
+
     def coefficients(self) -> npt.NDArray[Any]:
         """x of the last solve, (n,)."""
         return self._view(self._context.x, self.n_pixels).copy()

@@ -85,8 +85,9 @@ def _plan(problems: Problems, candidate: Candidate) -> list[Timed]:
             continue
         worst = max(effort[level][1] for effort in efforts)
         calls = [(k, effort[level][0]) for k, effort in zip(numbers, efforts, strict=True)]
-        count = int(candidate.prepare(0, candidate.ladder[0])().shape[1]) if candidate.batch else 1
-        plans.append(Timed(candidate.name, level, [_Call(candidate, k, setting) for k, setting in calls], worst, count))
+        plans.append(
+            Timed(candidate.name, level, [_Call(candidate, k, how) for k, how in calls], worst, max(1, candidate.batch))
+        )
     return plans
 
 
@@ -130,12 +131,11 @@ def _table(problems: Problems, rounds: int, progress: Progress) -> dict[str, Any
     for plan in plans:
         row: dict[str, Any] = {"solver": plan.name, "level": plan.level, "reached": plan.calls is not None}
         if plan.calls is not None:
-            ratios = np.array(plan.rounds_s) / np.array(base[plan.level].rounds_s[: len(plan.rounds_s)])
             row |= {
                 "us": plan.median_us,
                 "us_low": 1e6 * float(np.percentile(plan.rounds_s, 25)),
                 "us_high": 1e6 * float(np.percentile(plan.rounds_s, 75)),
-                "ratio": float(np.median(ratios)),
+                "ratio": plan.median_us / base[plan.level].median_us,
                 "worst_suboptimality": plan.worst,
                 "rounds": len(plan.rounds_s),
             }
@@ -162,12 +162,11 @@ def _equal(problems: Problems, rounds: int) -> list[dict[str, Any]]:
         for _ in range(max(3, rounds // 2)):
             for plan in plans:
                 _round(plan)
-        base = np.array(next(p for p in plans if p.name == "eitskin fista, float32").rounds_s)
+        base = next(p for p in plans if p.name == "eitskin fista, float32")
         for plan in plans:
-            found.append({
-                "solver": plan.name, "iterations": count, "us": plan.median_us,
-                "ratio": float(np.median(np.array(plan.rounds_s) / base)),
-            })  # fmt: skip
+            found.append(
+                {"solver": plan.name, "iterations": count, "us": plan.median_us, "ratio": plan.median_us / base.median_us}
+            )
     return found
 
 

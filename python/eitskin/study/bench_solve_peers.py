@@ -20,13 +20,15 @@ from eitskin.study.bench_solve_problems import Problems, bench_options
 Floats = npt.NDArray[np.floating[Any]]
 
 COUNTS = (1, 2, 3, 5, 7, 10, 14, 20, 30, 45, 60, 90, 140, 200, 300, 500, 800, 1300, 2000, 4000, 8000, 16000, 32000)
+BATCH = 240
 LARS = {"lambda1": 1.0, "mode": 2, "pos": True, "numThreads": 1}
 TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(2, 29))
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """``prepare(k, setting)`` makes what is not timed and returns what is; that returns x (n,), or for a batch (k, n).
+    """``prepare(k, setting)`` makes what is not timed and returns what is; ``read`` turns what that returns into x (n,), or for
+    a ``batch`` of so many problems into those of the first (k, n).
 
     ``signed``: solves the problem without x >= 0, and is judged by its optimum.
     """
@@ -35,7 +37,7 @@ class Candidate:
     ladder: Sequence[Any]
     prepare: Callable[[int, Any], Callable[[], Any]]
     read: Callable[[Any], Floats]
-    batch: bool = False
+    batch: int = 0
     signed: bool = False
 
 
@@ -45,6 +47,7 @@ def ours(problems: Problems) -> list[Candidate]:
     for width in ("float32", "float64"):
         for solver in ("active-set", "coordinate", "working-set", "fista"):
             found.append(_ours(problems, solver, width))
+        found.append(_ours_in_a_row(problems, width))
     return found
 
 
@@ -56,6 +59,27 @@ def _ours(problems: Problems, solver: str, width: str) -> Candidate:
         return engine.bare_solve(problems.y[k])
 
     return Candidate(f"eitskin {solver}, {width}", COUNTS, prepare, lambda _: engine.coefficients())
+
+
+def _ours_in_a_row(problems: Problems, width: str) -> Candidate:
+    """The active set on as many problems as SPAMS gets at once, one call each: y / lambda and lambda 1, as there."""
+    engine = CoreEngine(problems.blob, width)
+    scaled = (problems.y / problems.lam[:, None]).astype(engine.dtype)
+    many = np.tile(scaled, (-(-BATCH // len(problems)), 1))
+
+    def prepare(_: int, count: int) -> Callable[[], Any]:
+        options = bench_options(problems.model, solver="active-set", iterations=count, lambda_abs=1.0)
+
+        def run() -> Floats:
+            engine.set_options(options)
+            return engine.bare_solves(many)
+
+        return run
+
+    def read(x: Floats) -> Floats:
+        return np.asarray(x[: len(problems)] * problems.lam[:, None])
+
+    return Candidate(f"eitskin active-set, {width}, batch of {len(many)}", (1000,), prepare, read, len(many))
 
 
 def numpy_fista(problems: Problems, dtype: Any) -> Candidate:
@@ -91,7 +115,7 @@ def spams(problems: Problems) -> list[Candidate]:
         s: Any = np.asfortranarray(problems.s, dtype=dtype)
         gram = np.asfortranarray(s.T @ s)
         scaled = np.asfortranarray((problems.y / problems.lam[:, None]).T, dtype=dtype)
-        many = np.asfortranarray(np.tile(scaled, (1, -(-240 // len(problems)))))
+        many = np.asfortranarray(np.tile(scaled, (1, -(-BATCH // len(problems)))))
 
         def alone(k: int, cholesky: bool, s: Any = s, scaled: Any = scaled, gram: Any = gram) -> Callable[[], Any]:
             y, lam = np.asfortranarray(scaled[:, k : k + 1]), problems.lam[k]
@@ -108,7 +132,8 @@ def spams(problems: Problems) -> list[Candidate]:
         width = np.dtype(dtype).name
         for cholesky, by in ((False, "Gram"), (True, "Cholesky")):
             found.append(Candidate(f"SPAMS, {width}, {by}", (cholesky,), alone, np.asarray))
-            found.append(Candidate(f"SPAMS, {width}, {by}, batch of {many.shape[1]}", (cholesky,), together, spread, batch=True))
+            name, count = f"SPAMS, {width}, {by}, batch of {many.shape[1]}", int(many.shape[1])
+            found.append(Candidate(name, (cholesky,), together, spread, count))
     return found
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from eitskin.core.results import SOLVERS
 from eitskin.study import bench_solve, bench_solve_peers
 from eitskin.study.bench_solve_problems import Problems, make_problems
 from small_models import prebuilt, session
 
-SOLVERS = ("active-set", "coordinate", "working-set", "fista")
 OWN = {f"eitskin {solver}, {width}" for solver in SOLVERS for width in ("float32", "float64")}
 
 
