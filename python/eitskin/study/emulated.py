@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -116,10 +117,12 @@ def run_frames(
     options: Options,
     *,
     portable: bool = False,
+    settings: Mapping[str, float] | None = None,
 ) -> EmulatedRun:
     """The emulated board's results for ``frames_v`` (k, m) after taring on ``quiet_v`` (q, m), volts.
 
-    Of ``options``, those that the program takes: warm start, sign and solver; all others are the model's defaults.
+    Of ``options``, those that the program takes: warm start, sign and solver; all others are the model's defaults, or as
+    ``settings`` say (those that frames_m7.c knows by name).
     ``folder`` is where the program finds its files. ``portable``: plain C instead of the processor's own kernels.
 
     Raises:
@@ -129,6 +132,8 @@ def run_frames(
     (folder / "model.eitm").write_bytes(blob)
     plan = len(quiet_v), len(frames_v), int(options.warm_start), SIGNS.index(options.sign), SOLVERS.index(options.solver)
     (folder / "plan.txt").write_text(" ".join(map(str, (*plan, int(portable)))) + "\n", encoding="ascii")
+    lines = (f"{name} {value:.9g}\n" for name, value in (settings or {}).items())
+    (folder / "options.txt").write_text("".join(lines), encoding="ascii")
     (folder / "frames.f32").write_bytes(np.vstack([quiet_v, frames_v]).astype("<f4").tobytes())
     command = [QEMU, "-M", "mps2-an500", "-nographic", "-monitor", "none", "-semihosting-config"]
     command += ["enable=on,target=native", "-icount", "shift=6", "-kernel", str(program)]

@@ -323,6 +323,7 @@ BAD_OPTIONS = [
     ({"gap_every": 0}, "gap_every"),
     ({"max_touches": 17}, "max_touches = 17 is out of range; use 0 to 16"),
     ({"max_masked": -1}, "max_masked"),
+    ({"mac_limit": -1}, "mac_limit"),
     ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),
     ({"solver": "newton"}, "solver = 'newton' is not known; use one of fista, working-set"),
     ({"warm_start": 2}, "warm_start"),

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import shutil
-import subprocess
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,20 +9,21 @@ from typing import Any
 
 import numpy as np
 
-import eitskin
-from eitskin.core.results import SIGNS, SOLVERS
-from eitskin.errors import VerificationError
+from eitskin.errors import UsageError, VerificationError
+from eitskin.study.emulated import (
+    BUILD_TOOLS,
+    PROGRAM,
+    QEMU,
+    EmulatedFrame,
+    build_cortex_m7,
+    checkout_root,
+    need_tools,
+    run_frames,
+)
 from eitskin.study.tradeoff.accuracy import Solved
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.engines import Built
 from eitskin.study.tradeoff.scene_sets import Measured
-
-TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm", "cmake", "ninja")
-PROGRAM = "tests/emulated/frames_m7.c"
-LINE = re.compile(
-    r"frame (\d+) status (-?\d+) stop (\d+) iterations (\d+) macs (\d+) (?:touchmacs (\d+) )?solve (\d+) touch (\d+) "
-)
-TIMEOUT_S = 600
 
 
 @dataclass(frozen=True)
@@ -35,30 +33,13 @@ class Emulator:
     program: Path
 
 
-def find_sources() -> Path | None:
-    """The checkout that this package runs from, or the current folder; None where neither has the C sources."""
-    for root in (Path(eitskin.__file__).resolve().parents[2], Path.cwd()):
-        if (root / PROGRAM).is_file():
-            return root
-    return None
-
-
 def make_emulator(folder: Path) -> Emulator | str:
     """Build the program below ``folder``; where that cannot be, why."""
-    absent = [tool for tool in TOOLS if shutil.which(tool) is None]
-    if absent:
-        return f"{', '.join(absent)} not installed"
-    root = find_sources()
-    if root is None:
-        return "no C sources beside this installation; run in a checkout"
-    build = folder / "cortex-m7"
-    configure = ["cmake", "-S", str(root), "-B", str(build), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DEITSKIN_TESTS=OFF"]
-    configure += [f"-DCMAKE_TOOLCHAIN_FILE={root / 'cmake' / 'arm-cortex-m7.cmake'}"]
-    for command in (configure, ["cmake", "--build", str(build), "--target", "frames_m7"]):
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            return f"building for the Cortex-M7 failed: {(done.stdout + done.stderr).strip().splitlines()[-1]}"
-    return Emulator(build / "tests" / "emulated" / "frames_m7.elf")
+    try:
+        need_tools(*BUILD_TOOLS, QEMU)
+        return Emulator(build_cortex_m7(checkout_root(), folder / "cortex-m7", "frames_m7") / PROGRAM)
+    except UsageError as error:
+        return str(error).splitlines()[0]
 
 
 def chosen_scenes(solved: Solved, spread: int, most: int) -> tuple[list[int], list[int]]:
@@ -86,42 +67,30 @@ def count_instructions(
     if not one.warm_start:
         for k, row in zip(scenes, last, strict=True):
             info = solved.results[k].info
-            if (row[0], row[1]) != (info.iterations, info.macs + info.touch_macs):
+            if (row.iterations, row.macs) != (info.iterations, info.macs + info.touch_macs):
                 macs = info.macs + info.touch_macs
-                raise VerificationError(f"configuration {one.name!r}: the emulated core does {row[1]} MACs, this host's {macs}")
-    mean = np.mean([row[2:] for row in last[: len(even)]], axis=0)
+                raise VerificationError(f"configuration {one.name!r}: the emulated core does {row.macs} MACs, this host's {macs}")
+    mean = np.mean([(row.solve_instructions, row.touch_instructions) for row in last[: len(even)]], axis=0)
     return {
         "kind": "counted",
         "frames": len(scenes),
         "solve_mean": round(float(mean[0])),
         "touch_mean": round(float(mean[1])),
         "mean": round(float(mean.sum())),
-        "most": max(row[2] + row[3] for row in found),
-        "macs_mean": round(float(np.mean([row[1] for row in last[: len(even)]]))),
+        "most": max(row.instructions for row in found),
+        "macs_mean": round(float(np.mean([row.macs for row in last[: len(even)]]))),
     }
 
 
-def _run(emulator: Emulator, one: Configuration, built: Built, quiet_v: Any, frames_v: Any) -> list[tuple[int, int, int, int]]:
-    """Iterations, MACs, instructions of solve and touches of each frame."""
+def _run(emulator: Emulator, one: Configuration, built: Built, quiet_v: Any, frames_v: Any) -> tuple[EmulatedFrame, ...]:
+    """What the emulated core says of each frame."""
     options = built.reconstructor(one).options
+    settings = {name: value for name, value in one.solver_settings.items() if name not in ("warm_start", "solver")}
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "model.eitm").write_bytes(built.blob)
-        plan = len(quiet_v), len(frames_v), int(options.warm_start), SIGNS.index(options.sign), SOLVERS.index(options.solver)
-        (folder / "plan.txt").write_text(" ".join(map(str, plan)) + "\n")
-        settings = {name: value for name, value in one.solver_settings.items() if name not in ("warm_start", "solver")}
-        (folder / "options.txt").write_text("".join(f"{name} {value:.9g}\n" for name, value in settings.items()))
-        (folder / "frames.f32").write_bytes(np.vstack([quiet_v, frames_v]).astype("<f4").tobytes())
-        command = ["qemu-system-arm", "-M", "mps2-an500", "-nographic", "-monitor", "none", "-semihosting-config"]
-        command += ["enable=on,target=native", "-icount", "shift=6", "-kernel", str(emulator.program.resolve())]
         try:
-            done = subprocess.run(
-                command, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT_S, check=False, stdin=subprocess.DEVNULL
-            )
-        except subprocess.TimeoutExpired:
-            raise VerificationError(f"configuration {one.name!r}: {TIMEOUT_S} s did not suffice under emulation") from None
-    rows = [match.groups() for match in map(LINE.match, done.stdout.splitlines()) if match is not None]
-    if done.returncode or len(rows) != len(frames_v) or any(row[1] != "0" for row in rows):
-        last = (done.stdout + done.stderr).strip().splitlines()[-1:]
-        raise VerificationError(f"configuration {one.name!r}: the emulated core gave no result: {' '.join(last) or 'no output'}")
-    return [(int(row[3]), int(row[4]) + int(row[5] or 0), int(row[6]), int(row[7])) for row in rows]
+            done = run_frames(emulator.program.resolve(), Path(name), built.blob, quiet_v, frames_v, options, settings=settings)
+        except UsageError as error:
+            raise VerificationError(f"configuration {one.name!r}: {error}") from None
+    if any(frame.status != 0 for frame in done.frames):
+        raise VerificationError(f"configuration {one.name!r}: the emulated core refuses a frame that this host takes")
+    return done.frames
