@@ -1,8 +1,12 @@
-"""One frame through cffi: how long, how much of it outside C, and beside the numpy reference. Interleaved runs, ratios."""
+"""One frame through cffi: how long, how much of it outside C, beside the numpy reference and, where installed, pyEIT. Interleaved
+runs, ratios."""
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import platform
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter_ns
 from typing import Any
@@ -59,9 +63,33 @@ def golden_session() -> tuple[CoreEngine, CoreEngine, Reconstructor, np.ndarray[
     return core, portable, numpy_engine, frames
 
 
+def pyeit_frames(reference_v: np.ndarray[Any, Any]) -> dict[str, Callable[[np.ndarray[Any, Any]], Any]]:
+    """pyEIT's one-step solvers on a mesh of about 3,000 elements, set up: each takes a frame (m,) volts and gives its image on
+    the elements. Empty where it, scipy or netgen is not installed."""
+    if any(importlib.util.find_spec(name) is None for name in ("pyeit", "scipy", "netgen")):
+        return {}
+    from eitskin.fem.mesh import mesh_for_elements
+    from eitskin.skin.protocol import adjacent
+    from eitskin.skin.skin import paper_skin
+    from eitskin.study.bench_jacobian import pyeit_case
+
+    skin, protocol = paper_skin(), adjacent(16)
+    theirs, pattern, order = pyeit_case(mesh_for_elements(skin, 3000), skin, protocol)
+    gauss_newton = importlib.import_module("pyeit.eit.jac").JAC(theirs, pattern)
+    gauss_newton.setup(p=0.5, lamb=0.01, method="kotre")
+    back_projection = importlib.import_module("pyeit.eit.bp").BP(theirs, pattern)
+    back_projection.setup(weight="none")
+    base = reference_v[order]
+    return {
+        "pyEIT: Gauss-Newton, image only": lambda frame: gauss_newton.solve(frame[order], base),
+        "pyEIT: back projection, image only": lambda frame: back_projection.solve(frame[order], base),
+    }
+
+
 def run(runs: int = 2000) -> FrameTimes:
     """Time ``runs`` frames of the core, and a hundredth as many of the slow engines among them."""
     core, portable, reference, frames = golden_session()
+    peers = pyeit_frames(frames.mean(axis=0))
     samples: dict[str, list[float]] = {}
 
     def clock(name: str, call: Any) -> None:
@@ -81,6 +109,8 @@ def run(runs: int = 2000) -> FrameTimes:
         if k % 100 == 0:
             clock("C, portable kernels: frame to touches", lambda f=frame: portable.reconstruct(f))
             clock("numpy: image only", lambda f=frame: reference.reconstruct(f, touches=False))
+            for name, peer in peers.items():
+                clock(name, lambda f=frame, solve=peer: solve(f))
     info = core.reconstruct(frames[0]).info
     return FrameTimes(
         {name: float(np.median(values)) for name, values in samples.items()},

@@ -136,10 +136,10 @@ def _ours(mesh: Mesh, skin: Skin, protocol: Protocol, grid: Grid) -> dict[str, C
     }
 
 
-def _pyeit(mesh: Mesh, skin: Skin, protocol: Protocol) -> dict[str, Callable[[], FloatArray]]:
-    """pyEIT on the same mesh; its electrodes are points, here the rim nodes nearest to the electrodes' middles."""
-    fem, wrapper = importlib.import_module("pyeit.eit.fem"), importlib.import_module("pyeit.mesh")
-    scan = importlib.import_module("pyeit.eit.protocol")
+def pyeit_case(mesh: Mesh, skin: Skin, protocol: Protocol) -> tuple[Any, Any, npt.NDArray[np.intp]]:
+    """pyEIT's mesh and protocol for the same mesh, and the order in which it measures the rows. Its electrodes are points, here
+    the rim nodes nearest to the electrodes' middles."""
+    wrapper, scan = importlib.import_module("pyeit.mesh"), importlib.import_module("pyeit.eit.protocol")
     middles = skin.electrode_centres_mm()
     contacts = [
         int(edges[np.argmin(np.hypot(*(mesh.nodes_mm[edges[:, 0]] - middle).T)), 0])
@@ -154,9 +154,13 @@ def _pyeit(mesh: Mesh, skin: Skin, protocol: Protocol) -> dict[str, Callable[[],
         node=np.array(mesh.nodes_mm), element=np.array(mesh.triangles), el_pos=np.array(contacts), ref_node=reference
     )
     pattern = scan.PyEITProtocol(ex_mat=drives, meas_mat=measures, keep_ba=np.ones(protocol.n_rows, dtype=bool))
-    kept = fem.EITForward(theirs, pattern)
-    order = np.lexsort((protocol.drive_measure[:, 1], protocol.drive_measure[:, 0]))
-    back = np.argsort(order, kind="stable")
+    return theirs, pattern, np.lexsort((protocol.drive_measure[:, 1], protocol.drive_measure[:, 0]))
+
+
+def _pyeit(mesh: Mesh, skin: Skin, protocol: Protocol) -> dict[str, Callable[[], FloatArray]]:
+    fem = importlib.import_module("pyeit.eit.fem")
+    theirs, pattern, order = pyeit_case(mesh, skin, protocol)
+    kept, back = fem.EITForward(theirs, pattern), np.argsort(order, kind="stable")
     return {
         "first": lambda: fem.EITForward(theirs, pattern).compute_jac()[0][back],
         "again": lambda: kept.compute_jac()[0][back],
