@@ -23,7 +23,7 @@ def add_parser(subparsers: Any) -> None:
     solve = what.add_parser("solve", help="the solve alone: time to a suboptimality, beside other solvers")
     solve.add_argument("--scenes", type=int, default=20, help="problems of each model (default: %(default)s)")
     solve.add_argument("--seed", type=int, default=3, help="of the scenes (default: %(default)s)")
-    solve.add_argument("--rounds", type=int, default=21, help="interleaved rounds (default: %(default)s)")
+    solve.add_argument("--rounds", type=int, default=11, help="interleaved rounds (default: %(default)s)")
     solve.add_argument("--picture", type=Path, metavar="PNG", help="draw suboptimality against MIoU instead")
     solve.add_argument("--json", action="store_true")
     solve.set_defaults(run=run_solve)

@@ -1,7 +1,7 @@
 """``eitskin bench solve``: the time to a given suboptimality, side by side with other solvers, one thread, interleaved rounds.
 
 For each solver, problem and level the least effort on its ladder that gets there is found first, judged in float64; only that is
-timed. So no solver pays for a stopping rule that is too careful.
+timed, in processor time of the one thread. So no solver pays for a stopping rule that is too careful.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import gc
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from time import perf_counter
+from time import perf_counter, thread_time
 from typing import Any
 
 import numpy as np
@@ -93,7 +93,7 @@ def _plan(problems: Problems, candidate: Candidate) -> list[Timed]:
 
 @dataclass(frozen=True)
 class _Call:
-    """Prepares, untimed, and runs; returns the seconds."""
+    """Prepares, untimed, and runs; returns the thread's processor seconds: what others do on the machine does not count."""
 
     candidate: Candidate
     k: int
@@ -101,9 +101,9 @@ class _Call:
 
     def __call__(self) -> float:
         run = self.candidate.prepare(self.k, self.setting)
-        start = perf_counter()
+        start = thread_time()
         run()
-        return perf_counter() - start
+        return thread_time() - start
 
 
 def _round(plan: Timed) -> None:
@@ -182,8 +182,8 @@ def text(result: dict[str, Any]) -> str:
     """Tables of microseconds a problem and ratios to the active set in float32."""
     known = {name: number for name, number in result["versions"].items() if number}
     lines = [
-        f"time to (F - F*) / F*, microseconds a problem: medians of {result['rounds']} interleaved rounds (fewer where slow, 3 "
-        f"at least), one thread, seed {result['seed']}, 60 dB; {result['machine']}",
+        f"time to (F - F*) / F*, microseconds of processor time a problem: medians of {result['rounds']} interleaved rounds "
+        f"(fewer where slow, 3 at least), one thread, seed {result['seed']}, 60 dB; {result['machine']}",
         ", ".join(f"{name} {number}" for name, number in known.items()),
         *(f"not installed: {name}; run  pip install {name}" for name, number in result["versions"].items() if number is None),
     ]
