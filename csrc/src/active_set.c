@@ -351,7 +351,7 @@ void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known
     a.tolerance = 2 * EPSILON * eits_sqrt((eits_real)ctx->model->lipschitz) * ctx->info.data_norm;
     a.pull = ctx->slope[0], a.sign = ctx->slope[1], a.work = ctx->slope[2], a.step = ctx->x_next, a.column = ctx->sx_next;
     eits_certificate c;
-    ctx->working_count = 0;
+    ctx->working_count = ctx->working_held = 0; /* the set changes column by column here: none are held unpacked */
     if (gradient_known) {
         eits_copy(ctx->residual, ctx->y, EITS_STRIDE(ctx->model->rank));
         c = eits_evaluate(ctx, lambda, EITS_LAYOUT_WORKING);

@@ -114,3 +114,25 @@ def test_the_working_set_spares_macs() -> None:
     assert whole < macs[11] - macs[10] < 1.3 * whole
     assert macs[60] - macs[11] < 48 * 0.2 * whole
     assert macs[60] < 0.25 * macs_of(60, solver="fista")
+
+
+@pytest.mark.parametrize("prepared", [True, False])
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_solver_takes_nothing_over_from_the_one_before(storage: str, prepared: bool) -> None:
+    """The working set's columns are held unpacked; another solver on the same context must not read them for its own."""
+    blob, s = small_blob(storage, "difference"), small()
+    frames, chosen = s.frames(32, 2, "increase"), default_options(small_model(storage, "difference"))
+    used = CoreEngine(blob, prepared=prepared)
+    used.set_baseline(s.quiet(31, 8))
+    for before in SOLVERS:
+        for after in SOLVERS:
+            used.set_options(replace(chosen, solver=before))
+            used.reconstruct(frames[0])
+            used.set_options(replace(chosen, solver=after))
+            used.forget()
+            fresh = CoreEngine(blob, prepared=prepared)
+            fresh.set_baseline(s.quiet(31, 8))
+            fresh.set_options(replace(chosen, solver=after))
+            one, other = used.reconstruct(frames[1]), fresh.reconstruct(frames[1])
+            assert (one.image == other.image).all() and one.info.gap == other.info.gap, (before, after)
+            assert (one.info.iterations, one.info.stop) == (other.info.iterations, other.info.stop)
