@@ -7,7 +7,7 @@ import importlib
 import importlib.util
 import platform
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter_ns
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from eitskin.core.engine import CoreEngine
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 
 SEED = 20240918
@@ -47,20 +48,21 @@ def machine() -> str:
     return f"{platform.machine()} {platform.system()}, Python {platform.python_version()}, numpy {np.__version__}"
 
 
-def golden_session() -> tuple[CoreEngine, CoreEngine, Reconstructor, np.ndarray[Any, Any]]:
-    """The core, the portable core, the numpy reference, tared; and 32 noisy golden frames (60 dB)."""
+def golden_session() -> tuple[CoreEngine, CoreEngine, CoreEngine, Reconstructor, np.ndarray[Any, Any]]:
+    """The core, cold and warm, the portable core, the numpy reference, tared; and 32 noisy golden frames (60 dB)."""
     model, blob = load_prebuilt()
     rng = np.random.default_rng(SEED)
     reference = model.golden.reference_v.astype(np.float64)
     noise = np.sqrt(np.mean(reference**2)) * 1e-3
     quiet = reference + noise * rng.standard_normal((64, len(reference)))
     frames = model.golden.frame_v + noise * rng.standard_normal((32, len(reference)))
-    core, portable = CoreEngine(blob), CoreEngine(blob, prepared=False, portable=True)
+    core, warm, portable = CoreEngine(blob), CoreEngine(blob), CoreEngine(blob, prepared=False, portable=True)
+    warm.set_options(replace(default_options(model), warm_start=True))
     numpy_engine = Reconstructor(model, engine="numpy")
-    for engine in (core, portable):
+    for engine in (core, warm, portable):
         engine.set_baseline(quiet)
     numpy_engine.tare(quiet)
-    return core, portable, numpy_engine, frames
+    return core, warm, portable, numpy_engine, frames
 
 
 def pyeit_frames(reference_v: np.ndarray[Any, Any]) -> dict[str, Callable[[np.ndarray[Any, Any]], Any]]:
@@ -88,7 +90,7 @@ def pyeit_frames(reference_v: np.ndarray[Any, Any]) -> dict[str, Callable[[np.nd
 
 def run(runs: int = 2000) -> FrameTimes:
     """Time ``runs`` frames of the core, and a hundredth as many of the slow engines among them."""
-    core, portable, reference, frames = golden_session()
+    core, warm, portable, reference, frames = golden_session()
     peers = pyeit_frames(frames.mean(axis=0))
     samples: dict[str, list[float]] = {}
 
@@ -106,6 +108,7 @@ def run(runs: int = 2000) -> FrameTimes:
         clock("C: solve", solve)
         clock("C: touches", touches)
         clock("Python: frame to touches", lambda f=frame: core.reconstruct(f))
+        clock("Python: frame to touches, warm", lambda f=frame: warm.reconstruct(f))
         if k % 100 == 0:
             clock("C, portable kernels: frame to touches", lambda f=frame: portable.reconstruct(f))
             clock("numpy: image only", lambda f=frame: reference.reconstruct(f, touches=False))
