@@ -254,7 +254,8 @@ def test_ctrl_c_stops_the_board_and_sums_up(scene: Path) -> None:
     board = board_of(scene)
     with behind_a_port(board) as port:
         source = str(Path(eitskin.__file__).parents[1])
-        listening = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background job has it off
+        # a shell's background job has the signal off, and what it starts too
+        listening = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
         command = [sys.executable, "-c", listening + MAIN, "stream", "--device", f"serial:{port}", "--tare", "4"]
         environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
         with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
