@@ -2,6 +2,8 @@
 #ifndef EITSKIN_TEST_DENSE_H
 #define EITSKIN_TEST_DENSE_H
 
+#include "small_model.h"
+
 #include "eitskin/eitskin.h"
 
 typedef struct dense {
@@ -44,5 +46,14 @@ double dense_greatest_difference(const double *a, const eits_real *b, size_t cou
 /* Zeroed doubles, or abort; and reals as doubles. */
 double *dense_numbers(size_t count);
 double *dense_copy(const eits_real *a, size_t count);
+
+/* A small model, a context on it, and the model in doubles: what most tests of a solve stand on. */
+typedef struct dense_bench {
+    small_model made;
+    small_context c;
+    dense d;
+} dense_bench;
+eits_context *dense_bench_open(dense_bench *bench, small_spec spec, int prepared);
+void dense_bench_close(dense_bench *bench);
 
 #endif

@@ -329,3 +329,9 @@ void small_reference(const eits_model *model, double gain, eits_real *frame)
             frame[fold.second] = (eits_real)(gain * fold.sign * (double)model->v_ref[k]);
     }
 }
+
+void small_new_data(eits_context *ctx, uint64_t state)
+{
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        ctx->y[i] = (eits_real)small_random(&state);
+}

@@ -64,4 +64,7 @@ void *small_aligned(void **memory, size_t size);
 /* A uniform random number in [-1, 1): a fixed generator, the same on every machine. */
 double small_random(uint64_t *state);
 
+/* Such numbers as the reduced data of a context. */
+void small_new_data(eits_context *ctx, uint64_t state);
+
 #endif

@@ -12,25 +12,11 @@
 
 enum { SIDE = 12, RANK = 36 };
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-    dense d;
-} bench;
+typedef dense_bench bench;
 
 static eits_context *set_up(bench *b, eits_storage storage)
 {
-    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .round = 1, .storage = storage});
-    small_context_open(&b->c, &b->made, 0);
-    b->d = dense_of(&b->c.model);
-    return &b->c.ctx;
-}
-
-static void tear_down(bench *b)
-{
-    dense_free(&b->d);
-    small_context_close(&b->c);
-    small_model_free(&b->made);
+    return dense_bench_open(b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .round = 1, .storage = storage}, 0);
 }
 
 /* The documented cover, over all pixels; with the gradient's basis taken out. Returns the number of covered pixels. */
@@ -86,7 +72,7 @@ static void area(void)
         }
         CHECK_NEAR(sum, 3.14159265358979 * (radius * radius + pixel * pixel / 12), 0.005 * sum);
     }
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 static eits_disc random_disc(uint64_t *state)
@@ -121,7 +107,7 @@ static void responses(void)
             CHECK_EQUAL(eits_disc_atom(ctx, &disc, atom, ctx->slope), 4 * macs);
             CHECK_NEAR(dense_greatest_difference(expected, atom, RANK), 0, 2000 * EPS);
         }
-        tear_down(&b);
+        dense_bench_close(&b);
     }
 }
 
@@ -142,7 +128,7 @@ static void far_away_there_is_nothing(void)
                 CHECK(atom[i] == 0 && ctx->slope[0][i] == 0 && ctx->slope[1][i] == 0 && ctx->slope[2][i] == 0);
         }
     }
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 /* Derivatives by x, y and radius against central differences of the response written out in double. Where a pixel's cover
@@ -208,7 +194,7 @@ static void derivatives(void)
         for (int i = 0; i < RANK; ++i)
             CHECK_NEAR(ctx->slope[k][i], (up[i] - down[i]) * 512, 2e-3);
     }
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 int main(void)

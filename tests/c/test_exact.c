@@ -22,16 +22,10 @@ typedef struct bench {
     small_context c;
 } bench;
 
-static void new_data(eits_context *ctx, uint64_t state)
-{
-    for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        ctx->y[i] = (eits_real)small_random(&state);
-}
-
 static eits_context *open_made(bench *b, int prepared)
 {
     small_context_open(&b->c, &b->made, prepared);
-    new_data(&b->c.ctx, 61);
+    small_new_data(&b->c.ctx, 61);
     return &b->c.ctx;
 }
 
@@ -210,7 +204,7 @@ static void warm_starts(void)
             CHECK(many > RANK);
             CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
-            new_data(ctx, 62);
+            small_new_data(ctx, 62);
             CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
             const eits_info again = solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0);

@@ -13,32 +13,11 @@
 
 enum { SIDE = 7, N = SIDE * SIDE, RANK = 12, SOLVERS = 4 };
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-    dense d;
-} bench;
-
-static void new_data(eits_context *ctx, uint64_t state)
-{
-    for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        ctx->y[i] = (eits_real)small_random(&state);
-}
+typedef dense_bench bench;
 
 static eits_context *set_up(bench *b)
 {
-    memset(b, 0, sizeof *b);
-    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
-    small_context_open(&b->c, &b->made, 0);
-    b->d = dense_of(&b->c.model);
-    return &b->c.ctx;
-}
-
-static void tear_down(bench *b)
-{
-    dense_free(&b->d);
-    small_context_close(&b->c);
-    small_model_free(&b->made);
+    return dense_bench_open(b, (small_spec){.rank = RANK, .side = SIDE}, 0);
 }
 
 typedef struct way {
@@ -62,10 +41,10 @@ static eits_info solve(eits_context *ctx, way w, uint32_t limit)
     eits_forget(ctx);
     if (w.warm) {
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        new_data(ctx, 71);
+        small_new_data(ctx, 71);
         CHECK_EQUAL(eits_solve(ctx), EITS_OK);
     }
-    new_data(ctx, 72);
+    small_new_data(ctx, 72);
     for (uint32_t i = 0; w.warm && i < RANK; ++i) { /* near what the start is for */
         eits_real kept = ctx->y[i];
         uint64_t state = 71;
@@ -121,7 +100,7 @@ static void every_limit_holds(void)
                 CHECK(spent == free_run.macs || warm);
                 const eits_info enough = solve(ctx, w, (uint32_t)(2 * free_run.macs));
                 CHECK(enough.macs == free_run.macs && enough.gap == free_run.gap && enough.stop == free_run.stop);
-                tear_down(&b);
+                dense_bench_close(&b);
             }
         }
     }
@@ -139,7 +118,7 @@ static void to_the_last_mac(void)
         const eits_info less = solve(ctx, w, (uint32_t)free_run.macs - 1);
         CHECK_EQUAL(less.stop, EITS_STOP_MACS);
         CHECK_EQUAL(less.iterations, free_run.iterations - 1);
-        tear_down(&b);
+        dense_bench_close(&b);
     }
 }
 
@@ -161,7 +140,7 @@ static void beside_step_halvings(void)
             CHECK(info.stop == EITS_STOP_DIVERGED || info.stop == EITS_STOP_MACS || info.stop == EITS_STOP_ITERATIONS);
         }
     }
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 /* A frame's own multiply-accumulates are always spent; what is left of the limit is the solver's. */
@@ -187,7 +166,7 @@ static void of_a_whole_frame(void)
             least = limit == 2 ? info.macs : least; /* the first frame also builds the basis */
             CHECK(limit <= 2 || info.macs <= (limit > least ? limit : least));
         }
-        tear_down(&b);
+        dense_bench_close(&b);
     }
 }
 

@@ -14,25 +14,11 @@
 
 enum { SIDE = 8, N = SIDE * SIDE, RANK = 16 };
 
-typedef struct bench {
-    small_model made;
-    small_context c;
-    dense d;
-} bench;
+typedef dense_bench bench;
 
 static eits_context *set_up(bench *b, small_spec spec)
 {
-    b->made = small_model_make(spec);
-    small_context_open(&b->c, &b->made, 1);
-    b->d = dense_of(&b->c.model);
-    return &b->c.ctx;
-}
-
-static void tear_down(bench *b)
-{
-    dense_free(&b->d);
-    small_context_close(&b->c);
-    small_model_free(&b->made);
+    return dense_bench_open(b, spec, 1);
 }
 
 static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
@@ -100,7 +86,7 @@ static void gate_and_lambda_rule(void)
     set_options(ctx, o);
     ctx->baseline.lambda_noise = (eits_real)(100 * top);
     CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS); /* no gate, and lambda_abs does not look at the noise */
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 static void warm_start_saves_iterations(void)
@@ -122,7 +108,7 @@ static void warm_start_saves_iterations(void)
         CHECK_EQUAL(info.stop, EITS_STOP_GAP);
         CHECK(info.gap_rel <= R(1e-4));
         needed[warm] = info.iterations;
-        tear_down(&b);
+        dense_bench_close(&b);
     }
     CHECK(needed[0] >= 10);
     CHECK(2 * needed[1] <= needed[0]);
@@ -153,7 +139,7 @@ static void no_ghost_after_lift_off(void)
     for (int j = 0; j < N; ++j)
         CHECK(fabs(after[j]) < 0.1 * peak);
     free(after);
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 static void warm_start_is_forgotten(void)
@@ -189,7 +175,7 @@ static void warm_start_is_forgotten(void)
     (void)solve(ctx);
     CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
     eits_forget(NULL);
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 /* A stated Lipschitz constant that is too small: the step is halved until the objective falls. */
@@ -225,7 +211,7 @@ static void step_too_large(void)
         }
         free(y);
         free(x);
-        tear_down(&b);
+        dense_bench_close(&b);
     }
 }
 
@@ -248,7 +234,7 @@ static void ending_above_the_start(void)
         CHECK_EQUAL(info.stop, above ? EITS_STOP_DIVERGED : EITS_STOP_ITERATIONS);
         CHECK_EQUAL(info.nonzeros, above ? 0 : RANK);
         CHECK_NEAR(ctx->x[0], above ? 0 : 1.98 * (1 - lambda), 1e-5);
-        tear_down(&b);
+        dense_bench_close(&b);
     }
 }
 
@@ -276,7 +262,7 @@ static void step_absurdly_large(void)
                 CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
                 CHECK_EQUAL(count, 0);
             }
-            tear_down(&b);
+            dense_bench_close(&b);
         }
     }
 }
@@ -297,7 +283,7 @@ static void data_that_are_not_finite(void)
         for (int j = 0; j < N; ++j)
             CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
     }
-    tear_down(&b);
+    dense_bench_close(&b);
     /* coefficients that are finite, an image that is not */
     bench w;
     w.made = small_model_make(RANDOM);
@@ -310,7 +296,7 @@ static void data_that_are_not_finite(void)
     CHECK_EQUAL(eits_solve(&w.c.ctx), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
     for (int j = 0; j < N; ++j)
         CHECK(isfinite((double)w.c.ctx.image[j]) && (sizeof(eits_real) == 8 || w.c.ctx.image[j] == 0));
-    tear_down(&w);
+    dense_bench_close(&w);
 }
 
 /* Frames in other units: the gain takes them up. By powers of two to the bit, by others within rounding. */
@@ -344,7 +330,7 @@ static void units_do_not_matter(void)
         CHECK_NEAR(dense_greatest_difference(as_doubles, ctx->image, N), 0, u < 4 ? 0 : 200 * EPS * peak);
         CHECK_NEAR(ctx->info.lambda, first_info.lambda, 100 * EPS * (double)first_info.lambda);
         free(as_doubles);
-        tear_down(&b);
+        dense_bench_close(&b);
     }
     /* and reduced data in other units give coefficients in them */
     bench b;
@@ -361,7 +347,7 @@ static void units_do_not_matter(void)
             CHECK(ctx->x[j] == first[j] * (eits_real)ldexp(1, power));
         CHECK(info.gap_rel > 0);
     }
-    tear_down(&b);
+    dense_bench_close(&b);
 }
 
 int main(void)

@@ -22,18 +22,12 @@ typedef struct bench {
     small_context c;
 } bench;
 
-static void new_data(eits_context *ctx, uint64_t state)
-{
-    for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        ctx->y[i] = (eits_real)small_random(&state);
-}
-
 static eits_context *set_up(bench *b, small_spec spec, int prepared)
 {
     memset(b, 0, sizeof *b);
     b->made = small_model_make(spec);
     small_context_open(&b->c, &b->made, prepared);
-    new_data(&b->c.ctx, 61);
+    small_new_data(&b->c.ctx, 61);
     return &b->c.ctx;
 }
 
@@ -93,7 +87,7 @@ static void looking_always_gives_the_bits_of_fista(void)
                         look_always(&o);
                         o.warm_start = 1;
                         (void)solve(ctx, o);
-                        new_data(ctx, 62); /* and from there to other data */
+                        small_new_data(ctx, 62); /* and from there to other data */
                         (void)solve(ctx, o);
                     }
                     CHECK(b[0].c.ctx.info.nonzeros > 0);
