@@ -43,6 +43,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_sweeps = 6,
         .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
+        .findings = EITS_FINDINGS_ALL,
     };
     *options = chosen;
     return EITS_OK;
@@ -155,7 +156,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
                       in_range(o->touch_min_radius_mm, R(1e-6), huge) &&
                       in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
                       in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
-                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000;
+                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL;
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)

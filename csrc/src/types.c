@@ -1,4 +1,4 @@
-#include "eitskin/types.h"
+#include "eitskin/findings.h"
 
 const char *eits_status_text(eits_status status)
 {
@@ -21,6 +21,21 @@ const char *eits_status_text(eits_status status)
     case EITS_E_NOT_FINITE: return "the result would not be finite";
     }
     return "unknown status";
+}
+
+const char *eits_finding_text(eits_finding finding)
+{
+    switch (finding) {
+    case EITS_FINDING_SATURATED: return "saturated";
+    case EITS_FINDING_ELECTRODE_OPEN: return "electrode open";
+    case EITS_FINDING_BRIDGED: return "electrodes bridged";
+    case EITS_FINDING_GLITCH: return "glitch";
+    case EITS_FINDING_ELECTRODE_NOISY: return "electrode noisy";
+    case EITS_FINDING_MISFIT: return "misfit";
+    case EITS_FINDING_STALE_REFERENCE: return "stale reference";
+    case EITS_FINDING_CROWDED: return "crowded";
+    }
+    return "unknown finding";
 }
 
 #define TEXT_OF(x) #x

@@ -6,6 +6,7 @@
 #ifndef EITSKIN_CONTEXT_H
 #define EITSKIN_CONTEXT_H
 
+#include "eitskin/findings.h"
 #include "eitskin/model.h"
 #include "eitskin/types.h"
 
@@ -46,6 +47,7 @@ typedef struct eits_options {
     uint32_t touch_sweeps; /* sweeps of the off-grid fit over all touches; 0: peaks with their strengths only */
     eits_real follow_mm;   /* a touch that moved at most so far since the last frame keeps its id */
     uint32_t mac_limit;    /* > 0: stop where the next step and the gap after it would take info.macs beyond this; see solve.h */
+    uint32_t findings;     /* bits of eits_finding that are looked for; EITS_FINDINGS_ALL by default */
 } eits_options;
 
 /* Why the solver stopped. */
@@ -78,6 +80,11 @@ typedef struct eits_info {
     eits_real gap_rel;    /* gap / (|y|^2 / 2) */
     eits_real residual;   /* |y - S x| */
     eits_real data_norm;  /* |y| */
+    uint32_t findings;    /* bits of eits_finding; CROWDED is set by eits_find_touches */
+    uint32_t saturated;   /* rows, masked ones apart */
+    uint32_t glitches;    /* rows left out as glitches */
+    eits_real misfit;     /* share of |d| beyond noise that the model's sheet cannot give, 0 to 1; 0 where it was not judged */
+    uint64_t open_electrodes, bridged_electrodes, noisy_electrodes; /* bit e: electrode e, of the first 64; ctx->electrode has all */
 } eits_info;
 
 typedef struct eits_touch {
@@ -101,6 +108,7 @@ typedef struct eits_baseline {
     eits_real correlation;  /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
     eits_real noise_v;      /* rms over rows of the quiet frames' deviation, V; 0 if unknown */
     eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames; 0 if unknown */
+    uint32_t glitches;      /* readings of quiet frames that were left out of the reference */
 } eits_baseline;
 
 typedef struct eits_context {
@@ -109,7 +117,8 @@ typedef struct eits_context {
     eits_options options;
     eits_baseline baseline;
     uint8_t *bad;            /* n_rows: masked by the caller */
-    uint8_t *unusable;       /* n_rows: masked in this frame */
+    uint8_t *unusable;       /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
+    uint8_t electrode[EITS_MOST_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
     uint8_t *basis_for;      /* n_folded: which rows of each fold were in use when the basis below was built */
     eits_real *d;            /* n_folded: data of this frame */
     eits_real *y;            /* stride: reduced data, projected */

@@ -3,6 +3,7 @@
 #define EITSKIN_H
 
 #include "eitskin/types.h"
+#include "eitskin/findings.h"
 #include "eitskin/model.h"
 #include "eitskin/context.h"
 #include "eitskin/frame.h"

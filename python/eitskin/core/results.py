@@ -14,6 +14,10 @@ SIGNS = ("increase", "decrease", "both")
 SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
+FINDINGS = (  # bit k of eits_info.findings, as eits_finding_text names it
+    "saturated", "electrode open", "electrodes bridged", "glitch", "electrode noisy", "misfit", "stale reference", "crowded",
+)  # fmt: skip
+ALL_FINDINGS = 2 ** len(FINDINGS) - 1
 STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
 
@@ -24,7 +28,7 @@ class Options:
     ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both". ``solver`` is "fista"
     (every column in every iteration), "working-set" (FISTA on the columns that may differ from zero), "coordinate" (sweeps of
     coordinate descent) or "active-set" (rounds to the exact optimum). ``mac_limit`` (0: none): the best so far when the next
-    step would take the solve beyond so many multiply-accumulates.
+    step would take the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of ``FINDINGS``.
     """
 
     iterations: int
@@ -51,6 +55,7 @@ class Options:
     saturation_v: float = 0.0
     touch_sweeps: int = 6
     mac_limit: int = 0
+    findings: int = ALL_FINDINGS
 
 
 WHOLE = {
@@ -60,6 +65,7 @@ WHOLE = {
     "max_masked": (0, 2**32 - 1),
     "touch_sweeps": (0, 1000),
     "mac_limit": (0, 2**32 - 1),
+    "findings": (0, ALL_FINDINGS),
 }
 SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_share")
 
