@@ -135,8 +135,6 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
         instrument->settings = settings;
         instrument->engine.tared = instrument->engine.angle_known = false;
         instrument->stream.what &= EITS_STREAM_RAW;
-        if (instrument->engine.open)
-            fw_engine_expect(&instrument->engine);
     } else {
         checked = answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, sample_rate_hz), 0);
     }
@@ -156,7 +154,8 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
         outside(&bad, offsetof(eits_command_solver, sign), c.sign, 0, EITS_SIGN_BOTH) ||
         share_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
         share_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
-        outside(&bad, offsetof(eits_command_solver, solver), c.solver, 0, EITS_SOLVER_ACTIVE_SET))
+        outside(&bad, offsetof(eits_command_solver, solver), c.solver, 0, EITS_SOLVER_ACTIVE_SET) ||
+        outside(&bad, offsetof(eits_command_solver, findings), c.findings, 0, EITS_FINDINGS_ALL))
         return bad;
     if (!instrument->engine.open)
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
@@ -169,6 +168,7 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
     options.gap_rel = c.gap_rel;
     options.solver = (eits_solver)c.solver;
     options.mac_limit = c.mac_limit;
+    options.findings = c.findings;
     const eits_status status = eits_set_options(&instrument->engine.ctx, &options);
     return status == EITS_OK ? ok() : answer(EITS_REPLY_CORE, (int32_t)status, 0);
 }

@@ -22,7 +22,7 @@ size_t fw_engine_needs(const eits_model *model)
 {
     const size_t rows = model->n_rows;
     return EITS_ALIGN16(eits_workspace_size(model, 0)) + 2 * frame_bytes(model) + EITS_ALIGN16(rows * sizeof(uint16_t)) +
-           EITS_ALIGN16(rows * sizeof(float)) + EITS_ALIGN16(rows) + kept_bytes(model);
+           EITS_ALIGN16(rows) + kept_bytes(model);
 }
 
 static void *take(uint8_t **next, size_t bytes)
@@ -45,7 +45,6 @@ static void lay_out(fw_engine *engine)
         frame->quality = (uint8_t *)(frame->volts + rows);
     }
     engine->unique = take(&next, rows * sizeof(uint16_t));
-    engine->expected = take(&next, rows * sizeof(float));
     engine->flags = take(&next, rows);
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
     engine->kept.bad = end - EITS_ALIGN16(rows); /* not cleared: it may hold what is to be restored */
@@ -87,7 +86,6 @@ eits_status fw_engine_open(fw_engine *engine, const eits_model *model)
     list_unique(engine);
     engine->used_bytes = needs;
     engine->open = true;
-    fw_engine_expect(engine);
     return EITS_OK;
 }
 
@@ -102,27 +100,6 @@ void fw_engine_close(fw_engine *engine)
 fw_scan_table fw_engine_table(const fw_engine *engine)
 {
     return (fw_scan_table){engine->model.protocol, engine->model.n_rows, engine->unique, engine->n_unique};
-}
-
-static float magnitude(float value)
-{
-    return value < 0 ? -value : value;
-}
-
-void fw_engine_expect(fw_engine *engine)
-{
-    const eits_model *model = &engine->model;
-    const eits_baseline *baseline = &engine->ctx.baseline;
-    for (uint32_t i = 0; i < model->n_rows; ++i) {
-        const float v0 = magnitude(baseline->v0[i]);
-        engine->expected[i] = engine->tared && v0 >= 0 ? v0 : 0; /* NaN: masked at the tare */
-    }
-    for (uint32_t k = 0; !engine->tared && k < model->n_folded; ++k) {
-        const eits_fold fold = model->fold[k];
-        engine->expected[fold.first] = magnitude(model->v_ref[k]);
-        if (fold.second != EITS_FOLD_NONE)
-            engine->expected[fold.second] = magnitude(model->v_ref[k]);
-    }
 }
 
 void fw_engine_keep(fw_engine *engine)
@@ -185,6 +162,5 @@ eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, floa
         fw_engine_restore(engine);
     else
         engine->tared = engine->angle_known = false;
-    fw_engine_expect(engine);
     return status;
 }

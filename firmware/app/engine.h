@@ -28,7 +28,6 @@ typedef struct fw_engine {
     fw_frame frames[2];
     uint16_t *unique;        /* rows that are no other's reciprocal */
     uint32_t n_unique;
-    float *expected;         /* n_rows: magnitude of each row's voltage on the untouched skin, V; 0: unknown */
     uint8_t *flags;          /* n_rows: bits of the frame under way */
     fw_kept kept;
 } fw_engine;
@@ -45,9 +44,6 @@ void fw_engine_close(fw_engine *engine);
 
 /* The table that the scan measures. */
 fw_scan_table fw_engine_table(const fw_engine *engine);
-
-/* Learn what row magnitudes are to be expected from the reference frame, or untared from the model. */
-void fw_engine_expect(fw_engine *engine);
 
 /* Keep baseline, options, masks and angle; restore puts them back, the warm start forgotten. */
 void fw_engine_keep(fw_engine *engine);

@@ -19,26 +19,39 @@ static void tell(fw_faults *faults, eits_fault code, bool there, fw_fault_detail
     (void)fw_outbox_send(faults->outbox, EITS_PACKET_FAULT, &packet, sizeof packet, NULL, 0);
 }
 
-static uint32_t with_bit(uint32_t bits, uint32_t bit, bool set)
+static bool of_electrode(eits_fault code)
 {
-    return set ? bits | bit : bits & ~bit;
+    return code == EITS_FAULT_ELECTRODE_OPEN || code == EITS_FAULT_BRIDGED || code == EITS_FAULT_ELECTRODE_NOISY;
+}
+
+static uint32_t place_of(eits_fault code, fw_fault_detail detail)
+{
+    return of_electrode(code) ? (uint32_t)detail.index & 31u : 0;
+}
+
+static uint32_t with_bit(uint32_t bits, uint32_t place, bool set)
+{
+    return set ? bits | 1u << place : bits & ~(1u << place);
 }
 
 void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail)
 {
-    const uint32_t bit = 1u << code;
-    if (code == EITS_FAULT_ELECTRODE_OPEN) {
-        const uint32_t electrode = 1u << ((uint32_t)detail.index & 31u);
-        if (((faults->open_electrodes & electrode) != 0) == there)
-            return;
-        faults->open_electrodes = with_bit(faults->open_electrodes, electrode, there);
-        faults->raised = with_bit(faults->raised, bit, faults->open_electrodes != 0);
-    } else {
-        if (((faults->raised & bit) != 0) == there)
-            return;
-        faults->raised = with_bit(faults->raised, bit, there);
-    }
+    const uint32_t place = place_of(code, detail);
+    faults->clean[code][place] = 0;
+    if (((faults->there[code] >> place & 1u) != 0) == there)
+        return;
+    faults->there[code] = with_bit(faults->there[code], place, there);
+    faults->raised = with_bit(faults->raised, code, faults->there[code] != 0);
     tell(faults, code, there, detail);
+}
+
+void fw_fault_found(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail)
+{
+    const uint32_t place = place_of(code, detail);
+    if (found)
+        fw_fault_set(faults, code, true, detail);
+    else if ((faults->there[code] >> place & 1u) != 0 && ++faults->clean[code][place] >= EITS_FAULT_CLEAN_FRAMES)
+        fw_fault_set(faults, code, false, detail);
 }
 
 bool fw_fault_is(const fw_faults *faults, eits_fault code)
@@ -48,10 +61,8 @@ bool fw_fault_is(const fw_faults *faults, eits_fault code)
 
 void fw_faults_clear(fw_faults *faults, uint32_t frame)
 {
-    for (uint32_t code = 1; code < 32; ++code) {
-        for (int32_t e = 0; code == EITS_FAULT_ELECTRODE_OPEN && e < 32; ++e)
-            fw_fault_set(faults, EITS_FAULT_ELECTRODE_OPEN, false, (fw_fault_detail){.frame = frame, .index = e});
-        if (code != EITS_FAULT_ELECTRODE_OPEN)
-            fw_fault_set(faults, (eits_fault)code, false, (fw_fault_detail){.frame = frame});
+    for (uint32_t code = 1; code < EITS_FAULTS; ++code) {
+        for (int32_t k = 0; k < 32; ++k)
+            fw_fault_set(faults, (eits_fault)code, false, (fw_fault_detail){.frame = frame, .index = k});
     }
 }

@@ -1,4 +1,5 @@
-/* Faults: each is told once when it rises and once when it has gone. */
+/* Faults: each is told once when it rises and once when it has gone. Those of an electrode (ELECTRODE_OPEN, BRIDGED,
+ * ELECTRODE_NOISY) count for each electrode, detail.index, below 32. */
 #ifndef FW_FAULTS_H
 #define FW_FAULTS_H
 
@@ -6,8 +7,9 @@
 
 typedef struct fw_faults {
     fw_outbox *outbox;
-    uint32_t raised;          /* bit k: fault number k */
-    uint32_t open_electrodes; /* bit e: electrode e */
+    uint32_t raised;             /* bit k: fault number k */
+    uint32_t there[EITS_FAULTS]; /* of an electrode's: bit e; of others: bit 0 */
+    uint8_t clean[EITS_FAULTS][32]; /* frames in a row without what is there, by the same bits */
 } fw_faults;
 
 typedef struct fw_fault_detail {
@@ -18,9 +20,12 @@ typedef struct fw_fault_detail {
 
 void fw_faults_init(fw_faults *faults, fw_outbox *outbox);
 
-/* The fault is there, or is not: a packet goes out where that changed. ELECTRODE_OPEN counts for each electrode (detail.index,
- * below 32). */
+/* The fault is there, or is not: a packet goes out where that changed. */
 void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail);
+
+/* A frame shows the fault, or does not: it rises at once, and goes with the EITS_FAULT_CLEAN_FRAMES-th frame in a row that does
+ * not, so that what comes and goes with the noise does not fill the line. */
+void fw_fault_found(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail);
 
 bool fw_fault_is(const fw_faults *faults, eits_fault code);
 

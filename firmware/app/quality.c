@@ -5,12 +5,17 @@
 
 enum { FAILED = EITS_QUALITY_SATURATED | EITS_QUALITY_UNSETTLED, UNUSABLE = FAILED | EITS_QUALITY_OPEN | EITS_QUALITY_MASKED };
 
-static float rms(const float *values, uint32_t count)
+/* Of the voltages that the model expects, over all rows that have a fold. */
+static float rms_expected(const eits_model *model)
 {
     float sum = 0;
-    for (uint32_t i = 0; i < count; ++i)
-        sum += values[i] * values[i];
-    return count > 0 ? sqrtf(sum / (float)count) : 0;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const uint32_t sides = model->fold[k].second == EITS_FOLD_NONE ? 1 : 2;
+        sum += (float)sides * model->v_ref[k] * model->v_ref[k];
+        count += sides;
+    }
+    return sum > 0 ? sqrtf(sum / (float)count) : 0;
 }
 
 static float rms_of_z(const fw_engine *engine, const fw_frame *frame)
@@ -40,29 +45,42 @@ void fw_quality_prepare(fw_engine *engine, fw_frame *frame)
     }
 }
 
+typedef struct evidence {
+    uint32_t significant[FW_ELECTRODES]; /* rows */
+    uint32_t alive;                      /* bit e: a row of electrode e is */
+} evidence;
+
+/* What one row says of its electrodes, given the square of the magnitude below which it is dead. */
+static void weigh(const fw_engine *engine, const fw_frame *frame, uint32_t row, float limit2, evidence *so_far)
+{
+    if (row == EITS_FOLD_NONE || engine->flags[row] == 0 || (frame->quality[row] & EITS_QUALITY_UNSETTLED) != 0 ||
+        engine->ctx.bad[row])
+        return;
+    const fw_iq z = frame->z[row];
+    const bool dead = (frame->quality[row] & EITS_QUALITY_SATURATED) != 0 || z.i * z.i + z.q * z.q < limit2;
+    for (uint32_t k = 0; k < 4; ++k) {
+        const uint32_t electrode = engine->model.protocol[4 * (size_t)row + k];
+        ++so_far->significant[electrode];
+        so_far->alive |= (uint32_t)!dead << electrode;
+    }
+}
+
 static uint32_t find_open(const fw_engine *engine, const fw_frame *frame)
 {
     const eits_model *model = &engine->model;
-    const float noise = engine->tared ? engine->ctx.baseline.noise_v : 0, expected_rms = rms(engine->expected, model->n_rows);
-    /* untared, the model tells shares only: the frame itself gives the scale */
-    const float scale = engine->tared || !(expected_rms > 0) ? 1 : rms_of_z(engine, frame) / expected_rms;
-    uint32_t significant[FW_ELECTRODES] = {0}, alive = 0, open = 0;
-    for (uint32_t i = 0; i < model->n_rows; ++i) {
-        const float expected = scale * engine->expected[i], share = FW_OPEN_SHARE * expected;
-        const float limit = share > FW_OPEN_NOISE * noise ? share : FW_OPEN_NOISE * noise;
-        if (engine->flags[i] == 0 || (frame->quality[i] & EITS_QUALITY_UNSETTLED) != 0 || engine->ctx.bad[i] ||
-            !(expected > scale * FW_OPEN_SIGNIFICANT * expected_rms) || expected < 10 * limit)
+    const float expected_rms = rms_expected(model), least = FW_OPEN_SIGNIFICANT * expected_rms;
+    const float share = expected_rms > 0 ? FW_OPEN_SHARE * rms_of_z(engine, frame) / expected_rms : 0;
+    evidence found = {.alive = 0};
+    uint32_t open = 0;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const float expected2 = model->v_ref[k] * model->v_ref[k];
+        if (!(expected2 > least * least))
             continue;
-        const fw_iq z = frame->z[i];
-        const bool dead = (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 || z.i * z.i + z.q * z.q < limit * limit;
-        for (uint32_t k = 0; k < 4; ++k) {
-            const uint32_t electrode = model->protocol[4 * (size_t)i + k];
-            ++significant[electrode];
-            alive |= (uint32_t)!dead << electrode;
-        }
+        weigh(engine, frame, model->fold[k].first, share * share * expected2, &found);
+        weigh(engine, frame, model->fold[k].second, share * share * expected2, &found);
     }
     for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
-        if (significant[e] >= FW_OPEN_LEAST_ROWS && (alive & 1u << e) == 0)
+        if (found.significant[e] >= FW_OPEN_LEAST_ROWS && (found.alive & 1u << e) == 0)
             open |= 1u << e;
     }
     return open;
@@ -78,13 +96,13 @@ static void mark_open(const fw_engine *engine, fw_frame *frame, uint32_t open)
     }
 }
 
-static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_findings *findings)
+static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_judgement *judged)
 {
     const eits_model *model = &engine->model;
     const float all = rms_of_z(engine, frame);
     float worst = 0;
-    findings->checked = all > 0;
-    for (uint32_t k = 0; k < model->n_folded && findings->checked; ++k) {
+    judged->checked = all > 0;
+    for (uint32_t k = 0; k < model->n_folded && judged->checked; ++k) {
         const eits_fold fold = model->fold[k];
         if (fold.second == EITS_FOLD_NONE || ((frame->quality[fold.first] | frame->quality[fold.second]) & UNUSABLE) != 0)
             continue;
@@ -96,10 +114,10 @@ static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_findi
         }
         if (share > worst) {
             worst = share;
-            findings->worst_row = fold.first;
+            judged->worst_row = fold.first;
         }
     }
-    findings->worst_permille = (uint32_t)(1000 * (worst < 1000 ? worst : 1000) + 0.5f);
+    judged->worst_permille = (uint32_t)(1000 * (worst < 1000 ? worst : 1000) + 0.5f);
 }
 
 /* Second rows get what their first ones measured. */
@@ -115,27 +133,25 @@ static void copy_reciprocals(const fw_engine *engine, fw_frame *frame)
     }
 }
 
-void fw_quality_judge(fw_engine *engine, fw_frame *frame, fw_findings *findings)
+void fw_quality_judge(fw_engine *engine, fw_frame *frame, bool by_model, fw_judgement *judged)
 {
     const uint32_t rows = engine->model.n_rows;
-    *findings = (fw_findings){0};
-    for (uint32_t i = 0; i < rows; ++i) {
-        if ((frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !engine->ctx.bad[i] && findings->saturated++ == 0)
-            findings->first_saturated = i;
-    }
-    findings->open = find_open(engine, frame);
-    mark_open(engine, frame, findings->open);
+    *judged = (fw_judgement){.open = by_model ? find_open(engine, frame) : 0};
+    mark_open(engine, frame, judged->open);
     for (uint32_t i = 0; i < rows; ++i) {
         if (engine->ctx.bad[i])
             frame->quality[i] |= EITS_QUALITY_MASKED;
     }
     if ((frame->flags & EITS_RAW_RECIPROCAL) == 0)
-        check_reciprocity(engine, frame, findings);
+        check_reciprocity(engine, frame, judged);
     if ((frame->flags & (EITS_RAW_RECIPROCAL | EITS_RAW_CHECK)) != 0)
         copy_reciprocals(engine, frame);
     for (uint32_t i = 0; i < rows; ++i) {
         if (engine->ctx.bad[i])
             frame->quality[i] |= EITS_QUALITY_MASKED;
+        const bool saturated = (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !engine->ctx.bad[i];
+        if (saturated && judged->saturated++ == 0)
+            judged->first_saturated = i;
         if ((frame->quality[i] & UNUSABLE) != 0)
             frame->volts[i] = (float)NAN;
     }

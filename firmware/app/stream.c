@@ -2,31 +2,51 @@
 #include "app/angle.h"
 #include "app/instrument.h"
 
-static void tell_faults(fw_instrument *instrument, const fw_frame *frame, const fw_findings *findings)
+/* What the scan itself tells. */
+static void tell_scan(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
 {
     fw_faults *faults = &instrument->faults;
     fw_fault_detail detail = {.frame = frame->number};
     fw_fault_set(faults, EITS_FAULT_SCAN_STALLED, false, detail);
-    for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
-        detail.index = (int32_t)e;
-        fw_fault_set(faults, EITS_FAULT_ELECTRODE_OPEN, (findings->open & 1u << e) != 0, detail);
-    }
-    detail.index = (int32_t)findings->first_saturated;
-    detail.value = (int32_t)findings->saturated;
-    fw_fault_set(faults, EITS_FAULT_SATURATED, findings->saturated > 0, detail);
-    detail.index = 0;
     detail.value = (int32_t)frame->bus_errors;
     fw_fault_set(faults, EITS_FAULT_BUS, frame->bus_errors > 0, detail);
-    if (!findings->checked)
+    detail.index = (int32_t)judged->first_saturated;
+    detail.value = (int32_t)judged->saturated;
+    fw_fault_found(faults, EITS_FAULT_SATURATED, judged->saturated > 0, detail);
+    if (!judged->checked)
         return;
     /* one frame in which a touch moves has reciprocals that disagree too */
-    const bool doubtful = (float)findings->worst_permille > 1000.0f * FW_RECIPROCITY_SHARE;
+    const bool doubtful = (float)judged->worst_permille > 1000.0f * FW_RECIPROCITY_SHARE;
     instrument->doubtful = doubtful ? instrument->doubtful + 1 : 0;
     instrument->agreeing = doubtful ? 0 : instrument->agreeing + 1;
-    detail.index = (int32_t)findings->worst_row;
-    detail.value = (int32_t)findings->worst_permille;
+    detail.index = (int32_t)judged->worst_row;
+    detail.value = (int32_t)judged->worst_permille;
     if (instrument->doubtful >= FW_RECIPROCITY_FRAMES || instrument->agreeing >= FW_RECIPROCITY_FRAMES)
         fw_fault_set(faults, EITS_FAULT_RECIPROCITY, doubtful, detail);
+}
+
+/* What the core found, whose info is of this frame; `solved`: not its frame stage alone. */
+static void tell_found(fw_instrument *instrument, const fw_frame *frame, bool solved)
+{
+    const eits_info *info = &instrument->engine.ctx.info;
+    instrument->glitches += info->glitches;
+    fw_found_open(&instrument->faults, frame->number, info->open_electrodes);
+    fw_found_skin(&instrument->faults, frame->number, info);
+    if (solved)
+        fw_found_reference(&instrument->faults, frame->number, info);
+}
+
+/* Look at a frame that is not solved: faults are told whether anything is streamed or not. */
+static void examine(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
+{
+    eits_context *ctx = &instrument->engine.ctx;
+    uint64_t macs;
+    ctx->info = (eits_info){0};
+    if (instrument->engine.tared)
+        (void)eits_frame_stage(ctx, frame->volts, instrument->engine.model.n_rows, &ctx->info.masked, &macs);
+    else
+        ctx->info.open_electrodes = judged->open;
+    tell_found(instrument, frame, !instrument->engine.tared); /* without a reference none is stale */
 }
 
 static void send_raw(fw_instrument *instrument, const fw_frame *frame, uint32_t flags)
@@ -47,9 +67,11 @@ static void take_tare(fw_instrument *instrument, const fw_frame *frame)
     const fw_tare_step step = fw_tare_add(&instrument->tare, &instrument->engine, frame, &status);
     if (step == FW_TARE_TAKEN || step == FW_TARE_DONE)
         send_raw(instrument, frame, EITS_RAW_QUIET);
-    if (step == FW_TARE_DONE)
+    if (step == FW_TARE_DONE) {
+        fw_fault_set(&instrument->faults, EITS_FAULT_STALE_REFERENCE, false, (fw_fault_detail){.frame = frame->number});
         fw_send_tare_reply(instrument, (fw_answer){0});
-    else if (step == FW_TARE_FAILED)
+    }
+    if (step == FW_TARE_FAILED)
         fw_send_tare_reply(instrument, (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)status}});
 }
 
@@ -94,7 +116,7 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
 }
 
 /* Returns the microseconds that the solver took, touches included. */
-static uint32_t solve(fw_instrument *instrument, const fw_frame *frame)
+static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
 {
     eits_context *ctx = &instrument->engine.ctx;
     eits_touch touches[EITS_MAX_TOUCHES];
@@ -124,6 +146,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame)
                                .gap_rel = info->gap_rel,
                                .residual = info->residual,
                                .data_norm = info->data_norm};
+    fw_found_head(&head, info, judged, &ctx->options);
     fw_stats_add(&instrument->stats, EITS_STAGE_SOLVE, head.solve_us);
     if (wanted)
         fw_stats_add(&instrument->stats, EITS_STAGE_TOUCHES, head.touch_us);
@@ -131,6 +154,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame)
     instrument->touched = count > 0;
     fw_fault_set(&instrument->faults, EITS_FAULT_SOLVER, status != EITS_OK,
                  (fw_fault_detail){.frame = frame->number, .value = (int32_t)status});
+    tell_found(instrument, frame, status == EITS_OK);
     send_solved(instrument, frame, &head, touches, count);
     return done_us - began_us;
 }
@@ -149,27 +173,33 @@ void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
     fw_engine *engine = &instrument->engine;
     fw_stream *stream = &instrument->stream;
     const bool quiet = fw_tare_wants(&instrument->tare, frame);
-    fw_findings findings;
+    const bool solved = engine->tared && (stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0;
+    fw_judgement judged;
     instrument->last_frame = frame->number;
     fw_quality_prepare(engine, frame);
     if (quiet ? fw_tare_first(&instrument->tare) : !engine->angle_known)
         fw_angle_learn(engine, frame);
     fw_angle_apply(engine, frame);
-    fw_quality_judge(engine, frame, &findings);
-    tell_faults(instrument, frame, &findings);
+    fw_quality_judge(engine, frame, quiet || !engine->tared, &judged);
+    tell_scan(instrument, frame, &judged);
     fw_stats_add(&instrument->stats, EITS_STAGE_SCAN, frame->scan_us);
     fw_stats_add(&instrument->stats, EITS_STAGE_DEMODULATE, frame->busy_us);
     if (quiet) {
+        fw_found_open(&instrument->faults, frame->number, judged.open);
         take_tare(instrument, frame);
         return;
     }
-    if (!due(stream))
+    if (!due(stream)) {
+        examine(instrument, frame, &judged);
         return;
+    }
     const uint32_t began_us = fw_now_us(instrument);
     uint32_t solving_us = 0;
     send_raw(instrument, frame, 0);
-    if ((stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0 && engine->tared)
-        solving_us = solve(instrument, frame);
+    if (solved)
+        solving_us = solve(instrument, frame, &judged);
+    else
+        examine(instrument, frame, &judged);
     const uint32_t done_us = fw_now_us(instrument);
     fw_stats_add(&instrument->stats, EITS_STAGE_SEND, done_us - began_us - solving_us);
     fw_stats_add(&instrument->stats, EITS_STAGE_FRAME, done_us - frame->time_us);

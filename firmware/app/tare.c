@@ -53,6 +53,5 @@ fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame
     tare->active = false;
     engine->tared = engine->angle_known = true;
     eits_forget(&engine->ctx);
-    fw_engine_expect(engine);
     return FW_TARE_DONE;
 }

@@ -88,11 +88,11 @@ static void test_two_open(void)
         b.sheet.detached[3] = b.sheet.detached[other] = true;
         sheet_solve(&b.sheet);
         host_run(&b.host, 60);
-        CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 1u << 3 | 1u << other);
+        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 3 | 1u << other);
         b.sheet.detached[3] = b.sheet.detached[other] = false;
         sheet_solve(&b.sheet);
         host_run(&b.host, 60);
-        CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 0);
+        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
     }
     bench_stop(&b);
 }
@@ -110,7 +110,7 @@ static void test_open_at_the_rail(void)
     tare();
     b.board.volts = to_the_rail;
     host_run(&b.host, 60);
-    CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 1u << 6);
+    CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 6);
     const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_SATURATED, true, 0);
     CHECK(fault != NULL);
     bench_stop(&b);
@@ -156,7 +156,7 @@ static void test_masked_row_is_not_judged(void)
     b.sheet.detached[5] = true;
     sheet_solve(&b.sheet);
     host_run(&b.host, 60);
-    CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 1u << 5);
+    CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 5);
     bench_stop(&b);
 }
 
@@ -173,7 +173,7 @@ static void test_touches_are_not_open(bool tared)
             sheet_touch(&b.sheet, 1.7 * place, -0.4 * place, place == 4 ? 2.5 : 1 + place, factors[f]);
             sheet_solve(&b.sheet);
             host_run(&b.host, 45);
-            CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 0);
+            CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
         }
     }
     CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
@@ -275,7 +275,7 @@ static void test_dead(void)
     tare();
     b.board.volts = nothing;
     host_run(&b.host, 60);
-    CHECK_EQUAL(b.host.instrument.faults.open_electrodes, 0xFFFF); /* a cable unplugged looks like this */
+    CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0xFFFF); /* a cable unplugged looks like this */
     CHECK(host_fault(&b.host, EITS_FAULT_SOLVER, true, 0) != NULL);
     const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
     const eits_packet_solved *head = (const void *)image->payload;

@@ -7,13 +7,13 @@
 #ifndef EITSKIN_LINK_H
 #define EITSKIN_LINK_H
 
-#include "eitskin/types.h"
+#include "eitskin/findings.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#define EITS_LINK_VERSION 1u       /* the first byte of every packet; another is refused */
+#define EITS_LINK_VERSION 2u       /* the first byte of every packet; another is refused */
 #define EITS_LINK_HEAD 8u
 #define EITS_LINK_MAX_PAYLOAD 16384u
 #define EITS_LINK_MAX_PACKET (EITS_LINK_HEAD + EITS_LINK_MAX_PAYLOAD + 4u)
@@ -72,7 +72,7 @@ typedef enum eits_quality {
     EITS_QUALITY_UNSETTLED = 2,   /* the multiplexers were switched later than the settling time before the first sample */
     EITS_QUALITY_RECIPROCITY = 4, /* it and its reciprocal disagree (full scans and checks) */
     EITS_QUALITY_COPIED = 8,      /* not measured: its reciprocal's value */
-    EITS_QUALITY_OPEN = 16,       /* one of its electrodes is taken to be open */
+    EITS_QUALITY_OPEN = 16,       /* one of its electrodes is taken to be open, before a tare or in it; after it the core tells */
     EITS_QUALITY_MASKED = 32      /* left out by MASK_ROW */
 } eits_quality;
 
@@ -86,8 +86,18 @@ typedef enum eits_fault {
     EITS_FAULT_SCAN_STALLED = 7,   /* the converter or its DMA gave nothing in time */
     EITS_FAULT_CRASH = 8,          /* the board restarted after a processor fault: words are pc, lr, cfsr, hfsr, address */
     EITS_FAULT_WATCHDOG = 9,       /* the board restarted because the program hung */
-    EITS_FAULT_BUS = 10            /* the generator or the multiplexers could not be written */
+    EITS_FAULT_BUS = 10,           /* the generator or the multiplexers could not be written */
+    /* what the core found in a frame (findings.h); so are 2 and 3 after a tare */
+    EITS_FAULT_BRIDGED = 11,         /* index: electrode; value: its partner, -1 where there are more; words: all, bit e */
+    EITS_FAULT_ELECTRODE_NOISY = 12, /* index: electrode */
+    EITS_FAULT_MISFIT = 13,          /* value: parts per thousand of the data that no sheet of the model's gives */
+    EITS_FAULT_STALE_REFERENCE = 14
 } eits_fault;
+#define EITS_FAULTS 15u
+
+/* ELECTRODE_OPEN, SATURATED and those from BRIDGED on are raised in the frame that shows them, and gone after so many frames in
+ * a row that do not. */
+#define EITS_FAULT_CLEAN_FRAMES 8u
 
 /* Bits of eits_packet_raw.flags */
 #define EITS_RAW_QUIET 1u      /* a frame of a tare */
@@ -157,6 +167,11 @@ typedef struct eits_packet_solved {
     uint32_t iterations, nonzeros;
     uint32_t macs, touch_macs;
     float lambda, lambda_max, lambda_noise, gap_rel, residual, data_norm;
+    uint32_t findings;  /* bits of eits_finding */
+    uint16_t saturated; /* rows at either end of the converter's range, masked ones apart */
+    uint16_t glitches;  /* rows left out as glitches */
+    float misfit;
+    uint64_t open_electrodes, bridged_electrodes, noisy_electrodes; /* bit e: electrode e */
 } eits_packet_solved;
 
 typedef struct eits_packet_touch {
@@ -186,6 +201,7 @@ typedef struct eits_packet_stats {
     uint32_t packets_sent, packets_dropped; /* since the link came up; a dropped packet still takes a sequence number */
     uint32_t deadlines_missed;
     uint32_t slots_repeated;                /* measurements taken again because the switch came too late */
+    uint32_t glitches;                      /* rows left out as glitches, of all frames after a tare */
     uint32_t link_packets, link_crc_errors, link_framing_errors, link_overruns;
     uint32_t stack_bytes, stack_used;       /* used: the most so far */
     uint32_t workspace_bytes, workspace_used;
@@ -228,6 +244,7 @@ typedef struct eits_command_solver {
     float lambda_rel, gap_rel;
     uint32_t solver;    /* eits_solver */
     uint32_t mac_limit; /* 0: none */
+    uint32_t findings;  /* bits of eits_finding that are looked for */
 } eits_command_solver;
 
 typedef struct eits_command_model_begin { uint32_t request, bytes, crc; } eits_command_model_begin; /* stops the scan */
