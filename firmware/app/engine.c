@@ -22,7 +22,7 @@ size_t fw_engine_needs(const eits_model *model)
 {
     const size_t rows = model->n_rows;
     return EITS_ALIGN16(eits_workspace_size(model, 0)) + 2 * frame_bytes(model) + EITS_ALIGN16(rows * sizeof(uint16_t)) +
-           EITS_ALIGN16(rows) + kept_bytes(model);
+           EITS_ALIGN16(rows) + EITS_ALIGN16(model->n_folded) + kept_bytes(model);
 }
 
 static void *take(uint8_t **next, size_t bytes)
@@ -46,6 +46,7 @@ static void lay_out(fw_engine *engine)
     }
     engine->unique = take(&next, rows * sizeof(uint16_t));
     engine->flags = take(&next, rows);
+    engine->sides = take(&next, engine->model.n_folded);
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
     engine->kept.bad = end - EITS_ALIGN16(rows); /* not cleared: it may hold what is to be restored */
     engine->kept.v0 = (float *)(void *)(end - kept_bytes(&engine->model));
@@ -100,6 +101,21 @@ void fw_engine_close(fw_engine *engine)
 fw_scan_table fw_engine_table(const fw_engine *engine)
 {
     return (fw_scan_table){engine->model.protocol, engine->model.n_rows, engine->unique, engine->n_unique};
+}
+
+/* Which sides are in use decides when the next solved frame builds its basis anew, and so its MACs: that is put back. */
+void fw_engine_examine(fw_engine *engine, const float *volts)
+{
+    eits_context *ctx = &engine->ctx;
+    const size_t folds = engine->model.n_folded;
+    const uint32_t stale = ctx->basis_stale;
+    uint64_t macs;
+    memcpy(engine->sides, ctx->basis_for, folds);
+    ctx->info = (eits_info){0};
+    (void)eits_frame_stage(ctx, volts, engine->model.n_rows, &ctx->info.masked, &macs);
+    const bool changed = memcmp(engine->sides, ctx->basis_for, folds) != 0;
+    memcpy(ctx->basis_for, engine->sides, folds);
+    ctx->basis_stale |= stale | (uint32_t)changed;
 }
 
 void fw_engine_keep(fw_engine *engine)

@@ -29,6 +29,7 @@ typedef struct fw_engine {
     uint16_t *unique;        /* rows that are no other's reciprocal */
     uint32_t n_unique;
     uint8_t *flags;          /* n_rows: bits of the frame under way */
+    uint8_t *sides;          /* n_folded: scratch */
     fw_kept kept;
 } fw_engine;
 
@@ -44,6 +45,10 @@ void fw_engine_close(fw_engine *engine);
 
 /* The table that the scan measures. */
 fw_scan_table fw_engine_table(const fw_engine *engine);
+
+/* The core's frame stage on a frame that is not solved: fills ctx.info as far as that goes. The frames that are solved get the
+ * bits that they would have got without it. */
+void fw_engine_examine(fw_engine *engine, const float *volts);
 
 /* Keep baseline, options, masks and angle; restore puts them back, the warm start forgotten. */
 void fw_engine_keep(fw_engine *engine);

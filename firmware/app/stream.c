@@ -39,13 +39,10 @@ static void tell_found(fw_instrument *instrument, const fw_frame *frame, bool so
 /* Look at a frame that is not solved: faults are told whether anything is streamed or not. */
 static void examine(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
 {
-    eits_context *ctx = &instrument->engine.ctx;
-    uint64_t macs;
-    ctx->info = (eits_info){0};
     if (instrument->engine.tared)
-        (void)eits_frame_stage(ctx, frame->volts, instrument->engine.model.n_rows, &ctx->info.masked, &macs);
+        fw_engine_examine(&instrument->engine, frame->volts);
     else
-        ctx->info.open_electrodes = judged->open;
+        instrument->engine.ctx.info = (eits_info){.open_electrodes = judged->open};
     tell_found(instrument, frame, !instrument->engine.tared); /* without a reference none is stale */
 }
 

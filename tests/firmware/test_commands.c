@@ -25,11 +25,11 @@ static void test_lengths(void)
 {
     const struct { eits_packet_type type; uint32_t size; } expected[] = {
         {EITS_PACKET_GET_INFO, 4},      {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},      {EITS_PACKET_SCAN, 24},
-        {EITS_PACKET_SOLVER, 36},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
+        {EITS_PACKET_SOLVER, 40},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
         {EITS_PACKET_MASK_ROW, 8},      {EITS_PACKET_RESET, 4},     {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
     for (size_t k = 0; k < sizeof expected / sizeof expected[0]; ++k) {
         uint8_t payload[64] = {0};
-        for (uint32_t size = 4; size <= 32; ++size) {
+        for (uint32_t size = 4; size <= 44; ++size) {
             if (size != expected[k].size)
                 REPLY(host_command(&b.host, expected[k].type, payload, size), EITS_REPLY_LENGTH, (int32_t)expected[k].size, 0);
         }
@@ -155,7 +155,7 @@ static eits_packet_reply solver_with(eits_command_solver c)
 static void test_solver(void)
 {
     const eits_command_solver good = {.iterations = 7, .max_touches = 3, .warm_start = 1, .sign = 2, .lambda_rel = 0.05f, .gap_rel = 0.01f,
-                                      .solver = EITS_SOLVER_COORDINATE, .mac_limit = 123456};
+                                      .solver = EITS_SOLVER_COORDINATE, .mac_limit = 123456, .findings = EITS_FINDING_GLITCH};
     eits_command_solver c = good;
     c.iterations = 0;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1);
@@ -181,6 +181,9 @@ static void test_solver(void)
     c = good;
     c.solver = 4;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 28, 3);
+    c = good;
+    c.findings = EITS_FINDINGS_ALL + 1;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 36, EITS_FINDINGS_ALL);
     const eits_options *options = &b.host.instrument.engine.ctx.options;
     CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->mac_limit, 0);
@@ -193,6 +196,7 @@ static void test_solver(void)
     CHECK_NEAR(options->lambda_rel, 0.05f, 0);
     CHECK_NEAR(options->gap_rel, 0.01f, 0);
     CHECK_EQUAL(options->solver, EITS_SOLVER_COORDINATE);
+    CHECK_EQUAL(options->findings, EITS_FINDING_GLITCH);
     CHECK_EQUAL(options->mac_limit, 123456);
 }
 

@@ -111,14 +111,17 @@ def _until(items: Iterator[LiveFrame | Fault | LinkEvent], seconds: float | None
 def _count(items: Iterable[LiveFrame | Fault | LinkEvent], summary: LiveSummary, frames: int) -> None:
     from tqdm import tqdm
 
-    from eitskin.device.live import LiveFrame, news_text
+    from eitskin.device.live import LiveFrame
+    from eitskin.device.news import News
     from eitskin.device.wire.packets import Fault
 
+    news = News()
     with tqdm(desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()) as bar:
         for item in items:
+            for text in news.lines(item):
+                bar.write(f"eitskin: {text}", file=sys.stderr)
             if isinstance(item, LiveFrame):
                 summary.add(item)
                 bar.update()
-                continue
-            summary.faults += isinstance(item, Fault) and item.raised
-            bar.write(f"eitskin: {news_text(item)}", file=sys.stderr)
+            else:
+                summary.faults += isinstance(item, Fault) and item.raised

@@ -61,6 +61,12 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     solver.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
     add_wish(solver)
     solver.add_argument("--sign", choices=("increase", "decrease", "both"), help="which changes to look for (default: increase)")
+    solver.add_argument(
+        "--ignore",
+        metavar="FINDING[,FINDING]",
+        help="do not look for saturated, electrode-open, electrodes-bridged, glitch, electrode-noisy, misfit, stale-reference, "
+        "crowded, or all (default: look for all)",
+    )
     start = solver.add_mutually_exclusive_group()
     start.add_argument("--warm", action="store_true", help="begin each frame from the last one's result")
     start.add_argument("--cold", action="store_true", help="begin each frame from nothing (default)")
@@ -193,8 +199,30 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
         raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
     warm = True if options.warm else False if options.cold else None
     return SolverSettings(
-        options.iterations, options.gap, warm, options.sign, solver=options.solver, mac_limit=options.mac_limit
-    )
+        options.iterations, options.gap, warm, options.sign, solver=options.solver, mac_limit=options.mac_limit,
+        findings=read_ignored(options.ignore),
+    )  # fmt: skip
+
+
+def read_ignored(text: str | None) -> int | None:
+    """The findings that are left, bit k of ``core.results.FINDINGS``, without those in "glitch,electrode-noisy" or "all"; None
+    for None.
+
+    Raises:
+        UsageError: one is unknown.
+    """
+    from eitskin.config import nearest
+    from eitskin.core.results import ALL_FINDINGS, FINDINGS
+
+    if text is None:
+        return None
+    names = [name.replace(" ", "-") for name in FINDINGS]
+    left = ALL_FINDINGS
+    for name in text.split(","):
+        if name != "all" and name not in names:
+            raise UsageError(f"--ignore {text}: {nearest(name, (*names, 'all'))}")
+        left &= 0 if name == "all" else ~(1 << names.index(name))
+    return left
 
 
 def check_scan(options: argparse.Namespace) -> None:
@@ -251,7 +279,8 @@ def prepare(
     Raises:
         EitskinError: a setting cannot be, the board refuses it, or the recording cannot be written.
     """
-    from eitskin.device.live import begin_scene, news_text, set_up, take_reference
+    from eitskin.device.live import begin_scene, set_up, take_reference
+    from eitskin.device.news import News
     from eitskin.device.recordings.run_file import RunRecorder
 
     if device.transport.replays:
@@ -269,11 +298,13 @@ def prepare(
             take_reference(device, frames, streamed=record is not None)
             if not simulated:
                 say("touch it")
-        began_us, news = begin_scene(device)
+        began_us, meanwhile = begin_scene(device)
         if truth is not None and began_us is not None:
             truth.begin(began_us)
-        for item in news:
-            say(news_text(item))
+        news = News()
+        for item in meanwhile:
+            for text in news.lines(item):
+                say(text)
     except BaseException:
         if recorder is not None:
             recorder.close()
@@ -301,7 +332,7 @@ def _wished_solver(options: argparse.Namespace, device: Device, known: KnownMode
     point = chosen_point(options, known.model, named.applied(board_options(known.model)), "f767", board_takes())
     say(settings_text(point, "f767"))
     kept = {name: value for name, value in point.configuration.solver_settings.items() if name in board_takes()}
-    return replace(SolverSettings(**kept), sign=named.sign, warm_start=named.warm_start)
+    return replace(SolverSettings(**kept), sign=named.sign, warm_start=named.warm_start, findings=named.findings)
 
 
 def _refuse_settings(options: argparse.Namespace, name: str) -> None:

@@ -51,25 +51,26 @@ def show(
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
-    from eitskin.device.live import LiveFrame, LiveSummary, finish, news_text
+    from eitskin.device.live import LiveFrame, LiveSummary, finish
+    from eitskin.device.news import News
     from eitskin.device.wire.packets import Fault
     from eitskin.study.watch import Watcher, line, table
     from eitskin.view.stream_picture import Album, draw_stream
 
-    summary, watcher, album = LiveSummary(), Watcher(known, truth), Album()
+    summary, watcher, album, news = LiveSummary(), Watcher(known, truth), Album(), News()
     broken: EitskinError | None = None
     try:
         for item in items:
+            for text in news.lines(item):
+                print(f"eitskin: {text}", file=sys.stderr, flush=True)
             if isinstance(item, LiveFrame):
                 summary.add(item)
                 seen = watcher.see(item)
                 if options.picture is not None:
                     album.add(seen)
                 print(json.dumps(table(seen)) if options.json else line(seen), flush=True)
-                continue
-            if isinstance(item, Fault):
+            elif isinstance(item, Fault):
                 summary.faults += item.raised
-            print(f"eitskin: {news_text(item)}", file=sys.stderr, flush=True)
     except KeyboardInterrupt:
         print("eitskin: stopped", file=sys.stderr)
     except EitskinError as error:

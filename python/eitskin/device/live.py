@@ -15,7 +15,7 @@ from eitskin.device.known_model import NAMES_IT, KnownModel, board_options
 from eitskin.device.link import LinkEvent
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
 from eitskin.device.wire.commands import StreamCommand
-from eitskin.device.wire.explain import fault_text, status_text
+from eitskin.device.wire.explain import status_text
 from eitskin.device.wire.packets import BoardStats, Fault, RawFrame, Solved, SolvedImage, SolvedTouches, Stream
 from eitskin.errors import DeviceError
 
@@ -257,14 +257,6 @@ def _frame(clock: _Clock, parts: dict[str, Any]) -> LiveFrame:
     first = next(iter(parts.values()))
     board_us = first.time_us if isinstance(first, RawFrame) else first.solved.time_us
     return LiveFrame(first.frame, clock.elapsed_us(board_us), board_us, **parts)
-
-
-def news_text(news: Fault | LinkEvent) -> str:
-    """A fault or an event of the link in a line."""
-    if isinstance(news, Fault):
-        return f"fault at frame {news.frame}: {fault_text(news)}" if news.raised else fault_text(news)
-    counted = f" ({news.missing} packets)" if news.missing else ""
-    return f"link: {news.kind}{counted}" + (f": {news.text}" if news.text else "")
 
 
 def finish(summary: LiveSummary, device: Device) -> LiveSummary:

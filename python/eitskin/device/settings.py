@@ -32,7 +32,7 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at none."""
+    """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at none, ``findings`` at all."""
 
     iterations: int | None = None
     gap_rel: float | None = None
@@ -42,6 +42,7 @@ class SolverSettings:
     max_touches: int | None = None
     solver: str | None = None
     mac_limit: int | None = None
+    findings: int | None = None
 
     @property
     def named(self) -> dict[str, Any]:

@@ -11,12 +11,12 @@ from eitskin.device.known_model import KnownModel, scanned_protocol
 from eitskin.device.live import begin_scene
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, collect
 from eitskin.device.wire.explain import fault_text
-from eitskin.device.wire.packets import BoardInfo, BoardStats, Fault, FaultCode
+from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault, FaultCode
 from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Report
 from eitskin.frames.doctor.subject import AS_GIVEN, Subject
 from eitskin.skin.skin import Skin
 
-NOT_FOR_THE_SKIN = frozenset((FaultCode.DEADLINE, FaultCode.WATCHDOG, FaultCode.CRASH))
+NOT_FOR_THE_SKIN = frozenset((FaultCode.DEADLINE, FaultCode.WATCHDOG, FaultCode.CRASH, FaultCode.STALE_REFERENCE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +68,11 @@ def board_subject(device: Device, measured: Measured, known: KnownModel | None, 
 
 def board_findings(report: Report, measured: Measured) -> Report:
     """``report`` with what the board itself says. Remedies of ``eitskin import`` are taken out: a board is mended by hand."""
-    told = {fault.code: fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised}
+    raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]
+    told = {(fault.code, fault.index if fault.code in ELECTRODE_FAULTS else 0): fault for fault in raised}
     own = [_finding(fault) for fault in told.values()]
-    own += [_standing(code) for code in measured.info.fault_codes if code not in told]
+    codes = {fault.code for fault in raised}
+    own += [_standing(code) for code in measured.info.fault_codes if code not in codes]
     missing = measured.quiet.missing + measured.touched.missing
     if missing:
         own.append(Finding("board-link", NOTE, f"{missing} packets were lost between board and host", {"missing": missing}))

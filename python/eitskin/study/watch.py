@@ -92,9 +92,9 @@ def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
 def line(seen: Seen) -> str:
     """A frame in a line."""
     frame = seen.frame
-    parts = [part for part in (_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame)) if part]
+    parts = [part for part in (_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame), _found_text(frame)) if part]
     if frame.refused:
-        parts = [f"refused: {frame.refused}", *([_raw_text(frame)] if frame.raw is not None else [])]
+        parts = [part for part in (f"refused: {frame.refused}", _raw_text(frame), _found_text(frame)) if part]
     return f"{frame.number:7d} {frame.time_us / 1e6:9.3f} s  " + "; ".join(parts)
 
 
@@ -104,6 +104,10 @@ def _solve_text(frame: LiveFrame) -> str:
         return ""
     macs, time_us = solved.macs + solved.touch_macs, solved.solve_us + solved.touch_us
     return solve_text(solved.iterations, solved.stop, solved.gap_rel, macs, time_us)
+
+
+def _found_text(frame: LiveFrame) -> str:
+    return "" if frame.solved is None else ", ".join(frame.solved.info.found)
 
 
 def _error(seen: Seen, number: int) -> str:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import Options, Reconstruction, Touch
+from eitskin.core.results import FINDINGS, Info, Options, Reconstruction, Touch
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, follow
-from eitskin.device.wire.packets import Fault, Quality, RawFrame, Stream
+from eitskin.device.wire.packets import Fault, Quality, RawFrame, Solved, Stream
 from eitskin.errors import FrameError
 from eitskin.solve.reconstructor import Reconstructor
 
@@ -24,7 +24,8 @@ from eitskin.solve.reconstructor import Reconstructor
 class HostCheck:
     """How many frames were compared and how that ended.
 
-    ``same``: every bit of the image, and of the touches but their ids, which count on from whatever the board did before.
+    ``same``: every bit of the image, and of the touches but their ids, which count on from whatever the board did before, and
+    all that was found in the frame.
     ``different``: numbers of frames that are not. ``untold``: frames whose solve began from one that was lost on the way, or
     from a reference that was. ``alone``: solved on the board without its raw frame here.
     """
@@ -127,7 +128,8 @@ class HostTwin:
         except FrameError:
             self._judge(frame, frame.refused is not None, 1.0)
             return None
-        same, difference = frame.refused is None, 1.0
+        assert frame.solved is not None
+        same, difference = frame.refused is None and same_findings(result.info, raw, frame.solved, self._core.options), 1.0
         if same and frame.image is not None:
             same, difference = same_bits(result.image, frame.image.image), _difference(result.image, frame.image.image)
         if same and frame.touches is not None:
@@ -174,6 +176,19 @@ def same_bits(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> bool:
 def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
     """Whether two lists of touches are the same numbers in the same order, ids apart."""
     return [_numbers(touch) for touch in one] == [_numbers(touch) for touch in other]
+
+
+def same_findings(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
+    """Whether this host's core found in a frame what the board says of it; rows that the converter saturated are no numbers to the
+    core, so the quality of the raw frame tells them."""
+    lost = int(np.count_nonzero(raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED))
+    saturated = 1 << FINDINGS.index("saturated") if lost else 0
+    here = info.findings | (saturated & options.findings), info.saturated + lost, info.glitches
+    electrodes = info.open_electrodes, info.bridged_electrodes, info.noisy_electrodes
+    return (here, electrodes) == (
+        (solved.findings, solved.saturated, solved.glitches),
+        (solved.open_electrodes, solved.bridged_electrodes, solved.noisy_electrodes),
+    )
 
 
 def _numbers(touch: Touch) -> bytes:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from eitskin import __version__
 from eitskin.device.wire.codec import Decoder, Packet, encode
-from eitskin.device.wire.packets import PacketType
+from eitskin.device.wire.packets import LINK_VERSION, PacketType
 from eitskin.device.wire.payloads import build_info
 from eitskin.errors import DeviceError, FileError
 
@@ -136,7 +136,7 @@ def read_head(path: str | Path) -> dict[str, Any]:
 
     Raises:
         FileError: it cannot be read, or is no recording.
-        DeviceError: it is of a newer version.
+        DeviceError: it is of a newer version, or its packets are of another version of the link.
     """
     try:
         with Path(path).open("rb") as stream:
@@ -145,7 +145,11 @@ def read_head(path: str | Path) -> dict[str, Any]:
         raise FileError(f"{path}: no such recording; check the path") from None
     except OSError as error:
         raise FileError(f"{path}: cannot read this recording ({error.strerror})") from None
-    packets = Decoder().feed(data)
+    decoder = Decoder()
+    packets, other = decoder.feed(data), decoder.other_version
+    if not packets and other is not None:
+        advice = "upgrade eitskin" if other > LINK_VERSION else "read it with the eitskin that recorded it, or record again"
+        raise DeviceError(f"{path}: packets of link version {other}, and this eitskin reads version {LINK_VERSION}; {advice}")
     if not packets or packets[0].type != PacketType.RECORDING:
         raise FileError(f"{path}: no eitskin recording (.eits), or cut in its first bytes; make one with  eitskin record")
     try:

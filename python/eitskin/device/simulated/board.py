@@ -1,7 +1,7 @@
 """A simulated board: the firmware's commands, checks and replies over the host core and a scene's frames.
 
-What the firmware does with registers is left out: there is no converter (no saturation, no open electrodes) and no processor
-time; every time that would tell of one is 0. The clock runs only while the board scans for someone. All else is as
+What the firmware does with registers is left out: there is no converter (no saturated rows, and open electrodes only once there
+is a reference, by the core) and no processor time; every time that would tell of one is 0. The clock runs only while the board scans for someone. All else is as
 docs/link-protocol.md says, and the packets are the very bytes.
 """
 
@@ -18,6 +18,8 @@ import numpy.typing as npt
 from eitskin import __version__
 from eitskin.device.simulated.banks import E_MODEL_MAGIC, SimBanks, golden
 from eitskin.device.simulated.checks import OK, Answer, check_scan, check_size, check_solver, outside, slot_us
+from eitskin.device.simulated.faults import SimFaults
+from eitskin.device.simulated.scan import rows_us, scan_frame
 from eitskin.device.simulated.skin import SceneSkin
 from eitskin.device.wire import commands as cmd
 from eitskin.device.wire.codec import Decoder, Packet, encode
@@ -28,7 +30,6 @@ from eitskin.device.wire.packets import (
     Fault,
     FaultCode,
     PacketType,
-    Quality,
     RawFlags,
     RawFrame,
     Reply,
@@ -36,7 +37,9 @@ from eitskin.device.wire.packets import (
     Stream,
 )
 from eitskin.device.wire.packets import ReplyStatus as Status
-from eitskin.device.wire.payloads import build_fault, build_info, build_raw, build_reply, build_stats
+from eitskin.device.wire.payloads import build_info, build_raw, build_reply, build_stats
+from eitskin.device.simulated.solve import NOTHING
+from eitskin.core.results import Info
 from eitskin.model.storage import STORAGES
 
 BOARD_NAME = "simulated"
@@ -67,7 +70,8 @@ class SimBoard:
         self._decoder = Decoder(numbered=False)
         self._output = bytearray()
         self._sequence = self._sent = 0
-        self._frame = self._solved = 0
+        self._frame = self._solved = self._glitches = 0
+        self._faults = SimFaults(self._send)
         self._stage_counts = dict.fromkeys(STAGES, 0)
         self._scan = DEFAULT_SCAN
         self._tare: _Tare | None = None
@@ -87,12 +91,11 @@ class SimBoard:
         self._solver, why = self.banks.open_newest()
         if self._solver is not None:
             period = self.skin.period_us
-            self._scan = replace(self._scan, frame_period_us=period if period >= self._rows_us(full=True) else 0)
+            self._scan = replace(self._scan, frame_period_us=period if period >= rows_us(self._solver, self._scan, full=True) else 0)
         return why
 
     def _tell_no_model(self, why: int) -> None:
-        if self._solver is None:
-            self._send(PacketType.FAULT, build_fault(Fault(FaultCode.NO_MODEL, True, self._frame, 0, why)))
+        self._faults.set(Fault(FaultCode.NO_MODEL, self._solver is None, self._frame, 0, why if self._solver is None else 0))
 
     # ---- bytes ----
 
@@ -124,11 +127,6 @@ class SimBoard:
         """Whether anyone waits for a frame."""
         return self._solver is not None and not self.banks.active and (self._tare is not None or bool(self._what))
 
-    def _rows_us(self, *, full: bool) -> int:
-        assert self._solver is not None
-        rows = self._solver.model.protocol.n_rows if full else len(self._solver.model.fold.first)
-        return rows * slot_us(self._scan)
-
     def scan_one(self) -> bool:
         """Scan one frame and send what is asked of it; False where nobody wants one.
 
@@ -138,21 +136,8 @@ class SimBoard:
         if not self.wanted:
             return False
         assert self._solver is not None
-        every, model = self._scan.check_every, self._solver.model
-        full = every != 0 and self._frame % every == 0
-        flags = RawFlags(0) if every == 1 else RawFlags.CHECK if full else RawFlags.RECIPROCAL
-        volts, quality = self.skin.frame(model.protocol, self.time_us), np.zeros(model.protocol.n_rows, dtype=np.uint8)
-        if every != 1:
-            pairs = model.fold.second >= 0
-            first, second = model.fold.first[pairs], model.fold.second[pairs]
-            volts[second] = model.fold.sign[pairs].astype(np.float32) * volts[first]
-            quality[second] |= np.uint8(Quality.COPIED)
-        quality[self._solver.masked] |= np.uint8(Quality.MASKED)
-        volts[self._solver.masked] = np.nan
-        burst_us = -(-self._scan.samples * 1_000_000 // self._scan.sample_rate_hz)
-        scan_us = self._rows_us(full=full) - slot_us(self._scan) + burst_us
-        raw = RawFrame(self._frame, self.time_us % 2**32, scan_us, int(flags), volts, quality)
-        self.time_us += max(self._scan.frame_period_us, self._rows_us(full=full))
+        raw, next_us = scan_frame(self.skin, self._solver, self._scan, self._frame, self.time_us)
+        self.time_us += next_us
         self._frame = (self._frame + 1) % 2**32
         self._stage_counts["scan"] += 1
         self._process(raw)
@@ -165,19 +150,34 @@ class SimBoard:
             return
         if self._phase > 0:
             self._phase -= 1
+            self._examine(raw)
             return
         self._phase = self._every - 1
         if self._what & Stream.RAW:
             self._send(PacketType.RAW, build_raw(raw))
         if self._what & (Stream.IMAGE | Stream.TOUCHES) and self._solver.tared:
-            for packet_type, payload in self._solver.solve(raw, self._what):
+            status, info, packets = self._solver.solve(raw, self._what)
+            self._tell_found(raw, info, solved=status == 0)
+            for packet_type, payload in packets:
                 self._send(packet_type, payload)
             self._solved += 1
             self._stage_counts["solve"] += 1
+        else:
+            self._examine(raw)
         if self._left > 0:
             self._left -= 1
             if self._left == 0:
                 self._what = Stream(0)
+
+    def _examine(self, raw: RawFrame) -> None:
+        """Faults are told whether anything is streamed or not; without a reference nothing is found, and none is stale."""
+        assert self._solver is not None
+        tared = self._solver.tared
+        self._tell_found(raw, self._solver.examine(raw) if tared else NOTHING, solved=not tared)
+
+    def _tell_found(self, raw: RawFrame, info: Info, *, solved: bool) -> None:
+        self._glitches += info.glitches
+        self._faults.found(raw.frame, info, solved=solved)
 
     def _take_quiet(self, tare: _Tare, raw: RawFrame) -> None:
         assert self._solver is not None
@@ -188,6 +188,8 @@ class SimBoard:
             return
         status = self._solver.tare(tare.frames)
         self._tare = None
+        if status == 0:
+            self._faults.set(Fault(FaultCode.STALE_REFERENCE, False, raw.frame, 0, 0))
         answer = OK if status == 0 else Answer(Status.CORE, (status, 0))
         reply = build_reply(Reply(tare.request, PacketType.TARE, answer.status, answer.detail))
         self._last_tare = tare.request, reply
@@ -325,6 +327,7 @@ class SimBoard:
         return OK
 
     def _on_clear_faults(self, request: int, command: cmd.ClearFaults) -> Answer:
+        self._faults.clear(self._frame)
         self._tell_no_model(E_MODEL_MAGIC)
         return OK
 
@@ -376,7 +379,7 @@ class SimBoard:
             every=self._every,
             tared=int(solver is not None and solver.tared),
             frame_period_us=scan.frame_period_us,
-            faults=0 if solver else 1 << FaultCode.NO_MODEL,
+            faults=self._faults.raised,
             volts_per_code_nv=0,
         )
 
@@ -391,6 +394,7 @@ class SimBoard:
             packets_dropped=0,
             deadlines_missed=0,
             slots_repeated=0,
+            glitches=self._glitches,
             link_packets=counters.packets,
             link_crc_errors=counters.crc_errors,
             link_framing_errors=counters.framing_errors,

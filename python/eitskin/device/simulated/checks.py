@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from eitskin.core.results import MAX_TOUCHES, SOLVERS
+from eitskin.core.results import ALL_FINDINGS, MAX_TOUCHES, SOLVERS
 from eitskin.device.wire.commands import Command, ModelData, Scan, Solver
 from eitskin.device.wire.packets import ReplyStatus as Status
 
@@ -89,4 +89,4 @@ def check_solver(command: Solver) -> Answer | None:
     for offset, value in ((20, command.lambda_rel), (24, command.gap_rel)):
         if not 0 <= value <= 1:
             return Answer(Status.RANGE, (offset, 1 if value > 1 else 0))
-    return outside(28, command.solver, 0, len(SOLVERS) - 1)
+    return outside(28, command.solver, 0, len(SOLVERS) - 1) or outside(36, command.findings, 0, ALL_FINDINGS)

@@ -62,6 +62,7 @@ class SimSolver:
             gap_rel=command.gap_rel,
             solver=SOLVERS[command.solver],
             mac_limit=command.mac_limit,
+            findings=command.findings,
         )
         try:
             self.engine.set_options(options)
@@ -94,8 +95,13 @@ class SimSolver:
         """
         return CoreEngine(self.blob).self_test()
 
-    def solve(self, raw: RawFrame, what: Stream) -> list[tuple[PacketType, bytes]]:
-        """IMAGE and TOUCHES of a frame, as asked for; times are 0."""
+    def examine(self, raw: RawFrame) -> Info:
+        """What the core finds in a frame that is not solved."""
+        self.engine.follow(raw.voltage_v[None])
+        return self.engine.last_info()
+
+    def solve(self, raw: RawFrame, what: Stream) -> tuple[int, Info, list[tuple[PacketType, bytes]]]:
+        """An eits_status, what the core says of a frame, and its IMAGE and TOUCHES, as asked for; times are 0."""
         status, info = 0, NOTHING
         image = np.zeros(self.model.grid.n_pixels, dtype=np.float32)
         touches = ()
@@ -103,13 +109,15 @@ class SimSolver:
             result = self.engine.reconstruct(raw.voltage_v, touches=bool(what & Stream.TOUCHES))
             info, image, touches = result.info, result.image, result.touches  # type: ignore[assignment]
         except FrameError as error:
-            status = core_status(error)
+            status, info = core_status(error), self.engine.last_info()
         solved = Solved(
             frame=raw.frame, time_us=raw.time_us, solve_us=0, touch_us=0, age_us=0, count=len(image), status=status,
             stop=info.stop, masked=info.masked, iterations=info.iterations, nonzeros=info.nonzeros,
             macs=min(info.macs, 2**32 - 1), touch_macs=min(info.touch_macs, 2**32 - 1), lambda_=info.lambda_,
             lambda_max=info.lambda_max, lambda_noise=info.lambda_noise, gap_rel=info.gap_rel, residual=info.residual,
-            data_norm=info.data_norm,
+            data_norm=info.data_norm, findings=info.findings, saturated=info.saturated, glitches=info.glitches,
+            misfit=info.misfit, open_electrodes=info.open_electrodes, bridged_electrodes=info.bridged_electrodes,
+            noisy_electrodes=info.noisy_electrodes,
         )  # fmt: skip
         packets = []
         if what & Stream.IMAGE:
@@ -117,4 +125,4 @@ class SimSolver:
         if what & Stream.TOUCHES:
             found = SolvedTouches(replace(solved, count=len(touches)), touches)
             packets.append((PacketType.TOUCHES, build_touches(found)))
-        return packets
+        return status, info, packets

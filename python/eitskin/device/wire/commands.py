@@ -88,10 +88,11 @@ class Scan(Command):
 
 @dataclass(frozen=True)
 class Solver(Command):
-    """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and ``SOLVERS``."""
+    """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and ``SOLVERS``, ``findings`` what is
+    looked for, bit k of ``FINDINGS``."""
 
     TYPE = PacketType.SOLVER
-    LAYOUT = struct.Struct("<IIIIIffII")
+    LAYOUT = struct.Struct("<IIIIIffIII")
     iterations: int
     max_touches: int
     warm_start: int
@@ -100,6 +101,7 @@ class Solver(Command):
     gap_rel: float
     solver: int
     mac_limit: int
+    findings: int
 
 
 @dataclass(frozen=True)

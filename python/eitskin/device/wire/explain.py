@@ -6,7 +6,7 @@ from dataclasses import fields
 
 from eitskin.core.engine import load_core
 from eitskin.device.wire.commands import COMMANDS
-from eitskin.device.wire.packets import Fault, FaultCode, PacketType, Quality, Reply, ReplyStatus
+from eitskin.device.wire.packets import FOUND_FAULTS, Fault, FaultCode, PacketType, Quality, Reply, ReplyStatus
 
 UPLOAD = "upload one with  eitskin model upload MODEL.eitm"
 
@@ -63,26 +63,56 @@ def reply_text(reply: Reply) -> str:
 
 
 def fault_text(fault: Fault) -> str:
-    """What went wrong on the board (or that it is over), and what to do."""
-    name = FaultCode(fault.code).name.lower().replace("_", " ") if fault.code in list(FaultCode) else f"fault {fault.code}"
+    """What went wrong on the board (or that it is over), in which frame, and what to do."""
+    if fault.code in FOUND_FAULTS:
+        name = found_name(fault)
+        return f"{name}, frame {fault.frame}: {_FOUND[FaultCode(fault.code)]}" if fault.raised else f"{name}: over, frame {fault.frame}"
+    known = fault.code in list(FaultCode)
+    name = FaultCode(fault.code).name.lower().replace("_", " ") if known else f"fault {fault.code}"
     if not fault.raised:
-        return f"{name}: over" + (f" (electrode {fault.index})" if fault.code == FaultCode.ELECTRODE_OPEN else "")
+        return f"{name}: over, frame {fault.frame}"
+    return f"{name}, frame {fault.frame}: {_text(fault) if known else f'value {fault.value}'}"
+
+
+def found_name(fault: Fault) -> str:
+    """What was found in a frame, by name: "electrode 5 open"; for a code of ``FOUND_FAULTS``."""
+    pair = fault.raised and fault.value >= 0
+    names = {
+        FaultCode.ELECTRODE_OPEN: f"electrode {fault.index} open",
+        FaultCode.SATURATED: f"{fault.value} rows saturated from row {fault.index} on" if fault.raised else "rows saturated",
+        FaultCode.BRIDGED: f"electrodes {fault.index} and {fault.value} bridged" if pair else f"electrode {fault.index} bridged",
+        FaultCode.ELECTRODE_NOISY: f"electrode {fault.index} noisy",
+        FaultCode.MISFIT: f"misfit {fault.value / 10:.1f} %" if fault.raised and fault.value else "misfit",
+        FaultCode.STALE_REFERENCE: "stale reference",
+    }
+    return names[FaultCode(fault.code)]
+
+
+_FOUND = {
+    FaultCode.ELECTRODE_OPEN: "it makes no contact; wet or press it, then tare",
+    FaultCode.SATURATED: "beyond the converter's range; lower the gain or the current",
+    FaultCode.BRIDGED: "water, paste or a wire joins them; dry or part them",
+    FaultCode.ELECTRODE_NOISY: "a loose contact or wire; press it, or see to its wire",
+    FaultCode.MISFIT: "no such sheet gives such voltages; check order, signs and wiring (eitskin doctor)",
+    FaultCode.STALE_REFERENCE: "the skin has changed since it was taken; leave it untouched and run  eitskin tare",
+}
+
+
+def _text(fault: Fault) -> str:
     pc, lr, cfsr, hfsr, address = fault.words
     texts = {
         FaultCode.NO_MODEL: f"no bank holds a valid model ({status_text(fault.value)}); {UPLOAD}",
-        FaultCode.ELECTRODE_OPEN: f"electrode {fault.index} makes no contact; wet or press it, then tare",
-        FaultCode.SATURATED: f"{fault.value} rows beyond the converter's range, the first is row {fault.index}; lower the gain",
-        FaultCode.DEADLINE: f"a frame took {fault.value} us longer than the frame period; make the period longer",
+        FaultCode.DEADLINE: f"it took {fault.value} us longer than the frame period; make the period longer",
         FaultCode.RECIPROCITY: f"row {fault.index} and its reciprocal differ by {fault.value} parts per thousand of the rms "
         "voltage; check the wiring (eitskin doctor)",
-        FaultCode.SOLVER: f"the solver refused frame {fault.frame}: {status_text(fault.value)}",
+        FaultCode.SOLVER: f"the solver refused it: {status_text(fault.value)}",
         FaultCode.SCAN_STALLED: "the converter gave nothing in time; reset the board",
         FaultCode.CRASH: f"the board restarted after a processor fault at pc 0x{pc:08x}, lr 0x{lr:08x}, cfsr 0x{cfsr:08x}, "
         f"hfsr 0x{hfsr:08x}, address 0x{address:08x}; please report it",
         FaultCode.WATCHDOG: "the board restarted because its program hung; please report it",
         FaultCode.BUS: "the generator or the multiplexers could not be written; check their wiring",
     }
-    return f"{name}: {texts[FaultCode(fault.code)]}" if fault.code in list(FaultCode) else f"{name}: value {fault.value}"
+    return texts[FaultCode(fault.code)]
 
 
 def quality_text(quality: int) -> str:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import Touch
+from eitskin.core.results import Info, Touch
 
-LINK_VERSION = 1
+LINK_VERSION = 2
+CLEAN_FRAMES = 8  # EITS_FAULT_CLEAN_FRAMES: so many frames in a row without it, and what was found has gone
 MAX_PAYLOAD = 16384
 STAGES = ("scan", "demodulate", "solve", "touches", "send", "frame")
 
@@ -79,6 +80,18 @@ class FaultCode(IntEnum):
     CRASH = 8
     WATCHDOG = 9
     BUS = 10
+    BRIDGED = 11
+    ELECTRODE_NOISY = 12
+    MISFIT = 13
+    STALE_REFERENCE = 14
+
+
+# faults that rise in the frame that shows them and go after CLEAN_FRAMES; of those of an electrode each has its own
+FOUND_FAULTS = frozenset(
+    (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY, FaultCode.MISFIT,
+     FaultCode.STALE_REFERENCE)
+)  # fmt: skip
+ELECTRODE_FAULTS = frozenset((FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY))
 
 
 class Quality(IntFlag):
@@ -207,8 +220,9 @@ class RawFrame:
 
 @dataclass(frozen=True)
 class Solved:
-    """eits_packet_solved: what the board's core says of a frame's solve, and the times. ``status`` is 0 or an eits_status
-    (negative), ``stop`` one of ``core.results.STOPS``."""
+    """eits_packet_solved: what the board's core says of a frame and its solve, and the times. ``status`` is 0 or an eits_status
+    (negative), ``stop`` one of ``core.results.STOPS``, ``findings`` as in ``core.results.Info``; ``saturated`` rows are those that
+    the converter tells too."""
 
     frame: int
     time_us: int
@@ -229,10 +243,29 @@ class Solved:
     gap_rel: float
     residual: float
     data_norm: float
+    findings: int = 0
+    saturated: int = 0
+    glitches: int = 0
+    misfit: float = 0.0
+    open_electrodes: tuple[int, ...] = ()
+    bridged_electrodes: tuple[int, ...] = ()
+    noisy_electrodes: tuple[int, ...] = ()
+
+    @property
+    def info(self) -> Info:
+        """As the core says it on a host, as far as it is told here."""
+        return Info(
+            self.iterations, self.stop, self.nonzeros, self.masked, 0, 0, self.macs, self.touch_macs, self.lambda_,
+            self.lambda_max, self.lambda_noise, 0.0, self.gap_rel, self.residual, self.data_norm,
+            findings=self.findings, saturated=self.saturated, glitches=self.glitches, misfit=self.misfit,
+            open_electrodes=self.open_electrodes, bridged_electrodes=self.bridged_electrodes,
+            noisy_electrodes=self.noisy_electrodes,
+        )  # fmt: skip
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the same names, without the underscore of ``lambda_``."""
-        return {key.rstrip("_"): value for key, value in asdict(self).items()}
+        """For JSON: the same names, without the underscore of ``lambda_``; findings by name."""
+        values = {key.rstrip("_"): value for key, value in asdict(self).items()}
+        return values | {"findings": list(self.info.findings_by_name), "found": list(self.info.found)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,6 +314,7 @@ class BoardStats:
     packets_dropped: int
     deadlines_missed: int
     slots_repeated: int
+    glitches: int
     link_packets: int
     link_crc_errors: int
     link_framing_errors: int

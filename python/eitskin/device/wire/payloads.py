@@ -26,10 +26,10 @@ from eitskin.device.wire.packets import (
 INFO_STRUCT = struct.Struct("<I4s16s24sIIIIIIQIIIIIIIIIIIHHIHHHHIII")
 REPLY_STRUCT = struct.Struct("<IHHii")
 RAW_STRUCT = struct.Struct("<IIIHH")
-SOLVED_STRUCT = struct.Struct("<IIIIIHHHHIIIIffffff")
+SOLVED_STRUCT = struct.Struct("<IIIIIHHHHIIIIffffffIHHfQQQ")
 TOUCH_STRUCT = struct.Struct("<Ifffff")
 STAGE_STRUCT = struct.Struct("<IIII")
-STATS_STRUCT = struct.Struct("<16I" + 4 * len(STAGES) * "I")
+STATS_STRUCT = struct.Struct("<17I" + 4 * len(STAGES) * "I")
 FAULT_STRUCT = struct.Struct("<HHIii5I")
 
 
@@ -83,18 +83,24 @@ def build_raw(raw: RawFrame) -> bytes:
     return head + raw.voltage_v.astype("<f4").tobytes() + raw.quality.astype(np.uint8).tobytes()
 
 
+def _bits(word: int) -> tuple[int, ...]:
+    """The places of the bits that are set."""
+    return tuple(bit for bit in range(64) if word >> bit & 1) if word else ()
+
+
 def _parse_solved(payload: bytes, what: str, each: int) -> Solved:
     if len(payload) < SOLVED_STRUCT.size:
         raise MalformedPacket(f"{what}: {len(payload)} bytes are too few")
-    f, t, solve, touch, age, count, status, stop, *rest = SOLVED_STRUCT.unpack_from(payload)
+    f, t, solve, touch, age, count, status, stop, *rest, opened, bridged, noisy = SOLVED_STRUCT.unpack_from(payload)
     _exactly(payload, SOLVED_STRUCT.size + each * count, what)
     if stop >= len(STOPS):
         raise MalformedPacket(f"{what}: stop {stop} is not known")
-    return Solved(f, t, solve, touch, age, count, -status, STOPS[stop], *rest)
+    return Solved(f, t, solve, touch, age, count, -status, STOPS[stop], *rest, _bits(opened), _bits(bridged), _bits(noisy))
 
 
 def _build_solved(solved: Solved) -> bytes:
     values = asdict(solved) | {"status": -solved.status, "stop": STOPS.index(solved.stop)}
+    values |= {name: sum(1 << e for e in values[name]) for name in ("open_electrodes", "bridged_electrodes", "noisy_electrodes")}
     return SOLVED_STRUCT.pack(*values.values())
 
 
@@ -121,8 +127,8 @@ def build_touches(touches: SolvedTouches) -> bytes:
 def parse_stats(payload: bytes) -> BoardStats:
     _exactly(payload, STATS_STRUCT.size, "STATS")
     values = STATS_STRUCT.unpack(payload)
-    stages = {name: StageStats(*values[16 + 4 * k : 20 + 4 * k]) for k, name in enumerate(STAGES)}
-    return BoardStats(*values[:16], stages)  # type: ignore[call-arg]
+    stages = {name: StageStats(*values[17 + 4 * k : 21 + 4 * k]) for k, name in enumerate(STAGES)}
+    return BoardStats(*values[:17], stages)  # type: ignore[call-arg]
 
 
 def build_stats(stats: BoardStats) -> bytes:

@@ -1,0 +1,96 @@
+"""What a stream tells beside its frames, in lines: faults, events of the link, and what is found in frames once it rises and goes.
+
+A board tells most of what it finds as faults, and all of it in the head of each frame. What both tell is said once.
+"""
+
+from __future__ import annotations
+
+from eitskin.device.link import LinkEvent
+from eitskin.device.live import LiveFrame
+from eitskin.device.wire.explain import fault_text
+from eitskin.device.wire.packets import CLEAN_FRAMES, FOUND_FAULTS, Fault, FaultCode, Solved
+
+Key = tuple[str, int]  # a name of core.results.FINDINGS, and which electrode; -1: none
+
+_NAMES = {
+    FaultCode.ELECTRODE_OPEN: "electrode open",
+    FaultCode.SATURATED: "saturated",
+    FaultCode.BRIDGED: "electrodes bridged",
+    FaultCode.ELECTRODE_NOISY: "electrode noisy",
+    FaultCode.MISFIT: "misfit",
+    FaultCode.STALE_REFERENCE: "stale reference",
+}
+_OF_ELECTRODES = {"electrode open": "open", "electrodes bridged": "bridged", "electrode noisy": "noisy"}
+
+
+class News:
+    """Turns what a stream gives into lines, as it comes."""
+
+    def __init__(self) -> None:
+        self._clean: dict[Key, int] = {}  # what has been said to be there: frames in a row without it
+
+    def lines(self, item: LiveFrame | Fault | LinkEvent) -> list[str]:
+        """What is new with ``item``; of a frame only what it shows and those before it did not, or what has gone."""
+        if isinstance(item, LinkEvent):
+            return [link_text(item)]
+        if isinstance(item, Fault):
+            return self._fault(item)
+        return [] if item.solved is None else self._found(item.solved)
+
+    def _fault(self, fault: Fault) -> list[str]:
+        if fault.code not in FOUND_FAULTS:
+            return [fault_text(fault)]
+        keys = _keys(fault)
+        new = keys[0] not in self._clean if fault.raised else keys[0] in self._clean
+        for key in keys:
+            if fault.raised:
+                self._clean.setdefault(key, 0)
+            elif key == keys[0]:
+                self._clean.pop(key, None)
+        return [fault_text(fault)] if new else []
+
+    def _found(self, solved: Solved) -> list[str]:
+        now, said = _found(solved), []
+        for key, text in now.items():
+            if key not in self._clean:
+                said.append(f"{text}, frame {solved.frame}")
+            self._clean[key] = 0
+        for key in [key for key in self._clean if key not in now]:
+            self._clean[key] += 1
+            if self._clean[key] >= CLEAN_FRAMES:
+                del self._clean[key]
+                said.append(f"{_plain(key)}: over, frame {solved.frame}")
+        return said
+
+
+def link_text(event: LinkEvent) -> str:
+    """An event of the link in a line."""
+    counted = f" ({event.missing} packets)" if event.missing else ""
+    return f"link: {event.kind}{counted}" + (f": {event.text}" if event.text else "")
+
+
+def _keys(fault: Fault) -> list[Key]:
+    name = _NAMES[FaultCode(fault.code)]
+    if name not in _OF_ELECTRODES:
+        return [(name, -1)]
+    partner = [(name, fault.value)] if fault.code == FaultCode.BRIDGED and fault.raised and fault.value >= 0 else []
+    return [(name, fault.index), *partner]
+
+
+def _plain(key: Key) -> str:
+    name, electrode = key
+    return f"electrode {electrode} {_OF_ELECTRODES[name]}" if electrode >= 0 else name
+
+
+def _found(solved: Solved) -> dict[Key, str]:
+    """What the head names, each with its text."""
+    electrodes = {
+        "electrode open": solved.open_electrodes,
+        "electrodes bridged": solved.bridged_electrodes,
+        "electrode noisy": solved.noisy_electrodes,
+    }
+    found: dict[Key, str] = {}
+    for name, text in zip(solved.info.findings_by_name, solved.info.found, strict=True):
+        which = electrodes.get(name, ())
+        found |= {(name, e): _plain((name, e)) for e in which} if which else {(name, -1): text}
+    return found
