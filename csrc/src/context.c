@@ -2,6 +2,7 @@
 #include "eitskin/context.h"
 
 #include "columns.h"
+#include "examine.h"
 #include "kernels.h"
 #include "vec.h"
 
@@ -89,6 +90,11 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->unusable = take_bytes(a, rows);
     ctx->basis_for = take_bytes(a, folded);
     ctx->d = take_reals(a, folded);
+    ctx->apart = take_reals(a, folded);
+    ctx->along = take_reals(a, folded);
+    ctx->drift = take_reals(a, stride);
+    ctx->sheet_inverse = take_reals(a, stride);
+    ctx->sheet_shrink = take_reals(a, stride);
     ctx->y = take_reals(a, stride);
     ctx->basis = take_reals(a, ctx->model->rank * stride);
     ctx->residual = take_reals(a, stride);
@@ -132,6 +138,7 @@ eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspac
     *ctx = (eits_context){.model = model, .kernels = eits_kernels_best(), .next_id = 1, .basis_stale = 1};
     arena a = {workspace};
     lay_out(ctx, &a, size >= eits_workspace_size(model, 1));
+    eits_learn_sheet(ctx);
     return eits_options_default(model, &ctx->options);
 }
 

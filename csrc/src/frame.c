@@ -1,23 +1,42 @@
 /* The frame stage: unusable channels, difference, fold, whitening, projection. */
 #include "eitskin/frame.h"
 
+#include "examine.h"
 #include "kernels.h"
 #include "log.h"
 #include "stages.h"
 #include "vec.h"
 
-/* Mark rows that cannot be used in this frame; returns their number. */
-static uint32_t find_unusable(eits_context *ctx, const eits_real *frame)
+/* Why each row of this frame cannot be used, as far as the row itself tells. */
+static void find_unusable(eits_context *ctx, const eits_real *frame)
 {
     const eits_real limit = ctx->options.saturation_v;
-    uint32_t count = 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        const int saturated = limit > 0 && eits_fabs(frame[i]) >= limit;
-        const int unknown = !eits_is_finite(frame[i]) || !eits_is_finite(ctx->baseline.v0[i]);
-        ctx->unusable[i] = (uint8_t)(ctx->bad[i] || unknown || saturated);
-        count += ctx->unusable[i];
+        const unsigned masked = ctx->bad[i] || !eits_is_finite(ctx->baseline.v0[i]) ? EITS_ROW_MASKED : 0;
+        const unsigned unknown = !eits_is_finite(frame[i]) ? EITS_ROW_UNKNOWN : 0;
+        const unsigned saturated = limit > 0 && eits_fabs(frame[i]) >= limit ? EITS_ROW_SATURATED : 0;
+        ctx->unusable[i] = (uint8_t)(masked | unknown | saturated);
+        ctx->info.saturated += masked == 0 && saturated != 0;
     }
+    if (ctx->info.saturated > 0 && eits_wants(ctx, EITS_FINDING_SATURATED))
+        ctx->info.findings |= EITS_FINDING_SATURATED;
+}
+
+static uint32_t count_unusable(const eits_context *ctx)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
+        count += ctx->unusable[i] != 0;
     return count;
+}
+
+static void forget_findings(eits_context *ctx)
+{
+    eits_info *info = &ctx->info;
+    info->findings = info->saturated = info->glitches = 0;
+    info->open_electrodes = info->bridged_electrodes = info->noisy_electrodes = 0;
+    info->misfit = info->unexplained = 0;
+    memset(ctx->electrode, 0, sizeof ctx->electrode);
 }
 
 /* A frame of nothing but zeros is a dead front end, not a quiet skin. */
@@ -51,10 +70,8 @@ static int ratio_undefined(const eits_context *ctx, eits_real v0)
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE && eits_fabs(v0) < R(1e-6) * ctx->baseline.v0_rms;
 }
 
-/* Which rows of a fold are in use, as bits; none: the fold is left out. */
-enum { LEFT_OUT = 0, FIRST = 1, SECOND = 2, BOTH = FIRST | SECOND };
-
-/* d_k: the mean of a row and its reciprocal, or whichever is usable; sets basis_for, and says whether any of it changed. */
+/* d_k: the mean of a row and its reciprocal, or whichever is usable; apart_k: their difference. Sets basis_for, and says whether
+ * any of it changed. */
 static int fold_data(eits_context *ctx, const eits_real *frame)
 {
     const eits_real *v0 = ctx->baseline.v0;
@@ -62,19 +79,21 @@ static int fold_data(eits_context *ctx, const eits_real *frame)
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_fold fold = ctx->model->fold[k];
         const uint32_t rows[2] = {fold.first, fold.second};
-        eits_real sum = 0;
-        uint8_t used = LEFT_OUT;
+        eits_real sum = 0, apart = 0;
+        uint8_t used = EITS_SIDE_NONE;
         for (int side = 0; side < 2; ++side) {
             const uint32_t i = rows[side];
             if (i == EITS_FOLD_NONE || ctx->unusable[i] || ratio_undefined(ctx, v0[i]))
                 continue;
             /* a ratio has no sign to turn: only the differences of a reciprocal measured the other way round do */
             const int turn = side == 1 && fold.sign < 0 && ctx->model->data_kind != EITS_DATA_NORMALISED;
-            const eits_real value = datum(ctx, frame[i], v0[i]);
-            sum += turn ? -value : value;
-            used |= (uint8_t)(side == 0 ? FIRST : SECOND);
+            const eits_real measured = datum(ctx, frame[i], v0[i]), value = turn ? -measured : measured;
+            apart = sum - value;
+            sum += value;
+            used |= (uint8_t)(side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND);
         }
-        ctx->d[k] = used == BOTH ? R(0.5) * sum : sum;
+        ctx->d[k] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
+        ctx->apart[k] = used == EITS_SIDE_BOTH ? apart : 0;
         changed |= used != ctx->basis_for[k];
         ctx->basis_for[k] = used;
     }
@@ -116,13 +135,13 @@ static uint64_t drift_direction(eits_context *ctx, eits_real *out)
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
         const uint8_t used = ctx->basis_for[k];
-        const eits_real first = used & FIRST ? ctx->baseline.v0[fold.first] : 0;
-        const eits_real second = used & SECOND ? (eits_real)fold.sign * ctx->baseline.v0[fold.second] : 0;
-        const eits_real along = ctx->baseline.gain * (used == BOTH ? R(0.5) * (first + second) : first + second);
+        const eits_real first = used & EITS_SIDE_FIRST ? ctx->baseline.v0[fold.first] : 0;
+        const eits_real second = used & EITS_SIDE_SECOND ? (eits_real)fold.sign * ctx->baseline.v0[fold.second] : 0;
+        const eits_real along = ctx->baseline.gain * (used == EITS_SIDE_BOTH ? R(0.5) * (first + second) : first + second);
         ctx->list_index[k] = k;
-        ctx->list_value[k] = used != LEFT_OUT && model->data_kind == EITS_DATA_NORMALISED ? 1 : along;
+        ctx->along[k] = used != EITS_SIDE_NONE && model->data_kind == EITS_DATA_NORMALISED ? 1 : along;
     }
-    ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->list_value, model->n_folded, out);
+    ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->along, model->n_folded, out);
     return (uint64_t)model->n_folded * model->rank;
 }
 
@@ -130,39 +149,87 @@ static uint64_t rebuild_basis(eits_context *ctx)
 {
     uint64_t macs = 0;
     ctx->basis_count = 0;
+    eits_zero(ctx->along, ctx->model->n_folded);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] != LEFT_OUT)
+        if (ctx->basis_for[k] != EITS_SIDE_NONE)
             continue;
         reduction_column(ctx, k, ctx->residual);
         macs += ctx->model->rank + extend_basis(ctx, ctx->residual);
     }
     if (ctx->options.project_baseline) {
         macs += drift_direction(ctx, ctx->residual);
+        eits_copy(ctx->drift, ctx->residual, EITS_STRIDE(ctx->model->rank));
         macs += extend_basis(ctx, ctx->residual);
     }
     ctx->basis_stale = 0;
     return macs;
 }
 
+/* y = P d of the folds in use, not yet projected; returns 1 where none is left out. */
+static int reduce(eits_context *ctx, uint64_t *macs)
+{
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        ctx->list_index[count] = k;
+        ctx->list_value[count] = ctx->d[k];
+        count += ctx->basis_for[k] != EITS_SIDE_NONE;
+    }
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, count, ctx->y);
+    *macs += (uint64_t)count * ctx->model->rank;
+    return count == ctx->model->n_folded;
+}
+
+/* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew. */
+static int examine_reduced(eits_context *ctx, uint64_t *macs)
+{
+    if (!ctx->sheet_known || !eits_judge_misfit(ctx))
+        return 0;
+    if (eits_wants(ctx, EITS_FINDING_GLITCH) && eits_find_unpaired(ctx, macs)) {
+        ctx->info.misfit = 0;
+        return 1;
+    }
+    if (eits_wants(ctx, EITS_FINDING_MISFIT))
+        ctx->info.findings |= EITS_FINDING_MISFIT;
+    return 0;
+}
+
+static eits_status check_rows(const eits_context *ctx, const eits_real *frame, uint32_t *masked)
+{
+    *masked = count_unusable(ctx);
+    if (*masked > ctx->options.max_masked)
+        return EITS_E_FRAME_CHANNELS;
+    return *masked < ctx->model->n_rows && is_dead(ctx, frame) ? EITS_E_FRAME_ZERO : EITS_OK;
+}
+
 eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t *masked, uint64_t *macs)
 {
     const eits_model *model = ctx->model;
-    *masked = find_unusable(ctx, frame);
+    const int judged = ctx->baseline.ready != 0; /* without a reference there is nothing to judge by */
     *macs = 0;
-    if (*masked > ctx->options.max_masked)
-        return EITS_E_FRAME_CHANNELS;
-    if (*masked < model->n_rows && is_dead(ctx, frame))
-        return EITS_E_FRAME_ZERO;
-    if (fold_data(ctx, frame) || ctx->basis_stale)
-        *macs += rebuild_basis(ctx);
-    uint32_t count = 0;
-    for (uint32_t k = 0; k < model->n_folded; ++k) {
-        ctx->list_index[count] = k;
-        ctx->list_value[count] = ctx->d[k];
-        count += ctx->basis_for[k] != LEFT_OUT;
+    forget_findings(ctx);
+    find_unusable(ctx, frame);
+    if (judged)
+        eits_find_electrodes(ctx, frame);
+    eits_status status = check_rows(ctx, frame, masked);
+    if (status != EITS_OK)
+        return status;
+    int changed = fold_data(ctx, frame);
+    if (judged && eits_find_glitches(ctx, macs)) {
+        status = check_rows(ctx, frame, masked);
+        if (status != EITS_OK)
+            return status;
+        changed |= fold_data(ctx, frame);
     }
-    ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->list_value, count, ctx->y);
-    *macs += (uint64_t)count * model->rank;
+    if (changed || ctx->basis_stale)
+        *macs += rebuild_basis(ctx);
+    if (reduce(ctx, macs) && judged && examine_reduced(ctx, macs)) {
+        status = check_rows(ctx, frame, masked);
+        if (status != EITS_OK)
+            return status;
+        if (fold_data(ctx, frame))
+            *macs += rebuild_basis(ctx);
+        (void)reduce(ctx, macs);
+    }
     *macs += eits_project(ctx, ctx->y);
     if (ctx->basis_count == model->rank) /* no direction is left: what is there is rounding */
         eits_zero(ctx->y, model->rank);

@@ -3,6 +3,7 @@
 
 #include "eitskin/frame.h"
 #include "certificate.h"
+#include "examine.h"
 #include "kernels.h"
 #include "solvers.h"
 #include "stages.h"
@@ -91,6 +92,7 @@ static eits_status solve(eits_context *ctx)
         answer_zero(ctx, EITS_STOP_DIVERGED);
         return EITS_E_NOT_FINITE;
     }
+    eits_judge_reference(ctx);
     if (o->gate_factor > 0 && ctx->info.lambda_max < o->gate_factor * ctx->info.lambda_noise) {
         answer_zero(ctx, EITS_STOP_GATE);
         return EITS_OK;

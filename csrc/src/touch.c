@@ -2,6 +2,7 @@
 #include "eitskin/touch.h"
 
 #include "disc.h"
+#include "examine.h"
 #include "kernels.h"
 #include "stages.h"
 #include "track.h"
@@ -351,6 +352,14 @@ static void report(const fit *f, eits_real pixel_mm, eits_touch *out)
     }
 }
 
+/* |residual|^2 / |y|^2 of what fit_strengths and all after it left; without touches all of it. */
+static eits_real unexplained(const eits_context *ctx, int looked)
+{
+    const uint32_t rank = ctx->model->rank;
+    const eits_real whole = looked ? eits_dot(ctx, ctx->y, ctx->y, rank) : 0;
+    return whole > 0 ? eits_dot(ctx, ctx->residual, ctx->residual, rank) / whole : 0;
+}
+
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room, uint32_t *count)
 {
     if (ctx == NULL || (touches == NULL && room > 0))
@@ -358,7 +367,8 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     fit f = {.count = 0};
     eits_touch found[EITS_MAX_TOUCHES];
     const eits_stop stop = ctx->info.stop;
-    if (stop != EITS_STOP_GATE && stop != EITS_STOP_ZERO && stop != EITS_STOP_DIVERGED) {
+    const int looked = stop != EITS_STOP_GATE && stop != EITS_STOP_ZERO && stop != EITS_STOP_DIVERGED;
+    if (looked) {
         seed(ctx, &f);
         fit_strengths(ctx, &f);
         if (ctx->options.touch_change_s_per_m > 0) {
@@ -373,6 +383,9 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     eits_track(ctx, found, f.count);
     ctx->info.touches = f.count;
     ctx->info.touch_macs = f.macs;
+    ctx->info.unexplained = unexplained(ctx, looked);
+    ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
+    eits_judge_crowd(ctx, found, f.count);
     for (uint32_t k = 0; k < f.count && k < room; ++k)
         touches[k] = found[k];
     if (count != NULL)

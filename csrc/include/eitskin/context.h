@@ -84,6 +84,7 @@ typedef struct eits_info {
     uint32_t saturated;   /* rows, masked ones apart */
     uint32_t glitches;    /* rows left out as glitches */
     eits_real misfit;     /* share of |d| beyond noise that the model's sheet cannot give, 0 to 1; 0 where it was not judged */
+    eits_real unexplained; /* share of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked for */
     uint64_t open_electrodes, bridged_electrodes, noisy_electrodes; /* bit e: electrode e, of the first 64; ctx->electrode has all */
 } eits_info;
 
@@ -121,6 +122,12 @@ typedef struct eits_context {
     uint8_t electrode[EITS_MOST_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
     uint8_t *basis_for;      /* n_folded: which rows of each fold were in use when the basis below was built */
     eits_real *d;            /* n_folded: data of this frame */
+    eits_real *apart;        /* n_folded: what the two rows of each fold differ by; 0 where one is in use */
+    eits_real *along;        /* n_folded: data of a drift of the gain; zeros where it is not ignored */
+    eits_real *drift;        /* stride: P along */
+    eits_real *sheet_inverse, *sheet_shrink; /* stride each: 1 / |P_i|^2, and so much of it as predicts d (misfit.c) */
+    eits_real sheet_energy;  /* |P|^2: what unit noise on the folded rows makes of |y|^2 */
+    uint32_t sheet_known;    /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
     eits_real *y;            /* stride: reduced data, projected */
     eits_real *basis;        /* rank x stride: orthonormal directions to ignore */
     uint32_t basis_count;
@@ -167,8 +174,8 @@ typedef struct eits_context {
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise copies of S and of
  * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
-    (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + EITS_REALS(n_folded) +                   \
-     (8 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
+    (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + 3 * EITS_REALS(n_folded) +               \
+     (11 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
      EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_REALS(EITS_TRIANGLE(rank)) + EITS_ALIGN16((size_t)(n_cells) * 2u) +       \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \

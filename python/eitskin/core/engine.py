@@ -120,7 +120,7 @@ class CoreEngine:
                 self._check_frame(status, f"reference frame {number} (from 0)")
             self._check_frame(self._lib.eits_baseline_finish(self._context), "reference frames")
         b = self._context.baseline
-        return Baseline(int(b.count), b.correlation, b.gain, b.v0_rms, b.noise_v, b.lambda_noise)
+        return Baseline(int(b.count), b.correlation, b.gain, b.v0_rms, b.noise_v, b.lambda_noise, int(b.glitches))
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
@@ -273,8 +273,15 @@ def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
     return Info(
         i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs, i.touch_macs,
         getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual, i.data_norm,
+        i.findings, i.saturated, i.glitches, i.misfit, i.unexplained,
+        _bits(i.open_electrodes), _bits(i.bridged_electrodes), _bits(i.noisy_electrodes),
         solve_us=solve_ns / 1000, touch_us=touch_ns / 1000,
     )  # fmt: skip
+
+
+def _bits(word: int) -> tuple[int, ...]:
+    """The places of the bits that are set."""
+    return tuple(bit for bit in range(64) if word >> bit & 1) if word else ()
 
 
 def _touch(t: Any) -> Touch:

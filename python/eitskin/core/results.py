@@ -119,7 +119,7 @@ def check_quiet(frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], 
 @dataclass(frozen=True)
 class Baseline:
     """The reference as learned: ``correlation`` with the model's own, ``gain`` in model volts per measured volt,
-    ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was given."""
+    ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was given; ``glitches`` readings were left out."""
 
     frames: int
     correlation: float
@@ -127,6 +127,7 @@ class Baseline:
     v0_rms_v: float
     noise_v: float
     lambda_noise: float
+    glitches: int = 0
 
 
 @dataclass(frozen=True)
@@ -161,12 +162,49 @@ class Info:
     gap_rel: float
     residual: float
     data_norm: float
+    findings: int = 0
+    saturated: int = 0
+    glitches: int = 0
+    misfit: float = 0.0
+    unexplained: float = 0.0
+    open_electrodes: tuple[int, ...] = ()
+    bridged_electrodes: tuple[int, ...] = ()
+    noisy_electrodes: tuple[int, ...] = ()
     solve_us: float = field(default=0.0, compare=False)
     touch_us: float = field(default=0.0, compare=False)
 
+    @property
+    def found(self) -> tuple[str, ...]:
+        """What was found wrong with the frame, each in a few words: "electrode 5 open", "2 rows left out as glitches"..."""
+        details = {
+            "saturated": f"{self.saturated} row{'s' * (self.saturated != 1)} saturated",
+            "electrode open": f"{_electrodes(self.open_electrodes)} open",
+            "electrodes bridged": f"{_electrodes(self.bridged_electrodes)} bridged",
+            "glitch": f"{self.glitches} row{'s' * (self.glitches != 1)} left out as glitch{'es' * (self.glitches != 1)}",
+            "electrode noisy": f"{_electrodes(self.noisy_electrodes)} noisy",
+            "misfit": f"misfit {100 * self.misfit:.1f} %" if self.misfit > 0 else "misfit",
+            "stale reference": "stale reference: tare again",
+            "crowded": "crowded: more touches than can be told apart",
+        }
+        return tuple(details[name] for name in self.findings_by_name)
+
+    @property
+    def findings_by_name(self) -> tuple[str, ...]:
+        """Those of ``FINDINGS`` that were made."""
+        return tuple(name for bit, name in enumerate(FINDINGS) if self.findings >> bit & 1)
+
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the same names, without the underscore of ``lambda_``."""
-        return {key.rstrip("_"): value for key, value in asdict(self).items()}
+        """For JSON: the same names, without the underscore of ``lambda_``; findings by name."""
+        values = {key.rstrip("_"): value for key, value in asdict(self).items()}
+        return values | {"findings": list(self.findings_by_name), "found": list(self.found)}
+
+
+def _electrodes(numbers: tuple[int, ...]) -> str:
+    """ "electrode 5", "electrodes 5 and 6"; from 0."""
+    if not numbers:
+        return "electrode"
+    *most, last = map(str, numbers)
+    return f"electrodes {', '.join(most)} and {last}" if most else f"electrode {last}"
 
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:
