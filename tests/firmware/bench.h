@@ -17,6 +17,9 @@ typedef struct bench {
 void bench_start(bench *b, const skin_spec *spec);
 void bench_stop(bench *b);
 
+/* The board's `volts`: of the sheet. */
+double bench_sheet(void *user, const uint8_t electrodes[4], uint64_t at_ns);
+
 /* Restart the board on what its flash holds. */
 void bench_restart(bench *b);
 

@@ -217,11 +217,11 @@ def read_ignored(text: str | None) -> int | None:
     if text is None:
         return None
     names = [name.replace(" ", "-") for name in FINDINGS]
-    left = ALL_FINDINGS
+    left: int = ALL_FINDINGS
     for name in text.split(","):
         if name != "all" and name not in names:
             raise UsageError(f"--ignore {text}: {nearest(name, (*names, 'all'))}")
-        left &= 0 if name == "all" else ~(1 << names.index(name))
+        left = 0 if name == "all" else left & ~(1 << names.index(name))
     return left
 
 

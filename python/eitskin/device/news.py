@@ -1,4 +1,4 @@
-"""What a stream tells beside its frames, in lines: faults, events of the link, and what is found in frames once it rises and goes.
+"""What a stream tells beside its frames, in lines: faults, events of the link, what is found in frames once it rises and goes.
 
 A board tells most of what it finds as faults, and all of it in the head of each frame. What both tell is said once.
 """

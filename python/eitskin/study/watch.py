@@ -92,10 +92,11 @@ def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
 def line(seen: Seen) -> str:
     """A frame in a line."""
     frame = seen.frame
-    parts = [part for part in (_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame), _found_text(frame)) if part]
+    parts = [_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame)]
     if frame.refused:
-        parts = [part for part in (f"refused: {frame.refused}", _raw_text(frame), _found_text(frame)) if part]
-    return f"{frame.number:7d} {frame.time_us / 1e6:9.3f} s  " + "; ".join(parts)
+        parts = [f"refused: {frame.refused}", _raw_text(frame)]
+    text = "; ".join(part for part in (*parts, _found_text(frame)) if part)
+    return f"{frame.number:7d} {frame.time_us / 1e6:9.3f} s  {text}"
 
 
 def _solve_text(frame: LiveFrame) -> str:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eitskin.device.wire.codec import Decoder, Packet, encode
-from eitskin.device.wire.packets import MAX_PAYLOAD, PacketType
+from eitskin.device.wire.packets import LINK_VERSION, MAX_PAYLOAD, PacketType
 from eitskin.errors import DeviceError
 
 
@@ -27,7 +27,7 @@ def test_round_trip(packet_type: int, sequence: int, payload: bytes) -> None:
 
 def test_the_bytes_are_the_documented_ones() -> None:
     """Worked out by hand in docs/link-protocol.md."""
-    head = bytes([1, 0x80, 4, 0, 7, 0, 0, 0])
+    head = bytes([LINK_VERSION, 0x80, 4, 0, 7, 0, 0, 0])
     payload = bytes([1, 2, 0, 3])
     checksum = zlib.crc32(head + payload).to_bytes(4, "little")
     assert 0 not in checksum
@@ -119,14 +119,14 @@ def test_a_port_opened_in_the_middle_of_a_packet() -> None:
 def test_another_version_is_told_apart_from_damage() -> None:
     from eitskin.core import _core_f32 as core
 
-    plain = bytes([2, 1, 0, 0, 1, 1, 1, 1])
+    plain = bytes([3, 1, 0, 0, 1, 1, 1, 1])
     plain += zlib.crc32(plain).to_bytes(4, "little")
     stuffed = bytes([3]) + plain[:2] + bytes([1, 9]) + plain[4:]
-    assert core.lib.EITS_LINK_VERSION == 1
+    assert core.lib.EITS_LINK_VERSION == 2
     decoder = Decoder()
     assert decoder.feed(b"\0" + stuffed + b"\0") == []
     assert decoder.counters.version_errors == 1
-    assert decoder.other_version == 2
+    assert decoder.other_version == 3
 
 
 def test_what_was_half_received_before_a_cut_is_no_error() -> None:

@@ -180,7 +180,8 @@ def test_raw_frames_are_read_bit_for_bit(rows: list[tuple[float, int]], frame: i
 
 
 def solved(count: int, status: int = 0) -> pk.Solved:
-    return pk.Solved(7, 8, 9, 10, 11, count, status, "gap", 3, 20, 40, 1234, 56, 0.5, 1.5, 0.25, 0.125, 2.0, 4.0)
+    return pk.Solved(7, 8, 9, 10, 11, count, status, "gap", 3, 20, 40, 1234, 56, 0.5, 1.5, 0.25, 0.125, 2.0, 4.0,
+                     0b10111111, 3, 2, 0.375, (5, 63), (0, 1), (7,))  # fmt: skip
 
 
 def test_images_and_touches_are_read_as_built() -> None:
@@ -197,10 +198,10 @@ def test_images_and_touches_are_read_as_built() -> None:
 
 def test_stats_and_faults_are_read_as_built() -> None:
     stages = {name: pk.StageStats(k, 2 * k, 3 * k, 4 * k) for k, name in enumerate(pk.STAGES, 1)}
-    stats = pk.BoardStats(*range(16), stages)  # type: ignore[call-arg]
+    stats = pk.BoardStats(*range(17), stages)  # type: ignore[call-arg]
     payload = pl.build_stats(stats)
     c = core.ffi.from_buffer("eits_packet_stats *", bytearray(payload))
-    assert (c.workspace_used, c.stage[5].worst_us, c.stage[0].count) == (15, 24, 1)
+    assert (c.slots_repeated, c.glitches, c.workspace_used, c.stage[5].worst_us, c.stage[0].count) == (7, 8, 16, 24, 1)
     assert pl.parse(pk.PacketType.STATS, payload) == stats
     fault = pk.Fault(8, True, 99, -1, -15, (1, 2, 3, 4, 2**32 - 1))
     assert pl.parse(pk.PacketType.FAULT, pl.build_fault(fault)) == fault
@@ -249,7 +250,7 @@ def test_commands_are_read_as_a_board_reads_them(request: int, what: int, every:
 
 
 def test_floats_of_a_command_are_single() -> None:
-    command = cmd.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9)
+    command = cmd.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37)
     parsed = cmd.parse_command(cmd.Solver, command.payload(5))
     assert parsed is not None
     assert math.isclose(parsed[1].lambda_rel, 0.03, rel_tol=1e-7)

@@ -33,8 +33,8 @@ def rows(text: str) -> list[list[str]]:
         ("INFO", "eits_packet_info", 152),
         ("REPLY", "eits_packet_reply", 16),
         ("RAW", "eits_packet_raw", 16),
-        ("IMAGE", "eits_packet_solved", 68),
-        ("STATS", "eits_packet_stats", 160),
+        ("IMAGE", "eits_packet_solved", 104),
+        ("STATS", "eits_packet_stats", 164),
         ("FAULT", "eits_packet_fault", 36),
     ],
 )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from device_helpers import FRAMES, QUIET, empty_bank, fresh_skin, scene, sim_board, sim_device
 
+from eitskin.core.results import ALL_FINDINGS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.simulated.board import SimBoard
@@ -204,7 +205,7 @@ def refused(device: Device, command: cmd.Command) -> tuple[ReplyStatus, tuple[in
 
 
 SCAN = cmd.Scan(50_000_000, 1_000_000, 80, 16, 1, 0, 0)
-SOLVER = cmd.Solver(30, 5, 1, 0, 0.03, 0.0, 1, 0)
+SOLVER = cmd.Solver(30, 5, 1, 0, 0.03, 0.0, 1, 0, ALL_FINDINGS)
 RANGE = ReplyStatus.RANGE
 REFUSALS = [
     (cmd.StreamCommand(8, 1), RANGE, (4, 7)),

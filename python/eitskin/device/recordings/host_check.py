@@ -179,8 +179,8 @@ def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
 
 
 def same_findings(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
-    """Whether this host's core found in a frame what the board says of it; rows that the converter saturated are no numbers to the
-    core, so the quality of the raw frame tells them."""
+    """Whether this host's core found in a frame what the board says of it. Rows that the converter saturated are no numbers to
+    the core: the quality of the raw frame tells them."""
     lost = int(np.count_nonzero(raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED))
     saturated = 1 << FINDINGS.index("saturated") if lost else 0
     here = info.findings | (saturated & options.findings), info.saturated + lost, info.glitches

@@ -1,13 +1,12 @@
 """A simulated board: the firmware's commands, checks and replies over the host core and a scene's frames.
 
 What the firmware does with registers is left out: there is no converter (no saturated rows, and open electrodes only once there
-is a reference, by the core) and no processor time; every time that would tell of one is 0. The clock runs only while the board scans for someone. All else is as
-docs/link-protocol.md says, and the packets are the very bytes.
+is a reference, by the core) and no processor time; every time that would tell of one is 0. The clock runs only while the board
+scans for someone. All else is as docs/link-protocol.md says, and the packets are the very bytes.
 """
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -16,11 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin import __version__
+from eitskin.core.results import Info
 from eitskin.device.simulated.banks import E_MODEL_MAGIC, SimBanks, golden
 from eitskin.device.simulated.checks import OK, Answer, check_scan, check_size, check_solver, outside, slot_us
 from eitskin.device.simulated.faults import SimFaults
 from eitskin.device.simulated.scan import rows_us, scan_frame
 from eitskin.device.simulated.skin import SceneSkin
+from eitskin.device.simulated.solve import NOTHING, model_facts
 from eitskin.device.wire import commands as cmd
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.packets import (
@@ -38,9 +39,6 @@ from eitskin.device.wire.packets import (
 )
 from eitskin.device.wire.packets import ReplyStatus as Status
 from eitskin.device.wire.payloads import build_info, build_raw, build_reply, build_stats
-from eitskin.device.simulated.solve import NOTHING
-from eitskin.core.results import Info
-from eitskin.model.storage import STORAGES
 
 BOARD_NAME = "simulated"
 DATA_BYTES = 4096
@@ -91,7 +89,8 @@ class SimBoard:
         self._solver, why = self.banks.open_newest()
         if self._solver is not None:
             period = self.skin.period_us
-            self._scan = replace(self._scan, frame_period_us=period if period >= rows_us(self._solver, self._scan, full=True) else 0)
+            enough = period >= rows_us(self._solver, self._scan, full=True)
+            self._scan = replace(self._scan, frame_period_us=period if enough else 0)
         return why
 
     def _tell_no_model(self, why: int) -> None:
@@ -340,15 +339,15 @@ class SimBoard:
     def _on_model_commit(self, request: int, command: cmd.ModelCommit) -> Answer:
         answer = self.banks.commit()
         if answer.status == Status.OK:
-            self._open_newest()
+            self._tell_no_model(self._open_newest())
         return answer
 
     # ---- what it says about itself ----
 
     def _info(self, request: int) -> BoardInfo:
         solver, scan = self._solver, self._scan
-        blob, model = (b"", None) if solver is None else (solver.blob, solver.model)
         return BoardInfo(
+            **model_facts(solver, self.banks.in_use or 0),
             request=request,
             firmware=tuple(int(word) for word in __version__.split(".")[:3]),  # type: ignore[arg-type]
             board=BOARD_NAME,
@@ -357,18 +356,6 @@ class SimBoard:
             electrodes=self.skin.electrodes,
             bank_bytes=self.banks.room,
             data_bytes=DATA_BYTES,
-            model_bytes=len(blob),
-            model_crc=zlib.crc32(blob),
-            protocol_hash=model.protocol.hash if model else 0,
-            n_electrodes=model.protocol.n_electrodes if model else 0,
-            n_rows=model.protocol.n_rows if model else 0,
-            n_folded=len(model.fold.first) if model else 0,
-            rank=model.rank if model else 0,
-            n_pixels=model.grid.n_pixels if model else 0,
-            nx=model.grid.nx if model else 0,
-            ny=model.grid.ny if model else 0,
-            storage=STORAGES.index(model.stored.storage) if model else 0,
-            bank=self.banks.in_use or 0,
             excitation_millihz=scan.excitation_millihz,
             sample_rate_hz=scan.sample_rate_hz,
             samples=scan.samples,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import zlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +24,7 @@ from eitskin.device.wire.packets import (
 from eitskin.device.wire.payloads import build_image, build_touches
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.model.eitm import decode_model
+from eitskin.model.storage import STORAGES
 from eitskin.solve.options import default_options
 
 E_ARGUMENT = -1
@@ -32,6 +35,20 @@ def core_status(error: EitskinError) -> int:
     """The eits_status behind an error of ``CoreEngine``."""
     match = re.search(r"status (-\d+)\)", str(error))
     return int(match.group(1)) if match else E_ARGUMENT
+
+
+def model_facts(solver: SimSolver | None, bank: int) -> dict[str, Any]:
+    """What ``BoardInfo`` says of the model, zeros where there is none."""
+    names = (
+        "model_bytes", "model_crc", "protocol_hash", "n_electrodes", "n_rows", "n_folded", "rank", "n_pixels", "nx", "ny",
+        "storage", "bank",
+    )  # fmt: skip
+    if solver is None:
+        return dict.fromkeys(names, 0)
+    blob, model, protocol, grid = solver.blob, solver.model, solver.model.protocol, solver.model.grid
+    head = len(blob), zlib.crc32(blob), protocol.hash, protocol.n_electrodes, protocol.n_rows
+    rest = len(model.fold.first), model.rank, grid.n_pixels, grid.nx, grid.ny, STORAGES.index(model.stored.storage), bank
+    return dict(zip(names, (*head, *rest), strict=True))
 
 
 class SimSolver:

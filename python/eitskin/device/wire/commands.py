@@ -88,8 +88,8 @@ class Scan(Command):
 
 @dataclass(frozen=True)
 class Solver(Command):
-    """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and ``SOLVERS``, ``findings`` what is
-    looked for, bit k of ``FINDINGS``."""
+    """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and ``SOLVERS``, ``findings``
+    what is looked for, bit k of ``FINDINGS``."""
 
     TYPE = PacketType.SOLVER
     LAYOUT = struct.Struct("<IIIIIffIII")

@@ -65,13 +65,12 @@ def reply_text(reply: Reply) -> str:
 def fault_text(fault: Fault) -> str:
     """What went wrong on the board (or that it is over), in which frame, and what to do."""
     if fault.code in FOUND_FAULTS:
-        name = found_name(fault)
-        return f"{name}, frame {fault.frame}: {_FOUND[FaultCode(fault.code)]}" if fault.raised else f"{name}: over, frame {fault.frame}"
-    known = fault.code in list(FaultCode)
-    name = FaultCode(fault.code).name.lower().replace("_", " ") if known else f"fault {fault.code}"
-    if not fault.raised:
-        return f"{name}: over, frame {fault.frame}"
-    return f"{name}, frame {fault.frame}: {_text(fault) if known else f'value {fault.value}'}"
+        name, text = found_name(fault), _FOUND[FaultCode(fault.code)]
+    elif fault.code in list(FaultCode):
+        name, text = FaultCode(fault.code).name.lower().replace("_", " "), _text(fault)
+    else:
+        name, text = f"fault {fault.code}", f"value {fault.value}"
+    return f"{name}, frame {fault.frame}: {text}" if fault.raised else f"{name}: over, frame {fault.frame}"
 
 
 def found_name(fault: Fault) -> str:

@@ -221,8 +221,8 @@ class RawFrame:
 @dataclass(frozen=True)
 class Solved:
     """eits_packet_solved: what the board's core says of a frame and its solve, and the times. ``status`` is 0 or an eits_status
-    (negative), ``stop`` one of ``core.results.STOPS``, ``findings`` as in ``core.results.Info``; ``saturated`` rows are those that
-    the converter tells too."""
+    (negative), ``stop`` one of ``core.results.STOPS``, ``findings`` as in ``core.results.Info``; ``saturated`` also counts
+    what the converter tells."""
 
     frame: int
     time_us: int

@@ -95,7 +95,8 @@ def _parse_solved(payload: bytes, what: str, each: int) -> Solved:
     _exactly(payload, SOLVED_STRUCT.size + each * count, what)
     if stop >= len(STOPS):
         raise MalformedPacket(f"{what}: stop {stop} is not known")
-    return Solved(f, t, solve, touch, age, count, -status, STOPS[stop], *rest, _bits(opened), _bits(bridged), _bits(noisy))
+    rest += [_bits(opened), _bits(bridged), _bits(noisy)]
+    return Solved(f, t, solve, touch, age, count, -status, STOPS[stop], *rest)
 
 
 def _build_solved(solved: Solved) -> bytes:

@@ -1,0 +1,136 @@
+/* What the core finds reaches the host by name: in the frame's head, and what persists as faults; on frames of the sheet. */
+#include "bench.h"
+#include "check.h"
+
+static bench b;
+
+/* Tared, and everything is streamed. */
+static void start(void)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    b.board.noise_codes = 4;
+    CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
+}
+
+static const eits_packet_solved *head_of(const host_packet *packet)
+{
+    return (const void *)packet->payload;
+}
+
+/* Nothing is streamed, or every fifth frame: it is told all the same, in the frame that shows it. */
+static void test_open_while_nobody_looks(uint16_t every)
+{
+    start();
+    CHECK_EQUAL(host_stream(&b.host, every > 0 ? EITS_STREAM_TOUCHES : 0, every > 0 ? every : 1, 0).status, EITS_REPLY_OK);
+    host_run(&b.host, 50);
+    for (uint32_t e = 2; e < 16; e += 6) {
+        host_forget(&b.host);
+        b.sheet.detached[e] = true;
+        sheet_solve(&b.sheet);
+        const uint32_t before = b.host.instrument.last_frame;
+        host_run(&b.host, 60);
+        const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
+        CHECK(fault != NULL && fault->index == (int32_t)e && fault->frame <= before + 2);
+        b.sheet.detached[e] = false;
+        sheet_solve(&b.sheet);
+        host_run(&b.host, 300);
+        CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0) != NULL);
+    }
+    bench_stop(&b);
+}
+
+/* Two electrodes that are joined: both named, each with the other. */
+static double bridged(void *user, const uint8_t e[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    double volts = 0; /* of the sheet with 6 and 7 as one: the pair's transfer impedances are their mean */
+    for (int k = 0; k < 16; ++k) {
+        uint8_t row[4];
+        for (int p = 0; p < 4; ++p)
+            row[p] = e[p] == 6 || e[p] == 7 ? (uint8_t)(k >> p & 1 ? 6 : 7) : e[p];
+        volts += sheet_volts(user, row) / 16;
+    }
+    return volts;
+}
+
+static void test_bridged(void)
+{
+    start();
+    host_run(&b.host, 50);
+    host_forget(&b.host);
+    b.board.volts = bridged;
+    host_run(&b.host, 60);
+    for (int32_t k = 0; k < 2; ++k) {
+        const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_BRIDGED, true, (uint32_t)k);
+        CHECK(fault != NULL && fault->index == 6 + k && fault->value == 7 - k && fault->words[0] == 0xC0 && fault->words[1] == 0);
+    }
+    CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, true, 2) == NULL);
+    const eits_packet_solved *head = head_of(host_last(&b.host, EITS_PACKET_TOUCHES));
+    CHECK_EQUAL(head->bridged_electrodes, 0xC0);
+    CHECK_EQUAL(head->findings & EITS_FINDING_BRIDGED, EITS_FINDING_BRIDGED);
+    CHECK_EQUAL(host_info(&b.host).faults >> EITS_FAULT_BRIDGED & 1u, 1);
+    b.board.volts = bench_sheet;
+    host_run(&b.host, 300);
+    CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, false, 0) != NULL);
+    CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, false, 1) != NULL);
+    CHECK_EQUAL(host_info(&b.host).faults >> EITS_FAULT_BRIDGED & 1u, 0);
+    bench_stop(&b);
+}
+
+/* One reading that is off for a frame: left out, in the head and in STATS, and no fault. */
+static double one_row_off(void *user, const uint8_t e[4], uint64_t at_ns)
+{
+    (void)at_ns;
+    return sheet_volts(user, e) + (e[0] == 2 && e[2] == 9 ? 0.02 : 0);
+}
+
+static void test_glitch(void)
+{
+    start();
+    host_run(&b.host, 50);
+    const uint32_t before = host_stats(&b.host, 0).glitches;
+    host_forget(&b.host);
+    b.board.volts = one_row_off;
+    host_run(&b.host, 24);
+    b.board.volts = bench_sheet;
+    host_run(&b.host, 60);
+    uint32_t rows = 0;
+    for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_TOUCHES); ++k) {
+        const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_TOUCHES, k));
+        CHECK_EQUAL(head->findings, head->glitches > 0 ? EITS_FINDING_GLITCH : 0);
+        CHECK(head->glitches <= 2 && head->masked == head->glitches);
+        rows += head->glitches;
+    }
+    CHECK(rows >= 1);
+    CHECK_EQUAL(host_stats(&b.host, 0).glitches - before, rows);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FAULT), 0);
+    bench_stop(&b);
+}
+
+/* What is not looked for is not found. */
+static void test_switched_off(void)
+{
+    start();
+    const eits_options *o = &b.host.instrument.engine.ctx.options;
+    eits_command_solver solver = {.iterations = o->iterations, .max_touches = o->max_touches, .lambda_rel = o->lambda_rel,
+                                  .gap_rel = o->gap_rel, .solver = o->solver,
+                                  .findings = EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN};
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver).status, EITS_REPLY_OK);
+    b.sheet.detached[5] = true;
+    sheet_solve(&b.sheet);
+    host_run(&b.host, 60);
+    CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0) == NULL);
+    CHECK_EQUAL(head_of(host_last(&b.host, EITS_PACKET_IMAGE))->open_electrodes, 0);
+    bench_stop(&b);
+}
+
+int main(void)
+{
+    test_open_while_nobody_looks(0);
+    test_open_while_nobody_looks(5);
+    test_bridged();
+    test_glitch();
+    test_switched_off();
+    return checks_report("found");
+}
