@@ -74,8 +74,8 @@ class Judged:
 
     @property
     def gap_rounding(self) -> float:
-        """How far off the gap may be: as the objective, and by the correlations' error dc: sum_j |x_j| dc_j for the slacks, and, as
-        s = lambda / max c is off by at most dc / max c, that share of |r|^2 + sum_j |x_j c_j|."""
+        """How far off the gap may be: as the objective, and by the correlations' error dc: sum_j |x_j| dc_j for the slacks, and,
+        as s = lambda / max c is off by at most dc / max c, that share of |r|^2 + sum_j |x_j c_j|."""
         r = self.residual
         correlation, norm = self.s.T @ r, float(np.linalg.norm(r))
         off = np.linalg.norm(self.s, axis=0) * (self.rho + self.s.shape[0] * U * norm)
