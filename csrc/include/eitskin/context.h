@@ -55,7 +55,8 @@ typedef enum eits_stop {
     EITS_STOP_GATE = 2,       /* lambda_max lies within the noise: no touch, the image is zero */
     EITS_STOP_ZERO = 3,       /* lambda >= lambda_max: zero is the exact optimum; or |y| < 2^-51 (4.4e-16; double: 1e-146), whose
                                * square says nothing */
-    EITS_STOP_DIVERGED = 4,   /* the objective rose although the step was halved again and again; the image is zero */
+    EITS_STOP_DIVERGED = 4,   /* the objective rose, or all went to zero, although the step was halved again and again; the image
+                               * is zero */
     EITS_STOP_MACS = 5,       /* the next step would have passed mac_limit: the image is the best until then */
     EITS_STOP_OPTIMUM = 6     /* no coefficient moves any more but by rounding: coordinate descent and active set */
 } eits_stop;

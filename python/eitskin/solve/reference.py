@@ -67,10 +67,11 @@ def fista(
         last = k == options.iterations
         if not last and k % options.gap_every:
             continue
-        if not last and options.gap_rel == 0 and float(sx @ sx) <= 8 * scale:
+        none = not x.any()
+        if not last and options.gap_rel == 0 and not none and float(sx @ sx) <= 8 * scale:
             continue
         certificate = certify(s, y, x, sx, lam, sign, basis)
-        if not certificate.objective <= scale * (1 + 1e-3):
+        if not certificate.objective <= scale * (1 + 1e-3) or (none and certificate.gap > 1e-3 * scale):
             if halvings == MAX_STEP_HALVINGS or last:
                 stop = "diverged"
                 break

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from certified import Judged, judged
+from everywhere import on_host
+from made_models import made_blob, plain_options
 
 from eitskin.solve.reference_problem import greatest
+from eitskin.study.emulated_steps import Choose, Load, Solve
 
 RANK, COLUMNS = 20, 64
 
@@ -56,3 +60,10 @@ def whitened(seed: int) -> RandomProblem:
     """Orthonormal rows: every eigenvalue of S S' is 1."""
     q, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((COLUMNS, RANK)))
     return with_data(q.T, seed + 1000)
+
+
+def optimum_of(problem: RandomProblem, sign: str, share: float = 0.03) -> Judged:
+    """By the active set in float64, to a gap of 1e-12 of the start's objective; ``share`` is lambda / lambda_max."""
+    options = plain_options(problem.s, solver="active-set", sign=sign, iterations=1000, gap_rel=1e-12, lambda_rel=share)
+    _, outcomes = on_host([Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], "float64")
+    return judged(problem.s, problem.y, sign, outcomes[0])
