@@ -133,6 +133,19 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
     return EITS_OK;
 }
 
+/* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
+static eits_real unit_for(const eits_context *ctx, const eits_real *frame)
+{
+    eits_real largest = 0, unit = 1;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
+        largest = !ctx->bad[i] && eits_fabs(frame[i]) > largest ? eits_fabs(frame[i]) : largest;
+    while (unit <= R(0.5) * largest)
+        unit *= 2;
+    while (unit > largest && unit > R(0x1p-125))
+        unit *= R(0.5);
+    return unit;
+}
+
 eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length)
 {
     if (ctx == NULL || frame == NULL || ctx->baseline.count >= ctx->baseline.wanted)
@@ -145,6 +158,8 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
         status = learn_lambda_noise(ctx, frame);
     if (status != EITS_OK)
         return status;
+    if (b->count == 0)
+        b->m2_unit = unit_for(ctx, frame);
     ++b->count;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* Welford, Technometrics 4 (1962) 419 */
         if (ctx->bad[i])
@@ -153,7 +168,7 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
             continue;
         const eits_real delta = frame[i] - b->v0[i];
         b->v0[i] += delta / (eits_real)b->count;
-        b->m2[i] = eits_fma(delta, frame[i] - b->v0[i], b->m2[i]);
+        b->m2[i] = eits_fma(delta / b->m2_unit, (frame[i] - b->v0[i]) / b->m2_unit, b->m2[i]);
     }
     return EITS_OK;
 }
@@ -176,7 +191,7 @@ eits_status eits_baseline_finish(eits_context *ctx)
             ++used;
         }
     }
-    b->noise_v = used > 0 ? eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
+    b->noise_v = used > 0 ? b->m2_unit * eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
     b->ready = 1;
     return EITS_OK;
 }
