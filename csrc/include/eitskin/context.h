@@ -112,6 +112,7 @@ typedef struct eits_baseline {
     eits_real correlation;  /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
     eits_real noise_v;      /* rms over rows of the quiet frames' deviation, V; 0 if unknown */
     eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames; 0 if unknown */
+    uint32_t second_waits;  /* the second quiet frame is in m2 until there is a third */
     uint32_t glitches;      /* readings of quiet frames that were left out of the reference */
 } eits_baseline;
 
