@@ -4,7 +4,7 @@
 
 set(EITSKIN_CORE_SOURCES
     types.c model.c kernels.c columns.c kernels_portable.c context.c stages.c baseline.c frame.c
-    electrodes.c glitch.c misfit.c solve.c certificate.c fista.c
+    electrodes.c glitch.c quiet.c misfit.c solve.c certificate.c fista.c
     working_set.c coordinate.c active_set.c missing.c factor.c disc.c touch.c crowded.c track.c batch.c self_test.c link.c)
 
 set(EITSKIN_WARNINGS -Wall -Wextra -Wconversion -Wdouble-promotion -Werror)

@@ -1,6 +1,7 @@
 /* The reference frame and its noise, from one frame or learned from many quiet ones. */
 #include "eitskin/frame.h"
 
+#include "examine.h"
 #include "kernels.h"
 #include "stages.h"
 #include "vec.h"
@@ -98,6 +99,7 @@ eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t 
         b->count = 1;
         b->noise_v = 0;
         b->lambda_noise = 0;
+        b->glitches = b->second_waits = 0;
     }
     eits_zero(b->m2, length);
     return status;
@@ -115,6 +117,7 @@ eits_status eits_baseline_begin(eits_context *ctx, uint32_t count)
     b->ready = 0;
     b->lambda_noise = 0;
     b->noise_v = 0;
+    b->glitches = b->second_waits = 0;
     return EITS_OK;
 }
 
@@ -133,29 +136,92 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
     return EITS_OK;
 }
 
-eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length)
+/* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
+static eits_real unit_for(const eits_context *ctx, const eits_real *frame)
 {
-    if (ctx == NULL || frame == NULL || ctx->baseline.count >= ctx->baseline.wanted)
-        return EITS_E_ARGUMENT;
+    eits_real largest = 0, unit = 1;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
+        largest = !ctx->bad[i] && eits_fabs(frame[i]) > largest ? eits_fabs(frame[i]) : largest;
+    while (unit <= R(0.5) * largest)
+        unit *= 2;
+    while (unit > largest && unit > R(0x1p-125))
+        unit *= R(0.5);
+    return unit;
+}
+
+/* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
+static void take_in(eits_context *ctx, const eits_real *frame)
+{
     eits_baseline *b = &ctx->baseline;
-    eits_status status = check_quiet(ctx, frame, length);
-    if (status == EITS_OK && b->count == b->wanted / 2)
-        status = fit_to_model(ctx);
-    if (status == EITS_OK && b->count >= b->wanted / 2)
-        status = learn_lambda_noise(ctx, frame);
-    if (status != EITS_OK)
-        return status;
     ++b->count;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* Welford, Technometrics 4 (1962) 419 */
+        if (ctx->bad[i] == EITS_BAD_NOW)
+            continue;
         if (ctx->bad[i])
             b->v0[i] = R(NAN);
         if (!eits_is_finite(b->v0[i]))
             continue;
         const eits_real delta = frame[i] - b->v0[i];
         b->v0[i] += delta / (eits_real)b->count;
-        b->m2[i] = eits_fma(delta, frame[i] - b->v0[i], b->m2[i]);
+        b->m2[i] = eits_fma(delta / b->m2_unit, (frame[i] - b->v0[i]) / b->m2_unit, b->m2[i]);
     }
-    return EITS_OK;
+}
+
+/* The second frame waits in m2 until a third tells which of them is right where they differ. */
+static void keep_second(eits_context *ctx, const eits_real *frame)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (ctx->bad[i])
+            ctx->baseline.v0[i] = R(NAN);
+    }
+    eits_copy(ctx->baseline.m2, frame, ctx->model->n_rows);
+    ctx->baseline.count = 2;
+    ctx->baseline.second_waits = 1;
+}
+
+static void weigh_second(eits_context *ctx, const eits_real *frame)
+{
+    eits_baseline *b = &ctx->baseline;
+    b->glitches += eits_quiet_weigh(ctx, frame);
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* as take_in */
+        const eits_real delta = b->m2[i] - b->v0[i], second = b->m2[i];
+        b->m2[i] = 0;
+        if (!eits_is_finite(b->v0[i]))
+            continue;
+        b->v0[i] += delta / 2;
+        b->m2[i] = eits_fma(delta / b->m2_unit, (second - b->v0[i]) / b->m2_unit, 0);
+    }
+    b->second_waits = 0;
+}
+
+eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length)
+{
+    if (ctx == NULL || frame == NULL || ctx->baseline.count >= ctx->baseline.wanted)
+        return EITS_E_ARGUMENT;
+    eits_baseline *b = &ctx->baseline;
+    eits_status status = check_quiet(ctx, frame, length);
+    if (status != EITS_OK)
+        return status;
+    const int judged = eits_wants(ctx, EITS_FINDING_GLITCH);
+    if (b->count == 1 && judged) {
+        keep_second(ctx, frame);
+        return EITS_OK;
+    }
+    if (b->second_waits)
+        weigh_second(ctx, frame);
+    const uint32_t left = b->count >= 2 && judged ? eits_quiet_leave_out(ctx, frame) : 0;
+    if (b->count == b->wanted / 2)
+        status = fit_to_model(ctx);
+    if (status == EITS_OK && b->count >= b->wanted / 2)
+        status = learn_lambda_noise(ctx, frame);
+    if (status == EITS_OK) {
+        if (b->count == 0)
+            b->m2_unit = unit_for(ctx, frame);
+        take_in(ctx, frame);
+        b->glitches += left;
+    }
+    eits_quiet_clear(ctx);
+    return status;
 }
 
 eits_status eits_baseline_finish(eits_context *ctx)
@@ -176,7 +242,7 @@ eits_status eits_baseline_finish(eits_context *ctx)
             ++used;
         }
     }
-    b->noise_v = used > 0 ? eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
+    b->noise_v = used > 0 ? b->m2_unit * eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
     b->ready = 1;
     return EITS_OK;
 }

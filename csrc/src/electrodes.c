@@ -43,10 +43,11 @@ static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
     return (any & (unsigned)state) != 0;
 }
 
-/* Every significant row of an open electrode is dead. Were that so for all of them, it would not be the electrodes. */
-static void find_open(eits_context *ctx, const eits_real *frame, limits most)
+/* Every significant row of an open electrode is dead. Were that so for all of them, it would not be the electrodes. Returns
+ * whether any electrode is alive; `alive` says which. */
+static int find_open(eits_context *ctx, const eits_real *frame, limits most, uint8_t *alive)
 {
-    uint8_t rows[EITS_MOST_ELECTRODES] = {0}, alive[EITS_MOST_ELECTRODES] = {0};
+    uint8_t rows[EITS_MOST_ELECTRODES] = {0};
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const int state = judge_row(ctx, frame, most, i);
         if (state == 0)
@@ -62,13 +63,16 @@ static void find_open(eits_context *ctx, const eits_real *frame, limits most)
         judged += rows[e] >= EITS_ROWS_TO_JUDGE;
         open += rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e];
     }
-    if (open == 0 || open == judged)
-        return;
+    if (open == judged)
+        return 0;
+    if (open == 0 || !eits_wants(ctx, EITS_FINDING_ELECTRODE_OPEN))
+        return 1;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
         if (rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e])
             ctx->electrode[e] |= EITS_ELECTRODE_OPEN;
     }
     ctx->info.findings |= EITS_FINDING_ELECTRODE_OPEN;
+    return 1;
 }
 
 static int is_pair(const uint8_t *two, uint8_t e, uint8_t f)
@@ -92,7 +96,8 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
     return dead >= EITS_ROWS_TO_JUDGE;
 }
 
-static void find_bridged(eits_context *ctx, const eits_real *frame, limits most)
+/* Both of a bridged pair are alive in rows that use one of them alone. */
+static void find_bridged(eits_context *ctx, const eits_real *frame, limits most, const uint8_t *alive)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (judge_row(ctx, frame, most, i) != DEAD || uses(ctx, i, EITS_ELECTRODE_OPEN))
@@ -100,7 +105,7 @@ static void find_bridged(eits_context *ctx, const eits_real *frame, limits most)
         for (uint32_t k = 0; k < 4; k += 2) {
             const uint8_t e = eits_row(ctx, i)[k], f = eits_row(ctx, i)[k + 1];
             const unsigned known = ctx->electrode[e] & ctx->electrode[f] & EITS_ELECTRODE_BRIDGED;
-            if (known != 0 || !pair_is_dead(ctx, frame, most, e, f))
+            if (known != 0 || !alive[e] || !alive[f] || !pair_is_dead(ctx, frame, most, e, f))
                 continue;
             ctx->electrode[e] |= EITS_ELECTRODE_BRIDGED;
             ctx->electrode[f] |= EITS_ELECTRODE_BRIDGED;
@@ -157,10 +162,9 @@ void eits_find_electrodes(eits_context *ctx, const eits_real *frame)
         leave_impossible(ctx, frame, most);
     if (dead < EITS_ROWS_TO_JUDGE)
         return;
-    if (eits_wants(ctx, EITS_FINDING_ELECTRODE_OPEN))
-        find_open(ctx, frame, most);
-    if (eits_wants(ctx, EITS_FINDING_BRIDGED))
-        find_bridged(ctx, frame, most);
+    uint8_t alive[EITS_MOST_ELECTRODES] = {0};
+    if (find_open(ctx, frame, most, alive) && eits_wants(ctx, EITS_FINDING_BRIDGED))
+        find_bridged(ctx, frame, most, alive);
     if ((ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED)) == 0)
         return;
     eits_name_electrodes(ctx);

@@ -61,9 +61,20 @@ int eits_find_glitches(eits_context *ctx, uint64_t *macs);
  * their prediction errors. ctx->y is P d, not yet projected, no fold left out, ctx->sheet_known. */
 int eits_find_unpaired(eits_context *ctx, uint64_t *macs);
 
-/* The quiet frame `newer` against `older`, both whole: how many folds do not agree (0 where they are too many to be glitches);
- * sets `bit` in ctx->basis_for of those, clears it in the others. */
+/* A row of ctx->bad that is left out of the quiet frame at hand only. */
+enum { EITS_BAD_NOW = 2 };
+
+/* The quiet frame `newer` against `older`: how many folds do not agree (0 where they are too many to be glitches); sets `bit` in
+ * ctx->list_index of those, clears it in the others. Uses the list. */
 uint32_t eits_quiet_odd(eits_context *ctx, const eits_real *newer, const eits_real *older, uint8_t bit);
+
+/* Mark the readings of a quiet frame that the mean so far does not bear out with EITS_BAD_NOW; returns their number. */
+uint32_t eits_quiet_leave_out(eits_context *ctx, const eits_real *frame);
+void eits_quiet_clear(eits_context *ctx);
+
+/* Of the first two quiet frames, in v0 and m2: readings that neither the other nor the third bears out become the other's.
+ * Returns their number. */
+uint32_t eits_quiet_weigh(eits_context *ctx, const eits_real *frame);
 
 /* What misfit and prediction need to know of P and S; once, at the start. */
 void eits_learn_sheet(eits_context *ctx);

@@ -147,11 +147,13 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
         certified = 0;
         if (k != o->iterations && k % o->gap_every != 0)
             continue;
-        if (k != o->iterations && !(o->gap_rel > 0) && eits_dot(ctx, ctx->sx, ctx->sx, ctx->model->rank) <= 4 * 2 * scale)
+        const int none = ctx->info.nonzeros == 0;
+        if (k != o->iterations && !(o->gap_rel > 0) && !none && eits_dot(ctx, ctx->sx, ctx->sx, ctx->model->rank) <= 4 * 2 * scale)
             continue; /* |Sx| <= 2 |y| wherever the objective is below its value at zero */
         c = eits_certify(ctx, lambda, layout);
         certified = 1;
-        if (!(c.objective <= ceiling)) {
+        /* too long a step may also throw all coefficients beyond their sign, to zero: then the gap is that of the start */
+        if (!(c.objective <= ceiling) || (none && c.gap > R(1e-3) * scale)) {
             if (ctx->info.step_halvings == MAX_STEP_HALVINGS || k == o->iterations) {
                 ctx->info.stop = EITS_STOP_DIVERGED;
                 break;

@@ -171,7 +171,8 @@ static eits_status read_dims(eits_model *model, const section *dims)
         return EITS_E_MODEL_VALUE;
     const float numbers[] = {model->pixel_mm, model->origin_x_mm, model->origin_y_mm,
                              model->current_a, model->lipschitz,   model->noise_gain};
-    if (!all_finite(numbers, sizeof numbers / sizeof numbers[0]) || model->pixel_mm <= 0.0f || model->lipschitz <= 0.0f ||
+    /* the inverse of the Lipschitz constant must be a number */
+    if (!all_finite(numbers, sizeof numbers / sizeof numbers[0]) || model->pixel_mm <= 0.0f || model->lipschitz < 0x1p-126f ||
         model->current_a <= 0.0f || model->noise_gain < 0.0f)
         return EITS_E_MODEL_VALUE;
     model->data_kind = (eits_data_kind)kind;

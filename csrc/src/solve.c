@@ -72,12 +72,16 @@ static void run(eits_context *ctx, int gradient_known)
     }
 }
 
+/* Data whose square is hardly a number any more: objective and gap would be rounding. */
+static const eits_real LEAST_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
+
 /* ctx->info holds what the frame stage counted, and zeros. */
 static eits_status solve(eits_context *ctx)
 {
     const eits_options *o = &ctx->options;
     const uint32_t rank = ctx->model->rank;
-    ctx->info.data_norm = eits_sqrt(eits_dot(ctx, ctx->y, ctx->y, rank));
+    const eits_real square = eits_dot(ctx, ctx->y, ctx->y, rank);
+    ctx->info.data_norm = eits_sqrt(square);
     ctx->info.lambda_noise = ctx->baseline.lambda_noise;
     if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank)) {
         answer_zero(ctx, EITS_STOP_MACS);
@@ -97,7 +101,7 @@ static eits_status solve(eits_context *ctx)
         answer_zero(ctx, EITS_STOP_GATE);
         return EITS_OK;
     }
-    if (!(ctx->info.lambda_max > ctx->info.lambda)) {
+    if (!(ctx->info.lambda_max > ctx->info.lambda) || square < LEAST_SQUARE) {
         answer_zero(ctx, EITS_STOP_ZERO);
         return EITS_OK;
     }

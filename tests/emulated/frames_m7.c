@@ -1,10 +1,21 @@
-/* Reads "model.eitm" and "frames.f32" (quiet frames, then frames; counts on "plan.txt") from the host's folder, runs them as a
- * board would, and prints for each frame: why the solve stopped, iterations, MACs and instructions of the solve and of the
- * touches, the stack that they took, the image's CRC-32, and the touches' numbers as hexadecimal bits. Floats are printed as
- * bits: there is nothing to round. Options in "options.txt", a name and a value a line, replace the model's own; the file may
- * be absent. */
+/* Does what "script.txt" in the host's folder says, a word and its values a line, as a board would, and prints a line for each
+ * that can fail and for each frame. Numbers of frames come one after another from "frames.f32".
+ *
+ *     portable 0|1    plain C or the processor's own kernels, from the next model on
+ *     model FILE      open a model and start a context: no options, masks or reference stay
+ *     option NAME X   as eits_options calls it; "choose" puts all of them in force
+ *     choose
+ *     mask ROW 0|1
+ *     quiet COUNT     take the reference from as many frames, until one is refused
+ *     frames COUNT    reconstruct as many
+ *     solve COUNT     as many vectors of reduced data, by the solver alone
+ *     forget
+ *
+ * A frame's line says why the solve stopped, iterations, MACs and instructions of the solve and of the touches, the stack that
+ * they took, the image's CRC-32, info and touches. Floats are printed as bits: there is nothing to round. */
 #include "eitskin/eitskin.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -13,22 +24,29 @@ enum { MOST_MODEL = 2048 * 1024, MOST_WORKSPACE = 1024 * 1024, MOST_ROWS = 4096 
 static _Alignas(16) uint8_t model_bytes[MOST_MODEL];
 static _Alignas(16) uint8_t workspace[MOST_WORKSPACE];
 static float frame[MOST_ROWS];
+static eits_model model;
+static eits_context ctx;
+static eits_options options;
+static unsigned portable;
+static FILE *numbers;
 
 /* CMSDK timer 0 at 25 MHz counts down; QEMU's -icount shift=6 makes it 1.6 ticks an instruction. */
 #define TIMER_CTRL (*(volatile uint32_t *)0x40000000u)
 #define TIMER_VALUE (*(volatile uint32_t *)0x40000004u)
 #define TIMER_RELOAD (*(volatile uint32_t *)0x40000008u)
 
+/* Anew for every count, so that none depends on where between two ticks it began. */
 static void start_timer(void)
 {
+    TIMER_CTRL = 0;
     TIMER_RELOAD = 0xFFFFFFFFu;
     TIMER_VALUE = 0xFFFFFFFFu;
     TIMER_CTRL = 1;
 }
 
-static unsigned long instructions_since(uint32_t start)
+static unsigned long instructions_since_start(void)
 {
-    return (unsigned long)((uint64_t)(start - TIMER_VALUE) * 5u / 8u);
+    return (unsigned long)((uint64_t)(0xFFFFFFFFu - TIMER_VALUE) * 5u / 8u);
 }
 
 /* The stack below here is painted before the calls and looked at after them. */
@@ -61,100 +79,177 @@ static unsigned long bits_of(float value)
     return (unsigned long)bits;
 }
 
-static int fail(const char *what, eits_status status)
+static int fail(const char *what)
 {
-    printf("error %s: %s\n", what, eits_status_text(status));
+    printf("error %s\n", what);
+    return 0;
+}
+
+typedef struct option {
+    const char *name;
+    size_t offset;
+    int whole; /* a uint32_t; else a real */
+} option;
+
+#define WHOLE(name) {#name, offsetof(eits_options, name), 1}
+#define REAL(name) {#name, offsetof(eits_options, name), 0}
+
+static const option option_table[] = {
+    WHOLE(iterations), WHOLE(gap_every), WHOLE(max_touches), WHOLE(max_masked), WHOLE(warm_start), WHOLE(project_baseline),
+    WHOLE(touch_sweeps), WHOLE(mac_limit), REAL(lambda_abs), REAL(lambda_rel), REAL(lambda_noise_factor), REAL(gate_factor),
+    REAL(gap_rel), REAL(saturation_v), REAL(touch_threshold), REAL(touch_share), REAL(touch_min_radius_mm),
+    REAL(touch_max_radius_mm), REAL(touch_seed_radius_mm), REAL(touch_change_s_per_m), REAL(touch_radius_weight), REAL(follow_mm),
+};
+
+/* An option by its name; 0 for one that is none. */
+static int set_option(const char *name, double value)
+{
+    if (strcmp(name, "sign") == 0) {
+        options.sign = (eits_sign)(uint32_t)value;
+        return 1;
+    }
+    if (strcmp(name, "solver") == 0) {
+        options.solver = (eits_solver)(uint32_t)value;
+        return 1;
+    }
+    for (size_t k = 0; k < sizeof option_table / sizeof option_table[0]; ++k) {
+        if (strcmp(name, option_table[k].name) != 0)
+            continue;
+        uint8_t *const field = (uint8_t *)&options + option_table[k].offset;
+        const uint32_t whole = option_table[k].whole ? (uint32_t)value : 0;
+        const float real = (float)value;
+        memcpy(field, option_table[k].whole ? (const void *)&whole : (const void *)&real, sizeof real);
+        return 1;
+    }
+    return 0;
+}
+
+static int load(const char *name)
+{
+    FILE *file = fopen(name, "rb");
+    const size_t size = file == NULL ? 0 : fread(model_bytes, 1, sizeof model_bytes, file);
+    if (file != NULL)
+        fclose(file);
+    size_t need = 0;
+    eits_status status = eits_model_open(&model, model_bytes, size);
+    if (status == EITS_OK) {
+        need = eits_workspace_size(&model, 0);
+        status = need <= sizeof workspace && model.n_rows <= MOST_ROWS ? eits_init(&ctx, &model, workspace, need) : EITS_E_WORKSPACE;
+    }
+    if (status == EITS_OK)
+        status = eits_use_portable_kernels(&ctx, (int)portable);
+    if (status == EITS_OK)
+        options = ctx.options;
+    printf("model status %d workspace %lu kernels %s\n", (int)status, (unsigned long)need, status == EITS_OK ? eits_kernels_name(&ctx) : "none");
+    return status == EITS_OK;
+}
+
+static int read_numbers(float *to, uint32_t count)
+{
+    return numbers != NULL && count <= MOST_ROWS && fread(to, sizeof to[0], count, numbers) == count;
+}
+
+/* All of `count` frames are read, also where one is refused. */
+static int tare(unsigned count)
+{
+    eits_status status = count >= 4 ? eits_baseline_begin(&ctx, count) : EITS_OK;
+    for (unsigned k = 0; k < count; ++k) {
+        if (!read_numbers(frame, model.n_rows))
+            return fail("frames.f32 is short");
+        if (status == EITS_OK)
+            status = count >= 4 ? eits_baseline_add(&ctx, frame, model.n_rows) : eits_baseline_set(&ctx, frame, model.n_rows);
+    }
+    if (status == EITS_OK && count >= 4)
+        status = eits_baseline_finish(&ctx);
+    printf("quiet status %d\n", (int)status);
     return 1;
 }
 
-/* Options by name; a name that is none of these is refused. */
-static int read_options(eits_options *options)
+static void print_touches(const eits_touch *touches, uint32_t found)
 {
-    char name[32];
-    float value;
-    FILE *file = fopen("options.txt", "r");
-    int known = 1;
-    while (known && file != NULL && fscanf(file, "%31s %f", name, &value) == 2) {
-        if (strcmp(name, "iterations") == 0)
-            options->iterations = (uint32_t)value;
-        else if (strcmp(name, "touch_sweeps") == 0)
-            options->touch_sweeps = (uint32_t)value;
-        else if (strcmp(name, "gap_rel") == 0)
-            options->gap_rel = value;
-        else if (strcmp(name, "lambda_rel") == 0)
-            options->lambda_rel = value;
-        else if (strcmp(name, "mac_limit") == 0)
-            options->mac_limit = (uint32_t)value;
-        else
-            known = 0;
+    printf(" touches %lu", (unsigned long)found);
+    for (uint32_t t = 0; t < found; ++t)
+        printf(" %lu:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)touches[t].id, bits_of(touches[t].x_mm), bits_of(touches[t].y_mm),
+               bits_of(touches[t].radius_mm), bits_of(touches[t].strength_s_per_m_mm2), bits_of(touches[t].confidence));
+    printf("\n");
+}
+
+static void print_info(const eits_info *info)
+{
+    printf(" info %lu:%lu:%lu", (unsigned long)info->nonzeros, (unsigned long)info->masked, (unsigned long)info->step_halvings);
+    const float reals[] = {info->lambda, info->lambda_max, info->lambda_noise, info->gap, info->gap_rel, info->residual, info->data_norm};
+    for (size_t k = 0; k < sizeof reals / sizeof reals[0]; ++k)
+        printf(":%08lx", bits_of(reals[k]));
+}
+
+/* One frame, or one vector of reduced data. */
+static int solve_one(unsigned k, int reduced)
+{
+    if (!read_numbers(reduced ? ctx.y : frame, reduced ? model.rank : model.n_rows))
+        return fail("frames.f32 is short");
+    volatile uint32_t *const painted = lowest_painted();
+    paint_stack(painted);
+    start_timer();
+    const eits_status status = reduced ? eits_solve(&ctx) : eits_reconstruct(&ctx, frame, model.n_rows, NULL, NULL);
+    const unsigned long solve = instructions_since_start();
+    eits_touch touches[EITS_MAX_TOUCHES];
+    uint32_t found = 0;
+    start_timer();
+    (void)eits_find_touches(&ctx, touches, EITS_MAX_TOUCHES, &found);
+    const unsigned long touch = instructions_since_start();
+    const unsigned long stack = stack_used(painted);
+    printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu stack %lu image %08lx", k, (int)status,
+           (int)ctx.info.stop, (unsigned long)ctx.info.iterations, (unsigned long)ctx.info.macs, (unsigned long)ctx.info.touch_macs,
+           solve, touch, stack, (unsigned long)eits_crc32(0, ctx.image, (size_t)model.n_pixels * sizeof ctx.image[0]));
+    print_info(&ctx.info);
+    print_touches(touches, found);
+    return 1;
+}
+
+/* One line of the script; 0 ends the run. */
+static int obey(const char *word, FILE *script)
+{
+    static char name[64];
+    double value;
+    unsigned a, b;
+    if (strcmp(word, "portable") == 0)
+        return fscanf(script, "%u", &portable) == 1 || fail("portable");
+    if (strcmp(word, "model") == 0)
+        return fscanf(script, "%63s", name) == 1 && load(name);
+    if (strcmp(word, "option") == 0)
+        return (fscanf(script, "%63s %lf", name, &value) == 2 && set_option(name, value)) || fail("unknown option");
+    if (strcmp(word, "choose") == 0) {
+        printf("choose status %d\n", (int)eits_set_options(&ctx, &options));
+        return 1;
     }
-    if (file != NULL)
-        fclose(file);
-    return known;
+    if (strcmp(word, "mask") == 0)
+        return (fscanf(script, "%u %u", &a, &b) == 2 && eits_mask_row(&ctx, a, (int)b) == EITS_OK) || fail("mask");
+    if (strcmp(word, "quiet") == 0)
+        return fscanf(script, "%u", &a) == 1 && tare(a);
+    if (strcmp(word, "forget") == 0) {
+        eits_forget(&ctx);
+        return 1;
+    }
+    const int reduced = strcmp(word, "solve") == 0;
+    if ((!reduced && strcmp(word, "frames") != 0) || fscanf(script, "%u", &a) != 1)
+        return fail("unknown word");
+    for (b = 0; b < a; ++b) {
+        if (!solve_one(b, reduced))
+            return 0;
+    }
+    return 1;
 }
 
 int main(void)
 {
-    eits_model model;
-    eits_context ctx;
-    unsigned quiet = 0, count = 0, warm = 0, sign = 0, solver = 0, portable = 0;
-    FILE *file = fopen("plan.txt", "r");
-    if (file == NULL || fscanf(file, "%u %u %u %u %u %u", &quiet, &count, &warm, &sign, &solver, &portable) != 6)
-        return fail("plan.txt", EITS_E_ARGUMENT);
-    fclose(file);
-    file = fopen("model.eitm", "rb");
-    const size_t size = file == NULL ? 0 : fread(model_bytes, 1, sizeof model_bytes, file);
-    eits_status status = eits_model_open(&model, model_bytes, size);
-    if (status != EITS_OK)
-        return fail("model", status);
-    fclose(file);
-    const size_t need = eits_workspace_size(&model, 0);
-    status = need <= sizeof workspace ? eits_init(&ctx, &model, workspace, need) : EITS_E_WORKSPACE;
-    if (status != EITS_OK)
-        return fail("init", status);
-    eits_options options = ctx.options;
-    options.warm_start = warm;
-    options.sign = (eits_sign)sign;
-    options.solver = (eits_solver)solver;
-    status = read_options(&options) ? eits_set_options(&ctx, &options) : EITS_E_ARGUMENT;
-    if (status == EITS_OK)
-        status = eits_use_portable_kernels(&ctx, (int)portable);
-    if (status == EITS_OK)
-        status = quiet >= 4 ? eits_baseline_begin(&ctx, quiet) : EITS_OK;
-    if (status != EITS_OK)
-        return fail("baseline", status);
-    printf("workspace %lu kernels %s\n", (unsigned long)need, eits_kernels_name(&ctx));
-    file = fopen("frames.f32", "rb");
-    start_timer();
-    for (unsigned k = 0; file != NULL && k < quiet + count; ++k) {
-        if (fread(frame, sizeof frame[0], model.n_rows, file) != model.n_rows)
-            return fail("frames.f32", EITS_E_FRAME_LENGTH);
-        if (k < quiet) {
-            status = quiet >= 4 ? eits_baseline_add(&ctx, frame, model.n_rows) : eits_baseline_set(&ctx, frame, model.n_rows);
-            if (status == EITS_OK && quiet >= 4 && k + 1 == quiet)
-                status = eits_baseline_finish(&ctx);
-            if (status != EITS_OK)
-                return fail("quiet frame", status);
-            continue;
-        }
-        volatile uint32_t *const painted = lowest_painted();
-        paint_stack(painted);
-        uint32_t start = TIMER_VALUE;
-        status = eits_reconstruct(&ctx, frame, model.n_rows, NULL, NULL);
-        const unsigned long solve = instructions_since(start);
-        eits_touch touches[EITS_MAX_TOUCHES];
-        uint32_t found = 0;
-        start = TIMER_VALUE;
-        (void)eits_find_touches(&ctx, touches, EITS_MAX_TOUCHES, &found);
-        const unsigned long touch = instructions_since(start);
-        const unsigned long stack = stack_used(painted);
-        printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu stack %lu image %08lx touches %lu",
-               k - quiet, (int)status, (int)ctx.info.stop, (unsigned long)ctx.info.iterations, (unsigned long)ctx.info.macs,
-               (unsigned long)ctx.info.touch_macs, solve, touch, stack, (unsigned long)eits_crc32(0, ctx.image, (size_t)model.n_pixels * sizeof ctx.image[0]), (unsigned long)found);
-        for (uint32_t t = 0; t < found; ++t)
-            printf(" %lu:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)touches[t].id, bits_of(touches[t].x_mm), bits_of(touches[t].y_mm),
-                   bits_of(touches[t].radius_mm), bits_of(touches[t].strength_s_per_m_mm2), bits_of(touches[t].confidence));
-        printf("\n");
+    char word[16];
+    FILE *script = fopen("script.txt", "r");
+    if (script == NULL)
+        return !fail("no script.txt");
+    numbers = fopen("frames.f32", "rb");
+    while (fscanf(script, "%15s", word) == 1) {
+        if (!obey(word, script))
+            return 1;
     }
-    return file == NULL ? fail("frames.f32", EITS_E_ARGUMENT) : 0;
+    return 0;
 }

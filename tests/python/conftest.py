@@ -7,6 +7,15 @@ from pathlib import Path
 import pytest
 
 from cross_build import ROOT, build_cortex_m7
+from margins import (  # noqa: F401
+    margins,
+    pytest_addoption,
+    pytest_configure,
+    pytest_runtest_logreport,
+    pytest_sessionfinish,
+    pytest_terminal_summary,
+    pytest_unconfigure,
+)
 
 
 @pytest.fixture(scope="session")

@@ -55,8 +55,10 @@ typedef enum eits_stop {
     EITS_STOP_ITERATIONS = 0, /* the given number of iterations was done */
     EITS_STOP_GAP = 1,        /* the duality gap was small enough */
     EITS_STOP_GATE = 2,       /* lambda_max lies within the noise: no touch, the image is zero */
-    EITS_STOP_ZERO = 3,       /* lambda >= lambda_max: zero is the exact optimum */
-    EITS_STOP_DIVERGED = 4,   /* the objective rose although the step was halved again and again; the image is zero */
+    EITS_STOP_ZERO = 3,       /* lambda >= lambda_max: zero is the exact optimum; or |y| < 2^-51 (4.4e-16; double: 1e-146), whose
+                               * square says nothing */
+    EITS_STOP_DIVERGED = 4,   /* the objective rose, or all went to zero, although the step was halved again and again; the image
+                               * is zero */
     EITS_STOP_MACS = 5,       /* the next step would have passed mac_limit: the image is the best until then */
     EITS_STOP_OPTIMUM = 6     /* no coefficient moves any more but by rounding: coordinate descent and active set */
 } eits_stop;
@@ -101,7 +103,8 @@ struct eits_kernels; /* matrix products, chosen at start-up among builds that gi
 /* Learned from quiet frames. */
 typedef struct eits_baseline {
     eits_real *v0;       /* n_rows: mean of the quiet frames, V; NaN for a row that was masked in any of them */
-    eits_real *m2;       /* n_rows: sum of squared deviations, V^2 */
+    eits_real *m2;           /* n_rows: sum of squared deviations, in m2_unit^2 */
+    eits_real m2_unit;       /* V: a power of two near the first quiet frame's greatest voltage, so that squares are numbers */
     uint32_t wanted, count;
     uint32_t ready;
     eits_real v0_rms;       /* rms of v0 over the rows in use, V */
@@ -109,6 +112,7 @@ typedef struct eits_baseline {
     eits_real correlation;  /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
     eits_real noise_v;      /* rms over rows of the quiet frames' deviation, V; 0 if unknown */
     eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames; 0 if unknown */
+    uint32_t second_waits;  /* the second quiet frame is in m2 until there is a third */
     uint32_t glitches;      /* readings of quiet frames that were left out of the reference */
 } eits_baseline;
 

@@ -100,7 +100,7 @@ typedef struct eits_model {
     float pixel_mm;
     float origin_x_mm, origin_y_mm; /* lower left corner of pixel (0, 0) */
     float current_a;
-    float lipschitz;  /* at least the greatest eigenvalue of S'S as stored */
+    float lipschitz;  /* at least the greatest eigenvalue of S'S as stored, and 2^-126 */
     float noise_gain; /* max over pixels of the deviation of (S'P n)_j for unit white noise n on the folded rows */
     uint64_t protocol_hash;
     const uint8_t *protocol;   /* n_rows x 4: I+, I-, V+, V- */

@@ -166,7 +166,7 @@ def _rim_pieces(skin: Skin, max_size_mm: float, electrode_size_mm: float) -> tup
         snapped = np.abs(away[np.arange(len(cuts)), nearest]) < 1e-3 * skin.electrodes.width_mm
         cuts = np.unique(np.concatenate([corners, cuts[~snapped]]))
     else:
-        cuts = np.unique(cuts)
+        cuts = _without_long_arcs(np.unique(cuts), perimeter)
     ends = np.append(cuts[1:], cuts[0] + perimeter)
     middles = (cuts + ends) / 2
     inside = np.mod(middles[:, None] - spans[None, :, 0], perimeter) < skin.electrodes.width_mm
@@ -179,6 +179,14 @@ def _rim_pieces(skin: Skin, max_size_mm: float, electrode_size_mm: float) -> tup
         controls = (outline.points_at(middles) * stretch[:, None]).tolist()
     sizes = np.where(owner >= 0, electrode_size_mm, max_size_mm)
     return [[x, y, c, s] for (x, y), c, s in zip(points.tolist(), controls, sizes.tolist(), strict=True)], owner
+
+
+def _without_long_arcs(cuts: FloatArray, perimeter: float) -> FloatArray:
+    """``cuts`` of a circle, and more where two are over a quarter of it apart: the tangents of a long arc's ends do not meet."""
+    arcs = np.append(cuts[1:], cuts[0] + perimeter) - cuts
+    parts = np.ceil(arcs / (perimeter / 4)).astype(int)
+    more = [cut + arc * k / count for cut, arc, count in zip(cuts, arcs, parts, strict=True) for k in range(1, count)]
+    return np.unique(np.mod([*cuts, *more], perimeter))
 
 
 def _checked_mesh(skin: Skin, arrays: list[npt.NDArray[Any]], owner: IntArray) -> Mesh:

@@ -36,12 +36,19 @@ SCALED = ("i16", "i8")
 MAX_SECTIONS = 256
 MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
+NEARER = "choose units nearer to volts and siemens per metre"
+LEAST_LIPSCHITZ, MOST_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
 
 Sections = dict[str, bytes]
 
 
 def encode_model(model: Model) -> bytes:
-    """The file's bytes."""
+    """The file's bytes.
+
+    Raises:
+        ModelError: a number does not fit float32.
+    """
+    _check_floats(model)
     stored, stride = model.stored, stride_for(model.rank)
     projection = np.zeros((model.projection.shape[1], stride), dtype="<f4")
     projection[:, : model.rank] = model.projection.T
@@ -66,6 +73,18 @@ def encode_model(model: Model) -> bytes:
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     return _assemble(sections, model.protocol.hash)
+
+
+def _check_floats(model: Model) -> None:
+    """Refuse what float32 cannot hold, and what no reader would take."""
+    numbers = {
+        "the Lipschitz constant": model.lipschitz, "the noise gain": model.noise_gain, "the current": model.protocol.current_a,
+    }  # fmt: skip
+    for name, value in numbers.items():
+        if not abs(value) <= MOST_FLOAT32:
+            raise ModelError(f"model: {name} of {value:g} does not fit float32; {NEARER}")
+    if model.lipschitz < LEAST_LIPSCHITZ:
+        raise ModelError(f"model: the Lipschitz constant of {model.lipschitz:g} is too small for float32; {NEARER}")
 
 
 def _encode_dims(model: Model, stride: int) -> bytes:
@@ -197,8 +216,10 @@ def _read_dims(content: bytes, where: str) -> _Dims:
     if not in_range:
         _refuse(where, "a dimension out of range")
     numbers = (d.pixel_mm, d.origin_x_mm, d.origin_y_mm, d.current_a, d.lipschitz, d.noise_gain)
-    if not all(map(isfinite, numbers)) or min(d.pixel_mm, d.current_a, d.lipschitz) <= 0 or d.noise_gain < 0:
+    if not all(map(isfinite, numbers)) or min(d.pixel_mm, d.current_a) <= 0 or d.noise_gain < 0:
         _refuse(where, "a number in section 'DIMS' that is out of range")
+    if d.lipschitz < LEAST_LIPSCHITZ:
+        _refuse(where, "a matrix whose squares are too small for float32; scale it up")
     return d
 
 

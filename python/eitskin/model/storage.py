@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.errors import UsageError
+
 STORAGES = ("f32", "f16", "i16", "i8")
 DTYPES: dict[str, np.dtype[Any]] = {
     "f32": np.dtype("<f4"),
@@ -39,16 +41,25 @@ class StoredMatrix:
 
 
 def store(matrix: npt.ArrayLike, storage: str) -> StoredMatrix:
-    """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest of their column's steps."""
+    """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest of their column's steps.
+
+    Raises:
+        UsageError: a number does not fit.
+    """
     wide = np.asarray(matrix, dtype=np.float64)
     rank, n = wide.shape
     padded = np.zeros((n, stride_for(rank)))
     padded[:, :rank] = wide.T
     dtype = DTYPES[storage]
+    most = float(np.finfo(dtype if dtype.kind == "f" else np.float32).max)
+    greatest = float(np.abs(padded).max(initial=0.0))
+    if not greatest <= most:
+        raise UsageError(f"model: a sensitivity of {greatest:.3g} does not fit {storage}; use another storage")
     if dtype.kind == "f":
         return StoredMatrix(storage, padded.astype(dtype), None)
     top = float(np.iinfo(dtype).max)
     peak = np.abs(padded).max(axis=1)
-    scale = np.where(peak > 0, peak / top, 1.0).astype("<f4")
+    # a column whose step would be no normal number is taken for silent
+    scale = np.where(peak / top >= np.finfo(np.float32).tiny, peak / top, 1.0).astype("<f4")
     levels = np.clip(np.rint(padded / scale[:, None].astype(np.float64)), -top, top)
     return StoredMatrix(storage, levels.astype(dtype), scale)

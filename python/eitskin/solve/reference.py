@@ -22,6 +22,7 @@ from eitskin.solve.reference_touches import find_touches
 BoolArray = npt.NDArray[np.bool_]
 
 BASIS_TOLERANCE = 1e-6
+LEAST_SQUARE = 2.0**-969
 MAX_STEP_HALVINGS = 8
 PRUNE_EVERY, LOOK_GROWTH = 5, 6
 DEAD = "all voltages are zero; is the skin driven and connected?"
@@ -66,10 +67,11 @@ def fista(
         last = k == options.iterations
         if not last and k % options.gap_every:
             continue
-        if not last and options.gap_rel == 0 and float(sx @ sx) <= 8 * scale:
+        none = not x.any()
+        if not last and options.gap_rel == 0 and not none and float(sx @ sx) <= 8 * scale:
             continue
         certificate = certify(s, y, x, sx, lam, sign, basis)
-        if not certificate.objective <= scale * (1 + 1e-3):
+        if not certificate.objective <= scale * (1 + 1e-3) or (none and certificate.gap > 1e-3 * scale):
             if halvings == MAX_STEP_HALVINGS or last:
                 stop = "diverged"
                 break
@@ -259,7 +261,7 @@ class ReferenceEngine:
         zero = Result(np.zeros(n), 0, "zero", nothing, 0)
         if o.gate_factor > 0 and lambda_max < o.gate_factor * self._lambda_noise:
             result = Result(zero.x, 0, "gate", nothing, 0)
-        elif not lambda_max > lam:
+        elif not lambda_max > lam or norm**2 < LEAST_SQUARE:
             result = zero
         else:
             result = self._run(Problem(self._s, y, lam, o.sign, basis))

@@ -8,31 +8,32 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import SIGNS, SOLVERS, STOPS, Options
+from eitskin.core.results import STOPS, Options
 from eitskin.errors import UsageError
+from eitskin.study.emulated_steps import Choose, Load, Play, Solve, Step, Tare, write_steps
 
 BUILD_TOOLS = ("arm-none-eabi-gcc", "cmake", "ninja")
 QEMU = "qemu-system-arm"
 PROGRAM = Path("tests") / "emulated" / "frames_m7.elf"
 MOST_SECONDS = 300
-HEAD = re.compile(r"workspace (\d+) kernels (\S+)")
+STATUS = re.compile(r"(model|choose|quiet) status (-?\d+)(?: workspace (\d+) kernels (\S+))?")
 LINE = re.compile(
     r"frame (\d+) status (-?\d+) stop (\d+) iterations (\d+) macs (\d+) touchmacs (\d+) solve (\d+) touch (\d+) stack (\d+) "
-    r"image ([0-9a-f]{8}) touches (\d+)(.*)"
+    r"image ([0-9a-f]{8}) info (\S+) touches (\d+)(.*)"
 )
 
 
 @dataclass(frozen=True)
 class EmulatedFrame:
-    """One frame as the emulated board printed it. ``touches``: their number, then ids and numbers as hexadecimal bits;
+    """One frame as the emulated board printed it. ``touches``: their number, then ids and numbers as hexadecimal bits; ``info``:
+    non-zeros, masked rows, halvings, then lambda, lambda_max, lambda_noise, gap, gap_rel, residual and |y| as such bits;
     ``stack_bytes``: the deepest of solve and touches."""
 
     status: int
@@ -44,6 +45,7 @@ class EmulatedFrame:
     touch_instructions: int
     stack_bytes: int
     image_crc: int
+    info: str
     touches: str
 
     @property
@@ -59,11 +61,13 @@ class EmulatedFrame:
 
 @dataclass(frozen=True)
 class EmulatedRun:
-    """What a run printed: the core's workspace in bytes, the name of its kernels, a result a frame."""
+    """What a run printed: the last model's workspace in bytes, the name of its kernels, a result a frame, and the statuses of
+    every model, choice of options and tare."""
 
     workspace_bytes: int
     kernels: str
     frames: tuple[EmulatedFrame, ...]
+    statuses: tuple[tuple[str, int], ...]
 
 
 def checkout_root() -> Path:
@@ -117,24 +121,31 @@ def run_frames(
     options: Options,
     *,
     portable: bool = False,
-    settings: Mapping[str, float] | None = None,
 ) -> EmulatedRun:
     """The emulated board's results for ``frames_v`` (k, m) after taring on ``quiet_v`` (q, m), volts.
 
-    Of ``options``, those that the program takes: warm start, sign and solver; all others are the model's defaults, or as
-    ``settings`` say (those that frames_m7.c knows by name).
+    ``folder`` is where the program finds its files. ``portable``: plain C instead of the processor's own kernels.
+
+    Raises:
+        UsageError: QEMU is missing, the program fails, or the model, the options or a quiet frame are refused.
+    """
+    done = run_steps(program, folder, (Load(blob), Choose(options), Tare(quiet_v), Play(frames_v)), portable=portable)
+    refused = [f"{word} (status {status})" for word, status in done.statuses if status != 0]
+    if refused:
+        raise UsageError(f"the emulated board refuses: {', '.join(refused)}")
+    return done
+
+
+def run_steps(program: Path, folder: Path, steps: Sequence[Step], *, portable: bool = False) -> EmulatedRun:
+    """The emulated board's results for ``steps``, what it refuses included; a model that is refused must be the last step.
+
     ``folder`` is where the program finds its files. ``portable``: plain C instead of the processor's own kernels.
 
     Raises:
         UsageError: QEMU is missing or the program fails.
     """
     need_tools(QEMU)
-    (folder / "model.eitm").write_bytes(blob)
-    plan = len(quiet_v), len(frames_v), int(options.warm_start), SIGNS.index(options.sign), SOLVERS.index(options.solver)
-    (folder / "plan.txt").write_text(" ".join(map(str, (*plan, int(portable)))) + "\n", encoding="ascii")
-    lines = (f"{name} {value:.9g}\n" for name, value in (settings or {}).items())
-    (folder / "options.txt").write_text("".join(lines), encoding="ascii")
-    (folder / "frames.f32").write_bytes(np.vstack([quiet_v, frames_v]).astype("<f4").tobytes())
+    write_steps(folder, steps, portable=portable)
     command = [QEMU, "-M", "mps2-an500", "-nographic", "-monitor", "none", "-semihosting-config"]
     command += ["enable=on,target=native", "-icount", "shift=6", "-kernel", str(program)]
     try:
@@ -143,16 +154,22 @@ def run_frames(
         )
     except subprocess.TimeoutExpired:
         raise UsageError(f"the emulated board did not end within {MOST_SECONDS} s") from None
-    head = HEAD.search(done.stdout)
-    found = [match for match in map(LINE.match, done.stdout.splitlines()) if match is not None]
-    if done.returncode != 0 or head is None or len(found) != len(frames_v):
+    lines = done.stdout.splitlines()
+    heads = [match for match in map(STATUS.match, lines) if match is not None]
+    found = [match for match in map(LINE.match, lines) if match is not None]
+    models = [match for match in heads if match[1] == "model"]
+    wanted = sum(len(step.frames_v) for step in steps if isinstance(step, Play)) + sum(
+        len(step.data) for step in steps if isinstance(step, Solve)
+    )
+    refused = bool(models) and models[-1][2] != "0"
+    if not models or (not refused and (done.returncode != 0 or len(found) != wanted)):
         raise UsageError(f"the emulated board failed: {(done.stdout + done.stderr).strip()[-500:]}")
-    return EmulatedRun(int(head[1]), head[2], tuple(map(_frame, found)))
+    statuses = tuple((match[1], int(match[2])) for match in heads)
+    return EmulatedRun(int(models[-1][3]), models[-1][4], tuple(map(_frame, found)), statuses)
 
 
 def _frame(match: re.Match[str]) -> EmulatedFrame:
     g = match.groups()
     iterations, macs, touch_macs, solve, touch, stack = map(int, g[3:9])
-    return EmulatedFrame(
-        int(g[1]), STOPS[int(g[2])], iterations, macs, touch_macs, solve, touch, stack, int(g[9], 16), f"{g[10]}{g[11]}"
-    )
+    image, info, touches = int(g[9], 16), g[10], f"{g[11]}{g[12]}"
+    return EmulatedFrame(int(g[1]), STOPS[int(g[2])], iterations, macs, touch_macs, solve, touch, stack, image, info, touches)

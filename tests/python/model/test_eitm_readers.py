@@ -94,7 +94,7 @@ def test_whole_numbers_of_dims(field: int) -> None:
         (1, np.isfinite),
         (2, np.isfinite),
         (3, lambda v: 0 < v < np.inf),
-        (4, lambda v: 0 < v < np.inf),
+        (4, lambda v: 2.0**-126 <= v < np.inf),
         (5, lambda v: 0 <= v < np.inf),
     ],
 )

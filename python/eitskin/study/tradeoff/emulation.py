@@ -85,10 +85,9 @@ def count_instructions(
 def _run(emulator: Emulator, one: Configuration, built: Built, quiet_v: Any, frames_v: Any) -> tuple[EmulatedFrame, ...]:
     """What the emulated core says of each frame."""
     options = built.reconstructor(one).options
-    settings = {name: value for name, value in one.solver_settings.items() if name not in ("warm_start", "solver")}
     with tempfile.TemporaryDirectory() as name:
         try:
-            done = run_frames(emulator.program.resolve(), Path(name), built.blob, quiet_v, frames_v, options, settings=settings)
+            done = run_frames(emulator.program.resolve(), Path(name), built.blob, quiet_v, frames_v, options)
         except UsageError as error:
             raise VerificationError(f"configuration {one.name!r}: {error}") from None
     if any(frame.status != 0 for frame in done.frames):

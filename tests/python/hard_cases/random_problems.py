@@ -1,0 +1,69 @@
+"""Matrices and data by seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from certified import Judged, judged
+from everywhere import on_host
+from made_models import made_blob, plain_options
+
+from eitskin.solve.reference_problem import greatest
+from eitskin.study.emulated_steps import Choose, Load, Solve
+
+RANK, COLUMNS = 20, 64
+
+
+@dataclass(frozen=True, eq=False)
+class RandomProblem:
+    """S (r, n), float32 numbers as float64, and data y (r,) likewise."""
+
+    s: np.ndarray
+    y: np.ndarray
+
+    def lambda_max(self, sign: str) -> float:
+        """The least lambda at which zero is the optimum."""
+        return greatest(self.s.T @ self.y, sign)
+
+
+def rounded(values: np.ndarray) -> np.ndarray:
+    """To float32 numbers."""
+    return np.asarray(values).astype(np.float32).astype(np.float64)
+
+
+def with_data(s: np.ndarray, seed: int, noise: float = 0.05) -> RandomProblem:
+    """Data of two columns of ``s``, one up, one down, and noise relative to them."""
+    rng, n = np.random.default_rng(seed), s.shape[1]
+    first, second = s[:, 3 % n], s[:, 40 % n]
+    y = first - 0.7 * second
+    size = np.linalg.norm(y) or 1.0
+    return RandomProblem(rounded(s), rounded(y + noise * size * rng.standard_normal(len(y))))
+
+
+def gaussian(seed: int, rank: int = RANK, columns: int = COLUMNS) -> RandomProblem:
+    """Unit columns in random directions."""
+    s = np.random.default_rng(seed).standard_normal((rank, columns))
+    return with_data(s / np.linalg.norm(s, axis=0), seed + 1000)
+
+
+def smooth(seed: int, rank: int = RANK, columns: int = COLUMNS, decay: float = 0.8) -> RandomProblem:
+    """Columns that resemble their neighbours, singular values falling by ``decay``: as a Jacobian's do."""
+    rng = np.random.default_rng(seed)
+    left, _ = np.linalg.qr(rng.standard_normal((rank, rank)))
+    place = (np.arange(columns) + 0.5) / columns
+    right = np.array([np.cos(np.pi * k * place + rng.uniform(0, 1)) for k in range(rank)])
+    return with_data(left @ (decay ** np.arange(rank)[:, None] * right) / np.sqrt(columns / 2), seed + 1000)
+
+
+def whitened(seed: int) -> RandomProblem:
+    """Orthonormal rows: every eigenvalue of S S' is 1."""
+    q, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((COLUMNS, RANK)))
+    return with_data(q.T, seed + 1000)
+
+
+def optimum_of(problem: RandomProblem, sign: str, share: float = 0.03) -> Judged:
+    """By the active set in float64, to a gap of 1e-12 of the start's objective; ``share`` is lambda / lambda_max."""
+    options = plain_options(problem.s, solver="active-set", sign=sign, iterations=1000, gap_rel=1e-12, lambda_rel=share)
+    _, outcomes = on_host([Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], "float64")
+    return judged(problem.s, problem.y, sign, outcomes[0])

@@ -1,0 +1,86 @@
+"""Matrices whose columns do not tell coefficients apart: duplicates, opposites, zeros, low ranks; and whitened ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from certified import check_sound, judged
+from everywhere import SameEverywhere
+from made_models import made_blob, plain_options
+from random_problems import RandomProblem, gaussian, rounded, smooth, whitened, with_data
+
+from eitskin.core.results import SIGNS, SOLVERS
+from eitskin.study.emulated_steps import Choose, Load, Solve, Step
+from margins import Margins
+
+
+def repeated(times: int, turn: float = 1.0, nudge: float = 0.0) -> RandomProblem:
+    """16 directions, each ``times`` in a row, every second turned by ``turn`` and nudged by so much of itself."""
+    base, rng = gaussian(2, columns=64 // times).s, np.random.default_rng(3)
+    s = np.repeat(base, times, axis=1)
+    s[:, 1::2] = turn * s[:, 1::2] + nudge * rng.standard_normal(s[:, 1::2].shape)
+    return with_data(s, 4)
+
+
+def with_zeros() -> RandomProblem:
+    """Every third column is zero."""
+    s = gaussian(5).s.copy()
+    s[:, ::3] = 0
+    return with_data(s, 6)
+
+
+def of_rank(rank: int) -> RandomProblem:
+    """64 columns of 20 rows within so many directions."""
+    rng = np.random.default_rng(7)
+    return with_data(rng.standard_normal((20, rank)) @ rng.standard_normal((rank, 64)) / 8, 8)
+
+
+def all_zero() -> RandomProblem:
+    """Nothing is seen at all."""
+    return RandomProblem(np.zeros((20, 64)), gaussian(9).y)
+
+
+def steep() -> RandomProblem:
+    """Columns from 1e-6 to 1e6 in length."""
+    s = gaussian(10).s * 10.0 ** np.linspace(-6, 6, 64)
+    return RandomProblem(rounded(s), rounded(s @ np.eye(64)[40] + 0.1 * s[:, 50]))
+
+
+PROBLEMS = {
+    "problem/duplicate-columns": {
+        "twice": repeated(2),
+        "four times": repeated(4),
+        "all the same": repeated(64),
+        "opposite": repeated(2, -1.0),
+        "all but the same": repeated(2, nudge=1e-7),
+        "all but opposite": repeated(2, -1.0, 1e-7),
+    },
+    "problem/zero-columns": {"every third": with_zeros(), "all": all_zero()},
+    "problem/low-rank": {"1": of_rank(1), "2": of_rank(2), "7": of_rank(7), "falling by 0.5": smooth(11, decay=0.5)},
+    "problem/whitened": {"orthonormal rows": whitened(12)},
+    "problem/steep-columns": {"1e-6 to 1e6": steep()},
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
+    """Whatever the columns, the result is sound (certified.check_sound); a zero column stays at zero; where the data have fewer
+    directions than there are columns, the active set's support is no larger than they are."""
+    steps: list[Step] = []
+    asked = []
+    for case, problems in PROBLEMS.items():
+        for name, problem in problems.items():
+            lipschitz = 1.0 if not problem.s.any() else None
+            for sign in SIGNS:
+                for share in (0.003, 0.3):
+                    options = plain_options(problem.s, solver=solver, sign=sign, iterations=150, lambda_rel=share)
+                    steps += [Load(made_blob(problem.s, lipschitz=lipschitz)), Choose(options), Solve(problem.y[None])]
+                    asked.append((case, name, problem, sign))
+    _, outcomes = same_everywhere.steps(steps)
+    for (case, name, problem, sign), one in zip(asked, outcomes, strict=True):
+        check_sound(margins, case, judged(problem.s, problem.y, sign, one), one)
+        silent = ~problem.s.any(axis=0)
+        if silent.any():
+            margins.everywhere(case, "zero columns that moved", np.count_nonzero(one.coefficients[silent]), 0, "pixels")
+        if solver == "active-set" and one.info.stop == "optimum" and case != "problem/steep-columns":
+            assert one.info.nonzeros <= np.linalg.matrix_rank(problem.s, tol=1e-4), name

@@ -1,0 +1,78 @@
+"""Skins whose Jacobian is ill-conditioned, from mesh to touches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from certified import U, check_sound, judged
+from everywhere import Host, Outcome, SameEverywhere, as_float32, on_host
+from hard_skins import SKINS, HardSkin, hard_skin
+
+from eitskin.core.results import SOLVERS, Options
+from eitskin.solve.options import default_options
+from eitskin.study.emulated_steps import Choose, Load, Play, Step, Tare
+from margins import Margins
+
+CASE = "problem/ill-conditioned-skins"
+FRAMES = 2
+
+
+def steps_for(h: HardSkin, options: Options) -> list[Step]:
+    return [Load(h.blob), Choose(options), Tare(h.quiet_v(8)), Play(h.frames_v(FRAMES))]
+
+
+def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
+    """y of each frame, (r,), in float64."""
+    host = Host(h.blob, width)
+    assert [host.status_of(step) for step in (Choose(options), Tare(as_float32(h.quiet_v(8))))] == [0, 0]
+    data = []
+    for frame in as_float32(h.frames_v(FRAMES)):
+        host.solve_frame(frame)
+        data.append(host.reduced_data()[: h.model.rank].astype(np.float64))
+    return data
+
+
+def rounding_of_data(h: HardSkin) -> float:
+    """|P| times what a row's datum may be off: 8 roundings of the mean of 8 quiet frames, 4 of difference, gain and product,
+    and k of a row of P: (12 + k) u |v| over k folded rows."""
+    k = len(h.model.v_ref_v)
+    norm = float(np.linalg.norm(h.model.projection.astype(np.float64), 2))
+    return (12 + k) * U * norm * float(np.linalg.norm(h.model.v_ref_v.astype(np.float64)))
+
+
+def compare_widths(
+    margins: Margins, name: str, h: HardSkin, narrow: Outcome, wide: Outcome, y: np.ndarray, y64: np.ndarray
+) -> None:
+    """The optimum's S x moves by at most as much as y, and as far again by lambda, which follows y; each gap g adds sqrt(2 g)."""
+    size = float(np.linalg.norm(y64))
+    moved = float(np.linalg.norm(y - y64))
+    margins.everywhere(CASE, f"y, float32 from float64, {name}", moved / size, rounding_of_data(h) / size, "|y|")
+    one, other = judged(h.model.sensitivity, y, "increase", narrow), judged(h.model.sensitivity, y64, "increase", wide)
+    room = 2 * moved + np.sqrt(2 * one.gap) + np.sqrt(2 * (other.gap + U * size**2))
+    apart = float(np.linalg.norm(h.model.sensitivity @ (one.x - other.x)))
+    margins.everywhere(CASE, f"S x, float32 from float64, {name}", apart / size, room / size, "|y|")
+
+
+@pytest.mark.parametrize("name", SKINS)
+def test_ill_conditioned_skins(same_everywhere: SameEverywhere, margins: Margins, name: str) -> None:
+    """The default settings give finite images and touches; each solver, without projection so that S is the whole problem, a
+    sound result; and to a small gap, float32 what float64 gives."""
+    h = hard_skin(name)
+    usual = default_options(h.model)
+    sound = replace(usual, project_baseline=False, gate_factor=0.0)
+    precise = replace(sound, solver="active-set", iterations=300, gap_rel=1e-5)
+    chosen = [usual, *(replace(sound, solver=solver) for solver in SOLVERS), precise]
+    _, outcomes = same_everywhere.steps([step for options in chosen for step in steps_for(h, options)])
+    by_options = [outcomes[k * FRAMES : (k + 1) * FRAMES] for k in range(len(chosen))]
+    for one in by_options[0]:
+        assert one.status == 0 and one.finite() and one.info.stop in ("iterations", "gate")
+        assert len(one.touches) <= usual.max_touches
+    data = data_of(h, sound, "float32")
+    for of_solver in by_options[1:]:
+        for y, one in zip(data, of_solver, strict=True):
+            check_sound(margins, CASE, judged(h.model.sensitivity, y, "increase", one), one)
+    _, wide = on_host(steps_for(h, precise), "float64")
+    for k, y64 in enumerate(data_of(h, precise, "float64")):
+        compare_widths(margins, name, h, by_options[-1][k], wide[k], data[k], y64)

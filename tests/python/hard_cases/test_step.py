@@ -1,0 +1,61 @@
+"""A model that states too small a Lipschitz constant makes FISTA's step too long: the guard halves it, or gives zero and says
+so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from certified import check_sound, judged
+from everywhere import SameEverywhere
+from made_models import lipschitz_of, made_blob, plain_options
+from random_problems import gaussian, optimum_of, smooth, whitened
+
+from eitskin.core.results import SIGNS, SOLVERS
+from eitskin.study.emulated_steps import Choose, Load, Solve, Step
+from margins import Margins
+
+CASE = "problem/step-too-long"
+MOST_HALVINGS = 8
+FACTORS = (0.1, 1.0, 2.0, 10.0, 100.0, 1e3, 1e6, 1e20)
+PROBLEMS = {"gaussian": gaussian(31), "smooth": smooth(32), "whitened": whitened(33)}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("iterations", [3, 300])
+def test_step_too_long(same_everywhere: SameEverywhere, margins: Margins, solver: str, iterations: int) -> None:
+    """Up to 2^8 times too long, the halvings leave most of 300 iterations: at least 99 % of what the objective can lose is lost.
+    Where the step cannot be brought down, or there is no time, the image is zero and the stop is "diverged". Coordinate descent
+    and active set take no step from the constant."""
+    steps: list[Step] = []
+    asked = []
+    for name, problem in PROBLEMS.items():
+        for factor in FACTORS:
+            blob = made_blob(problem.s, lipschitz=lipschitz_of(problem.s) / factor)
+            for sign in SIGNS:
+                options = plain_options(problem.s, solver=solver, sign=sign, iterations=iterations)
+                steps += [Load(blob), Choose(options), Solve(problem.y[None])]
+                asked.append((name, factor, sign))
+    _, outcomes = same_everywhere.steps(steps)
+    halved = gave_up = 0
+    for (name, factor, sign), one in zip(asked, outcomes, strict=True):
+        problem = PROBLEMS[name]
+        point = judged(problem.s, problem.y, sign, one)
+        check_sound(margins, CASE, point, one)
+        assert one.info.step_halvings <= MOST_HALVINGS
+        halved += one.info.step_halvings > 0
+        gave_up += one.info.stop == "diverged"
+        if one.info.stop == "diverged":
+            assert not one.image.any() and factor > 1 and solver in ("fista", "working-set")
+        elif iterations == 300:
+            best, start = optimum_of(problem, sign), point.at_zero()
+            left = max(0.0, point.objective - best.objective) / (start.objective - best.objective)
+            margins.everywhere(CASE, f"left to do after 300 iterations of {solver}", left, 0.01, "of what there was")
+        if solver not in ("fista", "working-set"):
+            assert one.info.step_halvings == 0
+        elif iterations == 300:
+            assert factor > 2**MOST_HALVINGS or one.info.stop != "diverged", (factor, one.info)
+            assert factor < 1e6 or one.info.stop == "diverged", (factor, one.info)
+        assert one.image.any() or one.info.stop == "diverged", (name, factor, sign)
+    if solver in ("fista", "working-set"):
+        assert gave_up and (halved or iterations == 3)
+    assert not np.isnan([one.info.gap for one in outcomes]).any()
