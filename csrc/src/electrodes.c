@@ -43,7 +43,7 @@ static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
     return (any & (unsigned)state) != 0;
 }
 
-/* Every significant row of an open electrode is dead. Were that so for all of them, it would not be the electrodes. Returns
+/* Every significant row of an open electrode is dead. Where that is so for all of them, a cable is off or no current flows. Returns
  * whether any electrode is alive; `alive` says which. */
 static int find_open(eits_context *ctx, const eits_real *frame, limits most, uint8_t *alive)
 {
@@ -63,16 +63,15 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits most, uin
         judged += rows[e] >= EITS_ROWS_TO_JUDGE;
         open += rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e];
     }
-    if (open == judged)
-        return 0;
+    const int living = open < judged;
     if (open == 0 || !eits_wants(ctx, EITS_FINDING_ELECTRODE_OPEN))
-        return 1;
+        return living;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
         if (rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e])
             ctx->electrode[e] |= EITS_ELECTRODE_OPEN;
     }
     ctx->info.findings |= EITS_FINDING_ELECTRODE_OPEN;
-    return 1;
+    return living;
 }
 
 static int is_pair(const uint8_t *two, uint8_t e, uint8_t f)
@@ -146,7 +145,7 @@ static void leave_impossible(eits_context *ctx, const eits_real *frame, limits m
     }
 }
 
-void eits_find_electrodes(eits_context *ctx, const eits_real *frame)
+int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
 {
     const limits most = limits_of(ctx);
     uint32_t dead = 0, turned = 0, grown = 0;
@@ -161,13 +160,17 @@ void eits_find_electrodes(eits_context *ctx, const eits_real *frame)
     if (turned + grown > 0 && turned + grown < EITS_ROWS_TO_JUDGE && eits_wants(ctx, EITS_FINDING_GLITCH))
         leave_impossible(ctx, frame, most);
     if (dead < EITS_ROWS_TO_JUDGE)
-        return;
+        return 1;
     uint8_t alive[EITS_MOST_ELECTRODES] = {0};
-    if (find_open(ctx, frame, most, alive) && eits_wants(ctx, EITS_FINDING_BRIDGED))
+    const int living = find_open(ctx, frame, most, alive);
+    if (living && eits_wants(ctx, EITS_FINDING_BRIDGED))
         find_bridged(ctx, frame, most, alive);
-    if ((ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED)) == 0)
-        return;
-    eits_name_electrodes(ctx);
+    const int named = (ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED)) != 0;
+    if (named)
+        eits_name_electrodes(ctx);
+    if (!living || !named) /* without any signal there is nothing to leave out */
+        return living || !named;
     eits_leave_electrodes(ctx, EITS_ELECTRODE_OPEN, EITS_ROW_OPEN);
     eits_leave_electrodes(ctx, EITS_ELECTRODE_BRIDGED, EITS_ROW_BRIDGED);
+    return 1;
 }

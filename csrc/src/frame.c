@@ -208,9 +208,10 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     *macs = 0;
     forget_findings(ctx);
     find_unusable(ctx, frame);
-    if (judged)
-        eits_find_electrodes(ctx, frame);
+    const int dead = judged && !eits_find_electrodes(ctx, frame);
     eits_status status = check_rows(ctx, frame, masked);
+    if (status == EITS_OK && dead)
+        status = EITS_E_FRAME_ZERO;
     if (status != EITS_OK)
         return status;
     int changed = fold_data(ctx, frame);

@@ -317,7 +317,8 @@ static void test_dead(void)
     CHECK(host_fault(&b.host, EITS_FAULT_SOLVER, true, 0) != NULL);
     const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
     const eits_packet_solved *head = (const void *)image->payload;
-    CHECK_EQUAL((int16_t)head->status, -EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL((int16_t)head->status, -EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(head->open_electrodes, 0xFFFF);
     for (uint32_t j = 0; j < b.open.n_pixels; ++j) {
         float value;
         memcpy(&value, image->payload + sizeof *head + 4 * j, 4);
