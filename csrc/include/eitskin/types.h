@@ -42,7 +42,7 @@ typedef enum eits_status {
     EITS_E_MODEL_ALIGNMENT = -9, /* the blob does not start at a 16-byte boundary */
     EITS_E_FRAME_LENGTH = -10,   /* a frame's length is not the number of protocol rows */
     EITS_E_FRAME_CHANNELS = -11, /* more channels are unusable than the options allow */
-    EITS_E_FRAME_ZERO = -12,     /* the reference or another frame is all zero: the front end is dead */
+    EITS_E_FRAME_ZERO = -12,     /* the reference or another frame is all zero, or a frame nothing but noise: the front end is dead */
     EITS_E_NO_BASELINE = -13,    /* a frame came before the reference frame was set */
     EITS_E_BASELINE_SHORT = -14, /* a baseline was finished with fewer quiet frames than it needs */
     EITS_E_NOT_FINITE = -15      /* a result would not be finite; the outputs were cleared instead */

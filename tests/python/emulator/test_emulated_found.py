@@ -1,0 +1,116 @@
+"""The firmware on the emulated board names what is wrong with a frame within that frame, by fault and head, as the host would."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from eitskin.device.bank import bank_bytes
+from eitskin.device.client import Device
+from eitskin.device.emulator.analog.skin import Skin
+from eitskin.device.emulator.board import EmulatedBoard
+from eitskin.device.emulator.scene_skin import skin_of
+from eitskin.device.live import LiveFrame, put_together
+from eitskin.device.wire.packets import CLEAN_FRAMES, Fault, FaultCode
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.scene.description import Scene
+from eitskin.scene.library_scenes import find_scene
+from emulated import EVERYTHING, board_of, connect, twin_check
+
+
+def scene(effects: dict[str, Any]) -> Scene:
+    return replace(find_scene("two_touch"), effects=effects)
+
+
+def device_before(image: bytes, skin: Skin) -> Device:
+    return connect(EmulatedBoard(image, skin, (bank_bytes(load_prebuilt()[1], 1),)))
+
+
+def taken(device: Device, frames: int) -> tuple[list[LiveFrame], list[Fault]]:
+    items = list(put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING))
+    return [item for item in items if isinstance(item, LiveFrame)], [item for item in items if isinstance(item, Fault)]
+
+
+def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
+    """Named by a fault and by the head in the same frame, that is at the latest the first which is wholly without it; gone after
+    eight frames with it; every bit, and all that was found, as the host finds it."""
+    model, blob = load_prebuilt()
+    device = device_before(
+        image, skin_of(scene({"detached": {"electrodes": [5], "from_s": 0.1, "until_s": 0.2}}), model.protocol)
+    )
+    told: list[Fault] = []
+    device.record(lambda packet: told.extend(_faults(packet)))
+    check, seen, _ = twin_check(device, blob, 22)
+    assert (check.same, check.different) == (22, [])
+    uses = (model.protocol.drive_measure == 5).any(axis=1)
+    whole = [f.number for f in seen if f.raw is not None and np.abs(f.raw.voltage_v[uses]).max() < 1e-3]
+    named = [f.number for f in seen if f.solved is not None and f.solved.open_electrodes == (5,)]
+    assert named[0] <= whole[0]
+    assert set(whole) <= set(named)
+    mine = [fault for fault in told if fault.code == FaultCode.ELECTRODE_OPEN]
+    assert [(fault.raised, fault.index, fault.frame) for fault in mine] == [
+        (True, 5, named[0]), (False, 5, named[-1] + CLEAN_FRAMES),
+    ]  # fmt: skip
+    for frame in seen:
+        if frame.number in whole:
+            assert frame.solved is not None
+            assert frame.solved.info.findings_by_name == ("electrode open",)
+            assert frame.solved.masked == uses.sum()
+            assert frame.raw is not None
+            assert np.isfinite(frame.raw.voltage_v).all()
+    assert FaultCode.ELECTRODE_OPEN not in device.info().fault_codes
+
+
+def _faults(packet: Any) -> list[Fault]:
+    from eitskin.device.wire.payloads import parse
+
+    content = parse(packet.type, packet.payload)
+    return [content] if isinstance(content, Fault) else []
+
+
+def test_bridged_electrodes_are_named_with_each_other(image: bytes) -> None:
+    protocol = load_prebuilt()[0].protocol
+    whole, bridged = skin_of(scene({}), protocol), skin_of(scene({"bridged": {"electrodes": [6, 7]}}), protocol)
+    device = device_before(image, Skin(protocol, whole.quiet_v, bridged.frames_v, 20.0))
+    device.tare(4)
+    device.start_scene()
+    frames, faults = taken(device, 4)
+    told = [fault for fault in faults if fault.code == FaultCode.BRIDGED]
+    assert [(fault.raised, fault.index, fault.value, fault.words[0]) for fault in told] == [
+        (True, 6, 7, 0xC0),
+        (True, 7, 6, 0xC0),
+    ]
+    first = next(f for f in frames if f.solved is not None and f.solved.bridged_electrodes)
+    assert first.solved is not None
+    assert (first.solved.bridged_electrodes, first.number) == ((6, 7), told[0].frame)
+    assert FaultCode.BRIDGED in device.info().fault_codes
+
+
+def test_a_reading_that_is_off_is_left_out_and_counted(image: bytes) -> None:
+    """One burst of one row at half its amplitude."""
+    device = device_before(image, skin_of(scene({}), load_prebuilt()[0].protocol))
+    device.tare(16)
+    board = board_of(device)
+    sample, spoiled = board.adc.sample, []
+
+    def spoil(times: np.ndarray, channel: int) -> np.ndarray:
+        codes = sample(times, channel)
+        swing = float(codes.max()) - float(codes.min())
+        if len(spoiled) == 0 and swing > 500 and bursts[0] > 300:
+            spoiled.append(swing)
+            codes = (2048 + (codes.astype(np.float64) - 2048) / 2).astype(codes.dtype)
+        bursts[0] += 1
+        return codes
+
+    bursts = [0]
+    board.adc.sample = spoil  # type: ignore[assignment]
+    frames, faults = taken(device, 5)
+    assert spoiled
+    rows = [frame.solved.glitches for frame in frames if frame.solved is not None]
+    assert sorted(rows)[:-1] == [0, 0, 0, 0]
+    assert 1 <= max(rows) <= 2
+    assert [frame.solved.info.findings_by_name for frame in frames if frame.solved and frame.solved.glitches] == [("glitch",)]
+    assert device.stats().glitches == max(rows)
+    assert not faults
