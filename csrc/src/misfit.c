@@ -1,7 +1,7 @@
 /* What of the data no sheet of the model's gives, and a reference that was taken with a touch on the skin. */
 #include "examine.h"
 
-#include "kernels.h"
+#include "column.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -9,20 +9,14 @@
  * |d|^2 - sum (P d)_i^2 / |P_i|^2 is what lies outside. Told by two probes: P (P'v) against |P_i|^2 v. */
 static const eits_real ORTHOGONAL = R(1e-3);
 
-static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out)
-{
-    const eits_real one = 1;
-    ctx->kernels->mul(&ctx->model->reduction, &k, &one, 1, out);
-}
-
 /* ctx->sheet_inverse = |P_i|^2 for now. */
 static void row_energies(eits_context *ctx)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        reduction_column(ctx, k, ctx->residual);
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
         for (uint32_t i = 0; i < ctx->model->rank; ++i)
-            ctx->sheet_inverse[i] = eits_fma(ctx->residual[i], ctx->residual[i], ctx->sheet_inverse[i]);
-        ctx->sheet_energy += eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
+            ctx->sheet_inverse[i] = eits_fma(column[i], column[i], ctx->sheet_inverse[i]);
+        ctx->sheet_energy += eits_dot(ctx, column, column, ctx->model->rank);
     }
 }
 
@@ -36,9 +30,8 @@ static int is_orthogonal(eits_context *ctx, uint32_t period)
         ctx->sx[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->sheet_inverse[i]);
     }
     for (uint32_t k = 0; k < folds; ++k) {
-        reduction_column(ctx, k, ctx->residual);
         ctx->list_index[k] = k;
-        ctx->list_value[k] = eits_dot(ctx, ctx->residual, ctx->sx, rank);
+        ctx->list_value[k] = eits_dot(ctx, eits_column(&ctx->model->reduction, k, ctx->residual), ctx->sx, rank);
     }
     ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, folds, ctx->residual);
     for (uint32_t i = 0; i < rank; ++i) {
@@ -94,8 +87,8 @@ static uint64_t learn_stray(eits_context *ctx)
     for (uint32_t i = 0; i < rank; ++i)
         ctx->sz[i] *= ctx->sheet_inverse[i];
     for (uint32_t k = 0; k < folds; ++k) {
-        reduction_column(ctx, k, ctx->residual);
-        ctx->stray[k] = ctx->along[k] - eits_dot(ctx, ctx->residual, ctx->sz, rank);
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
+        ctx->stray[k] = ctx->along[k] - eits_dot(ctx, column, ctx->sz, rank);
     }
     ctx->stray_stale = 0;
     return 2u * (uint64_t)folds * rank;

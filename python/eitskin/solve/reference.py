@@ -11,7 +11,8 @@ from time import perf_counter_ns
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import FINDINGS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
+from eitskin.core.findings import FINDINGS, with_findings
+from eitskin.core.results import Baseline, Info, Options, Reconstruction, Touch, check_quiet
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
@@ -252,7 +253,7 @@ class ReferenceEngine:
             FrameError: there are, or all others are zero.
         """
         if int(unusable.sum()) > self.options.max_masked:
-            raise FrameError("frame: too many channels of the frame are unusable")
+            raise FrameError(with_findings("frame: too many channels of the frame are unusable", self._examiner.found))
         if not unusable.all() and not frame[~unusable].any():
             raise FrameError(f"frame: {DEAD}")
         return unusable

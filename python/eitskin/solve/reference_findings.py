@@ -5,14 +5,15 @@ docs/findings.md says what each rule is for and what its thresholds were chosen 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import FINDINGS, Touch
+from eitskin.core.findings import FINDINGS
+from eitskin.core.results import Touch
 from eitskin.model.model import Model
 
 FloatArray = npt.NDArray[np.float64]
@@ -42,12 +43,12 @@ class Found:
     glitches: int = 0
     misfit: float = 0.0
     unexplained: float = 0.0
-    open: tuple[int, ...] = ()
-    bridged: tuple[int, ...] = ()
-    noisy: tuple[int, ...] = ()
+    open_electrodes: tuple[int, ...] = ()
+    bridged_electrodes: tuple[int, ...] = ()
+    noisy_electrodes: tuple[int, ...] = ()
 
     @property
-    def bits(self) -> int:
+    def findings(self) -> int:
         """As eits_info.findings."""
         return sum(1 << bit for bit, name in enumerate(FINDINGS) if name in self.names)
 
@@ -144,12 +145,11 @@ class Examiner:
         if silent.sum() == judged_electrodes:  # it is not the electrodes
             return out
         dead = judged & ~alive
-        self.found.open = tuple(int(e) for e in np.flatnonzero(silent)) if "electrode open" in self.wanted else ()
-        self.found.bridged = self._bridged(dead, alive)
-        for name, which in (("electrode open", self.found.open), ("electrodes bridged", self.found.bridged)):
-            if which:
-                self.found.names.add(name)
-        return out | self._using(self.found.open + self.found.bridged)
+        self.found.open_electrodes = tuple(int(e) for e in np.flatnonzero(silent)) if "electrode open" in self.wanted else ()
+        self.found.bridged_electrodes = self._bridged(dead, alive)
+        silent_ones, bridged = self.found.open_electrodes, self.found.bridged_electrodes
+        self.found.names |= {name for name, which in (("electrode open", silent_ones), ("electrodes bridged", bridged)) if which}
+        return out | self._using(silent_ones + bridged)
 
     def _using(self, electrodes: tuple[int, ...]) -> BoolArray:
         return np.asarray(np.isin(self.rows, electrodes).any(axis=1))
@@ -164,7 +164,7 @@ class Examiner:
     def _bridged(self, dead: BoolArray, alive: BoolArray) -> tuple[int, ...]:
         if "electrodes bridged" not in self.wanted:
             return ()
-        without_open, found = ~self._using(self.found.open), set[int]()
+        without_open, found = ~self._using(self.found.open_electrodes), set[int]()
         pairs = {frozenset(map(int, pair)) for row in self.rows[dead & without_open] for pair in (row[:2], row[2:])}
         for pair in pairs:
             across = np.array([set(row[:2]) == pair or set(row[2:]) == pair for row in self.rows.tolist()]) & without_open
@@ -231,7 +231,7 @@ class Examiner:
             return out
         if "electrode noisy" not in self.wanted:
             return out
-        self.found.noisy = found
+        self.found.noisy_electrodes = found
         self.found.names.add("electrode noisy")
         pair = set(found)
         if len(found) == 2 and all(set(row[:2]) == pair or set(row[2:]) == pair for row in used.tolist()):
@@ -315,7 +315,4 @@ class Examiner:
     def of_frame(self) -> dict[str, Any]:
         """The fields of ``Info`` that say what was found."""
         f = self.found
-        return {
-            "findings": f.bits, "saturated": f.saturated, "glitches": f.glitches, "misfit": f.misfit,
-            "unexplained": f.unexplained, "open_electrodes": f.open, "bridged_electrodes": f.bridged, "noisy_electrodes": f.noisy,
-        }  # fmt: skip
+        return {name: getattr(f, name) for name in ("findings", *(entry.name for entry in fields(f) if entry.name != "names"))}
