@@ -92,7 +92,7 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->d = take_reals(a, folded);
     ctx->apart = take_reals(a, folded);
     ctx->along = take_reals(a, folded);
-    ctx->drift = take_reals(a, stride);
+    ctx->stray = take_reals(a, folded);
     ctx->sheet_inverse = take_reals(a, stride);
     ctx->sheet_shrink = take_reals(a, stride);
     ctx->y = take_reals(a, stride);

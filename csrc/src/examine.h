@@ -81,8 +81,8 @@ uint32_t eits_quiet_weigh(eits_context *ctx, const eits_real *frame);
 void eits_learn_sheet(eits_context *ctx);
 
 /* How much of ctx->d no sheet gives, into info; returns 1 where that stands out. ctx->y is P d, not yet projected, no fold left
- * out; ctx->along is the drift of the gain, ctx->drift what P makes of it (zeros: it is not ignored); ctx->sheet_known. */
-int eits_judge_misfit(eits_context *ctx);
+ * out; ctx->along is the drift of the gain (zeros: it is not ignored); ctx->sheet_known. Uses residual, sz and the list. */
+int eits_judge_misfit(eits_context *ctx, uint64_t *macs);
 
 /* Whether the change goes the way touches cannot; ctx->gradient is S'y, info.lambda_max known. */
 void eits_judge_reference(eits_context *ctx);

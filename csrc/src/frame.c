@@ -158,10 +158,10 @@ static uint64_t rebuild_basis(eits_context *ctx)
     }
     if (ctx->options.project_baseline) {
         macs += drift_direction(ctx, ctx->residual);
-        eits_copy(ctx->drift, ctx->residual, EITS_STRIDE(ctx->model->rank));
         macs += extend_basis(ctx, ctx->residual);
     }
     ctx->basis_stale = 0;
+    ctx->stray_stale = 1;
     return macs;
 }
 
@@ -182,7 +182,7 @@ static int reduce(eits_context *ctx, uint64_t *macs)
 /* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew. */
 static int examine_reduced(eits_context *ctx, uint64_t *macs)
 {
-    if (!ctx->sheet_known || !eits_judge_misfit(ctx))
+    if (!ctx->sheet_known || !eits_judge_misfit(ctx, macs))
         return 0;
     if (eits_wants(ctx, EITS_FINDING_GLITCH) && eits_find_unpaired(ctx, macs)) {
         ctx->info.misfit = 0;

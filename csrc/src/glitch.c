@@ -1,7 +1,7 @@
 /* Glitches: rows that their reciprocals, or all the other folds, do not bear out; too many that share an electrode: a noisy one. */
 #include "examine.h"
 
-#include "kernels.h"
+#include "column.h"
 #include "vec.h"
 
 static const eits_real ROBUST = R(1.4826); /* the deviation of a normal distribution over the median of its magnitudes */
@@ -91,13 +91,6 @@ static void leave_row(eits_context *ctx, uint32_t row)
 
 /* ---- what the other folds predict ---- */
 
-/* Column k of P. */
-static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out)
-{
-    const eits_real one = 1;
-    ctx->kernels->mul(&ctx->model->reduction, &k, &one, 1, out);
-}
-
 static int all_known(const eits_context *ctx)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
@@ -127,13 +120,13 @@ static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_
     const uint32_t rank = ctx->model->rank;
     fit_all(ctx, macs);
     for (uint32_t a = 0; a < n; ++a) {
-        reduction_column(ctx, flagged[a], ctx->residual);
-        e[a] = ctx->d[flagged[a]] - eits_dot(ctx, ctx->residual, ctx->sz, rank);
+        const eits_real *column = eits_column(&ctx->model->reduction, flagged[a], ctx->sx);
+        e[a] = ctx->d[flagged[a]] - eits_dot(ctx, column, ctx->sz, rank);
         for (uint32_t i = 0; i < rank; ++i)
-            ctx->residual[i] *= ctx->sheet_shrink[i];
+            ctx->residual[i] = ctx->sheet_shrink[i] * column[i];
         for (uint32_t b = 0; b <= a; ++b) {
-            reduction_column(ctx, flagged[b], ctx->sx);
-            eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx, ctx->residual, ctx->sx, rank);
+            const eits_real *other = eits_column(&ctx->model->reduction, flagged[b], ctx->sx);
+            eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx, ctx->residual, other, rank);
             for (uint32_t k = 0; k < b; ++k)
                 sum = eits_fma(-l[a][k], l[b][k], sum);
             if (a == b && !(sum > EITS_GLITCH_PIVOT))
@@ -246,11 +239,11 @@ int eits_find_unpaired(eits_context *ctx, uint64_t *macs)
     eits_real worst = 0, energy = 0;
     uint32_t at = 0;
     for (uint32_t k = 0; k < folds; ++k) {
-        reduction_column(ctx, k, ctx->residual);
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
         eits_real leverage = 0;
-        const eits_real off = eits_fabs(ctx->d[k] - eits_dot(ctx, ctx->residual, ctx->sz, rank));
+        const eits_real off = eits_fabs(ctx->d[k] - eits_dot(ctx, column, ctx->sz, rank));
         for (uint32_t i = 0; i < rank; ++i)
-            leverage = eits_fma(ctx->sheet_shrink[i] * ctx->residual[i], ctx->residual[i], leverage);
+            leverage = eits_fma(ctx->sheet_shrink[i] * column[i], column[i], leverage);
         const eits_real left = 1 - leverage;
         energy = eits_fma(off, off, energy);
         ctx->list_value[k] = left > EITS_GLITCH_PIVOT ? off / eits_sqrt(left) : 0;

@@ -1,7 +1,7 @@
 /* What of the data no sheet of the model's gives, and a reference that was taken with a touch on the skin. */
 #include "examine.h"
 
-#include "kernels.h"
+#include "column.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -9,20 +9,14 @@
  * |d|^2 - sum (P d)_i^2 / |P_i|^2 is what lies outside. Told by two probes: P (P'v) against |P_i|^2 v. */
 static const eits_real ORTHOGONAL = R(1e-3);
 
-static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out)
-{
-    const eits_real one = 1;
-    ctx->kernels->mul(&ctx->model->reduction, &k, &one, 1, out);
-}
-
 /* ctx->sheet_inverse = |P_i|^2 for now. */
 static void row_energies(eits_context *ctx)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        reduction_column(ctx, k, ctx->residual);
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
         for (uint32_t i = 0; i < ctx->model->rank; ++i)
-            ctx->sheet_inverse[i] = eits_fma(ctx->residual[i], ctx->residual[i], ctx->sheet_inverse[i]);
-        ctx->sheet_energy += eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
+            ctx->sheet_inverse[i] = eits_fma(column[i], column[i], ctx->sheet_inverse[i]);
+        ctx->sheet_energy += eits_dot(ctx, column, column, ctx->model->rank);
     }
 }
 
@@ -36,9 +30,8 @@ static int is_orthogonal(eits_context *ctx, uint32_t period)
         ctx->sx[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->sheet_inverse[i]);
     }
     for (uint32_t k = 0; k < folds; ++k) {
-        reduction_column(ctx, k, ctx->residual);
         ctx->list_index[k] = k;
-        ctx->list_value[k] = eits_dot(ctx, ctx->residual, ctx->sx, rank);
+        ctx->list_value[k] = eits_dot(ctx, eits_column(&ctx->model->reduction, k, ctx->residual), ctx->sx, rank);
     }
     ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, folds, ctx->residual);
     for (uint32_t i = 0; i < rank; ++i) {
@@ -84,13 +77,21 @@ void eits_learn_sheet(eits_context *ctx)
     eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
 }
 
-/* a'b less what of both the sheet gives: a'b - (P a)' |P_i|^-2 (P b). */
-static eits_real outside(const eits_context *ctx, const eits_real *a, const eits_real *pa, const eits_real *b, const eits_real *pb)
+/* ctx->stray = what of the drift no sheet gives: along - P' |P_i|^-2 P along, in full, since differences of sums would be rounding. */
+static uint64_t learn_stray(eits_context *ctx)
 {
-    const uint32_t rank = ctx->model->rank;
+    const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
+    for (uint32_t k = 0; k < folds; ++k)
+        ctx->list_index[k] = k;
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->along, folds, ctx->sz);
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] = ctx->sheet_inverse[i] * pa[i];
-    return eits_dot(ctx, a, b, ctx->model->n_folded) - eits_dot(ctx, ctx->sz, pb, rank);
+        ctx->sz[i] *= ctx->sheet_inverse[i];
+    for (uint32_t k = 0; k < folds; ++k) {
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
+        ctx->stray[k] = ctx->along[k] - eits_dot(ctx, column, ctx->sz, rank);
+    }
+    ctx->stray_stale = 0;
+    return 2u * (uint64_t)folds * rank;
 }
 
 eits_real eits_noise_energy(const eits_context *ctx)
@@ -106,18 +107,22 @@ eits_real eits_noise_energy(const eits_context *ctx)
     return sum;
 }
 
-int eits_judge_misfit(eits_context *ctx)
+int eits_judge_misfit(eits_context *ctx, uint64_t *macs)
 {
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     if (rank >= folds || !(ctx->baseline.noise_v > 0))
         return 0;
-    eits_real off = outside(ctx, ctx->d, ctx->y, ctx->d, ctx->y), whole = eits_dot(ctx, ctx->d, ctx->d, folds);
     const eits_real drift = eits_dot(ctx, ctx->along, ctx->along, folds);
+    if (drift > 0 && ctx->stray_stale)
+        *macs += learn_stray(ctx);
+    for (uint32_t i = 0; i < rank; ++i)
+        ctx->sz[i] = ctx->sheet_inverse[i] * ctx->y[i];
+    eits_real whole = eits_dot(ctx, ctx->d, ctx->d, folds), off = whole - eits_dot(ctx, ctx->sz, ctx->y, rank);
     if (drift > 0) { /* how far it drifted is no news */
-        const eits_real both = eits_dot(ctx, ctx->d, ctx->along, folds), out = outside(ctx, ctx->d, ctx->y, ctx->along, ctx->drift);
-        const eits_real left = outside(ctx, ctx->along, ctx->drift, ctx->along, ctx->drift);
-        whole -= both * both / drift;
-        off -= left > 0 ? out * out / left : 0;
+        const eits_real along = eits_dot(ctx, ctx->d, ctx->along, folds), astray = eits_dot(ctx, ctx->d, ctx->stray, folds);
+        const eits_real stray = eits_dot(ctx, ctx->stray, ctx->stray, folds);
+        whole -= along * along / drift;
+        off -= stray > 0 ? astray * astray / stray : 0;
     }
     const eits_real noise = eits_noise_energy(ctx) * (eits_real)(folds - rank) / (eits_real)folds;
     if (!(off > noise) || !(whole > 0))

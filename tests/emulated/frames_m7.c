@@ -96,7 +96,7 @@ typedef struct option {
 
 static const option option_table[] = {
     WHOLE(iterations), WHOLE(gap_every), WHOLE(max_touches), WHOLE(max_masked), WHOLE(warm_start), WHOLE(project_baseline),
-    WHOLE(touch_sweeps), WHOLE(mac_limit), REAL(lambda_abs), REAL(lambda_rel), REAL(lambda_noise_factor), REAL(gate_factor),
+    WHOLE(touch_sweeps), WHOLE(mac_limit), WHOLE(findings), REAL(lambda_abs), REAL(lambda_rel), REAL(lambda_noise_factor), REAL(gate_factor),
     REAL(gap_rel), REAL(saturation_v), REAL(touch_threshold), REAL(touch_share), REAL(touch_min_radius_mm),
     REAL(touch_max_radius_mm), REAL(touch_seed_radius_mm), REAL(touch_change_s_per_m), REAL(touch_radius_weight), REAL(follow_mm),
 };
@@ -180,6 +180,11 @@ static void print_info(const eits_info *info)
     const float reals[] = {info->lambda, info->lambda_max, info->lambda_noise, info->gap, info->gap_rel, info->residual, info->data_norm};
     for (size_t k = 0; k < sizeof reals / sizeof reals[0]; ++k)
         printf(":%08lx", bits_of(reals[k]));
+    printf(":%lu:%lu:%lu:%08lx:%08lx", (unsigned long)info->findings, (unsigned long)info->saturated, (unsigned long)info->glitches,
+           bits_of(info->misfit), bits_of(info->unexplained));
+    const uint64_t electrodes[] = {info->open_electrodes, info->bridged_electrodes, info->noisy_electrodes};
+    for (size_t k = 0; k < 3; ++k)
+        printf(":%08lx%08lx", (unsigned long)(electrodes[k] >> 32), (unsigned long)(electrodes[k] & 0xFFFFFFFFu));
 }
 
 /* One frame, or one vector of reduced data. */

@@ -128,7 +128,8 @@ typedef struct eits_context {
     eits_real *d;            /* n_folded: data of this frame */
     eits_real *apart;        /* n_folded: what the two rows of each fold differ by; 0 where one is in use */
     eits_real *along;        /* n_folded: data of a drift of the gain; zeros where it is not ignored */
-    eits_real *drift;        /* stride: P along */
+    eits_real *stray;        /* n_folded: what of that no sheet gives, unless stale */
+    uint32_t stray_stale;
     eits_real *sheet_inverse, *sheet_shrink; /* stride each: 1 / |P_i|^2, and so much of it as predicts d (misfit.c) */
     eits_real sheet_energy;  /* |P|^2: what unit noise on the folded rows makes of |y|^2 */
     uint32_t sheet_known;    /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
@@ -178,8 +179,8 @@ typedef struct eits_context {
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise copies of S and of
  * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
-    (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + 3 * EITS_REALS(n_folded) +               \
-     (11 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
+    (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +               \
+     (10 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
      EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_REALS(EITS_TRIANGLE(rank)) + EITS_ALIGN16((size_t)(n_cells) * 2u) +       \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.cli.budget_options import add_wish, wished
 from eitskin.cli.device_options import add_solver, check_solver
 from eitskin.config import nearest
+from eitskin.core.findings import plural
 from eitskin.errors import ConfigError, EitskinError, FrameError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
@@ -85,6 +86,8 @@ def run(options: argparse.Namespace) -> int:
             f"run  eitskin doctor {options.frames}",
             file=sys.stderr,
         )
+    if baseline.glitches:
+        print(f"eitskin: {plural(baseline.glitches, 'reading')} of the quiet frames left out as glitches", file=sys.stderr)
     chosen = _chosen(frames, options.only)
     if options.threads > 1:
         results, refused = _reconstruct_threaded(reconstructor, blob, frames, chosen, options.threads)
@@ -235,6 +238,8 @@ def _print(
                 f"{label if k == 0 else '':11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f} {touch.radius_mm:9.2f} "
                 f"{touch.strength_s_per_m_mm2:16.3f}  {error}{f'  {_solve(result)}' if k == 0 else ''}".rstrip()
             )
+        if result.info.findings:
+            print(f"{'':11} found: {'; '.join(result.info.found)}")
     macs = [result.info.macs + result.info.touch_macs for result in results.values()]
     cost = f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""
     print(f"{len(results)} frames, {len(refused)} refused{cost}")

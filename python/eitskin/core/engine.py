@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.findings import with_findings
 from eitskin.core.results import SIGNS, SOLVERS, STOPS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
 
@@ -184,7 +185,9 @@ class CoreEngine:
         if frame.shape != (self.n_rows,):
             raise FrameError(f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows")
         began_ns = perf_counter_ns()
-        self._check_frame(self.solve_frame(frame), "frame")
+        status = self.solve_frame(frame)
+        if status != 0:
+            raise FrameError(with_findings(f"frame: {self._status_text(status)}", self.last_info()))
         solved_ns = found_ns = perf_counter_ns()
         found: tuple[Touch, ...] = ()
         if touches:
@@ -230,7 +233,7 @@ class CoreEngine:
         for k in range(count):
             r = results[k]
             if r.status != 0:
-                done.append(FrameError(f"frame: {self._status_text(r.status)}"))
+                done.append(FrameError(with_findings(f"frame: {self._status_text(r.status)}", _info(r.info))))
                 continue
             each = tuple(_touch(found[room * k + i]) for i in range(r.count))
             done.append(Reconstruction(images[k], coefficients[k], each, _info(r.info)))

@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.findings import ALL_FINDINGS, names, words
 from eitskin.errors import FrameError, UsageError
 
 SIGNS = ("increase", "decrease", "both")
 SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
-FINDINGS = (  # bit k of eits_info.findings, as eits_finding_text names it
-    "saturated", "electrode open", "electrodes bridged", "glitch", "electrode noisy", "misfit", "stale reference", "crowded",
-)  # fmt: skip
-ALL_FINDINGS = 2 ** len(FINDINGS) - 1
 STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
 
@@ -176,35 +173,17 @@ class Info:
     @property
     def found(self) -> tuple[str, ...]:
         """What was found wrong with the frame, each in a few words: "electrode 5 open", "2 rows left out as glitches"..."""
-        details = {
-            "saturated": f"{self.saturated} row{'s' * (self.saturated != 1)} saturated",
-            "electrode open": f"{_electrodes(self.open_electrodes)} open",
-            "electrodes bridged": f"{_electrodes(self.bridged_electrodes)} bridged",
-            "glitch": f"{self.glitches} row{'s' * (self.glitches != 1)} left out as glitch{'es' * (self.glitches != 1)}",
-            "electrode noisy": f"{_electrodes(self.noisy_electrodes)} noisy",
-            "misfit": f"misfit {100 * self.misfit:.1f} %" if self.misfit > 0 else "misfit",
-            "stale reference": "stale reference: tare again",
-            "crowded": "crowded: more touches than can be told apart",
-        }
-        return tuple(details[name] for name in self.findings_by_name)
+        return words(self)
 
     @property
     def findings_by_name(self) -> tuple[str, ...]:
         """Those of ``FINDINGS`` that were made."""
-        return tuple(name for bit, name in enumerate(FINDINGS) if self.findings >> bit & 1)
+        return names(self.findings)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: the same names, without the underscore of ``lambda_``; findings by name."""
         values = {key.rstrip("_"): value for key, value in asdict(self).items()}
         return values | {"findings": list(self.findings_by_name), "found": list(self.found)}
-
-
-def _electrodes(numbers: tuple[int, ...]) -> str:
-    """ "electrode 5", "electrodes 5 and 6"; from 0."""
-    if not numbers:
-        return "electrode"
-    *most, last = map(str, numbers)
-    return f"electrodes {', '.join(most)} and {last}" if most else f"electrode {last}"
 
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:

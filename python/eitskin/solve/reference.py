@@ -11,12 +11,15 @@ from time import perf_counter_ns
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.findings import FINDINGS, with_findings
 from eitskin.core.results import Baseline, Info, Options, Reconstruction, Touch, check_quiet
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
 from eitskin.solve.reference_exact import ActiveSet, coordinate
+from eitskin.solve.reference_findings import Examiner, Folded, Found, Reference
 from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, certify, greatest, project, shrink
+from eitskin.solve.reference_quiet import clean
 from eitskin.solve.reference_touches import find_touches
 
 BoolArray = npt.NDArray[np.bool_]
@@ -116,6 +119,9 @@ class ReferenceEngine:
         self._warm: FloatArray | None = None
         self._last: tuple[Touch, ...] = ()
         self._next_id = 1
+        self._examiner = Examiner(model)
+        self._noise_v = self._noise_energy = 0.0
+        self._ready = False
 
     def set_options(self, options: Options) -> None:
         """Replace the options.
@@ -128,6 +134,7 @@ class ReferenceEngine:
         if options.sign != self.options.sign:
             self._warm = None
         self.options = options
+        self._examiner.wanted = {name for bit, name in enumerate(FINDINGS) if options.findings >> bit & 1}
 
     def mask_rows(self, rows: BoolArray) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
@@ -166,26 +173,30 @@ class ReferenceEngine:
         check_quiet(frames, self._bad, self.options.saturation_v)
         frames = np.where(self._bad, 0.0, frames)
         before, self._without_reference = self._without_reference, self._bad.copy()
-        lambda_noise, noise = 0.0, 0.0
+        lambda_noise, noise, left = 0.0, 0.0, np.zeros(frames.shape, dtype=np.bool_)
+        was_ready, self._ready = self._ready, False
         try:
             if len(frames) >= 4:
-                lambda_noise = self._learn_lambda_noise(frames)
+                if "glitch" in self._examiner.wanted:
+                    frames, left = clean(frames, self.model.fold, ~self._bad)
+                lambda_noise = self._learn_lambda_noise(frames, left)
                 noise = float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
             correlation = self._fit_to_model(frames.mean(axis=0))
         except FrameError:
-            self._without_reference = before
+            self._without_reference, self._ready = before, was_ready and self._v0 is not None
             raise
-        self._lambda_noise = lambda_noise
-        return Baseline(len(frames), correlation, self._gain, self._v0_rms, noise, self._lambda_noise)
+        self._lambda_noise, self._noise_v, self._ready = lambda_noise, noise, True
+        return Baseline(len(frames), correlation, self._gain, self._v0_rms, noise, lambda_noise, int(left.sum()))
 
-    def _learn_lambda_noise(self, frames: FloatArray) -> float:
-        """The greatest max |S'y| of the second half of ``frames``, each against the mean of those before it."""
+    def _learn_lambda_noise(self, frames: FloatArray, left: BoolArray) -> float:
+        """The greatest max |S'y| of the second half of ``frames``, each against the mean of those before it; readings in ``left``
+        are not used."""
         half, seen = len(frames) // 2, 0.0
         try:
             self._fit_to_model(frames[:half].mean(axis=0))
             for k in range(half, len(frames)):
                 self._v0 = frames[:k].mean(axis=0)
-                seen = max(seen, greatest(self._s.T @ self.frame_stage(frames[k])[0], "both"))
+                seen = max(seen, greatest(self._s.T @ self.frame_stage(np.where(left[k], np.nan, frames[k]))[0], "both"))
         except FrameError:
             self._v0 = None
             raise
@@ -208,36 +219,72 @@ class ReferenceEngine:
         """
         if self._v0 is None:
             raise FrameError("frame: no reference frame has been set")
-        fold, kind, limit = self.model.fold, self.model.data_kind, self.options.saturation_v
-        unusable = self._bad | self._without_reference | ~np.isfinite(frame)
-        if limit > 0:
-            unusable |= np.abs(np.nan_to_num(frame)) >= limit
+        limit, look = self.options.saturation_v, self._examiner
+        look.found = Found()
+        masked = self._bad | self._without_reference
+        saturated = (np.abs(np.nan_to_num(frame)) >= limit) & (limit > 0)
+        unusable = masked | ~np.isfinite(frame) | saturated
+        look.found.saturated = int((saturated & ~masked).sum())
+        look.found.names |= {"saturated"} & look.wanted if look.found.saturated else set()
+        judged = Reference(np.where(masked, np.nan, self._v0), self._v0_rms, self._gain, self._noise_v) if self._ready else None
+        if judged:
+            unusable = unusable | look.electrodes(frame, judged, masked, unusable)
+        folded = self._fold(frame, self._check_rows(frame, unusable))
+        if judged:
+            unusable = unusable | look.glitches(folded, judged)
+            folded = self._fold(frame, self._check_rows(frame, unusable))
+        if judged and look.misfit(folded, self._along(folded), judged):
+            glitch = look.unpaired(folded)
+            if glitch.any():
+                look.found.misfit, unusable = 0.0, unusable | glitch
+                folded = self._fold(frame, self._check_rows(frame, unusable))
+            else:
+                look.found.names |= {"misfit"} & look.wanted
+        self._noise_energy = look.noise_energy(folded, judged) if judged else 0.0
+        basis = orthonormal(self._directions(folded), self.model.rank)
+        y = project(self._p @ folded.d, basis)
+        # where the basis leaves no direction, what is there is rounding
+        return y if len(basis) < len(y) else np.zeros_like(y), basis, int(unusable.sum())
+
+    def _check_rows(self, frame: FloatArray, unusable: BoolArray) -> BoolArray:
+        """``unusable`` (m,), if there are not too many of them.
+
+        Raises:
+            FrameError: there are, or all others are zero.
+        """
         if int(unusable.sum()) > self.options.max_masked:
-            raise FrameError("frame: too many channels of the frame are unusable")
+            raise FrameError(with_findings("frame: too many channels of the frame are unusable", self._examiner.found))
         if not unusable.all() and not frame[~unusable].any():
             raise FrameError(f"frame: {DEAD}")
+        return unusable
+
+    def _fold(self, frame: FloatArray, unusable: BoolArray) -> Folded:
+        """The data of ``frame``, folded; zero where a fold is left out."""
+        assert self._v0 is not None
+        fold, kind = self.model.fold, self.model.data_kind
         out = unusable | ((kind != "difference") & (np.abs(self._v0) < 1e-6 * self._v0_rms))
         value = np.where(out, 0.0, self._datum(np.where(out, self._v0, frame), self._v0))
         sign = np.ones_like(fold.sign) if kind == "normalised" else fold.sign
         first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
-        count = first.astype(int) + second
-        d = (value[fold.first] + np.where(second, sign * value[fold.second], 0.0)) / np.maximum(count, 1)
-        basis = orthonormal(self._directions(first, second), self.model.rank)
-        y = project(self._p @ np.where(count > 0, d, 0.0), basis)
-        # where the basis leaves no direction, what is there is rounding
-        return y if len(basis) < len(y) else np.zeros_like(y), basis, int(unusable.sum())
+        one, other = value[fold.first], np.where(second, sign * value[fold.second], 0.0)
+        d = (np.where(first, one, 0.0) + other) / np.maximum(first.astype(int) + second, 1)
+        return Folded(d, np.where(first & second, one - other, 0.0), first, second)
 
-    def _directions(self, first: BoolArray, second: BoolArray) -> list[FloatArray]:
-        """What the misfit ignores: P's columns of rows left out, and the drift of the gain; by which rows of each fold (k,)
-        are in use."""
-        count = first.astype(int) + second
-        directions = [self._p[:, k] for k in np.flatnonzero(count == 0)]
-        if self.options.project_baseline and self._drift_v0 is not None:
-            fold, v0 = self.model.fold, self._drift_v0
-            total = np.where(first, v0[fold.first], 0.0) + np.where(second, fold.sign * v0[fold.second], 0.0)
-            along = np.ones_like(total) if self.model.data_kind == "normalised" else self._gain * total / np.maximum(count, 1)
-            directions.append(self._p @ np.where(count > 0, along, 0.0))
-        return directions
+    def _along(self, folded: Folded) -> FloatArray | None:
+        """What drift of the gain makes of the folded data, (k,); None where it is not ignored."""
+        if not self.options.project_baseline or self._drift_v0 is None:
+            return None
+        fold, v0, count = self.model.fold, self._drift_v0, folded.first.astype(int) + folded.second
+        if self.model.data_kind == "normalised":
+            return np.where(count > 0, 1.0, 0.0)
+        total = np.where(folded.first, v0[fold.first], 0.0) + np.where(folded.second, fold.sign * v0[fold.second], 0.0)
+        return np.asarray(self._gain * total / np.maximum(count, 1))
+
+    def _directions(self, folded: Folded) -> list[FloatArray]:
+        """What the misfit ignores: P's columns of folds left out, and the drift of the gain."""
+        directions = [self._p[:, k] for k in np.flatnonzero(~(folded.first | folded.second))]
+        along = self._along(folded)
+        return directions if along is None else [*directions, self._p @ along]
 
     def reconstruct(self, frame: FloatArray, *, touches: bool = True) -> Reconstruction:
         """One frame (m,) volts to image and touches.
@@ -255,6 +302,7 @@ class ReferenceEngine:
             raise
         o, norm = self.options, float(np.linalg.norm(y))
         lambda_max = greatest(self._s.T @ y, o.sign)
+        self._examiner.stale(self._s.T @ y, o.sign, lambda_max, self._lambda_noise)
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * self._lambda_noise)
         n = self.model.grid.n_pixels
         nothing = Certificate(0.0, 0.5 * norm**2, norm)
@@ -272,14 +320,17 @@ class ReferenceEngine:
         found: tuple[Touch, ...] = ()
         solved_ns = perf_counter_ns()
         if touches:
-            found, self._next_id = find_touches(
+            found, self._next_id, self._examiner.found.unexplained = find_touches(
                 self.model, image, y, basis, o, self._lambda_noise, self._last, self._next_id
             )
             self._last = found
+            noise_share = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum()) / max(norm**2, 1e-300)
+            self._examiner.crowd(found, o.max_touches, noise_share)
         gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,
             lam, lambda_max, self._lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300), result.certificate.residual, norm,
+            **self._examiner.of_frame(),
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)

@@ -191,8 +191,9 @@ def find_touches(
     lambda_noise: float,
     last: tuple[Touch, ...],
     next_id: int,
-) -> tuple[tuple[Touch, ...], int]:
-    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), strongest first, and the next free id."""
+) -> tuple[tuple[Touch, ...], int, float]:
+    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), strongest first, the next free id, and the share of
+    |y|^2 that the touches leave (0 where the image is zero)."""
     fit = Fit(model, y, basis, options, lambda_noise)
     if np.abs(image).max() > 0:
         fit.seed(image)
@@ -209,7 +210,9 @@ def find_touches(
         for d, e in zip(fit.discs, explained, strict=True)
     ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
-    return _track(found, last, options.follow_mm, next_id)
+    left, whole = fit.residual(), float(y @ y)
+    unexplained = float(left @ left) / whole if whole > 0 and np.abs(image).max() > 0 else 0.0
+    return *_track(found, last, options.follow_mm, next_id), unexplained
 
 
 def _track(found: list[Touch], last: tuple[Touch, ...], follow_mm: float, next_id: int) -> tuple[tuple[Touch, ...], int]:

@@ -33,7 +33,8 @@ LINE = re.compile(
 @dataclass(frozen=True)
 class EmulatedFrame:
     """One frame as the emulated board printed it. ``touches``: their number, then ids and numbers as hexadecimal bits; ``info``:
-    non-zeros, masked rows, halvings, then lambda, lambda_max, lambda_noise, gap, gap_rel, residual and |y| as such bits;
+    non-zeros, masked rows, halvings, then lambda, lambda_max, lambda_noise, gap, gap_rel, residual and |y| as such bits,
+    and what was found;
     ``stack_bytes``: the deepest of solve and touches."""
 
     status: int

@@ -87,6 +87,16 @@ def test_electrode_around_a_corner_and_ending_on_one() -> None:
     assert mesh.areas_mm2.min() > 0.05
 
 
+def test_electrodes_on_a_quarter_of_a_disk() -> None:
+    """The bare arc is longer than half of the rim: its nodes lie on the circle all the same."""
+    places = tuple(2.5 + 5.0 * k for k in range(16))
+    skin = Skin("bunched", disk(100.0), Electrodes(16, 3.0, positions_mm=places), conductivity_s_per_m=0.02, thickness_mm=5.0)
+    mesh = build_mesh(skin, max_size_mm=6.0)
+    rim = np.hypot(*mesh.nodes_mm.T)
+    assert rim.max() < 50 + 1e-6 and mesh.areas_mm2.sum() > 0.99 * skin.outline.area_mm2
+    assert np.count_nonzero(rim > 50 - 1e-3) > 314 / 6
+
+
 def test_sizes_are_obeyed_and_repeatable() -> None:
     skin = paper_skin()
     coarse = build_mesh(skin, max_size_mm=12.0, electrode_size_mm=2.0)

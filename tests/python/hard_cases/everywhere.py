@@ -116,10 +116,16 @@ def bits(value: float) -> str:
     return f"{struct.unpack('<I', struct.pack('<f', value))[0]:08x}"
 
 
+def _electrode_bits(numbers: tuple[int, ...]) -> str:
+    return f"{sum(1 << e for e in numbers):016x}"
+
+
 def as_printed(outcome: Outcome) -> tuple[object, ...]:
     """In the emulated program's words."""
     i = outcome.info
     info = ":".join([str(i.nonzeros), str(i.masked), str(i.step_halvings), *(bits(getattr(i, name)) for name in NUMBERS)])
+    info = ":".join([info, str(i.findings), str(i.saturated), str(i.glitches), bits(i.misfit), bits(i.unexplained)])
+    info = ":".join([info, *map(_electrode_bits, (i.open_electrodes, i.bridged_electrodes, i.noisy_electrodes))])
     words = [
         f" {t.id}:" + ":".join(map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence)))
         for t in outcome.touches

@@ -179,6 +179,8 @@ def test_saturated_channels_are_left_out(engine: str) -> None:
     limit = 1.5 * float(np.abs(session().quiet_v).max())
     damaged = frame.copy()
     damaged[[3, 50, 171]] = [limit, -limit, 3 * limit]
+    assert reconstructor.reconstruct(damaged).info.glitches == 3
+    reconstructor.with_options(findings=0)
     spoilt = reconstructor.reconstruct(damaged)
     assert np.abs(spoilt.image - whole.image).max() > whole.image.max()
     reconstructor.with_options(saturation_v=limit)
@@ -324,6 +326,7 @@ BAD_OPTIONS = [
     ({"max_touches": 17}, "max_touches = 17 is out of range; use 0 to 16"),
     ({"max_masked": -1}, "max_masked"),
     ({"mac_limit": -1}, "mac_limit"),
+    ({"findings": 256}, "findings = 256 is out of range; use 0 to 255"),
     ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),
     ({"solver": "newton"}, "solver = 'newton' is not known; use one of fista, working-set"),
     ({"warm_start": 2}, "warm_start"),

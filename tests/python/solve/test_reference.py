@@ -79,7 +79,7 @@ def test_a_row_left_out_is_a_row_of_any_value() -> None:
     s, model = small(), small_model()
     fold = s.protocol.reciprocal_pairs()
     frame = s.frames(4, 1)[0]
-    engine = reference(model, project_baseline=False)
+    engine = reference(model, project_baseline=False, findings=0)
     whole, _, _ = engine.frame_stage(frame)
     damaged = frame.copy()
     damaged[[fold.first[30], fold.second[30]]] = np.nan
