@@ -37,7 +37,7 @@ static uint32_t with_bit(uint32_t bits, uint32_t place, bool set)
 void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail)
 {
     const uint32_t place = place_of(code, detail);
-    faults->clean[code][place] = 0;
+    faults->run[code][place] = 0;
     if (((faults->there[code] >> place & 1u) != 0) == there)
         return;
     faults->there[code] = with_bit(faults->there[code], place, there);
@@ -48,10 +48,12 @@ void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detai
 void fw_fault_found(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail)
 {
     const uint32_t place = place_of(code, detail);
-    if (found)
-        fw_fault_set(faults, code, true, detail);
-    else if ((faults->there[code] >> place & 1u) != 0 && ++faults->clean[code][place] >= EITS_FAULT_CLEAN_FRAMES)
-        fw_fault_set(faults, code, false, detail);
+    const bool there = (faults->there[code] >> place & 1u) != 0;
+    const uint32_t shown = code >= EITS_FAULT_ELECTRODE_NOISY ? EITS_FAULT_SHOWN_FRAMES : 1;
+    if (found == there)
+        faults->run[code][place] = 0;
+    else if (++faults->run[code][place] >= (there ? EITS_FAULT_CLEAN_FRAMES : shown))
+        fw_fault_set(faults, code, found, detail);
 }
 
 bool fw_fault_is(const fw_faults *faults, eits_fault code)

@@ -95,8 +95,9 @@ typedef enum eits_fault {
 } eits_fault;
 #define EITS_FAULTS 15u
 
-/* ELECTRODE_OPEN, SATURATED and those from BRIDGED on are raised in the frame that shows them, and gone after so many frames in
- * a row that do not. */
+/* ELECTRODE_OPEN, SATURATED and BRIDGED are raised in the frame that shows them, and those after it with the third in a row, since
+ * a touch that lands within a scan gives one such frame; all these are gone after so many frames in a row that do not. */
+#define EITS_FAULT_SHOWN_FRAMES 3u
 #define EITS_FAULT_CLEAN_FRAMES 8u
 
 /* Bits of eits_packet_raw.flags */

@@ -205,14 +205,14 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
 
 
 def read_ignored(text: str | None) -> int | None:
-    """The findings that are left, bit k of ``core.results.FINDINGS``, without those in "glitch,electrode-noisy" or "all"; None
+    """The findings that are left, bit k of ``core.findings.FINDINGS``, without those in "glitch,electrode-noisy" or "all"; None
     for None.
 
     Raises:
         UsageError: one is unknown.
     """
     from eitskin.config import nearest
-    from eitskin.core.results import ALL_FINDINGS, FINDINGS
+    from eitskin.core.findings import ALL_FINDINGS, FINDINGS
 
     if text is None:
         return None

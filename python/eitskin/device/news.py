@@ -5,12 +5,13 @@ A board tells most of what it finds as faults, and all of it in the head of each
 
 from __future__ import annotations
 
+from eitskin.core.findings import names, words
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import fault_text
-from eitskin.device.wire.packets import CLEAN_FRAMES, FOUND_FAULTS, Fault, FaultCode, Solved
+from eitskin.device.wire.packets import CLEAN_FRAMES, DOUBTFUL_FAULTS, FOUND_FAULTS, SHOWN_FRAMES, Fault, FaultCode, Solved
 
-Key = tuple[str, int]  # a name of core.results.FINDINGS, and which electrode; -1: none
+Key = tuple[str, int]  # a name of core.findings.FINDINGS, and which electrode; -1: none
 
 _NAMES = {
     FaultCode.ELECTRODE_OPEN: "electrode open",
@@ -20,6 +21,7 @@ _NAMES = {
     FaultCode.MISFIT: "misfit",
     FaultCode.STALE_REFERENCE: "stale reference",
 }
+_DOUBTFUL = frozenset(_NAMES[code] for code in DOUBTFUL_FAULTS)
 _OF_ELECTRODES = {"electrode open": "open", "electrodes bridged": "bridged", "electrode noisy": "noisy"}
 
 
@@ -28,6 +30,7 @@ class News:
 
     def __init__(self) -> None:
         self._clean: dict[Key, int] = {}  # what has been said to be there: frames in a row without it
+        self._shown: dict[Key, int] = {}  # what the last frame showed: how many in a row
 
     def lines(self, item: LiveFrame | Fault | LinkEvent) -> list[str]:
         """What is new with ``item``; of a frame only what it shows and those before it did not, or what has gone."""
@@ -51,12 +54,13 @@ class News:
 
     def _found(self, solved: Solved) -> list[str]:
         now, said = _found(solved), []
+        self._shown = {key: self._shown.get(key, 0) + 1 for key in now}
         for key, text in now.items():
-            if key not in self._clean:
+            if key not in self._clean and self._shown[key] >= (SHOWN_FRAMES if key[0] in _DOUBTFUL else 1):
                 said.append(f"{text}, frame {solved.frame}")
-            self._clean[key] = 0
-        for key in [key for key in self._clean if key not in now]:
-            self._clean[key] += 1
+                self._clean[key] = 0
+        for key in list(self._clean):
+            self._clean[key] = 0 if key in now else self._clean[key] + 1
             if self._clean[key] >= CLEAN_FRAMES:
                 del self._clean[key]
                 said.append(f"{_plain(key)}: over, frame {solved.frame}")
@@ -90,7 +94,7 @@ def _found(solved: Solved) -> dict[Key, str]:
         "electrode noisy": solved.noisy_electrodes,
     }
     found: dict[Key, str] = {}
-    for name, text in zip(solved.info.findings_by_name, solved.info.found, strict=True):
+    for name, text in zip(names(solved.findings), words(solved), strict=True):
         which = electrodes.get(name, ())
         found |= {(name, e): _plain((name, e)) for e in which} if which else {(name, -1): text}
     return found

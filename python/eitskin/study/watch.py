@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.findings import words
 from eitskin.core.results import solve_text
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
@@ -108,7 +109,7 @@ def _solve_text(frame: LiveFrame) -> str:
 
 
 def _found_text(frame: LiveFrame) -> str:
-    return "" if frame.solved is None else ", ".join(frame.solved.info.found)
+    return "" if frame.solved is None else ", ".join(words(frame.solved))
 
 
 def _error(seen: Seen, number: int) -> str:

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 from device_helpers import QUIET, empty_bank, scene, sim_device
 
-from eitskin.core.results import ALL_FINDINGS, FINDINGS, Info
+from eitskin.core.findings import ALL_FINDINGS, FINDINGS
+from eitskin.core.results import Info
 from eitskin.device.bank import bank_bytes
-from eitskin.device.known_model import KnownModel, board_options
-from eitskin.device.live import LiveFrame, follow
+from eitskin.device.known_model import board_options
+from eitskin.device.live import LiveFrame, follow, take_reference
 from eitskin.device.news import News
 from eitskin.device.open import open_device
 from eitskin.device.recordings.host_check import check_recording
@@ -23,10 +24,9 @@ from eitskin.device.simulated.board import SimBoard
 from eitskin.device.simulated.faults import SimFaults
 from eitskin.device.simulated.skin import SceneSkin
 from eitskin.device.wire.explain import fault_text
-from eitskin.device.wire.packets import CLEAN_FRAMES, Fault, FaultCode, Solved, SolvedTouches, Stream
+from eitskin.device.wire.packets import CLEAN_FRAMES, SHOWN_FRAMES, Fault, FaultCode, Solved, SolvedTouches, Stream
 from eitskin.device.wire.payloads import parse_fault
 from eitskin.errors import DeviceError
-from eitskin.model.eitm import decode_model
 from small_models import prebuilt
 
 OFF, FROM_FRAME, UNTIL_FRAME, FRAMES = 5, 3, 6, 20
@@ -98,14 +98,10 @@ def test_what_is_not_looked_for_is_not_found() -> None:
 
 def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_path: Path) -> None:
     path = tmp_path / "run.eits"
-    model, blob = prebuilt()
-    options = board_options(KnownModel(decode_model(blob, "it"), blob).model)
+    options = board_options(prebuilt()[0])
     with sim_device(board()) as device:
         device.solver(options)
         with RunRecorder(path, device, options):
-            list(device.stream(Stream.RAW, frames=1))
-            from eitskin.device.live import take_reference
-
             take_reference(device, QUIET, streamed=True)
             device.start_scene()
             live = list(follow(device, ALL))
@@ -126,8 +122,6 @@ def test_the_check_tells_findings_apart(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(payloads, "_build_solved", lambda solved: build(replace(solved, open_electrodes=())))
     path = tmp_path / "run.eits"
     with sim_device(board()) as device, RunRecorder(path, device, board_options(prebuilt()[0])):
-        from eitskin.device.live import take_reference
-
         device.solver(board_options(prebuilt()[0]))
         take_reference(device, QUIET, streamed=True)
         device.start_scene()
@@ -143,7 +137,7 @@ def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path: Path) -> N
     path = tmp_path / "old.eits"
     path.write_bytes(b"\0" + stuffed + b"\0")
     with pytest.raises(
-        DeviceError, match=r"old\.eits: packets of link version 1, and this eitskin reads version 2; read it with"
+        DeviceError, match=r"old\.eits: packets of link version 1, and this eitskin reads version 2; read"
     ):
         open_device(f"file:{path}")
 
@@ -164,7 +158,7 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
     news = News()
     glitch = {"findings": bits("glitch"), "glitches": 1}
     assert news.lines(solved(1)) == []
-    assert news.lines(solved(2, **glitch)) == ["1 row left out as glitch, frame 2"]
+    assert news.lines(solved(2, **glitch)) == ["1 row left out as a glitch, frame 2"]
     assert news.lines(solved(3, **glitch)) == []
     assert [news.lines(solved(4 + k)) for k in range(CLEAN_FRAMES - 1)] == [[]] * (CLEAN_FRAMES - 1)
     assert news.lines(solved(20, **glitch)) == []  # it came back in time
@@ -204,7 +198,13 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
     assert fault_text(Fault(FaultCode.BRIDGED, True, 1, 4, -1)).startswith("electrode 4 bridged, frame 1: ")
 
 
-def test_simulated_faults_of_all_kinds_rise_at_once_and_go_after_clean_frames() -> None:
+def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:
+    news, misfit = News(), {"findings": bits("misfit"), "misfit": 0.125}
+    told = [news.lines(solved(frame, **(misfit if frame in (2, 3, 7, 8, 9, 10) else {}))) for frame in range(1, 12)]
+    assert told == [[]] * 8 + [["misfit 12.5 %, frame 9"], [], []]
+
+
+def test_simulated_faults_of_all_kinds_rise_and_go_after_clean_frames() -> None:
     sent: list[Fault] = []
     board_faults = SimFaults(lambda kind, payload: sent.append(parse_fault(payload)))
     plain = Info(0, "gap", 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -212,10 +212,13 @@ def test_simulated_faults_of_all_kinds_rise_at_once_and_go_after_clean_frames() 
         plain, findings=bits("misfit", "stale reference"), misfit=0.25, open_electrodes=(1,), bridged_electrodes=(2, 40),
         noisy_electrodes=(3,),
     )  # fmt: skip
-    board_faults.found(1, all_found, solved=True)
+    board_faults.found(0, all_found, solved=True)
+    assert [f.code for f in sent] == [FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.BRIDGED]
+    for _ in range(SHOWN_FRAMES - 1):
+        board_faults.found(1, all_found, solved=True)
     assert [(f.code, f.index, f.value) for f in sent] == [
-        (FaultCode.ELECTRODE_OPEN, 1, 0), (FaultCode.BRIDGED, 2, 40), (FaultCode.BRIDGED, 40, 2), (FaultCode.ELECTRODE_NOISY, 3, 0),
-        (FaultCode.MISFIT, 0, 250), (FaultCode.STALE_REFERENCE, 0, 0),
+        (FaultCode.ELECTRODE_OPEN, 1, 0), (FaultCode.BRIDGED, 2, 40), (FaultCode.BRIDGED, 40, 2),
+        (FaultCode.ELECTRODE_NOISY, 3, 0), (FaultCode.MISFIT, 0, 250), (FaultCode.STALE_REFERENCE, 0, 0),
     ]  # fmt: skip
     assert sent[1].words[:2] == (4, 256)
     rose = len(sent)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from device_helpers import FRAMES, QUIET, empty_bank, fresh_skin, scene, sim_board, sim_device
 
-from eitskin.core.results import ALL_FINDINGS
+from eitskin.core.findings import ALL_FINDINGS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.simulated.board import SimBoard

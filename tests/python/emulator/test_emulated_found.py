@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.core.findings import names
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.emulator.analog.skin import Skin
@@ -21,7 +22,7 @@ from emulated import EVERYTHING, board_of, connect, twin_check
 
 
 def scene(effects: dict[str, Any]) -> Scene:
-    return replace(find_scene("two_touch"), effects=effects)
+    return replace(find_scene("two_touch"), effects=effects, frames=16, rate_hz=20.0)
 
 
 def device_before(image: bytes, skin: Skin) -> Device:
@@ -34,16 +35,16 @@ def taken(device: Device, frames: int) -> tuple[list[LiveFrame], list[Fault]]:
 
 
 def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
-    """Named by a fault and by the head in the same frame, that is at the latest the first which is wholly without it; gone after
-    eight frames with it; every bit, and all that was found, as the host finds it."""
+    """Named by a fault and by the head in the same frame, at the latest the first that is wholly without it; gone after eight
+    frames with it; every bit, and all that was found, as the host finds it."""
     model, blob = load_prebuilt()
-    device = device_before(
-        image, skin_of(scene({"detached": {"electrodes": [5], "from_s": 0.1, "until_s": 0.2}}), model.protocol)
-    )
+    wobble = {"detached": {"electrodes": [5], "from_s": 0.05, "until_s": 0.12}}
+    device = device_before(image, skin_of(scene(wobble), model.protocol))
     told: list[Fault] = []
     device.record(lambda packet: told.extend(_faults(packet)))
-    check, seen, _ = twin_check(device, blob, 22)
-    assert (check.same, check.different) == (22, [])
+    check, seen, _ = twin_check(device, blob, 16)
+    assert (check.same + check.alone, check.different) == (16, [])  # the line does not carry all
+    assert check.same > 10
     uses = (model.protocol.drive_measure == 5).any(axis=1)
     whole = [f.number for f in seen if f.raw is not None and np.abs(f.raw.voltage_v[uses]).max() < 1e-3]
     named = [f.number for f in seen if f.solved is not None and f.solved.open_electrodes == (5,)]
@@ -56,7 +57,7 @@ def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
     for frame in seen:
         if frame.number in whole:
             assert frame.solved is not None
-            assert frame.solved.info.findings_by_name == ("electrode open",)
+            assert names(frame.solved.findings) == ("electrode open",)
             assert frame.solved.masked == uses.sum()
             assert frame.raw is not None
             assert np.isfinite(frame.raw.voltage_v).all()
@@ -78,10 +79,8 @@ def test_bridged_electrodes_are_named_with_each_other(image: bytes) -> None:
     device.start_scene()
     frames, faults = taken(device, 4)
     told = [fault for fault in faults if fault.code == FaultCode.BRIDGED]
-    assert [(fault.raised, fault.index, fault.value, fault.words[0]) for fault in told] == [
-        (True, 6, 7, 0xC0),
-        (True, 7, 6, 0xC0),
-    ]
+    assert [(fault.raised, fault.index, fault.value) for fault in told] == [(True, 6, 7), (True, 7, 6)]
+    assert {fault.words[:2] for fault in told} == {(0xC0, 0)}
     first = next(f for f in frames if f.solved is not None and f.solved.bridged_electrodes)
     assert first.solved is not None
     assert (first.solved.bridged_electrodes, first.number) == ((6, 7), told[0].frame)
@@ -111,6 +110,6 @@ def test_a_reading_that_is_off_is_left_out_and_counted(image: bytes) -> None:
     rows = [frame.solved.glitches for frame in frames if frame.solved is not None]
     assert sorted(rows)[:-1] == [0, 0, 0, 0]
     assert 1 <= max(rows) <= 2
-    assert [frame.solved.info.findings_by_name for frame in frames if frame.solved and frame.solved.glitches] == [("glitch",)]
+    assert [names(frame.solved.findings) for frame in frames if frame.solved and frame.solved.glitches] == [("glitch",)]
     assert device.stats().glitches == max(rows)
     assert not faults

@@ -52,7 +52,7 @@ def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board() -> Non
     frames = as_frames(run.frames, [], known.model.protocol, board, known, allow_nonfinite=True)
     report = board_findings(examine(subject_from_frames(frames, known.model.skin)), Measured(run, RawRun(), board, None))
     by_name = {finding.name: finding for finding in report.findings}
-    assert "electrode 5 makes no contact" in by_name["board-electrode-open"].text
+    assert "electrode 5 open, frame 3: it makes no contact" in by_name["board-electrode-open"].text
     assert by_name["board-watchdog"].severity == "note" and "2 packets" in by_name["board-link"].text
     assert "not-finite" in by_name and report.exit_code == 11
     assert report.mend == "" and not any(finding.mend for finding in report.findings)

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import FINDINGS, Info, Options, Reconstruction, Touch
+from eitskin.core.findings import FINDINGS
+from eitskin.core.results import Info, Options, Reconstruction, Touch
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, follow

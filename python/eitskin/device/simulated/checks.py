@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from eitskin.core.results import ALL_FINDINGS, MAX_TOUCHES, SOLVERS
+from eitskin.core.findings import ALL_FINDINGS
+from eitskin.core.results import MAX_TOUCHES, SOLVERS
 from eitskin.device.wire.commands import Command, ModelData, Scan, Solver
 from eitskin.device.wire.packets import ReplyStatus as Status
 

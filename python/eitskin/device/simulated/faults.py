@@ -1,14 +1,25 @@
-"""Faults of a simulated board, told as the firmware tells them: what is found rises at once and goes after frames without it."""
+"""Faults of a simulated board, told as the firmware tells them: what frames show rises, and goes after frames without it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from eitskin.core.results import FINDINGS, Info
-from eitskin.device.wire.packets import CLEAN_FRAMES, Fault, FaultCode, PacketType
+from eitskin.core.findings import FINDINGS
+from eitskin.core.results import Info
+from eitskin.device.wire.packets import (
+    CLEAN_FRAMES,
+    DOUBTFUL_FAULTS,
+    ELECTRODE_FAULTS,
+    FOUND_FAULTS,
+    SHOWN_FRAMES,
+    Fault,
+    FaultCode,
+    PacketType,
+)
 from eitskin.device.wire.payloads import build_fault
 
 Send = Callable[[PacketType, bytes], None]
+Key = tuple[FaultCode, int]
 
 
 class SimFaults:
@@ -16,45 +27,46 @@ class SimFaults:
 
     def __init__(self, send: Send) -> None:
         self._send = send
-        self._clean: dict[tuple[FaultCode, int], int] = {}  # what is there: frames in a row without it
+        self._there: set[Key] = set()
+        self._run: dict[Key, int] = {}  # frames in a row without what is there, or with what is not
 
     @property
     def raised(self) -> int:
         """Bit k: fault number k."""
-        return sum(1 << code for code in {code for code, _ in self._clean})
+        return sum(1 << code for code in {code for code, _ in self._there})
 
     def set(self, fault: Fault) -> None:
         """It is there, or is not."""
-        key = FaultCode(fault.code), fault.index if fault.code in _OF_ELECTRODES else 0
-        if fault.raised == (key in self._clean):
+        key = _key(fault)
+        self._run.pop(key, None)
+        if fault.raised == (key in self._there):
             return
-        if fault.raised:
-            self._clean[key] = 0
-        else:
-            del self._clean[key]
+        (self._there.add if fault.raised else self._there.remove)(key)
         self._send(PacketType.FAULT, build_fault(fault))
 
     def clear(self, frame: int) -> None:
         """All are taken to be gone; those that are still there will rise anew."""
-        for code, index in sorted(self._clean):
+        for code, index in sorted(self._there):
             self.set(Fault(code, False, frame, index, 0))
 
     def found(self, frame: int, info: Info, *, solved: bool) -> None:
         """What the core found in a frame; only ``solved`` ones tell of the reference."""
-        now = {(fault.code, fault.index): fault for fault in _faults(frame, info)}
-        for key, fault in now.items():
-            self.set(fault)
-            self._clean[FaultCode(key[0]), key[1]] = 0
-        for code, index in sorted(self._clean):
-            judged = code in _OF_ELECTRODES or code == FaultCode.MISFIT or (code == FaultCode.STALE_REFERENCE and solved)
-            if not judged or (code, index) in now:
+        now = {_key(fault): fault for fault in _faults(frame, info)}
+        for key in sorted(self._there | set(self._run) | set(now)):
+            code, index = key
+            there = key in self._there
+            if code not in FOUND_FAULTS or (code == FaultCode.STALE_REFERENCE and not solved):
                 continue
-            self._clean[code, index] += 1
-            if self._clean[code, index] >= CLEAN_FRAMES:
-                self.set(Fault(code, False, frame, index, 0))
+            if (key in now) == there:
+                self._run.pop(key, None)
+                continue
+            self._run[key] = self._run.get(key, 0) + 1
+            if self._run[key] >= (CLEAN_FRAMES if there else SHOWN_FRAMES if code in DOUBTFUL_FAULTS else 1):
+                self.set(now.get(key, Fault(code, False, frame, index, 0)))
 
 
-_OF_ELECTRODES = (FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY)
+def _key(fault: Fault) -> Key:
+    return FaultCode(fault.code), fault.index if fault.code in ELECTRODE_FAULTS else 0
 
 
 def _faults(frame: int, info: Info) -> list[Fault]:

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import Info, Touch
+from eitskin.core.findings import names, words
+from eitskin.core.results import Touch
 
 LINK_VERSION = 2
-CLEAN_FRAMES = 8  # EITS_FAULT_CLEAN_FRAMES: so many frames in a row without it, and what was found has gone
+SHOWN_FRAMES = 3  # EITS_FAULT_SHOWN_FRAMES: in a row, until what a moving touch may look like for a frame is a fault
+CLEAN_FRAMES = 8  # EITS_FAULT_CLEAN_FRAMES: in a row without it, until what was found is over
 MAX_PAYLOAD = 16384
 STAGES = ("scan", "demodulate", "solve", "touches", "send", "frame")
 
@@ -86,11 +88,12 @@ class FaultCode(IntEnum):
     STALE_REFERENCE = 14
 
 
-# faults that rise in the frame that shows them and go after CLEAN_FRAMES; of those of an electrode each has its own
+# faults that frames show, and that go after CLEAN_FRAMES; of those of an electrode each has its own
 FOUND_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY, FaultCode.MISFIT,
      FaultCode.STALE_REFERENCE)
 )  # fmt: skip
+DOUBTFUL_FAULTS = frozenset((FaultCode.ELECTRODE_NOISY, FaultCode.MISFIT, FaultCode.STALE_REFERENCE))  # rise after SHOWN_FRAMES
 ELECTRODE_FAULTS = frozenset((FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY))
 
 
@@ -221,7 +224,7 @@ class RawFrame:
 @dataclass(frozen=True)
 class Solved:
     """eits_packet_solved: what the board's core says of a frame and its solve, and the times. ``status`` is 0 or an eits_status
-    (negative), ``stop`` one of ``core.results.STOPS``, ``findings`` as in ``core.results.Info``; ``saturated`` also counts
+    (negative), ``stop`` one of ``core.results.STOPS``, ``findings`` as in ``core.findings``; ``saturated`` also counts
     what the converter tells."""
 
     frame: int
@@ -251,21 +254,10 @@ class Solved:
     bridged_electrodes: tuple[int, ...] = ()
     noisy_electrodes: tuple[int, ...] = ()
 
-    @property
-    def info(self) -> Info:
-        """As the core says it on a host, as far as it is told here."""
-        return Info(
-            self.iterations, self.stop, self.nonzeros, self.masked, 0, 0, self.macs, self.touch_macs, self.lambda_,
-            self.lambda_max, self.lambda_noise, 0.0, self.gap_rel, self.residual, self.data_norm,
-            findings=self.findings, saturated=self.saturated, glitches=self.glitches, misfit=self.misfit,
-            open_electrodes=self.open_electrodes, bridged_electrodes=self.bridged_electrodes,
-            noisy_electrodes=self.noisy_electrodes,
-        )  # fmt: skip
-
     def as_dict(self) -> dict[str, Any]:
         """For JSON: the same names, without the underscore of ``lambda_``; findings by name."""
         values = {key.rstrip("_"): value for key, value in asdict(self).items()}
-        return values | {"findings": list(self.info.findings_by_name), "found": list(self.info.found)}
+        return values | {"findings": list(names(self.findings)), "found": list(words(self))}
 
 
 @dataclass(frozen=True, eq=False)
