@@ -2,6 +2,7 @@
 #include "eitskin/frame.h"
 
 #include "kernels.h"
+#include "observed.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -126,7 +127,7 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
     const eits_status status = eits_frame_data(ctx, frame, &masked, &macs);
     if (status != EITS_OK)
         return status;
-    eits_apply_t(ctx, ctx->y, ctx->gradient);
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
     const eits_real seen = eits_greatest(ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH);
     if (seen > ctx->baseline.lambda_noise)
         ctx->baseline.lambda_noise = seen;

@@ -3,6 +3,7 @@
 
 #include "columns.h"
 #include "kernels.h"
+#include "observed.h"
 #include "vec.h"
 
 size_t eits_workspace_size(const eits_model *model, int prepared)
@@ -89,7 +90,10 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->basis_for = take_bytes(a, folded);
     ctx->d = take_reals(a, folded);
     ctx->y = take_reals(a, stride);
-    ctx->basis = take_reals(a, ctx->model->rank * stride);
+    ctx->basis = take_reals(a, stride + 2 * EITS_PADDED_TRIANGLE(ctx->model->rank));
+    ctx->row_scale = take_reals(a, stride);
+    ctx->row_strength = take_reals(a, stride);
+    ctx->adjoint = take_reals(a, stride);
     ctx->residual = take_reals(a, stride);
     ctx->sx = take_reals(a, stride);
     ctx->sx_next = take_reals(a, stride);
@@ -131,6 +135,7 @@ eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspac
     *ctx = (eits_context){.model = model, .kernels = eits_kernels_best(), .next_id = 1, .basis_stale = 1};
     arena a = {workspace};
     lay_out(ctx, &a, size >= eits_workspace_size(model, 1));
+    eits_observed_init(ctx);
     return eits_options_default(model, &ctx->options);
 }
 

@@ -3,6 +3,7 @@
 
 #include "kernels.h"
 #include "log.h"
+#include "observed.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -51,7 +52,7 @@ static int ratio_undefined(const eits_context *ctx, eits_real v0)
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE && eits_fabs(v0) < R(1e-6) * ctx->baseline.v0_rms;
 }
 
-/* Which rows of a fold are in use, as bits; none: the fold is left out. */
+/* Which rows of a fold are in use, as bits; none: the fold is left out, and other files take it for zero. */
 enum { LEFT_OUT = 0, FIRST = 1, SECOND = 2, BOTH = FIRST | SECOND };
 
 /* d_k: the mean of a row and its reciprocal, or whichever is usable; sets basis_for, and says whether any of it changed. */
@@ -128,16 +129,17 @@ static uint64_t drift_direction(eits_context *ctx, eits_real *out)
 
 static uint64_t rebuild_basis(eits_context *ctx)
 {
-    uint64_t macs = 0;
+    uint64_t macs = eits_observed_build(ctx);
     ctx->basis_count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] != LEFT_OUT)
+        if (ctx->rewhitened || ctx->basis_for[k] != LEFT_OUT)
             continue;
         reduction_column(ctx, k, ctx->residual);
         macs += ctx->model->rank + extend_basis(ctx, ctx->residual);
     }
     if (ctx->options.project_baseline) {
         macs += drift_direction(ctx, ctx->residual);
+        macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->residual) : 0;
         macs += extend_basis(ctx, ctx->residual);
     }
     ctx->basis_stale = 0;
@@ -163,8 +165,10 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     }
     ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->list_value, count, ctx->y);
     *macs += (uint64_t)count * model->rank;
+    *macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->y) : 0;
     *macs += eits_project(ctx, ctx->y);
-    if (ctx->basis_count == model->rank) /* no direction is left: what is there is rounding */
+    const uint32_t directions = ctx->rewhitened && count < model->rank ? count : model->rank;
+    if (ctx->basis_count >= directions) /* no direction is left: what is there is rounding */
         eits_zero(ctx->y, model->rank);
     return eits_is_finite(eits_dot(ctx, ctx->y, ctx->y, model->rank)) ? EITS_OK : EITS_E_NOT_FINITE;
 }

@@ -4,6 +4,7 @@
 #include "eitskin/frame.h"
 #include "certificate.h"
 #include "kernels.h"
+#include "observed.h"
 #include "solvers.h"
 #include "stages.h"
 #include "vec.h"
@@ -78,12 +79,12 @@ static eits_status solve(eits_context *ctx)
     const uint32_t rank = ctx->model->rank;
     ctx->info.data_norm = eits_sqrt(eits_dot(ctx, ctx->y, ctx->y, rank));
     ctx->info.lambda_noise = ctx->baseline.lambda_noise;
-    if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank)) {
+    if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx))) {
         answer_zero(ctx, EITS_STOP_MACS);
         return EITS_OK;
     }
-    eits_apply_t(ctx, ctx->y, ctx->gradient);
-    ctx->info.macs += (uint64_t)ctx->model->n_pixels * rank;
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
+    ctx->info.macs += (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx);
     ctx->info.lambda_max = eits_greatest(ctx->gradient, ctx->model->n_pixels, o->sign);
     ctx->info.lambda = choose_lambda(ctx);
     if (!eits_is_finite(ctx->info.data_norm) || !eits_is_finite(ctx->info.lambda_max)) {

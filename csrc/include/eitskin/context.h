@@ -110,12 +110,22 @@ typedef struct eits_context {
     eits_baseline baseline;
     uint8_t *bad;            /* n_rows: masked by the caller */
     uint8_t *unusable;       /* n_rows: masked in this frame */
-    uint8_t *basis_for;      /* n_folded: which rows of each fold were in use when the basis below was built */
+    uint8_t *basis_for;      /* n_folded: which rows of each fold were in use when the basis below was built; 0: neither */
     eits_real *d;            /* n_folded: data of this frame */
     eits_real *y;            /* stride: reduced data, projected */
-    eits_real *basis;        /* rank x stride: orthonormal directions to ignore */
+    eits_real *basis;        /* orthonormal directions to ignore, up to rank of them, stride apart; where rewhitened, at most one,
+                              * and behind it two triangles (observed.c) */
     uint32_t basis_count;
     uint32_t basis_stale;
+    uint32_t rewhitens;      /* 1: the model's P and S have the builder's form, so that rows left out can be whitened anew */
+    uint32_t rewhitened;     /* 1: they are, for basis_for: the solver's S is F S (observed.h) */
+    eits_real *row_scale;    /* stride: s_1 of the scaled Jacobian over that of each direction, and over w s_1 of the first */
+    eits_real *row_strength; /* stride: (s_i / s_1)^2 */
+    eits_real strongest;     /* s_1, in the units of 1 / P */
+    eits_real strongest_square; /* |S_1|^2 */
+    eits_real floor;         /* mu, by which the model was whitened */
+    eits_real map_square;    /* what F'F is scaled by */
+    eits_real *adjoint;      /* stride: F' of the residual, and scratch */
     eits_real *residual;     /* stride */
     eits_real *sx, *sx_next, *sz; /* stride each */
     eits_real *slope[3];     /* stride each: a touch's response by x, y and radius */
@@ -152,6 +162,7 @@ typedef struct eits_context {
 #define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
 #define EITS_REALS(count) EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
 #define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
+#define EITS_PADDED_TRIANGLE(rank) (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
 #define EITS_TRIANGLE(rank) ((size_t)(rank) * ((size_t)(rank) + 1u) / 2u)
 #define EITS_PANEL_COLUMNS(n_pixels) (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
 
@@ -159,7 +170,7 @@ typedef struct eits_context {
  * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
     (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + EITS_REALS(n_folded) +                   \
-     (8 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
+     (20 + EITS_STRIDE(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
      EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_REALS(EITS_TRIANGLE(rank)) + EITS_ALIGN16((size_t)(n_cells) * 2u) +       \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \

@@ -16,6 +16,7 @@ from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
 from eitskin.solve.reference_exact import ActiveSet, coordinate
+from eitskin.solve.reference_observed import Whitening, form_of, whiten
 from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, certify, greatest, project, shrink
 from eitskin.solve.reference_touches import find_touches
 
@@ -104,6 +105,9 @@ class ReferenceEngine:
         self.options = default_options(model)
         self._s, self._p = model.sensitivity, model.projection.astype(np.float64)
         self._v_ref = model.v_ref_v.astype(np.float64)
+        self._form = form_of(self._p, self._s)
+        self._whitening: Whitening | None = None
+        self.seen = self._s
         self._bad = np.zeros(model.protocol.n_rows, dtype=bool)
         self._without_reference = self._bad
         self._v0: FloatArray | None = None
@@ -183,7 +187,8 @@ class ReferenceEngine:
             self._fit_to_model(frames[:half].mean(axis=0))
             for k in range(half, len(frames)):
                 self._v0 = frames[:k].mean(axis=0)
-                seen = max(seen, greatest(self._s.T @ self.frame_stage(frames[k])[0], "both"))
+                y = self.frame_stage(frames[k])[0]
+                seen = max(seen, greatest(self.seen.T @ y, "both"))
         except FrameError:
             self._v0 = None
             raise
@@ -200,6 +205,8 @@ class ReferenceEngine:
 
     def frame_stage(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, int]:
         """Reduced projected data y (r,), the basis (k, r) of what is ignored, and how many rows were left out.
+
+        ``self.seen`` (r, n) is then S, or what stands for it where rows are left out.
 
         Raises:
             FrameError: no reference, or too many unusable channels.
@@ -220,21 +227,32 @@ class ReferenceEngine:
         first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
         count = first.astype(int) + second
         d = (value[fold.first] + np.where(second, sign * value[fold.second], 0.0)) / np.maximum(count, 1)
+        self._leave_out(count > 0)
         basis = orthonormal(self._directions(first, second), self.model.rank)
-        y = project(self._p @ np.where(count > 0, d, 0.0), basis)
+        y = project(self._reduce(np.where(count > 0, d, 0.0)), basis)
+        directions = len(y) if self._whitening is None else min(len(y), int((count > 0).sum()))
         # where the basis leaves no direction, what is there is rounding
-        return y if len(basis) < len(y) else np.zeros_like(y), basis, int(unusable.sum())
+        return y if len(basis) < directions else np.zeros_like(y), basis, int(unusable.sum())
+
+    def _leave_out(self, known: BoolArray) -> None:
+        """Whiten anew for the folded rows (k,) that are known."""
+        self._whitening = None if self._form is None or known.all() else whiten(self._form, known)
+        self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
+
+    def _reduce(self, d: FloatArray) -> FloatArray:
+        """Folded data (k,) to reduced data (r,)."""
+        return self._p @ d if self._whitening is None else self._whitening.data @ (self._p @ d)
 
     def _directions(self, first: BoolArray, second: BoolArray) -> list[FloatArray]:
-        """What the misfit ignores: P's columns of rows left out, and the drift of the gain; by which rows of each fold (k,)
-        are in use."""
+        """What the misfit ignores: P's columns of rows left out, unless that is whitened anew, and the drift of the gain; by
+        which rows of each fold (k,) are in use."""
         count = first.astype(int) + second
-        directions = [self._p[:, k] for k in np.flatnonzero(count == 0)]
+        directions = [self._p[:, k] for k in np.flatnonzero(count == 0) if self._whitening is None]
         if self.options.project_baseline and self._drift_v0 is not None:
             fold, v0 = self.model.fold, self._drift_v0
             total = np.where(first, v0[fold.first], 0.0) + np.where(second, fold.sign * v0[fold.second], 0.0)
             along = np.ones_like(total) if self.model.data_kind == "normalised" else self._gain * total / np.maximum(count, 1)
-            directions.append(self._p @ np.where(count > 0, along, 0.0))
+            directions.append(self._reduce(np.where(count > 0, along, 0.0)))
         return directions
 
     def reconstruct(self, frame: FloatArray, *, touches: bool = True) -> Reconstruction:
@@ -252,7 +270,7 @@ class ReferenceEngine:
             self._warm = None
             raise
         o, norm = self.options, float(np.linalg.norm(y))
-        lambda_max = greatest(self._s.T @ y, o.sign)
+        lambda_max = greatest(self.seen.T @ y, o.sign)
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * self._lambda_noise)
         n = self.model.grid.n_pixels
         nothing = Certificate(0.0, 0.5 * norm**2, norm)
@@ -262,7 +280,7 @@ class ReferenceEngine:
         elif not lambda_max > lam:
             result = zero
         else:
-            result = self._run(Problem(self._s, y, lam, o.sign, basis))
+            result = self._run(Problem(self.seen, y, lam, o.sign, basis))
             if result.stop == "diverged":
                 result = Result(zero.x, result.iterations, "diverged", nothing, result.step_halvings)
         self._warm = result.x if result.stop in ("iterations", "gap", "optimum") else None
@@ -271,7 +289,7 @@ class ReferenceEngine:
         solved_ns = perf_counter_ns()
         if touches:
             found, self._next_id = find_touches(
-                self.model, image, y, basis, o, self._lambda_noise, self._last, self._next_id
+                self.model, self.seen, image, y, basis, o, self._lambda_noise, self._last, self._next_id
             )
             self._last = found
         gap = result.certificate.gap
