@@ -132,7 +132,7 @@ eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspac
         return EITS_E_ARGUMENT;
     if ((uintptr_t)workspace % 16 != 0 || size < eits_workspace_size(model, 0))
         return EITS_E_WORKSPACE;
-    *ctx = (eits_context){.model = model, .kernels = eits_kernels_best(), .next_id = 1, .basis_stale = 1};
+    *ctx = (eits_context){.model = model, .kernels = eits_kernels_best(), .next_id = 1, .basis_stale = 1, .noise_ratio = 1};
     arena a = {workspace};
     lay_out(ctx, &a, size >= eits_workspace_size(model, 1));
     eits_observed_init(ctx);

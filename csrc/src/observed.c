@@ -241,6 +241,41 @@ static uint64_t finish_map(const eits_context *ctx, eits_real share, eits_real *
     return macs;
 }
 
+static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v);
+
+enum { PROBES = 8 };
+
+/* Noise in S'y, over that with all rows. White noise n on the rows makes G^-1 n of y; its mean square over S's columns is the trace
+ * of S'F' (G'G)^-1 F S, found by PROBES sign vectors that are orthogonal within each PROBES directions. The greatest of the
+ * columns grows faster than their mean, by an exponent found on masks of one row to three electrodes. */
+static uint64_t measure_noise(eits_context *ctx)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_real *v = ctx->sz, sum = 0, whole = 0;
+    for (uint32_t p = 0; p < PROBES; ++p) {
+        for (uint32_t i = 0; i < rank; ++i) {
+            const uint32_t both = i & p, odd = (both ^ both >> 1 ^ both >> 2) & 1u;
+            const eits_real size = eits_sqrt(ctx->row_strength[i]) / ctx->row_scale[i];
+            v[i] = odd ? -size : size;
+        }
+        (void)eits_map(ctx, v);
+        solve_transposed(ctx, metric_of(ctx), v);
+        sum += eits_dot(ctx, v, v, rank);
+    }
+    for (uint32_t i = 0; i < rank; ++i) {
+        const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
+        whole = eits_fma(ctx->row_strength[i] * w2, w2, whole);
+    }
+    const eits_real ratio = eits_sqrt(ctx->map_square * sum / (PROBES * whole));
+    ctx->noise_ratio = ratio * eits_sqrt(eits_sqrt(ratio));
+    return PROBES * 2u * triangle_macs(ctx);
+}
+
+eits_real eits_lambda_noise(const eits_context *ctx)
+{
+    return ctx->noise_ratio * ctx->baseline.lambda_noise;
+}
+
 uint64_t eits_observed_build(eits_context *ctx)
 {
     const uint32_t folded = ctx->model->n_folded;
@@ -248,6 +283,7 @@ uint64_t eits_observed_build(eits_context *ctx)
     for (uint32_t k = 0; k < folded; ++k)
         missing += !in_use(ctx, k);
     ctx->rewhitened = 0;
+    ctx->noise_ratio = 1;
     if (missing == 0 || !ctx->rewhitens)
         return 0;
     const eits_real left = (eits_real)(folded - missing) / (eits_real)folded, cube = left * left * left;
@@ -260,7 +296,7 @@ uint64_t eits_observed_build(eits_context *ctx)
     macs += factor_metric(ctx, floor, f, g);
     macs += finish_map(ctx, eits_sqrt(ctx->map_square), g, f);
     ctx->rewhitened = (uint32_t)eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank));
-    return macs;
+    return ctx->rewhitened ? macs + measure_noise(ctx) : macs;
 }
 
 /* v = T^-1 v; v = T'^-1 v. */

@@ -17,6 +17,9 @@ void eits_observed_init(eits_context *ctx);
  * form, or numbers overflow. Returns the multiply-accumulates. Uses ctx->sz as scratch. */
 uint64_t eits_observed_build(eits_context *ctx);
 
+/* lambda_noise for the rows in use. */
+eits_real eits_lambda_noise(const eits_context *ctx);
+
 /* While ctx->rewhitened: P d of the rows in use (stride numbers) becomes the data that F S x is to meet. */
 uint64_t eits_observed_data(eits_context *ctx, eits_real *v);
 

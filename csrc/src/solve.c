@@ -21,7 +21,7 @@ static eits_real choose_lambda(const eits_context *ctx)
     if (o->lambda_abs > 0)
         return o->lambda_abs;
     const eits_real by_data = o->lambda_rel * ctx->info.lambda_max;
-    const eits_real by_noise = o->lambda_noise_factor * ctx->baseline.lambda_noise;
+    const eits_real by_noise = o->lambda_noise_factor * eits_lambda_noise(ctx);
     return by_data > by_noise ? by_data : by_noise;
 }
 
@@ -78,7 +78,7 @@ static eits_status solve(eits_context *ctx)
     const eits_options *o = &ctx->options;
     const uint32_t rank = ctx->model->rank;
     ctx->info.data_norm = eits_sqrt(eits_dot(ctx, ctx->y, ctx->y, rank));
-    ctx->info.lambda_noise = ctx->baseline.lambda_noise;
+    ctx->info.lambda_noise = eits_lambda_noise(ctx);
     if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx))) {
         answer_zero(ctx, EITS_STOP_MACS);
         return EITS_OK;

@@ -279,7 +279,7 @@ static void judge(eits_context *ctx, fit *f)
 /* Whether the disc stands out of the noise by the same test as the whole frame: S_j'(y - other discs) at its pixel. */
 static int stands_out(eits_context *ctx, fit *f, uint32_t k)
 {
-    const eits_real least = ctx->options.gate_factor * ctx->baseline.lambda_noise;
+    const eits_real least = ctx->options.gate_factor * eits_lambda_noise(ctx);
     const uint32_t rank = ctx->model->rank;
     if (!(least > 0))
         return 1;

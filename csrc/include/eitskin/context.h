@@ -67,12 +67,12 @@ typedef struct eits_info {
     uint32_t masked;   /* protocol rows that were left out of this frame */
     uint32_t step_halvings;
     uint32_t touches;         /* set by eits_find_touches */
-    uint64_t macs;            /* multiply-accumulates with a stored matrix, a basis vector or the active set's factor; vector
+    uint64_t macs;            /* multiply-accumulates with a stored matrix, a basis vector, F or the active set's factor; vector
                                * sums not counted */
     uint64_t touch_macs;      /* the same for eits_find_touches */
     eits_real lambda;
     eits_real lambda_max;
-    eits_real lambda_noise;
+    eits_real lambda_noise; /* the baseline's, times what rows left out add */
     eits_real gap;        /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED, and where MACS came
                            * before anything was known */
     eits_real gap_rel;    /* gap / (|y|^2 / 2) */
@@ -100,7 +100,7 @@ typedef struct eits_baseline {
     eits_real gain;         /* model volts per measured volt: rms(v_ref) / rms(v0), negative where correlation is */
     eits_real correlation;  /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
     eits_real noise_v;      /* rms over rows of the quiet frames' deviation, V; 0 if unknown */
-    eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames; 0 if unknown */
+    eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames, as with all rows in use; 0 if unknown */
 } eits_baseline;
 
 typedef struct eits_context {
@@ -125,6 +125,7 @@ typedef struct eits_context {
     eits_real strongest_square; /* |S_1|^2 */
     eits_real floor;         /* mu, by which the model was whitened */
     eits_real map_square;    /* what F'F is scaled by */
+    eits_real noise_ratio;   /* how much more noise max(S'y) has so than with all rows; 1 where nothing is re-whitened */
     eits_real *adjoint;      /* stride: F' of the residual, and scratch */
     eits_real *residual;     /* stride */
     eits_real *sx, *sx_next, *sz; /* stride each */

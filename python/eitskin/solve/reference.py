@@ -188,7 +188,7 @@ class ReferenceEngine:
             for k in range(half, len(frames)):
                 self._v0 = frames[:k].mean(axis=0)
                 y = self.frame_stage(frames[k])[0]
-                seen = max(seen, greatest(self.seen.T @ y, "both"))
+                seen = max(seen, greatest(self.seen.T @ y, "both") / self._noise_ratio)
         except FrameError:
             self._v0 = None
             raise
@@ -234,6 +234,10 @@ class ReferenceEngine:
         # where the basis leaves no direction, what is there is rounding
         return y if len(basis) < directions else np.zeros_like(y), basis, int(unusable.sum())
 
+    @property
+    def _noise_ratio(self) -> float:
+        return 1.0 if self._whitening is None else self._whitening.noise_ratio
+
     def _leave_out(self, known: BoolArray) -> None:
         """Whiten anew for the folded rows (k,) that are known."""
         self._whitening = None if self._form is None or known.all() else whiten(self._form, known)
@@ -271,11 +275,12 @@ class ReferenceEngine:
             raise
         o, norm = self.options, float(np.linalg.norm(y))
         lambda_max = greatest(self.seen.T @ y, o.sign)
-        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * self._lambda_noise)
+        lambda_noise = self._lambda_noise * self._noise_ratio
+        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
         n = self.model.grid.n_pixels
         nothing = Certificate(0.0, 0.5 * norm**2, norm)
         zero = Result(np.zeros(n), 0, "zero", nothing, 0)
-        if o.gate_factor > 0 and lambda_max < o.gate_factor * self._lambda_noise:
+        if o.gate_factor > 0 and lambda_max < o.gate_factor * lambda_noise:
             result = Result(zero.x, 0, "gate", nothing, 0)
         elif not lambda_max > lam:
             result = zero
@@ -289,13 +294,13 @@ class ReferenceEngine:
         solved_ns = perf_counter_ns()
         if touches:
             found, self._next_id = find_touches(
-                self.model, self.seen, image, y, basis, o, self._lambda_noise, self._last, self._next_id
+                self.model, self.seen, image, y, basis, o, lambda_noise, self._last, self._next_id
             )
             self._last = found
         gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,
-            lam, lambda_max, self._lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300), result.certificate.residual, norm,
+            lam, lambda_max, lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300), result.certificate.residual, norm,
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)

@@ -15,6 +15,7 @@ FORM = 0.01
 LEAST_FLOOR_SHARE, LEAST_FLOOR = 0.1, 1e-4
 LOST = 0.01
 STEP_MARGIN = 0.995
+PROBES, NOISE_POWER = 8, 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +34,14 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """For some of the rows: what ``see`` F (r, r) makes of S x is to meet what ``data`` (r, r) makes of P d."""
+    """For some of the rows: what ``see`` F (r, r) makes of S x is to meet what ``data`` (r, r) makes of P d.
+
+    ``noise_ratio``: how much more noise max(S'y) has than with all rows.
+    """
 
     see: FloatArray
     data: FloatArray
+    noise_ratio: float
 
 
 def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
@@ -69,4 +74,14 @@ def whiten(form: Form, known: BoolArray) -> Whitening:
     share = np.sqrt(STEP_MARGIN * form.square * (1 + floor) / (1 + lost))
     see = share * np.linalg.solve(g, r * form.scale)
     data = share * np.linalg.solve(g, np.linalg.solve(r.T, np.diag(form.scale)))
-    return Whitening(see, data)
+    return Whitening(see, data, _noise_ratio(form, np.linalg.solve(g.T, see), share))
+
+
+def _noise_ratio(form: Form, spread: FloatArray, share: float) -> float:
+    """By sign vectors that are orthogonal within each eight directions; ``spread`` is G'^-1 F."""
+    i = np.arange(len(form.scale))
+    odd = [(i & p ^ (i & p) >> 1 ^ (i & p) >> 2) & 1 for p in range(PROBES)]
+    probes = (1 - 2 * np.array(odd).T) * (np.sqrt(form.strength) / form.scale)[:, None]
+    whole = float(np.sum(form.strength / form.scale**4))
+    ratio = share * np.sqrt(np.sum((spread @ probes) ** 2) / (PROBES * whole))
+    return float(ratio**NOISE_POWER)
