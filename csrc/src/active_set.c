@@ -7,6 +7,7 @@
 #include "column.h"
 #include "factor.h"
 #include "missing.h"
+#include "observed.h"
 #include "solvers.h"
 #include "stages.h"
 #include "vec.h"
@@ -90,7 +91,7 @@ static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
     for (uint32_t i = 0; i < rank; ++i)
         a->column[i] = scale * from[i];
     const eits_real before = eits_dot(ctx, a->column, a->column, rank);
-    ctx->info.macs += 2u * rank + eits_project(ctx, a->column);
+    ctx->info.macs += 2u * rank + eits_forward(ctx, a->column);
     const eits_real square = eits_dot(ctx, a->column, a->column, rank);
     return square > INDEPENDENT * before ? square : 0;
 }
@@ -99,9 +100,9 @@ static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
 static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
 {
     const uint32_t count = ctx->working_count;
-    eits_apply_t_working(ctx, a->column, a->work);
+    eits_apply_t_working(ctx, eits_adjoint(ctx, a->column, ctx->adjoint), a->work);
     eits_factor_forward(ctx, count, a->work, a->work);
-    ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_factor_solve_macs(count) + count;
+    ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_adjoint_macs(ctx) + eits_factor_solve_macs(count) + count;
     return square - eits_dot(ctx, a->work, a->work, count);
 }
 
@@ -150,7 +151,7 @@ static void add(eits_context *ctx, active *a, uint32_t j)
     eits_real x = 0, square = 0;
     for (int first = 1;; first = 0) {
         const uint32_t count = ctx->working_count;
-        if (!affords(ctx, a, (uint64_t)rank * (count + 2u + 2u * ctx->basis_count) + 2u * (eits_factor_solve_macs(count) + count)))
+        if (!affords(ctx, a, (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + 2u * (eits_factor_solve_macs(count) + count)))
             break;
         if (first && !((square = read_column(ctx, a, j)) > 0))
             return;
@@ -240,7 +241,7 @@ static eits_certificate certify(eits_context *ctx, const active *a)
 static int begin_warm(eits_context *ctx, active *a)
 {
     const uint64_t held = ctx->info.nonzeros, rank = ctx->model->rank;
-    if (!eits_affords(ctx, held * (held + 2u + 2u * ctx->basis_count) * rank + held * eits_factor_solve_macs((uint32_t)held) +
+    if (!eits_affords(ctx, held * ((held + 2u) * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + eits_factor_solve_macs((uint32_t)held)) +
                                held * (rank + held) + 2u * eits_gradient_macs(ctx)))
         return 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
@@ -280,7 +281,7 @@ static int look_nearby(eits_context *ctx, active *a, eits_real *objective)
 {
     const uint64_t rank = ctx->model->rank;
     if (a->limited || a->loose || a->broken ||
-        !eits_affords(ctx, (ctx->working_count + 2u * ctx->basis_count) * rank + ctx->model->n_pixels * rank +
+        !eits_affords(ctx, ctx->working_count * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + ctx->model->n_pixels * rank +
                                macs_to_finish(ctx, ctx->working_count)))
         return 0;
     ctx->info.macs += rank * eits_apply_working(ctx, ctx->x, ctx->sx);

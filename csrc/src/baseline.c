@@ -3,6 +3,7 @@
 
 #include "examine.h"
 #include "kernels.h"
+#include "observed.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -129,8 +130,8 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
     const eits_status status = eits_frame_data(ctx, frame, &masked, &macs);
     if (status != EITS_OK)
         return status;
-    eits_apply_t(ctx, ctx->y, ctx->gradient);
-    const eits_real seen = eits_greatest(ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH);
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
+    const eits_real seen = eits_greatest(ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH) / ctx->noise_ratio;
     if (seen > ctx->baseline.lambda_noise)
         ctx->baseline.lambda_noise = seen;
     return EITS_OK;

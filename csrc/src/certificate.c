@@ -2,26 +2,34 @@
 #include "certificate.h"
 
 #include "kernels.h"
+#include "observed.h"
 #include "stages.h"
 #include "vec.h"
 
 uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx)
 {
     const size_t stride = EITS_STRIDE(ctx->model->rank);
+    if (ctx->rewhitened) {
+        eits_copy(ctx->residual, sx, stride);
+        const uint64_t macs = eits_forward(ctx, ctx->residual);
+        for (size_t i = 0; i < stride; ++i)
+            ctx->residual[i] = ctx->y[i] - ctx->residual[i];
+        return macs;
+    }
     eits_copy(ctx->residual, ctx->y, stride);
     eits_axpy(ctx, ctx->residual, -1, sx, stride);
-    return eits_project(ctx, ctx->residual);
+    return eits_forward(ctx, ctx->residual);
 }
 
 uint64_t eits_gradient_macs(const eits_context *ctx)
 {
-    return ((uint64_t)ctx->model->n_pixels + 2u * ctx->basis_count) * ctx->model->rank;
+    return (uint64_t)ctx->model->n_pixels * ctx->model->rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx);
 }
 
 void eits_take_gradient(eits_context *ctx, const eits_real *sx)
 {
     (void)eits_take_residual(ctx, sx);
-    eits_apply_t(ctx, ctx->residual, ctx->gradient);
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->residual, ctx->adjoint), ctx->gradient);
     ctx->info.macs += eits_gradient_macs(ctx);
 }
 

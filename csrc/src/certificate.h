@@ -13,10 +13,10 @@ typedef struct eits_certificate {
 /* Where a solver keeps its coefficients: ctx->x[j] for each column, or ctx->x[k] for column ctx->working[k]. */
 typedef enum eits_layout { EITS_LAYOUT_FULL = 0, EITS_LAYOUT_WORKING = 1 } eits_layout;
 
-/* residual = Q (y - sx), with y projected already; returns the multiply-accumulates. */
+/* residual = Q (y - F sx), with y projected already and F as in observed.h; returns the multiply-accumulates. */
 uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx);
 
-/* ctx->residual = Q (y - sx), ctx->gradient = S' residual, of every column; counts into ctx->info. */
+/* ctx->residual = Q (y - F sx), ctx->gradient = S' F' residual, of every column; counts into ctx->info. */
 void eits_take_gradient(eits_context *ctx, const eits_real *sx);
 
 /* Objective and gap at ctx->x from ctx->residual and ctx->gradient as eits_take_gradient leaves them. */

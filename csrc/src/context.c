@@ -4,6 +4,7 @@
 #include "columns.h"
 #include "examine.h"
 #include "kernels.h"
+#include "observed.h"
 #include "vec.h"
 
 size_t eits_workspace_size(const eits_model *model, int prepared)
@@ -96,7 +97,10 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->sheet_inverse = take_reals(a, stride);
     ctx->sheet_shrink = take_reals(a, stride);
     ctx->y = take_reals(a, stride);
-    ctx->basis = take_reals(a, ctx->model->rank * stride);
+    ctx->basis = take_reals(a, stride + 2 * EITS_PADDED_TRIANGLE(ctx->model->rank));
+    ctx->row_scale = take_reals(a, stride);
+    ctx->row_strength = take_reals(a, stride);
+    ctx->adjoint = take_reals(a, stride);
     ctx->residual = take_reals(a, stride);
     ctx->sx = take_reals(a, stride);
     ctx->sx_next = take_reals(a, stride);
@@ -135,10 +139,11 @@ eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspac
         return EITS_E_ARGUMENT;
     if ((uintptr_t)workspace % 16 != 0 || size < eits_workspace_size(model, 0))
         return EITS_E_WORKSPACE;
-    *ctx = (eits_context){.model = model, .kernels = eits_kernels_best(), .next_id = 1, .basis_stale = 1};
+    *ctx = (eits_context){.model = model, .kernels = eits_kernels_best(), .next_id = 1, .basis_stale = 1, .noise_ratio = 1};
     arena a = {workspace};
     lay_out(ctx, &a, size >= eits_workspace_size(model, 1));
     eits_learn_sheet(ctx);
+    eits_observed_init(ctx);
     return eits_options_default(model, &ctx->options);
 }
 

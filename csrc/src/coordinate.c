@@ -1,10 +1,12 @@
 /* Coordinate descent with the residual kept (Friedman et al., Ann. Appl. Stat. 1 (2007) 302, doi 10.1214/07-AOAS131). A sweep
  * goes over a list of columns: at a look, those that are not zero or whose correlation with the residual exceeds lambda; then
  * without those that stayed at zero. The residual is kept within the directions that count, so a column's correlation needs no
- * projection; where at most one direction is ignored its part is kept apart and costs nothing either. */
+ * projection; where at most one direction is ignored its part is kept apart and costs nothing either. Where rows left out are
+ * whitened anew (observed.h) what is kept is F' of the residual. */
 #include "certificate.h"
 #include "column.h"
 #include "kernels.h"
+#include "observed.h"
 #include "solvers.h"
 #include "stages.h"
 #include "vec.h"
@@ -15,7 +17,7 @@ typedef struct descent {
     eits_real along;  /* where one direction is ignored: the residual's part along it, which ctx->residual then has too */
     eits_real *norm;  /* |s_j|^2; negative: not known yet */
     eits_real *slant; /* s_j along the direction ignored */
-    int apart;        /* at most one direction is ignored */
+    int apart;        /* at most one direction is ignored, and nothing is re-whitened */
 } descent;
 
 static eits_real *scratch(const eits_context *ctx)
@@ -25,7 +27,10 @@ static eits_real *scratch(const eits_context *ctx)
 
 static uint64_t macs_of_a_visit(const eits_context *ctx, const descent *d)
 {
-    return (uint64_t)ctx->model->rank * (d->apart ? 4u : 3u + 2u * ctx->basis_count);
+    const uint64_t rank = ctx->model->rank;
+    if (ctx->rewhitened)
+        return 3u * rank + 2u * eits_forward_macs(ctx) + eits_adjoint_macs(ctx);
+    return rank * (d->apart ? 4u : 3u + 2u * ctx->basis_count);
 }
 
 /* Whether one more visit, S x with one more column and the gap after it are still to be had. */
@@ -34,9 +39,25 @@ static int affords_visit(const eits_context *ctx, const descent *d)
     return eits_affords(ctx, macs_of_a_visit(ctx, d) + ((uint64_t)ctx->info.nonzeros + 1) * ctx->model->rank + eits_gradient_macs(ctx));
 }
 
+/* F s_j of a column. */
+static eits_real *see(eits_context *ctx, const eits_real *column, eits_real scale)
+{
+    eits_real *seen = ctx->sx_next;
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        seen[i] = scale * column[i];
+    ctx->info.macs += eits_map(ctx, seen);
+    return seen;
+}
+
 static void measure(eits_context *ctx, descent *d, uint32_t j, const eits_real *column, eits_real scale)
 {
     const uint32_t rank = ctx->model->rank;
+    if (ctx->rewhitened) {
+        const eits_real *seen = see(ctx, column, scale);
+        d->norm[j] = eits_dot(ctx, seen, seen, rank);
+        ctx->info.macs += rank;
+        return;
+    }
     d->norm[j] = scale * scale * eits_dot(ctx, column, column, rank);
     ctx->info.macs += rank;
     if (!d->apart || ctx->basis_count == 0)
@@ -67,8 +88,14 @@ static eits_real visit(eits_context *ctx, descent *d, uint32_t j)
         return 0;
     ctx->x[j] = after;
     ctx->info.nonzeros += (uint32_t)(after != 0) - (uint32_t)(before != 0);
-    eits_axpy(ctx, ctx->residual, -step * scale, column, rank);
     ctx->info.macs += rank;
+    if (ctx->rewhitened) {
+        eits_real *seen = see(ctx, column, scale);
+        ctx->info.macs += eits_project(ctx, seen) + eits_adjoint_macs(ctx);
+        eits_axpy(ctx, ctx->residual, -step, eits_adjoint(ctx, seen, ctx->adjoint), rank);
+        return norm * step * step;
+    }
+    eits_axpy(ctx, ctx->residual, -step * scale, column, rank);
     if (!d->apart)
         ctx->info.macs += eits_project(ctx, ctx->residual);
     else if (ctx->basis_count == 1)
@@ -128,6 +155,8 @@ static eits_real rounding(const eits_context *ctx)
 static int descend(eits_context *ctx, descent *d, uint32_t last)
 {
     eits_real first = 0, worth = 0;
+    eits_copy(ctx->residual, eits_adjoint(ctx, ctx->residual, ctx->adjoint), EITS_STRIDE(ctx->model->rank));
+    ctx->info.macs += eits_adjoint_macs(ctx);
     for (int begun = 0; ctx->info.iterations < last && !(begun && worth <= SETTLED * first); begun = 1) {
         if (sweep(ctx, d, &worth) == SWEEP_LIMIT) {
             ctx->info.stop = EITS_STOP_MACS;
@@ -146,7 +175,7 @@ void eits_run_coordinate(eits_context *ctx, eits_real lambda, int gradient_known
     const eits_options *o = &ctx->options;
     const eits_real scale = R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
     const uint32_t end = o->iterations;
-    descent d = {.lambda = lambda, .norm = ctx->z, .slant = ctx->x_next, .apart = ctx->basis_count <= 1};
+    descent d = {.lambda = lambda, .norm = ctx->z, .slant = ctx->x_next, .apart = !ctx->rewhitened && ctx->basis_count <= 1};
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         d.norm[j] = -1;
     eits_certificate c = {0};

@@ -2,7 +2,7 @@
 
 #include "columns.h"
 #include "kernels.h"
-#include "stages.h"
+#include "observed.h"
 #include "vec.h"
 
 /* The kept pixels that the disc covers: their columns in `matrix` into list_index, their covers and the covers' derivative by distance. */
@@ -69,7 +69,7 @@ static covered cover(eits_context *ctx, const eits_disc *disc)
 static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *value, eits_real *out)
 {
     ctx->kernels->mul(&c->matrix, c->index, value, c->count, out);
-    return (uint64_t)c->count * ctx->model->rank + eits_project(ctx, out);
+    return (uint64_t)c->count * ctx->model->rank + eits_forward(ctx, out);
 }
 
 uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom, eits_real *const *slope)

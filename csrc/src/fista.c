@@ -1,6 +1,7 @@
 /* FISTA with non-negative, non-positive or signed shrinkage; solve.h has the problem and its source. */
 #include "certificate.h"
 #include "kernels.h"
+#include "observed.h"
 #include "solvers.h"
 #include "vec.h"
 #include "working_set.h"
@@ -21,8 +22,8 @@ static uint32_t held(const eits_context *ctx)
 static void take_working_gradient(eits_context *ctx, const eits_real *sx)
 {
     ctx->info.macs += eits_take_residual(ctx, sx);
-    eits_apply_t_working(ctx, ctx->residual, ctx->gradient);
-    ctx->info.macs += (uint64_t)ctx->working_count * ctx->model->rank;
+    eits_apply_t_working(ctx, eits_adjoint(ctx, ctx->residual, ctx->adjoint), ctx->gradient);
+    ctx->info.macs += (uint64_t)ctx->working_count * ctx->model->rank + eits_adjoint_macs(ctx);
 }
 
 /* The extrapolated point starts at x, momentum forgotten. */
@@ -99,7 +100,7 @@ static int looks_at_every_column(const eits_context *ctx, uint32_t k, const sche
 static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule *s)
 {
     const uint64_t whole = eits_gradient_macs(ctx);
-    const uint64_t some = ((uint64_t)ctx->working_count + 2u * ctx->basis_count) * ctx->model->rank;
+    const uint64_t some = (uint64_t)ctx->working_count * ctx->model->rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx);
     return eits_affords(ctx, whole + (looks_at_every_column(ctx, k, s) ? whole : some));
 }
 

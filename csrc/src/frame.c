@@ -4,6 +4,7 @@
 #include "examine.h"
 #include "kernels.h"
 #include "log.h"
+#include "observed.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -147,17 +148,18 @@ static uint64_t drift_direction(eits_context *ctx, eits_real *out)
 
 static uint64_t rebuild_basis(eits_context *ctx)
 {
-    uint64_t macs = 0;
+    uint64_t macs = eits_observed_build(ctx);
     ctx->basis_count = 0;
     eits_zero(ctx->along, ctx->model->n_folded);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] != EITS_SIDE_NONE)
+        if (ctx->rewhitened || ctx->basis_for[k] != EITS_SIDE_NONE)
             continue;
         reduction_column(ctx, k, ctx->residual);
         macs += ctx->model->rank + extend_basis(ctx, ctx->residual);
     }
     if (ctx->options.project_baseline) {
         macs += drift_direction(ctx, ctx->residual);
+        macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->residual) : 0;
         macs += extend_basis(ctx, ctx->residual);
     }
     ctx->basis_stale = 0;
@@ -165,8 +167,8 @@ static uint64_t rebuild_basis(eits_context *ctx)
     return macs;
 }
 
-/* y = P d of the folds in use, not yet projected; returns 1 where none is left out. */
-static int reduce(eits_context *ctx, uint64_t *macs)
+/* y = P d of the folds in use, not yet projected; returns their number. */
+static uint32_t reduce(eits_context *ctx, uint64_t *macs)
 {
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
@@ -176,7 +178,7 @@ static int reduce(eits_context *ctx, uint64_t *macs)
     }
     ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, count, ctx->y);
     *macs += (uint64_t)count * ctx->model->rank;
-    return count == ctx->model->n_folded;
+    return count;
 }
 
 /* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew. */
@@ -223,16 +225,19 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     }
     if (changed || ctx->basis_stale)
         *macs += rebuild_basis(ctx);
-    if (reduce(ctx, macs) && judged && examine_reduced(ctx, macs)) {
+    uint32_t count = reduce(ctx, macs);
+    if (count == model->n_folded && judged && examine_reduced(ctx, macs)) {
         status = check_rows(ctx, frame, masked);
         if (status != EITS_OK)
             return status;
         if (fold_data(ctx, frame))
             *macs += rebuild_basis(ctx);
-        (void)reduce(ctx, macs);
+        count = reduce(ctx, macs);
     }
+    *macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->y) : 0;
     *macs += eits_project(ctx, ctx->y);
-    if (ctx->basis_count == model->rank) /* no direction is left: what is there is rounding */
+    const uint32_t directions = ctx->rewhitened && count < model->rank ? count : model->rank;
+    if (ctx->basis_count >= directions) /* no direction is left: what is there is rounding */
         eits_zero(ctx->y, model->rank);
     return eits_is_finite(eits_dot(ctx, ctx->y, ctx->y, model->rank)) ? EITS_OK : EITS_E_NOT_FINITE;
 }

@@ -139,7 +139,7 @@ void eits_judge_reference(eits_context *ctx)
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
     const eits_real against = eits_greatest(ctx->gradient, ctx->model->n_pixels, other);
-    const eits_real least = EITS_STALE_NOISE * ctx->baseline.lambda_noise;
+    const eits_real least = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (least > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > least)
         ctx->info.findings |= EITS_FINDING_STALE_REFERENCE;
 }

@@ -1,6 +1,7 @@
 #include "missing.h"
 
 #include "kernels.h"
+#include "observed.h"
 #include "vec.h"
 
 /* How far the correlations lie beyond zero under the sign rule, into ctx->list_value. */
@@ -76,6 +77,7 @@ static void mark_near(const eits_context *ctx, uint32_t j, uint8_t *marks)
 uint64_t eits_gradient_nearby(eits_context *ctx, uint8_t *marks)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
+    const eits_real *residual = eits_adjoint(ctx, ctx->residual, ctx->adjoint);
     uint64_t columns = 0;
     memset(marks, 0, EITS_PANEL_COLUMNS(s->cols) / EITS_PANEL);
     for (uint32_t k = 0; k < ctx->working_count; ++k)
@@ -89,10 +91,10 @@ uint64_t eits_gradient_nearby(eits_context *ctx, uint8_t *marks)
         for (uint32_t l = 0; l < count; ++l)
             index[l] = first + l;
         if (ctx->panels != NULL)
-            ctx->kernels->mul_t_panels(s, ctx->panels + (size_t)first * s->rows, index, count, ctx->residual, ctx->gradient + first);
+            ctx->kernels->mul_t_panels(s, ctx->panels + (size_t)first * s->rows, index, count, residual, ctx->gradient + first);
         else
-            ctx->kernels->mul_t(s, index, count, ctx->residual, ctx->gradient + first);
+            ctx->kernels->mul_t(s, index, count, residual, ctx->gradient + first);
         columns += count;
     }
-    return columns * s->rows;
+    return columns * s->rows + eits_adjoint_macs(ctx);
 }

@@ -9,7 +9,7 @@
  * columns in marked panels only. */
 uint32_t eits_list_missing(const eits_context *ctx, eits_real least, const uint8_t *marks);
 
-/* ctx->gradient = S' ctx->residual for the columns in panels that show pixels beside those held, zero elsewhere;
+/* ctx->gradient = S' F' ctx->residual for the columns in panels that show pixels beside those held, zero elsewhere;
  * `marks` is n_pixels bytes to write to. Returns the multiply-accumulates. */
 uint64_t eits_gradient_nearby(eits_context *ctx, uint8_t *marks);
 

@@ -5,6 +5,7 @@
 #include "certificate.h"
 #include "examine.h"
 #include "kernels.h"
+#include "observed.h"
 #include "solvers.h"
 #include "stages.h"
 #include "vec.h"
@@ -21,7 +22,7 @@ static eits_real choose_lambda(const eits_context *ctx)
     if (o->lambda_abs > 0)
         return o->lambda_abs;
     const eits_real by_data = o->lambda_rel * ctx->info.lambda_max;
-    const eits_real by_noise = o->lambda_noise_factor * ctx->baseline.lambda_noise;
+    const eits_real by_noise = o->lambda_noise_factor * eits_lambda_noise(ctx);
     return by_data > by_noise ? by_data : by_noise;
 }
 
@@ -82,13 +83,13 @@ static eits_status solve(eits_context *ctx)
     const uint32_t rank = ctx->model->rank;
     const eits_real square = eits_dot(ctx, ctx->y, ctx->y, rank);
     ctx->info.data_norm = eits_sqrt(square);
-    ctx->info.lambda_noise = ctx->baseline.lambda_noise;
-    if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank)) {
+    ctx->info.lambda_noise = eits_lambda_noise(ctx);
+    if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx))) {
         answer_zero(ctx, EITS_STOP_MACS);
         return EITS_OK;
     }
-    eits_apply_t(ctx, ctx->y, ctx->gradient);
-    ctx->info.macs += (uint64_t)ctx->model->n_pixels * rank;
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
+    ctx->info.macs += (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx);
     ctx->info.lambda_max = eits_greatest(ctx->gradient, ctx->model->n_pixels, o->sign);
     ctx->info.lambda = choose_lambda(ctx);
     if (!eits_is_finite(ctx->info.data_norm) || !eits_is_finite(ctx->info.lambda_max)) {

@@ -4,6 +4,7 @@
 #include "disc.h"
 #include "examine.h"
 #include "kernels.h"
+#include "observed.h"
 #include "stages.h"
 #include "track.h"
 #include "vec.h"
@@ -279,12 +280,15 @@ static void judge(eits_context *ctx, fit *f)
 /* Whether the disc stands out of the noise by the same test as the whole frame: S_j'(y - other discs) at its pixel. */
 static int stands_out(eits_context *ctx, fit *f, uint32_t k)
 {
-    const eits_real least = ctx->options.gate_factor * ctx->baseline.lambda_noise;
+    const eits_real least = ctx->options.gate_factor * eits_lambda_noise(ctx);
     const uint32_t rank = ctx->model->rank;
     if (!(least > 0))
         return 1;
     const eits_disc *disc = &f->disc[k];
+    const eits_real *atom = eits_adjoint(ctx, atom_of(ctx, k), ctx->slope[0]);
+    const eits_real *residual = eits_adjoint(ctx, ctx->residual, ctx->slope[1]);
     eits_real best = 0;
+    f->macs += 2u * eits_adjoint_macs(ctx);
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
         const eits_pixel at = ctx->model->pixel[j];
         const eits_real pixel = (eits_real)ctx->model->pixel_mm;
@@ -294,7 +298,7 @@ static int stands_out(eits_context *ctx, fit *f, uint32_t k)
             continue;
         const eits_real scale = ctx->model->sensitivity.scale != NULL ? (eits_real)ctx->model->sensitivity.scale[j] : 1;
         eits_read_column(&ctx->model->sensitivity, j, ctx->sx);
-        const eits_real seen = scale * eits_fma(disc->change, eits_dot(ctx, ctx->sx, atom_of(ctx, k), rank), eits_dot(ctx, ctx->sx, ctx->residual, rank));
+        const eits_real seen = scale * eits_fma(disc->change, eits_dot(ctx, ctx->sx, atom, rank), eits_dot(ctx, ctx->sx, residual, rank));
         f->macs += 2u * rank;
         best = seen * disc->polarity > best ? seen * disc->polarity : best;
     }

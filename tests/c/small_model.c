@@ -126,6 +126,12 @@ static double wave(uint32_t order, uint32_t place, uint32_t side)
     return sqrt((order == 0 ? 1.0 : 2.0) / side) * cos(pi * order * (place + 0.5) / side);
 }
 
+/* w_i of P = diag(w) U' and S = diag(s w) V'. */
+static double whitening(uint32_t i)
+{
+    return 1 / sqrt(pow(SMALL_DECAY, 2.0 * i) + SMALL_FLOOR);
+}
+
 /* S (column after column, rank numbers each) in double. */
 static double *make_s(const small_spec *spec, const uint32_t *cells, uint32_t n)
 {
@@ -140,8 +146,10 @@ static double *make_s(const small_spec *spec, const uint32_t *cells, uint32_t n)
             double value = i == j;
             if (spec->shape == SMALL_RANDOM)
                 value = small_random(&state) / sqrt(n);
-            else if (spec->shape == SMALL_WAVES)
+            else if (spec->shape != SMALL_IDENTITY)
                 value = wave(i % across, cells[j] % side, side) * wave(i / across, cells[j] / side, side);
+            if (spec->shape == SMALL_WHITENED)
+                value *= pow(SMALL_DECAY, i) * whitening(i);
             s[(size_t)j * rank + i] = value;
         }
     }
@@ -219,8 +227,12 @@ static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *cons
     uint64_t state = 20240918;
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         small_put_f32(at[VREF] + 4 * k, 1.0f + 0.5f * (float)small_random(&state));
-        for (uint32_t i = 0; i < spec->rank; ++i)
-            small_put_f32(at[REDU] + 4 * ((size_t)k * stride + i), identity ? (float)(i == k) : 0.3f * (float)small_random(&state));
+        for (uint32_t i = 0; i < spec->rank; ++i) {
+            float value = identity ? (float)(i == k) : 0.3f * (float)small_random(&state);
+            if (spec->shape == SMALL_WHITENED)
+                value = (float)(whitening(i) * wave(i, k, SMALL_FOLDED));
+            small_put_f32(at[REDU] + 4 * ((size_t)k * stride + i), value);
+        }
     }
     for (uint32_t j = 0; j < n; ++j) {
         small_put_f32(at[COLW] + 4 * j, identity ? 1.0f : 0.02f + 0.001f * (float)(j % 7));

@@ -5,12 +5,15 @@
 #include "eitskin/eitskin.h"
 
 /* 8 electrodes, adjacent: 40 rows in 19 reciprocal pairs, every fifth measured the other way round, and 2 single rows. */
+#define SMALL_DECAY 0.75
+#define SMALL_FLOOR 0.01
 enum { SMALL_ELECTRODES = 8, SMALL_ROWS = 40, SMALL_PAIRS = 19, SMALL_FOLDED = 21, SMALL_SECTIONS = 12 };
 
 typedef enum small_shape {
     SMALL_RANDOM = 0,
     SMALL_IDENTITY, /* P and S are (as far as shapes go) identities and weights are 1, so that results can be said beforehand */
-    SMALL_WAVES     /* the rows of S are orthonormal cosines over the image, the lowest first: discs can be fitted */
+    SMALL_WAVES,    /* the rows of S are orthonormal cosines over the image, the lowest first: discs can be fitted */
+    SMALL_WHITENED  /* as the builder whitens: the same, singular values SMALL_DECAY^i, floor SMALL_FLOOR, and P's rows likewise */
 } small_shape;
 
 typedef struct small_spec {

@@ -71,12 +71,12 @@ typedef struct eits_info {
     uint32_t masked;   /* protocol rows that were left out of this frame */
     uint32_t step_halvings;
     uint32_t touches;         /* set by eits_find_touches */
-    uint64_t macs;            /* multiply-accumulates with a stored matrix, a basis vector or the active set's factor; vector
+    uint64_t macs;            /* multiply-accumulates with a stored matrix, a basis vector, F or the active set's factor; vector
                                * sums not counted */
     uint64_t touch_macs;      /* the same for eits_find_touches */
     eits_real lambda;
     eits_real lambda_max;
-    eits_real lambda_noise;
+    eits_real lambda_noise; /* the baseline's, times what rows left out add */
     eits_real gap;        /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED, and where MACS came
                            * before anything was known */
     eits_real gap_rel;    /* gap / (|y|^2 / 2) */
@@ -111,7 +111,7 @@ typedef struct eits_baseline {
     eits_real gain;         /* model volts per measured volt: rms(v_ref) / rms(v0), negative where correlation is */
     eits_real correlation;  /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
     eits_real noise_v;      /* rms over rows of the quiet frames' deviation, V; 0 if unknown */
-    eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames; 0 if unknown */
+    eits_real lambda_noise; /* greatest max(S'y) seen in quiet frames, as with all rows in use; 0 if unknown */
     uint32_t second_waits;  /* the second quiet frame is in m2 until there is a third */
     uint32_t glitches;      /* readings of quiet frames that were left out of the reference */
 } eits_baseline;
@@ -124,7 +124,7 @@ typedef struct eits_context {
     uint8_t *bad;            /* n_rows: masked by the caller */
     uint8_t *unusable;       /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
     uint8_t electrode[EITS_MOST_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
-    uint8_t *basis_for;      /* n_folded: which rows of each fold were in use when the basis below was built */
+    uint8_t *basis_for;      /* n_folded: which rows of each fold were in use when the basis below was built; 0: neither */
     eits_real *d;            /* n_folded: data of this frame */
     eits_real *apart;        /* n_folded: what the two rows of each fold differ by; 0 where one is in use */
     eits_real *along;        /* n_folded: data of a drift of the gain; zeros where it is not ignored */
@@ -134,9 +134,20 @@ typedef struct eits_context {
     eits_real sheet_energy;  /* |P|^2: what unit noise on the folded rows makes of |y|^2 */
     uint32_t sheet_known;    /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
     eits_real *y;            /* stride: reduced data, projected */
-    eits_real *basis;        /* rank x stride: orthonormal directions to ignore */
+    eits_real *basis;        /* orthonormal directions to ignore, up to rank of them, stride apart; where rewhitened, at most one,
+                              * and behind it two triangles (observed.c) */
     uint32_t basis_count;
     uint32_t basis_stale;
+    uint32_t rewhitens;      /* 1: the model's P and S have the builder's form, so that rows left out can be whitened anew */
+    uint32_t rewhitened;     /* 1: they are, for basis_for: the solver's S is F S (observed.h) */
+    eits_real *row_scale;    /* stride: s_1 of the scaled Jacobian over that of each direction, and over w s_1 of the first */
+    eits_real *row_strength; /* stride: (s_i / s_1)^2 */
+    eits_real strongest;     /* s_1, in the units of 1 / P */
+    eits_real strongest_square; /* |S_1|^2 */
+    eits_real floor;         /* mu, by which the model was whitened */
+    eits_real map_square;    /* what F'F is scaled by */
+    eits_real noise_ratio;   /* how much more noise max(S'y) has so than with all rows; 1 where nothing is re-whitened */
+    eits_real *adjoint;      /* stride: F' of the residual, and scratch */
     eits_real *residual;     /* stride */
     eits_real *sx, *sx_next, *sz; /* stride each */
     eits_real *slope[3];     /* stride each: a touch's response by x, y and radius */
@@ -173,6 +184,7 @@ typedef struct eits_context {
 #define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
 #define EITS_REALS(count) EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
 #define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
+#define EITS_PADDED_TRIANGLE(rank) (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
 #define EITS_TRIANGLE(rank) ((size_t)(rank) * ((size_t)(rank) + 1u) / 2u)
 #define EITS_PANEL_COLUMNS(n_pixels) (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
 
@@ -180,7 +192,7 @@ typedef struct eits_context {
  * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
     (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +               \
-     (10 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
+     (22 + EITS_STRIDE(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
      EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_REALS(EITS_TRIANGLE(rank)) + EITS_ALIGN16((size_t)(n_cells) * 2u) +       \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \

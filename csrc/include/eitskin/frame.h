@@ -1,9 +1,15 @@
 /* eitskin: from boundary voltages to the solver's data.
  *
  * A frame is n_rows voltages in the order of the model's protocol table. The stages: unusable channels are found, the
- * difference to the reference frame is taken (eits_data_kind), reciprocal rows are folded into their mean, P whitens, and
- * directions that carry no news (rows left out, drift of the gain) are projected away: leaving a row out is the same as
- * minimising over its value, which in reduced space removes the span of its column of P.
+ * difference to the reference frame is taken (eits_data_kind), reciprocal rows are folded into their mean, P whitens, and the
+ * direction that drift of the gain takes, which carries no news, is projected away.
+ *
+ * Rows left out: of a reciprocal pair the other row stands for both. Where both are out, what is left is whitened anew: the
+ * solver then meets the data by F S instead of S, as the reduction would have had it without those rows (docs/eitm-format.md,
+ * "Rows left out"), the floor lower the fewer rows there are; lambda_noise grows with the noise that this lets through. That
+ * needs a model of the builder's form, P's rows orthogonal and S whitened by them, which eits_init finds out. Of any other
+ * model, the rows' values are minimised over: the span of their columns of P is projected away, too, which loses much of what
+ * the rows left know. With no row out there is no F, and no cost.
  */
 #ifndef EITSKIN_FRAME_H
 #define EITSKIN_FRAME_H
@@ -31,7 +37,7 @@ eits_status eits_baseline_finish(eits_context *ctx);
  * reference was taken has none, and stays out until the next reference. Errors: EITS_E_ARGUMENT. */
 eits_status eits_mask_row(eits_context *ctx, uint32_t row, int bad);
 
-/* The frame stage alone: fills ctx->d, ctx->y, ctx->basis, ctx->unusable and returns the number of rows left out in
+/* The frame stage alone: fills ctx->d, ctx->y, ctx->basis (and F), ctx->unusable and returns the number of rows left out in
  * `masked`. Errors: EITS_E_NO_BASELINE, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO,
  * EITS_E_NOT_FINITE. */
 eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t length, uint32_t *masked, uint64_t *macs);

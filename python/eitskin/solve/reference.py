@@ -18,6 +18,7 @@ from eitskin.model.model import Model
 from eitskin.solve.options import default_options
 from eitskin.solve.reference_exact import ActiveSet, coordinate
 from eitskin.solve.reference_findings import Examiner, Folded, Found, Reference
+from eitskin.solve.reference_observed import Whitening, form_of, whiten
 from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, certify, greatest, project, shrink
 from eitskin.solve.reference_quiet import clean
 from eitskin.solve.reference_touches import find_touches
@@ -109,6 +110,9 @@ class ReferenceEngine:
         self.options = default_options(model)
         self._s, self._p = model.sensitivity, model.projection.astype(np.float64)
         self._v_ref = model.v_ref_v.astype(np.float64)
+        self._form = form_of(self._p, self._s)
+        self._whitening: Whitening | None = None
+        self.seen = self._s
         self._bad = np.zeros(model.protocol.n_rows, dtype=bool)
         self._without_reference = self._bad
         self._v0: FloatArray | None = None
@@ -196,7 +200,8 @@ class ReferenceEngine:
             self._fit_to_model(frames[:half].mean(axis=0))
             for k in range(half, len(frames)):
                 self._v0 = frames[:k].mean(axis=0)
-                seen = max(seen, greatest(self._s.T @ self.frame_stage(np.where(left[k], np.nan, frames[k]))[0], "both"))
+                y = self.frame_stage(np.where(left[k], np.nan, frames[k]))[0]
+                seen = max(seen, greatest(self.seen.T @ y, "both") / self._noise_ratio)
         except FrameError:
             self._v0 = None
             raise
@@ -213,6 +218,8 @@ class ReferenceEngine:
 
     def frame_stage(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, int]:
         """Reduced projected data y (r,), the basis (k, r) of what is ignored, and how many rows were left out.
+
+        ``self.seen`` (r, n) is then S, or what stands for it where rows are left out.
 
         Raises:
             FrameError: no reference, or too many unusable channels.
@@ -241,10 +248,13 @@ class ReferenceEngine:
             else:
                 look.found.names |= {"misfit"} & look.wanted
         self._noise_energy = look.noise_energy(folded, judged) if judged else 0.0
+        known = folded.first | folded.second
+        self._leave_out(known)
         basis = orthonormal(self._directions(folded), self.model.rank)
-        y = project(self._p @ folded.d, basis)
+        y = project(self._reduce(folded.d), basis)
+        directions = len(y) if self._whitening is None else min(len(y), int(known.sum()))
         # where the basis leaves no direction, what is there is rounding
-        return y if len(basis) < len(y) else np.zeros_like(y), basis, int(unusable.sum())
+        return y if len(basis) < directions else np.zeros_like(y), basis, int(unusable.sum())
 
     def _check_rows(self, frame: FloatArray, unusable: BoolArray) -> BoolArray:
         """``unusable`` (m,), if there are not too many of them.
@@ -280,11 +290,24 @@ class ReferenceEngine:
         total = np.where(folded.first, v0[fold.first], 0.0) + np.where(folded.second, fold.sign * v0[fold.second], 0.0)
         return np.asarray(self._gain * total / np.maximum(count, 1))
 
+    @property
+    def _noise_ratio(self) -> float:
+        return 1.0 if self._whitening is None else self._whitening.noise_ratio
+
+    def _leave_out(self, known: BoolArray) -> None:
+        """Whiten anew for the folded rows (k,) that are known."""
+        self._whitening = None if self._form is None or known.all() else whiten(self._form, known)
+        self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
+
+    def _reduce(self, d: FloatArray) -> FloatArray:
+        """Folded data (k,) to reduced data (r,)."""
+        return self._p @ d if self._whitening is None else self._whitening.data @ (self._p @ d)
+
     def _directions(self, folded: Folded) -> list[FloatArray]:
-        """What the misfit ignores: P's columns of folds left out, and the drift of the gain."""
-        directions = [self._p[:, k] for k in np.flatnonzero(~(folded.first | folded.second))]
-        along = self._along(folded)
-        return directions if along is None else [*directions, self._p @ along]
+        """What the misfit ignores: P's columns of folds left out, unless that is whitened anew, and the drift of the gain."""
+        left_out = np.flatnonzero(~(folded.first | folded.second)) if self._whitening is None else []
+        directions, along = [self._p[:, k] for k in left_out], self._along(folded)
+        return directions if along is None else [*directions, self._reduce(along)]
 
     def reconstruct(self, frame: FloatArray, *, touches: bool = True) -> Reconstruction:
         """One frame (m,) volts to image and touches.
@@ -301,18 +324,19 @@ class ReferenceEngine:
             self._warm = None
             raise
         o, norm = self.options, float(np.linalg.norm(y))
-        lambda_max = greatest(self._s.T @ y, o.sign)
-        self._examiner.stale(self._s.T @ y, o.sign, lambda_max, self._lambda_noise)
-        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * self._lambda_noise)
+        correlation = self.seen.T @ y
+        lambda_max, lambda_noise = greatest(correlation, o.sign), self._lambda_noise * self._noise_ratio
+        self._examiner.stale(correlation, o.sign, lambda_max, lambda_noise)
+        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
         n = self.model.grid.n_pixels
         nothing = Certificate(0.0, 0.5 * norm**2, norm)
         zero = Result(np.zeros(n), 0, "zero", nothing, 0)
-        if o.gate_factor > 0 and lambda_max < o.gate_factor * self._lambda_noise:
+        if o.gate_factor > 0 and lambda_max < o.gate_factor * lambda_noise:
             result = Result(zero.x, 0, "gate", nothing, 0)
         elif not lambda_max > lam or norm**2 < LEAST_SQUARE:
             result = zero
         else:
-            result = self._run(Problem(self._s, y, lam, o.sign, basis))
+            result = self._run(Problem(self.seen, y, lam, o.sign, basis))
             if result.stop == "diverged":
                 result = Result(zero.x, result.iterations, "diverged", nothing, result.step_halvings)
         self._warm = result.x if result.stop in ("iterations", "gap", "optimum") else None
@@ -321,7 +345,7 @@ class ReferenceEngine:
         solved_ns = perf_counter_ns()
         if touches:
             found, self._next_id, self._examiner.found.unexplained = find_touches(
-                self.model, image, y, basis, o, self._lambda_noise, self._last, self._next_id
+                self.model, self.seen, image, y, basis, o, lambda_noise, self._last, self._next_id
             )
             self._last = found
             noise_share = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum()) / max(norm**2, 1e-300)
@@ -329,7 +353,7 @@ class ReferenceEngine:
         gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,
-            lam, lambda_max, self._lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300), result.certificate.residual, norm,
+            lam, lambda_max, lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300), result.certificate.residual, norm,
             **self._examiner.of_frame(),
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
         )  # fmt: skip

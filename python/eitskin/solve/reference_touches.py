@@ -34,12 +34,14 @@ class Disc:
 class Fit:
     """One frame's discs: their answers in reduced space, and what they leave of y."""
 
-    def __init__(self, model: Model, y: FloatArray, basis: FloatArray, options: Options, lambda_noise: float) -> None:
-        self.model, self.y, self.basis, self.options = model, y, basis, options
+    def __init__(
+        self, model: Model, seen: FloatArray, y: FloatArray, basis: FloatArray, options: Options, lambda_noise: float
+    ) -> None:
+        self.model, self.seen, self.y, self.basis, self.options = model, seen, y, basis, options
         self.gate = options.gate_factor * lambda_noise
         self.centres = model.grid.centres_mm()
         weight = model.column_weight.astype(np.float64)
-        self.per_change = model.sensitivity / np.where(weight != 0, weight, np.inf)
+        self.per_change = seen / np.where(weight != 0, weight, np.inf)
         self.discs: list[Disc] = []
 
     def answers(self, disc: Disc) -> tuple[FloatArray, FloatArray]:
@@ -157,7 +159,7 @@ class Fit:
             return True
         disc, pixel = self.discs[k], self.model.grid.pixel_mm
         near = (np.abs(self.centres - (disc.x_mm, disc.y_mm)) <= pixel).all(axis=1)
-        seen = disc.polarity * (self.model.sensitivity[:, near].T @ self.residual(leave_out=k))
+        seen = disc.polarity * (self.seen[:, near].T @ self.residual(leave_out=k))
         return bool(seen.max(initial=0.0) >= self.gate)
 
     def keep_real(self) -> FloatArray:
@@ -184,6 +186,7 @@ def damped_step(h: FloatArray, g: FloatArray) -> FloatArray:
 
 def find_touches(
     model: Model,
+    seen: FloatArray,
     image: FloatArray,
     y: FloatArray,
     basis: FloatArray,
@@ -192,9 +195,9 @@ def find_touches(
     last: tuple[Touch, ...],
     next_id: int,
 ) -> tuple[tuple[Touch, ...], int, float]:
-    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), strongest first, the next free id, and the share of
-    |y|^2 that the touches leave (0 where the image is zero)."""
-    fit = Fit(model, y, basis, options, lambda_noise)
+    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), which ``seen`` (r, n) explains, strongest first, the next
+    free id, and the share of |y|^2 that the touches leave (0 where the image is zero)."""
+    fit = Fit(model, seen, y, basis, options, lambda_noise)
     if np.abs(image).max() > 0:
         fit.seed(image)
     if fit.discs:

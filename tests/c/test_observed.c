@@ -1,0 +1,371 @@
+/* Rows left out of a frame: the reduction whitened anew, against the formula in double; and what it must never do. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "kernels.h"
+#include "observed.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RANK = 13, STRIDE = 16, SIDE = 6, N = SIDE * SIDE };
+
+static const small_spec WHITENED = {.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED};
+/* What the core states of its numbers: the floor's law, how little a lost direction counts, the margin of the step. */
+static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1;
+
+typedef struct bench {
+    dense_bench b;
+    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+    int out[SMALL_FOLDED];
+} bench;
+
+static eits_context *set_up(bench *b, small_spec spec, int project)
+{
+    uint64_t state = 91;
+    memset(b, 0, sizeof *b);
+    eits_context *ctx = dense_bench_open(&b->b, spec, 0);
+    small_reference(ctx->model, 1, b->reference);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
+    eits_options o = ctx->options;
+    o.project_baseline = (uint32_t)project;
+    o.max_masked = SMALL_ROWS;
+    o.iterations = 40;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_baseline_set(ctx, b->reference, SMALL_ROWS), EITS_OK);
+    return ctx;
+}
+
+/* Leave folded row k out. */
+static void leave_out(bench *b, uint32_t k)
+{
+    const eits_fold fold = b->b.c.model.fold[k];
+    b->out[k] = 1;
+    b->frame[fold.first] = R(NAN);
+    if (fold.second != EITS_FOLD_NONE)
+        b->frame[fold.second] = R(NAN);
+}
+
+static uint32_t stage(bench *b)
+{
+    uint32_t masked = 0;
+    uint64_t macs = 0;
+    CHECK_EQUAL(eits_frame_stage(&b->b.c.ctx, b->frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    return masked;
+}
+
+/* Column j of F, or of F S: by the core's own map. */
+static void map_column(eits_context *ctx, const double *column, int project, double *out)
+{
+    eits_real v[STRIDE] = {0};
+    for (int i = 0; i < RANK; ++i)
+        v[i] = (eits_real)column[i];
+    if (project)
+        (void)eits_forward(ctx, v);
+    else
+        (void)eits_map(ctx, v);
+    for (int i = 0; i < RANK; ++i)
+        out[i] = (double)v[i];
+}
+
+/* In place, by Gauss-Jordan; the matrix is positive definite. */
+static void invert(double a[RANK][RANK])
+{
+    for (int p = 0; p < RANK; ++p) {
+        const double inverse = 1 / a[p][p];
+        a[p][p] = 1;
+        for (int j = 0; j < RANK; ++j)
+            a[p][j] *= inverse;
+        for (int i = 0; i < RANK; ++i) {
+            const double factor = a[i][p];
+            if (i == p)
+                continue;
+            a[i][p] = 0;
+            for (int j = 0; j < RANK; ++j)
+                a[i][j] -= factor * a[p][j];
+        }
+    }
+}
+
+/* The metric M = D^-1 (I - mu' (T + mu' I)^-1) D^-1 and its right side D^-1 (T + mu' I)^-1 diag(s) U_o' d_o, with
+ * T = diag(s) (U_o' U_o + e I) diag(s) and D_i = s_i w_i, so scaled that no step grows. */
+static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
+{
+    const eits_context *ctx = &b->b.c.ctx;
+    const double *p = b->b.d.p;
+    double k[RANK][RANK], s[RANK], w[RANK], left = 0;
+    for (int f = 0; f < SMALL_FOLDED; ++f)
+        left += !b->out[f] / (double)SMALL_FOLDED;
+    const double share = left * left * left, mu = SMALL_FLOOR * (share > LEAST_SHARE ? share : LEAST_SHARE), lost = LOST * mu;
+    const double scale = MARGIN / (1 + SMALL_FLOOR) * (1 + mu) / (1 + lost);
+    for (int i = 0; i < RANK; ++i) {
+        s[i] = pow(SMALL_DECAY, i);
+        w[i] = 1 / sqrt(s[i] * s[i] + SMALL_FLOOR);
+    }
+    for (int i = 0; i < RANK; ++i) {
+        for (int j = 0; j < RANK; ++j) {
+            double sum = i == j ? lost : 0;
+            for (int f = 0; f < SMALL_FOLDED; ++f)
+                sum += b->out[f] ? 0 : p[f * RANK + i] / w[i] * p[f * RANK + j] / w[j];
+            k[i][j] = s[i] * sum * s[j] + (i == j ? mu : 0);
+        }
+    }
+    invert(k);
+    for (int i = 0; i < RANK; ++i) {
+        right[i] = 0;
+        for (int j = 0; j < RANK; ++j) {
+            m[i][j] = scale * ((i == j) - mu * k[i][j]) / (s[i] * w[i] * s[j] * w[j]);
+            for (int f = 0; f < SMALL_FOLDED; ++f)
+                right[i] += b->out[f] ? 0 : scale * k[i][j] * s[j] * p[f * RANK + j] / w[j] * (double)ctx->d[f] / (s[i] * w[i]);
+        }
+    }
+}
+
+/* F'F and F'y are the formula's, whichever rows are out; with none out there is no map. */
+static void the_reduction_without_those_rows(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, WHITENED, 0);
+    CHECK(ctx->rewhitens);
+    (void)stage(&b);
+    CHECK(!ctx->rewhitened && eits_adjoint(ctx, ctx->y, ctx->adjoint) == ctx->y);
+    for (uint32_t count = 1; count < SMALL_FOLDED; ++count) {
+        double m[RANK][RANK], right[RANK];
+        leave_out(&b, (5 * count) % SMALL_FOLDED);
+        (void)stage(&b);
+        CHECK(ctx->rewhitened);
+        CHECK_EQUAL(ctx->basis_count, 0);
+        by_formula(&b, m, right);
+        const double bound = BOTH_WIDTHS(3e-4, 1e-6); /* P is stored as float: orthogonal to its rounding */
+        for (int j = 0; j < RANK; ++j) {
+            double unit[RANK] = {0}, column[RANK];
+            eits_real f_unit[STRIDE] = {0};
+            unit[j] = 1;
+            map_column(ctx, unit, 0, column);
+            for (int i = 0; i < RANK; ++i)
+                f_unit[i] = (eits_real)column[i];
+            const eits_real *back = eits_adjoint(ctx, f_unit, ctx->adjoint);
+            for (int i = 0; i < RANK; ++i)
+                CHECK_NEAR(back[i], m[i][j], bound);
+        }
+        const eits_real *pulled = eits_adjoint(ctx, ctx->y, ctx->adjoint);
+        for (int i = 0; i < RANK; ++i)
+            CHECK_NEAR(pulled[i], right[i], bound);
+    }
+    dense_bench_close(&b.b);
+}
+
+/* The greatest eigenvalue of the seen S's, by power iteration from below. */
+static double greatest_eigenvalue(const double *s)
+{
+    double v[RANK], w[RANK], size = 0;
+    for (int i = 0; i < RANK; ++i)
+        v[i] = 1 + 0.1 * i;
+    for (int step = 0; step < 200; ++step) {
+        memset(w, 0, sizeof w);
+        for (int j = 0; j < N; ++j) {
+            const double along = dense_dot(s + j * RANK, v, RANK);
+            for (int i = 0; i < RANK; ++i)
+                w[i] += along * s[j * RANK + i];
+        }
+        size = sqrt(dense_dot(w, w, RANK));
+        for (int i = 0; i < RANK; ++i)
+            v[i] = w[i] / size;
+    }
+    return size;
+}
+
+/* Each solver solves the problem of F S and y; the gap is the true one; the stated step suffices. */
+static void solvers_solve_the_seen_problem(void)
+{
+    for (int storage = 0; storage < 4; ++storage) {
+        for (int sign = 0; sign < 3; ++sign) {
+            small_spec spec = WHITENED;
+            spec.storage = (eits_storage)storage;
+            spec.lipschitz_factor = 1.0001;
+            bench b;
+            eits_context *ctx = set_up(&b, spec, storage % 2);
+            for (uint32_t k = 0; k < 7; ++k)
+                leave_out(&b, 3 * k % 20);
+            (void)stage(&b);
+            CHECK(ctx->rewhitened);
+            CHECK_EQUAL(ctx->basis_count, storage % 2);
+            for (int j = 0; j < N; ++j)
+                map_column(ctx, b.b.d.s + j * RANK, 1, b.b.d.s + j * RANK);
+            CHECK(greatest_eigenvalue(b.b.d.s) <= (double)b.b.c.model.lipschitz);
+            double *y = dense_copy(ctx->y, RANK), least = 0;
+            eits_options o = ctx->options;
+            o.sign = (eits_sign)sign;
+            o.lambda_rel = R(0.05);
+            o.gate_factor = 0;
+            for (int solver = 3; solver >= 0; --solver) { /* the active set first: its gap bounds the optimum from below */
+                o.solver = (eits_solver)solver;
+                o.iterations = 4000;
+                o.gap_rel = R(BOTH_WIDTHS(1e-5, 1e-9));
+                CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+                eits_forget(ctx);
+                CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+                const eits_info info = ctx->info;
+                CHECK(info.gap >= 0 && info.nonzeros > 0 && info.step_halvings == 0);
+                double *got = dense_copy(ctx->x, N);
+                const double lambda = (double)info.lambda, scale = 0.5 * dense_dot(y, y, RANK);
+                CHECK_NEAR(info.gap, dense_gap(&b.b.d, y, got, lambda, o.sign), 300 * EPS * scale);
+                const double objective = dense_objective(&b.b.d, y, got, lambda), room = 300 * EPS * scale;
+                if (solver == 3) {
+                    CHECK(info.stop == EITS_STOP_GAP || info.stop == EITS_STOP_OPTIMUM);
+                    CHECK(info.gap <= BOTH_WIDTHS(1e-5, 1e-9) * scale);
+                    least = objective - (double)info.gap - room;
+                }
+                CHECK(objective >= least && objective <= least + (double)info.gap + BOTH_WIDTHS(1.2e-4, 1e-8) * scale);
+                CHECK(info.gap <= R(1e-3) * (eits_real)scale);
+                free(got);
+            }
+            free(y);
+            dense_bench_close(&b.b);
+        }
+    }
+}
+
+/* Rows drop out one after another until none is left, with and without the drift: finite throughout, zero where nothing is left,
+ * the same bits from both kernels and from a fresh context, and the whole frame's own once all are back. */
+static void until_nothing_is_left(void)
+{
+    for (int project = 0; project < 2; ++project) {
+        bench b, fresh;
+        eits_context *ctx = set_up(&b, WHITENED, project);
+        eits_real whole[N], image[N], good[SMALL_ROWS], norm = 0;
+        memcpy(good, b.frame, sizeof good);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, whole, NULL), EITS_OK);
+        for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+            leave_out(&b, k);
+            CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
+            uint32_t count = 99;
+            CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+            for (int j = 0; j < N; ++j)
+                CHECK(eits_is_finite(image[j]));
+            const uint32_t left = SMALL_FOLDED - 1 - k;
+            CHECK(eits_is_finite(ctx->info.data_norm) && ctx->info.gap >= 0);
+            CHECK((ctx->info.data_norm > 0) == (left > (uint32_t)project));
+            if (left <= (uint32_t)project)
+                CHECK(ctx->info.stop == EITS_STOP_ZERO && ctx->info.nonzeros == 0 && count == 0);
+            norm = k == 0 ? ctx->info.data_norm : norm;
+            CHECK(ctx->info.data_norm < 4 * norm); /* 1 / sqrt(LEAST_SHARE), and some */
+            eits_context *other = set_up(&fresh, WHITENED, project);
+            CHECK_EQUAL(eits_use_portable_kernels(other, 1), EITS_OK);
+            CHECK_EQUAL(eits_reconstruct(other, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK(memcmp(other->image, image, sizeof image) == 0 && memcmp(other->y, ctx->y, RANK * sizeof *ctx->y) == 0);
+            dense_bench_close(&fresh.b);
+        }
+        memcpy(b.frame, good, sizeof good);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
+        CHECK(!ctx->rewhitened && memcmp(whole, image, sizeof whole) == 0);
+        dense_bench_close(&b.b);
+    }
+}
+
+/* The values of rows left out are nothing to the answer, and drift of the gain is still ignored. */
+static void rows_out_do_not_count(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, WHITENED, 1);
+    eits_real seen[2][STRIDE];
+    for (int round = 0; round < 2; ++round) {
+        for (uint32_t k = 2; k < 20; k += 4) {
+            const eits_fold fold = ctx->model->fold[k];
+            b.frame[fold.first] = round ? R(1e6) : R(-2);
+            b.frame[fold.second == EITS_FOLD_NONE ? fold.first : fold.second] = round ? R(3) : R(-1e-9);
+            CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
+            if (fold.second != EITS_FOLD_NONE)
+                CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
+        }
+        (void)stage(&b);
+        memcpy(seen[round], ctx->y, sizeof seen[round]);
+    }
+    CHECK(ctx->rewhitened && memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        b.frame[i] = b.reference[i] * R(1.3);
+    (void)stage(&b);
+    for (int i = 0; i < RANK; ++i)
+        CHECK_NEAR(ctx->y[i], 0, 200 * EPS);
+    dense_bench_close(&b.b);
+}
+
+/* Change one number of P for all of a row (or one entry), and see whether the model still counts as the builder's. */
+static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows, eits_real first_of_map[RANK])
+{
+    bench b;
+    memset(&b, 0, sizeof b);
+    b.b.made = small_model_make(WHITENED);
+    uint8_t *p = small_model_section(&b.b.made, "REDU", NULL);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        for (uint32_t i = 0; i < RANK; ++i) {
+            float value;
+            memcpy(&value, p + 4 * (STRIDE * k + i), 4);
+            small_put_f32(p + 4 * (STRIDE * k + i), all_rows || i == row ? (float)(value * factor) : value);
+        }
+    }
+    small_model_seal(&b.b.made);
+    small_context_open(&b.b.c, &b.b.made, 0);
+    eits_context *ctx = &b.b.c.ctx;
+    const uint32_t rewhitens = ctx->rewhitens;
+    small_reference(ctx->model, 1, b.reference);
+    memcpy(b.frame, b.reference, sizeof b.frame);
+    b.frame[3] *= R(1.1);
+    CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+    leave_out(&b, 4);
+    leave_out(&b, 9);
+    (void)stage(&b);
+    CHECK(ctx->rewhitened == rewhitens);
+    CHECK(rewhitens ? ctx->basis_count == 1 : ctx->basis_count <= 3);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    for (uint32_t i = 0; i < RANK && rewhitens; ++i)
+        first_of_map[i] = ctx->basis[STRIDE + i];
+    small_context_close(&b.b.c);
+    small_model_free(&b.b.made);
+    return rewhitens;
+}
+
+/* Any other P keeps the projection: rows of another size, zero rows, rows that overflow; the unit of the data does not matter. */
+static void models_of_another_form(void)
+{
+    eits_real plain[RANK], scaled[RANK];
+    CHECK(rewhitens_with(0, 1, 0, plain));
+    CHECK(!rewhitens_with(2, 1.2, 0, scaled));
+    CHECK(!rewhitens_with(2, 0, 0, scaled));
+    CHECK(!rewhitens_with(0, 0, 1, scaled) || !"a zero P");
+    CHECK(rewhitens_with(0, 1099511627776.0, 1, scaled));
+    CHECK(memcmp(plain, scaled, sizeof plain) == 0);
+    CHECK(rewhitens_with(0, 1 / 1099511627776.0, 1, scaled));
+    CHECK(memcmp(plain, scaled, sizeof plain) == 0);
+    CHECK(!rewhitens_with(0, 1e-31, 1, scaled));
+    bench b;
+    small_spec other = WHITENED;
+    other.shape = SMALL_RANDOM;
+    CHECK(!set_up(&b, other, 0)->rewhitens);
+    dense_bench_close(&b.b);
+    other.shape = SMALL_IDENTITY; /* whitened with no floor at all */
+    eits_context *ctx = set_up(&b, other, 0);
+    CHECK(ctx->rewhitens && ctx->floor == 0);
+    leave_out(&b, 1);
+    (void)stage(&b);
+    CHECK(ctx->rewhitened);
+    for (int i = 0; i < RANK; ++i)
+        CHECK_NEAR(ctx->y[i], i == 1 ? 0 : sqrt(MARGIN) * (double)ctx->d[i], 1e-4);
+    dense_bench_close(&b.b);
+}
+
+int main(void)
+{
+    the_reduction_without_those_rows();
+    solvers_solve_the_seen_problem();
+    until_nothing_is_left();
+    rows_out_do_not_count();
+    models_of_another_form();
+    return checks_report("observed");
+}
