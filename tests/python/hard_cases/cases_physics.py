@@ -38,7 +38,7 @@ CASES = (
         "The small one is hardly there; the large one exceeds touch_max_radius_mm.",
         "3 mm: one touch, to its diameter. 40 mm: touches only within it, though it may be more than one, and nine tenths of "
         "the image within it and a pixel around.",
-        ("hard_cases/test_hard_touches.py::test_small", "hard_cases/test_touches.py::test_large"),
+        ("hard_cases/test_hard_touches.py::test_small", "hard_cases/test_hard_touches.py::test_large"),
     ),
     Case(
         "physics/contrasts",
