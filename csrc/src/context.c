@@ -116,6 +116,7 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->working_slot = (uint32_t *)(void *)take_bytes(a, room * 4);
     eits_drop_columns(ctx);
     if (prepared) {
+        a->next += (EITS_LINE - (uintptr_t)a->next % EITS_LINE) % EITS_LINE;
         ctx->panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);
         ctx->working_panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);
         eits_make_panels(&ctx->model->sensitivity, ctx->panels);

@@ -36,6 +36,8 @@ typedef struct eits_kernels {
     eits_real (*dot)(const eits_real *a, const eits_real *b, size_t count);
     /* out += factor * a */
     void (*axpy)(eits_real *out, eits_real factor, const eits_real *a, size_t count);
+    /* List the `count` numbers' non-zeros and their places, in order; returns how many. */
+    uint32_t (*nonzeros)(const eits_real *a, uint32_t count, uint32_t *place, eits_real *value);
     /* The greatest of `count` numbers under the sign rule: max a, max -a or max |a|; not below 0, and none that is NaN. */
     eits_real (*greatest)(const eits_real *a, size_t count, eits_sign sign);
     /* One proximal step of FISTA over n coefficients: next = shrink(z + step * gradient, threshold) under the sign rule,
@@ -52,7 +54,8 @@ const eits_kernels *eits_kernels_best(void);
 void eits_read_column(const eits_matrix *matrix, uint32_t column, eits_real *out);
 
 /* List the non-zeros of x in ascending order, times the column scales; returns their number. */
-uint32_t eits_list_nonzeros(const eits_matrix *matrix, const eits_real *x, uint32_t *index, eits_real *value);
+uint32_t eits_list_nonzeros(const eits_kernels *kernels, const eits_matrix *matrix, const eits_real *x, uint32_t *index,
+                            eits_real *value);
 
 /* out = S' v by panels if there are any, else from the columns. */
 void eits_apply_t(const eits_context *ctx, const eits_real *v, eits_real *out);

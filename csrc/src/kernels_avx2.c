@@ -67,6 +67,9 @@ static void avx2_sum_two_panels(const eits_real *panel, const eits_real *other, 
 #define KERNELS_OWN_PRODUCTS
 #define KERNELS_OWN_ROWS
 #define KERNELS_OWN_GREATEST
+#ifndef EITS_DOUBLE
+#define KERNELS_OWN_NONZEROS
+#endif
 #define KERNELS_OWN_PROX
 #include "kernels_body.h"
 

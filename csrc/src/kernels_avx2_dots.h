@@ -1,4 +1,4 @@
-/* Part of kernels_avx2.c: products by eight lanes and a tree, and the greatest of many numbers. */
+/* Part of kernels_avx2.c: products by eight lanes and a tree, and the greatest and the non-zero of many numbers. */
 
 /* out = the trees of four columns' eight lanes each, in the order of eits_tree8. */
 static inline void four_trees(vector lanes[4][8 / LANES], eits_real *out)
@@ -136,3 +136,39 @@ static eits_real avx2_greatest(const eits_real *a, size_t count, eits_sign sign)
     }
     return greatest;
 }
+
+#ifndef EITS_DOUBLE
+/* Four at a time: a table says for each pattern of non-zeros how they move together. What is written beyond the non-zeros is
+ * written over, and never behind the last of `count` places. */
+static uint32_t avx2_nonzeros(const eits_real *a, uint32_t count, uint32_t *place, eits_real *value)
+{
+#define L(k) 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3
+#define NO 0, 0, 0, 0
+    static const uint8_t from[16][16] = {
+        {NO, NO, NO, NO},     {L(0), NO, NO, NO},   {L(1), NO, NO, NO},   {L(0), L(1), NO, NO},
+        {L(2), NO, NO, NO},   {L(0), L(2), NO, NO}, {L(1), L(2), NO, NO}, {L(0), L(1), L(2), NO},
+        {L(3), NO, NO, NO},   {L(0), L(3), NO, NO}, {L(1), L(3), NO, NO}, {L(0), L(1), L(3), NO},
+        {L(2), L(3), NO, NO}, {L(0), L(2), L(3), NO}, {L(1), L(2), L(3), NO}, {L(0), L(1), L(2), L(3)},
+    };
+#undef L
+#undef NO
+    static const uint8_t how_many[16] = {0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4};
+    uint32_t found = 0, j = 0;
+    __m128i places = _mm_setr_epi32(0, 1, 2, 3);
+    for (; j + 4 <= count; j += 4) {
+        const __m128 four = _mm_loadu_ps(a + j);
+        const int pattern = _mm_movemask_ps(_mm_cmpneq_ps(four, _mm_setzero_ps()));
+        const __m128i order = _mm_loadu_si128((const __m128i *)(const void *)from[pattern]);
+        _mm_storeu_si128((__m128i *)(void *)(place + found), _mm_shuffle_epi8(places, order));
+        _mm_storeu_si128((__m128i *)(void *)(value + found), _mm_shuffle_epi8(_mm_castps_si128(four), order));
+        found += how_many[pattern];
+        places = _mm_add_epi32(places, _mm_set1_epi32(4));
+    }
+    for (; j < count; ++j) {
+        place[found] = j;
+        value[found] = a[j];
+        found += a[j] != 0;
+    }
+    return found;
+}
+#endif

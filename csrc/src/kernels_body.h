@@ -1,7 +1,7 @@
 /* The matrix products, included once for each processor that they are built for (kernels_portable.c, kernels_avx2.c).
  * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this, and KERNELS_OWN_PRODUCTS,
- * KERNELS_OWN_VECTORS, KERNELS_OWN_ROWS, KERNELS_OWN_GREATEST or KERNELS_OWN_PROX where it has its own mul, mul_t, dots and unpack; dot and axpy;
- * rows_dot and rows_sum; greatest; or prox:
+ * KERNELS_OWN_VECTORS, KERNELS_OWN_ROWS, KERNELS_OWN_GREATEST, KERNELS_OWN_NONZEROS or KERNELS_OWN_PROX where it has its own mul, mul_t, dots and unpack; dot and axpy;
+ * rows_dot and rows_sum; greatest; nonzeros; or prox:
  *     sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the EITS_PANEL lanes l */
 #include "half.h"
 #include "kernels.h"
@@ -195,6 +195,19 @@ static void NAME(axpy)(eits_real *out, eits_real factor, const eits_real *a, siz
 
 #endif
 
+#ifndef KERNELS_OWN_NONZEROS
+static uint32_t NAME(nonzeros)(const eits_real *a, uint32_t count, uint32_t *place, eits_real *value)
+{
+    uint32_t found = 0;
+    for (uint32_t j = 0; j < count; ++j) {
+        place[found] = j;
+        value[found] = a[j];
+        found += a[j] != 0; /* without a branch that would be guessed wrong */
+    }
+    return found;
+}
+#endif
+
 #ifndef KERNELS_OWN_GREATEST
 /* Eight at a time: which of them is the greatest does not depend on the order. */
 static eits_real NAME(most)(const eits_real *a, size_t count)
@@ -274,5 +287,5 @@ static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restri
     {                                                                                                                      \
         .name = TEXT, .mul = NAME(mul), .mul_t = NAME(mul_t), .mul_t_panels = NAME(mul_t_panels),                       \
         .dots = NAME(dots), .rows_dot = NAME(rows_dot), .rows_sum = NAME(rows_sum), .unpack = NAME(unpack),                \
-        .dot = NAME(dot), .axpy = NAME(axpy), .greatest = NAME(greatest), .prox = NAME(prox)                               \
+        .dot = NAME(dot), .axpy = NAME(axpy), .nonzeros = NAME(nonzeros), .greatest = NAME(greatest), .prox = NAME(prox) \
     }

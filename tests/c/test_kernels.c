@@ -109,7 +109,7 @@ static void check_mul(const sample *s, uint64_t *state)
     uint32_t *index = memory_of(m->cols * sizeof *index);
     for (int share = 0; share <= 4; ++share) { /* of zeros: all, three quarters, ... none */
         fill(x, m->cols, 1 - 0.25 * share, state);
-        const uint32_t count = eits_list_nonzeros(m, x, index, value);
+        const uint32_t count = eits_list_nonzeros(builds[share % build_count], m, x, index, value);
         uint32_t seen = 0;
         for (uint32_t j = 0; j < m->cols; ++j) {
             if (x[j] == 0)
@@ -335,6 +335,31 @@ static void the_greatest(void)
     }
 }
 
+/* Every pattern of eight, and a few more behind; nothing is written behind the last place. */
+static void places_of_nonzeros(void)
+{
+    for (uint32_t pattern = 0; pattern < 256; ++pattern) {
+        for (uint32_t count = 8; count < 12; ++count) {
+            eits_real a[12] = {0}, value[13];
+            uint32_t place[13], found = 0;
+            for (uint32_t j = 0; j < count; ++j)
+                a[j] = pattern >> j % 8 & 1 ? (eits_real)j + 1 : 0;
+            for (int b = 0; b < build_count; ++b) {
+                place[count] = 77, value[count] = 77, found = 0;
+                const uint32_t listed = builds[b]->nonzeros(a, count, place, value);
+                for (uint32_t j = 0; j < count; ++j) {
+                    if (a[j] == 0)
+                        continue;
+                    CHECK(found < listed && place[found] == j && value[found] == a[j]);
+                    ++found;
+                }
+                CHECK_EQUAL(listed, found);
+                CHECK(place[count] == 77 && value[count] == 77);
+            }
+        }
+    }
+}
+
 static void proximal_steps(void)
 {
     uint64_t state = 13;
@@ -373,8 +398,10 @@ static void zeros_are_skipped(void)
     sample s = make_sample(EITS_STORAGE_F32, 5, 9, &state);
     eits_real x[9] = {0, R(-0.0), 2, 0, 0, R(-1e-30), 0, 0, 3}, value[9], out[8];
     uint32_t index[9];
-    CHECK_EQUAL(eits_list_nonzeros(&s.matrix, x, index, value), 3); /* minus zero is zero, however small is not */
-    CHECK(index[0] == 2 && index[1] == 5 && index[2] == 8);
+    for (int b = 0; b < build_count; ++b) {
+        CHECK_EQUAL(eits_list_nonzeros(builds[b], &s.matrix, x, index, value), 3); /* minus zero is zero, however small is not */
+        CHECK(index[0] == 2 && index[1] == 5 && index[2] == 8);
+    }
     for (uint32_t i = 0; i < 5; ++i)
         ((float *)s.data)[8 * 3 + i] = NAN; /* a column that is not listed is not read */
     builds[0]->mul(&s.matrix, index, value, 3, out);
@@ -408,6 +435,7 @@ int main(void)
     products_of_all_storages_and_sizes();
     dots_and_axpys();
     products_with_few_rows();
+    places_of_nonzeros();
     the_greatest();
     proximal_steps();
     zeros_are_skipped();

@@ -148,6 +148,7 @@ typedef struct eits_context {
 #define EITS_NO_PIXEL 0xFFFFu
 #define EITS_MOST_HELD 256u
 #define EITS_HELD(n_pixels) ((size_t)((n_pixels) < EITS_MOST_HELD ? (n_pixels) : EITS_MOST_HELD))
+#define EITS_LINE 64u /* bytes: panels start at a multiple, where no vector of theirs lies across two lines of the cache */
 #define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
 #define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
 #define EITS_REALS(count) EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
@@ -163,7 +164,7 @@ typedef struct eits_context {
      EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_REALS((size_t)(rank) * EITS_STRIDE(rank)) + EITS_ALIGN16((size_t)(n_cells) * 2u) +       \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \
      EITS_ALIGN16(EITS_HELD(n_pixels) * 2u) + EITS_ALIGN16(EITS_HELD(n_pixels)) + EITS_ALIGN16(EITS_HELD(n_pixels) * 4u) + \
-     ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) : 0u))
+     ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) + EITS_LINE : 0u))
 
 /* The same number for an open model, as a function. Returns 0 for a null model. */
 size_t eits_workspace_size(const eits_model *model, int prepared);
