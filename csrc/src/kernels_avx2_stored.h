@@ -70,23 +70,32 @@ static inline __m256 lanes_i8(const int8_t *from)
     return _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)from)));
 }
 
+/* Four rows from four registers, each with four numbers of a column in either half; blends are cheaper than shuffles. */
+static inline void four_rows(const vector c[4], vector row[4])
+{
+    const vector a = _mm256_unpacklo_ps(c[0], c[1]), b = _mm256_unpackhi_ps(c[0], c[1]);
+    const vector d = _mm256_unpacklo_ps(c[2], c[3]), e = _mm256_unpackhi_ps(c[2], c[3]);
+    const vector ad = _mm256_shuffle_ps(a, d, 0x4E), be = _mm256_shuffle_ps(b, e, 0x4E);
+    row[0] = _mm256_blend_ps(a, ad, 0xCC), row[1] = _mm256_blend_ps(ad, d, 0xCC);
+    row[2] = _mm256_blend_ps(b, be, 0xCC), row[3] = _mm256_blend_ps(be, e, 0xCC);
+}
+
 #define DEFINE_LANES(TAG, TYPE)                                                                                            \
-    /* row[i]: number i of eight columns, a lane each; column l and l + 4 share a register, so that lanes need not cross */ \
+    /* row[i]: number i of eight columns, a lane each; whole columns of eight are converted at once */                     \
     static inline void transpose_##TAG(const TYPE *const column[], size_t at, vector row[])                               \
     {                                                                                                                      \
-        vector c[4];                                                                                                       \
-        for (int l = 0; l < 4; ++l)                                                                                        \
-            c[l] = _mm256_insertf128_ps(_mm256_castps128_ps256(four_##TAG(column[l] + at)), four_##TAG(column[l + 4] + at), 1); \
-        const vector a = _mm256_unpacklo_ps(c[0], c[1]), b = _mm256_unpackhi_ps(c[0], c[1]);                               \
-        const vector d = _mm256_unpacklo_ps(c[2], c[3]), e = _mm256_unpackhi_ps(c[2], c[3]);                               \
-        const vector ad = _mm256_shuffle_ps(a, d, 0x4E), be = _mm256_shuffle_ps(b, e, 0x4E); /* blends are cheaper */      \
-        row[0] = _mm256_blend_ps(a, ad, 0xCC), row[1] = _mm256_blend_ps(ad, d, 0xCC);                                      \
-        row[2] = _mm256_blend_ps(b, be, 0xCC), row[3] = _mm256_blend_ps(be, e, 0xCC);                                      \
+        vector low[4], high[4];                                                                                            \
+        for (int l = 0; l < 4; ++l) {                                                                                      \
+            const vector c = lanes_##TAG(column[l] + at), d = lanes_##TAG(column[l + 4] + at);                             \
+            low[l] = _mm256_permute2f128_ps(c, d, 0x20), high[l] = _mm256_permute2f128_ps(c, d, 0x31);                     \
+        }                                                                                                                  \
+        four_rows(low, row);                                                                                               \
+        four_rows(high, row + 4);                                                                                          \
     }
 
 #endif
 
-enum { GROUPS = 4 }; /* of LANES columns at a time in mul_t: so many chains hide the latency of one */
+enum { GROUPS = 3 }; /* of LANES columns at a time in mul_t: so many chains hide the latency of one */
 
 #define DEFINE_PRODUCTS(TAG, TYPE)                                                                                         \
     DEFINE_LANES(TAG, TYPE)                                                                                                \
@@ -126,39 +135,42 @@ enum { GROUPS = 4 }; /* of LANES columns at a time in mul_t: so many chains hide
         for (; row < stride; row += 8)                                                                                     \
             rows_##TAG(data + row, stride, index, value, count, out + row, 8 / LANES);                                     \
     }                                                                                                                      \
+    /* sum_l = the chain over the first `whole` rows of column l, of `groups` times LANES columns */                       \
+    static inline void chains_##TAG(const TYPE *const column[], uint32_t whole, const eits_real *v, eits_real *sum,       \
+                                    const int groups)                                                                      \
+    {                                                                                                                      \
+        vector lane[GROUPS];                                                                                               \
+        for (int g = 0; g < groups; ++g)                                                                                   \
+            lane[g] = ZERO();                                                                                              \
+        for (uint32_t i = 0; i < whole; i += LANES) {                                                                      \
+            for (int g = 0; g < groups; ++g) {                                                                             \
+                vector row[LANES];                                                                                         \
+                transpose_##TAG(column + g * LANES, i, row);                                                               \
+                for (uint32_t r = 0; r < LANES; ++r)                                                                       \
+                    lane[g] = FMA(row[r], SET1(v[i + r]), lane[g]);                                                        \
+            }                                                                                                              \
+        }                                                                                                                  \
+        for (int g = 0; g < groups; ++g)                                                                                   \
+            STORE(sum + g * LANES, lane[g]);                                                                               \
+    }                                                                                                                      \
     static void mul_t_##TAG(const eits_matrix *matrix, const uint32_t *index, uint32_t count, const eits_real *v,         \
                             eits_real *out)                                                                                \
     {                                                                                                                      \
         const TYPE *data = matrix->data;                                                                                   \
         const uint32_t rows = matrix->rows, whole = rows / 8 * 8;                                                          \
-        for (uint32_t k = 0; k < count; k += GROUPS * LANES) {                                                             \
+        for (uint32_t k = 0; k < count;) {                                                                                 \
             const TYPE *column[GROUPS * LANES];                                                                            \
             eits_real sum[GROUPS * LANES];                                                                                 \
-            vector lane[GROUPS];                                                                                           \
-            const uint32_t taken = count - k < GROUPS * LANES ? count - k : GROUPS * LANES;                                \
-            const int groups = (int)((taken + LANES - 1) / LANES);                                                         \
-            for (uint32_t l = 0; l < GROUPS * LANES; ++l) { /* lanes to spare take the last column again */                \
+            const uint32_t width = count - k >= GROUPS * LANES ? GROUPS * LANES : LANES;                                   \
+            const uint32_t taken = count - k < width ? count - k : width;                                                  \
+            for (uint32_t l = 0; l < width; ++l) { /* lanes to spare take the last column again */                         \
                 const uint32_t at = l < taken ? k + l : count - 1;                                                         \
                 column[l] = data + (size_t)matrix->stride * (index != NULL ? index[at] : at);                              \
             }                                                                                                              \
-            for (int g = 0; g < GROUPS; ++g)                                                                               \
-                lane[g] = ZERO();                                                                                          \
-            for (uint32_t i = 0; i < whole; i += 8) {                                                                      \
-                for (int g = 0; g < groups; ++g) {                                                                         \
-                    const TYPE *from[LANES];                                                                               \
-                    vector row[4];                                                                                         \
-                    for (int l = 0; l < LANES; ++l)                                                                        \
-                        from[l] = column[g * LANES + l];                                                                   \
-                    transpose_##TAG(from, i, row);                                                                         \
-                    for (uint32_t r = 0; r < 4; ++r)                                                                       \
-                        lane[g] = FMA(row[r], SET1(v[i + r]), lane[g]);                                                    \
-                    transpose_##TAG(from, i + 4, row);                                                                     \
-                    for (uint32_t r = 0; r < 4; ++r)                                                                       \
-                        lane[g] = FMA(row[r], SET1(v[i + 4 + r]), lane[g]);                                                \
-                }                                                                                                          \
-            }                                                                                                              \
-            for (int g = 0; g < GROUPS; ++g)                                                                               \
-                STORE(sum + g * LANES, lane[g]);                                                                           \
+            if (width > LANES)                                                                                             \
+                chains_##TAG(column, whole, v, sum, GROUPS);                                                               \
+            else                                                                                                           \
+                chains_##TAG(column, whole, v, sum, 1);                                                                    \
             for (uint32_t i = whole; i < rows; ++i) {                                                                      \
                 for (uint32_t l = 0; l < taken; ++l) {                                                                     \
                     float number[8]; /* a column is padded to a multiple of eight */                                       \
@@ -168,6 +180,7 @@ enum { GROUPS = 4 }; /* of LANES columns at a time in mul_t: so many chains hide
                 }                                                                                                          \
             }                                                                                                              \
             memcpy(out + k, sum, taken * sizeof *sum);                                                                     \
+            k += taken;                                                                                                    \
         }                                                                                                                  \
     }
 

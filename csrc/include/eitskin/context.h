@@ -159,10 +159,9 @@ typedef struct eits_context {
  * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
     (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + EITS_REALS(n_folded) +                   \
-     (8 + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
+     (8 + 2 * (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
-     EITS_ALIGN16((size_t)(n_pixels) * 4u) + (size_t)(rank)*EITS_REALS(EITS_STRIDE(rank)) +                                \
-     EITS_ALIGN16((size_t)(n_cells) * 2u) +                                                                                \
+     EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_ALIGN16((size_t)(n_cells) * 2u) +                                        \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \
      EITS_ALIGN16(EITS_HELD(n_pixels) * 2u) + EITS_ALIGN16(EITS_HELD(n_pixels)) + EITS_ALIGN16(EITS_HELD(n_pixels) * 4u) + \
      ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) + EITS_LINE - 16u : 0u))
