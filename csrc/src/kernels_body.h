@@ -1,7 +1,7 @@
 /* The matrix products, included once for each processor that they are built for (kernels_portable.c, kernels_avx2.c).
- * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this, and KERNELS_OWN_PRODUCTS,
- * KERNELS_OWN_VECTORS, KERNELS_OWN_ROWS, KERNELS_OWN_GREATEST, KERNELS_OWN_NONZEROS or KERNELS_OWN_PROX where it has its own mul, mul_t, dots and unpack; dot and axpy;
- * rows_dot and rows_sum; greatest; nonzeros; or prox:
+ * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this, and where it has its own
+ * KERNELS_OWN_PRODUCTS (mul, mul_t, dots, unpack), KERNELS_OWN_PANELS (sum_two_panels beside the above), KERNELS_OWN_VECTORS (dot,
+ * axpy), KERNELS_OWN_ROWS (rows_dot, rows_sum), KERNELS_OWN_NONZEROS, KERNELS_OWN_GREATEST, KERNELS_OWN_PROX:
  *     sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the EITS_PANEL lanes l */
 #include "half.h"
 #include "kernels.h"
