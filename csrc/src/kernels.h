@@ -36,6 +36,8 @@ typedef struct eits_kernels {
     eits_real (*dot)(const eits_real *a, const eits_real *b, size_t count);
     /* out += factor * a */
     void (*axpy)(eits_real *out, eits_real factor, const eits_real *a, size_t count);
+    /* out = a + factor * (a - b) */
+    void (*extrapolate)(eits_real *out, eits_real factor, const eits_real *a, const eits_real *b, size_t count);
     /* List the `count` numbers' non-zeros and their places, in order; returns how many. */
     uint32_t (*nonzeros)(const eits_real *a, uint32_t count, uint32_t *place, eits_real *value);
     /* The greatest of `count` numbers under the sign rule: max a, max -a or max |a|; not below 0, and none that is NaN. */

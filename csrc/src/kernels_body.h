@@ -248,6 +248,13 @@ static eits_real NAME(greatest)(const eits_real *a, size_t count, eits_sign sign
 }
 #endif
 
+static void NAME(extrapolate)(eits_real *restrict out, eits_real factor, const eits_real *restrict a, const eits_real *restrict b,
+                              size_t count)
+{
+    for (size_t i = 0; i < count; ++i)
+        out[i] = eits_fma(factor, a[i] - b[i], a[i]);
+}
+
 #ifndef KERNELS_OWN_ROWS
 static void NAME(rows_dot)(const eits_real *rows, size_t stride, uint32_t count, size_t length, const eits_real *v, eits_real *out)
 {
@@ -287,5 +294,6 @@ static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restri
     {                                                                                                                      \
         .name = TEXT, .mul = NAME(mul), .mul_t = NAME(mul_t), .mul_t_panels = NAME(mul_t_panels),                       \
         .dots = NAME(dots), .rows_dot = NAME(rows_dot), .rows_sum = NAME(rows_sum), .unpack = NAME(unpack),                \
-        .dot = NAME(dot), .axpy = NAME(axpy), .nonzeros = NAME(nonzeros), .greatest = NAME(greatest), .prox = NAME(prox) \
+        .dot = NAME(dot), .axpy = NAME(axpy), .extrapolate = NAME(extrapolate), .nonzeros = NAME(nonzeros),                \
+        .greatest = NAME(greatest), .prox = NAME(prox)                                                                     \
     }

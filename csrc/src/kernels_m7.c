@@ -357,6 +357,7 @@ const eits_kernels eits_kernels_m7 = {
     .unpack = own_unpack,
     .dot = own_dot,
     .axpy = own_axpy,
+    .extrapolate = m7_extrapolate,
     .nonzeros = m7_nonzeros,
     .greatest = m7_greatest,
     .prox = m7_prox,

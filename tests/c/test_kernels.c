@@ -276,6 +276,9 @@ static void dots_and_axpys(void)
             builds[k]->axpy(out[k], R(-0.37), a, count);
             for (size_t i = 0; i < count; ++i)
                 CHECK(out[k][i] == eits_fma(R(-0.37), a[i], b[i]));
+            builds[k]->extrapolate(out[k], R(0.8), a, b, count);
+            for (size_t i = 0; i < count; ++i)
+                CHECK(out[k][i] == eits_fma(R(0.8), a[i] - b[i], a[i]));
         }
         free(a), free(b), free(out[0]), free(out[1]);
     }

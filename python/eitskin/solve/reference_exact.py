@@ -186,7 +186,7 @@ class ActiveSet:
         return moved or bool((self.held.spread(self.p.n) != before).any()), failed
 
     def _look_nearby(self, objective: float) -> tuple[float, bool, bool]:
-        """Columns beside those held so far, if the last step was worth it: objective, whether anything moved, whether it failed."""
+        """Columns beside those held so far, if the last step was worth it: objective, whether any moved, whether it failed."""
         p, held = self.p, self.held
         residual = p.residual(held.spread(p.n))
         now = 0.5 * float(residual @ residual) + p.lam * float(np.abs(held.x).sum())

@@ -200,9 +200,9 @@ def as_markdown(result: KernelTimes, command: str) -> str:
         + ("all are within 3 times their limit." if not hot else f"beyond 3 times the limit: {'; '.join(hot)}."),
         "The others serve contexts without room for panels. Beyond 3 times their limit: "
         + (f"{'; '.join(cold)}. " if cold else "none. ")
-        + "`mul_t` has to bring a row of eight columns into one register: 20 shuffles and 16 blends for 64 numbers. It takes as long by "
-        "16-byte loads into halves, by broadcast loads and blends, and by two, three or four groups of eight columns at a time. In double "
-        "width each packed number is converted twice. `dots` sums in another order, needs no such rows, and is what the active set "
-        "calls; the iterations keep `mul_t` for its bits.",
+        + "`mul_t` has to bring a row of eight columns into one register: 20 shuffles and 16 blends for 64 numbers. It takes "
+        "as long by 16-byte loads into halves, by broadcast loads and blends, and by two, three or four groups of eight "
+        "columns at a time. In double width each packed number is converted twice. `dots` sums in another order, needs no "
+        "such rows, and is what the active set calls; the iterations keep `mul_t` for its bits.",
     ]
     return "\n\n".join(parts)
