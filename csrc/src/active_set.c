@@ -1,8 +1,9 @@
 /* Active set: the exact optimum over a few columns by Newton's step on a factor of their products, which grows and shrinks with
  * them; then those columns join whose correlation exceeds lambda and is the greatest among their neighbours in the image; and
- * again until none is missing; between two looks at every column, looks nearby (Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23, with several columns at a
- * time). Each step keeps signs and lowers the objective. A column that depends on those held moves with them, along what leaves
- * S x as it is, until one of them is zero and makes room: the factor never has more rows than there are directions. */
+ * again until none is missing; between two looks at every column, looks beside those held so far (Lawson and Hanson, Solving Least
+ * Squares Problems, 1974, chapter 23, with several columns at a time). Each step keeps signs and lowers the objective. A column
+ * that depends on those held moves with them, along what leaves S x as it is, until one of them is zero and makes room: the
+ * factor never has more rows than there are directions. */
 #include "certificate.h"
 #include "column.h"
 #include "factor.h"
@@ -21,7 +22,9 @@ typedef struct active {
     eits_real *sign;     /* of each column held: that of its coefficient, or of the correlation that brought it in */
     eits_real *work;
     eits_real *step;
+    eits_real *reach;    /* of each column held: what share of the step it can go */
     eits_real *column;   /* the new column's part that counts */
+    eits_nearby near;    /* columns beside those held, now or before */
     int limited; /* the next step is not to be had for the MACs */
     int loose;   /* a column is held that the factor does not have */
     int broken;  /* the factor is of no use */
@@ -46,33 +49,19 @@ static int affords(const eits_context *ctx, active *a, uint64_t macs)
     return !a->limited;
 }
 
-/* Copy column working[k] into its lane of the panels, where there are any. */
-static void pack_lane(const eits_context *ctx, uint32_t k)
-{
-    if (ctx->working_panels == NULL)
-        return;
-    const uint32_t rows = ctx->model->rank, j = ctx->working[k];
-    eits_real *to = ctx->working_panels + (size_t)(k / EITS_PANEL) * EITS_PANEL * rows + k % EITS_PANEL;
-    const eits_real *from = ctx->panels + (size_t)(j / EITS_PANEL) * EITS_PANEL * rows + j % EITS_PANEL;
-    for (uint32_t i = 0; i < rows; ++i)
-        to[(size_t)i * EITS_PANEL] = from[(size_t)i * EITS_PANEL];
-}
-
+/* The last column held takes the place. Uses a->work and a->step. */
 static void drop(eits_context *ctx, active *a, uint32_t place)
 {
-    const uint32_t count = ctx->working_count;
-    if (affords(ctx, a, eits_factor_drop_macs(count, place))) { /* otherwise the factor is needed no longer */
-        ctx->info.macs += eits_factor_drop_macs(count, place);
-        eits_factor_drop(ctx, count, place);
+    const uint32_t count = ctx->working_count, last = count - 1;
+    if (affords(ctx, a, eits_factor_macs(count))) { /* otherwise the factor is needed no longer */
+        ctx->info.macs += eits_factor_macs(count);
+        eits_factor_drop(ctx, count, place, a->work, a->step);
     }
-    --ctx->working_count;
-    for (uint32_t k = place; k + 1 < count; ++k) {
-        ctx->working[k] = ctx->working[k + 1];
-        ctx->x[k] = ctx->x[k + 1];
-        a->pull[k] = a->pull[k + 1];
-        a->sign[k] = a->sign[k + 1];
-        pack_lane(ctx, k);
-    }
+    ctx->working_count = last;
+    ctx->working[place] = ctx->working[last];
+    ctx->x[place] = ctx->x[last];
+    a->pull[place] = a->pull[last];
+    a->sign[place] = a->sign[last];
 }
 
 /* Hold column j without a row of the factor's: only where the solve ends or another solver goes on. */
@@ -91,39 +80,40 @@ static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
     for (uint32_t i = 0; i < rank; ++i)
         a->column[i] = scale * from[i];
     const eits_real before = eits_dot(ctx, a->column, a->column, rank);
-    ctx->info.macs += 2u * rank + eits_forward(ctx, a->column);
+    ctx->info.macs += rank;
+    if (ctx->basis_count == 0 && !ctx->rewhitened)
+        return before;
+    ctx->info.macs += rank + eits_forward(ctx, a->column);
     const eits_real square = eits_dot(ctx, a->column, a->column, rank);
     return square > INDEPENDENT * before ? square : 0;
 }
 
-/* a->work = L^-1 (products of the new column with those held); returns what they leave of its square. */
+/* a->step = the combination of the columns held that comes nearest to the new one; returns what it leaves of its square. */
 static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
 {
     const uint32_t count = ctx->working_count;
-    eits_apply_t_working(ctx, eits_adjoint(ctx, a->column, ctx->adjoint), a->work);
-    eits_factor_forward(ctx, count, a->work, a->work);
-    ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_adjoint_macs(ctx) + eits_factor_solve_macs(count) + count;
+    ctx->kernels->dots(&ctx->model->sensitivity, ctx->working, count, eits_adjoint(ctx, a->column, ctx->adjoint), a->step);
+    eits_factor_solve(ctx, count, a->step, a->work, a->step);
+    ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_adjoint_macs(ctx) + eits_factor_macs(count) + count;
     return square - eits_dot(ctx, a->work, a->work, count);
 }
 
 static void hold(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_real sign, eits_real pull, eits_real left)
 {
     const uint32_t k = ctx->working_count++;
-    eits_factor_append(ctx, k, a->work, left);
+    eits_factor_append(ctx, k, a->step, left);
     ctx->working[k] = j;
     ctx->x[k] = x;
     a->sign[k] = sign;
     a->pull[k] = pull;
-    pack_lane(ctx, k);
 }
 
-/* The new column depends on those held (a->work as above). Move along what leaves S x as it is, if that lowers the objective,
+/* The new column depends on those held (a->step as above). Move along what leaves S x as it is, if that lowers the objective,
  * until a coefficient is zero, and drop that; returns by how much the new one moved, 0 where there is no such way. */
 static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_real pull)
 {
     const uint32_t count = ctx->working_count;
-    eits_factor_back(ctx, count, a->work, a->step);
-    ctx->info.macs += eits_factor_solve_macs(count) + count;
+    ctx->info.macs += count;
     eits_real slope = sign * pull, shortest = R(INFINITY);
     uint32_t place = count;
     for (uint32_t k = 0; k < count; ++k) {
@@ -146,12 +136,12 @@ static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_rea
 /* Take column j in, at zero. */
 static void add(eits_context *ctx, active *a, uint32_t j)
 {
-    const eits_real sign = ctx->gradient[j] > 0 ? 1 : -1, pull = eits_fma(-sign, a->lambda, ctx->gradient[j]);
+    const eits_real sign = ctx->gradient[j] > 0 ? 1 : -1, pull = ctx->gradient[j] - sign * a->lambda;
     const uint32_t rank = ctx->model->rank;
     eits_real x = 0, square = 0;
     for (int first = 1;; first = 0) {
         const uint32_t count = ctx->working_count;
-        if (!affords(ctx, a, (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + 2u * (eits_factor_solve_macs(count) + count)))
+        if (!affords(ctx, a, (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + eits_factor_macs(count) + 2u * count))
             break;
         if (first && !((square = read_column(ctx, a, j)) > 0))
             return;
@@ -185,28 +175,27 @@ static void settle(eits_context *ctx, active *a)
 {
     while (ctx->working_count > 0) {
         const uint32_t count = ctx->working_count;
-        if (!affords(ctx, a, 2u * eits_factor_solve_macs(count)))
+        if (!affords(ctx, a, eits_factor_macs(count)))
             return;
-        eits_factor_forward(ctx, count, a->pull, a->work);
-        eits_factor_back(ctx, count, a->work, a->step);
-        ctx->info.macs += 2u * eits_factor_solve_macs(count);
+        eits_factor_solve(ctx, count, a->pull, a->work, a->step);
+        ctx->info.macs += eits_factor_macs(count);
         if (!eits_all_finite(a->step, count)) {
             a->broken = 1;
             return;
         }
         eits_real share = 1;
         for (uint32_t k = 0; k < count; ++k) {
-            a->work[k] = reach(ctx, a, k);
-            share = a->work[k] < share ? a->work[k] : share;
+            a->reach[k] = reach(ctx, a, k);
+            share = a->reach[k] < share ? a->reach[k] : share;
         }
         for (uint32_t k = 0; k < count; ++k) {
-            ctx->x[k] = eits_fma(share, a->step[k], ctx->x[k]);
+            ctx->x[k] += share * a->step[k];
             a->pull[k] *= 1 - share;
         }
         a->moved = a->moved || share > 0;
         uint32_t dropped = 0;
         for (uint32_t k = count; k-- > 0;) {
-            if (a->work[k] <= share) {
+            if (a->reach[k] <= share) { /* the last, which takes the place, is not among them */
                 drop(ctx, a, k);
                 ++dropped;
             }
@@ -222,7 +211,7 @@ static eits_real take_pulls(eits_context *ctx, active *a)
     eits_real greatest = 0;
     for (uint32_t k = 0; k < ctx->working_count; ++k) {
         eits_real *g = &ctx->gradient[ctx->working[k]];
-        a->pull[k] = eits_fma(-a->sign[k], a->lambda, *g);
+        a->pull[k] = *g - a->sign[k] * a->lambda;
         greatest = eits_fabs(a->pull[k]) > greatest ? eits_fabs(a->pull[k]) : greatest;
         *g = 0;
     }
@@ -241,7 +230,7 @@ static eits_certificate certify(eits_context *ctx, const active *a)
 static int begin_warm(eits_context *ctx, active *a)
 {
     const uint64_t held = ctx->info.nonzeros, rank = ctx->model->rank;
-    if (!eits_affords(ctx, held * ((held + 2u) * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + eits_factor_solve_macs((uint32_t)held)) +
+    if (!eits_affords(ctx, held * ((held + 2u) * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + eits_factor_macs((uint32_t)held)) +
                                held * (rank + held) + 2u * eits_gradient_macs(ctx)))
         return 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
@@ -275,27 +264,29 @@ static int take_in(eits_context *ctx, active *a, uint32_t missing)
     return a->moved;
 }
 
-/* What joins next is mostly beside what is held: look there only. *objective is the last one known. Returns whether anything
+/* What joins next is mostly beside what is or was held: look there only. *objective is the last one known. Returns whether anything
  * moved. */
 static int look_nearby(eits_context *ctx, active *a, eits_real *objective)
 {
     const uint64_t rank = ctx->model->rank;
     if (a->limited || a->loose || a->broken ||
-        !eits_affords(ctx, ctx->working_count * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + ctx->model->n_pixels * rank +
-                               macs_to_finish(ctx, ctx->working_count)))
+        !eits_affords(ctx, ctx->working_count * rank + eits_forward_macs(ctx) + macs_to_finish(ctx, ctx->working_count)))
         return 0;
     ctx->info.macs += rank * eits_apply_working(ctx, ctx->x, ctx->sx);
     ctx->info.macs += eits_take_residual(ctx, ctx->sx);
-    eits_real now = R(0.5) * eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
+    eits_real l1 = 0;
     for (uint32_t k = 0; k < ctx->working_count; ++k)
-        now = eits_fma(a->lambda, eits_fabs(ctx->x[k]), now);
+        l1 += eits_fabs(ctx->x[k]);
+    const eits_real now = R(0.5) * eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank) + a->lambda * l1;
     if (!(now < *objective * (1 - WORTHWHILE)))
         return 0;
     *objective = now;
-    uint8_t *marks = (uint8_t *)(void *)ctx->z;
-    ctx->info.macs += eits_gradient_nearby(ctx, marks);
+    eits_nearby_add(ctx, &a->near);
+    if (!eits_affords(ctx, a->near.count * rank + eits_adjoint_macs(ctx) + macs_to_finish(ctx, ctx->working_count)))
+        return 0;
+    eits_take_gradient_nearby(ctx, &a->near);
     (void)take_pulls(ctx, a);
-    const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, marks);
+    const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, &a->near);
     return missing > 0 && take_in(ctx, a, missing);
 }
 
@@ -350,7 +341,9 @@ void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known
     const uint32_t free = ctx->model->rank - ctx->basis_count;
     active a = {.lambda = lambda, .most = free < ctx->model->n_pixels ? free : ctx->model->n_pixels};
     a.tolerance = 2 * EPSILON * eits_sqrt((eits_real)ctx->model->lipschitz) * ctx->info.data_norm;
-    a.pull = ctx->slope[0], a.sign = ctx->slope[1], a.work = ctx->slope[2], a.step = ctx->x_next, a.column = ctx->sx_next;
+    a.pull = ctx->slope[0], a.sign = ctx->slope[1], a.work = ctx->slope[2], a.step = ctx->sz;
+    a.reach = ctx->x_next, a.column = ctx->sx_next;
+    a.near = eits_nearby_none(ctx);
     eits_certificate c;
     ctx->working_count = ctx->working_held = 0; /* the set changes column by column here: none are held unpacked */
     if (gradient_known) {

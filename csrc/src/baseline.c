@@ -131,7 +131,7 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
     if (status != EITS_OK)
         return status;
     eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
-    const eits_real seen = eits_greatest(ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH) / ctx->noise_ratio;
+    const eits_real seen = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH) / ctx->noise_ratio;
     if (seen > ctx->baseline.lambda_noise)
         ctx->baseline.lambda_noise = seen;
     return EITS_OK;

@@ -54,7 +54,7 @@ eits_real eits_ceiling(const eits_context *ctx)
  * 606, doi 10.1109/JSTSP.2007.910971, with |y|^2 / 2 - |y - s r|^2 / 2 written out). */
 eits_certificate eits_evaluate(const eits_context *ctx, eits_real lambda, eits_layout layout)
 {
-    const eits_real largest = eits_greatest(ctx->gradient, ctx->model->n_pixels, ctx->options.sign);
+    const eits_real largest = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, ctx->options.sign);
     const eits_real s = largest > lambda ? lambda / largest : 1;
     const uint32_t count = layout == EITS_LAYOUT_WORKING ? ctx->working_count : ctx->model->n_pixels;
     eits_real lane[8] = {0}, lane_l1[8] = {0};

@@ -114,7 +114,7 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->list_value = take_reals(a, EITS_LIST(pixels, folded));
     ctx->list_index = (uint32_t *)(void *)take_bytes(a, EITS_LIST(pixels, folded) * 4);
     ctx->working = (uint32_t *)(void *)take_bytes(a, pixels * 4);
-    ctx->factor = take_reals(a, EITS_TRIANGLE(ctx->model->rank));
+    ctx->factor = take_reals(a, ctx->model->rank * stride);
     ctx->image = take_reals(a, pixels);
     ctx->atoms = take_reals(a, EITS_MAX_TOUCHES * stride);
     ctx->cell = (uint16_t *)(void *)take_bytes(a, (size_t)ctx->model->nx * ctx->model->ny * 2);
@@ -127,6 +127,7 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->working_slot = (uint32_t *)(void *)take_bytes(a, room * 4);
     eits_drop_columns(ctx);
     if (prepared) {
+        a->next += (EITS_LINE - (uintptr_t)a->next % EITS_LINE) % EITS_LINE;
         ctx->panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);
         ctx->working_panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);
         eits_make_panels(&ctx->model->sensitivity, ctx->panels);

@@ -5,44 +5,44 @@
 
 static eits_real *row(const eits_context *ctx, uint32_t i)
 {
-    return ctx->factor + EITS_TRIANGLE(i);
+    return ctx->factor + EITS_STRIDE(ctx->model->rank) * i;
 }
 
-void eits_factor_forward(const eits_context *ctx, uint32_t count, const eits_real *b, eits_real *w)
+void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, eits_real *w, eits_real *d)
 {
-    for (uint32_t i = 0; i < count; ++i)
-        w[i] = (b[i] - eits_dot(ctx, row(ctx, i), w, i)) / row(ctx, i)[i];
+    const size_t stride = EITS_STRIDE(ctx->model->rank), length = EITS_STRIDE(count);
+    eits_zero(b + count, length - count);
+    ctx->kernels->rows_dot(ctx->factor, stride, count, length, b, w);
+    ctx->kernels->rows_sum(ctx->factor, stride, count, length, w, d);
 }
 
-void eits_factor_back(const eits_context *ctx, uint32_t count, eits_real *w, eits_real *d)
+void eits_factor_append(eits_context *ctx, uint32_t count, const eits_real *d, eits_real left)
 {
-    for (uint32_t i = count; i-- > 0;) {
-        d[i] = w[i] / row(ctx, i)[i];
-        eits_axpy(ctx, w, -d[i], row(ctx, i), i);
+    const eits_real share = 1 / eits_sqrt(left);
+    eits_real *r = row(ctx, count);
+    eits_zero(r, EITS_STRIDE(ctx->model->rank));
+    for (uint32_t k = 0; k < count; ++k)
+        r[k] = -share * d[k];
+    r[count] = share;
+}
+
+void eits_factor_drop(eits_context *ctx, uint32_t count, uint32_t place, eits_real *scratch, eits_real *more)
+{
+    const size_t stride = EITS_STRIDE(ctx->model->rank), length = EITS_STRIDE(count);
+    const uint32_t last = count - 1;
+    eits_real square = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        scratch[i] = row(ctx, i)[place];
+        square += scratch[i] * scratch[i];
     }
-}
-
-void eits_factor_append(eits_context *ctx, uint32_t count, const eits_real *w, eits_real left)
-{
-    eits_copy(row(ctx, count), w, count);
-    row(ctx, count)[count] = eits_sqrt(left);
-}
-
-/* Without row `place` the rows below reach one column too far; rotations of neighbouring columns bring them back. */
-void eits_factor_drop(eits_context *ctx, uint32_t count, uint32_t place)
-{
-    for (uint32_t c = place; c + 1 < count; ++c) {
-        const eits_real *top = row(ctx, c + 1);
-        const eits_real a = top[c], b = top[c + 1];
-        const eits_real length = eits_sqrt(eits_fma(a, a, b * b));
-        const eits_real cosine = length > 0 ? a / length : 1, sine = length > 0 ? b / length : 0;
-        for (uint32_t i = c + 1; i < count; ++i) {
-            eits_real *r = row(ctx, i);
-            const eits_real left = r[c], right = r[c + 1];
-            r[c] = eits_fma(cosine, left, sine * right);
-            r[c + 1] = eits_fma(cosine, right, -sine * left);
-        }
+    const eits_real norm = eits_sqrt(square), end = eits_fabs(scratch[last]);
+    scratch[last] = scratch[last] < 0 ? -(norm + end) : norm + end; /* the sign that does not cancel */
+    const eits_real twice = norm > 0 ? 1 / (norm * (norm + end)) : 0;
+    ctx->kernels->rows_sum(ctx->factor, stride, count, length, scratch, more);
+    for (uint32_t i = 0; i < last; ++i) {
+        eits_real *r = row(ctx, i);
+        eits_axpy(ctx, r, -twice * scratch[i], more, length);
+        r[place] = r[last];
+        r[last] = 0;
     }
-    for (uint32_t i = place; i + 1 < count; ++i) /* each row moves up, and is one shorter */
-        eits_copy(row(ctx, i), row(ctx, i + 1), i + 1);
 }

@@ -73,9 +73,7 @@ static int iterate(eits_context *ctx, eits_real lambda, eits_real step, eits_rea
     ctx->info.nonzeros = by_working_set(ctx) ? eits_apply_working(ctx, ctx->x_next, ctx->sx_next)
                                              : eits_apply(ctx, ctx->x_next, ctx->sx_next);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
-    const size_t stride = EITS_STRIDE(ctx->model->rank);
-    for (size_t i = 0; i < stride; ++i)
-        ctx->sz[i] = eits_fma(beta, ctx->sx_next[i] - ctx->sx[i], ctx->sx_next[i]);
+    ctx->kernels->extrapolate(ctx->sz, beta, ctx->sx_next, ctx->sx, EITS_STRIDE(ctx->model->rank));
     swap(&ctx->x, &ctx->x_next);
     swap(&ctx->sx, &ctx->sx_next);
     *t = t_next;

@@ -50,14 +50,9 @@ static void scale_listed(const eits_matrix *matrix, const uint32_t *index, uint3
         values[k] *= (eits_real)matrix->scale[index[k]];
 }
 
-uint32_t eits_list_nonzeros(const eits_matrix *matrix, const eits_real *x, uint32_t *index, eits_real *value)
+uint32_t eits_list_nonzeros(const eits_kernels *kernels, const eits_matrix *matrix, const eits_real *x, uint32_t *index, eits_real *value)
 {
-    uint32_t count = 0;
-    for (uint32_t j = 0; j < matrix->cols; ++j) {
-        index[count] = j;
-        value[count] = x[j];
-        count += x[j] != 0; /* without a branch that would be guessed wrong */
-    }
+    const uint32_t count = kernels->nonzeros(x, matrix->cols, index, value);
     scale_listed(matrix, index, count, value);
     return count;
 }
@@ -88,7 +83,7 @@ void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real
 uint32_t eits_apply(const eits_context *ctx, const eits_real *x, eits_real *out)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
-    const uint32_t count = eits_list_nonzeros(s, x, ctx->list_index, ctx->list_value);
+    const uint32_t count = eits_list_nonzeros(ctx->kernels, s, x, ctx->list_index, ctx->list_value);
     ctx->kernels->mul(s, ctx->list_index, ctx->list_value, count, out);
     return count;
 }

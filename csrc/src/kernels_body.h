@@ -1,7 +1,7 @@
 /* The matrix products, included once for each processor that they are built for (kernels_portable.c, kernels_avx2.c).
- * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this, and KERNELS_OWN_PRODUCTS or
- * KERNELS_OWN_VECTORS where it has its own mul, mul_t and unpack, or dot and axpy, or
- * KERNELS_OWN_PROX:
+ * NAME(x) gives that build's names; the build defines NAME(sum_panel) before it includes this, and where it has its own
+ * KERNELS_OWN_PRODUCTS (mul, mul_t, dots, unpack), KERNELS_OWN_PANELS (sum_two_panels beside the above), KERNELS_OWN_VECTORS (dot,
+ * axpy), KERNELS_OWN_ROWS (rows_dot, rows_sum), KERNELS_OWN_NONZEROS, KERNELS_OWN_GREATEST, KERNELS_OWN_PROX:
  *     sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the EITS_PANEL lanes l */
 #include "half.h"
 #include "kernels.h"
@@ -58,6 +58,23 @@
             for (uint32_t i = 0; i < matrix->rows; ++i)                                                                    \
                 a = eits_fma(READ(c[i]), v[i], a);                                                                         \
             out[k] = a;                                                                                                    \
+        }                                                                                                                  \
+    }                                                                                                                      \
+    static void NAME(dots_##TAG)(const eits_matrix *matrix, const uint32_t *index, uint32_t count, const eits_real *v,     \
+                                 eits_real *out)                                                                           \
+    {                                                                                                                      \
+        const uint32_t rows = matrix->rows;                                                                                \
+        for (uint32_t k = 0; k < count; ++k) {                                                                             \
+            const TYPE *c = (const TYPE *)matrix->data + (size_t)matrix->stride * index[k];                                \
+            eits_real lane[8] = {0};                                                                                       \
+            uint32_t i = 0;                                                                                                \
+            for (; i + 8 <= rows; i += 8) {                                                                                \
+                for (uint32_t l = 0; l < 8; ++l)                                                                           \
+                    lane[l] = eits_fma(READ(c[i + l]), v[i + l], lane[l]);                                                 \
+            }                                                                                                              \
+            for (uint32_t l = 0; i + l < rows; ++l)                                                                        \
+                lane[l] = eits_fma(READ(c[i + l]), v[i + l], lane[l]);                                                     \
+            out[k] = eits_tree8(lane);                                                                                     \
         }                                                                                                                  \
     }
 
@@ -124,12 +141,29 @@ static void NAME(mul_t)(const eits_matrix *matrix, const uint32_t *index, uint32
     }
     NAME(scale)(matrix, index, count, out);
 }
+
+static void NAME(dots)(const eits_matrix *matrix, const uint32_t *index, uint32_t count, const eits_real *v, eits_real *out)
+{
+    switch (matrix->storage) {
+    case EITS_STORAGE_F32: NAME(dots_f32)(matrix, index, count, v, out); break;
+    case EITS_STORAGE_F16: NAME(dots_f16)(matrix, index, count, v, out); break;
+    case EITS_STORAGE_I16: NAME(dots_i16)(matrix, index, count, v, out); break;
+    case EITS_STORAGE_I8: NAME(dots_i8)(matrix, index, count, v, out); break;
+    }
+    NAME(scale)(matrix, index, count, out);
+}
 #endif
 
 static void NAME(mul_t_panels)(const eits_matrix *matrix, const eits_real *panels, const uint32_t *index, uint32_t count,
                                const eits_real *v, eits_real *out)
 {
-    for (uint32_t j = 0; j < count; j += EITS_PANEL) {
+    uint32_t j = 0;
+#ifdef KERNELS_OWN_PANELS
+    const size_t whole = (size_t)EITS_PANEL * matrix->rows;
+    for (; j + 2 * EITS_PANEL <= count; j += 2 * EITS_PANEL)
+        NAME(sum_two_panels)(panels + (size_t)j * matrix->rows, panels + (size_t)j * matrix->rows + whole, v, matrix->rows, out + j);
+#endif
+    for (; j < count; j += EITS_PANEL) {
         const uint32_t lanes = count - j < EITS_PANEL ? count - j : EITS_PANEL;
         eits_real sum[EITS_PANEL];
         NAME(sum_panel)(panels + (size_t)j * matrix->rows, v, matrix->rows, sum);
@@ -161,6 +195,82 @@ static void NAME(axpy)(eits_real *out, eits_real factor, const eits_real *a, siz
 
 #endif
 
+#ifndef KERNELS_OWN_NONZEROS
+static uint32_t NAME(nonzeros)(const eits_real *a, uint32_t count, uint32_t *place, eits_real *value)
+{
+    uint32_t found = 0;
+    for (uint32_t j = 0; j < count; ++j) {
+        place[found] = j;
+        value[found] = a[j];
+        found += a[j] != 0; /* without a branch that would be guessed wrong */
+    }
+    return found;
+}
+#endif
+
+#ifndef KERNELS_OWN_GREATEST
+/* Eight at a time: which of them is the greatest does not depend on the order. */
+static eits_real NAME(most)(const eits_real *a, size_t count)
+{
+    eits_real lane[8] = {0};
+    size_t i = 0;
+    for (; i + 8 <= count; i += 8) {
+        for (size_t l = 0; l < 8; ++l)
+            lane[l] = a[i + l] > lane[l] ? a[i + l] : lane[l];
+    }
+    for (; i < count; ++i)
+        lane[0] = a[i] > lane[0] ? a[i] : lane[0];
+    for (size_t l = 1; l < 8; ++l)
+        lane[0] = lane[l] > lane[0] ? lane[l] : lane[0];
+    return lane[0];
+}
+
+static eits_real NAME(least)(const eits_real *a, size_t count)
+{
+    eits_real lane[8] = {0};
+    size_t i = 0;
+    for (; i + 8 <= count; i += 8) {
+        for (size_t l = 0; l < 8; ++l)
+            lane[l] = a[i + l] < lane[l] ? a[i + l] : lane[l];
+    }
+    for (; i < count; ++i)
+        lane[0] = a[i] < lane[0] ? a[i] : lane[0];
+    for (size_t l = 1; l < 8; ++l)
+        lane[0] = lane[l] < lane[0] ? lane[l] : lane[0];
+    return lane[0];
+}
+
+static eits_real NAME(greatest)(const eits_real *a, size_t count, eits_sign sign)
+{
+    const eits_real high = sign != EITS_SIGN_DECREASE ? NAME(most)(a, count) : 0;
+    const eits_real low = sign != EITS_SIGN_INCREASE ? -NAME(least)(a, count) : 0;
+    return low > high ? low : high;
+}
+#endif
+
+static void NAME(extrapolate)(eits_real *restrict out, eits_real factor, const eits_real *restrict a, const eits_real *restrict b,
+                              size_t count)
+{
+    for (size_t i = 0; i < count; ++i)
+        out[i] = eits_fma(factor, a[i] - b[i], a[i]);
+}
+
+#ifndef KERNELS_OWN_ROWS
+static void NAME(rows_dot)(const eits_real *rows, size_t stride, uint32_t count, size_t length, const eits_real *v, eits_real *out)
+{
+    for (uint32_t k = 0; k < count; ++k)
+        out[k] = NAME(dot)(rows + stride * k, v, length);
+}
+
+static void NAME(rows_sum)(const eits_real *rows, size_t stride, uint32_t count, size_t length, const eits_real *value,
+                           eits_real *out)
+{
+    eits_zero(out, length);
+    for (uint32_t k = 0; k < count; ++k)
+        NAME(axpy)(out, value[k], rows + stride * k, length);
+}
+#endif
+
 #ifndef KERNELS_OWN_PROX
 /* The proximal step of threshold |x|_1: of the two halves one is zero, or both. v - v is zero, and NaN where v is not finite:
  * a run that overflows must not end as a zero. */
@@ -183,5 +293,7 @@ static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restri
 #define KERNELS_TABLE(TEXT)                                                                                                \
     {                                                                                                                      \
         .name = TEXT, .mul = NAME(mul), .mul_t = NAME(mul_t), .mul_t_panels = NAME(mul_t_panels),                       \
-        .unpack = NAME(unpack), .dot = NAME(dot), .axpy = NAME(axpy), .prox = NAME(prox)                                   \
+        .dots = NAME(dots), .rows_dot = NAME(rows_dot), .rows_sum = NAME(rows_sum), .unpack = NAME(unpack),                \
+        .dot = NAME(dot), .axpy = NAME(axpy), .extrapolate = NAME(extrapolate), .nonzeros = NAME(nonzeros),                \
+        .greatest = NAME(greatest), .prox = NAME(prox)                                                                     \
     }

@@ -1,7 +1,8 @@
 /* The matrix products for a Cortex-M7 with its single-precision FPU. The portable C loads each number by an instruction of its
  * own; here VLDM loads many by one, so that an instruction is spent on little but the FMA. Each sum is the same chain in the
  * same order, hence the same bits. Instructions a multiply-accumulate: mul_t 1.35 (f16 2.4, i16 3.3,
- * i8 4.0), mul 1.35 (other storages are unpacked block by block before), dot 1.5; to unpack a number: f16 1.5, i16 and i8 3.1. */
+ * i8 4.0), mul 1.35 (other storages are unpacked block by block before, for dots too), dot 1.5; to unpack a number: f16 1.5, i16 and
+ * i8 3.1. */
 #define NAME(x) m7_##x
 
 #include "kernels.h"
@@ -18,6 +19,7 @@ static void m7_sum_panel(const eits_real *panel, const eits_real *v, uint32_t ro
 }
 
 #define KERNELS_OWN_VECTORS /* dot and axpy stand below */
+#define KERNELS_OWN_ROWS
 #define KERNELS_OWN_PRODUCTS
 #include "kernels_body.h"
 
@@ -342,59 +344,21 @@ static void own_mul(const eits_matrix *matrix, const uint32_t *index, const eits
         mul_unpacked(matrix, index, value, count, out);
 }
 
-/* ---- vectors ---- */
-
-static eits_real own_dot(const eits_real *a, const eits_real *b, size_t count)
-{
-    eits_real lane[8] = {0};
-    uint32_t turns = (uint32_t)(count / 8);
-    if (turns > 0) {
-        __asm__ volatile("vldmia %[lane], {s16-s23}\n"
-                         "1:\n\t"
-                         "vldmia %[a]!, {s0-s7}\n\t"
-                         "vldmia %[b]!, {s8-s15}\n\t"
-                         "vfma.f32 s16, s0, s8\n\tvfma.f32 s17, s1, s9\n\tvfma.f32 s18, s2, s10\n\tvfma.f32 s19, s3, s11\n\t"
-                         "vfma.f32 s20, s4, s12\n\tvfma.f32 s21, s5, s13\n\tvfma.f32 s22, s6, s14\n\tvfma.f32 s23, s7, s15\n\t"
-                         "subs %[turns], #1\n\t"
-                         "bne 1b\n\t"
-                         "vstmia %[lane], {s16-s23}\n\t"
-                         : [a] "+r"(a), [b] "+r"(b), [turns] "+l"(turns)
-                         : [lane] "r"(lane)
-                         : LOW_S, MIDDLE_S, "cc", "memory");
-    }
-    for (size_t l = 0; l < count % 8; ++l)
-        lane[l] = eits_fma(a[l], b[l], lane[l]);
-    return eits_tree8(lane);
-}
-
-static void own_axpy(eits_real *out, eits_real factor, const eits_real *a, size_t count)
-{
-    uint32_t turns = (uint32_t)(count / 8);
-    if (turns > 0) {
-        __asm__ volatile("vmov s16, %[factor]\n"
-                         "1:\n\t"
-                         "vldmia %[a]!, {s0-s7}\n\t"
-                         "vldmia %[out], {s8-s15}\n\t"
-                         "vfma.f32 s8, s16, s0\n\tvfma.f32 s9, s16, s1\n\tvfma.f32 s10, s16, s2\n\tvfma.f32 s11, s16, s3\n\t"
-                         "vfma.f32 s12, s16, s4\n\tvfma.f32 s13, s16, s5\n\tvfma.f32 s14, s16, s6\n\tvfma.f32 s15, s16, s7\n\t"
-                         "vstmia %[out]!, {s8-s15}\n\t"
-                         "subs %[turns], #1\n\t"
-                         "bne 1b\n\t"
-                         : [a] "+r"(a), [out] "+r"(out), [turns] "+l"(turns)
-                         : [factor] "r"(factor)
-                         : LOW_S, MIDDLE_S, "cc", "memory");
-    }
-    for (size_t i = 0; i < count % 8; ++i)
-        out[i] = eits_fma(factor, a[i], out[i]);
-}
+#include "kernels_m7_vectors.h"
 
 const eits_kernels eits_kernels_m7 = {
     .name = "cortex-m7",
     .mul = own_mul,
     .mul_t = own_mul_t,
     .mul_t_panels = m7_mul_t_panels,
+    .dots = own_dots,
+    .rows_dot = own_rows_dot,
+    .rows_sum = own_rows_sum,
     .unpack = own_unpack,
     .dot = own_dot,
     .axpy = own_axpy,
+    .extrapolate = m7_extrapolate,
+    .nonzeros = m7_nonzeros,
+    .greatest = m7_greatest,
     .prox = m7_prox,
 };

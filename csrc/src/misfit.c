@@ -138,7 +138,7 @@ void eits_judge_reference(eits_context *ctx)
     if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_FINDING_STALE_REFERENCE))
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
-    const eits_real against = eits_greatest(ctx->gradient, ctx->model->n_pixels, other);
+    const eits_real against = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, other);
     const eits_real least = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (least > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > least)
         ctx->info.findings |= EITS_FINDING_STALE_REFERENCE;

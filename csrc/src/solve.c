@@ -90,7 +90,7 @@ static eits_status solve(eits_context *ctx)
     }
     eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
     ctx->info.macs += (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx);
-    ctx->info.lambda_max = eits_greatest(ctx->gradient, ctx->model->n_pixels, o->sign);
+    ctx->info.lambda_max = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, o->sign);
     ctx->info.lambda = choose_lambda(ctx);
     if (!eits_is_finite(ctx->info.data_norm) || !eits_is_finite(ctx->info.lambda_max)) {
         ctx->info.data_norm = ctx->info.lambda_max = ctx->info.lambda = 0;

@@ -10,9 +10,6 @@ uint64_t eits_project(const eits_context *ctx, eits_real *v);
 /* eits_frame_stage without its checks; the baseline need not be finished. */
 eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t *masked, uint64_t *macs);
 
-/* The greatest of the coefficients' correlations g under the sign rule: max g, max -g or max |g|; not below 0. */
-eits_real eits_greatest(const eits_real *g, uint32_t count, eits_sign sign);
-
 /* 1 where each of the values is finite. */
 int eits_all_finite(const eits_real *values, size_t count);
 

@@ -63,7 +63,7 @@ static void seed(const eits_context *ctx, fit *f)
     const eits_model *model = ctx->model;
     const eits_options *o = &ctx->options;
     eits_real height[EITS_MAX_TOUCHES];
-    const eits_real least = o->touch_threshold * eits_greatest(ctx->image, model->n_pixels, EITS_SIGN_BOTH);
+    const eits_real least = o->touch_threshold * eits_greatest(ctx, ctx->image, model->n_pixels, EITS_SIGN_BOTH);
     for (uint32_t j = 0; j < model->n_pixels; ++j) {
         const eits_real here = eits_fabs(ctx->image[j]);
         if (!(here > 0) || here < least || !is_peak(ctx, j))

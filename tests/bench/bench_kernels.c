@@ -123,6 +123,11 @@ static void call_mul_t(work *w)
     w->kernels->mul_t(&w->matrix[w->storage], w->columns == FEW_COLUMNS ? w->few : NULL, w->columns, w->v, w->out);
 }
 
+static void call_dots(work *w)
+{
+    w->kernels->dots(&w->matrix[w->storage], w->few, w->columns, w->v, w->out);
+}
+
 static void call_panels(work *w)
 {
     w->kernels->mul_t_panels(&w->matrix[0], w->panels, NULL, w->columns, w->v, w->out);
@@ -253,6 +258,8 @@ int main(int count, char **argument)
         c = add("mul_t, all columns", names[s], call_mul_t, all, all * item[s]);
         c->which = (eits_storage)s, c->columns = cols;
         c = add("mul_t, 48 columns", names[s], call_mul_t, some, some * item[s]);
+        c->which = (eits_storage)s, c->columns = FEW_COLUMNS;
+        c = add("dots, 48 columns", names[s], call_dots, some, some * item[s]);
         c->which = (eits_storage)s, c->columns = FEW_COLUMNS;
         c = add("mul, all columns", names[s], call_mul, all, all * item[s]);
         c->which = (eits_storage)s, c->columns = cols, c->chain = cols;

@@ -109,7 +109,7 @@ static void check_mul(const sample *s, uint64_t *state)
     uint32_t *index = memory_of(m->cols * sizeof *index);
     for (int share = 0; share <= 4; ++share) { /* of zeros: all, three quarters, ... none */
         fill(x, m->cols, 1 - 0.25 * share, state);
-        const uint32_t count = eits_list_nonzeros(m, x, index, value);
+        const uint32_t count = eits_list_nonzeros(builds[share % build_count], m, x, index, value);
         uint32_t seen = 0;
         for (uint32_t j = 0; j < m->cols; ++j) {
             if (x[j] == 0)
@@ -187,6 +187,34 @@ static void check_mul_t(const sample *s, uint64_t *state)
     free(v), free(expected), free(out), free(panels), free(column);
 }
 
+/* S' v by eight lanes and a tree, in each build: one result, to the bit; numbers beside a column do not count. */
+static void check_dots(const sample *s, uint64_t *state)
+{
+    const eits_matrix *m = &s->matrix;
+    eits_real *v = reals(m->rows), *expected = reals(m->cols), *out = reals(m->cols + 1), *column = reals(m->rows);
+    uint32_t *index = memory_of(m->cols * sizeof *index);
+    fill(v, m->rows, 0.1, state);
+    for (uint32_t j = 0; j < m->cols; ++j) {
+        index[j] = m->cols - 1 - j;
+        eits_read_column(m, index[j], column);
+        eits_real lane[8] = {0};
+        for (uint32_t i = 0; i < m->rows; ++i)
+            lane[i % 8] = eits_fma(column[i], v[i], lane[i % 8]);
+        expected[j] = eits_tree8(lane);
+        if (m->scale != NULL)
+            expected[j] *= (eits_real)m->scale[index[j]];
+    }
+    for (int b = 0; b < build_count; ++b) {
+        for (uint32_t count = 0; count <= m->cols; count += count < 9 ? 1 : 23) {
+            memset(out, 0xFF, (m->cols + 1) * sizeof *out);
+            builds[b]->dots(m, index, count, v, out);
+            CHECK(same_bits(out, expected, count));
+            CHECK(isnan((double)out[count]));
+        }
+    }
+    free(v), free(expected), free(out), free(column), free(index);
+}
+
 /* Stored numbers as floats, from any block of eight on: the numbers themselves, padding included, and nothing beside them. */
 static void check_unpack(const sample *s)
 {
@@ -217,6 +245,7 @@ static void products_of_all_storages_and_sizes(void)
                 sample s = make_sample((eits_storage)storage, rows[r], cols[c], &state);
                 check_mul(&s, &state);
                 check_mul_t(&s, &state);
+                check_dots(&s, &state);
                 check_unpack(&s);
                 free_sample(&s);
             }
@@ -247,8 +276,90 @@ static void dots_and_axpys(void)
             builds[k]->axpy(out[k], R(-0.37), a, count);
             for (size_t i = 0; i < count; ++i)
                 CHECK(out[k][i] == eits_fma(R(-0.37), a[i], b[i]));
+            builds[k]->extrapolate(out[k], R(0.8), a, b, count);
+            for (size_t i = 0; i < count; ++i)
+                CHECK(out[k][i] == eits_fma(R(0.8), a[i] - b[i], a[i]));
         }
         free(a), free(b), free(out[0]), free(out[1]);
+    }
+}
+
+static void products_with_few_rows(void)
+{
+    enum { STRIDE = 40 };
+    uint64_t state = 15;
+    for (uint32_t count = 0; count <= 18; ++count) {
+        for (size_t length = 0; length <= STRIDE; length += 8) {
+            eits_real *rows = reals((size_t)STRIDE * count), *v = reals(STRIDE + 18), dots[20], sums[STRIDE + 1];
+            fill(rows, (size_t)STRIDE * count, 0.2, &state);
+            fill(v, STRIDE + 18, 0.2, &state);
+            for (int b = 0; b < build_count; ++b) {
+                memset(dots, 0xFF, sizeof dots), memset(sums, 0xFF, sizeof sums);
+                builds[b]->rows_dot(rows, STRIDE, count, length, v, dots);
+                builds[b]->rows_sum(rows, STRIDE, count, length, v, sums);
+                for (uint32_t k = 0; k < count; ++k)
+                    CHECK(dots[k] == builds[b]->dot(rows + STRIDE * k, v, length));
+                for (size_t i = 0; i < length; ++i) {
+                    eits_real chain = 0;
+                    for (uint32_t k = 0; k < count; ++k)
+                        chain = eits_fma(v[k], rows[STRIDE * k + i], chain);
+                    CHECK(sums[i] == chain);
+                }
+                CHECK(isnan((double)dots[count]) && isnan((double)sums[length]));
+            }
+            free(rows), free(v);
+        }
+    }
+}
+
+static void the_greatest(void)
+{
+    uint64_t state = 16;
+    for (size_t count = 0; count <= 70; ++count) {
+        for (int kind = 0; kind < 3; ++kind) { /* of both signs, none above zero, none below */
+            eits_real *a = reals(count), most[3] = {0};
+            fill(a, count, 0.1, &state);
+            for (size_t i = 0; i < count; ++i) {
+                a[i] = kind == 0 ? a[i] : kind == 1 ? -eits_fabs(a[i]) : eits_fabs(a[i]);
+                const eits_real as[3] = {a[i], -a[i], eits_fabs(a[i])};
+                for (int sign = 0; sign < 3; ++sign)
+                    most[sign] = as[sign] > most[sign] ? as[sign] : most[sign];
+            }
+            for (int b = 0; b < build_count; ++b) {
+                for (int sign = 0; sign < 3; ++sign)
+                    CHECK(builds[b]->greatest(a, count, (eits_sign)sign) == most[sign]);
+            }
+            if (count > 0)
+                a[count / 2] = R(NAN); /* is never the greatest */
+            for (int b = 0; b < build_count; ++b)
+                CHECK(builds[b]->greatest(a, count, EITS_SIGN_BOTH) <= most[2]);
+            free(a);
+        }
+    }
+}
+
+/* Every pattern of eight, and a few more behind; nothing is written behind the last place. */
+static void places_of_nonzeros(void)
+{
+    for (uint32_t pattern = 0; pattern < 256; ++pattern) {
+        for (uint32_t count = 8; count < 12; ++count) {
+            eits_real a[12] = {0}, value[13];
+            uint32_t place[13], found = 0;
+            for (uint32_t j = 0; j < count; ++j)
+                a[j] = pattern >> j % 8 & 1 ? (eits_real)j + 1 : 0;
+            for (int b = 0; b < build_count; ++b) {
+                place[count] = 77, value[count] = 77, found = 0;
+                const uint32_t listed = builds[b]->nonzeros(a, count, place, value);
+                for (uint32_t j = 0; j < count; ++j) {
+                    if (a[j] == 0)
+                        continue;
+                    CHECK(found < listed && place[found] == j && value[found] == a[j]);
+                    ++found;
+                }
+                CHECK_EQUAL(listed, found);
+                CHECK(place[count] == 77 && value[count] == 77);
+            }
+        }
     }
 }
 
@@ -290,8 +401,10 @@ static void zeros_are_skipped(void)
     sample s = make_sample(EITS_STORAGE_F32, 5, 9, &state);
     eits_real x[9] = {0, R(-0.0), 2, 0, 0, R(-1e-30), 0, 0, 3}, value[9], out[8];
     uint32_t index[9];
-    CHECK_EQUAL(eits_list_nonzeros(&s.matrix, x, index, value), 3); /* minus zero is zero, however small is not */
-    CHECK(index[0] == 2 && index[1] == 5 && index[2] == 8);
+    for (int b = 0; b < build_count; ++b) {
+        CHECK_EQUAL(eits_list_nonzeros(builds[b], &s.matrix, x, index, value), 3); /* minus zero is zero, however small is not */
+        CHECK(index[0] == 2 && index[1] == 5 && index[2] == 8);
+    }
     for (uint32_t i = 0; i < 5; ++i)
         ((float *)s.data)[8 * 3 + i] = NAN; /* a column that is not listed is not read */
     builds[0]->mul(&s.matrix, index, value, 3, out);
@@ -324,6 +437,9 @@ int main(void)
     find_builds();
     products_of_all_storages_and_sizes();
     dots_and_axpys();
+    products_with_few_rows();
+    places_of_nonzeros();
+    the_greatest();
     proximal_steps();
     zeros_are_skipped();
     choice_of_kernels();

@@ -157,7 +157,7 @@ typedef struct eits_context {
     uint32_t *list_index;    /* as many: those columns */
     uint32_t *working;       /* n_pixels: the working set's columns; x, x_next, z hold theirs only while it runs */
     uint32_t working_count;
-    eits_real *factor;       /* EITS_TRIANGLE(rank): the active set's triangular factor, row after row */
+    eits_real *factor;       /* rank x stride: rows that make the active set's columns orthonormal (factor.h) */
     eits_real *image;        /* n_pixels: S/m */
     eits_real *atoms;        /* EITS_MAX_TOUCHES x stride: responses of the touches */
     uint16_t *cell;          /* ny x nx: which kept pixel a cell of the image is; EITS_NO_PIXEL for none */
@@ -180,24 +180,24 @@ typedef struct eits_context {
 #define EITS_NO_PIXEL 0xFFFFu
 #define EITS_MOST_HELD 256u
 #define EITS_HELD(n_pixels) ((size_t)((n_pixels) < EITS_MOST_HELD ? (n_pixels) : EITS_MOST_HELD))
+#define EITS_LINE 64u /* bytes: panels start at a multiple, where no vector of theirs lies across two lines of the cache */
 #define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
 #define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
 #define EITS_REALS(count) EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
 #define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
 #define EITS_PADDED_TRIANGLE(rank) (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
-#define EITS_TRIANGLE(rank) ((size_t)(rank) * ((size_t)(rank) + 1u) / 2u)
 #define EITS_PANEL_COLUMNS(n_pixels) (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
 
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise copies of S and of
  * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
     (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +               \
-     (22 + EITS_STRIDE(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) +                  \
+     (22 + EITS_STRIDE(rank) + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) + \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
-     EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_REALS(EITS_TRIANGLE(rank)) + EITS_ALIGN16((size_t)(n_cells) * 2u) +       \
+     EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_ALIGN16((size_t)(n_cells) * 2u) +                                        \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \
      EITS_ALIGN16(EITS_HELD(n_pixels) * 2u) + EITS_ALIGN16(EITS_HELD(n_pixels)) + EITS_ALIGN16(EITS_HELD(n_pixels) * 4u) + \
-     ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) : 0u))
+     ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) + EITS_LINE - 16u : 0u))
 
 /* The same number for an open model, as a function. Returns 0 for a null model. */
 size_t eits_workspace_size(const eits_model *model, int prepared);

@@ -1,7 +1,7 @@
 """Coordinate descent and active set of the numpy reference: the C core's rules, written for reading.
 
-csrc/src/coordinate.c and active_set.c say where the methods are from. The factor here is solved anew at each step instead of
-being kept up to date.
+csrc/src/coordinate.c and active_set.c say where the methods are from. The columns' products are solved with anew at each step;
+the core keeps a factor of them up to date.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ EPSILON = 2.3e-16
 INDEPENDENT = 1e-10
 LOOK_GROWTH = 6
 SETTLED = 0.001
-WORTHWHILE, LOOKS_NEARBY, NEAR, PANEL = 1e-6, 20, 1, 32
+WORTHWHILE, LOOKS_NEARBY = 1e-6, 20
 
 
 def coordinate(problem: Problem, options: Options, start: FloatArray | None = None, done: int = 0) -> Result:
@@ -96,7 +96,8 @@ class ActiveSet:
         self.p, self.options, self.held = problem, options, Held()
         self.most = min(len(problem.y) - len(problem.basis), problem.n)
         self.tolerance = 2 * EPSILON * np.sqrt(lipschitz) * float(np.linalg.norm(problem.y))
-        self.near, self.index = neighbours(grid), grid.index
+        self.near = neighbours(grid)
+        self.nearby = np.zeros(problem.n + 1, dtype=bool)  # the last is no pixel
 
     def _left(self, j: int) -> tuple[float, float, FloatArray]:
         """The square of column ``j``'s part that counts (0: rounding), what the columns held leave of it, and the
@@ -185,23 +186,19 @@ class ActiveSet:
         return moved or bool((self.held.spread(self.p.n) != before).any()), failed
 
     def _look_nearby(self, objective: float) -> tuple[float, bool, bool]:
-        """Columns near those held, if the last step was worth it: the objective, whether anything moved, whether it failed."""
+        """Columns beside those held so far, if the last step was worth it: objective, whether any moved, whether it failed."""
         p, held = self.p, self.held
         residual = p.residual(held.spread(p.n))
         now = 0.5 * float(residual @ residual) + p.lam * float(np.abs(held.x).sum())
         if not now < objective * (1 - WORTHWHILE):
             return objective, False, False
-        gradient = np.where(self._nearby(), p.s.T @ residual, 0.0)
+        self.nearby[held.columns] = True
+        self.nearby[self.near[held.columns]] = True
+        gradient = np.where(self.nearby[:-1], p.s.T @ residual, 0.0)
         held.pull = [float(gradient[j]) - s * p.lam for j, s in zip(held.columns, held.sign, strict=True)]
         gradient[held.columns] = 0.0
         missing = self._missing(gradient)
         return (now, *self._take_in(missing, gradient)) if missing else (now, False, False)
-
-    def _nearby(self) -> npt.NDArray[np.bool_]:
-        """Columns (n,) in panels that show pixels beside those held."""
-        distance = np.abs(self.index[:, None, :] - self.index[None, self.held.columns, :]).max(axis=2)
-        panels = np.unique(np.flatnonzero((distance <= NEAR).any(axis=1)) // PANEL)
-        return np.asarray(np.isin(np.arange(self.p.n) // PANEL, panels))
 
     def run(self, start: FloatArray | None) -> Result:
         """Rounds until something ends them; where they fail, coordinate descent goes on."""

@@ -196,12 +196,13 @@ def as_markdown(result: KernelTimes, command: str) -> str:
         "time over limit.",
         markdown_table(HEAD, rows(result)),
         "A prepared context, the default on a host, calls the panel products, `mul` on held columns (f32 whatever the storage), "
-        "`dot`, `axpy`, `prox` and `unpack`: "
+        "`dots` (the active set), `dot`, `axpy`, `prox` and `unpack`: "
         + ("all are within 3 times their limit." if not hot else f"beyond 3 times the limit: {'; '.join(hot)}."),
         "The others serve contexts without room for panels. Beyond 3 times their limit: "
         + (f"{'; '.join(cold)}. " if cold else "none. ")
-        + "`mul_t` has to bring a row of eight columns into one register: one and a half shuffles for eight numbers, and one or "
-        "two more to convert packed ones, where the processor does one shuffle and two FMAs a cycle. Blends instead of shuffles "
-        "and eight rows a turn were tried, and are no faster. In double width each packed number is converted twice.",
+        + "`mul_t` has to bring a row of eight columns into one register: 20 shuffles and 16 blends for 64 numbers. It takes "
+        "as long by 16-byte loads into halves, by broadcast loads and blends, and by two, three or four groups of eight "
+        "columns at a time. In double width each packed number is converted twice. `dots` sums in another order, needs no "
+        "such rows, and is what the active set calls; the iterations keep `mul_t` for its bits.",
     ]
     return "\n\n".join(parts)
