@@ -141,7 +141,8 @@ static void add(eits_context *ctx, active *a, uint32_t j)
     eits_real x = 0, square = 0;
     for (int first = 1;; first = 0) {
         const uint32_t count = ctx->working_count;
-        if (!affords(ctx, a, (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + eits_factor_macs(count) + 2u * count))
+        if (!affords(ctx, a, (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) +
+                                 eits_factor_macs(count) + 2u * count))
             break;
         if (first && !((square = read_column(ctx, a, j)) > 0))
             return;
@@ -230,7 +231,8 @@ static eits_certificate certify(eits_context *ctx, const active *a)
 static int begin_warm(eits_context *ctx, active *a)
 {
     const uint64_t held = ctx->info.nonzeros, rank = ctx->model->rank;
-    if (!eits_affords(ctx, held * ((held + 2u) * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx) + eits_factor_macs((uint32_t)held)) +
+    if (!eits_affords(ctx, held * ((held + 2u) * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx)) +
+                               held * eits_factor_macs((uint32_t)held) +
                                held * (rank + held) + 2u * eits_gradient_macs(ctx)))
         return 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {

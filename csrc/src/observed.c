@@ -245,9 +245,9 @@ static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_
 
 enum { PROBES = 8 };
 
-/* Noise in S'y, over that with all rows. White noise n on the rows makes G^-1 n of y; its mean square over S's columns is the trace
- * of S'F' (G'G)^-1 F S, found by PROBES sign vectors that are orthogonal within each PROBES directions. The greatest of the
- * columns grows faster than their mean, by an exponent found on masks of one row to three electrodes. */
+/* Noise in S'F'y, over that in S'y with all rows. White noise on the rows has the covariance (G'G)^-1 in y; its mean square over S's
+ * columns is the trace of S'F' (G'G)^-1 F S, found by PROBES sign vectors that are orthogonal within each PROBES directions. The
+ * greatest of the columns grows faster than their mean, by an exponent found on masks of one row to three electrodes. */
 static uint64_t measure_noise(eits_context *ctx)
 {
     const uint32_t rank = ctx->model->rank;
@@ -296,7 +296,13 @@ uint64_t eits_observed_build(eits_context *ctx)
     macs += factor_metric(ctx, floor, f, g);
     macs += finish_map(ctx, eits_sqrt(ctx->map_square), g, f);
     ctx->rewhitened = (uint32_t)eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank));
-    return ctx->rewhitened ? macs + measure_noise(ctx) : macs;
+    if (ctx->rewhitened)
+        macs += measure_noise(ctx);
+    if (!(ctx->noise_ratio > 0) || !eits_is_finite(ctx->noise_ratio)) {
+        ctx->rewhitened = 0;
+        ctx->noise_ratio = 1;
+    }
+    return macs;
 }
 
 /* v = T^-1 v; v = T'^-1 v. */
