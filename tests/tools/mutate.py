@@ -24,7 +24,7 @@ from queue import SimpleQueue
 from mutations import MUTATIONS, Mutation
 
 ROOT = Path(__file__).resolve().parents[2]
-COPIED = ("CMakeLists.txt", "cmake", "csrc", "firmware", "tests/c", "tests/firmware")
+COPIED = ("CMakeLists.txt", "cmake", "csrc", "firmware", "tests/c", "tests/firmware", "tests/soak")
 SOURCES = Path("csrc") / "src"
 MOST_SECONDS = 30
 SLOW_LAST = ("solve_state", "solve", "touch", "working_set", "exact", "mac_limit", "model_values")

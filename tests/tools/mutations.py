@@ -143,7 +143,7 @@ FRAME = (
             "frame",
         ),
         ("a dead front end taken for a quiet skin", "if (!ctx->unusable[i] && frame[i] != 0)", "if (!ctx->unusable[i])", "frame"),
-        ("the logarithm unbounded", "low = R(1.0 / 16.0)", "low = R(0.0)", "frame"),
+        ("the logarithm bounded elsewhere", "high = R(16.0)", "high = R(32.0)", "frame"),
     )
     + _of(
         "log.h",
@@ -261,7 +261,12 @@ WORKING_SET = _of(
         "sign == EITS_SIGN_DECREASE ? none : 2 * lambda}",
         "working_set",
     ),
-    ("columns that came to rest in x only are dropped", "if (x == 0 && z == 0 && !moves", "if (x == 0 && !moves", "working_set"),
+    (
+        "columns that would move are dropped",
+        "if (x == 0 && z == 0 && !moves(gradient, rest))",
+        "if (x == 0 && z == 0)",
+        "working_set",
+    ),
     (
         "coefficients stay where they were packed",
         "ctx->x_next[ctx->working[k]] = ctx->x[k];",
@@ -276,13 +281,13 @@ EXACT = (
         ("a coordinate's step without its norm", "v = eits_fma(norm, before, gradient)", "v = before + gradient", "exact"),
         ("a coordinate not shrunk", "shrunk = up ? v - d->lambda", "shrunk = up ? v", "exact"),
         (
-            "the residual moves the wrong way",
+            "the residual moves without the scale",
             "ctx->residual, -step * scale, column",
-            "ctx->residual, step * scale, column",
+            "ctx->residual, -step, column",
             "exact",
         ),
         ("the ignored direction not taken out", "gradient = eits_fma(-d->along, d->slant[j], gradient);", ";", "exact"),
-        ("settled at once", "SETTLED = R(0.001)", "SETTLED = R(1.0)", "exact"),
+        ("rest for what still moves", "return 64 * epsilon * epsilon *", "return 64 * epsilon *", "exact"),
     )
     + _of(
         "active_set.c",
