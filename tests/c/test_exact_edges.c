@@ -119,8 +119,111 @@ static void starts_that_cancel(void)
     dense_bench_close(&b);
 }
 
+/* Columns of S without their part along `direction`, a unit vector. */
+static void project_columns(dense *d, const double *direction)
+{
+    for (uint32_t j = 0; j < d->n; ++j) {
+        double *column = d->s + (size_t)j * d->rank;
+        const double along = dense_dot(column, direction, d->rank);
+        for (uint32_t i = 0; i < d->rank; ++i)
+            column[i] -= along * direction[i];
+    }
+}
+
+/* Sweeps over the columns that may move at zero, less those that stay there; `square`: each column's before the projection. */
+static void dense_sweeps(const dense *d, const double *square, double *r, double lambda, int sweeps, double *x)
+{
+    uint32_t list[N], count = 0;
+    for (uint32_t j = 0; j < N; ++j) {
+        if (fabs(dense_dot(d->s + (size_t)j * d->rank, r, d->rank)) > lambda)
+            list[count++] = j;
+    }
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+        uint32_t left = 0;
+        for (uint32_t k = 0; k < count; ++k) {
+            const uint32_t j = list[k];
+            const double *column = d->s + (size_t)j * d->rank, v = square[j] * x[j] + dense_dot(column, r, d->rank);
+            const double after = copysign(fmax(fabs(v) - lambda, 0), v) / square[j], step = after - x[j];
+            for (uint32_t i = 0; i < d->rank; ++i)
+                r[i] -= step * column[i];
+            x[j] = after;
+            if (after != 0 || step != 0)
+                list[left++] = j;
+        }
+        count = left;
+    }
+}
+
+/* A few sweeps, beside no direction that is ignored, and one. */
+static void sweeps_as_written_apart(void)
+{
+    enum { RANK_HERE = 12, SWEEPS = 3 };
+    for (uint32_t ignored = 0; ignored < 2; ++ignored) {
+        for (int storage = 0; storage < 4; ++storage) {
+            dense_bench b;
+            eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = RANK_HERE, .side = SIDE, .storage = (eits_storage)storage}, 0);
+            double square[N], direction[RANK_HERE], *x = dense_numbers(N);
+            for (uint32_t j = 0; j < N; ++j)
+                square[j] = dense_dot(b.d.s + j * RANK_HERE, b.d.s + j * RANK_HERE, RANK_HERE);
+            for (uint32_t i = 0; i < RANK_HERE; ++i)
+                direction[i] = (i % 2 ? -1 : 1) / sqrt(RANK_HERE);
+            small_new_data(ctx, 84);
+            ctx->basis_count = ignored;
+            for (uint32_t i = 0; ignored && i < RANK_HERE; ++i)
+                ctx->basis[i] = (eits_real)direction[i];
+            double *r = dense_copy(ctx->y, RANK_HERE);
+            if (ignored) {
+                const double along = dense_dot(r, direction, RANK_HERE);
+                for (uint32_t i = 0; i < RANK_HERE; ++i)
+                    ctx->y[i] = (eits_real)(r[i] -= along * direction[i]);
+                project_columns(&b.d, direction);
+            }
+            eits_options o = ctx->options;
+            o.solver = EITS_SOLVER_COORDINATE;
+            o.sign = EITS_SIGN_BOTH;
+            o.iterations = SWEEPS;
+            o.lambda_rel = R(0.02);
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+            CHECK_EQUAL(ctx->info.iterations, SWEEPS);
+            dense_sweeps(&b.d, square, r, (double)ctx->info.lambda, SWEEPS, x);
+            CHECK(dense_greatest_difference(x, ctx->x, N) < 3000 * EPS);
+            free(r), free(x);
+            dense_bench_close(&b);
+        }
+    }
+}
+
+/* The optimum to rounding, in few rounds. */
+static void the_active_set_ends_soon(void)
+{
+    enum { RANK_HERE = 12, ROUNDS = 25 };
+    static const double lambdas[] = {0.003, 0.03, 0.3};
+    for (int way = 0; way < 36; ++way) {
+        dense_bench b;
+        eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)}, way % 2);
+        small_new_data(ctx, 85 + (uint64_t)way);
+        eits_options o = ctx->options;
+        o.solver = EITS_SOLVER_ACTIVE_SET;
+        o.sign = (eits_sign)(way / 3 % 3);
+        o.iterations = ROUNDS;
+        o.lambda_rel = (eits_real)lambdas[way % 3];
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+        CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+        CHECK(ctx->info.iterations < ROUNDS && ctx->info.nonzeros <= RANK_HERE);
+        double *x = dense_copy(ctx->x, 81), *y = dense_copy(ctx->y, RANK_HERE);
+        const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, o.sign);
+        CHECK(gap <= BOTH_WIDTHS(3e-6, 1e-14) * 0.5 * dense_dot(y, y, RANK_HERE));
+        free(x), free(y);
+        dense_bench_close(&b);
+    }
+}
+
 int main(void)
 {
+    the_active_set_ends_soon();
+    sweeps_as_written_apart();
     starts_that_cancel();
     every_limit_beside_columns_that_depend();
     return checks_report("exact solvers at their edges");

@@ -278,22 +278,22 @@ WORKING_SET = _of(
 EXACT = (
     _of(
         "coordinate.c",
-        ("a coordinate's step without its norm", "v = eits_fma(norm, before, gradient)", "v = before + gradient", "exact"),
-        ("a coordinate not shrunk", "shrunk = up ? v - d->lambda", "shrunk = up ? v", "exact"),
+        ("a coordinate's step without its norm", "v = eits_fma(norm, before, gradient)", "v = before + gradient", "exact_edges"),
+        ("a coordinate not shrunk", "shrunk = up ? v - d->lambda", "shrunk = up ? v", "exact_edges"),
         (
             "the residual moves without the scale",
             "ctx->residual, -step * scale, column",
             "ctx->residual, -step, column",
-            "exact",
+            "exact_edges",
         ),
-        ("the ignored direction not taken out", "gradient = eits_fma(-d->along, d->slant[j], gradient);", ";", "exact"),
-        ("rest for what still moves", "return 64 * epsilon * epsilon *", "return 64 * epsilon *", "exact"),
+        ("the ignored direction not taken out", "gradient = eits_fma(-d->along, d->slant[j], gradient);", ";", "exact_edges"),
+        ("rest for what still moves", "return 64 * epsilon * epsilon *", "return 64 * epsilon *", "exact_edges"),
     )
     + _of(
         "active_set.c",
-        ("pulls without lambda", "a->pull[k] = eits_fma(-a->sign[k], a->lambda, *g);", "a->pull[k] = *g;", "exact"),
-        ("Newton's step beyond a change of sign", "if (a->sign[k] * target > 0)", "if (1)", "exact"),
-        ("tolerance a thousand times as wide", "a.tolerance = 2 * EPSILON", "a.tolerance = 20000 * EPSILON", "exact"),
+        ("pulls without lambda", "a->pull[k] = eits_fma(-a->sign[k], a->lambda, *g);", "a->pull[k] = *g;", "exact_edges"),
+        ("Newton's step beyond a change of sign", "if (a->sign[k] * target > 0)", "if (1)", "exact_edges"),
+        ("tolerance a thousand times as wide", "a.tolerance = 2 * EPSILON", "a.tolerance = 20000 * EPSILON", "exact_edges"),
     )
     + _of(
         "factor.c",
@@ -301,18 +301,23 @@ EXACT = (
             "a rotation the wrong way",
             "r[c] = eits_fma(cosine, left, sine * right);",
             "r[c] = eits_fma(cosine, left, -sine * right);",
-            "exact",
+            "exact_edges",
         ),
         (
             "the back substitution adds",
             "eits_axpy(ctx, w, -d[i], row(ctx, i), i);",
             "eits_axpy(ctx, w, d[i], row(ctx, i), i);",
-            "exact",
+            "exact_edges",
         ),
     )
     + _of(
         "missing.c",
-        ("peaks of the row below only", "y <= iy + 1 && y < m->ny", "y <= iy && y < m->ny", "exact"),
+        (
+            "columns missed whose correlation is beyond lambda",
+            "if (!(v[j] > least) ||",
+            "if (!(v[j] > 4 * least) ||",
+            "exact_edges",
+        ),
     )
 )
 
@@ -345,7 +350,7 @@ TOUCH = (
             "g[i] = -disc->change * eits_dot(ctx, column[i], left, rank);",
             "touch_fit",
         ),
-        ("no halving of a disc's step", "attempt < 3; ++attempt", "attempt < 1; ++attempt", "touch_fit"),
+        ("no halving of a disc's step", "attempt < 3; ++attempt", "attempt < 1; ++attempt", "track"),
         (
             "strength without the soft edge",
             "eits_fma(disc->radius_mm, disc->radius_mm, soft_edge)",
