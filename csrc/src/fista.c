@@ -111,7 +111,7 @@ static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, sc
         if (!by_working_set(ctx))
             return;
         eits_working_set_choose(ctx, lambda);
-        s->next_look = k + s->interval;
+        s->next_look = s->interval < UINT32_MAX - k ? k + s->interval : UINT32_MAX;
         s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / LOOK_GROWTH / 2 ? s->interval : LOOK_GROWTH * s->interval;
         return;
     }

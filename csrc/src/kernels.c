@@ -31,9 +31,9 @@ static eits_real read_entry(const eits_matrix *matrix, size_t at)
     case EITS_STORAGE_F32: return (eits_real)((const float *)matrix->data)[at];
     case EITS_STORAGE_F16: return (eits_real)eits_half_to_float(((const uint16_t *)matrix->data)[at]);
     case EITS_STORAGE_I16: return (eits_real)((const int16_t *)matrix->data)[at];
-    case EITS_STORAGE_I8: return (eits_real)((const int8_t *)matrix->data)[at];
+    case EITS_STORAGE_I8: break;
     }
-    return 0;
+    return (eits_real)((const int8_t *)matrix->data)[at];
 }
 
 void eits_read_column(const eits_matrix *matrix, uint32_t column, eits_real *out)

@@ -347,3 +347,9 @@ void small_new_data(eits_context *ctx, uint64_t state)
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         ctx->y[i] = (eits_real)small_random(&state);
 }
+
+int small_same_touch(const eits_touch *a, const eits_touch *b)
+{
+    return a->id == b->id && a->x_mm == b->x_mm && a->y_mm == b->y_mm && a->radius_mm == b->radius_mm &&
+           a->strength_s_per_m_mm2 == b->strength_s_per_m_mm2 && a->confidence == b->confidence;
+}

@@ -70,4 +70,7 @@ double small_random(uint64_t *state);
 /* Such numbers as the reduced data of a context. */
 void small_new_data(eits_context *ctx, uint64_t state);
 
+/* Whether each field is the same: there may be padding between them. */
+int small_same_touch(const eits_touch *a, const eits_touch *b);
+
 #endif

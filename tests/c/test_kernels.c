@@ -395,6 +395,26 @@ static void proximal_steps(void)
     }
 }
 
+/* A number that is none comes out as none, wherever it stands: not as a coefficient at rest. */
+static void steps_that_are_not_finite(void)
+{
+    enum { COUNT = 19 };
+    const double wild[] = {NAN, INFINITY, -INFINITY};
+    for (int sign = 0; sign < 3; ++sign) {
+        for (int k = 0; k < 3; ++k) {
+            for (int b = 0; b < build_count; ++b) {
+                eits_real g[COUNT] = {0}, x[COUNT] = {0}, next[COUNT], z[COUNT] = {0};
+                const eits_prox how = {1, R(0.5), R(0.5), (eits_sign)sign};
+                for (int j = 0; j < COUNT; j += 3)
+                    g[j] = (eits_real)wild[k];
+                builds[b]->prox(&how, COUNT, g, x, next, z);
+                for (int j = 0; j < COUNT; ++j)
+                    CHECK(isfinite((double)next[j]) == (j % 3 != 0));
+            }
+        }
+    }
+}
+
 static void zeros_are_skipped(void)
 {
     uint64_t state = 14;
@@ -441,6 +461,7 @@ int main(void)
     places_of_nonzeros();
     the_greatest();
     proximal_steps();
+    steps_that_are_not_finite();
     zeros_are_skipped();
     choice_of_kernels();
     return checks_report("kernels");

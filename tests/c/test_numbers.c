@@ -4,6 +4,7 @@
 
 #include "half.h"
 #include "log.h"
+#include "stages.h"
 
 #include <math.h>
 #include <string.h>
@@ -88,8 +89,30 @@ static void logarithm_rises(void)
     }
 }
 
+/* The greatest under each sign rule, wherever it stands and however many there are. */
+static void the_greatest(void)
+{
+    eits_real g[20];
+    for (uint32_t count = 1; count <= 20; ++count) {
+        for (uint32_t at = 0; at < count; ++at) {
+            for (int turned = 0; turned < 2; ++turned) {
+                const eits_real other = R(turned ? 0.5 : -0.5);
+                for (uint32_t j = 0; j < count; ++j)
+                    g[j] = other;
+                g[at] = R(turned ? -2 : 2);
+                const eits_real least = count > 1 ? R(0.5) : 0;
+                CHECK(eits_greatest(g, count, EITS_SIGN_INCREASE) == (turned ? least : 2));
+                CHECK(eits_greatest(g, count, EITS_SIGN_DECREASE) == (turned ? 2 : least));
+                CHECK(eits_greatest(g, count, EITS_SIGN_BOTH) == 2);
+            }
+        }
+    }
+    CHECK(eits_greatest(g, 0, EITS_SIGN_BOTH) == 0);
+}
+
 int main(void)
 {
+    the_greatest();
     halves();
     logarithm_is_accurate();
     logarithm_rises();

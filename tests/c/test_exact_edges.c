@@ -1,0 +1,230 @@
+/* The exact solvers where columns depend on each other and MACs run out, at whatever place: the image is finite, and never worse
+ * than zero. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/solve.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 7, N = SIDE * SIDE, RANK = 6 };
+
+/* Columns in groups of three that are alike but for `off` of one number each, every seventh zero. */
+static eits_context *set_up(dense_bench *b, double off)
+{
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
+    uint32_t size;
+    uint8_t *sens = small_model_section(&b->made, "SENS", &size);
+    const size_t column = size / N;
+    for (size_t j = 0; j < N; ++j) {
+        float *values = (float *)(void *)(sens + column * j);
+        if (j % 7 == 0)
+            memset(values, 0, column);
+        else if (j % 3 != 0)
+            memcpy(values, values - column / sizeof *values, column);
+        values[j % RANK] *= (float)(1 + off);
+    }
+    small_model_seal(&b->made);
+    small_context_open(&b->c, &b->made, 0);
+    b->d = dense_of(&b->c.model);
+    return &b->c.ctx;
+}
+
+static void check_result(const dense_bench *b, double most)
+{
+    const eits_context *ctx = &b->c.ctx;
+    double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
+    uint32_t nonzeros = 0;
+    for (int j = 0; j < N; ++j) {
+        CHECK(isfinite((double)ctx->image[j]) && isfinite(x[j]));
+        nonzeros += x[j] != 0;
+    }
+    CHECK_EQUAL(ctx->info.nonzeros, nonzeros);
+    CHECK(dense_objective(&b->d, y, x, (double)ctx->info.lambda) <= most);
+    free(x), free(y);
+}
+
+/* Another solver's coefficients to start from, and less and less to spend. */
+static void every_limit_beside_columns_that_depend(void)
+{
+    static const double offs[] = {0, 1e-7, 1e-4, 3e-3};
+    for (int way = 0; way < 16; ++way) {
+        dense_bench b;
+        eits_context *ctx = set_up(&b, offs[way % 4]);
+        eits_options o = ctx->options;
+        o.sign = way / 4 % 2 ? EITS_SIGN_BOTH : EITS_SIGN_INCREASE;
+        o.lambda_rel = R(way % 2 ? 0.001 : 0.1);
+        o.iterations = 30;
+        for (uint32_t limit = 40; limit < 12000; limit += 1 + limit / 60) {
+            small_new_data(ctx, 81);
+            eits_forget(ctx);
+            o.mac_limit = 0;
+            o.solver = EITS_SOLVER_FISTA;
+            o.warm_start = way >= 8;
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+            ctx->y[limit % RANK] += R(0.4);
+            double *y = dense_copy(ctx->y, RANK);
+            const double at_zero = 0.5 * dense_dot(y, y, RANK);
+            free(y);
+            o.mac_limit = limit;
+            o.solver = EITS_SOLVER_ACTIVE_SET;
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+            CHECK(ctx->info.macs <= limit);
+            CHECK(ctx->info.stop == EITS_STOP_MACS || ctx->info.stop == EITS_STOP_OPTIMUM || ctx->info.stop == EITS_STOP_ITERATIONS);
+            check_result(&b, at_zero * (1 + 1e-3));
+        }
+        dense_bench_close(&b);
+    }
+}
+
+/* A start whose great coefficients cancel, on columns that are alike: without those that depend it is far worse than zero. */
+static void starts_that_cancel(void)
+{
+    dense_bench b;
+    eits_context *ctx = set_up(&b, 0);
+    const uint32_t one = 9 + 1, other = 9 + 2; /* of a group of three */
+    eits_options o = ctx->options;
+    o.sign = EITS_SIGN_BOTH;
+    o.solver = EITS_SOLVER_ACTIVE_SET;
+    o.warm_start = 1;
+    o.lambda_abs = R(1e-5);
+    o.iterations = 30;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    small_new_data(ctx, 83);
+    ctx->x[one] = R(300.5);
+    ctx->x[other] = R(-300);
+    double column[RANK], along = 0;
+    for (int i = 0; i < RANK; ++i) {
+        column[i] = b.d.s[one * RANK + (uint32_t)i];
+        along += column[i] * (double)ctx->y[i];
+    }
+    if (along < 0) { /* so that the start is better than zero */
+        ctx->x[one] = R(-300.5);
+        ctx->x[other] = R(300);
+    }
+    ctx->warm = 1;
+    double *y = dense_copy(ctx->y, RANK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+    check_result(&b, 0.5 * dense_dot(y, y, RANK));
+    CHECK(ctx->info.gap_rel < R(1e-3));
+    free(y);
+    dense_bench_close(&b);
+}
+
+/* Columns of S without their part along `direction`, a unit vector. */
+static void project_columns(dense *d, const double *direction)
+{
+    for (uint32_t j = 0; j < d->n; ++j) {
+        double *column = d->s + (size_t)j * d->rank;
+        const double along = dense_dot(column, direction, d->rank);
+        for (uint32_t i = 0; i < d->rank; ++i)
+            column[i] -= along * direction[i];
+    }
+}
+
+/* Sweeps over the columns that may move at zero, less those that stay there; `square`: each column's before the projection. */
+static void dense_sweeps(const dense *d, const double *square, double *r, double lambda, int sweeps, double *x)
+{
+    uint32_t list[N], count = 0;
+    for (uint32_t j = 0; j < N; ++j) {
+        if (fabs(dense_dot(d->s + (size_t)j * d->rank, r, d->rank)) > lambda)
+            list[count++] = j;
+    }
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+        uint32_t left = 0;
+        for (uint32_t k = 0; k < count; ++k) {
+            const uint32_t j = list[k];
+            const double *column = d->s + (size_t)j * d->rank, v = square[j] * x[j] + dense_dot(column, r, d->rank);
+            const double after = copysign(fmax(fabs(v) - lambda, 0), v) / square[j], step = after - x[j];
+            for (uint32_t i = 0; i < d->rank; ++i)
+                r[i] -= step * column[i];
+            x[j] = after;
+            if (after != 0 || step != 0)
+                list[left++] = j;
+        }
+        count = left;
+    }
+}
+
+/* A few sweeps, beside no direction that is ignored, and one. */
+static void sweeps_as_written_apart(void)
+{
+    enum { RANK_HERE = 12, SWEEPS = 3 };
+    for (uint32_t ignored = 0; ignored < 2; ++ignored) {
+        for (int storage = 0; storage < 4; ++storage) {
+            dense_bench b;
+            eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = RANK_HERE, .side = SIDE, .storage = (eits_storage)storage}, 0);
+            double square[N], direction[RANK_HERE], *x = dense_numbers(N);
+            for (uint32_t j = 0; j < N; ++j)
+                square[j] = dense_dot(b.d.s + j * RANK_HERE, b.d.s + j * RANK_HERE, RANK_HERE);
+            for (uint32_t i = 0; i < RANK_HERE; ++i)
+                direction[i] = (i % 2 ? -1 : 1) / sqrt(RANK_HERE);
+            small_new_data(ctx, 84);
+            ctx->basis_count = ignored;
+            for (uint32_t i = 0; ignored && i < RANK_HERE; ++i)
+                ctx->basis[i] = (eits_real)direction[i];
+            double *r = dense_copy(ctx->y, RANK_HERE);
+            if (ignored) {
+                const double along = dense_dot(r, direction, RANK_HERE);
+                for (uint32_t i = 0; i < RANK_HERE; ++i)
+                    ctx->y[i] = (eits_real)(r[i] -= along * direction[i]);
+                project_columns(&b.d, direction);
+            }
+            eits_options o = ctx->options;
+            o.solver = EITS_SOLVER_COORDINATE;
+            o.sign = EITS_SIGN_BOTH;
+            o.iterations = SWEEPS;
+            o.lambda_rel = R(0.02);
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+            CHECK_EQUAL(ctx->info.iterations, SWEEPS);
+            dense_sweeps(&b.d, square, r, (double)ctx->info.lambda, SWEEPS, x);
+            CHECK(dense_greatest_difference(x, ctx->x, N) < 3000 * EPS);
+            free(r), free(x);
+            dense_bench_close(&b);
+        }
+    }
+}
+
+/* The optimum to rounding, in few rounds. */
+static void the_active_set_ends_soon(void)
+{
+    enum { RANK_HERE = 12, ROUNDS = 25 };
+    static const double lambdas[] = {0.003, 0.03, 0.3};
+    for (int way = 0; way < 36; ++way) {
+        dense_bench b;
+        eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)}, way % 2);
+        small_new_data(ctx, 85 + (uint64_t)way);
+        eits_options o = ctx->options;
+        o.solver = EITS_SOLVER_ACTIVE_SET;
+        o.sign = (eits_sign)(way / 3 % 3);
+        o.iterations = ROUNDS;
+        o.lambda_rel = (eits_real)lambdas[way % 3];
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+        CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+        CHECK(ctx->info.iterations < ROUNDS && ctx->info.nonzeros <= RANK_HERE);
+        double *x = dense_copy(ctx->x, 81), *y = dense_copy(ctx->y, RANK_HERE);
+        const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, o.sign);
+        CHECK(gap <= BOTH_WIDTHS(3e-6, 1e-14) * 0.5 * dense_dot(y, y, RANK_HERE));
+        free(x), free(y);
+        dense_bench_close(&b);
+    }
+}
+
+int main(void)
+{
+    the_active_set_ends_soon();
+    sweeps_as_written_apart();
+    starts_that_cancel();
+    every_limit_beside_columns_that_depend();
+    return checks_report("exact solvers at their edges");
+}

@@ -1,0 +1,160 @@
+/* Numbers at the ends of the width: what overflows or vanishes on the way is refused or answered with zero, never NaN. */
+#include "check.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "vec.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { SIDE = 4, N = SIDE * SIDE, MOST_RANK = 40 };
+static const double GREATEST = BOTH_WIDTHS((double)FLT_MAX, DBL_MAX);
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    eits_real frame[SMALL_ROWS];
+} bench;
+
+static void make(bench *b, uint32_t rank)
+{
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make((small_spec){.rank = rank, .side = SIDE});
+}
+
+static eits_context *open_made(bench *b)
+{
+    small_model_seal(&b->made);
+    small_context_open(&b->c, &b->made, 0);
+    return &b->c.ctx;
+}
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+/* Every number of VREF. */
+static void set_v_ref(bench *b, float value)
+{
+    uint8_t *at = small_model_section(&b->made, "VREF", NULL);
+    for (int k = 0; k < SMALL_FOLDED; ++k)
+        small_put_f32(at + 4 * k, value);
+}
+
+/* The reference of a model of equal voltages, `volts` each, and what becomes of a frame of `measured` volts. */
+static void reference(float volts, double measured, eits_status expected)
+{
+    bench b;
+    make(&b, 12);
+    set_v_ref(&b, volts);
+    eits_context *ctx = open_made(&b);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        b.frame[i] = (eits_real)measured;
+    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), expected);
+    CHECK_EQUAL(ctx->baseline.ready, expected == EITS_OK);
+    CHECK(expected != EITS_OK || (isfinite((double)ctx->baseline.gain) && ctx->baseline.gain != 0));
+    tear_down(&b);
+}
+
+static void references_out_of_proportion(void)
+{
+    const eits_status narrow_only = BOTH_WIDTHS(EITS_E_FRAME_ZERO, EITS_OK);
+    reference(1, 1, EITS_OK);
+    reference(0, 1, EITS_E_FRAME_ZERO);
+    reference(1e-40f, 1, narrow_only);                                 /* one over the model's volts overflows */
+    reference(1, GREATEST, EITS_E_FRAME_ZERO);                         /* the fold's sum does */
+    reference(FLT_MAX, BOTH_WIDTHS(1e-30, 1e-300), EITS_E_FRAME_ZERO); /* the gain does */
+    reference(1e-30f, BOTH_WIDTHS(1e25, 1e300), EITS_E_FRAME_ZERO);    /* the gain vanishes */
+}
+
+/* Every column of S: `first` in the first eight rows, `rest` in the others. */
+static void set_columns(bench *b, uint32_t rank, float first, float rest)
+{
+    uint32_t size;
+    uint8_t *at = small_model_section(&b->made, "SENS", &size);
+    const uint32_t stride = size / 4 / N;
+    for (uint32_t j = 0; j < N; ++j) {
+        for (uint32_t i = 0; i < rank; ++i)
+            small_put_f32(at + 4 * ((size_t)j * stride + i), i < 8 ? first : rest);
+    }
+}
+
+static void check_cleared(const eits_context *ctx)
+{
+    for (int j = 0; j < N; ++j)
+        CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
+    CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.residual) && isfinite((double)ctx->info.lambda));
+}
+
+static void correlations_that_overflow(void)
+{
+    for (int solver = 0; solver < 4; ++solver) {
+        bench b;
+        make(&b, 12);
+        set_columns(&b, 12, 1e36f, 1e36f);
+        eits_context *ctx = open_made(&b);
+        for (int i = 0; i < 12; ++i)
+            ctx->y[i] = R(BOTH_WIDTHS(1e5, 1e150));
+        ctx->options.solver = (eits_solver)solver;
+        CHECK_EQUAL(eits_solve(ctx), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
+        CHECK(BOTH_WIDTHS(1, 0) == (ctx->info.stop == EITS_STOP_DIVERGED && ctx->info.lambda_max == 0));
+        if (sizeof(eits_real) == 4)
+            check_cleared(ctx);
+        tear_down(&b);
+    }
+}
+
+/* Columns so small that their squares are sums of the least numbers there are, and come out too small by more than half: the
+ * steps of coordinate descent, and those of the active set, are then too long, and the objective says so, whatever there is to
+ * spend. So are the numbers that the factor gives where the data are great. */
+static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_limit)
+{
+    bench b;
+    make(&b, MOST_RANK);
+    set_columns(&b, MOST_RANK, 3.75e-23f, 2.6e-23f);
+    small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 6e-43f); /* the Lipschitz constant of these */
+    eits_context *ctx = open_made(&b);
+    for (int i = 0; i < MOST_RANK; ++i)
+        ctx->y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
+    eits_options o = ctx->options;
+    o.solver = solver;
+    o.sign = EITS_SIGN_BOTH;
+    o.lambda_rel = R(0.01);
+    o.iterations = 50;
+    o.mac_limit = mac_limit;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    const eits_info info = ctx->info;
+    if (sizeof(eits_real) == 4)
+        check_cleared(ctx);
+    tear_down(&b);
+    return info;
+}
+
+static void columns_whose_squares_vanish(void)
+{
+    static const double sizes[] = {1, 1e16};
+    for (int solver = EITS_SOLVER_COORDINATE; solver <= EITS_SOLVER_ACTIVE_SET; ++solver) {
+        for (int s = 0; s < 2; ++s) {
+            const eits_info info = solve_vanishing((eits_solver)solver, sizes[s], 0);
+            CHECK_EQUAL(info.stop, BOTH_WIDTHS(EITS_STOP_DIVERGED, EITS_STOP_OPTIMUM));
+            CHECK(sizeof(eits_real) == 4 || info.residual < R(0.02) * info.data_norm);
+            for (uint32_t limit = MOST_RANK; sizeof(eits_real) == 4 && limit < info.macs; limit += limit < 2000 ? MOST_RANK : limit / 3) {
+                const eits_info limited = solve_vanishing((eits_solver)solver, sizes[s], limit);
+                CHECK(limited.macs <= limit && (limited.stop == EITS_STOP_MACS || limited.stop == EITS_STOP_DIVERGED));
+            }
+        }
+    }
+}
+
+int main(void)
+{
+    references_out_of_proportion();
+    correlations_that_overflow();
+    columns_whose_squares_vanish();
+    return checks_report("extremes");
+}

@@ -1,0 +1,212 @@
+/* Where a solve starts from, and what it may not take over: after a halved step, from a start worse than zero, over another
+ * stage's scratch, after a frame that was refused or empty. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 8, N = SIDE * SIDE, RANK = 16 };
+
+typedef dense_bench bench;
+
+static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
+static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
+
+static void set_options(eits_context *ctx, eits_options o)
+{
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+}
+
+static eits_info solve(eits_context *ctx)
+{
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return ctx->info;
+}
+
+/* After a halved step the iterations that are left are those from zero, with fresh momentum. */
+static void a_halved_step_starts_afresh(void)
+{
+    bench b;
+    small_spec spec = RANDOM;
+    spec.lipschitz_factor = 1.02 / 6;
+    eits_context *ctx = dense_bench_open(&b, spec, 0);
+    small_new_data(ctx, 91);
+    eits_options o = ctx->options;
+    o.solver = EITS_SOLVER_FISTA;
+    o.lambda_rel = R(0.1);
+    o.gap_rel = R(1e-30); /* so that each check is made */
+    o.iterations = 60;
+    o.gap_every = 10;
+    set_options(ctx, o);
+    const eits_info info = solve(ctx);
+    CHECK(info.step_halvings >= 1 && info.step_halvings <= 3);
+    const double lipschitz = (double)b.c.model.lipschitz * pow(2, info.step_halvings);
+    double *y = dense_copy(ctx->y, RANK), *x = dense_numbers(N);
+    dense_fista(&b.d, y, (double)info.lambda, lipschitz, 60 - 10 * info.step_halvings, EITS_SIGN_INCREASE, x);
+    CHECK(dense_greatest_difference(x, ctx->x, N) < 2000 * EPS);
+    free(y), free(x);
+    dense_bench_close(&b);
+}
+
+/* The residual is small at the start, but the penalty is not: zero is the better start, to the bit. */
+static void a_start_worse_than_zero(void)
+{
+    for (int solver = 0; solver < 4; ++solver) {
+        bench warm, cold;
+        eits_context *ctx = dense_bench_open(&warm, RANDOM, 0), *other = dense_bench_open(&cold, RANDOM, 0);
+        small_new_data(ctx, 92);
+        small_new_data(other, 92);
+        eits_options o = ctx->options;
+        o.solver = (eits_solver)solver;
+        o.warm_start = 1;
+        o.lambda_rel = R(1e-4);
+        o.iterations = 3000;
+        set_options(ctx, o);
+        CHECK(solve(ctx).residual < R(0.5) * ctx->info.data_norm);
+        o.lambda_rel = R(0.8);
+        o.iterations = 3;
+        set_options(ctx, o);
+        set_options(other, o);
+        const eits_info info = solve(ctx);
+        CHECK_EQUAL(info.nonzeros, solve(other).nonzeros);
+        CHECK(memcmp(ctx->x, other->x, N * sizeof *ctx->x) == 0);
+        dense_bench_close(&warm);
+        dense_bench_close(&cold);
+    }
+}
+
+/* Frame k of a touch that wanders. */
+static void wandering_frame(const bench *b, uint32_t k, eits_real *frame)
+{
+    uint64_t state = 93 + k / 2;
+    small_reference(&b->c.model, 1, frame);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        frame[i] *= (eits_real)(1 + 0.05 * small_random(&state));
+}
+
+static eits_context *open_warm(bench *b, int solver)
+{
+    eits_context *ctx = dense_bench_open(b, WAVES, 0);
+    eits_real frame[SMALL_ROWS];
+    small_reference(&b->c.model, 1, frame);
+    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    eits_options o = ctx->options;
+    o.solver = (eits_solver)solver;
+    o.warm_start = 1;
+    o.iterations = 4;
+    o.sign = EITS_SIGN_BOTH;
+    set_options(ctx, o);
+    return ctx;
+}
+
+/* Whether touches are looked for between warm frames makes no difference to the images. */
+static void touches_leave_no_trace(void)
+{
+    for (int solver = 0; solver < 4; ++solver) {
+        bench seen, unseen;
+        eits_context *ctx = open_warm(&seen, solver), *other = open_warm(&unseen, solver);
+        for (uint32_t k = 0; k < 12; ++k) {
+            eits_real frame[SMALL_ROWS];
+            uint32_t count;
+            wandering_frame(&seen, k, frame);
+            CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+            CHECK(memcmp(ctx->image, other->image, N * sizeof *ctx->image) == 0);
+            CHECK(memcmp(&ctx->info, &other->info, sizeof ctx->info) == 0);
+            CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
+            CHECK(count > 0);
+        }
+        dense_bench_close(&seen);
+        dense_bench_close(&unseen);
+    }
+}
+
+/* A frame after one that was refused, or showed nothing, starts cold: the same bits for the same MACs as in a fresh context. */
+static void cold_after_nothing(void)
+{
+    for (int why = 0; why < 3; ++why) {
+        bench b, fresh;
+        eits_context *ctx = open_warm(&b, EITS_SOLVER_WORKING_SET), *other = open_warm(&fresh, EITS_SOLVER_WORKING_SET);
+        eits_real frame[SMALL_ROWS], nothing[SMALL_ROWS];
+        small_reference(&b.c.model, 1, nothing); /* the reference itself: zero is the answer */
+        for (int i = 0; why == 1 && i < SMALL_ROWS; ++i)
+            nothing[i] = R(NAN);
+        for (int i = 0; why == 2 && i < SMALL_ROWS; ++i)
+            nothing[i] = 0;
+        wandering_frame(&b, 0, frame);
+        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(eits_reconstruct(ctx, nothing, SMALL_ROWS, NULL, NULL),
+                    why == 0 ? EITS_OK : why == 1 ? EITS_E_FRAME_CHANNELS : EITS_E_FRAME_ZERO);
+        CHECK_EQUAL(eits_reconstruct(other, nothing, SMALL_ROWS, NULL, NULL) == EITS_OK, why == 0); /* makes the basis */
+        wandering_frame(&b, 4, frame);
+        CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK(memcmp(ctx->image, other->image, N * sizeof *ctx->image) == 0);
+        CHECK(ctx->info.iterations == other->info.iterations && ctx->info.gap == other->info.gap);
+        if (why == 0)
+            CHECK_EQUAL(ctx->info.macs, other->info.macs);
+        dense_bench_close(&b);
+        dense_bench_close(&fresh);
+    }
+}
+
+/* No interval is so long that it comes round to a short one. */
+static void the_longest_intervals(void)
+{
+    static const uint32_t intervals[] = {1000, UINT32_MAX - 1, UINT32_MAX};
+    uint64_t macs[3];
+    for (int k = 0; k < 3; ++k) {
+        bench b;
+        eits_context *ctx = dense_bench_open(&b, RANDOM, 0);
+        small_new_data(ctx, 95);
+        eits_options o = ctx->options;
+        o.solver = EITS_SOLVER_WORKING_SET;
+        o.iterations = 100;
+        o.gap_every = intervals[k];
+        set_options(ctx, o);
+        macs[k] = solve(ctx).macs;
+        dense_bench_close(&b);
+    }
+    CHECK_EQUAL(macs[1], macs[0]);
+    CHECK_EQUAL(macs[2], macs[0]);
+}
+
+/* A hundred thousand iterations end where the gap cannot fall any further, and nothing grows on the way. */
+static void iterations_without_number(void)
+{
+    for (int solver = 0; solver < 4; ++solver) {
+        bench b;
+        eits_context *ctx = dense_bench_open(&b, RANDOM, 1);
+        small_new_data(ctx, 96);
+        eits_options o = ctx->options;
+        o.solver = (eits_solver)solver;
+        o.iterations = 100000;
+        o.lambda_rel = R(0.05);
+        set_options(ctx, o);
+        const eits_info info = solve(ctx);
+        CHECK(solver < 2 ? info.stop == EITS_STOP_ITERATIONS && info.iterations == 100000 : info.stop == EITS_STOP_OPTIMUM);
+        CHECK(info.gap_rel >= 0 && info.gap_rel < R(BOTH_WIDTHS(1e-5, 1e-12)) && info.step_halvings == 0);
+        for (int j = 0; j < N; ++j)
+            CHECK(isfinite((double)ctx->x[j]) && ctx->x[j] >= 0);
+        dense_bench_close(&b);
+    }
+}
+
+int main(void)
+{
+    a_halved_step_starts_afresh();
+    a_start_worse_than_zero();
+    touches_leave_no_trace();
+    cold_after_nothing();
+    the_longest_intervals();
+    iterations_without_number();
+    return checks_report("starts");
+}
