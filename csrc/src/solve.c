@@ -8,6 +8,14 @@
 #include "stages.h"
 #include "vec.h"
 
+#include <float.h>
+
+#ifdef EITS_DOUBLE
+static const eits_real LEAST_SQUARE = DBL_MIN;
+#else
+static const eits_real LEAST_SQUARE = FLT_MIN; /* below it squares lose their digits, and nothing can be told by them */
+#endif
+
 static void start_from_zero(eits_context *ctx)
 {
     eits_zero(ctx->x, ctx->model->n_pixels);
@@ -76,7 +84,8 @@ static eits_status solve(eits_context *ctx)
 {
     const eits_options *o = &ctx->options;
     const uint32_t rank = ctx->model->rank;
-    ctx->info.data_norm = eits_sqrt(eits_dot(ctx, ctx->y, ctx->y, rank));
+    const eits_real square = eits_dot(ctx, ctx->y, ctx->y, rank);
+    ctx->info.data_norm = eits_sqrt(square);
     ctx->info.lambda_noise = ctx->baseline.lambda_noise;
     if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank)) {
         answer_zero(ctx, EITS_STOP_MACS);
@@ -95,7 +104,7 @@ static eits_status solve(eits_context *ctx)
         answer_zero(ctx, EITS_STOP_GATE);
         return EITS_OK;
     }
-    if (!(ctx->info.lambda_max > ctx->info.lambda)) {
+    if (!(ctx->info.lambda_max > ctx->info.lambda) || square < LEAST_SQUARE) {
         answer_zero(ctx, EITS_STOP_ZERO);
         return EITS_OK;
     }

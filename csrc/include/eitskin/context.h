@@ -53,7 +53,7 @@ typedef enum eits_stop {
     EITS_STOP_ITERATIONS = 0, /* the given number of iterations was done */
     EITS_STOP_GAP = 1,        /* the duality gap was small enough */
     EITS_STOP_GATE = 2,       /* lambda_max lies within the noise: no touch, the image is zero */
-    EITS_STOP_ZERO = 3,       /* lambda >= lambda_max: zero is the exact optimum */
+    EITS_STOP_ZERO = 3,       /* lambda >= lambda_max: zero is the exact optimum; or |y|^2 is too small a number to count with */
     EITS_STOP_DIVERGED = 4,   /* the objective rose although the step was halved again and again; the image is zero */
     EITS_STOP_MACS = 5,       /* the next step would have passed mac_limit: the image is the best until then */
     EITS_STOP_OPTIMUM = 6     /* no coefficient moves any more but by rounding: coordinate descent and active set */
