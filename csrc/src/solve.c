@@ -8,13 +8,8 @@
 #include "stages.h"
 #include "vec.h"
 
-#include <float.h>
-
-#ifdef EITS_DOUBLE
-static const eits_real LEAST_SQUARE = DBL_MIN;
-#else
-static const eits_real LEAST_SQUARE = FLT_MIN; /* below it squares lose their digits, and nothing can be told by them */
-#endif
+/* The least normal number: below it squares lose their digits, and nothing can be told by them. */
+static const eits_real LEAST_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 1.1754943508222875e-38 : 2.2250738585072014e-308);
 
 static void start_from_zero(eits_context *ctx)
 {

@@ -6,7 +6,7 @@
 #include "small_model.h"
 #include "vec.h"
 
-enum { MODELS = 16, STEPS = 12, MOST_ITERATIONS = 40, MOST_SWEEPS = 4 };
+enum { MODELS = 16, STEPS = 8, MOST_ITERATIONS = 24, MOST_SWEEPS = 2 };
 
 /* ---- models ---- */
 
@@ -204,7 +204,9 @@ static void reconstruct(twins *t, fuzz_bytes *in, int touches)
     uint32_t count[2];
     for (int k = 0; k < 2; ++k)
         MUST(eits_find_touches(&t->ctx[k], found[k], EITS_MAX_TOUCHES, &count[k]) == EITS_OK);
-    MUST(count[0] == count[1] && same_bits(found[0], found[1], count[0] * sizeof found[0][0]));
+    MUST(count[0] == count[1]);
+    for (uint32_t k = 0; k < count[0]; ++k) /* past the id: it may be padded */
+        MUST(found[0][k].id == found[1][k].id && same_bits(&found[0][k].x_mm, &found[1][k].x_mm, 5 * sizeof(eits_real)));
     MUST(status == EITS_OK || count[0] == 0);
     fuzz_check_touches(&t->ctx[0], found[0], count[0]);
 }
@@ -223,8 +225,8 @@ static void step(twins *t, fuzz_bytes *in)
     }
     case 3: change_options(t, in); break;
     case 4: eits_forget(&t->ctx[0]), eits_forget(&t->ctx[1]); break;
-    case 5: reconstruct(t, in, 0); break;
-    default: reconstruct(t, in, 1); break;
+    case 6: reconstruct(t, in, 1); break;
+    default: reconstruct(t, in, 0); break;
     }
     check_baseline(t);
 }
