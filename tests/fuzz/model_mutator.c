@@ -35,7 +35,7 @@ static uint8_t *find(uint8_t *data, size_t size, int which, uint32_t *bytes)
 
 static void seal(uint8_t *data, size_t size)
 {
-    uint32_t dims_bytes, bytes;
+    uint32_t dims_bytes = 0, bytes = 0;
     const uint8_t *dims = find(data, size, DIMS, &dims_bytes), *table = find(data, size, PROT, &bytes);
     if (dims != NULL && dims_bytes == 64 && table != NULL && bytes / 4 >= get(dims + 4)) {
         const uint64_t hash = eits_protocol_hash(get(dims), get(dims + 4), table);
@@ -96,7 +96,7 @@ static void point_right(uint8_t *at[SECTIONS], const uint32_t d[10])
 static size_t lay_out_anew(uint8_t *data, size_t size, size_t room, uint32_t seed)
 {
     static uint8_t made[MOST];
-    uint32_t bytes[SECTIONS], have, d[10];
+    uint32_t bytes[SECTIONS], have = 0, d[10];
     const uint8_t *dims = find(data, size, DIMS, &have);
     if (dims == NULL || have != 64)
         return size;
@@ -144,7 +144,7 @@ static void set_number(uint8_t *data, size_t size, uint32_t seed)
     static const uint32_t odd[] = {0x00000001u, 0x80000001u, 0x007FFFFFu, 0x00800000u, 0x7F7FFFFFu, 0xFF7FFFFFu, 0x7F800000u, 0x7FC00000u,
                                    0x80000000u, 0x7E967699u, 0x01000000u, 0x3F800000u, 0xBF800000u, 0x5F000000u, 0x20000000u, 0u};
     static const int numbers[] = {VREF, REDU, SENS, COLW, DEFS, GOLD, SCAL, DIMS};
-    uint32_t bytes;
+    uint32_t bytes = 0;
     uint8_t *section = find(data, size, numbers[seed % 8], &bytes);
     if (section == NULL || bytes < 4)
         return;
@@ -161,7 +161,7 @@ static void set_number(uint8_t *data, size_t size, uint32_t seed)
 
 static size_t mutate_section(uint8_t *data, size_t size, uint32_t seed)
 {
-    uint32_t bytes;
+    uint32_t bytes = 0;
     uint8_t *section = find(data, size, (int)(seed % SECTIONS), &bytes);
     if (section != NULL && bytes > 0) {
         const size_t kept = LLVMFuzzerMutate(section, bytes, bytes);

@@ -55,7 +55,7 @@ static void scripts(void)
 {
     for (unsigned model = 0; model < 16; ++model) {
         for (unsigned solver = 0; solver < 4; ++solver) {
-            uint8_t script[256] = {(uint8_t)model};
+            uint8_t script[256] = {(uint8_t)(model | (model + solver) % 4 << 4)};
             size_t at = 1;
             const uint8_t learn[] = {1, 4, 1, 127, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3, 4, 5, 1, 127, 9, 8, 7, 6, 5, 4, 3, 2, 1, 9, 8, 7, 6, 5,
                                      0, 127, 0, 127};
