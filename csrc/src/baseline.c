@@ -131,6 +131,8 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
     if (status != EITS_OK)
         return status;
     eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
+    if (!eits_all_finite(ctx->gradient, ctx->model->n_pixels))
+        return EITS_E_NOT_FINITE;
     const eits_real seen = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH) / ctx->noise_ratio;
     if (seen > ctx->baseline.lambda_noise)
         ctx->baseline.lambda_noise = seen;
@@ -243,7 +245,8 @@ eits_status eits_baseline_finish(eits_context *ctx)
             ++used;
         }
     }
-    b->noise_v = used > 0 ? b->m2_unit * eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
+    const eits_real noise_v = used > 0 ? b->m2_unit * eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
+    b->noise_v = eits_is_finite(noise_v) ? noise_v : 0; /* out of range: not known */
     b->ready = 1;
     return EITS_OK;
 }

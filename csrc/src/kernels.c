@@ -7,6 +7,11 @@
 
 #ifdef EITS_BUILD_AVX2
 extern const eits_kernels eits_kernels_avx2;
+#ifdef __clang__ /* which up to version 14 at least does not know the name; each processor with AVX2 has it */
+#define SUPPORTS_F16C 1
+#else
+#define SUPPORTS_F16C __builtin_cpu_supports("f16c")
+#endif
 #endif
 #ifdef EITS_BUILD_M7
 extern const eits_kernels eits_kernels_m7;
@@ -15,7 +20,7 @@ extern const eits_kernels eits_kernels_m7;
 const eits_kernels *eits_kernels_best(void)
 {
 #ifdef EITS_BUILD_AVX2
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c"))
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && SUPPORTS_F16C)
         return &eits_kernels_avx2;
 #endif
 #ifdef EITS_BUILD_M7

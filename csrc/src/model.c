@@ -247,7 +247,8 @@ static int between(float value, float low, float high)
 static int defaults_in_range(const eits_defaults *d)
 {
     const float huge = 1e30f;
-    return d->iterations >= 1 && d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET && between(d->lambda_rel, 0, 1) && between(d->mask_threshold, 0, 1) &&
+    return d->iterations >= 1 && d->iterations <= EITS_MAX_MODEL_ITERATIONS && d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET &&
+           between(d->lambda_rel, 0, 1) && between(d->mask_threshold, 0, 1) &&
            between(d->touch_threshold, 0, 1) && between(d->touch_share, 0, 1) && between(d->lambda_noise_factor, 0, huge) &&
            between(d->gate_factor, 0, huge) && between(d->touch_change_s_per_m, 0, huge) && between(d->follow_mm, 0, huge) &&
            between(d->touch_radius_weight, 0, huge) && between(d->touch_min_radius_mm, 1e-6f, huge) &&

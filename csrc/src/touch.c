@@ -336,10 +336,11 @@ static void keep_real(eits_context *ctx, fit *f)
 }
 
 /* A disc's covers (disc.h) add up to pi (radius^2 + pixel^2 / 12), averaged over its places, where the radius is at least half
- * a pixel: that is the area its change was fitted with. */
-static void report(const fit *f, eits_real pixel_mm, eits_touch *out)
+ * a pixel: that is the area its change was fitted with. Returns how many there are: those whose numbers are finite. */
+static uint32_t report(const fit *f, eits_real pixel_mm, eits_touch *out)
 {
     const eits_real soft_edge = pixel_mm * pixel_mm / 12;
+    uint32_t count = 0;
     for (uint32_t k = 0; k < f->count; ++k) {
         const eits_disc *disc = &f->disc[k];
         const eits_touch touch = {
@@ -349,13 +350,17 @@ static void report(const fit *f, eits_real pixel_mm, eits_touch *out)
             .strength_s_per_m_mm2 = disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, soft_edge),
             .confidence = f->explained[k] < 1 ? f->explained[k] : 1,
         };
-        uint32_t place = k;
+        const eits_real numbers[] = {touch.x_mm, touch.y_mm, touch.radius_mm, touch.strength_s_per_m_mm2, f->explained[k]};
+        if (!eits_all_finite(numbers, sizeof numbers / sizeof numbers[0])) /* weights or volts at the ends of the range */
+            continue;
+        uint32_t place = count++;
         while (place > 0 && eits_fabs(touch.strength_s_per_m_mm2) > eits_fabs(out[place - 1].strength_s_per_m_mm2)) {
             out[place] = out[place - 1];
             --place;
         }
         out[place] = touch;
     }
+    return count;
 }
 
 /* |residual|^2 / |y|^2 of what fit_strengths and all after it left; without touches all of it. */
@@ -385,16 +390,16 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         move_all(ctx, &f, ctx->options.touch_sweeps);
         keep_real(ctx, &f);
     }
-    report(&f, (eits_real)ctx->model->pixel_mm, found);
-    eits_track(ctx, found, f.count);
-    ctx->info.touches = f.count;
+    const uint32_t finite = report(&f, (eits_real)ctx->model->pixel_mm, found);
+    eits_track(ctx, found, finite);
+    ctx->info.touches = finite;
     ctx->info.touch_macs = f.macs;
     ctx->info.unexplained = unexplained(ctx, looked);
     ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
-    eits_judge_crowd(ctx, found, f.count);
-    for (uint32_t k = 0; k < f.count && k < room; ++k)
+    eits_judge_crowd(ctx, found, finite);
+    for (uint32_t k = 0; k < finite && k < room; ++k)
         touches[k] = found[k];
     if (count != NULL)
-        *count = f.count;
+        *count = finite;
     return EITS_OK;
 }

@@ -28,8 +28,10 @@ def load_toml(path: str | Path, what: str) -> dict[str, Any]:
         return tomllib.loads(read_bytes(path, what).decode("utf-8"))
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not UTF-8 text, so not a {what}") from None
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError is one; whole numbers of thousands of digits are another
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: not a {what}: nested too deeply") from None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -75,7 +77,10 @@ def number(
         bracket = "above" if open_low else "at least"
         bound = f"{bracket} {low:g}" + (f" and at most {high:g}" if high != float("inf") else "")
         raise ConfigError(f"{where}: {key} = {value!r} is out of range; it must be {bound}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise ConfigError(f"{where}: {key} is a number of {len(str(value))} digits; no float holds it") from None
 
 
 def integer(table: Mapping[str, Any], key: str, default: int | None, where: str, *, low: int, high: int) -> int:

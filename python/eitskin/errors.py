@@ -7,9 +7,14 @@ from __future__ import annotations
 
 
 class EitskinError(Exception):
-    """Base of all errors that a user can cause or mend; ``exit_code`` is the command line's status."""
+    """Base of all errors that a user can cause or mend; ``exit_code`` is the command line's status. Its text stays one line,
+    whatever names and values out of files it tells of."""
 
     exit_code = 1
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        return text if text.isprintable() else "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
 
 
 class UsageError(EitskinError):

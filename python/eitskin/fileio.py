@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from eitskin.errors import FileError
 
@@ -70,5 +72,17 @@ def read_bytes(path: str | Path, what: str) -> bytes:
         return Path(path).read_bytes()
     except FileNotFoundError:
         raise FileError(f"{path}: no such {what}; check the path") from None
-    except OSError as error:
-        raise FileError(f"{path}: cannot read this {what} ({error.strerror})") from error
+    except (OSError, ValueError) as error:  # a ValueError: zero bytes in the path
+        raise FileError(f"{path}: cannot read this {what} ({getattr(error, 'strerror', error)})") from error
+
+
+def parse_json(text: str | bytes) -> Any:
+    """The values of a JSON ``text``.
+
+    Raises:
+        ValueError: it is no JSON, not UTF-8, or nested too deeply.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None

@@ -26,9 +26,9 @@ eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t 
 
 /* Learn reference and noise from `count` >= 4 quiet frames: begin, add each, finish. The first half gives a first mean; the
  * second half also gives lambda_noise, the greatest max(S'y) that a quiet frame showed; the mean of all is the reference.
- * Until finish returns EITS_OK there is no reference. Single readings that neither their reciprocals nor
- * the other frames bear out are left out of it, and counted (baseline.glitches). Errors as above; EITS_E_BASELINE_SHORT if frames are missing. A frame
- * that is refused does not count. */
+ * Until finish returns EITS_OK there is no reference. Single readings that neither their reciprocals nor the other frames bear
+ * out are left out of it, and counted (baseline.glitches). Errors as above; EITS_E_BASELINE_SHORT if frames are missing,
+ * EITS_E_NOT_FINITE if S'y of a frame would not be finite. A frame that is refused does not count. */
 eits_status eits_baseline_begin(eits_context *ctx, uint32_t count);
 eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length);
 eits_status eits_baseline_finish(eits_context *ctx);

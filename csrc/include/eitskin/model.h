@@ -17,6 +17,7 @@ extern "C" {
 #define EITS_MAX_RANK 1024
 #define EITS_MAX_PIXELS 65535
 #define EITS_MAX_ROWS 65535
+#define EITS_MAX_MODEL_ITERATIONS 100000 /* of a model's own defaults; options may ask for more */
 
 /* How the reduced Jacobian is stored. Integer types carry one scale per column. */
 typedef enum eits_storage { EITS_STORAGE_F32 = 0, EITS_STORAGE_F16 = 1, EITS_STORAGE_I16 = 2, EITS_STORAGE_I8 = 3 } eits_storage;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -45,18 +46,19 @@ def listing(arrays: Mapping[str, NDArray[Any]]) -> str:
 def _read_mat(path: str | Path) -> dict[str, NDArray[Any]]:
     try:
         from scipy.io import loadmat
-        from scipy.io.matlab import MatReadError
     except ImportError:
         raise missing_extra("model", "scipy") from None
     try:
-        content = loadmat(str(path), simplify_cells=True, appendmat=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of names that stand twice
+            content = loadmat(str(path), simplify_cells=True, appendmat=False)
     except FileNotFoundError:
         raise FileError(f"{path}: no such MAT file; check the path") from None
     except NotImplementedError:
         raise FileError(f"{path}: a MATLAB 7.3 file (HDF5); save it with  save('-v7', ...)") from None
     except OSError as error:
         raise FileError(f"{path}: cannot read this MAT file ({error.strerror or error})") from None
-    except (MatReadError, ValueError, TypeError, KeyError, IndexError, EOFError, OverflowError, MemoryError):
+    except Exception:  # of a damaged file scipy raises whatever its parser meets
         raise FileError(f"{path}: not a readable MAT file: damaged, cut short, or another kind of file") from None
     arrays: dict[str, NDArray[Any]] = {}
     _flatten({name: value for name, value in content.items() if not name.startswith("__")}, "", arrays)

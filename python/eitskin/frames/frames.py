@@ -6,8 +6,6 @@ The file is an .npz; docs/frames-format.md lists its fields. It is read without 
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eitskin.errors import EitskinError, FileError, FrameError
-from eitskin.fileio import write_beside
+from eitskin.fileio import parse_json, write_beside
 from eitskin.skin.protocol import Protocol, table
 
 FloatArray = NDArray[np.float64]
@@ -216,7 +214,8 @@ def read_npz(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
         FileError: it cannot be read, or is no .npz.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with Path(path).open("rb") as stream:
+            archive = np.load(stream, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise FileError(f"{path}: one bare array (.npy), not an .npz with named arrays")
             arrays = {}
@@ -227,11 +226,13 @@ def read_npz(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
                     if "allow_pickle" not in str(error):
                         raise
             return arrays
+    except EitskinError:
+        raise
     except FileNotFoundError:
         raise FileError(f"{path}: no such {what}; check the path") from None
     except OSError as error:
         raise FileError(f"{path}: cannot read this {what} ({error.strerror or error})") from None
-    except (ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, NotImplementedError, SyntaxError):
+    except Exception:  # of a damaged file numpy and zipfile raise whatever their parsers meet
         raise FileError(f"{path}: not a readable .npz {what}: damaged, cut short, or another kind of file") from None
 
 
@@ -245,8 +246,8 @@ def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Fram
     if unknown:
         raise FrameError(f"unknown field {unknown[0]!r}; docs/frames-format.md lists the fields")
     try:
-        meta = json.loads(str(arrays["meta"]))
-    except json.JSONDecodeError:
+        meta = parse_json(str(arrays["meta"]))
+    except ValueError:
         raise FrameError("the field 'meta' is not JSON; make the file again") from None
     if not isinstance(meta, dict):
         raise FrameError("the field 'meta' is not a JSON object; make the file again")

@@ -181,8 +181,14 @@ def _from_arrays(path: str | Path, options: SourceOptions, row_counts: tuple[int
         names = tuple(str(name) for name in np.atleast_1d(pick(arrays, options.names, "--names", where)).ravel())
     times = None
     if options.time is not None:
-        times = np.atleast_1d(pick(arrays, options.time, "--time", where)).ravel().astype(np.float64)
+        times = _times(pick(arrays, options.time, "--time", where), f"{where}: {options.time}")
     return _finish(voltage, reference, names, times, table, arrays, options)
+
+
+def _times(values: NDArray[Any], where: str) -> FloatArray:
+    if values.dtype.kind not in "fiu":
+        raise FrameError(f"{where}: holds {values.dtype}, no times")
+    return np.atleast_1d(values).ravel().astype(np.float64)
 
 
 def _finish(

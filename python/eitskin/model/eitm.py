@@ -16,7 +16,7 @@ import numpy.typing as npt
 from eitskin.core.results import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
-from eitskin.fileio import read_bytes, write_bytes
+from eitskin.fileio import parse_json, read_bytes, write_bytes
 from eitskin.model.model import DATA_KINDS, Defaults, Golden, Model
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
@@ -35,6 +35,7 @@ REQUIRED_FLAG = 1
 SCALED = ("i16", "i8")
 MAX_SECTIONS = 256
 MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
+MAX_ITERATIONS = 100_000
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
 NEARER = "choose units nearer to volts and siemens per metre"
 LEAST_LIPSCHITZ, MOST_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
@@ -277,7 +278,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_share)
     sizes = (d.lambda_noise_factor, d.gate_factor, d.touch_change_s_per_m, d.follow_mm, d.touch_radius_weight)
     in_range = (
-        d.iterations >= 1
+        1 <= d.iterations <= MAX_ITERATIONS
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
         and LEAST_RADIUS_MM <= d.touch_min_radius_mm <= d.touch_seed_radius_mm <= d.touch_max_radius_mm <= HUGE
@@ -289,8 +290,8 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
 
 def _read_meta(content: bytes, where: str) -> dict[str, Any]:
     try:
-        meta = json.loads(content.decode("utf-8"))
-    except (ValueError, RecursionError):
+        meta = parse_json(content.decode("utf-8"))
+    except ValueError:
         _refuse(where, "section 'META' that is not JSON")
     skin = meta.get("skin", {}) if isinstance(meta, dict) else None
     if not isinstance(skin, dict) or not isinstance(skin.get("skin", {}), dict):

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from eitskin.config import load_toml
 from eitskin.errors import ConfigError, EitskinError, FileError, UsageError, missing_extra
-from eitskin.fileio import write_bytes
+from eitskin.fileio import parse_json, write_bytes
 from eitskin.frames.frames import Frames, read_npz
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.dataset_ranges import Ranges, drawn, ranges_of
@@ -209,7 +209,7 @@ def _open_folder(job: Job, folder: Path) -> None:
         write_bytes(path, (json.dumps(manifest, indent=2) + "\n").encode("utf-8"))
         return
     try:
-        there = json.loads(path.read_text(encoding="utf-8"))
+        there = parse_json(path.read_bytes())
     except (OSError, ValueError):
         there = None
     if there != manifest:

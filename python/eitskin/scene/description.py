@@ -192,8 +192,8 @@ def _skin(head: Mapping[str, Any], where: str, folder: Path) -> tuple[Skin, Prot
     if name == "paper":
         return paper_skin(), adjacent(16)
     path = folder / name
-    if not path.is_file():
-        raise ConfigError(f'{where}: skin = {name!r} is neither "paper" nor a file beside the scene ({path})')
+    if "\0" in name or not path.is_file():
+        raise ConfigError(f'{where}: skin = {name!r} is neither "paper" nor a file beside the scene')
     return load_skin(path)
 
 

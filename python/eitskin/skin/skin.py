@@ -200,6 +200,7 @@ def _electrodes_from_table(table: Mapping[str, Any], where: str) -> Electrodes:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    """Whether it is a number that a float can hold, and no truth value."""
+    return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63)
 
 

@@ -14,6 +14,7 @@ from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.packets import LINK_VERSION, PacketType
 from eitskin.device.wire.payloads import build_info
 from eitskin.errors import DeviceError, FileError
+from eitskin.fileio import parse_json
 
 if TYPE_CHECKING:
     from eitskin.device.client import Device
@@ -153,7 +154,7 @@ def read_head(path: str | Path) -> dict[str, Any]:
     if not packets or packets[0].type != PacketType.RECORDING:
         raise FileError(f"{path}: no eitskin recording (.eits), or cut in its first bytes; make one with  eitskin record")
     try:
-        head = json.loads(packets[0].payload)
+        head = parse_json(packets[0].payload)
     except ValueError:
         head = None
     if not isinstance(head, dict) or head.get("format") != FORMAT or not isinstance(head.get("version"), int):

@@ -14,6 +14,7 @@ from eitskin.device.recordings.recording import CHUNK, Recorder, read_head
 from eitskin.device.wire.codec import Decoder
 from eitskin.device.wire.packets import PacketType
 from eitskin.errors import EitskinError, FileError
+from eitskin.fileio import parse_json
 
 LOOKED_THROUGH = 64 * CHUNK  # the note is among the first packets
 
@@ -57,7 +58,7 @@ def _notes(path: str | Path) -> Iterator[dict[str, Any]]:
             for packet in decoder.feed(data):
                 if packet.type == PacketType.RECORDING:
                     try:
-                        note = json.loads(packet.payload)
+                        note = parse_json(packet.payload)
                     except ValueError:
                         continue
                     if isinstance(note, dict):

@@ -13,7 +13,7 @@ from typing import Any
 from eitskin.device.bank import BANK_BYTES, RECORD_BYTES
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import ConfigError, FileError, UsageError
-from eitskin.fileio import read_bytes
+from eitskin.fileio import parse_json, read_bytes
 from eitskin.study.tradeoff.configuration import Configuration, configuration_from
 
 FORMAT, VERSION = "eitskin-tradeoff", 1
@@ -222,8 +222,8 @@ def load_front(path: Path | None = None) -> Front:
     """
     if path is not None:
         try:
-            return front_from(json.loads(read_bytes(path, "results file")), str(path))
-        except (UnicodeDecodeError, json.JSONDecodeError):
+            return front_from(parse_json(read_bytes(path, "results file")), str(path))
+        except ValueError:
             raise ConfigError(f"{path}: not JSON; name the front.json that  eitskin tradeoff run  wrote") from None
     try:
         text = resources.files("eitskin.study.tradeoff").joinpath(SHIPPED).read_text(encoding="utf-8")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.errors import FileError
+from eitskin.fileio import parse_json
 
 
 def key_of(facts: dict[str, Any]) -> str:
@@ -33,7 +34,7 @@ class Store:
         self._torn = bool(text) and not text.endswith("\n")
         for line in text.splitlines():
             try:
-                entry = json.loads(line)
+                entry = parse_json(line)
                 self._values[entry["key"]] = entry["values"]
             except (ValueError, KeyError, TypeError):
                 continue

@@ -1,0 +1,127 @@
+/* Numbers at the ends of the range: what would not be finite is left out, unknown or zero, and never comes out. Found by fuzzing. */
+#include "check.h"
+#include "small_model.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+
+#include <math.h>
+
+static const small_spec SPEC = {.rank = 6, .side = 4};
+
+static void finite_touches(const eits_context *ctx, const eits_touch *touches, uint32_t count)
+{
+    CHECK(count <= EITS_MAX_TOUCHES && count == ctx->info.touches);
+    for (uint32_t k = 0; k < count; ++k)
+        CHECK(isfinite(touches[k].x_mm) && isfinite(touches[k].y_mm) && isfinite(touches[k].radius_mm) &&
+              isfinite(touches[k].strength_s_per_m_mm2) && isfinite(touches[k].confidence));
+}
+
+/* Pixels of 1e38 mm make a touch's strength infinite, and weights may have no inverse: then the disc's response is. */
+static void touches_are_finite_whatever_the_units(void)
+{
+    static const float units[][2] = {{1e38f, 0.02f}, {6.0f, 1e-45f}, {6.0f, 1e-39f}, {6.0f, 1e36f}, {1e-38f, 3e38f}};
+    for (size_t u = 0; u < sizeof units / sizeof units[0]; ++u) {
+        small_spec spec = SPEC;
+        spec.pixel_mm = units[u][0];
+        small_model made = small_model_make(spec);
+        uint8_t *weight = small_model_section(&made, "COLW", NULL);
+        for (uint32_t j = 0; j < 16; ++j)
+            small_put_f32(weight + 4 * j, units[u][1]);
+        small_model_seal(&made);
+        small_context c;
+        small_context_open(&c, &made, 0);
+        eits_real frame[SMALL_ROWS];
+        small_reference(&c.model, 1.0, frame);
+        CHECK_EQUAL(eits_baseline_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+        for (uint32_t i = 0; i < SMALL_ROWS; i += 3)
+            frame[i] *= (eits_real)(1.0 + 0.01 * (i % 7));
+        eits_touch touches[EITS_MAX_TOUCHES];
+        uint32_t count = 0;
+        (void)eits_reconstruct(&c.ctx, frame, SMALL_ROWS, NULL, NULL);
+        CHECK_EQUAL(eits_find_touches(&c.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+        finite_touches(&c.ctx, touches, count);
+        small_context_close(&c);
+        small_model_free(&made);
+    }
+}
+
+/* Squares of the deviations overflow: the noise is unknown, the reference good all the same. */
+static void noise_out_of_range_is_unknown(void)
+{
+    small_model made = small_model_make(SPEC);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    eits_real frame[SMALL_ROWS];
+    CHECK_EQUAL(eits_baseline_begin(&c.ctx, 6), EITS_OK);
+    for (int k = 0; k < 6; ++k) {
+        small_reference(&c.model, BOTH_WIDTHS(1e28, 1e250), frame);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            frame[i] *= (eits_real)(1.0 + 1e-3 * ((i + (uint32_t)k) % 5));
+        CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    }
+    CHECK_EQUAL(eits_baseline_finish(&c.ctx), EITS_OK);
+    CHECK(c.ctx.baseline.ready && c.ctx.baseline.noise_v == 0);
+    CHECK(isfinite(c.ctx.baseline.lambda_noise) && c.ctx.baseline.lambda_noise > 0);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+/* A quiet frame that leads beyond the range is refused and does not count. */
+static void a_quiet_frame_out_of_range_is_refused(void)
+{
+    small_model made = small_model_make(SPEC);
+    uint8_t *reduction = small_model_section(&made, "REDU", NULL);
+    for (uint32_t i = 0; i < SMALL_FOLDED * 8; ++i)
+        small_put_f32(reduction + 4 * i, i % 8 < 6 ? 1e19f : 0.0f);
+    small_put_f32(small_model_section(&made, "SENS", NULL), 3e38f);
+    small_model_seal(&made);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    eits_real frame[SMALL_ROWS];
+    CHECK_EQUAL(eits_baseline_begin(&c.ctx, 4), EITS_OK);
+    small_reference(&c.model, 1.0, frame);
+    CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    frame[0] *= (eits_real)1.5;
+    const eits_status status = eits_baseline_add(&c.ctx, frame, SMALL_ROWS);
+    CHECK_EQUAL(status, BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
+    CHECK_EQUAL(c.ctx.baseline.count, status == EITS_OK ? 3 : 2);
+    CHECK(isfinite(c.ctx.baseline.lambda_noise));
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+/* Data whose squares vanish: nothing can be told by norms and gaps, so the answer is zero, of every solver. */
+static void data_too_small_to_square_give_zero(void)
+{
+    small_model made = small_model_make(SPEC);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    for (uint32_t solver = 0; solver <= EITS_SOLVER_ACTIVE_SET; ++solver) {
+        eits_options options = c.ctx.options;
+        options.solver = (eits_solver)solver;
+        CHECK_EQUAL(eits_set_options(&c.ctx, &options), EITS_OK);
+        small_new_data(&c.ctx, 3);
+        for (uint32_t i = 0; i < SPEC.rank; ++i)
+            c.ctx.y[i] *= (eits_real)BOTH_WIDTHS(1e-24, 1e-165);
+        CHECK_EQUAL(eits_solve(&c.ctx), EITS_OK);
+        CHECK_EQUAL(c.ctx.info.stop, EITS_STOP_ZERO);
+        CHECK(c.ctx.info.lambda_max > c.ctx.info.lambda);
+        CHECK(c.ctx.info.residual <= c.ctx.info.data_norm && c.ctx.info.gap == 0 && c.ctx.info.nonzeros == 0);
+        for (uint32_t j = 0; j < 16; ++j)
+            CHECK(c.ctx.image[j] == 0);
+    }
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+int main(void)
+{
+    touches_are_finite_whatever_the_units();
+    noise_out_of_range_is_unknown();
+    a_quiet_frame_out_of_range_is_refused();
+    data_too_small_to_square_give_zero();
+    return checks_report("out_of_range");
+}

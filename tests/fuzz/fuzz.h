@@ -1,0 +1,45 @@
+/* What the fuzz targets share. A target is LLVMFuzzerTestOneInput of its file; clang's libFuzzer calls it with bytes of its own
+ * making, replay.c with files, under any compiler. */
+#ifndef EITSKIN_FUZZ_H
+#define EITSKIN_FUZZ_H
+
+#include "eitskin/eitskin.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Ends the run; libFuzzer then keeps the input. */
+#define MUST(holds)                                                        \
+    do {                                                                   \
+        if (!(holds)) {                                                    \
+            fprintf(stderr, "%s:%d: must: %s\n", __FILE__, __LINE__, #holds); \
+            abort();                                                       \
+        }                                                                  \
+    } while (0)
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+/* libFuzzer's own mutation; nothing in a replay. */
+size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t room);
+
+/* Read the input from its front; past its end there are zeros. */
+typedef struct fuzz_bytes {
+    const uint8_t *at, *end;
+} fuzz_bytes;
+uint8_t fuzz_u8(fuzz_bytes *b);
+uint32_t fuzz_u32(fuzz_bytes *b);
+float fuzz_f32(fuzz_bytes *b);
+
+/* What must hold after eits_reconstruct on `ctx` returned `status`: all numbers finite, the image zero on an error, certificates
+ * not negative, the residual no worse than that of zero, limits kept. `frame_macs`: what the frame stage alone may have cost. */
+void fuzz_check_result(const eits_context *ctx, eits_status status, uint64_t frame_macs);
+
+/* What must hold of the touches that eits_find_touches gave. */
+void fuzz_check_touches(const eits_context *ctx, const eits_touch *touches, uint32_t count);
+
+/* Room for a workspace, from a 64-byte boundary. */
+enum { FUZZ_WORKSPACE = 1 << 20 };
+void *fuzz_workspace(int which); /* 0 or 1 */
+
+#endif

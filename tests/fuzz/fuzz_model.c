@@ -1,0 +1,77 @@
+/* Any bytes as an .eitm model; where it opens, its own golden frame, its defaults, and frames made of its own voltages. */
+#include "fuzz.h"
+
+#include "vec.h"
+
+enum { MOST_BYTES = 1 << 15, MOST_WORK = 20000, MOST_ITERATIONS = 30, MOST_ROWS = 512 };
+
+static void frame_of(const eits_model *model, const float *volts, float factor, eits_real *frame)
+{
+    for (uint32_t i = 0; i < model->n_rows; ++i)
+        frame[i] = (eits_real)(volts[i] * factor);
+}
+
+static void reconstruct(eits_context *ctx, const eits_real *frame)
+{
+    eits_touch touches[EITS_MAX_TOUCHES];
+    uint32_t count;
+    const eits_status status = eits_reconstruct(ctx, frame, ctx->model->n_rows, NULL, NULL);
+    fuzz_check_result(ctx, status, 0);
+    MUST(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count) == EITS_OK);
+    MUST(status == EITS_OK || count == 0);
+    fuzz_check_touches(ctx, touches, count);
+}
+
+static void use(const eits_model *model)
+{
+    static eits_context ctx;
+    static eits_real frame[MOST_ROWS];
+    eits_options options;
+    eits_real difference;
+    const size_t size = eits_workspace_size(model, 1);
+    const uint64_t work = (uint64_t)model->n_pixels * model->rank;
+    if (size > FUZZ_WORKSPACE || model->n_rows > MOST_ROWS || work > MOST_WORK)
+        return;
+    const int prepared = model->meta_size % 2 == 0;
+    MUST(eits_init(&ctx, model, fuzz_workspace(0), prepared ? size : eits_workspace_size(model, 0)) == EITS_OK);
+    MUST(eits_options_default(model, &options) == EITS_OK);
+    MUST(eits_set_options(&ctx, &options) == EITS_OK); /* its own defaults are always good ones */
+    if (options.iterations <= MOST_ITERATIONS) {
+        const eits_status status = eits_self_test(&ctx, &difference);
+        MUST(difference >= 0); /* infinite where the golden image is not of this world, never NaN */
+        if (ctx.baseline.ready)
+            fuzz_check_result(&ctx, status, 0);
+    }
+    options.iterations = 1 + (options.iterations - 1) % MOST_ITERATIONS;
+    options.touch_sweeps = 2;
+    options.warm_start = 1;
+    MUST(eits_set_options(&ctx, &options) == EITS_OK);
+    frame_of(model, model->golden.reference, 1.0f, frame);
+    if (eits_baseline_set(&ctx, frame, model->n_rows) != EITS_OK)
+        return;
+    frame_of(model, model->golden.frame, 1.0f, frame);
+    reconstruct(&ctx, frame);
+    options.sign = EITS_SIGN_BOTH;
+    options.solver = (eits_solver)((model->defaults->solver + 1u) % 4u);
+    MUST(eits_set_options(&ctx, &options) == EITS_OK);
+    frame_of(model, model->golden.frame, 1.5f, frame);
+    reconstruct(&ctx, frame);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static _Alignas(16) uint8_t room[MOST_BYTES];
+    eits_model model, before;
+    if (size > MOST_BYTES)
+        return 0;
+    uint8_t *blob = room + MOST_BYTES - ((size + 15u) & ~(size_t)15u); /* a read too far runs out of `room`, but for 15 bytes */
+    memcpy(blob, data, size);
+    memset(&model, 0x5A, sizeof model);
+    memcpy(&before, &model, sizeof model);
+    const eits_status status = eits_model_open(&model, blob, size);
+    MUST(status == EITS_OK || memcmp(&model, &before, sizeof model) == 0);
+    MUST(eits_model_open(&before, blob + 1, size) == EITS_E_MODEL_ALIGNMENT);
+    if (status == EITS_OK)
+        use(&model);
+    return 0;
+}

@@ -1,0 +1,90 @@
+/* Writes the first inputs of a fuzz target into a folder: seeds TARGET FOLDER. scripts/fuzz begins with these and the kept corpus. */
+#include "fuzz.h"
+
+#include "small_model.h"
+
+static const char *folder;
+
+static void keep(const char *name, unsigned number, const uint8_t *bytes, size_t size)
+{
+    char path[4096];
+    snprintf(path, sizeof path, "%s/%s-%02u", folder, name, number);
+    FILE *file = fopen(path, "wb");
+    if (file == NULL || fwrite(bytes, 1, size, file) != size || fclose(file) != 0) {
+        fprintf(stderr, "cannot write %s\n", path);
+        exit(1);
+    }
+}
+
+static void models(void)
+{
+    for (unsigned k = 0; k < 24; ++k) {
+        const small_spec spec = {.rank = 1 + k % 9, .side = 1 + k % 5, .storage = (eits_storage)(k % 4), .kind = (eits_data_kind)(k % 3),
+                                 .shape = k % 5 == 0 ? SMALL_WAVES : SMALL_RANDOM, .lipschitz_factor = k == 23 ? 0.1 : 0};
+        if (spec.shape == SMALL_WAVES && spec.side * spec.side < spec.rank)
+            continue;
+        small_model made = small_model_make(spec);
+        small_put_u32(small_model_section(&made, "DEFS", NULL), 1 + k);      /* iterations */
+        small_put_u32(small_model_section(&made, "DEFS", NULL) + 56, k % 4); /* solver */
+        small_model_seal(&made);
+        keep("small", k, made.blob, made.size);
+        if (k % 8 == 0)
+            keep("cut", k, made.blob, made.size / 2);
+        small_model_free(&made);
+    }
+}
+
+static void packets(void)
+{
+    static const uint16_t sizes[] = {0, 1, 4, 8, 16, 36, 68, 152, 241, 242, 243, 495, 500};
+    for (unsigned k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
+        uint8_t payload[512], wire[2 + 2 * EITS_LINK_ENCODED(512)] = {255, (uint8_t)(37 * k)};
+        for (unsigned i = 0; i < sizes[k]; ++i)
+            payload[i] = (uint8_t)(k % 3 == 0 ? 0 : k % 3 == 1 ? 0xFF : i * 7);
+        size_t at = 2;
+        for (uint32_t sequence = 0; sequence < 2; ++sequence)
+            at += eits_link_encode(wire + at, sizeof wire - at, (uint8_t)(0x80 + k), sequence, payload, sizes[k], NULL, 0);
+        keep("packets", k, wire, at);
+        wire[at / 2] ^= 0x10;
+        keep("damaged", k, wire, at - 1);
+    }
+}
+
+/* fuzz_frame.c reads these steps. */
+static void scripts(void)
+{
+    for (unsigned model = 0; model < 16; ++model) {
+        for (unsigned solver = 0; solver < 4; ++solver) {
+            uint8_t script[256] = {(uint8_t)(model | (model + solver) % 4 << 4)};
+            size_t at = 1;
+            const uint8_t learn[] = {1, 4, 1, 127, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3, 4, 5, 1, 127, 9, 8, 7, 6, 5, 4, 3, 2, 1, 9, 8, 7, 6, 5,
+                                     0, 127, 0, 127};
+            const uint8_t once[] = {0, 0, 127};
+            const uint8_t options[] = {3, 2, 23, (uint8_t)solver, 22, (uint8_t)(model % 3), 4, (uint8_t)(model % 2)};
+            const uint8_t frames[] = {6, 1, 127, 30, 0, 40, 0, 50, 0, 60, 0, 20, 0, 9, 0, 90, 0, 6, 6, 127, 5, 0, 0, 0xC0, 0x7F,
+                                      5, 1, 127, 1, 30, 2, 40, 0, 50, 0, 60, 0, 20, 0, 9, 0, 90};
+            memcpy(script + at, solver % 2 ? learn : once, solver % 2 ? sizeof learn : sizeof once);
+            at += solver % 2 ? sizeof learn : sizeof once;
+            memcpy(script + at, options, sizeof options);
+            at += sizeof options;
+            memcpy(script + at, frames, sizeof frames);
+            at += sizeof frames;
+            keep("script", model * 4 + solver, script, at);
+        }
+    }
+}
+
+int main(int argc, char **argv)
+{
+    static const struct {
+        const char *target;
+        void (*write)(void);
+    } all[] = {{"model", models}, {"link", packets}, {"frame", scripts}};
+    folder = argc == 3 ? argv[2] : ".";
+    for (size_t k = 0; argc == 3 && k < sizeof all / sizeof all[0]; ++k) {
+        if (strcmp(argv[1], all[k].target) == 0)
+            return all[k].write(), 0;
+    }
+    fprintf(stderr, "seeds model|link|frame FOLDER\n");
+    return 2;
+}

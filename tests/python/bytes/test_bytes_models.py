@@ -1,0 +1,70 @@
+"""Any bytes as an .eitm model: read by Python and C alike or refused in a line; what is read can be used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bytes_damage import any_bytes, bounded, read_or_refuse, written
+from hypothesis import given
+
+from eitm_bytes import sealed, sections_of
+from eitskin.core.engine import CoreEngine
+from eitskin.errors import EitskinError, ModelError
+from eitskin.model.eitm import decode_model, encode_model, load_model
+from eitskin.solve.reconstructor import Reconstructor
+from small_models import tiny_blob
+
+WHOLE = [tiny_blob(storage) for storage in ("f32", "f16", "i16", "i8")]
+ENOUGH_WORK = 10_000
+
+
+def resealed(content: bytes) -> bytes:
+    """``content`` with a right checksum and hash where there is a header to put them in."""
+    try:
+        return sealed(content, rehash=True)
+    except Exception:
+        return content
+
+
+@given(content=any_bytes(WHOLE))
+@bounded(150)
+def test_a_damaged_model_is_refused_in_a_line(tmp_path: Path, content: bytes) -> None:
+    path = written(tmp_path, "x.eitm", content)
+    if read_or_refuse(lambda: load_model(path)) is None:
+        assert read_or_refuse(lambda: CoreEngine(content, prepared=False)) is None
+
+
+@given(content=any_bytes(WHOLE).map(resealed))
+@bounded(250)
+def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(tmp_path: Path, content: bytes) -> None:
+    path = written(tmp_path, "x.eitm", content)
+    loaded = read_or_refuse(lambda: load_model(path))
+    if loaded is None:
+        return
+    model, blob = loaded
+    assert encode_model(model)
+    if model.defaults.iterations > ENOUGH_WORK:
+        return
+    core = Reconstructor(model, blob=blob)
+    golden = model.golden
+    try:
+        core.tare(golden.reference_v)
+        result = core.reconstruct(golden.frame_v)
+    except EitskinError as error:
+        assert "\n" not in str(error)
+        return
+    assert np.isfinite(result.image).all()
+    assert all(np.isfinite([t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2]).all() for t in result.touches)
+
+
+def test_iterations_without_end_are_refused() -> None:
+    """A model whose own defaults would keep a board busy for a day is not one that ``eitskin model build`` made."""
+    blob = bytearray(tiny_blob())
+    place = sections_of(blob)["DEFS"].offset
+    blob[place : place + 4] = (100_001).to_bytes(4, "little")
+    with pytest.raises(ModelError):
+        CoreEngine(sealed(blob), prepared=False)
+    with pytest.raises(ModelError, match="a default out of range"):
+        decode_model(sealed(blob), "x")
