@@ -10,9 +10,6 @@
 #include "stages.h"
 #include "vec.h"
 
-/* The least normal number: below it squares lose their digits, and nothing can be told by them. */
-static const eits_real LEAST_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 1.1754943508222875e-38 : 2.2250738585072014e-308);
-
 static void start_from_zero(eits_context *ctx)
 {
     eits_zero(ctx->x, ctx->model->n_pixels);
