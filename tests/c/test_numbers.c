@@ -4,7 +4,7 @@
 
 #include "half.h"
 #include "log.h"
-#include "stages.h"
+#include "kernels.h"
 
 #include <math.h>
 #include <string.h>
@@ -90,8 +90,9 @@ static void logarithm_rises(void)
 }
 
 /* The greatest under each sign rule, wherever it stands and however many there are. */
-static void the_greatest(void)
+static void the_greatest(const eits_kernels *kernels)
 {
+    const eits_context ctx = {.kernels = kernels};
     eits_real g[20];
     for (uint32_t count = 1; count <= 20; ++count) {
         for (uint32_t at = 0; at < count; ++at) {
@@ -101,18 +102,19 @@ static void the_greatest(void)
                     g[j] = other;
                 g[at] = R(turned ? -2 : 2);
                 const eits_real least = count > 1 ? R(0.5) : 0;
-                CHECK(eits_greatest(g, count, EITS_SIGN_INCREASE) == (turned ? least : 2));
-                CHECK(eits_greatest(g, count, EITS_SIGN_DECREASE) == (turned ? 2 : least));
-                CHECK(eits_greatest(g, count, EITS_SIGN_BOTH) == 2);
+                CHECK(eits_greatest(&ctx, g, count, EITS_SIGN_INCREASE) == (turned ? least : 2));
+                CHECK(eits_greatest(&ctx, g, count, EITS_SIGN_DECREASE) == (turned ? 2 : least));
+                CHECK(eits_greatest(&ctx, g, count, EITS_SIGN_BOTH) == 2);
             }
         }
     }
-    CHECK(eits_greatest(g, 0, EITS_SIGN_BOTH) == 0);
+    CHECK(eits_greatest(&ctx, g, 0, EITS_SIGN_BOTH) == 0);
 }
 
 int main(void)
 {
-    the_greatest();
+    the_greatest(&eits_kernels_portable);
+    the_greatest(eits_kernels_best());
     halves();
     logarithm_is_accurate();
     logarithm_rises();
