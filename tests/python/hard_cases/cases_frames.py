@@ -12,8 +12,8 @@ CASES: tuple[Case, ...] = (
         "Nothing wrong",
         "Random scenes at 60 dB with contact impedances that differ by a fifth.",
         "Whatever looks for faults must leave healthy frames alone.",
-        "Nothing is found but, in a few scenes, that touches are hard to count; no row is left out; the image has the bits that it "
-        "has without looking.",
+        "Nothing is found but, in a few scenes, that touches are hard to count; no row is left out; the image has the bits "
+        "that it has without looking.",
         (f"{ROWS}::test_clean_frames_are_left_alone",),
     ),
     Case(
@@ -21,8 +21,8 @@ CASES: tuple[Case, ...] = (
         "Zeros and denormal numbers",
         "A frame of zeros, of denormal numbers, or with one row that fell to a denormal number.",
         "Every electrode looks open; ratios to the reference vanish, and logarithms of them do not exist.",
-        "All zero is refused as a dead front end, not as sixteen open electrodes; the image is zero. All denormal shows no touch. "
-        "One denormal row is a glitch: left out and counted.",
+        "All zero is refused as a dead front end, not as sixteen open electrodes; the image is zero. All denormal shows no "
+        "touch. One denormal row is a glitch: left out and counted.",
         (f"{ROWS}::test_zero_and_denormal", f"{ROWS}::test_one_denormal_row"),
     ),
     Case(
@@ -39,9 +39,9 @@ CASES: tuple[Case, ...] = (
         "A glitch",
         "One row of a frame is off by 5 % of rms(V0) to five times that.",
         "The image has four to five times its peak, somewhere else.",
-        "A full scan tells by the row's reciprocal and, which of the two is wrong, by the other rows: it is left out and counted, "
-        "and at most 0.02 of the MIoU are lost. A half scan has no reciprocals: only what the other rows contradict is left out, "
-        "and the mean loss is at most half of what it would be.",
+        "A full scan tells by the row's reciprocal and, which of the two is wrong, by the other rows: it is left out and "
+        "counted, and at most 0.02 of the MIoU are lost. A half scan has no reciprocals: only what the other rows contradict is left "
+        "out, and the mean loss is at most half of what it would be.",
         (f"{ROWS}::test_glitch", f"{ROWS}::test_glitch_in_half_scans"),
     ),
     Case(
@@ -132,7 +132,8 @@ CASES: tuple[Case, ...] = (
         "A common-mode jump",
         "A constant of 1 or 5 % of rms(V0) is added to all rows.",
         "It is no drift of the gain, and nearly such as a sheet could give.",
-        "No row is left out for it. 1 % costs at most 0.1 of the MIoU. 5 % spoils the image; at least half of such frames are named.",
+        "No row is left out for it. 1 % costs at most 0.1 of the MIoU. 5 % spoils the image; at least half of such "
+        "frames are named.",
         (f"{DRIFT}::test_common_mode_jump",),
     ),
     Case(
