@@ -87,3 +87,20 @@ uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *ato
     macs += respond(ctx, &c, c.ramp, slope[2]);
     return macs;
 }
+
+int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc)
+{
+    const eits_model *model = ctx->model;
+    const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / (eits_real)model->pixel_mm;
+    const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / (eits_real)model->pixel_mm;
+    if (!(x >= -1 && y >= -1 && x < (eits_real)model->nx + 1 && y < (eits_real)model->ny + 1))
+        return 0;
+    const uint32_t x1 = (uint32_t)(x + 1), y1 = (uint32_t)(y + 1); /* its cell, counted from 1 */
+    for (uint32_t iy = y1 > 2 ? y1 - 2 : 0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x1 > 2 ? x1 - 2 : 0; ix <= x1 && ix < model->nx; ++ix) {
+            if (ctx->cell[(size_t)iy * model->nx + ix] != EITS_NO_PIXEL)
+                return 1;
+        }
+    }
+    return 0;
+}

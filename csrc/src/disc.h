@@ -16,4 +16,7 @@ typedef struct eits_disc {
  * Returns the multiply-accumulates. */
 uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom, eits_real *const *slope);
 
+/* Whether a kept pixel is at the disc's centre or next to it: data that fit no disc would draw it far beyond the rim. */
+int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc);
+
 #endif

@@ -14,7 +14,7 @@ enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_
 #define EITS_ROWS_TO_JUDGE 3u         /* so many significant rows of an electrode or a pair must agree; so many turned ones are a misfit */
 #define EITS_ROW_GROWN R(8.0)         /* times the reference, or times this share of its rms where that is more: */
 #define EITS_ROW_SMALL R(0.05)
-#define EITS_GLITCH_NOISE R(8.0)      /* reciprocals that differ by so many times their difference's noise, */
+#define EITS_GLITCH_NOISE R(6.5)      /* reciprocals that differ by so many times their difference's noise, */
 #define EITS_GLITCH_ROBUST R(16.0)    /* the same where no noise was learned, of the robust deviation of all such differences, */
 #define EITS_GLITCH_LARGEST R(0.03)   /* and by this share of the largest datum: common modes scale with that, */
 #define EITS_GLITCH_SHARE R(0.25)     /* and by this share of the larger: channel gains that differ scale with the change */

@@ -184,7 +184,8 @@ static int examine_reduced(eits_context *ctx, uint64_t *macs)
 {
     if (!ctx->sheet_known || !eits_judge_misfit(ctx, macs))
         return 0;
-    if (eits_wants(ctx, EITS_FINDING_GLITCH) && eits_find_unpaired(ctx, macs)) {
+    const int known = (ctx->info.findings & EITS_FINDING_MISFIT) != 0; /* by turned rows: then it is no single fold */
+    if (!known && eits_wants(ctx, EITS_FINDING_GLITCH) && eits_find_unpaired(ctx, macs)) {
         ctx->info.misfit = 0;
         return 1;
     }

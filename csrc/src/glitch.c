@@ -47,8 +47,8 @@ static eits_real most_by_noise(const eits_context *ctx, uint32_t k)
     const eits_baseline *b = &ctx->baseline;
     if (ctx->model->data_kind != EITS_DATA_NORMALISED)
         return EITS_GLITCH_NOISE * eits_sqrt(R(2.0)) * eits_fabs(b->gain) * b->noise_v;
-    const eits_real first = 1 / b->v0[ctx->model->fold[k].first], second = 1 / b->v0[ctx->model->fold[k].second];
-    return EITS_GLITCH_NOISE * b->noise_v * eits_sqrt(eits_fma(first, first, second * second));
+    const eits_real first = b->noise_v / b->v0[ctx->model->fold[k].first], second = b->noise_v / b->v0[ctx->model->fold[k].second];
+    return EITS_GLITCH_NOISE * eits_sqrt(eits_fma(first, first, second * second));
 }
 
 static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)

@@ -210,6 +210,8 @@ static eits_real move_disc(eits_context *ctx, fit *f, uint32_t k)
         trial.y_mm += share * clamp(step[1], -reach, reach);
         trial.radius_mm = clamp(disc->radius_mm + share * clamp(step[2], -radius_reach, radius_reach), o->touch_min_radius_mm,
                                 o->touch_max_radius_mm);
+        if (!eits_disc_on_skin(ctx, &trial))
+            continue;
         f->macs += eits_disc_atom(ctx, &trial, trial_atom, NULL) + 3u * rank;
         trial.change = best_change(ctx, &trial, trial_atom, target);
         const eits_real trial_off = trial.radius_mm - expected;

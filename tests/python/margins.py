@@ -138,12 +138,19 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     _HERE.write(Path(os.environ[FOLDER]))
 
 
+def joined(targets: list[str]) -> str:
+    """As in a sentence."""
+    return " and ".join(targets)
+
+
 def summary_lines(found: Margins) -> Iterator[str]:
     """A line a case: the worst on host and M7."""
     for case, of_case in sorted(worst_of_cases(found).items()):
-        known = [(target, of_case[target]) for target in TARGETS if target in of_case]
-        said = [f"{target} {100 * margin.share:.2g} % ({margin.text})" for target, margin in known]
-        yield f"{case}: {'; '.join(said)}"
+        said: dict[str, list[str]] = {}
+        for target in TARGETS:
+            if target in of_case:
+                said.setdefault(f"{100 * of_case[target].share:.3g} % ({of_case[target].text})", []).append(target)
+        yield f"{case}: {'; '.join(f'{joined(targets)} {text}' for text, targets in said.items())}"
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

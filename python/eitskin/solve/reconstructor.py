@@ -29,7 +29,9 @@ MIN_CORRELATION = 0.9
 class Reconstructor:
     """One skin's reconstruction: tare on quiet frames, then turn frames into images and touches.
 
-    ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or "numpy" (the reference).
+    ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or "numpy" (the reference). What is
+    wrong with a frame is found, left out where that helps, and named in ``info.found`` (docs/findings.md); the option
+    ``findings`` chooses what is looked for.
 
     Raises:
         ModelError: the C core refuses the model.
@@ -96,7 +98,8 @@ class Reconstructor:
             )
 
     def tare(self, quiet_v: npt.ArrayLike) -> Baseline:
-        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the noise.
+        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the noise, and single readings
+        that the others do not bear out are left out (``glitches``).
 
         Raises:
             FrameError: a frame has the wrong length or cannot be used.

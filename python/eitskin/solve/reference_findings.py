@@ -21,7 +21,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 ROW_SIGNIFICANT, ROW_DEAD_SHARE, ROW_DEAD_NOISE, ROWS_TO_JUDGE = 0.3, 0.02, 5.0, 3
 ROW_GROWN, ROW_SMALL = 8.0, 0.05
-GLITCH_NOISE, GLITCH_ROBUST, GLITCH_LARGEST, GLITCH_SHARE, GLITCH_NEARER, GLITCH_MOST = 8.0, 16.0, 0.03, 0.25, 0.5, 8
+GLITCH_NOISE, GLITCH_ROBUST, GLITCH_LARGEST, GLITCH_SHARE, GLITCH_NEARER, GLITCH_MOST = 6.5, 16.0, 0.03, 0.25, 0.5, 8
 GLITCH_PIVOT, GLITCH_RIDGE, GLITCH_UNPAIRED, GLITCH_ENERGY, NOISY_SHARE = 0.05, 1e-4, 16.0, 0.5, 0.9
 MISFIT_SHARE, MISFIT_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
 CROWD_UNEXPLAINED, CROWD_NOISE, CROWD_NEIGHBOURS, CROWD_WEAKEST, ELECTRODES_A_TOUCH = 0.12, 1.5, 1.5, 0.01, 2
@@ -273,7 +273,7 @@ class Examiner:
     def unpaired(self, folded: Folded) -> BoolArray:
         """Rows of the one fold that the others predict worst, where no fold has a reciprocal of its own."""
         out, fold = np.zeros(self.model.protocol.n_rows, dtype=np.bool_), self.model.fold
-        if self.sheet is None or "glitch" not in self.wanted or (folded.apart != 0).any():
+        if "glitch" not in self.wanted or self.sheet is None or {"misfit"} & self.found.names or (folded.apart != 0).any():
             return out
         off = np.abs(folded.d - self._p.T @ (self.sheet.shrink * (self._p @ folded.d)))
         left = 1 - (self._p**2 * self.sheet.shrink[:, None]).sum(axis=0)

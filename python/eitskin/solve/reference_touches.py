@@ -107,6 +107,12 @@ class Fit:
         ratio = disc.change * disc.polarity / o.touch_change_s_per_m
         return float(np.clip(disc.radius_mm * np.sqrt(ratio), o.touch_min_radius_mm, o.touch_max_radius_mm))
 
+    def on_skin(self, disc: Disc) -> bool:
+        """Whether a kept pixel is there or next to it."""
+        grid = self.model.grid
+        cell = np.floor((np.array([disc.x_mm, disc.y_mm]) - grid.origin_mm) / grid.pixel_mm)
+        return bool((np.abs(grid.index - cell) <= 1).all(axis=1).any())
+
     def move(self, k: int) -> float:
         """One damped Gauss-Newton step of disc k, others held; returns how far it went, mm."""
         o, target = self.options, self.residual(leave_out=k)
@@ -128,6 +134,8 @@ class Fit:
         for share in (1.0, 0.5, 0.25):
             radius = float(np.clip(disc.radius_mm + share * step[2], o.touch_min_radius_mm, o.touch_max_radius_mm))
             trial = replace(disc, x_mm=disc.x_mm + share * step[0], y_mm=disc.y_mm + share * step[1], radius_mm=radius)
+            if not self.on_skin(trial):
+                continue
             trial_atom, _ = self.answers(trial)
             trial = replace(trial, change=self.best_change(trial, trial_atom, target))
             rest = target - trial.change * trial_atom

@@ -76,7 +76,7 @@ def page_text(found: Margins) -> str:
 
 def without_numbers(text: str) -> str:
     """What of the page follows from the catalogue alone."""
-    return "\n".join(line for line in text.splitlines() if not line.startswith("|"))
+    return "\n".join(line for line in text.splitlines() if not line.startswith("|")).rstrip()
 
 
 def missing(found: Margins) -> list[str]:

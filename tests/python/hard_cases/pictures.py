@@ -3,9 +3,78 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-DRAWN: dict[str, Callable[[Path], None]] = {}
+import touch_scenes
+from everywhere import on_host
+from losses import LEVELS, UNITS, all_steps, errors_of
+from touch_scenes import frames_of, groups
+
+from eitskin.scene.random_touches import Scene
+from eitskin.solve.options import default_options
+from eitskin.study.emulated_steps import Choose, Load, Play, Tare
+from eitskin.view.comparison_pictures import truth_marks
+from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from small_models import prebuilt
+
+SHOWN = (  # group, which of it, sign looked for, title
+    ("on an electrode", 0, "increase", "on an electrode"),
+    ("centre", 0, "increase", "at the centre"),
+    ("merging", 2, "increase", "40 mm apart"),
+    ("merging", 4, "increase", "24 mm apart"),
+    ("radius 3 mm", 0, "increase", "radius 3 mm"),
+    ("radius 40 mm", 0, "increase", "radius 40 mm"),
+    ("contrasts", 6, "increase", "contrast 1,000"),
+    ("insulating", 2, "decrease", "insulating"),
+    ("insulating", 2, "increase", "insulating,\nincreases wanted"),
+    ("crowds", 0, "increase", "10 on a ring"),
+    ("crowds", 1, "increase", "14 on two rings"),
+    ("crowds", 4, "increase", "6 in a row"),
+)
+
+
+def panel(group: str, which: int, sign: str, title: str) -> Panel:
+    """One scene's image with what was there and what was found."""
+    model, blob = prebuilt()
+    options = replace(default_options(model), sign=sign)
+    frames = frames_of(group)[which : which + 1]
+    _, (one,) = on_host([Load(blob), Choose(options), Tare(touch_scenes.simulated().quiet_v), Play(frames)])
+    truth = truth_marks(Scene(title, groups()[group][which]), model.skin.conductivity_s_per_m)
+    found = tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in one.touches)
+    count = len(found)
+    return Panel(f"{title}\n{count} touch{'' if count == 1 else 'es'} found", one.image, truth, found)
+
+
+def draw_touches(path: Path) -> None:
+    """Hard touches, their images and what was found."""
+    model, _ = prebuilt()
+    note = "solid circles: touches that are there; crosses and dashed circles: found"
+    panels = [panel(*each) for each in SHOWN]
+    draw_panels(path, model.skin, model.grid, panels, 4, title="Touches that are hard to see", note=note)
+
+
+def draw_losses(path: Path) -> None:
+    """How much the image changes with the damage to its frames."""
+    errors = errors_of(on_host(all_steps())[1])
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(9.0, 3.0), layout="constrained")
+        for k, (kind, values) in enumerate(errors.items()):
+            axes = figure.add_subplot(1, 3, k + 1)
+            axes.plot([float(level) for level in LEVELS[kind]][1:], values[1:], "o-", color="#1f6fb4")
+            axes.set_ylim(0, 0.26)
+            axes.set_xlabel(UNITS[kind], color=INK)
+            if kind == "noise":
+                axes.set_xscale("log")
+            if kind == "bits":
+                axes.invert_xaxis()
+            if k == 0:
+                axes.set_ylabel("change of the image,\nshare of its norm")
+        save_png(figure, path)
+
+
+DRAWN: dict[str, Callable[[Path], None]] = {"hard-touches.png": draw_touches, "hard-losses.png": draw_losses}
 
 
 def draw(name: str, path: Path) -> None:

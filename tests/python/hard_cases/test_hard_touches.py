@@ -29,7 +29,15 @@ def reconstruct(same_everywhere: SameEverywhere, frames: np.ndarray, sign: str =
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     assert all(one.status == 0 and one.finite() and len(one.touches) <= options.max_touches for one in outcomes)
+    assert sum(not on_skin(touch) for one in outcomes for touch in one.touches) == 0
     return outcomes
+
+
+def on_skin(touch: Found) -> bool:
+    """Whether its centre lies on a pixel of the image or next to one."""
+    grid = prebuilt()[0].grid
+    cell = np.floor((np.array([touch.x_mm, touch.y_mm]) - grid.origin_mm) / grid.pixel_mm)
+    return bool((np.abs(grid.index - cell) <= 1).all(axis=1).any())
 
 
 def off_mm(found: Found, truth: Touch) -> float:
@@ -151,8 +159,10 @@ def says_that_there_are_too_many(one: Outcome) -> bool | None:
 
 
 def test_more_touches_than_can_be_told_apart(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Finite, at most as many as asked for; and where the core has a word for it, it is said."""
+    """Finite, on the skin, at most as many as asked for; and where the core has a word for it, it is said."""
     for name, one in zip(crowds(), reconstruct(same_everywhere, frames_of("crowds")), strict=True):
         most = default_options(prebuilt()[0]).max_touches
         margins.everywhere("physics/crowds", "touches beyond max_touches", max(0, len(one.touches) - most), 0, "touches")
+        outside = sum(not on_skin(touch) for touch in one.touches)
+        margins.everywhere("physics/crowds", "touches beyond the skin", outside, 0, "touches")
         assert says_that_there_are_too_many(one) in (None, True), name

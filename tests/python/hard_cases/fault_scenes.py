@@ -1,0 +1,110 @@
+"""Random scenes of one to three touches on the paper's skin, and the same with something wrong; simulated once a session."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eitskin.scene.compiler import compile_scene
+from eitskin.scene.description import scene_from_table
+from eitskin.scene.random_touches import Scene, random_touches
+from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
+from eitskin.skin.protocol import Protocol, adjacent, table
+from eitskin.skin.skin import paper_skin
+from eitskin.study import metrics
+from eitskin.study.score import scorer_for
+from small_models import prebuilt
+
+SEED, COUNT, QUIET = 9, 6, 16
+SNR = 1e3  # rms(V0) / sigma: 60 dB
+ELECTRODES = 16
+ROWS = adjacent(ELECTRODES).drive_measure.astype(np.int64)
+CONTACTS = {"contact_impedance": {"spread": 0.2}}
+
+
+@cache
+def scenes() -> tuple[Scene, ...]:
+    """What is touched."""
+    return random_touches(paper_skin().outline, SEED, COUNT, "frames").scenes
+
+
+@cache
+def bench() -> Bench:
+    """Meshes, kept."""
+    return Bench()
+
+
+def frames_of(
+    k: int, effects: dict[str, Any], protocol: Protocol | None = None, rate_hz: float = 20.0, frames: int = 1
+) -> np.ndarray:
+    """One quiet frame of scene k, then ``frames`` touched ones (frames + 1, m) V, without noise."""
+    touches = [{"radius_mm": t.radius_mm, "x_mm": t.x_mm, "y_mm": t.y_mm, "contrast": t.contrast} for t in scenes()[k].touches]
+    head = {"name": "fault", "skin": "paper", "seed": 1000 * SEED + k, "frames": frames, "rate_hz": rate_hz, "quiet_frames": 1}
+    text = {"scene": head, "touch": touches, "effects": CONTACTS | effects}
+    scene = scene_from_table(text, "fault", Path())
+    if protocol is not None:
+        scene = replace(scene, protocol=protocol)
+    return simulate_frames(compile_scene(scene, bench=bench())).voltage_v
+
+
+def swapped(i: int, j: int) -> Protocol:
+    """The scan with two electrodes' wires exchanged."""
+    rows = ROWS.copy()
+    rows[i == ROWS], rows[j == ROWS] = j, i
+    return table(ELECTRODES, rows)
+
+
+@cache
+def simulated() -> list[dict[str, np.ndarray]]:
+    """By scene: "quiet" and "touched" (m,), and what is wrong, with electrode k or those from k on."""
+    found = []
+    for k in range(COUNT):
+        quiet, touched = frames_of(k, {})
+        pair = [k % ELECTRODES, (k + 1) % ELECTRODES]
+        apart = [k % ELECTRODES, (k + 4) % ELECTRODES]
+        faults = {
+            "detached": frames_of(k, {"detached": {"electrodes": pair[:1]}}),
+            "bridged": frames_of(k, {"bridged": {"electrodes": pair, "resistance_ohm": 10.0}}),
+            "bridged apart": frames_of(k, {"bridged": {"electrodes": apart, "resistance_ohm": 10.0}}),
+            "swapped": frames_of(k, {}, swapped(*pair)),
+            "swapped apart": frames_of(k, {}, swapped(*apart)),
+        }
+        found.append({"quiet": quiet, "touched": touched} | {name: frames[-1] for name, frames in faults.items()})
+    return found
+
+
+def rms_v(k: int) -> float:
+    """Of the untouched skin's voltages."""
+    return float(np.sqrt(np.mean(simulated()[k]["quiet"] ** 2)))
+
+
+def noisy(k: int, frame: np.ndarray, stream: int) -> np.ndarray:
+    """With noise that depends on scene and stream only."""
+    generator = np.random.default_rng([SEED, k, stream])
+    return np.asarray(frame + rms_v(k) / SNR * generator.standard_normal(frame.shape))
+
+
+def quiet_frames(k: int) -> np.ndarray:
+    """(QUIET, m) V."""
+    return noisy(k, np.tile(simulated()[k]["quiet"], (QUIET, 1)), 0)
+
+
+def half(frames: np.ndarray) -> np.ndarray:
+    """As a scan of one row of each reciprocal pair, copied to the other."""
+    fold, done = adjacent(ELECTRODES).reciprocal_pairs(), frames.copy()
+    done[..., fold.second] = fold.sign * frames[..., fold.first]
+    return done
+
+
+def miou(image: np.ndarray, k: int) -> float:
+    """Of an image (n,) against scene k, at the model's own threshold."""
+    model, _ = prebuilt()
+    scorer, scene = scorer_for(model), scenes()[k]
+    truth = metrics.disc_mask(scorer.judge.raster.points_mm, scene.centres_mm(), scene.radii_mm())
+    shown = scorer.judge.lookup.show(np.asarray(image, dtype=np.float64))
+    return float(metrics.miou(metrics.touch_mask(shown, model.defaults.mask_threshold), truth))
