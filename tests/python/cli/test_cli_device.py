@@ -127,7 +127,29 @@ def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     assert {info["stop"] for info in infos("--gap", "0.05", "--iterations", "1000")} == {"gap"}
     warm, cold = infos("--iterations", "10", "--warm"), infos("--iterations", "10", "--cold")
     assert warm[0]["gap_rel"] == cold[0]["gap_rel"] and warm[-1]["gap_rel"] < 0.5 * cold[-1]["gap_rel"]
-    assert infos("--sign", "decrease", "--iterations", "3")[0]["nonzeros"] != infos("--iterations", "3")[0]["nonzeros"]
+    other = infos("--sign", "decrease", "--iterations", "3", "--ignore", "all")
+    assert other[0]["nonzeros"] != infos("--iterations", "3")[0]["nonzeros"]
+    assert all(info["findings"] == [] for info in other)
+
+
+def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Touches that conduct, where what insulates is looked for, are what a stale reference gives."""
+    arguments = ["stream", "--device", f"sim:{scene}", "--sign", "decrease"]
+    assert main([*arguments, "--json"]) == 0
+    out, err = capsys.readouterr()
+    frames = json_lines(out)[:-1]
+    shown = [frame["frame"] for frame in frames if "stale reference" in frame["info"]["findings"]]
+    lines = [line for line in err.splitlines() if "stale reference" in line]
+    assert len(shown) > 3
+    assert lines == [
+        f"eitskin: stale reference, frame {shown[2]}: the skin has changed since it was taken; leave it untouched and run  "
+        "eitskin tare"
+    ]
+    assert main([*arguments, "--ignore", "stale-reference,crowded"]) == 0
+    out, err = capsys.readouterr()
+    assert "stale" not in out + err
+    assert main([*arguments, "--ignore", "stale"]) == 2
+    assert "--ignore stale: " in capsys.readouterr().err
 
 
 def test_every_other_frame(done: Done, scene: Path) -> None:
@@ -138,7 +160,8 @@ def test_every_other_frame(done: Done, scene: Path) -> None:
 def test_another_model_than_the_prebuilt_one(done: Done, scene: Path, tmp_path: Path) -> None:
     model = tmp_path / "small.eitm"
     model.write_bytes(small_blob())
-    frames = json_lines(done("stream", "--device", f"sim:{scene}", "--model", model, "--mode", "image", "--json"))
+    given = ("--device", f"sim:{scene}", "--model", model, "--ignore", "misfit")  # the coarse model does not fit the scene well
+    frames = json_lines(done("stream", *given, "--mode", "image", "--json"))
     assert len(frames) == FRAMES + 1 and len(frames[0]["image_s_per_m"]) < 812
 
 
