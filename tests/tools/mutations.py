@@ -357,12 +357,7 @@ TOUCH = (
             "eits_fma(disc->radius_mm, disc->radius_mm, 0 * soft_edge)",
             "touch_fit",
         ),
-        (
-            "a radius that strength does not tell",
-            "expected_radius(&ctx->options, &f.disc[k]);",
-            "ctx->options.touch_seed_radius_mm;",
-            "touch_fit",
-        ),
+        ("a radius that strength does not tell", "weight = o->touch_radius_weight * energy", "weight = 0 * energy", "touch_fit"),
         ("touches that noise makes", "return best >= least;", "return best >= 0 * least;", "touch"),
     )
     + _of(
