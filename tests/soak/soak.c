@@ -8,7 +8,7 @@
 #include "hand.h"
 
 #include "eitskin/eitskin.h"
-#include "stages.h"
+#include "kernels.h"
 #include "vec.h"
 
 #include <stdio.h>
@@ -174,7 +174,7 @@ static void reconstruct(eits_status expected, uint32_t masked)
         CHECK(run.ctx.info.masked == masked);
         CHECK(eits_find_touches(&run.ctx, touches, EITS_MAX_TOUCHES, &count) == EITS_OK);
     } else {
-        CHECK(eits_greatest(run.ctx.image, model.n_pixels, EITS_SIGN_BOTH) == 0);
+        CHECK(eits_greatest(&run.ctx, run.ctx.image, model.n_pixels, EITS_SIGN_BOTH) == 0);
         ++counts.refused;
     }
     check_touches(touches, count);
