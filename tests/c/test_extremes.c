@@ -116,7 +116,7 @@ static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_l
     bench b;
     make(&b, MOST_RANK);
     set_columns(&b, MOST_RANK, 3.75e-23f, 2.6e-23f);
-    small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 6e-43f); /* the Lipschitz constant of these */
+    small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 1.2e-38f); /* the least that a model may state */
     eits_context *ctx = open_made(&b);
     for (int i = 0; i < MOST_RANK; ++i)
         ctx->y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
