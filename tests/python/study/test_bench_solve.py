@@ -24,7 +24,7 @@ def test_suboptimality_is_judged_in_float64(problems: Problems) -> None:
     zero = np.zeros(problems.s.shape[1])
     assert problems.objective(0, zero) == pytest.approx(0.5 * problems.y[0] @ problems.y[0], rel=1e-14)
     assert problems.suboptimality(0, zero) > 1
-    assert (problems.best_signed <= problems.best).all()
+    assert (problems.best_signed <= problems.best * (1 + 1e-13)).all()  # where no sign differs, equal but for rounding
 
 
 def test_all_that_is_installed_reaches_its_level(problems: Problems, monkeypatch: pytest.MonkeyPatch) -> None:
