@@ -1,6 +1,7 @@
 /* More touches than can be told apart: said, not guessed. */
 #include "examine.h"
 
+#include "kernels.h"
 #include "vec.h"
 
 /* Chosen on training scenes of 1 to 12 touches; docs/findings.md has the rates. */
@@ -22,8 +23,18 @@ static eits_real noise_share(const eits_context *ctx)
     return energy > 0 ? eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->sheet_energy / energy : 0;
 }
 
-void eits_judge_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count)
+/* |residual|^2 / |y|^2. */
+static eits_real unexplained(const eits_context *ctx)
 {
+    const uint32_t rank = ctx->model->rank;
+    const eits_real whole = eits_dot(ctx, ctx->y, ctx->y, rank);
+    return whole > 0 ? eits_dot(ctx, ctx->residual, ctx->residual, rank) / whole : 0;
+}
+
+void eits_judge_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count)
+{
+    ctx->info.unexplained = looked ? unexplained(ctx) : 0;
+    ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
     if (count == 0 || !eits_wants(ctx, EITS_FINDING_CROWDED))
         return;
     int crowded = count >= ctx->options.max_touches || ELECTRODES_A_TOUCH * count >= ctx->model->n_electrodes;

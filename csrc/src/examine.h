@@ -90,8 +90,9 @@ void eits_judge_reference(eits_context *ctx);
 /* The variance of a fold's datum by the noise that was learned, summed over the folds; copied reciprocals are one measurement. */
 eits_real eits_noise_energy(const eits_context *ctx);
 
-/* Whether `count` touches are more than can be told apart; info.unexplained is known. */
-void eits_judge_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count);
+/* info.unexplained, from ctx->residual as the touches' fit left it (0 where nothing was `looked` for), and whether `count` touches
+ * are more than can be told apart. */
+void eits_judge_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count);
 
 /* The k-th smallest of n numbers, which are put in another order. */
 eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k);

@@ -363,14 +363,6 @@ static uint32_t report(const fit *f, eits_real pixel_mm, eits_touch *out)
     return count;
 }
 
-/* |residual|^2 / |y|^2 of what fit_strengths and all after it left; without touches all of it. */
-static eits_real unexplained(const eits_context *ctx, int looked)
-{
-    const uint32_t rank = ctx->model->rank;
-    const eits_real whole = looked ? eits_dot(ctx, ctx->y, ctx->y, rank) : 0;
-    return whole > 0 ? eits_dot(ctx, ctx->residual, ctx->residual, rank) / whole : 0;
-}
-
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room, uint32_t *count)
 {
     if (ctx == NULL || (touches == NULL && room > 0))
@@ -394,9 +386,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     eits_track(ctx, found, finite);
     ctx->info.touches = finite;
     ctx->info.touch_macs = f.macs;
-    ctx->info.unexplained = unexplained(ctx, looked);
-    ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
-    eits_judge_crowd(ctx, found, finite);
+    eits_judge_crowd(ctx, looked, found, finite);
     for (uint32_t k = 0; k < finite && k < room; ++k)
         touches[k] = found[k];
     if (count != NULL)

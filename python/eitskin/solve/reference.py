@@ -305,7 +305,7 @@ class ReferenceEngine:
 
     def _directions(self, folded: Folded) -> list[FloatArray]:
         """What the misfit ignores: P's columns of folds left out, unless that is whitened anew, and the drift of the gain."""
-        left_out = np.flatnonzero(~(folded.first | folded.second)) if self._whitening is None else []
+        left_out: list[int] = [] if self._whitening else np.flatnonzero(~(folded.first | folded.second)).tolist()
         directions, along = [self._p[:, k] for k in left_out], self._along(folded)
         return directions if along is None else [*directions, self._reduce(along)]
 

@@ -203,8 +203,8 @@ def find_touches(
     last: tuple[Touch, ...],
     next_id: int,
 ) -> tuple[tuple[Touch, ...], int, float]:
-    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), which ``seen`` (r, n) explains, strongest first, the next
-    free id, and the share of |y|^2 that the touches leave (0 where the image is zero)."""
+    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), which ``seen`` (r, n) explains, strongest first,
+    the next free id, and the share of |y|^2 that the touches leave (0 where the image is zero)."""
     fit = Fit(model, seen, y, basis, options, lambda_noise)
     if np.abs(image).max() > 0:
         fit.seed(image)

@@ -81,7 +81,7 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
     fold, lost = model.fold, np.random.default_rng(pairs).choice(len(model.fold.first), pairs, replace=False)
     damaged = s.frames(4, 1)[0]
     damaged[fold.first[lost]] = damaged[fold.second[lost]] = np.nan
-    engine = reference(model, project_baseline=False)
+    engine = reference(model, project_baseline=False, findings=0)
     y, basis, masked = engine.frame_stage(damaged)
     known = np.ones(len(fold.first), dtype=bool)
     known[lost] = False
