@@ -28,6 +28,11 @@ def compare(same_everywhere: SameEverywhere, spoil: Callable[[int, np.ndarray], 
     return [(clean, spoilt) for clean, spoilt in run(same_everywhere, played(spoil), options())]
 
 
+def unnamed(outcomes: list[tuple[Outcome, Outcome]]) -> int:
+    """Spoilt frames that are not said to be a misfit."""
+    return sum("misfit" not in one.info.findings_by_name for _, one in outcomes)
+
+
 def pair(k: int) -> tuple[int, ...]:
     """The electrodes beside each other with which scene k's fault is."""
     return tuple(sorted((k % ELECTRODES, (k + 1) % ELECTRODES)))
@@ -57,10 +62,11 @@ def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
 
 @pytest.mark.parametrize("which", ["swapped", "swapped apart"])
-def test_swapped(same_everywhere: SameEverywhere, which: str) -> None:
+def test_swapped(same_everywhere: SameEverywhere, margins: Margins, which: str) -> None:
     """A misfit, by name."""
-    for _, one in compare(same_everywhere, lambda k, _: simulated()[k][which]):
-        assert one.status == 0 and "misfit" in one.info.findings_by_name
+    outcomes = compare(same_everywhere, lambda k, _: simulated()[k][which])
+    assert all(one.status == 0 for _, one in outcomes)
+    margins.everywhere("frames/swapped", f"{which}: frames that were not named", unnamed(outcomes), 0, "frames")
 
 
 def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
@@ -89,7 +95,8 @@ def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> Non
 
 
 @pytest.mark.parametrize("by", [1, 3, 13, 65])
-def test_rotated(same_everywhere: SameEverywhere, by: int) -> None:
+def test_rotated(same_everywhere: SameEverywhere, margins: Margins, by: int) -> None:
     """All rows in the place of others: a misfit, by name."""
-    for _, one in compare(same_everywhere, lambda _, frame: np.roll(frame, by)):
-        assert one.status == 0 and "misfit" in one.info.findings_by_name
+    outcomes = compare(same_everywhere, lambda _, frame: np.roll(frame, by))
+    assert all(one.status == 0 for _, one in outcomes)
+    margins.everywhere("frames/rotated", f"by {by}: frames that were not named", unnamed(outcomes), 0, "frames")

@@ -147,11 +147,11 @@ def test_saturation_in_baseline(same_everywhere: SameEverywhere) -> None:
     assert same_everywhere.steps(steps)[0] == [0, 0, CHANNELS]
 
 
-def test_clean_frames_are_left_alone(same_everywhere: SameEverywhere) -> None:
+def test_clean_frames_are_left_alone(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Nothing is found, and the bits are those without any finding."""
     played = [(quiet_frames(k), noisy(k, simulated()[k]["touched"], 1)[None]) for k in range(COUNT)]
-    quietly = {"findings": options().findings & ~(1 << 7)}  # whether a scene is crowded is for test_touches.py
+    quietly = {"findings": options().findings & ~(1 << 7)}  # whether a scene is crowded is for test_hard_touches.py
     looked, blind = run(same_everywhere, played, options(**quietly)), run(same_everywhere, played, options(findings=0))
     for (one,), (other,) in zip(looked, blind, strict=True):
-        assert one.info.findings == 0 and one.info.masked == 0
+        margins.everywhere("frames/clean", "findings and rows left out", one.info.findings + one.info.masked, 0)
         assert (one.coefficients == other.coefficients).all() and one.touches == other.touches
