@@ -43,7 +43,7 @@ static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
     return (any & (unsigned)state) != 0;
 }
 
-/* Every significant row of an open electrode is dead. Where that is so for all of them, a cable is off or no current flows. Returns
+/* Every significant row of an open electrode is dead. Were that so for all of them, it would not be the electrodes. Returns
  * whether any electrode is alive; `alive` says which. */
 static int find_open(eits_context *ctx, const eits_real *frame, limits most, uint8_t *alive)
 {
@@ -63,15 +63,16 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits most, uin
         judged += rows[e] >= EITS_ROWS_TO_JUDGE;
         open += rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e];
     }
-    const int living = open < judged;
+    if (open == judged)
+        return 0;
     if (open == 0 || !eits_wants(ctx, EITS_FINDING_ELECTRODE_OPEN))
-        return living;
+        return 1;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
         if (rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e])
             ctx->electrode[e] |= EITS_ELECTRODE_OPEN;
     }
     ctx->info.findings |= EITS_FINDING_ELECTRODE_OPEN;
-    return living;
+    return 1;
 }
 
 static int is_pair(const uint8_t *two, uint8_t e, uint8_t f)
@@ -148,10 +149,11 @@ static void leave_impossible(eits_context *ctx, const eits_real *frame, limits m
 int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
 {
     const limits most = limits_of(ctx);
-    uint32_t dead = 0, turned = 0, grown = 0;
+    uint32_t dead = 0, silent = 0, turned = 0, grown = 0; /* silent: dead, though they can be used */
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const int state = judge_row(ctx, frame, most, i);
         dead += state == DEAD;
+        silent += state == DEAD && ctx->unusable[i] == 0;
         turned += (state & TURNED) != 0;
         grown += (uint32_t)is_grown(ctx, frame, most, i);
     }
@@ -162,14 +164,13 @@ int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
     if (dead < EITS_ROWS_TO_JUDGE)
         return 1;
     uint8_t alive[EITS_MOST_ELECTRODES] = {0};
-    const int living = find_open(ctx, frame, most, alive);
-    if (living && eits_wants(ctx, EITS_FINDING_BRIDGED))
+    if (!find_open(ctx, frame, most, alive))
+        return silent < EITS_ROWS_TO_JUDGE;
+    if (eits_wants(ctx, EITS_FINDING_BRIDGED))
         find_bridged(ctx, frame, most, alive);
-    const int named = (ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED)) != 0;
-    if (named)
-        eits_name_electrodes(ctx);
-    if (!living || !named) /* without any signal there is nothing to leave out */
-        return living || !named;
+    if ((ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED)) == 0)
+        return 1;
+    eits_name_electrodes(ctx);
     eits_leave_electrodes(ctx, EITS_ELECTRODE_OPEN, EITS_ROW_OPEN);
     eits_leave_electrodes(ctx, EITS_ELECTRODE_BRIDGED, EITS_ROW_BRIDGED);
     return 1;

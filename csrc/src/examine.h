@@ -49,8 +49,8 @@ void eits_name_electrodes(eits_context *ctx);
 void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_row_state why);
 
 /* Open electrodes and bridged pairs, by rows that are dead; rows whose sign has turned. Sets ctx->electrode, ctx->unusable and
- * info. ctx->unusable must hold what the rows themselves tell. Returns 0 where every electrode is open: a front end without any
- * signal, which no row tells anything about. */
+ * info. ctx->unusable must hold what the rows themselves tell. Returns 0 where no electrode shows any signal: it
+ * is not the electrodes then, but the front end. */
 int eits_find_electrodes(eits_context *ctx, const eits_real *frame);
 
 /* Single rows that their reciprocals do not bear out, and noisy electrodes. ctx->d holds the folded data, ctx->apart what each

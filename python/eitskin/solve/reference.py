@@ -236,7 +236,10 @@ class ReferenceEngine:
         judged = Reference(np.where(masked, np.nan, self._v0), self._v0_rms, self._gain, self._noise_v) if self._ready else None
         if judged:
             unusable = unusable | look.electrodes(frame, judged, masked, unusable)
-        folded = self._fold(frame, self._check_rows(frame, unusable))
+        self._check_rows(frame, unusable)
+        if look.found.no_signal:
+            raise FrameError(f"frame: {DEAD}")
+        folded = self._fold(frame, unusable)
         if judged:
             unusable = unusable | look.glitches(folded, judged)
             folded = self._fold(frame, self._check_rows(frame, unusable))

@@ -41,6 +41,7 @@ class Found:
     names: set[str] = field(default_factory=set)
     saturated: int = 0
     glitches: int = 0
+    no_signal: bool = False  # on any electrode: it is the front end
     misfit: float = 0.0
     unexplained: float = 0.0
     open_electrodes: tuple[int, ...] = ()
@@ -143,6 +144,7 @@ class Examiner:
             return out
         silent, judged_electrodes = self._silent(judged, alive)
         if silent.sum() == judged_electrodes:  # it is not the electrodes
+            self.found.no_signal = int((dead & ~unusable).sum()) >= ROWS_TO_JUDGE
             return out
         dead = judged & ~alive
         self.found.open_electrodes = tuple(int(e) for e in np.flatnonzero(silent)) if "electrode open" in self.wanted else ()
