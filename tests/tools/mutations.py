@@ -261,12 +261,7 @@ WORKING_SET = _of(
         "sign == EITS_SIGN_DECREASE ? none : 2 * lambda}",
         "working_set",
     ),
-    (
-        "columns that would move are dropped",
-        "if (x == 0 && z == 0 && !moves(gradient, rest))",
-        "if (x == 0 && z == 0)",
-        "working_set",
-    ),
+    ("panels of columns that were dropped", "    if (count < before)\n        eits_pack_panels(ctx);\n", "", "working_set"),
     (
         "coefficients stay where they were packed",
         "ctx->x_next[ctx->working[k]] = ctx->x[k];",
