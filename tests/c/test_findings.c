@@ -135,19 +135,18 @@ static void open_electrodes(void)
     }
 }
 
-/* Nothing on any row: a cable is off. The frame is refused, and every electrode named. */
+/* Nothing on any row is no matter of electrodes. */
 static void all_dead(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
     memset(b.frame, 0, sizeof b.frame);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
-    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_ELECTRODE_OPEN);
-    CHECK_EQUAL(ctx->info.open_electrodes, (1u << SMALL_ELECTRODES) - 1);
+    CHECK_EQUAL(ctx->info.findings, 0);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = R(NAN);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_ELECTRODE_OPEN);
+    CHECK_EQUAL(ctx->info.findings, 0);
     tear_down(&b);
 }
 

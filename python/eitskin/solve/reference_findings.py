@@ -34,6 +34,9 @@ def robust(values: FloatArray) -> float:
     return ROBUST * float(np.sort(values)[len(values) // 2]) if len(values) else 0.0
 
 
+PRIVATE = ("names", "no_signal")  # fields of Found that Info has not
+
+
 @dataclass
 class Found:
     """What a frame's examination has found so far."""
@@ -317,4 +320,4 @@ class Examiner:
     def of_frame(self) -> dict[str, Any]:
         """The fields of ``Info`` that say what was found."""
         f = self.found
-        return {name: getattr(f, name) for name in ("findings", *(entry.name for entry in fields(f) if entry.name != "names"))}
+        return {name: getattr(f, name) for name in ("findings", *(entry.name for entry in fields(f) if entry.name not in PRIVATE))}
