@@ -320,4 +320,5 @@ class Examiner:
     def of_frame(self) -> dict[str, Any]:
         """The fields of ``Info`` that say what was found."""
         f = self.found
-        return {name: getattr(f, name) for name in ("findings", *(entry.name for entry in fields(f) if entry.name not in PRIVATE))}
+        told = (entry.name for entry in fields(f) if entry.name not in PRIVATE)
+        return {name: getattr(f, name) for name in ("findings", *told)}
