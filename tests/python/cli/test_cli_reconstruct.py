@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence"
 INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs", "lambda", "lambda_max",
     "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",
+    "findings", "found", "saturated", "glitches", "misfit", "unexplained",
+    "open_electrodes", "bridged_electrodes", "noisy_electrodes",
 }  # fmt: skip
 SUMMARY = {
     "frames", "found", "true", "false", "position_median_mm", "position_worst_mm", "miou_image", "miou_touches",
@@ -50,6 +53,25 @@ def test_json(engine: str, done: Done, frames_file: Path) -> None:
     assert summary["found"] >= 0.9 * summary["true"] and summary["false"] <= 2
     assert summary["position_median_mm"] < 1.5 < summary["position_worst_mm"] < 10
     assert summary["miou_image"] > 0.8 and summary["miou_touches"] > 0.88
+
+
+def test_what_is_found_is_said(done: Done, frames_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A detached electrode in frame 1, a glitch in frame 2: by name in table and JSON; too many rows: refused, by name."""
+    frames = load_frames(frames_file)
+    spoilt = frames.voltage_v.copy()
+    spoilt[1, (frames.protocol.drive_measure == 5).any(axis=1)] = 0.0
+    spoilt[2, 30] *= 1.5
+    spoilt[3, np.isin(frames.protocol.drive_measure, (2, 6, 10)).any(axis=1)] = 0.0
+    save_frames(tmp_path / "spoilt.npz", replace(frames, voltage_v=spoilt))
+    code = main(["reconstruct", str(tmp_path / "spoilt.npz"), "--json"])
+    said = capsys.readouterr()
+    listed = json.loads(said.out)["frames"]
+    assert code == 8 and "electrodes 2, 6 and 10 open" in listed[3]["refused"] and "electrodes 2, 6 and 10 open" in said.err
+    assert listed[1]["info"]["found"][0] == "electrode 5 open" and listed[1]["info"]["masked"] == 52
+    assert listed[2]["info"]["findings"][0] == "glitch" and listed[2]["info"]["glitches"] in (1, 2)
+    assert listed[0]["info"]["masked"] == 0 and set(listed[0]["info"]["findings"]) <= {"crowded"}
+    main(["reconstruct", str(tmp_path / "spoilt.npz"), "--only", "test-s3-1"])
+    assert "found: electrode 5 open" in capsys.readouterr().out
 
 
 def test_what_it_says_is_what_the_reconstructor_does(done: Done, frames_file: Path) -> None:

@@ -40,8 +40,8 @@ CASES: tuple[Case, ...] = (
         "One row of a frame is off by 5 % of rms(V0) to five times that.",
         "The image has four to five times its peak, somewhere else.",
         "A full scan tells by the row's reciprocal and, which of the two is wrong, by the other rows: it is left out and "
-        "counted, and at most 0.02 of the MIoU are lost. A half scan has no reciprocals: only what the other rows contradict is "
-        "left out, and the mean loss is at most half of what it would be.",
+        "counted, and at most 0.02 of the MIoU are lost. A half scan has no reciprocals: only what the other rows contradict "
+        "is left out, and the mean loss is at most half of what it would be.",
         (f"{ROWS}::test_glitch", f"{ROWS}::test_glitch_in_half_scans"),
     ),
     Case(

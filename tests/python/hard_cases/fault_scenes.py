@@ -17,7 +17,7 @@ from eitskin.scene.session import Bench
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
 from eitskin.study import metrics
-from eitskin.study.score import scorer_for
+from eitskin.study.score import Scorer, scorer_for
 from small_models import prebuilt
 
 SEED, COUNT, QUIET = 9, 6, 16
@@ -101,10 +101,15 @@ def half(frames: np.ndarray) -> np.ndarray:
     return done
 
 
+@cache
+def scorer() -> Scorer:
+    """The model's, which takes a second to make."""
+    return scorer_for(prebuilt()[0])
+
+
 def miou(image: np.ndarray, k: int) -> float:
     """Of an image (n,) against scene k, at the model's own threshold."""
-    model, _ = prebuilt()
-    scorer, scene = scorer_for(model), scenes()[k]
-    truth = metrics.disc_mask(scorer.judge.raster.points_mm, scene.centres_mm(), scene.radii_mm())
-    shown = scorer.judge.lookup.show(np.asarray(image, dtype=np.float64))
-    return float(metrics.miou(metrics.touch_mask(shown, model.defaults.mask_threshold), truth))
+    judge, scene = scorer().judge, scenes()[k]
+    truth = metrics.disc_mask(judge.raster.points_mm, scene.centres_mm(), scene.radii_mm())
+    shown = judge.lookup.show(np.asarray(image, dtype=np.float64))
+    return float(metrics.miou(metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold), truth))
