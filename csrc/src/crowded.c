@@ -9,6 +9,7 @@ static const eits_real UNEXPLAINED = R(0.12); /* of |y|^2 beyond noise; model an
 static const eits_real NOISE = R(1.5);         /* times the energy that is expected of it */
 static const eits_real NEIGHBOURS = R(1.5);    /* two touches nearer than so many times the sum of their radii */
 static const eits_real WEAKEST = R(0.01);      /* the weakest of several touches explains less than this of |y|^2 */
+static const eits_real CLEAR = R(3.0);         /* max(S'y) over that of noise: below it what the touches leave is noise */
 enum { ELECTRODES_A_TOUCH = 2 }; /* with fewer electrodes for each touch the count is often wrong */
 
 static int too_near(const eits_touch *a, const eits_touch *b)
@@ -35,7 +36,7 @@ void eits_judge_crowd(eits_context *ctx, int looked, const eits_touch *touches, 
 {
     ctx->info.unexplained = looked ? unexplained(ctx) : 0;
     ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
-    if (count == 0 || !eits_wants(ctx, EITS_FINDING_CROWDED))
+    if (count == 0 || !eits_wants(ctx, EITS_FINDING_CROWDED) || ctx->info.lambda_max < CLEAR * ctx->info.lambda_noise)
         return;
     int crowded = count >= ctx->options.max_touches || ELECTRODES_A_TOUCH * count >= ctx->model->n_electrodes;
     crowded |= eits_fma(-NOISE, noise_share(ctx), ctx->info.unexplained) > UNEXPLAINED;

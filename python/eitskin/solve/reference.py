@@ -299,7 +299,8 @@ class ReferenceEngine:
 
     def _leave_out(self, known: BoolArray) -> None:
         """Whiten anew for the folded rows (k,) that are known."""
-        self._whitening = None if self._form is None or known.all() else whiten(self._form, known)
+        noise = self._noise_v / self._v0_rms if self._ready else 0.0
+        self._whitening = None if self._form is None or known.all() else whiten(self._form, known, noise)
         self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
 
     def _reduce(self, d: FloatArray) -> FloatArray:
@@ -352,7 +353,8 @@ class ReferenceEngine:
             )
             self._last = found
             noise_share = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum()) / max(norm**2, 1e-300)
-            self._examiner.crowd(found, o.max_touches, noise_share)
+            clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
+            self._examiner.crowd(found, o.max_touches, noise_share, clearness)
         gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,

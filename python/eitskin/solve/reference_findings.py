@@ -24,7 +24,7 @@ ROW_GROWN, ROW_SMALL = 8.0, 0.05
 GLITCH_NOISE, GLITCH_ROBUST, GLITCH_LARGEST, GLITCH_SHARE, GLITCH_NEARER, GLITCH_MOST = 6.5, 16.0, 0.03, 0.25, 0.5, 8
 GLITCH_PIVOT, GLITCH_RIDGE, GLITCH_UNPAIRED, GLITCH_ENERGY, NOISY_SHARE = 0.05, 1e-4, 16.0, 0.5, 0.9
 MISFIT_SHARE, MISFIT_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
-CROWD_UNEXPLAINED, CROWD_NOISE, CROWD_NEIGHBOURS, CROWD_WEAKEST, ELECTRODES_A_TOUCH = 0.12, 1.5, 1.5, 0.01, 2
+CROWD_UNEXPLAINED, CROWD_NOISE, CROWD_NEIGHBOURS, CROWD_WEAKEST, CROWD_CLEAR, ELECTRODES_A_TOUCH = 0.12, 1.5, 1.5, 0.01, 3.0, 2
 ROBUST = 1.4826
 ORTHOGONAL = 1e-3
 
@@ -302,10 +302,11 @@ class Examiner:
         if against > STALE_RATIO * lambda_max and against > STALE_NOISE * lambda_noise:
             self.found.names.add("stale reference")
 
-    def crowd(self, touches: tuple[Touch, ...], most: int, noise_share: float) -> None:
-        """Whether there are more touches than can be told apart; ``found.unexplained`` is known."""
+    def crowd(self, touches: tuple[Touch, ...], most: int, noise_share: float, clearness: float) -> None:
+        """Whether there are more touches than can be told apart; ``found.unexplained`` is known. ``clearness``: max(S'y) over that
+        of noise."""
         count = len(touches)
-        if not count or "crowded" not in self.wanted:
+        if not count or "crowded" not in self.wanted or clearness < CROWD_CLEAR:
             return
         crowded = count >= most or ELECTRODES_A_TOUCH * count >= self.model.protocol.n_electrodes
         crowded |= self.found.unexplained - CROWD_NOISE * noise_share > CROWD_UNEXPLAINED

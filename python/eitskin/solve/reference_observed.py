@@ -14,6 +14,7 @@ ORTHOGONAL = 1e-5
 FORM = 0.01
 LEAST_FLOOR_SHARE, LEAST_FLOOR = 0.1, 1e-4
 LOST = 0.01
+NOISE_FLOOR = 1150.0
 STEP_MARGIN = 0.995
 PROBES, NOISE_POWER = 8, 1.25
 
@@ -61,9 +62,10 @@ def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
     return Form(left, 1 / (w * s[first]), (s / s[first]) ** 2, max(0.0, floor / s[first] ** 2), float(squares[first]))
 
 
-def whiten(form: Form, known: BoolArray) -> Whitening:
-    """The whitening of the folded rows where ``known`` (k,)."""
-    floor = max(form.floor * max(float(known.mean()) ** 3, LEAST_FLOOR_SHARE), LEAST_FLOOR)
+def whiten(form: Form, known: BoolArray, noise: float) -> Whitening:
+    """The whitening of the folded rows where ``known`` (k,); ``noise``: rms of a reading's over that of the reference."""
+    left = float(known.mean())
+    floor = max(form.floor * max(left**3, LEAST_FLOOR_SHARE, NOISE_FLOOR * (1 - left) * noise), LEAST_FLOOR)
     lost = LOST * floor
     unit, missing = np.eye(len(form.scale)), ~known
     # U is orthogonal but for rounding to float32: which rows are summed over shows in the eighth figure

@@ -14,7 +14,7 @@ from cross_build import ROOT, build_cortex_m7
 from emulated import IMAGE
 from small_models import small_blob
 
-COPIED = ("csrc", "firmware", "cmake", "tests/emulated", "CMakeLists.txt", "CMakePresets.json")
+COPIED = ("csrc", "firmware", "cmake", "tests/emulated", "tests/soak", "CMakeLists.txt", "CMakePresets.json")
 TARGET = "eitskin_nucleo_f767zi"
 
 

@@ -97,7 +97,7 @@ def test_sizes(elf: Path, sections: dict[str, tuple[int, int]], symbols: dict[st
 def test_the_same_bytes_wherever_it_is_built(elf: Path, tmp_path: Path) -> None:
     """In a copy of the checkout with another path, in a folder of another name."""
     copy = tmp_path / "a checkout elsewhere"
-    for name in ("csrc", "firmware", "cmake", "tests/emulated"):
+    for name in ("csrc", "firmware", "cmake", "tests/emulated", "tests/soak"):
         shutil.copytree(ROOT / name, copy / name)
     shutil.copy(ROOT / "CMakeLists.txt", copy)
     again = build_cortex_m7(copy, tmp_path / "other", IMAGE) / "firmware" / f"{IMAGE}.bin"
