@@ -38,7 +38,8 @@ def test_counts_are_exact_and_follow_every_setting(cortex_m7: Path) -> None:
         measured = session.measured(60.0, one.samples, one.scan, one.held)
         counted[one.name] = count_instructions(emulator, one, built, measured, solved, 3, 2)
     assert counted["base"] == counted["again"]
-    assert counted["base"]["mean"] == counted["base"]["solve_mean"] + counted["base"]["touch_mean"] <= counted["base"]["most"]
+    parts = counted["base"]["solve_mean"] + counted["base"]["touch_mean"]
+    assert abs(counted["base"]["mean"] - parts) <= 1 and parts <= counted["base"]["most"]  # each mean is rounded by itself
     assert counted["sweeps"]["touch_mean"] < counted["base"]["touch_mean"]
     assert counted["sweeps"]["solve_mean"] == counted["base"]["solve_mean"]
     assert counted["gap"]["solve_mean"] != counted["base"]["solve_mean"]
