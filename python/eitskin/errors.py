@@ -5,6 +5,8 @@ An error's text is one line that says what was wrong, where, and what to do abou
 
 from __future__ import annotations
 
+LONGEST, ENDING = 3000, 1000  # characters of a line, and of its end
+
 
 class EitskinError(Exception):
     """Base of all errors that a user can cause or mend; ``exit_code`` is the command line's status. Its text stays one line,
@@ -14,6 +16,8 @@ class EitskinError(Exception):
 
     def __str__(self) -> str:
         text = super().__str__()
+        if len(text) > LONGEST:  # somebody's very long word in the middle: what to do is said at the end
+            text = f"{text[: LONGEST - ENDING - 5]} ... {text[-ENDING:]}"
         return text if text.isprintable() else "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
 
 
