@@ -16,10 +16,11 @@ CASES = (
     Case(
         "time/warm-frames",
         "Thousands of warm frames",
-        "A touch is held for 3,000 frames, each of which starts where the last one ended, then lifted.",
+        "A touch is held for 3,000 frames, each of which starts where the last one ended, then lifted; a hand moves, presses "
+        "and lifts for a million (scripts/soak).",
         "Rounding may gather from frame to frame; plain FISTA keeps a ghost of 0.6 of its peak for 50 frames.",
         "No frame's gap is above a cold one's; the image comes to rest; the first frame after lift-off is empty.",
-        ("hard_cases/test_long_runs.py::test_warm_frames",),
+        ("hard_cases/test_long_runs.py::test_warm_frames", "tests/soak/soak.c"),
     ),
     Case(
         "time/counters-wrap",
