@@ -303,8 +303,8 @@ class Examiner:
             self.found.names.add("stale reference")
 
     def crowd(self, touches: tuple[Touch, ...], most: int, noise_share: float, clearness: float) -> None:
-        """Whether there are more touches than can be told apart; ``found.unexplained`` is known. ``clearness``: max(S'y) over that
-        of noise."""
+        """Whether there are more touches than can be told apart; ``found.unexplained`` is known. ``clearness``: max(S'y) over
+        that of noise."""
         count = len(touches)
         if not count or "crowded" not in self.wanted or clearness < CROWD_CLEAR:
             return
