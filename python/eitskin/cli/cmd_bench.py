@@ -1,4 +1,5 @@
-"""``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes, boards, kernels, growth, batches."""
+"""``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes, boards, kernels, growth,
+batches; and what findings are worth."""
 
 from __future__ import annotations
 
@@ -66,6 +67,18 @@ def add_parser(subparsers: Any) -> None:
     batches.add_argument("--threads", type=int, nargs="+", default=[1, 2], metavar="N", help="default: 1 2")
     _add_page(batches, "Batches")
     batches.set_defaults(run=run_batches)
+    findings = what.add_parser(
+        "findings",
+        help="how often faults are called by their name, and what they cost the image",
+        description="Spoil frames of random scenes in every way that docs/findings.md names, count how often that is said in "
+        "that very frame, and compare the image with that of the same frame without the fault; some five minutes.",
+    )
+    findings.add_argument("--scenes", type=int, default=640, help="that every fault is put on (default: %(default)s)")
+    findings.add_argument("--crowds", type=int, default=24, help="scenes of each number of touches (default: %(default)s)")
+    findings.add_argument("--imperfect", type=int, default=40, help="scenes of each front end (default: %(default)s)")
+    findings.add_argument("--seed", type=int, default=4001, help="of scenes and noise (default: %(default)s)")
+    _add_page(findings, "Rates")
+    findings.set_defaults(run=run_findings)
     effects = what.add_parser("effects", help="scenes: the time with no effect, with each alone, with all")
     effects.add_argument("--frames", type=int, default=100, help="default: %(default)s")
     effects.add_argument("--json", action="store_true")
@@ -86,11 +99,11 @@ def _add_page(parser: argparse.ArgumentParser, title: str) -> None:
 PAGE = "Kernels, growth, batches"
 
 
-def _show(options: argparse.Namespace, title: str, result: Any, text: str, section: str) -> int:
+def _show(options: argparse.Namespace, title: str, result: Any, text: str, section: str, page: str = PAGE) -> int:
     from eitskin.study.sections import put_section
 
     if options.markdown is not None:
-        put_section(options.markdown, title, section, PAGE)
+        put_section(options.markdown, title, section, page)
     print(json.dumps(result.as_dict(), indent=2) if options.json else text)
     return 0
 
@@ -147,6 +160,22 @@ def run_batches(options: argparse.Namespace) -> int:
     result = bench_batches.run(options.frames, options.rounds, options.threads)
     command = f"eitskin bench batches --frames {options.frames} --rounds {options.rounds}"
     return _show(options, "Batches", result, bench_batches.as_text(result), bench_batches.as_markdown(result, command))
+
+
+def run_findings(options: argparse.Namespace) -> int:
+    """Count how often faults are named, and what they cost."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.study import bench_findings, bench_findings_page
+
+    _within("--scenes", options.scenes, 2, 100_000)
+    _within("--crowds", options.crowds, 2, 10_000)
+    _within("--imperfect", options.imperfect, 1, 10_000)
+    _within("--seed", options.seed, 0, 2**31 - 1)
+    refuse_unwritable(options.markdown)
+    result = bench_findings.run(options.seed, options.scenes, options.crowds, options.imperfect, progress=_progress)
+    sizes = f"--scenes {options.scenes} --crowds {options.crowds} --imperfect {options.imperfect}"
+    section = bench_findings_page.as_markdown(result, f"eitskin bench findings {sizes} --seed {options.seed}")
+    return _show(options, "Rates", result, bench_findings_page.as_text(result), section, "Findings")
 
 
 def run_frame(options: argparse.Namespace) -> int:

@@ -14,7 +14,7 @@ ORTHOGONAL = 1e-5
 FORM = 0.01
 LEAST_FLOOR_SHARE, LEAST_FLOOR = 0.1, 1e-4
 LOST = 0.01
-NOISE_FLOOR = 1150.0
+NOISE_FROM, MUCH_MISSING = 1 / 740, 0.25
 STEP_MARGIN = 0.995
 PROBES, NOISE_POWER = 8, 1.25
 
@@ -65,7 +65,8 @@ def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
 def whiten(form: Form, known: BoolArray, noise: float) -> Whitening:
     """The whitening of the folded rows where ``known`` (k,); ``noise``: rms of a reading's over that of the reference."""
     left = float(known.mean())
-    floor = max(form.floor * max(left**3, LEAST_FLOOR_SHARE, NOISE_FLOOR * (1 - left) * noise), LEAST_FLOOR)
+    noisy = 1 + min(1.0, (1 - left) / MUCH_MISSING) * max(0.0, noise / NOISE_FROM - 1)
+    floor = max(form.floor * max(left**3, LEAST_FLOOR_SHARE) * noisy, LEAST_FLOOR)
     lost = LOST * floor
     unit, missing = np.eye(len(form.scale)), ~known
     # U is orthogonal but for rounding to float32: which rows are summed over shows in the eighth figure

@@ -2,7 +2,7 @@
 
 Scenes are made as those of test_random_scenes.py, one to three touches, with 60 dB noise and spread contacts; in each an
 electrode detaches in the last frame (the effect `detached`), and its rows are given as NaN. Whole and damaged frames share a
-reference.
+reference. The printed means are the table "Rows left out" of docs/eitm-format.md.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from eitskin.study.score import Scorer, scorer_for
 from small_models import prebuilt
 
 SCENES = 160
-SEED = 78  # what an electrode costs differs from set to set by .003: .025 here, .028 on the training set, .031 on a third
+SEED = 78  # what an electrode costs differs from set to set: .024 here, .028 on the training set, .031 on a third
 QUIET = 16
 ELECTRODES = 16
 MOST_LOSS = 0.03
@@ -117,10 +117,10 @@ def judge() -> Judge:
 NONE_OUT = np.zeros(208, dtype=np.bool_)
 
 
-def scores(judge: Judge, electrodes: int, count: int = SCENES) -> FloatArray:
+def scores(judge: Judge, electrodes: int) -> FloatArray:
     """Mean scores of image and discs with so many electrodes out, the first of them truly off."""
     found = []
-    for case in cases()[:count]:
+    for case in cases():
         out = rows_of(*((case.electrode + 5 * k) % ELECTRODES for k in range(electrodes))) if electrodes else NONE_OUT
         found.append(judge.score(case, case.detached_v if electrodes else case.whole_v, out))
     return np.asarray(np.mean(found, axis=0))
@@ -135,7 +135,7 @@ def test_a_detached_electrode(judge: Judge) -> None:
 
 
 def test_each_further_electrode_costs_a_little(judge: Judge) -> None:
-    found = np.array([scores(judge, electrodes, 64) for electrodes in range(4)])
+    found = np.array([scores(judge, electrodes) for electrodes in range(4)])
     print(found)
     steps = -np.diff(found, axis=0)
     assert (steps > 0).all()
@@ -146,16 +146,17 @@ def test_each_further_electrode_costs_a_little(judge: Judge) -> None:
 def test_a_few_lost_rows_cost_next_to_nothing(judge: Judge) -> None:
     """Both of a reciprocal pair: one alone stands for both."""
     fold, generator = prebuilt()[0].fold, np.random.default_rng(SEED)
-    whole = scores(judge, 0, 64)
-    for count, most in ((1, 0.004), (3, 0.006), (10, 0.012)):
+    whole = scores(judge, 0)
+    for count, most in ((1, 0.004), (10, 0.008), (20, 0.012)):
         found = []
-        for case in cases()[:64]:
+        for case in cases():
             lost = generator.choice(len(fold.first), count, replace=False)
             out = NONE_OUT.copy()
             out[fold.first[lost]] = out[fold.second[lost]] = True
             found.append(judge.score(case, case.whole_v, out))
-        loss = whole - np.mean(found, axis=0)
-        print(count, loss)
+        mean = np.mean(found, axis=0)
+        loss = whole - mean
+        print(count, mean, loss)
         assert loss.max() <= most, count
 
 
