@@ -150,6 +150,46 @@ static void all_dead(void)
     tear_down(&b);
 }
 
+/* Nor is nothing but noise: a dead front end, which blames no electrode. */
+static void noise_alone(void)
+{
+    for (int open = 0; open < 2; ++open) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        look_for(ctx, open ? EITS_FINDINGS_ALL : EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN);
+        memset(b.frame, 0, sizeof b.frame);
+        add_noise(&b, b.frame);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
+        CHECK(ctx->info.findings == 0 && ctx->info.open_electrodes == 0);
+        b.frame[7] = ctx->baseline.v0[7]; /* one row that lives, and it is not the front end */
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(ctx->info.findings & EITS_FINDING_ELECTRODE_OPEN, open ? EITS_FINDING_ELECTRODE_OPEN : 0);
+        tear_down(&b);
+    }
+}
+
+/* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small tells nothing either way. */
+static void what_a_dead_row_is(void)
+{
+    for (int way = 0; way < 6; ++way) {
+        bench b;
+        eits_context *ctx = set_up(&b, 0);
+        const eits_real share = way < 2 ? (way ? R(0.025) : R(0.015)) : 0, small = way == 4 ? R(0.4) : R(0.2);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) * (b.frame[i] < 0 ? R(-1) : R(1));
+        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        look_for(ctx, EITS_FINDING_ELECTRODE_OPEN);
+        ctx->baseline.noise_v = way == 2 || way == 3 ? R(0.006) : 0; /* as though it had been learned */
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+            if (row_uses(ctx, i, 6) && (way < 4 || !row_uses(ctx, i, 2)))
+                b.frame[i] = way == 2 || way == 3 ? (way == 2 ? R(0.028) : R(0.033)) * b.frame[i] : share * b.frame[i];
+        }
+        reconstruct(&b);
+        CHECK_EQUAL(ctx->info.open_electrodes, way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);
+        tear_down(&b);
+    }
+}
+
 /* Refused, and still named. */
 static void refused_by_name(void)
 {
@@ -272,7 +312,7 @@ static void quiet_glitch(void)
         bench b;
         eits_context *ctx = set_up(&b, 1);
         const eits_real noise = ctx->baseline.noise_v, lambda_noise = ctx->baseline.lambda_noise;
-        const uint32_t row = b.c.model.fold[at].second;
+        const uint32_t row = at % 3 ? b.c.model.fold[at].second : b.c.model.fold[at].first;
         b.quiet[at][row] += R(0.5);
         CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
         for (int k = 0; k < QUIET; ++k) {
@@ -294,6 +334,23 @@ static void quiet_glitch(void)
         CHECK(ctx->baseline.glitches == 0 && ctx->baseline.noise_v > 5 * noise);
         tear_down(&b);
     }
+}
+
+/* More readings of a quiet frame than glitches are: it counts as it is. */
+static void quiet_frame_of_another_kind(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    for (uint32_t count = 1; count <= EITS_GLITCH_MOST + 1; ++count) {
+        b.quiet[5][b.c.model.fold[count].first] += R(0.5);
+        CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
+        for (int k = 0; k < QUIET; ++k)
+            CHECK_EQUAL(eits_baseline_add(ctx, b.quiet[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+        CHECK_EQUAL(ctx->baseline.glitches, count <= EITS_GLITCH_MOST ? count : 0);
+        CHECK((ctx->baseline.noise_v < R(2e-3)) == (count <= EITS_GLITCH_MOST));
+    }
+    tear_down(&b);
 }
 
 static void medians(void)
@@ -339,12 +396,15 @@ int main(void)
     nothing_wrong();
     open_electrodes();
     all_dead();
+    noise_alone();
+    what_a_dead_row_is();
     refused_by_name();
     bridged_pairs();
     one_glitch();
     impossible_rows();
     many_glitches();
     quiet_glitch();
+    quiet_frame_of_another_kind();
     medians();
     options_and_names();
     return checks_report("findings");
