@@ -233,6 +233,22 @@ static void misfits_that_are_no_glitch(void)
     spoil(&b, 4, 0.4);
     CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
     CHECK_EQUAL(ctx->info.masked, 0);
+    clean_frame(&b, 0.02); /* a lesser one beside it does not matter */
+    spoil(&b, 0, 0.6);
+    spoil(&b, 3, 0.36);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
+    CHECK(ctx->info.glitches == 2 && ctx->unusable[b.c.model.fold[0].first] == EITS_ROW_GLITCH);
+    clean_frame(&b, 0.02); /* a fold that none determines is not blamed, however large */
+    spoil(&b, 18, 6);
+    for (uint32_t k = 0; k < 9; k += 3)
+        spoil(&b, k, 0.3);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(ctx->info.masked, 0);
+    clean_frame(&b, 0.02); /* rows that have turned, though one stands out */
+    spoil(&b, 0, -7);
+    spoil(&b, 3, -1.1);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(ctx->info.masked, 0);
     tear_down(&b);
     ctx = set_up(&b, 0);
     clean_frame(&b, 0.15);
