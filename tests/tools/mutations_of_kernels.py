@@ -38,7 +38,7 @@ KERNELS = (
             "the greatest under the other sign",
             "high = sign != EITS_SIGN_DECREASE ?",
             "high = sign != EITS_SIGN_INCREASE ?",
-            "solve",
+            "kernels",
         ),
         ("the last few never the greatest", "lane[0] = a[i] > lane[0] ? a[i] : lane[0];", ";", "kernels"),
         ("the last few never the least", "lane[0] = a[i] < lane[0] ? a[i] : lane[0];", ";", "kernels"),
