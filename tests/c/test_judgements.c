@@ -4,6 +4,7 @@
 #include "dense.h"
 #include "small_model.h"
 
+#include "eitskin/solve.h"
 #include "examine.h"
 #include "kernels.h"
 #include "vec.h"
@@ -230,6 +231,58 @@ static void odd_readings(void)
     dense_bench_close(&b);
 }
 
+/* ---- noise that is learned ---- */
+
+/* The noise of voltages of any size, whose squares are out of range; and what lambda makes of it. */
+static void noise_of_any_size(void)
+{
+    static const double sizes[] = {1, BOTH_WIDTHS(1e-24, 1e-170), BOTH_WIDTHS(1e24, 1e170)};
+    enum { FRAMES = 8 };
+    for (int n = 0; n < 3; ++n) {
+        dense_bench b;
+        eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+        uint64_t state = 3;
+        eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+        double mean[SMALL_ROWS] = {0}, squares[SMALL_ROWS] = {0}, sum = 0;
+        small_reference(ctx->model, 1, reference);
+        CHECK_EQUAL(eits_baseline_begin(ctx, FRAMES), EITS_OK);
+        for (int k = 0; k < FRAMES; ++k) {
+            for (int i = 0; i < SMALL_ROWS; ++i) {
+                const double off = 0.01 * small_random(&state);
+                frame[i] = (eits_real)(sizes[n] * ((double)reference[i] + off));
+                mean[i] += off / FRAMES;
+                squares[i] += off * off;
+            }
+            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), EITS_OK);
+        }
+        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            sum += (squares[i] - FRAMES * mean[i] * mean[i]) / (FRAMES - 1) / SMALL_ROWS;
+        CHECK_NEAR((double)ctx->baseline.noise_v / sizes[n], sqrt(sum), 1e-4);
+        CHECK_EQUAL(ctx->baseline.glitches, 0);
+        memset(frame, 0, sizeof frame); /* a dead front end is no quiet frame */
+        CHECK_EQUAL(eits_baseline_begin(ctx, FRAMES), EITS_OK);
+        for (int k = 0; k < FRAMES; ++k) {
+            for (int i = 0; i < SMALL_ROWS; ++i)
+                frame[i] = k < FRAMES / 2 ? reference[i] : 0;
+            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), k < FRAMES / 2 ? EITS_OK : EITS_E_FRAME_ZERO);
+        }
+        dense_bench_close(&b);
+    }
+    dense_bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    small_new_data(ctx, 5);
+    ctx->baseline.lambda_noise = R(0.25);
+    eits_options o = ctx->options;
+    o.lambda_rel = R(1e-3);
+    o.lambda_noise_factor = R(0.5);
+    o.gate_factor = 0;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    CHECK(ctx->info.lambda == R(0.125) && ctx->info.lambda_noise == R(0.25));
+    dense_bench_close(&b);
+}
+
 int main(void)
 {
     crowds();
@@ -237,5 +290,6 @@ int main(void)
     misfits();
     noise_of_the_data();
     odd_readings();
+    noise_of_any_size();
     return checks_report("judgements");
 }

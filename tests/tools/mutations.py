@@ -65,7 +65,12 @@ FRAME = (
             "ctx->baseline.v0[fold.second] : 0",
             "frame",
         ),
-        ("a dead front end taken for a quiet skin", "if (!ctx->unusable[i] && frame[i] != 0)", "if (!ctx->unusable[i])", "frame"),
+        (
+            "a dead front end taken for a quiet skin",
+            "if (!ctx->unusable[i] && frame[i] != 0)",
+            "if (!ctx->unusable[i])",
+            "judgements",
+        ),
         ("the logarithm bounded elsewhere", "high = R(16.0)", "high = R(32.0)", "frame"),
     )
     + of(
@@ -88,8 +93,7 @@ FRAME = (
             "baseline",
         ),
         ("the noise without its unit", "used > 0 ? b->m2_unit * eits_sqrt", "used > 0 ? eits_sqrt", "baseline"),
-        ("units that overflow", "unit > largest && unit > R(0x1p-125)", "unit > largest && unit > R(0x1p-149)", "extremes"),
-        ("the unit is one", "            b->m2_unit = unit_for(ctx, frame);\n", "            b->m2_unit = 1;\n", "extremes"),
+        ("the unit is one", "            b->m2_unit = unit_for(ctx, frame);\n", "            b->m2_unit = 1;\n", "judgements"),
         ("readings left out are taken in", "        if (ctx->bad[i] == EITS_BAD_NOW)\n            continue;\n", "", "findings"),
         ("the second frame's own are never weighed", "    b->glitches += eits_quiet_weigh(ctx, frame);\n", "", "findings"),
         (
@@ -121,7 +125,7 @@ SOLVE = (
             "the noise without its factor",
             "o->lambda_noise_factor * eits_lambda_noise(ctx)",
             "eits_lambda_noise(ctx)",
-            "solve",
+            "judgements",
         ),
         ("warm where zero is better", "return twice < ", "return twice > 0 * ", "solve_state"),
         (

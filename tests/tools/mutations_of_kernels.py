@@ -20,7 +20,7 @@ KERNELS = (
         ("product's chain not fused", "a5 = eits_fma(READ(c[5]), v, a5);", "a5 += READ(c[5]) * v;", "kernels"),
         ("transposed product loses the last column", "for (; k < count; ++k) { ", "for (; k + 1 < count; ++k) { ", "kernels"),
         ("scales of other columns", "matrix->scale[index == NULL ? k : index[k]]", "matrix->scale[k]", "kernels"),
-        ("8-bit numbers without sign", "DEFINE_UNPACK(i8, int8_t, (float))", "DEFINE_UNPACK(i8, uint8_t, (float))", "columns"),
+        ("8-bit numbers without sign", "DEFINE_UNPACK(i8, int8_t, (float))", "DEFINE_UNPACK(i8, uint8_t, (float))", "kernels"),
         ("the dot product forgets the rest", "i + l < count; ++l)", "i + l + 1 < count; ++l)", "kernels"),
         (
             "dots forget the rest",
@@ -38,7 +38,7 @@ KERNELS = (
             "the greatest under the other sign",
             "high = sign != EITS_SIGN_DECREASE ?",
             "high = sign != EITS_SIGN_INCREASE ?",
-            "kernels",
+            "numbers",
         ),
         ("the last few never the greatest", "lane[0] = a[i] > lane[0] ? a[i] : lane[0];", ";", "kernels"),
         ("the last few never the least", "lane[0] = a[i] < lane[0] ? a[i] : lane[0];", ";", "kernels"),
