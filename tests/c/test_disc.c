@@ -197,11 +197,36 @@ static void derivatives(void)
     dense_bench_close(&b);
 }
 
+/* Places on the skin are those in a kept cell or one beside it. */
+static void on_the_skin(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
+    const double pixel = (double)ctx->model->pixel_mm;
+    uint32_t off = 0;
+    for (int iy = -3; iy < SIDE + 3; ++iy) {
+        for (int ix = -3; ix < SIDE + 3; ++ix) {
+            const double x = (double)ctx->model->origin_x_mm + (ix + 0.4) * pixel, y = (double)ctx->model->origin_y_mm + (iy + 0.6) * pixel;
+            const eits_disc disc = {.x_mm = (eits_real)x, .y_mm = (eits_real)y, .radius_mm = 3};
+            int near = 0;
+            for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
+                near |= abs((int)ctx->model->pixel[j].ix - ix) <= 1 && abs((int)ctx->model->pixel[j].iy - iy) <= 1;
+            CHECK_EQUAL(eits_disc_on_skin(ctx, &disc), near);
+            off += !near && ix >= 0 && iy >= 0 && ix < SIDE && iy < SIDE;
+        }
+    }
+    CHECK(off > 0);
+    const eits_disc none = {.x_mm = R(NAN)};
+    CHECK(!eits_disc_on_skin(ctx, &none));
+    dense_bench_close(&b);
+}
+
 int main(void)
 {
     responses();
     area();
     far_away_there_is_nothing();
     derivatives();
+    on_the_skin();
     return checks_report("disc");
 }

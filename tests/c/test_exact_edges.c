@@ -220,11 +220,50 @@ static void the_active_set_ends_soon(void)
     }
 }
 
+/* Columns of which a row left out hides all but rounding are not taken in, and no reason to go on for ever. */
+static void hidden_columns(void)
+{
+    dense_bench b;
+    memset(&b, 0, sizeof b);
+    b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE});
+    uint32_t size, k = 3;
+    uint8_t *sens = small_model_section(&b.made, "SENS", &size);
+    uint64_t state = 3;
+    for (size_t j = 0; j < N; ++j) {
+        const float *hidden = (const float *)(const void *)small_model_section(&b.made, "REDU", NULL) + EITS_STRIDE(RANK) * k;
+        for (size_t i = 0; i < RANK; ++i)
+            small_put_f32(sens + size / N * j + 4 * i, hidden[i] * (float)(1 + BOTH_WIDTHS(1e-3, 2e-6) * small_random(&state)));
+    }
+    small_model_seal(&b.made);
+    small_context_open(&b.c, &b.made, 0);
+    eits_context *ctx = &b.c.ctx;
+    eits_options o = ctx->options;
+    o.solver = EITS_SOLVER_ACTIVE_SET;
+    o.findings = o.project_baseline = 0;
+    o.max_masked = SMALL_ROWS;
+    o.gate_factor = o.gap_rel = 0;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    eits_real frame[SMALL_ROWS];
+    small_reference(ctx->model, 1, frame);
+    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        frame[i] *= (eits_real)(1 + 0.2 * small_random(&state));
+    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].first, 1), EITS_OK);
+    CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].second, 1), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK(ctx->basis_count == 1 && ctx->info.lambda > 0);
+    CHECK_EQUAL(ctx->info.nonzeros, 0);
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+    small_context_close(&b.c);
+    small_model_free(&b.made);
+}
+
 int main(void)
 {
     the_active_set_ends_soon();
     sweeps_as_written_apart();
     starts_that_cancel();
     every_limit_beside_columns_that_depend();
+    hidden_columns();
     return checks_report("exact solvers at their edges");
 }

@@ -17,7 +17,7 @@ enum { RANK = 13, STRIDE = 16, SIDE = 6, N = SIDE * SIDE };
 
 static const small_spec WHITENED = {.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED};
 /* What the core states of its numbers: the floor's law, how little a lost direction counts, the margin of the step. */
-static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1;
+static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1, NOISE_FLOOR = 1150;
 
 typedef struct bench {
     dense_bench b;
@@ -103,7 +103,8 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
     double k[RANK][RANK], s[RANK], w[RANK], left = 0;
     for (int f = 0; f < SMALL_FOLDED; ++f)
         left += !b->out[f] / (double)SMALL_FOLDED;
-    const double share = left * left * left, mu = SMALL_FLOOR * (share > LEAST_SHARE ? share : LEAST_SHARE), lost = LOST * mu;
+    const double noisy = NOISE_FLOOR * (1 - left) * (double)(ctx->baseline.noise_v / ctx->baseline.v0_rms);
+    const double mu = SMALL_FLOOR * fmax(noisy, fmax(left * left * left, LEAST_SHARE)), lost = LOST * mu;
     const double scale = MARGIN / (1 + SMALL_FLOOR) * (1 + mu) / (1 + lost);
     for (int i = 0; i < RANK; ++i) {
         s[i] = pow(SMALL_DECAY, i);
@@ -129,10 +130,11 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
 }
 
 /* F'F and F'y are the formula's, whichever rows are out; with none out there is no map. */
-static void the_reduction_without_those_rows(void)
+static void the_reduction_without_those_rows(double noise)
 {
     bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
+    ctx->baseline.noise_v = (eits_real)noise * ctx->baseline.v0_rms; /* as though it had been learned */
     CHECK(ctx->rewhitens);
     (void)stage(&b);
     CHECK(!ctx->rewhitened && eits_adjoint(ctx, ctx->y, ctx->adjoint) == ctx->y);
@@ -158,6 +160,45 @@ static void the_reduction_without_those_rows(void)
         const eits_real *pulled = eits_adjoint(ctx, ctx->y, ctx->adjoint);
         for (int i = 0; i < RANK; ++i)
             CHECK_NEAR(pulled[i], right[i], bound);
+    }
+    dense_bench_close(&b.b);
+}
+
+/* S'F'y of one row's datum, squared and summed over S's columns; with `whole` that of a frame with all rows. */
+static double energy_of_row(bench *b, uint32_t k, int whole)
+{
+    eits_context *ctx = &b->b.c.ctx;
+    eits_real y[STRIDE] = {0};
+    for (int i = 0; i < RANK; ++i)
+        y[i] = (eits_real)b->b.d.p[k * RANK + (uint32_t)i];
+    if (!whole)
+        (void)eits_observed_data(ctx, y);
+    double *back = dense_copy(whole ? y : eits_adjoint(ctx, y, ctx->adjoint), RANK), sum = 0;
+    for (int j = 0; j < N; ++j) {
+        const double c = dense_dot(b->b.d.s + j * RANK, back, RANK);
+        sum += c * c;
+    }
+    free(back);
+    return sum;
+}
+
+/* White noise on the rows that are left, in the correlations: its root mean square over that with all rows to the power 1.25. */
+static void noise_in_the_correlations(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, WHITENED, 0);
+    ctx->baseline.lambda_noise = R(3.0);
+    (void)stage(&b);
+    CHECK(ctx->noise_ratio == 1 && eits_lambda_noise(ctx) == R(3.0));
+    for (uint32_t count = 1; count < 16; ++count) {
+        double sum = 0, whole = 0;
+        leave_out(&b, (5 * count) % SMALL_FOLDED);
+        (void)stage(&b);
+        for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+            whole += energy_of_row(&b, k, 1);
+            sum += b.out[k] ? 0 : energy_of_row(&b, k, 0);
+        }
+        CHECK_NEAR(eits_lambda_noise(ctx), 3 * pow(sum / whole, 0.625), 0.04 * 3 * pow(sum / whole, 0.625)); /* it has 8 probes */
     }
     dense_bench_close(&b.b);
 }
@@ -297,7 +338,8 @@ static void rows_out_do_not_count(void)
     dense_bench_close(&b.b);
 }
 
-/* Change one number of P for all of a row (or one entry), and see whether the model still counts as the builder's. */
+/* Change a row of P, or all, and see whether frames with rows left out are whitened anew: where the model counts as the builder's
+ * and numbers suffice. */
 static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows, eits_real first_of_map[RANK])
 {
     bench b;
@@ -314,7 +356,6 @@ static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows, eits_r
     small_model_seal(&b.b.made);
     small_context_open(&b.b.c, &b.b.made, 0);
     eits_context *ctx = &b.b.c.ctx;
-    const uint32_t rewhitens = ctx->rewhitens;
     small_reference(ctx->model, 1, b.reference);
     memcpy(b.frame, b.reference, sizeof b.frame);
     b.frame[3] *= R(1.1);
@@ -322,8 +363,9 @@ static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows, eits_r
     leave_out(&b, 4);
     leave_out(&b, 9);
     (void)stage(&b);
-    CHECK(ctx->rewhitened == rewhitens);
-    CHECK(rewhitens ? ctx->basis_count == 1 : ctx->basis_count <= 3);
+    const uint32_t rewhitens = ctx->rewhitened;
+    CHECK(rewhitens <= ctx->rewhitens);
+    CHECK(rewhitens ? ctx->basis_count == 1 : ctx->basis_count <= 3 && ctx->noise_ratio == 1);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     for (uint32_t i = 0; i < RANK && rewhitens; ++i)
         first_of_map[i] = ctx->basis[STRIDE + i];
@@ -345,6 +387,7 @@ static void models_of_another_form(void)
     CHECK(rewhitens_with(0, 1 / 1099511627776.0, 1, scaled));
     CHECK(memcmp(plain, scaled, sizeof plain) == 0);
     CHECK(!rewhitens_with(0, 1e-31, 1, scaled));
+    CHECK_EQUAL(rewhitens_with(0, 3e-19, 0, scaled), BOTH_WIDTHS(0, 1)); /* the noise overflows there */
     bench b;
     small_spec other = WHITENED;
     other.shape = SMALL_RANDOM;
@@ -363,7 +406,9 @@ static void models_of_another_form(void)
 
 int main(void)
 {
-    the_reduction_without_those_rows();
+    the_reduction_without_those_rows(0);
+    the_reduction_without_those_rows(3e-3);
+    noise_in_the_correlations();
     solvers_solve_the_seen_problem();
     until_nothing_is_left();
     rows_out_do_not_count();

@@ -200,6 +200,32 @@ static void iterations_without_number(void)
     }
 }
 
+/* Steps more than twice too long that throw every coefficient beyond its sign, to zero, whenever one looks. */
+static void steps_that_end_at_zero(void)
+{
+    for (int factor = 40; factor < 50; factor += 3) {
+        for (uint32_t every = 1; every < 6; ++every) {
+            dense_bench b;
+            eits_context *ctx = dense_bench_open(
+                &b, (small_spec){.rank = 6, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 0.01 * factor}, 0);
+            for (uint32_t i = 0; i < 6; ++i)
+                ctx->y[i] = (eits_real)(1 + 0.1 * i);
+            eits_options o = ctx->options;
+            o.solver = EITS_SOLVER_FISTA;
+            o.lambda_rel = R(0.1);
+            o.gate_factor = 0;
+            o.gap_every = every;
+            o.iterations = 60;
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+            CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
+            CHECK_EQUAL(ctx->info.nonzeros, 6);
+            CHECK(ctx->info.step_halvings > 0 && ctx->info.gap_rel < R(1e-3));
+            dense_bench_close(&b);
+        }
+    }
+}
+
 int main(void)
 {
     a_halved_step_starts_afresh();
@@ -208,5 +234,6 @@ int main(void)
     cold_after_nothing();
     the_longest_intervals();
     iterations_without_number();
+    steps_that_end_at_zero();
     return checks_report("starts");
 }

@@ -84,7 +84,8 @@ static void point_right(uint8_t *at[SECTIONS], const uint32_t d[10])
         uint16_t row[2];
         memcpy(row, fold, sizeof row);
         row[0] = (uint16_t)(row[0] % m);
-        row[1] = row[1] == EITS_FOLD_NONE ? row[1] : (uint16_t)(row[1] % m);
+        if (row[1] != EITS_FOLD_NONE)
+            row[1] = (uint16_t)(row[1] % m);
         memcpy(fold, row, sizeof row);
     }
     for (uint32_t j = 0; j < n; ++j) {

@@ -22,10 +22,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
 
-from mutations import MUTATIONS, Mutation
+from mutation import Mutation
+from mutations import MUTATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
-COPIED = ("CMakeLists.txt", "cmake", "csrc", "firmware", "tests/c", "tests/firmware", "tests/soak")
+COPIED = ("CMakeLists.txt", "cmake", "csrc", "firmware", "tests/c", "tests/fuzz", "tests/firmware", "tests/soak")
 SOURCES = Path("csrc") / "src"
 MOST_CPU_SECONDS = 12
 SLOW_LAST = ("solve_state", "solve", "touch", "working_set", "exact", "mac_limit", "model_values")

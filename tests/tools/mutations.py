@@ -2,25 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from mutation import of
+from mutations_of_frames import FRAMES
+from mutations_of_kernels import KERNELS
 
-
-@dataclass(frozen=True)
-class Mutation:
-    """``original``, which stands once in ``csrc/src/file``, becomes ``replacement``. ``first`` is the C test to ask first."""
-
-    name: str
-    file: str
-    original: str
-    replacement: str
-    first: str
-
-
-def _of(file: str, *rows: tuple[str, str, str, str]) -> tuple[Mutation, ...]:
-    return tuple(Mutation(name, file, original, replacement, first) for name, original, replacement, first in rows)
-
-
-FISTA = _of(
+FISTA = of(
     "fista.c",
     ("a step twice too long", "eits_real step = 1 / (eits_real)", "eits_real step = 2 / (eits_real)", "solve"),
     ("a step half as long", "eits_real step = 1 / (eits_real)", "eits_real step = R(0.5) / (eits_real)", "solve"),
@@ -30,109 +16,46 @@ FISTA = _of(
     ("threshold without the step", ".threshold = step * lambda", ".threshold = lambda", "solve"),
     (
         "S z extrapolated from the older point",
-        "ctx->sx_next[i] - ctx->sx[i], ctx->sx_next[i])",
-        "ctx->sx_next[i] - ctx->sx[i], ctx->sx[i])",
+        "extrapolate(ctx->sz, beta, ctx->sx_next, ctx->sx, EITS",
+        "extrapolate(ctx->sz, beta, ctx->sx, ctx->sx_next, EITS",
         "solve",
     ),
+    (
+        "all coefficients thrown to zero taken for the answer",
+        " || (none && c.gap > R(1e-3) * scale)) {",
+        ") {",
+        "starts",
+    ),
+    ("no look where nothing is left", "!(o->gap_rel > 0) && !none && eits_dot", "!(o->gap_rel > 0) && eits_dot", "starts"),
     ("the step is never halved", "step *= R(0.5);", "step *= R(1.0);", "solve_state"),
     ("momentum kept where the step is halved", "            t = 1;\n", "", "starts"),
-    ("divergence seen too late", "if (!(c.objective <= ceiling)) {", "if (c.objective > R(1e9) * ceiling) {", "solve_state"),
+    (
+        "divergence seen too late",
+        "if (!(c.objective <= ceiling) || (none",
+        "if (c.objective > R(1e9) * ceiling || (none",
+        "solve_state",
+    ),
     ("stops at twice the gap", "c.gap <= o->gap_rel * scale", "c.gap <= 2 * o->gap_rel * scale", "solve"),
     ("momentum survives from the last frame", "    eits_copy(ctx->z, ctx->x, held(ctx));\n", "", "solve_state"),
     ("columns looked at once only", "s->interval < UINT32_MAX - k ?", "0 ?", "working_set"),
 )
 
-KERNELS = (
-    _of(
-        "kernels_body.h",
-        ("soft threshold does not shrink", "v > t ? v - t : 0", "v > t ? v : 0", "kernels"),
-        ("soft threshold shrinks outward", "v < -t ? v + t : 0", "v < -t ? v - t : 0", "kernels"),
-        (
-            "sign rule: increases allowed where only decreases are",
-            "allow_up = how->sign != EITS_SIGN_DECREASE",
-            "allow_up = how->sign != EITS_SIGN_BOTH",
-            "kernels",
-        ),
-        ("an overflow ends as a zero", "up + down + (v - v)", "up + down", "kernels"),
-        ("no extrapolation", "z[j] = eits_fma(beta, moved - x[j], moved);", "z[j] = moved;", "kernels"),
-        ("product's chain not fused", "a5 = eits_fma(READ(c[5]), v, a5);", "a5 += READ(c[5]) * v;", "kernels"),
-        ("transposed product loses the last column", "for (; k < count; ++k) { ", "for (; k + 1 < count; ++k) { ", "kernels"),
-        ("scales of other columns", "matrix->scale[index == NULL ? k : index[k]]", "matrix->scale[k]", "kernels"),
-        ("8-bit numbers without sign", "DEFINE_UNPACK(i8, int8_t, (float))", "DEFINE_UNPACK(i8, uint8_t, (float))", "columns"),
-        ("the dot product forgets the rest", "i + l < count; ++l)", "i + l + 1 < count; ++l)", "kernels"),
-    )
-    + _of(
-        "kernels_avx2.c",
-        ("AVX2: soft threshold does not shrink", "up_mask), SUB(v, high))", "up_mask), v)", "kernels"),
-        ("AVX2: sign rule ignored", "allow_down ? EVERYWHERE : ZERO()", "EVERYWHERE", "kernels"),
-        ("AVX2: an overflow ends as a zero", "ADD(ADD(up, down), SUB(v, v))", "ADD(up, down)", "kernels"),
-        (
-            "AVX2: the last few coefficients not fused",
-            "eits_fma(step, gradient[j], z[j])",
-            "step * gradient[j] + z[j]",
-            "kernels",
-        ),
-        (
-            "AVX2: 16-bit numbers without sign",
-            "_mm_cvtepi32_ps(_mm_cvtepi16_epi32(",
-            "_mm_cvtepi32_ps(_mm_cvtepu16_epi32(",
-            "kernels",
-        ),
-        (
-            "AVX2: rows beyond the last eight lost",
-            "for (uint32_t i = whole; i < rows; ++i)",
-            "for (uint32_t i = whole; i + 1 < rows; ++i)",
-            "kernels",
-        ),
-        ("AVX2: lanes crossed", "row[1] = _mm256_blend_ps(ad, d, 0xCC)", "row[1] = _mm256_blend_ps(d, ad, 0xCC)", "kernels"),
-    )
-    + _of(
-        "kernels.c",
-        (
-            "columns not scaled",
-            "values[k] *= (eits_real)matrix->scale[index[k]];",
-            "values[k] *= (eits_real)matrix->scale[0];",
-            "kernels",
-        ),
-        (
-            "panels of a working set from the wrong lane",
-            "const uint32_t j = ctx->working[k < ctx->working_count ? k : 0];",
-            "const uint32_t j = k;",
-            "working_set",
-        ),
-    )
-    + _of(
-        "half.h",
-        ("halves half as great", "0x1p112f", "0x1p111f", "numbers"),
-        ("halves lose their sign", "(half & 0x8000u) << 16", "(half & 0x8000u) << 15", "numbers"),
-    )
-    + _of(
-        "columns.c",
-        (
-            "a column gives way that is wanted",
-            "            ctx->held_wanted[ctx->held_at[index[k]]] = 1;\n",
-            "            ;\n",
-            "columns",
-        ),
-    )
-)
-
 FRAME = (
-    _of(
+    of(
         "frame.c",
-        ("reciprocals added without their sign", "sum += turn ? -value : value", "sum += value", "frame"),
-        ("a fold's sum for its mean", "used == BOTH ? R(0.5) * sum : sum", "sum", "frame"),
-        ("NaN let through", "!eits_is_finite(frame[i]) || ", "", "frame"),
+        ("reciprocals added without their sign", "value = turn ? -measured : measured;", "value = measured;", "frame"),
+        ("a fold's sum for its mean", "used == EITS_SIDE_BOTH ? R(0.5) * sum : sum", "sum", "frame"),
+        ("NaN let through", "unknown = !eits_is_finite(frame[i]) ? EITS_ROW_UNKNOWN : 0", "unknown = 0", "frame"),
         ("rows without a reference let through", " || !eits_is_finite(ctx->baseline.v0[i])", "", "baseline"),
         ("saturation only beyond the limit", "eits_fabs(frame[i]) >= limit", "eits_fabs(frame[i]) > limit", "frame"),
         ("saturation on one side only", "limit > 0 && eits_fabs(frame[i]) >= limit", "limit > 0 && frame[i] >= limit", "frame"),
-        ("masked rows used", "(uint8_t)(ctx->bad[i] || unknown || saturated)", "(uint8_t)(unknown || saturated)", "frame"),
+        ("masked rows used", "masked = ctx->bad[i] || !eits", "masked = !eits", "frame"),
         ("the gain left out", "return ctx->baseline.gain * (v - v0);", "return v - v0;", "frame"),
         ("ratios of another sign", "return (v - v0) / v0;", "return (v - v0) / eits_fabs(v0);", "frame"),
         (
             "the basis of the frame before",
-            "if (fold_data(ctx, frame) || ctx->basis_stale)",
-            "(void)fold_data(ctx, frame);\n    if (ctx->basis_stale)",
+            "if (changed || ctx->basis_stale)",
+            "if (ctx->basis_stale)",
             "frame",
         ),
         ("Gram and Schmidt once", "pass < 2; ++pass", "pass < 1; ++pass", "frame"),
@@ -142,22 +65,37 @@ FRAME = (
             "ctx->baseline.v0[fold.second] : 0",
             "frame",
         ),
-        ("a dead front end taken for a quiet skin", "if (!ctx->unusable[i] && frame[i] != 0)", "if (!ctx->unusable[i])", "frame"),
+        (
+            "a dead front end taken for a quiet skin",
+            "if (!ctx->unusable[i] && frame[i] != 0)",
+            "if (!ctx->unusable[i])",
+            "judgements",
+        ),
         ("the logarithm bounded elsewhere", "high = R(16.0)", "high = R(32.0)", "frame"),
     )
-    + _of(
+    + of(
         "log.h",
         ("the logarithm's series cut short", "terms = 6", "terms = 4", "numbers"),
         ("another base", "R(0.69314718055994530942)", "R(0.69314118055994530942)", "numbers"),
     )
-    + _of(
+    + of(
         "baseline.c",
         (
             "Welford's deviation from the old mean twice",
-            "eits_fma(delta, frame[i] - b->v0[i], b->m2[i])",
-            "eits_fma(delta, delta, b->m2[i])",
+            "(frame[i] - b->v0[i]) / b->m2_unit, b->m2[i])",
+            "delta / b->m2_unit, b->m2[i])",
             "baseline",
         ),
+        (
+            "the second frame's square of the old mean",
+            "(second - b->v0[i]) / b->m2_unit, 0)",
+            "delta / b->m2_unit, 0)",
+            "baseline",
+        ),
+        ("the noise without its unit", "used > 0 ? b->m2_unit * eits_sqrt", "used > 0 ? eits_sqrt", "baseline"),
+        ("the unit is one", "            b->m2_unit = unit_for(ctx, frame);\n", "            b->m2_unit = 1;\n", "judgements"),
+        ("readings left out are taken in", "        if (ctx->bad[i] == EITS_BAD_NOW)\n            continue;\n", "", "findings"),
+        ("the second frame's own are never weighed", "    b->glitches += eits_quiet_weigh(ctx, frame);\n", "", "findings"),
         (
             "the mean of one frame more",
             "b->v0[i] += delta / (eits_real)b->count;",
@@ -178,16 +116,16 @@ FRAME = (
 )
 
 SOLVE = (
-    _of(
+    of(
         "solve.c",
         ("no gate", "if (o->gate_factor > 0 && ", "if (0 && ", "solve_state"),
         ("a gate twice as high", "lambda_max < o->gate_factor *", "lambda_max < 2 * o->gate_factor *", "solve_state"),
         ("lambda the less of two", "return by_data > by_noise ?", "return by_data < by_noise ?", "solve_state"),
         (
             "the noise without its factor",
-            "o->lambda_noise_factor * ctx->baseline.lambda_noise",
-            "ctx->baseline.lambda_noise",
-            "solve",
+            "o->lambda_noise_factor * eits_lambda_noise(ctx)",
+            "eits_lambda_noise(ctx)",
+            "judgements",
         ),
         ("warm where zero is better", "return twice < ", "return twice > 0 * ", "solve_state"),
         (
@@ -210,24 +148,17 @@ SOLVE = (
             "solve",
         ),
     )
-    + _of(
+    + of(
         "stages.c",
         ("projected by half", "v, -eits_dot(ctx, direction, v, rank)", "v, R(-0.5) * eits_dot(ctx, direction, v, rank)", "frame"),
         (
-            "the greatest under the other sign",
-            "sign != EITS_SIGN_DECREASE ? most_of",
-            "sign != EITS_SIGN_INCREASE ? most_of",
-            "solve",
-        ),
-        ("the last few never the greatest", "        lane[0] = g[j] > lane[0] ? g[j] : lane[0];\n", "        ;\n", "numbers"),
-        (
             "the first alone is looked at for NaN",
-            "if (!eits_is_finite(values[i]))",
-            "if (!eits_is_finite(values[0]))",
+            "all &= eits_is_finite(values[i]);",
+            "all &= eits_is_finite(values[0]);",
             "solve_state",
         ),
     )
-    + _of(
+    + of(
         "certificate.c",
         (
             "the gap's residual part to the first power",
@@ -252,7 +183,7 @@ SOLVE = (
     )
 )
 
-WORKING_SET = _of(
+WORKING_SET = of(
     "working_set.c",
     ("rising columns left out", "return gradient > rest.high || ", "return ", "working_set"),
     (
@@ -271,7 +202,7 @@ WORKING_SET = _of(
 )
 
 EXACT = (
-    _of(
+    of(
         "coordinate.c",
         ("a coordinate's step without its norm", "v = eits_fma(norm, before, gradient)", "v = before + gradient", "exact_edges"),
         ("a coordinate not shrunk", "shrunk = up ? v - d->lambda", "shrunk = up ? v", "exact_edges"),
@@ -284,46 +215,59 @@ EXACT = (
         ("the ignored direction not taken out", "gradient = eits_fma(-d->along, d->slant[j], gradient);", ";", "exact_edges"),
         ("rest for what still moves", "return 64 * epsilon * epsilon *", "return 64 * epsilon *", "exact_edges"),
     )
-    + _of(
+    + of(
         "active_set.c",
-        ("pulls without lambda", "a->pull[k] = eits_fma(-a->sign[k], a->lambda, *g);", "a->pull[k] = *g;", "exact_edges"),
+        ("pulls without lambda", "a->pull[k] = *g - a->sign[k] * a->lambda;", "a->pull[k] = *g;", "exact_edges"),
         ("Newton's step beyond a change of sign", "if (a->sign[k] * target > 0)", "if (1)", "exact_edges"),
         ("tolerance a thousand times as wide", "a.tolerance = 2 * EPSILON", "a.tolerance = 20000 * EPSILON", "exact_edges"),
     )
-    + _of(
+    + of(
         "factor.c",
+        ("a row of K without its sign", "r[k] = -share * d[k];", "r[k] = share * d[k];", "exact_edges"),
+        ("a row of K not scaled", "    r[count] = share;\n", "    r[count] = 1;\n", "exact_edges"),
+        ("a reflection half as far", "1 / (norm * (norm + end)) : 0", "R(0.5) / (norm * (norm + end)) : 0", "exact_edges"),
         (
-            "a rotation the wrong way",
-            "r[c] = eits_fma(cosine, left, sine * right);",
-            "r[c] = eits_fma(cosine, left, -sine * right);",
+            "a reflection that cancels",
+            "scratch[last] < 0 ? -(norm + end) : norm + end",
+            "scratch[last] < 0 ? norm + end : -(norm + end)",
             "exact_edges",
         ),
+        ("the column dropped stays", "        r[place] = r[last];\n", "", "exact_edges"),
+        ("a column dropped leaves its end", "        r[last] = 0;\n", "", "exact_edges"),
         (
-            "the back substitution adds",
-            "eits_axpy(ctx, w, -d[i], row(ctx, i), i);",
-            "eits_axpy(ctx, w, d[i], row(ctx, i), i);",
+            "K' without the last row",
+            "rows_sum(ctx->factor, stride, count, length, w, d);",
+            "rows_sum(ctx->factor, stride, count - 1, length, w, d);",
             "exact_edges",
         ),
     )
-    + _of(
+    + of(
         "missing.c",
         (
             "columns missed whose correlation is beyond lambda",
-            "if (!(v[j] > least) ||",
-            "if (!(v[j] > 4 * least) ||",
+            "whole ? flag[j - first] : v[j] > least)",
+            "whole ? flag[j - first] : v[j] > 4 * least)",
             "exact_edges",
         ),
     )
 )
 
 TOUCH = (
-    _of(
+    of(
         "disc.c",
         ("covers half a pixel too wide", "share = R(0.5) + (radius - distance)", "share = R(1.0) + (radius - distance)", "disc"),
         ("a rim without slope", "share < 1 ? factor / pixel : 0", "share < 1 ? 0 * factor / pixel : 0", "disc"),
         ("weights not divided by", "return scale / (eits_real)model->column_weight[j];", "return scale;", "disc"),
+        ("the skin a cell too wide", "x1 > 2 ? x1 - 2 : 0; ix <= x1 &&", "x1 > 2 ? x1 - 2 : 0; ix <= x1 + 1 &&", "disc"),
+        (
+            "the skin is all of the image",
+            "            if (ctx->cell[(size_t)iy * model->nx + ix] != EITS_NO_PIXEL)\n",
+            "            if (1)\n",
+            "disc",
+        ),
+        ("the skin begins at its first cell", "if (!(x >= -1 && y >= -1 &&", "if (!(x >= 0 && y >= -1 &&", "disc"),
     )
-    + _of(
+    + of(
         "touch.c",
         ("touches of the other sign", "return change * disc->polarity > 0 ? change : 0;", "return change;", "touch"),
         ("too weak a touch is kept", "f->explained[weakest] >= ctx->options.touch_share", "f->explained[weakest] >= 0", "touch"),
@@ -355,7 +299,7 @@ TOUCH = (
         ("a radius that strength does not tell", "weight = o->touch_radius_weight * energy", "weight = 0 * energy", "touch_fit"),
         ("touches that noise makes", "return best >= least;", "return best >= 0 * least;", "touch"),
     )
-    + _of(
+    + of(
         "track.c",
         ("the farthest for the nearest", "squared <= nearest", "squared <= limit", "track"),
         ("two touches of one id", "        taken[from] = 1;\n", "", "track"),
@@ -363,7 +307,7 @@ TOUCH = (
     )
 )
 
-BYTES = _of(
+BYTES = of(
     "model.c",
     (
         "a checksum of every other nibble",
@@ -373,7 +317,7 @@ BYTES = _of(
     ),
     ("sections may reach beyond the end", "size > total - offset", "size > total", "model"),
     ("halves that are infinite", "(values[i] & 0x7C00u) == 0x7C00u", "(values[i] & 0x7FFFu) == 0x7FFFu", "model_values"),
-) + _of(
+) + of(
     "link.c",
     ("a full block stands for a zero", "if (d->in_packet && d->code != LONGEST_BLOCK)", "if (d->in_packet)", "link"),
     (
@@ -384,4 +328,4 @@ BYTES = _of(
     ),
 )
 
-MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCH + BYTES
+MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCH + BYTES + FRAMES

@@ -1,0 +1,86 @@
+/* A small skin with quiet frames, and what its rows use: for tests of what is found wrong with a frame. */
+#ifndef EITSKIN_TEST_FINDINGS_BENCH_H
+#define EITSKIN_TEST_FINDINGS_BENCH_H
+
+#include "check.h"
+#include "small_model.h"
+
+#include "examine.h"
+#include "vec.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { QUIET = 16 };
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    eits_real quiet[QUIET][SMALL_ROWS], frame[SMALL_ROWS];
+    uint64_t state;
+} bench;
+
+static inline void add_noise(bench *b, eits_real *frame)
+{
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        frame[i] += (eits_real)(1e-3 * small_random(&b->state));
+}
+
+/* 8 electrodes: with 40 rows each electrode has 20 of them, each pair 5 or 6 that drive or measure across it. */
+static inline eits_context *set_up(bench *b, int noise_known)
+{
+    b->made = small_model_make((small_spec){.rank = 12, .side = 4});
+    small_context_open(&b->c, &b->made, 0);
+    b->state = 7;
+    small_reference(&b->c.model, 1, b->frame);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i) /* all rows of a like size, so that all are significant */
+        b->frame[i] = b->frame[i] < 0 ? R(-1) : R(1);
+    for (int k = 0; k < QUIET; ++k) {
+        memcpy(b->quiet[k], b->frame, sizeof b->frame);
+        add_noise(b, b->quiet[k]);
+    }
+    if (noise_known) {
+        CHECK_EQUAL(eits_baseline_begin(&b->c.ctx, QUIET), EITS_OK);
+        for (int k = 0; k < QUIET; ++k)
+            CHECK_EQUAL(eits_baseline_add(&b->c.ctx, b->quiet[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_baseline_finish(&b->c.ctx), EITS_OK);
+    } else {
+        CHECK_EQUAL(eits_baseline_set(&b->c.ctx, b->frame, SMALL_ROWS), EITS_OK);
+    }
+    add_noise(b, b->frame);
+    return &b->c.ctx;
+}
+
+static inline void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+static inline int row_uses(const eits_context *ctx, uint32_t i, uint32_t e)
+{
+    const uint8_t *row = eits_row(ctx, i);
+    return row[0] == e || row[1] == e || row[2] == e || row[3] == e;
+}
+
+static inline int row_crosses(const eits_context *ctx, uint32_t i, uint32_t e, uint32_t f)
+{
+    const uint8_t *row = eits_row(ctx, i);
+    return (row[0] == e && row[1] == f) || (row[0] == f && row[1] == e) || (row[2] == e && row[3] == f) ||
+           (row[2] == f && row[3] == e);
+}
+
+static inline void look_for(eits_context *ctx, uint32_t findings)
+{
+    eits_options o = ctx->options;
+    o.findings = findings;
+    o.max_masked = SMALL_ROWS;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+}
+
+static inline void reconstruct(bench *b)
+{
+    CHECK_EQUAL(eits_reconstruct(&b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+}
+
+#endif

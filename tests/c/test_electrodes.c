@@ -1,0 +1,256 @@
+/* Open electrodes, bridged pairs, dead front ends, and rows that no sheet gives. */
+#include "findings_bench.h"
+
+/* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that lives, and it is not. */
+static void open_electrodes(void)
+{
+    for (int kind = 0; kind < 3; ++kind) {
+        for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
+            bench b;
+            eits_context *ctx = set_up(&b, 1);
+            look_for(ctx, EITS_FINDINGS_ALL);
+            eits_options o = ctx->options;
+            o.saturation_v = 2;
+            CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+            uint32_t count = 0, last = 0;
+            for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+                if (!row_uses(ctx, i, e))
+                    continue;
+                b.frame[i] = kind == 0 ? 0 : (kind == 1 ? R(NAN) : R(-2.5));
+                ++count;
+                last = i;
+            }
+            reconstruct(&b);
+            CHECK_EQUAL(ctx->info.masked, count);
+            CHECK_EQUAL(ctx->info.open_electrodes, 1u << e);
+            CHECK_EQUAL(ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED), EITS_FINDING_ELECTRODE_OPEN);
+            CHECK_EQUAL(ctx->info.saturated, kind == 2 ? count : 0);
+            CHECK((ctx->info.findings & EITS_FINDING_SATURATED) != 0 || kind != 2);
+            for (uint32_t k = 0; k < SMALL_ELECTRODES; ++k)
+                CHECK_EQUAL(ctx->electrode[k], k == e ? EITS_ELECTRODE_OPEN : 0);
+            for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+                CHECK((ctx->unusable[i] & EITS_ROW_OPEN) != 0 || !row_uses(ctx, i, e));
+            const eits_real dead = b.frame[last];
+            b.frame[last] = ctx->baseline.v0[last];
+            reconstruct(&b);
+            CHECK_EQUAL(ctx->info.open_electrodes, 0);
+            CHECK_EQUAL(ctx->electrode[e] & EITS_ELECTRODE_OPEN, 0);
+            b.frame[last] = dead;
+            look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN);
+            reconstruct(&b);
+            CHECK_EQUAL(ctx->info.open_electrodes, 0);
+            tear_down(&b);
+        }
+    }
+}
+
+/* Nothing on any row is no matter of electrodes. */
+static void all_dead(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    memset(b.frame, 0, sizeof b.frame);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(ctx->info.findings, 0);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        b.frame[i] = R(NAN);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(ctx->info.findings, 0);
+    tear_down(&b);
+}
+
+/* Nor is nothing but noise: a dead front end, which blames no electrode. */
+static void noise_alone(void)
+{
+    for (int open = 0; open < 2; ++open) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        look_for(ctx, open ? EITS_FINDINGS_ALL : EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN);
+        memset(b.frame, 0, sizeof b.frame);
+        add_noise(&b, b.frame);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
+        CHECK(ctx->info.findings == 0 && ctx->info.open_electrodes == 0);
+        b.frame[7] = ctx->baseline.v0[7]; /* one row that lives, and it is not the front end */
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+        CHECK_EQUAL(ctx->info.findings & EITS_FINDING_ELECTRODE_OPEN, open ? EITS_FINDING_ELECTRODE_OPEN : 0);
+        tear_down(&b);
+    }
+}
+
+/* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small tells nothing either way. */
+static void what_a_dead_row_is(void)
+{
+    for (int way = 0; way < 6; ++way) {
+        bench b;
+        eits_context *ctx = set_up(&b, 0);
+        const eits_real share = way < 2 ? (way ? R(0.025) : R(0.015)) : 0, small = way == 4 ? R(0.4) : R(0.2);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) * (b.frame[i] < 0 ? R(-1) : R(1));
+        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        look_for(ctx, EITS_FINDING_ELECTRODE_OPEN);
+        ctx->baseline.noise_v = way == 2 || way == 3 ? R(0.006) : 0; /* as though it had been learned */
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+            if (row_uses(ctx, i, 6) && (way < 4 || !row_uses(ctx, i, 2)))
+                b.frame[i] = way == 2 || way == 3 ? (way == 2 ? R(0.028) : R(0.033)) * b.frame[i] : share * b.frame[i];
+        }
+        reconstruct(&b);
+        CHECK_EQUAL(ctx->info.open_electrodes, way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);
+        tear_down(&b);
+    }
+}
+
+/* Refused, and still named. */
+static void refused_by_name(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    eits_options o = ctx->options;
+    o.max_masked = 10;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        b.frame[i] = row_uses(ctx, i, 3) ? 0 : b.frame[i];
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_ELECTRODE_OPEN);
+    CHECK_EQUAL(ctx->info.open_electrodes, 1u << 3);
+    tear_down(&b);
+}
+
+static void bridged_pairs(void)
+{
+    for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        const uint32_t f = (e + 1) % SMALL_ELECTRODES;
+        look_for(ctx, EITS_FINDINGS_ALL);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b.frame[i] *= row_crosses(ctx, i, e, f) ? R(0.01) : R(1);
+        reconstruct(&b);
+        CHECK_EQUAL(ctx->info.findings, EITS_FINDING_BRIDGED);
+        CHECK_EQUAL(ctx->info.bridged_electrodes, (1u << e) | (1u << f));
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            CHECK_EQUAL(ctx->unusable[i], row_uses(ctx, i, e) || row_uses(ctx, i, f) ? EITS_ROW_BRIDGED : 0);
+        look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_BRIDGED);
+        reconstruct(&b);
+        CHECK_EQUAL(ctx->info.bridged_electrodes, 0);
+        tear_down(&b);
+    }
+}
+
+/* One row across the pair that lives, whichever, and there is no bridge. */
+static void pairs_that_live(void)
+{
+    for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        const uint32_t f = (e + 1) % SMALL_ELECTRODES;
+        look_for(ctx, EITS_FINDING_BRIDGED);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b.frame[i] *= row_crosses(ctx, i, e, f) ? R(0.01) : R(1);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+            const eits_real dead = b.frame[i];
+            if (!row_crosses(ctx, i, e, f))
+                continue;
+            b.frame[i] *= 100;
+            reconstruct(&b);
+            CHECK_EQUAL(ctx->info.findings, 0);
+            b.frame[i] = dead;
+        }
+        reconstruct(&b);
+        CHECK_EQUAL(ctx->info.findings, EITS_FINDING_BRIDGED);
+        uint32_t telling = 0; /* two rows that tell something are too few */
+        memcpy(b.frame, b.quiet[0], sizeof b.frame);
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b.frame[i] *= row_crosses(ctx, i, e, f) && ++telling > 2 ? R(0.1) : R(1);
+        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        for (uint32_t i = 0, more = 0; i < SMALL_ROWS; ++i) {
+            const int another = !row_crosses(ctx, i, e, f) && more++ == 0;
+            b.frame[i] *= row_crosses(ctx, i, e, f) || another ? 0 : R(1);
+        }
+        reconstruct(&b);
+        CHECK_EQUAL(ctx->info.findings, 0);
+        tear_down(&b);
+    }
+}
+
+/* Rows that the user masked are no sign of an open electrode, nor saturated; and a frame's findings end with it. */
+static void masked_and_forgotten(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    look_for(ctx, EITS_FINDINGS_ALL);
+    eits_options o = ctx->options;
+    o.saturation_v = 2;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    const eits_real good = b.frame[9];
+    b.frame[9] *= -1;
+    reconstruct(&b);
+    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
+    b.frame[9] = good;
+    reconstruct(&b);
+    CHECK(ctx->info.findings == 0 && ctx->info.glitches == 0 && ctx->info.masked == 0);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+        if (!row_uses(ctx, i, 3))
+            continue;
+        CHECK_EQUAL(eits_mask_row(ctx, i, 1), EITS_OK);
+        b.frame[i] = i % 2 ? 3 : 0;
+    }
+    reconstruct(&b);
+    CHECK(ctx->info.findings == 0 && ctx->info.saturated == 0 && ctx->info.masked == 20);
+    tear_down(&b);
+}
+
+/* A row whose reference is next to nothing has not grown before it is eight times 5 % of the rms. */
+static void small_rows(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 0);
+    const eits_fold fold = b.c.model.fold[4];
+    b.frame[fold.first] = R(0.01), b.frame[fold.second] = (eits_real)fold.sign * R(0.01);
+    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    for (int grown = 0; grown < 2; ++grown) {
+        b.frame[fold.first] = grown ? R(0.42) : R(0.36), b.frame[fold.second] = (eits_real)fold.sign * b.frame[fold.first];
+        reconstruct(&b);
+        CHECK_EQUAL(ctx->info.findings, grown ? EITS_FINDING_GLITCH : 0);
+        CHECK_EQUAL(ctx->info.masked, grown ? 2 : 0);
+    }
+    tear_down(&b);
+}
+
+/* A sign that turned, and a row that grew eightfold, are no touch's doing; three turned ones are another order of the channels. */
+static void impossible_rows(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    const eits_real good = b.frame[9];
+    b.frame[9] *= -1;
+    reconstruct(&b);
+    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
+    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_GLITCH);
+    CHECK_EQUAL(ctx->info.masked, 1);
+    b.frame[9] = 9 * good;
+    reconstruct(&b);
+    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_GLITCH);
+    CHECK_EQUAL(ctx->info.masked, 1);
+    b.frame[9] = good;
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        b.frame[i] *= R(-1);
+    reconstruct(&b);
+    CHECK((ctx->info.findings & EITS_FINDING_MISFIT) != 0);
+    CHECK_EQUAL(ctx->info.masked, 0);
+    tear_down(&b);
+}
+
+int main(void)
+{
+    open_electrodes();
+    all_dead();
+    noise_alone();
+    what_a_dead_row_is();
+    refused_by_name();
+    bridged_pairs();
+    pairs_that_live();
+    masked_and_forgotten();
+    small_rows();
+    impossible_rows();
+    return checks_report("electrodes");
+}

@@ -1,0 +1,295 @@
+/* What is said of a frame that is imaged as it is - misfit, a stale reference, crowds - and which readings of quiet frames are odd:
+ * from numbers set by hand, on both sides of each limit. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/solve.h"
+#include "examine.h"
+#include "kernels.h"
+#include "vec.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { RANK = 13, SIDE = 6, N = SIDE * SIDE };
+
+static eits_context *set_up(dense_bench *b, eits_data_kind kind)
+{
+    memset(b, 0, sizeof *b);
+    eits_context *ctx = dense_bench_open(b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind}, 0);
+    eits_real reference[SMALL_ROWS];
+    small_reference(ctx->model, 1, reference);
+    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+    ctx->info.findings = 0;
+    return ctx;
+}
+
+/* ---- crowds ---- */
+
+static int crowded(eits_context *ctx, const eits_touch *touches, uint32_t count)
+{
+    eits_judge_crowd(ctx, 1, touches, count);
+    return (ctx->info.findings & EITS_FINDING_CROWDED) != 0;
+}
+
+static void crowds(void)
+{
+    dense_bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    eits_touch two[4] = {{.radius_mm = 2, .confidence = 1}, {.x_mm = 3, .y_mm = 4, .radius_mm = 1, .confidence = R(0.02)}};
+    eits_options o = ctx->options;
+    o.max_touches = 5;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    eits_zero(ctx->y, EITS_STRIDE(RANK));
+    eits_zero(ctx->residual, EITS_STRIDE(RANK));
+    ctx->y[0] = ctx->info.data_norm = 10;
+    ctx->info.lambda_max = 3, ctx->info.lambda_noise = R(0.9);
+    CHECK_EQUAL(crowded(ctx, two, 2), 0); /* 5 mm apart, 1.5 times the radii are 4.5 */
+    two[1].radius_mm = R(1.4);
+    CHECK_EQUAL(crowded(ctx, two, 2), 1);
+    CHECK_EQUAL(crowded(ctx, two, 1), 0);
+    two[1].radius_mm = 1;
+    two[1].confidence = R(0.009);
+    CHECK_EQUAL(crowded(ctx, two, 2), 1);
+    CHECK_EQUAL(crowded(ctx, two + 1, 1), 0);
+    two[1].confidence = R(0.02);
+    ctx->residual[0] = R(3.5); /* 0.1225 of |y|^2 */
+    CHECK_EQUAL(crowded(ctx, two, 1), 1);
+    CHECK_NEAR(ctx->info.unexplained, 0.1225, 1e-6);
+    ctx->info.lambda_noise = R(1.1);
+    CHECK_EQUAL(crowded(ctx, two, 1), 0);
+    ctx->info.lambda_noise = R(0.9);
+    ctx->baseline.noise_v = R(0.1); /* which explains some */
+    CHECK_EQUAL(crowded(ctx, two, 1), 0);
+    ctx->baseline.noise_v = 0;
+    ctx->residual[0] = R(3.3);
+    CHECK_EQUAL(crowded(ctx, two, 1), 0);
+    CHECK_EQUAL(crowded(ctx, two, 0), 0);
+    for (int k = 0; k < 4; ++k)
+        two[k] = (eits_touch){.x_mm = (eits_real)(10 * k), .radius_mm = 1, .confidence = R(0.1)};
+    CHECK_EQUAL(crowded(ctx, two, 3), 0);
+    CHECK_EQUAL(crowded(ctx, two, 4), 1); /* of 8 electrodes */
+    o.max_touches = 3;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(crowded(ctx, two, 3), 1);
+    CHECK_EQUAL(crowded(ctx, two, 2), 0);
+    o.findings = EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_CROWDED;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(crowded(ctx, two, 3), 0);
+    eits_judge_crowd(ctx, 0, two, 0);
+    CHECK(ctx->info.unexplained == 0);
+    dense_bench_close(&b);
+}
+
+/* ---- a stale reference ---- */
+
+static void stale_references(void)
+{
+    static const struct {
+        eits_sign sign;
+        double up, down, noise; /* the greatest correlations either way; lambda_noise */
+        int stale;
+    } CASES[] = {
+        {EITS_SIGN_INCREASE, 1, 1.8, 0.1, 1}, {EITS_SIGN_INCREASE, 1, 1.6, 0.1, 0}, {EITS_SIGN_DECREASE, 1.8, 1, 0.1, 1},
+        {EITS_SIGN_DECREASE, 1, 1.8, 0.1, 0}, {EITS_SIGN_INCREASE, 1, 1.8, 0.4, 0}, {EITS_SIGN_INCREASE, 1, 1.8, 0.35, 1},
+        {EITS_SIGN_INCREASE, 1, 9, 0, 0},     {EITS_SIGN_BOTH, 1, 9, 0.1, 0},
+    };
+    dense_bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    for (size_t k = 0; k < sizeof CASES / sizeof *CASES; ++k) {
+        eits_options o = ctx->options;
+        o.sign = CASES[k].sign;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        eits_zero(ctx->gradient, N);
+        ctx->gradient[5] = (eits_real)CASES[k].up;
+        ctx->gradient[N - 1] = (eits_real)-CASES[k].down;
+        ctx->info.lambda_max = (eits_real)(o.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
+        ctx->info.lambda_noise = (eits_real)CASES[k].noise;
+        ctx->info.findings = 0;
+        eits_judge_reference(ctx);
+        CHECK_EQUAL(ctx->info.findings, CASES[k].stale ? EITS_FINDING_STALE_REFERENCE : 0);
+    }
+    dense_bench_close(&b);
+}
+
+/* ---- misfit ---- */
+
+/* d = what a sheet gives, and `off` times what none gives; 1 where it is judged a misfit. */
+static int misfit(eits_context *ctx, double off)
+{
+    const double pi = 3.14159265358979323846;
+    uint32_t index[SMALL_FOLDED];
+    uint64_t macs = 0;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        index[k] = k;
+        ctx->d[k] = (eits_real)(cos(pi * 2 * (k + 0.5) / SMALL_FOLDED) + off * cos(pi * (RANK + 2) * (k + 0.5) / SMALL_FOLDED));
+        ctx->basis_for[k] = EITS_SIDE_BOTH;
+        ctx->apart[k] = 0;
+    }
+    ctx->kernels->mul(&ctx->model->reduction, index, ctx->d, SMALL_FOLDED, ctx->y);
+    eits_zero(ctx->along, SMALL_FOLDED);
+    ctx->info.misfit = 0;
+    return eits_judge_misfit(ctx, &macs);
+}
+
+static void misfits(void)
+{
+    dense_bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    CHECK(ctx->sheet_known);
+    for (int i = 0; i < RANK; ++i) { /* the ridge: s^2 / (s^2 + 1e-4 s_1^2), over |P_i|^2 */
+        const double s2 = pow(SMALL_DECAY, 2.0 * i), inverse = s2 + SMALL_FLOOR;
+        CHECK_NEAR(ctx->sheet_shrink[i], s2 / (s2 + 1e-4) * inverse, 1e-4 * inverse);
+        CHECK_NEAR(ctx->sheet_inverse[i], inverse, 1e-5);
+    }
+    CHECK(!misfit(ctx, 0.5) && ctx->info.misfit == 0); /* the noise is not known */
+    ctx->baseline.noise_v = R(1e-4);
+    CHECK(misfit(ctx, 0.06));
+    CHECK_NEAR(ctx->info.misfit, 0.06, 2e-4);
+    CHECK(!misfit(ctx, 0.045));
+    CHECK_NEAR(ctx->info.misfit, 0.045, 2e-4);
+    /* of |d|^2 = (1 + off^2) 21/2; noise leaves 8 times noise_v^2 outside */
+    const double off = 0.4, outside = off * off * SMALL_FOLDED / 2.0;
+    ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 8.5));
+    CHECK(!misfit(ctx, off));
+    CHECK_NEAR(ctx->info.misfit, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)), 1e-3);
+    ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 9.5));
+    CHECK(misfit(ctx, off));
+    ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 0.9));
+    CHECK(!misfit(ctx, off) && ctx->info.misfit == 0);
+    dense_bench_close(&b);
+}
+
+/* Two measurements of a fold have half the variance of one; a copy is none. Ratios have that of the voltage over the reference. */
+static void noise_of_the_data(void)
+{
+    for (int kind = 0; kind < 2; ++kind) {
+        dense_bench b;
+        eits_context *ctx = set_up(&b, kind ? EITS_DATA_NORMALISED : EITS_DATA_DIFFERENCE);
+        ctx->baseline.noise_v = R(0.25);
+        double sum = 0;
+        for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+            const int two = k % 3 == 0 && k < SMALL_PAIRS;
+            ctx->basis_for[k] = k < SMALL_PAIRS ? (k % 3 == 1 ? EITS_SIDE_SECOND : EITS_SIDE_BOTH) : EITS_SIDE_FIRST;
+            ctx->apart[k] = two ? R(0.1) : 0;
+            const double one = kind ? 0.25 / (double)ctx->model->v_ref[k] : 0.25 * (double)ctx->baseline.gain;
+            sum += one * one / (two ? 2 : 1);
+        }
+        CHECK_NEAR(eits_noise_energy(ctx), sum, 1e-5 * sum);
+        dense_bench_close(&b);
+    }
+}
+
+/* ---- readings of quiet frames ---- */
+
+static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_real *older, uint32_t marked[SMALL_FOLDED])
+{
+    memset(ctx->list_index, 0xFF, SMALL_FOLDED * sizeof *ctx->list_index);
+    const uint32_t count = eits_quiet_odd(ctx, newer, older, 4);
+    uint32_t bits = 0;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        CHECK_EQUAL(ctx->list_index[k] | 4u, 0xFFFFFFFFu); /* the other bits are not touched */
+        marked[k] = (ctx->list_index[k] & 4u) != 0;
+        bits += marked[k];
+    }
+    CHECK_EQUAL(bits, count);
+    return count;
+}
+
+/* All rows change by 1 %, each pair alike but for 0.1 %: then a reading is odd beyond 12 robust deviations and 5 % of its own. */
+static void odd_readings(void)
+{
+    dense_bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    eits_real older[SMALL_ROWS], newer[SMALL_ROWS], spoilt[SMALL_ROWS];
+    uint32_t marked[SMALL_FOLDED];
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        const eits_fold fold = ctx->model->fold[k];
+        const eits_real sign = fold.sign, size = k == 4 ? R(0.01) : (k == 5 ? R(0.5) : 1), spread = k % 2 ? R(1e-3) : R(-1e-3);
+        older[fold.first] = size, newer[fold.first] = size + R(0.01);
+        if (fold.second != EITS_FOLD_NONE)
+            older[fold.second] = sign * size, newer[fold.second] = sign * (size + R(0.01) + spread);
+    }
+    CHECK_EQUAL(odd_folds(ctx, newer, older, marked), 0);
+    static const struct {
+        uint32_t fold;
+        double off;
+        int odd;
+    } CASES[] = {{4, 0.022, 1}, {4, 0.015, 0}, {5, 0.03, 1}, {5, 0.022, 0}, {6, 0.06, 1}, {6, 0.045, 0}};
+    for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
+        memcpy(spoilt, newer, sizeof spoilt);
+        spoilt[ctx->model->fold[CASES[n].fold].first] += (eits_real)CASES[n].off;
+        CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), CASES[n].odd);
+        CHECK_EQUAL(marked[CASES[n].fold], CASES[n].odd);
+    }
+    memcpy(spoilt, newer, sizeof spoilt);
+    for (uint32_t count = 1; count <= EITS_GLITCH_MOST + 1; ++count) { /* as many are no glitches */
+        spoilt[ctx->model->fold[count].first] += R(0.2);
+        CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), count <= EITS_GLITCH_MOST ? count : 0);
+    }
+    dense_bench_close(&b);
+}
+
+/* ---- noise that is learned ---- */
+
+/* The noise of voltages of any size, whose squares are out of range; and what lambda makes of it. */
+static void noise_of_any_size(void)
+{
+    static const double sizes[] = {1, BOTH_WIDTHS(1e-24, 1e-170), BOTH_WIDTHS(1e24, 1e170)};
+    enum { FRAMES = 8 };
+    for (int n = 0; n < 3; ++n) {
+        dense_bench b;
+        eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+        uint64_t state = 3;
+        eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+        double mean[SMALL_ROWS] = {0}, squares[SMALL_ROWS] = {0}, sum = 0;
+        small_reference(ctx->model, 1, reference);
+        CHECK_EQUAL(eits_baseline_begin(ctx, FRAMES), EITS_OK);
+        for (int k = 0; k < FRAMES; ++k) {
+            for (int i = 0; i < SMALL_ROWS; ++i) {
+                const double off = 0.01 * small_random(&state);
+                frame[i] = (eits_real)(sizes[n] * ((double)reference[i] + off));
+                mean[i] += off / FRAMES;
+                squares[i] += off * off;
+            }
+            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), EITS_OK);
+        }
+        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            sum += (squares[i] - FRAMES * mean[i] * mean[i]) / (FRAMES - 1) / SMALL_ROWS;
+        CHECK_NEAR((double)ctx->baseline.noise_v / sizes[n], sqrt(sum), 1e-4);
+        CHECK_EQUAL(ctx->baseline.glitches, 0);
+        memset(frame, 0, sizeof frame); /* a dead front end is no quiet frame */
+        CHECK_EQUAL(eits_baseline_begin(ctx, FRAMES), EITS_OK);
+        for (int k = 0; k < FRAMES; ++k) {
+            for (int i = 0; i < SMALL_ROWS; ++i)
+                frame[i] = k < FRAMES / 2 ? reference[i] : 0;
+            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), k < FRAMES / 2 ? EITS_OK : EITS_E_FRAME_ZERO);
+        }
+        dense_bench_close(&b);
+    }
+    dense_bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    small_new_data(ctx, 5);
+    ctx->baseline.lambda_noise = R(0.25);
+    eits_options o = ctx->options;
+    o.lambda_rel = R(1e-3);
+    o.lambda_noise_factor = R(0.5);
+    o.gate_factor = 0;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    CHECK(ctx->info.lambda == R(0.125) && ctx->info.lambda_noise == R(0.25));
+    dense_bench_close(&b);
+}
+
+int main(void)
+{
+    crowds();
+    stale_references();
+    misfits();
+    noise_of_the_data();
+    odd_readings();
+    noise_of_any_size();
+    return checks_report("judgements");
+}

@@ -1,0 +1,422 @@
+/* Glitches where the other folds tell what is right: half scans, whose second rows are copies, and which side of a fold is wrong;
+ * and channels: many folds that share a pair. */
+#include "check.h"
+#include "small_model.h"
+
+#include "examine.h"
+#include "vec.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { RANK = 8, SIDE = 4, QUIET = 16, BLOCKS = 6, ALONE = RANK - 1, UNSEEN = SMALL_PAIRS, PAIR_FOLDS = 12 };
+
+/* A sheet in which folds 0 to 14 agree by threes, the single row 20 with folds 16 and 17, and folds 15 and 18 with none. Of the
+ * single row 19 the model sees nothing. */
+static uint32_t block_of(uint32_t k)
+{
+    if (k == UNSEEN)
+        return RANK;
+    if (k == 15 || k == 18)
+        return k == 15 ? BLOCKS : ALONE;
+    return k < 15 ? k / 3 : BLOCKS - 1;
+}
+
+typedef struct bench {
+    small_model made;
+    small_context c;
+    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+    uint64_t state;
+    int half; /* second rows are copies */
+} bench;
+
+static void shape_reduction(small_model *made)
+{
+    uint8_t *p = small_model_section(made, "REDU", NULL);
+    for (uint32_t i = 0; i < RANK; ++i) {
+        const double weight = 1 / sqrt(pow(SMALL_DECAY, 2.0 * i) + SMALL_FLOOR);
+        for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
+            small_put_f32(p + 4 * (RANK * k + i), block_of(k) == i ? (float)(i < BLOCKS ? weight / sqrt(3) : weight) : 0.0f);
+    }
+    small_model_seal(made);
+}
+
+/* The first folds all drive across the pair (0, 1) and measure across another, or the other way round; `crossed`: across (0, x) and
+ * (1, y) instead. */
+static void shape_protocol(small_model *made, int crossed)
+{
+    uint8_t *rows = small_model_section(made, "PROT", NULL), *folds = small_model_section(made, "FOLD", NULL);
+    for (uint32_t k = 0; k < PAIR_FOLDS; ++k) {
+        const uint8_t from = (uint8_t)(2 + k % 5), to = (uint8_t)(from + 1), zero = k % 4 == 3;
+        const uint8_t one[2] = {zero, crossed ? from : !zero}, other[2] = {crossed ? !zero : from, to};
+        uint8_t *fold = folds + 8 * k, *first = rows + 4 * (fold[0] | fold[1] << 8), *second = rows + 4 * (fold[2] | fold[3] << 8);
+        memcpy(first, k % 3 == 1 ? one : other, 2);
+        memcpy(first + 2, k % 3 == 1 ? other : one, 2);
+        memcpy(second, first + 2, 2);
+        memcpy(second + 2, first, 2);
+    }
+    const uint64_t hash = eits_protocol_hash(SMALL_ELECTRODES, SMALL_ROWS, rows);
+    memcpy(made->blob + 24, &hash, sizeof hash);
+    small_model_seal(made);
+}
+
+static void copy_halves(const bench *b, eits_real *frame)
+{
+    for (uint32_t k = 0; k < SMALL_PAIRS && b->half; ++k) {
+        const eits_fold fold = b->c.model.fold[k];
+        frame[fold.second] = (eits_real)fold.sign * frame[fold.first];
+    }
+}
+
+static void add_noise(bench *b, eits_real *frame)
+{
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        frame[i] += (eits_real)(1e-4 * small_random(&b->state));
+    copy_halves(b, frame);
+}
+
+/* A frame that the sheet gives, `size` large, and noise. */
+static void clean_frame(bench *b, double size)
+{
+    double change[RANK + 1];
+    for (uint32_t i = 0; i <= RANK; ++i)
+        change[i] = i < RANK ? size * small_random(&b->state) : 0;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        const eits_fold fold = b->c.model.fold[k];
+        b->frame[fold.first] = b->reference[fold.first] + (eits_real)change[block_of(k)];
+        if (fold.second != EITS_FOLD_NONE)
+            b->frame[fold.second] = b->reference[fold.second] + (eits_real)fold.sign * (eits_real)change[block_of(k)];
+    }
+    add_noise(b, b->frame);
+}
+
+enum { PLAIN, PAIR, CROSSED };
+
+static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kind kind)
+{
+    memset(b, 0, sizeof *b);
+    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind});
+    shape_reduction(&b->made);
+    if (protocol != PLAIN)
+        shape_protocol(&b->made, protocol == CROSSED);
+    small_context_open(&b->c, &b->made, 0);
+    eits_context *ctx = &b->c.ctx;
+    b->state = 7;
+    b->half = half;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        const eits_fold fold = b->c.model.fold[k];
+        b->reference[fold.first] = 1;
+        if (fold.second != EITS_FOLD_NONE)
+            b->reference[fold.second] = (eits_real)fold.sign;
+    }
+    eits_options o = ctx->options;
+    o.project_baseline = 0;
+    o.max_masked = SMALL_ROWS;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
+    for (int k = 0; k < QUIET; ++k) {
+        clean_frame(b, 0);
+        CHECK_EQUAL(eits_baseline_add(ctx, b->frame, SMALL_ROWS), EITS_OK);
+    }
+    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    CHECK(ctx->sheet_known && ctx->baseline.noise_v > 0);
+    return ctx;
+}
+
+static eits_context *set_up(bench *b, int half)
+{
+    return open_shaped(b, PLAIN, half, EITS_DATA_DIFFERENCE);
+}
+
+static void tear_down(bench *b)
+{
+    small_context_close(&b->c);
+    small_model_free(&b->made);
+}
+
+static void look_for(eits_context *ctx, uint32_t findings, uint32_t max_masked)
+{
+    eits_options o = ctx->options;
+    o.findings = findings;
+    o.max_masked = max_masked;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+}
+
+/* What was wrong with the rows themselves; the small model's touches are nothing to tell crowds by. */
+static uint32_t reconstruct(bench *b)
+{
+    CHECK_EQUAL(eits_reconstruct(&b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    return b->c.ctx.info.findings & ~(uint32_t)(EITS_FINDING_CROWDED | EITS_FINDING_STALE_REFERENCE);
+}
+
+/* Row and copy of fold k are off by `off`. */
+static void spoil(bench *b, uint32_t k, double off)
+{
+    b->frame[b->c.model.fold[k].first] += (eits_real)off;
+    copy_halves(b, b->frame);
+}
+
+static void clean_half_scans(void)
+{
+    for (int project = 0; project < 2; ++project) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        eits_options o = ctx->options;
+        o.project_baseline = (uint32_t)project;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        for (int k = 0; k < 40; ++k) {
+            clean_frame(&b, k % 2 ? 0.15 : 0.001);
+            CHECK_EQUAL(reconstruct(&b), 0);
+            CHECK_EQUAL(ctx->info.masked, 0);
+            CHECK(ctx->info.misfit < EITS_MISFIT_SHARE || k % 2 == 0);
+        }
+        tear_down(&b);
+    }
+}
+
+/* Left out with its copy, and counted; the image is that of a frame whose rows were known to be bad. */
+static void one_glitch_of_a_half_scan(void)
+{
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        bench b;
+        eits_context *ctx = set_up(&b, 1);
+        const eits_fold fold = b.c.model.fold[k];
+        const uint32_t rows = fold.second == EITS_FOLD_NONE ? 1 : 2;
+        eits_real data[RANK];
+        clean_frame(&b, 0.15);
+        spoil(&b, k, 0.6);
+        const uint32_t found = reconstruct(&b);
+        if (k == 15 || k == 18) { /* what no other says anything about may be so */
+            CHECK(found == 0 && ctx->info.masked == 0);
+            tear_down(&b);
+            continue;
+        }
+        CHECK_EQUAL(found, EITS_FINDING_GLITCH);
+        CHECK_EQUAL(ctx->info.glitches, rows);
+        CHECK_EQUAL(ctx->info.masked, rows);
+        CHECK(ctx->info.misfit == 0 && ctx->unusable[fold.first] == EITS_ROW_GLITCH);
+        memcpy(data, ctx->y, sizeof data);
+        look_for(ctx, EITS_FINDINGS_ALL, rows - 1);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
+        CHECK_EQUAL(ctx->info.glitches, rows);
+        look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_GLITCH, SMALL_ROWS);
+        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+        CHECK(ctx->info.misfit > EITS_MISFIT_SHARE && ctx->info.misfit <= 1 && ctx->info.masked == 0);
+        look_for(ctx, 0, SMALL_ROWS);
+        CHECK_EQUAL(reconstruct(&b), 0);
+        CHECK_EQUAL(ctx->info.masked, 0);
+        look_for(ctx, EITS_FINDINGS_ALL, SMALL_ROWS);
+        CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
+        if (fold.second != EITS_FOLD_NONE)
+            CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
+        CHECK_EQUAL(reconstruct(&b), 0);
+        CHECK(memcmp(data, ctx->y, sizeof data) == 0);
+        tear_down(&b);
+    }
+}
+
+/* Which of several it is cannot be told without reciprocals; and reciprocals that differ by noise bear each other out. */
+static void misfits_that_are_no_glitch(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 1);
+    clean_frame(&b, 0.15);
+    for (uint32_t k = 0; k < 9; k += 3)
+        spoil(&b, k, 0.6);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK(ctx->info.masked == 0 && ctx->info.glitches == 0);
+    clean_frame(&b, 0.15); /* noise all over: nothing stands out of it */
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
+        spoil(&b, k, 0.05 * small_random(&b.state));
+    spoil(&b, 4, 0.4);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(ctx->info.masked, 0);
+    clean_frame(&b, 0.02); /* a lesser one beside it does not matter */
+    spoil(&b, 0, 0.6);
+    spoil(&b, 3, 0.36);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
+    CHECK(ctx->info.glitches == 2 && ctx->unusable[b.c.model.fold[0].first] == EITS_ROW_GLITCH);
+    clean_frame(&b, 0.02); /* a fold that none determines is not blamed, however large */
+    spoil(&b, 18, 6);
+    for (uint32_t k = 0; k < 9; k += 3)
+        spoil(&b, k, 0.3);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(ctx->info.masked, 0);
+    clean_frame(&b, 0.02); /* rows that have turned, though one stands out */
+    spoil(&b, 0, -7);
+    spoil(&b, 3, -1.1);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(ctx->info.masked, 0);
+    tear_down(&b);
+    ctx = set_up(&b, 0);
+    clean_frame(&b, 0.15);
+    const eits_fold fold = b.c.model.fold[5];
+    b.frame[fold.first] += R(0.6);
+    b.frame[fold.second] += (eits_real)fold.sign * R(0.6);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(ctx->info.masked, 0);
+    tear_down(&b);
+}
+
+/* How far the gain drifted is no news; a glitch beside it is. */
+static void drift_is_no_misfit(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 0);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) { /* a reference that no sheet gives */
+        const eits_fold fold = b.c.model.fold[k];
+        b.reference[fold.first] *= R(1) + R(0.1) * (eits_real)(k % 3);
+        if (fold.second != EITS_FOLD_NONE)
+            b.reference[fold.second] *= R(1) + R(0.1) * (eits_real)(k % 3);
+    }
+    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
+    for (int k = 0; k < QUIET; ++k) {
+        clean_frame(&b, 0);
+        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    }
+    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    for (int project = 0; project < 2; ++project) {
+        eits_options o = ctx->options;
+        o.project_baseline = (uint32_t)project;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        clean_frame(&b, 0.02);
+        CHECK_EQUAL(reconstruct(&b), 0);
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            b.frame[i] += R(0.2) * b.reference[i];
+        CHECK_EQUAL(reconstruct(&b), project ? 0 : EITS_FINDING_MISFIT);
+        CHECK((ctx->info.misfit < R(0.01)) == project);
+        const eits_fold fold = b.c.model.fold[7];
+        b.frame[fold.first] += R(0.05);
+        b.frame[fold.second] += (eits_real)fold.sign * R(0.05);
+        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    }
+    tear_down(&b);
+}
+
+/* Of a fold whose sides differ, the side that the others bear out stays. */
+static void the_wrong_side_goes(void)
+{
+    for (int kind = 0; kind < 3; ++kind) {
+        for (uint32_t k = 0; k < SMALL_PAIRS; ++k) {
+            bench b;
+            eits_context *ctx = open_shaped(&b, PLAIN, 0, (eits_data_kind)kind);
+            const eits_fold fold = b.c.model.fold[k];
+            for (int side = 0; side < 2; ++side) {
+                const uint32_t wrong = side ? fold.second : fold.first, right = side ? fold.first : fold.second;
+                clean_frame(&b, 0.15);
+                b.frame[wrong] *= R(1.5);
+                CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
+                CHECK_EQUAL(ctx->unusable[wrong], EITS_ROW_GLITCH);
+                CHECK_EQUAL(ctx->unusable[right], block_of(k) < BLOCKS ? 0 : EITS_ROW_GLITCH);
+                CHECK_EQUAL(ctx->info.glitches, block_of(k) < BLOCKS ? 1 : 2);
+            }
+            tear_down(&b);
+        }
+    }
+}
+
+/* Two wrong of three that agree: the third tells. With one fold left out nothing tells. */
+static void several_wrong_sides(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, 0);
+    for (uint32_t count = 1; count <= EITS_GLITCH_MOST; ++count) {
+        clean_frame(&b, 0.15);
+        for (uint32_t l = 0; l < count; ++l) { /* folds 0, 1, 3, 4, ... */
+            const eits_fold fold = b.c.model.fold[l + l / 2];
+            b.frame[l % 3 ? fold.first : fold.second] *= l % 2 ? R(1.6) : R(1.4);
+        }
+        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
+        CHECK_EQUAL(ctx->info.glitches, count);
+        for (uint32_t l = 0; l < count; ++l) {
+            const eits_fold fold = b.c.model.fold[l + l / 2];
+            CHECK_EQUAL(ctx->unusable[l % 3 ? fold.first : fold.second], EITS_ROW_GLITCH);
+        }
+    }
+    clean_frame(&b, 0.15);
+    CHECK_EQUAL(eits_mask_row(ctx, b.c.model.fold[UNSEEN].first, 1), EITS_OK);
+    b.frame[b.c.model.fold[2].first] *= R(1.5);
+    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
+    CHECK_EQUAL(ctx->info.glitches, 2);
+    tear_down(&b);
+}
+
+/* The thresholds, from both sides: noise, the share of the largest datum, the share of their own. */
+static void what_sides_may_differ_by(void)
+{
+    static const struct {
+        double change, off, largest; /* of fold 4, of its second side, of fold 0 */
+        int found;
+    } CASES[] = {{0, 6e-4, 0, 1},   {0, 3e-4, 0, 0},    {0, 0.02, 0.5, 1},  {0, 0.01, 0.5, 0},
+                 {0.3, 0.12, 0, 1}, {0.3, 0.08, 0, 0}, {-0.3, -0.08, 0, 0}, {-0.3, -0.12, 0, 1}};
+    for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
+        bench b;
+        eits_context *ctx = set_up(&b, 0);
+        CHECK(ctx->baseline.noise_v > R(4e-5) && ctx->baseline.noise_v < R(7e-5));
+        look_for(ctx, EITS_FINDING_GLITCH, SMALL_ROWS);
+        memcpy(b.frame, b.reference, sizeof b.frame);
+        for (uint32_t k = 0; k < 6; ++k) {
+            const eits_fold fold = b.c.model.fold[k];
+            const eits_real change = (eits_real)(k < 3 ? CASES[n].largest : CASES[n].change);
+            b.frame[fold.first] += change;
+            b.frame[fold.second] += (eits_real)fold.sign * (change + (k == 4 ? (eits_real)CASES[n].off : 0));
+        }
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i) /* the frame against its own reference's noise */
+            b.frame[i] += ctx->baseline.v0[i] - b.reference[i];
+        CHECK_EQUAL(reconstruct(&b), CASES[n].found ? EITS_FINDING_GLITCH : 0);
+        tear_down(&b);
+    }
+}
+
+static int measures_across(const eits_context *ctx, uint32_t i)
+{
+    const uint8_t *row = eits_row(ctx, i);
+    return (row[2] == 0 && row[3] == 1) || (row[2] == 1 && row[3] == 0);
+}
+
+static int uses_either(const eits_context *ctx, uint32_t i)
+{
+    int uses = 0;
+    for (int p = 0; p < 4; ++p)
+        uses |= eits_row(ctx, i)[p] <= 1;
+    return uses;
+}
+
+/* The channel of one pair: the rows measured across it go, their reciprocals stay. Of two electrodes that share no channel, all. */
+static void noisy_channel(void)
+{
+    for (int crossed = 0; crossed < 2; ++crossed) {
+        bench b;
+        eits_context *ctx = open_shaped(&b, crossed ? CROSSED : PAIR, 0, EITS_DATA_DIFFERENCE);
+        clean_frame(&b, 0.02);
+        for (uint32_t k = 0; k < PAIR_FOLDS; ++k) {
+            const eits_fold fold = b.c.model.fold[k];
+            b.frame[measures_across(ctx, fold.second) ? fold.second : fold.first] *= R(1.3);
+        }
+        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_ELECTRODE_NOISY);
+        CHECK_EQUAL(ctx->info.noisy_electrodes, 3);
+        uint32_t count = 0;
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+            const int left = crossed ? uses_either(ctx, i) : measures_across(ctx, i);
+            CHECK_EQUAL(ctx->unusable[i], left ? EITS_ROW_NOISY : 0);
+            count += (uint32_t)left;
+        }
+        CHECK(count >= PAIR_FOLDS && ctx->info.masked == count);
+        tear_down(&b);
+    }
+}
+
+int main(void)
+{
+    clean_half_scans();
+    one_glitch_of_a_half_scan();
+    misfits_that_are_no_glitch();
+    drift_is_no_misfit();
+    the_wrong_side_goes();
+    several_wrong_sides();
+    what_sides_may_differ_by();
+    noisy_channel();
+    return checks_report("unpaired");
+}
