@@ -17,7 +17,7 @@ enum { RANK = 13, STRIDE = 16, SIDE = 6, N = SIDE * SIDE };
 
 static const small_spec WHITENED = {.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED};
 /* What the core states of its numbers: the floor's law, how little a lost direction counts, the margin of the step. */
-static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1, NOISE_FLOOR = 1150;
+static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1, NOISE_FROM = 1 / 740.0, MUCH_MISSING = 0.25;
 
 typedef struct bench {
     dense_bench b;
@@ -103,8 +103,9 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
     double k[RANK][RANK], s[RANK], w[RANK], left = 0;
     for (int f = 0; f < SMALL_FOLDED; ++f)
         left += !b->out[f] / (double)SMALL_FOLDED;
-    const double noisy = NOISE_FLOOR * (1 - left) * (double)(ctx->baseline.noise_v / ctx->baseline.v0_rms);
-    const double mu = SMALL_FLOOR * fmax(noisy, fmax(left * left * left, LEAST_SHARE)), lost = LOST * mu;
+    const double beyond = fmax(0, (double)(ctx->baseline.noise_v / ctx->baseline.v0_rms) / NOISE_FROM - 1);
+    const double noisy = 1 + fmin(1, (1 - left) / MUCH_MISSING) * beyond;
+    const double mu = SMALL_FLOOR * fmax(left * left * left, LEAST_SHARE) * noisy, lost = LOST * mu;
     const double scale = MARGIN / (1 + SMALL_FLOOR) * (1 + mu) / (1 + lost);
     for (int i = 0; i < RANK; ++i) {
         s[i] = pow(SMALL_DECAY, i);

@@ -10,11 +10,11 @@ OBSERVED = of(
     ("no least floor", "cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE", "cube", "observed"),
     (
         "noise asks for no higher floor",
-        "noisy = b->noise_v > 0 ? NOISE_FLOOR * missing",
-        "noisy = b->noise_v > 0 ? 0 * missing",
+        "(beyond > 0 ? 1 + much * beyond : 1)",
+        "(beyond > 0 ? 1 : 1)",
         "observed",
     ),
-    ("noise asks for more whatever is left out", "NOISE_FLOOR * missing * (", "NOISE_FLOOR * (", "observed"),
+    ("noise asks for more whatever is left out", "1 + much * beyond", "1 + (much > 0 ? beyond : 0)", "observed"),
     ("lost directions weigh a hundred times as much", "LOST = R(0.01)", "LOST = R(1.0)", "observed"),
     ("lost directions are not held", "row[i] += lost;", "row[i] += 0;", "observed"),
     (
