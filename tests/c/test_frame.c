@@ -390,6 +390,43 @@ static void ratios_at_their_limits(void)
     tear_down(&b);
 }
 
+/* Directions of rows left out that nearly agree are orthogonal all the same. */
+static void directions_that_nearly_agree(void)
+{
+    small_model made = small_model_make((small_spec){.rank = RANK, .side = 4});
+    uint8_t *p = small_model_section(&made, "REDU", NULL);
+    uint64_t state = 9;
+    for (uint32_t i = 0; i < RANK; ++i) {
+        float value;
+        memcpy(&value, p + 4 * (EITS_STRIDE(RANK) * 4 + i), 4);
+        small_put_f32(p + 4 * (EITS_STRIDE(RANK) * 5 + i), value * (float)(1 + 3e-3 * small_random(&state)));
+    }
+    small_model_seal(&made);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    eits_options o = c.ctx.options;
+    o.project_baseline = o.findings = 0;
+    o.max_masked = SMALL_ROWS;
+    CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
+    eits_real frame[SMALL_ROWS];
+    small_reference(&c.model, 1, frame);
+    CHECK_EQUAL(eits_baseline_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    frame[0] *= R(1.1);
+    for (uint32_t k = 4; k < 6; ++k) {
+        CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[k].first, 1), EITS_OK);
+        CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[k].second, 1), EITS_OK);
+    }
+    uint32_t masked;
+    uint64_t macs;
+    CHECK_EQUAL(eits_frame_stage(&c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_EQUAL(c.ctx.basis_count, 2);
+    double *a = dense_copy(c.ctx.basis, RANK), *b = dense_copy(c.ctx.basis + EITS_STRIDE(RANK), RANK);
+    CHECK_NEAR(dense_dot(a, b, RANK), 0, 4 * EPS);
+    free(a), free(b);
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
 int main(void)
 {
     data_of_each_kind();
@@ -402,5 +439,6 @@ int main(void)
     masked_rows();
     row_without_reference();
     ratios_at_their_limits();
+    directions_that_nearly_agree();
     return checks_report("frame");
 }
