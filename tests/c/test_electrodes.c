@@ -188,6 +188,14 @@ static void masked_and_forgotten(void)
     b.frame[9] = good;
     reconstruct(&b);
     CHECK(ctx->info.findings == 0 && ctx->info.glitches == 0 && ctx->info.masked == 0);
+    for (int turned = 1; turned >= 0; --turned) { /* the stage by itself */
+        uint32_t masked;
+        uint64_t macs;
+        b.frame[9] = turned ? -good : good;
+        CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+        CHECK_EQUAL(ctx->info.findings, turned ? EITS_FINDING_GLITCH : 0);
+        CHECK_EQUAL(ctx->info.glitches, turned);
+    }
     for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
         if (!row_uses(ctx, i, 3))
             continue;

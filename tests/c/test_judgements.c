@@ -197,7 +197,7 @@ static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_
     return count;
 }
 
-/* All rows change by 1 %, each pair alike but for 0.1 %: then a reading is odd beyond 12 robust deviations and 5 % of its own. */
+/* All rows change by 0.04, each pair alike but for 0.1 %: then a reading is odd beyond 12 robust deviations and 5 % of its own. */
 static void odd_readings(void)
 {
     dense_bench b;
@@ -207,9 +207,9 @@ static void odd_readings(void)
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         const eits_fold fold = ctx->model->fold[k];
         const eits_real sign = fold.sign, size = k == 4 ? R(0.01) : (k == 5 ? R(0.5) : 1), spread = k % 2 ? R(1e-3) : R(-1e-3);
-        older[fold.first] = size, newer[fold.first] = size + R(0.01);
+        older[fold.first] = size, newer[fold.first] = size + R(0.04);
         if (fold.second != EITS_FOLD_NONE)
-            older[fold.second] = sign * size, newer[fold.second] = sign * (size + R(0.01) + spread);
+            older[fold.second] = sign * size, newer[fold.second] = sign * (size + R(0.04) + spread);
     }
     CHECK_EQUAL(odd_folds(ctx, newer, older, marked), 0);
     static const struct {

@@ -234,7 +234,6 @@ MISFIT = of(
     ),
     ("stale: at any ratio", "against > EITS_STALE_RATIO * ctx->info.lambda_max &&", "against > 0 &&", "judgements"),
     ("stale: noise", " && against > least)", ")", "judgements"),
-    ("stale: under no sign", "sign == EITS_SIGN_BOTH || ", "", "judgements"),
 )
 
 CROWDED = of(
