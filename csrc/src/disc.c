@@ -1,5 +1,6 @@
 #include "disc.h"
 
+#include "column.h"
 #include "columns.h"
 #include "kernels.h"
 #include "observed.h"
@@ -25,8 +26,7 @@ static void cell_range(eits_real at, eits_real reach, uint32_t count, uint32_t *
 
 static eits_real column_factor(const eits_model *model, uint32_t j)
 {
-    const eits_real scale = model->sensitivity.scale != NULL ? (eits_real)model->sensitivity.scale[j] : 1;
-    return scale / (eits_real)model->column_weight[j];
+    return eits_column_scale(&model->sensitivity, j) / (eits_real)model->column_weight[j];
 }
 
 static covered cover(eits_context *ctx, const eits_disc *disc)

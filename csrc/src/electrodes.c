@@ -75,7 +75,7 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits most, uin
     return 1;
 }
 
-static int is_pair(const uint8_t *two, uint8_t e, uint8_t f)
+int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f)
 {
     return (two[0] == e && two[1] == f) || (two[0] == f && two[1] == e);
 }
@@ -86,7 +86,7 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
     uint32_t dead = 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const uint8_t *row = eits_row(ctx, i);
-        if ((!is_pair(row, e, f) && !is_pair(row + 2, e, f)) || uses(ctx, i, EITS_ELECTRODE_OPEN))
+        if ((!eits_is_pair(row, e, f) && !eits_is_pair(row + 2, e, f)) || uses(ctx, i, EITS_ELECTRODE_OPEN))
             continue;
         const int state = judge_row(ctx, frame, most, i);
         if ((state & ALIVE) != 0)
@@ -134,15 +134,19 @@ void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_r
     }
 }
 
+void eits_leave_glitch(eits_context *ctx, uint32_t i)
+{
+    ctx->unusable[i] |= EITS_ROW_GLITCH;
+    ++ctx->info.glitches;
+    ctx->info.findings |= EITS_FINDING_GLITCH;
+}
+
 /* Rows that no sheet gives, if they are few; more of them are a misfit. */
 static void leave_impossible(eits_context *ctx, const eits_real *frame, limits most)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if ((judge_row(ctx, frame, most, i) & TURNED) == 0 && !is_grown(ctx, frame, most, i))
-            continue;
-        ctx->unusable[i] |= EITS_ROW_GLITCH;
-        ++ctx->info.glitches;
-        ctx->info.findings |= EITS_FINDING_GLITCH;
+        if ((judge_row(ctx, frame, most, i) & TURNED) != 0 || is_grown(ctx, frame, most, i))
+            eits_leave_glitch(ctx, i);
     }
 }
 

@@ -14,6 +14,7 @@ enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_
 #define EITS_ROWS_TO_JUDGE 3u         /* so many significant rows of an electrode or a pair must agree; so many turned ones are a misfit */
 #define EITS_ROW_GROWN R(8.0)         /* times the reference, or times this share of its rms where that is more: */
 #define EITS_ROW_SMALL R(0.05)
+#define EITS_ROBUST R(1.4826)         /* the deviation of a normal distribution over the median of its magnitudes */
 #define EITS_GLITCH_NOISE R(6.5)      /* reciprocals that differ by so many times their difference's noise, */
 #define EITS_GLITCH_ROBUST R(16.0)    /* the same where no noise was learned, of the robust deviation of all such differences, */
 #define EITS_GLITCH_LARGEST R(0.03)   /* and by this share of the largest datum: common modes scale with that, */
@@ -41,6 +42,12 @@ static inline const uint8_t *eits_row(const eits_context *ctx, uint32_t i)
 {
     return ctx->model->protocol + 4 * (size_t)i;
 }
+
+/* Whether the two electrodes at `two` are e and f, either way round. */
+int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f);
+
+/* Leave row i, which is in use so far, out of this frame as a glitch, and count it. */
+void eits_leave_glitch(eits_context *ctx, uint32_t i);
 
 /* info names the electrodes in ctx->electrode. */
 void eits_name_electrodes(eits_context *ctx);

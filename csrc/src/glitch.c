@@ -4,8 +4,6 @@
 #include "column.h"
 #include "vec.h"
 
-static const eits_real ROBUST = R(1.4826); /* the deviation of a normal distribution over the median of its magnitudes */
-
 eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k)
 {
     uint32_t low = 0, high = n - 1;
@@ -53,6 +51,8 @@ static eits_real most_by_noise(const eits_context *ctx, uint32_t k)
 
 static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)
 {
+    if (ctx->basis_for[k] != EITS_SIDE_BOTH)
+        return 0;
     const eits_real off = eits_fabs(ctx->apart[k]);
     if (!(off > (ctx->baseline.noise_v > 0 ? most_by_noise(ctx, k) : most.robust)) || !(off > most.largest))
         return 0;
@@ -73,7 +73,7 @@ static tolerance find_tolerance(const eits_context *ctx)
     most.largest *= EITS_GLITCH_LARGEST;
     if (!(ctx->baseline.noise_v > 0) && count > 0) {
         const eits_real median = eits_kth(ctx->list_value, count, count / 2);
-        most.robust = EITS_GLITCH_ROBUST * ROBUST * median;
+        most.robust = EITS_GLITCH_ROBUST * EITS_ROBUST * median;
         if (!(median > 0))
             most.robust = R(INFINITY);
     }
@@ -84,9 +84,7 @@ static void leave_row(eits_context *ctx, uint32_t row)
 {
     if (row == EITS_FOLD_NONE || ctx->unusable[row] != 0)
         return;
-    ctx->unusable[row] |= EITS_ROW_GLITCH;
-    ++ctx->info.glitches;
-    ctx->info.findings |= EITS_FINDING_GLITCH;
+    eits_leave_glitch(ctx, row);
 }
 
 /* ---- what the other folds predict ---- */
@@ -171,8 +169,7 @@ static void choose_sides(eits_context *ctx, const uint32_t *flagged, uint32_t n,
 static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        const uint8_t *two = eits_row(ctx, i) + 2;
-        if ((two[0] == e && two[1] == f) || (two[0] == f && two[1] == e))
+        if (eits_is_pair(eits_row(ctx, i) + 2, e, f))
             ctx->unusable[i] |= EITS_ROW_NOISY;
     }
 }
@@ -181,12 +178,10 @@ static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
 static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance most)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] != EITS_SIDE_BOTH || !is_flagged(ctx, k, most))
+        if (!is_flagged(ctx, k, most))
             continue;
         const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
-        const int drives = (row[0] == e && row[1] == f) || (row[0] == f && row[1] == e);
-        const int measures = (row[2] == e && row[3] == f) || (row[2] == f && row[3] == e);
-        if (!drives && !measures)
+        if (!eits_is_pair(row, e, f) && !eits_is_pair(row + 2, e, f))
             return 0;
     }
     return 1;
@@ -198,7 +193,7 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance most)
     uint16_t shared[EITS_MOST_ELECTRODES] = {0};
     uint32_t found[2] = {0}, any = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] != EITS_SIDE_BOTH || !is_flagged(ctx, k, most))
+        if (!is_flagged(ctx, k, most))
             continue;
         for (uint32_t p = 0; p < 4; ++p)
             ++shared[eits_row(ctx, ctx->model->fold[k].first)[p]];
@@ -253,7 +248,7 @@ int eits_find_unpaired(eits_context *ctx, uint64_t *macs)
         }
     }
     *macs += 2u * (uint64_t)folds * rank;
-    if (!(worst * worst > EITS_GLITCH_ENERGY * energy) || !(worst > EITS_GLITCH_UNPAIRED * ROBUST * eits_kth(ctx->list_value, folds, folds / 2)))
+    if (!(worst * worst > EITS_GLITCH_ENERGY * energy) || !(worst > EITS_GLITCH_UNPAIRED * EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2)))
         return 0;
     leave_row(ctx, ctx->model->fold[at].first);
     leave_row(ctx, ctx->model->fold[at].second);
@@ -265,7 +260,7 @@ int eits_find_glitches(eits_context *ctx, uint64_t *macs)
     uint32_t flagged[EITS_GLITCH_MOST], count = 0;
     const tolerance most = find_tolerance(ctx);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] != EITS_SIDE_BOTH || !is_flagged(ctx, k, most))
+        if (!is_flagged(ctx, k, most))
             continue;
         if (count < EITS_GLITCH_MOST)
             flagged[count] = k;

@@ -49,10 +49,9 @@ static void make_shrink(eits_context *ctx)
     const eits_matrix *s = &ctx->model->sensitivity;
     eits_real most = 0;
     for (uint32_t j = 0; j < s->cols; ++j) {
-        const eits_real scale = s->scale == NULL ? 1 : (eits_real)s->scale[j];
-        eits_read_column(s, j, ctx->sx);
+        const eits_real *column = eits_column(s, j, ctx->sx), scale = eits_column_scale(s, j);
         for (uint32_t i = 0; i < s->rows; ++i) {
-            const eits_real value = scale * ctx->sx[i];
+            const eits_real value = scale * column[i];
             ctx->sheet_shrink[i] = eits_fma(value, value, ctx->sheet_shrink[i]);
         }
     }

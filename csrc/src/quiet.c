@@ -3,7 +3,6 @@
 
 #include "vec.h"
 
-static const eits_real ROBUST = R(1.4826); /* the deviation of a normal distribution over the median of its magnitudes */
 static const eits_real PAIRED = R(12.0), PAIRED_LEAST = R(1e-3);    /* robust deviations; and of the greatest voltage */
 static const eits_real UNPAIRED = R(16.0), UNPAIRED_LEAST = R(1e-2); /* the same where rows have no reciprocals, or copied ones */
 static const eits_real OWN_LEAST = R(0.05);                         /* and of the row's own voltage: noise may go with that */
@@ -56,7 +55,7 @@ static eits_real limit_of(const eits_context *ctx, const eits_real *newer, const
         if (!any)
             continue;
         *paired = way;
-        const eits_real spread = ROBUST * eits_kth(ctx->list_value, folds, folds / 2);
+        const eits_real spread = EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2);
         const eits_real limit = way ? PAIRED * spread : UNPAIRED * spread, least = (way ? PAIRED_LEAST : UNPAIRED_LEAST) * largest;
         return limit > least ? limit : least;
     }

@@ -1,6 +1,7 @@
 /* Peaks of the image start discs; the discs are fitted to the reduced data off the grid; those that explain nothing go. */
 #include "eitskin/touch.h"
 
+#include "column.h"
 #include "disc.h"
 #include "examine.h"
 #include "kernels.h"
@@ -298,9 +299,8 @@ static int stands_out(eits_context *ctx, fit *f, uint32_t k)
         const eits_real dy = eits_fma((eits_real)at.iy + R(0.5), pixel, (eits_real)ctx->model->origin_y_mm) - disc->y_mm;
         if (eits_fabs(dx) > pixel || eits_fabs(dy) > pixel)
             continue;
-        const eits_real scale = ctx->model->sensitivity.scale != NULL ? (eits_real)ctx->model->sensitivity.scale[j] : 1;
-        eits_read_column(&ctx->model->sensitivity, j, ctx->sx);
-        const eits_real seen = scale * eits_fma(disc->change, eits_dot(ctx, ctx->sx, atom, rank), eits_dot(ctx, ctx->sx, residual, rank));
+        const eits_real *column = eits_column(&ctx->model->sensitivity, j, ctx->sx), scale = eits_column_scale(&ctx->model->sensitivity, j);
+        const eits_real seen = scale * eits_fma(disc->change, eits_dot(ctx, column, atom, rank), eits_dot(ctx, column, residual, rank));
         f->macs += 2u * rank;
         best = seen * disc->polarity > best ? seen * disc->polarity : best;
     }

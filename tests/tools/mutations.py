@@ -257,7 +257,7 @@ TOUCH = (
         "disc.c",
         ("covers half a pixel too wide", "share = R(0.5) + (radius - distance)", "share = R(1.0) + (radius - distance)", "disc"),
         ("a rim without slope", "share < 1 ? factor / pixel : 0", "share < 1 ? 0 * factor / pixel : 0", "disc"),
-        ("weights not divided by", "return scale / (eits_real)model->column_weight[j];", "return scale;", "disc"),
+        ("weights not divided by", " / (eits_real)model->column_weight[j];", ";", "disc"),
         ("the skin a cell too wide", "x1 > 2 ? x1 - 2 : 0; ix <= x1 &&", "x1 > 2 ? x1 - 2 : 0; ix <= x1 + 1 &&", "disc"),
         (
             "the skin is all of the image",
