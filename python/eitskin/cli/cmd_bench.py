@@ -111,7 +111,7 @@ def _show(options: argparse.Namespace, title: str, result: Any, text: str, secti
 def run_kernels(options: argparse.Namespace) -> int:
     """Time each kernel beside the machine's peaks."""
     from eitskin.fileio import refuse_unwritable
-    from eitskin.study import bench_kernels
+    from eitskin.study.bench import kernels as bench_kernels
 
     _within("--rank", options.rank, 8, 1024)
     _within("--columns", options.columns, 48, 20_000)
@@ -125,7 +125,7 @@ def run_kernels(options: argparse.Namespace) -> int:
 def run_growth(options: argparse.Namespace) -> int:
     """Time frames of growing models."""
     from eitskin.fileio import refuse_unwritable
-    from eitskin.study import bench_growth
+    from eitskin.study.bench import growth as bench_growth
 
     _within("--rounds", options.rounds, 1, 1000)
     refuse_unwritable(options.markdown, options.picture)
@@ -150,7 +150,7 @@ def run_batches(options: argparse.Namespace) -> int:
     """Time batches over threads."""
     from eitskin.fileio import refuse_unwritable
     from eitskin.solve.batch import check_threads
-    from eitskin.study import bench_batches
+    from eitskin.study.bench import batches as bench_batches
 
     _within("--frames", options.frames, 8, 1_000_000)
     _within("--rounds", options.rounds, 1, 1000)
@@ -165,7 +165,8 @@ def run_batches(options: argparse.Namespace) -> int:
 def run_findings(options: argparse.Namespace) -> int:
     """Count how often faults are named, and what they cost."""
     from eitskin.fileio import refuse_unwritable
-    from eitskin.study import bench_findings, bench_findings_page
+    from eitskin.study.bench import findings as bench_findings
+    from eitskin.study.bench import findings_page as bench_findings_page
 
     _within("--scenes", options.scenes, 2, 100_000)
     _within("--crowds", options.crowds, 2, 10_000)
@@ -180,7 +181,7 @@ def run_findings(options: argparse.Namespace) -> int:
 
 def run_frame(options: argparse.Namespace) -> int:
     """Time a frame."""
-    from eitskin.study import bench_frame
+    from eitskin.study.bench import frame as bench_frame
 
     if not 100 <= options.runs <= 10_000_000:
         raise UsageError(f"bench frame: --runs {options.runs} is out of range; use 100 to 10000000")
@@ -198,14 +199,14 @@ def run_solve(options: argparse.Namespace) -> int:
     _within("--rounds", options.rounds, 3, 10_000)
     refuse_unwritable(options.picture)
     if options.picture is not None:
-        from eitskin.study import suboptimality
+        from eitskin.study.bench import suboptimality
         from eitskin.view.suboptimality_picture import draw
 
         curves = suboptimality.run(options.scenes, options.seed, _progress)
         draw(options.picture, curves)
         print(json.dumps(curves.as_dict(), indent=2) if options.json else suboptimality.text(curves))
         return 0
-    from eitskin.study import bench_solve
+    from eitskin.study.bench import solve as bench_solve
 
     result = bench_solve.run(options.scenes, options.seed, options.rounds, _progress)
     print(json.dumps(result, indent=2) if options.json else bench_solve.text(result))
@@ -214,7 +215,7 @@ def run_solve(options: argparse.Namespace) -> int:
 
 def run_jacobian(options: argparse.Namespace) -> int:
     """Time the Jacobian beside pyEIT's."""
-    from eitskin.study import bench_jacobian
+    from eitskin.study.bench import jacobian as bench_jacobian
 
     times = bench_jacobian.run()
     print(json.dumps(times, indent=2) if options.json else bench_jacobian.text(times))
@@ -224,7 +225,7 @@ def run_jacobian(options: argparse.Namespace) -> int:
 def run_board(options: argparse.Namespace) -> int:
     """Count what a frame costs on the emulated board."""
     from eitskin.fileio import refuse_unwritable, write_bytes
-    from eitskin.study import bench_board
+    from eitskin.study.bench import board as bench_board
 
     _within("--scenes", options.scenes, 1, 2000)
     _within("--seed", options.seed, 0, 2**31)
@@ -254,7 +255,7 @@ def _progress(items: Sequence[Any]) -> Iterable[Any]:
 
 def run_effects(options: argparse.Namespace) -> int:
     """Time each effect on one scene."""
-    from eitskin.study import bench_scenes
+    from eitskin.study.bench import scenes as bench_scenes
 
     _within("--frames", options.frames, 2, 100_000)
     result = bench_scenes.effects_table(options.frames, progress=_progress)
@@ -264,7 +265,7 @@ def run_effects(options: argparse.Namespace) -> int:
 
 def run_scenes(options: argparse.Namespace) -> int:
     """Time a moving touch and a dataset."""
-    from eitskin.study import bench_scenes
+    from eitskin.study.bench import scenes as bench_scenes
 
     _within("--frames", options.frames, 2, 100_000)
     _within("--scenes", options.scenes, 1, 1_000_000)

@@ -47,10 +47,10 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.scene.simulate import Measurement
     from eitskin.skin.protocol import adjacent
     from eitskin.skin.skin import load_skin, paper_skin
-    from eitskin.study import metrics
-    from eitskin.study.compare import Settings, compare
-    from eitskin.study.compare_table import to_csv, to_json, to_text
-    from eitskin.study.methods import methods
+    from eitskin.study.compare.methods import methods
+    from eitskin.study.compare.run import Settings, compare
+    from eitskin.study.compare.table import to_csv, to_json, to_text
+    from eitskin.study.judge import metrics
 
     _check(options)
     skin, protocol = (paper_skin(), adjacent(16)) if options.skin is None else load_skin(options.skin)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from eitskin.core.results import Reconstruction
     from eitskin.frames.frames import Frames
     from eitskin.solve.reconstructor import Reconstructor
-    from eitskin.study.score import FrameScore
+    from eitskin.study.judge.score import FrameScore
     from eitskin.study.tradeoff.front import Point
 
 
@@ -205,7 +205,7 @@ def _scores(
 ) -> dict[int, FrameScore]:
     if frames.touch_frame is None and frames.truth_mask is None:
         return {}
-    from eitskin.study.score import scorer_for
+    from eitskin.study.judge.score import scorer_for
 
     model = reconstructor.model
     if threshold is not None:

@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.device.known_model import find_model
     from eitskin.device.live import LiveSummary, finish, follow
     from eitskin.device.wire.packets import Stream
-    from eitskin.study.scene_truth import truth_of, until_over
+    from eitskin.study.judge.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)
     check_scan(options)

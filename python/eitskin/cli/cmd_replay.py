@@ -11,7 +11,7 @@ from eitskin.cli.device_options import read_mode, whole
 from eitskin.errors import EitskinError, FrameError, UsageError, VerificationError
 
 if TYPE_CHECKING:
-    from eitskin.study.scene_truth import SceneTruth
+    from eitskin.study.judge.scene_truth import SceneTruth
 
 
 def add_parser(subparsers: Any) -> None:
@@ -72,8 +72,8 @@ def _truth(path: Path) -> SceneTruth | None:
     """Of the scene that the recorded board saw, where that is still to be found."""
     from eitskin.device.recordings.recording import read_head
     from eitskin.device.recordings.run_file import recorded_options
-    from eitskin.study.matching import match
-    from eitskin.study.scene_truth import truth_of
+    from eitskin.study.judge.matching import match
+    from eitskin.study.judge.scene_truth import truth_of
 
     solver = recorded_options(path)
     try:

@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.device.live import follow, replayed
     from eitskin.device.wire.packets import Stream
     from eitskin.fileio import refuse_unwritable
-    from eitskin.study.scene_truth import truth_of, until_over
+    from eitskin.study.judge.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)
     check_scan(options)

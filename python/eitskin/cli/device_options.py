@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from eitskin.device.recordings.run_file import RunRecorder
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.packets import Stream
-    from eitskin.study.scene_truth import SceneTruth
+    from eitskin.study.judge.scene_truth import SceneTruth
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in, default), serial:/dev/ttyACM0, sim:SCENE (simulated), emu:SCENE (the firmware on "

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from eitskin.device.link import LinkEvent
     from eitskin.device.live import LiveFrame, LiveSummary
     from eitskin.device.wire.packets import Fault, Stream
-    from eitskin.study.scene_truth import SceneTruth
+    from eitskin.study.judge.scene_truth import SceneTruth
     from eitskin.study.watch import Watcher
 
 

@@ -18,7 +18,7 @@ from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
-from eitskin.study.score import FrameScore, scorer_for
+from eitskin.study.judge.score import FrameScore, scorer_for
 
 TOUCHES = (Touch(-38.0, 34.0, 9.0, 8.0), Touch(44.0, 22.0, 7.0, 5.0), Touch(-6.0, -52.0, 11.0, 4.0))
 TIMED_RUNS = 200

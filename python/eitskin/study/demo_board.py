@@ -19,8 +19,8 @@ from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.packets import BoardInfo, Stream
 from eitskin.errors import DeviceError
 from eitskin.scene.random_touches import Touch as TrueTouch
-from eitskin.study.matching import Matching
-from eitskin.study.scene_truth import truth_of
+from eitskin.study.judge.matching import Matching
+from eitskin.study.judge.scene_truth import truth_of
 
 TARE_FRAMES = 8
 FRAMES = 3

@@ -17,8 +17,8 @@ from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import quality_text
 from eitskin.errors import MissingExtraError
 from eitskin.scene.random_touches import Touch as TrueTouch
-from eitskin.study.image_touches import touches_in_image
-from eitskin.study.scene_truth import SceneTruth, TruthScore
+from eitskin.study.judge.image_touches import touches_in_image
+from eitskin.study.judge.scene_truth import SceneTruth, TruthScore
 
 FloatArray = npt.NDArray[np.float64]
 WORST_ROWS = 3

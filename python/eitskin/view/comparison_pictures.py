@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from eitskin.scene.random_touches import Scene
-from eitskin.study import metrics
-from eitskin.study.compare import Comparison, Result
+from eitskin.study.compare.run import Comparison, Result
+from eitskin.study.judge import metrics
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
-from eitskin.study.score import FrameScore
+from eitskin.study.judge.score import FrameScore
 from eitskin.view.pictures import Mark, Panel, draw_panels
 
 MOST_PANELS = 36

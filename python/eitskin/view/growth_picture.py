@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eitskin.study.bench_growth import GrowthTimes, exponent
+from eitskin.study.bench.growth import GrowthTimes, exponent
 from eitskin.view.pictures import INK, STYLE, load_matplotlib, save_png
 
 SOLVE, TOUCHES, MACS = "#1f6fb4", "#d1661f", "#7a7a7a"

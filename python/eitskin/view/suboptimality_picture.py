@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eitskin.study.suboptimality import LEAST, Curves
+from eitskin.study.bench.suboptimality import LEAST, Curves
 from eitskin.view.pictures import load_matplotlib, save_png
 
 COLOURS = {"fista": "#777777", "working-set": "#1f6fb2", "coordinate": "#d1761d", "active-set": "#2a8a3f"}

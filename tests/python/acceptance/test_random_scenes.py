@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.score import FrameScore, scorer_for
+from eitskin.study.judge.score import FrameScore, scorer_for
 from small_models import prebuilt, session
 
 SCENES = 200

@@ -16,7 +16,7 @@ from eitskin.cli.main import main
 from eitskin.frames.frames import load_frames
 from eitskin.model.eitm import load_model
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.score import scorer_for
+from eitskin.study.judge.score import scorer_for
 
 SKIN = Path(__file__).resolve().parents[3] / "examples" / "tank_kit4.toml"
 DIAMETER_MM = 280.0

@@ -10,8 +10,8 @@ from hypothesis import given
 
 from eitskin.device.flash import check_image
 from eitskin.firmware.prebuilt import load_image
+from eitskin.study.store import Store
 from eitskin.study.tradeoff.front import load_front
-from eitskin.study.tradeoff.store import Store
 
 WORDS = ODD_BYTES + ODD_WORDS
 

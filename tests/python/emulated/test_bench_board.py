@@ -9,7 +9,8 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.errors import UsageError
-from eitskin.study import bench_board, emulated
+from eitskin.study import emulated
+from eitskin.study.bench import board as bench_board
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import json
 import pytest
 
 from eitskin.errors import MissingExtraError, UsageError
-from eitskin.study import bench_jacobian
+from eitskin.study.bench import jacobian as bench_jacobian
 
 
 def test_both_compute_the_same_jacobian() -> None:

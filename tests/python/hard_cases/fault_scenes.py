@@ -16,8 +16,8 @@ from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import Bench
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
-from eitskin.study import metrics
-from eitskin.study.score import Scorer, scorer_for
+from eitskin.study.judge import metrics
+from eitskin.study.judge.score import Scorer, scorer_for
 from small_models import prebuilt
 
 SEED, COUNT, QUIET = 9, 6, 16

@@ -11,7 +11,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.bench_solve_problems import Problems, bench_options, make_problems
+from eitskin.study.bench.solve_problems import Problems, bench_options, make_problems
 from small_models import prebuilt, session, small_blob, small_model
 
 

@@ -12,7 +12,7 @@ from eitskin.solve.options import default_options
 from eitskin.solve.reference import ReferenceEngine, fista
 from eitskin.solve.reference_problem import greatest, project, shrink
 from eitskin.solve.reference_touches import Disc, Fit, damped_step
-from eitskin.study.metrics import pixel_cover
+from eitskin.study.judge.metrics import pixel_cover
 from small_models import DATA_KINDS, SIGNS, prebuilt, small, small_model
 
 GENERATOR = np.random.default_rng(41)

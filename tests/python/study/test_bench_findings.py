@@ -14,10 +14,10 @@ pytest.importorskip("netgen")
 from eitskin.cli.main import main
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study import bench_findings
-from eitskin.study.bench_findings_page import CROWD_HEAD, DETACHED_HEAD, FAULT_HEAD, IMPERFECT_HEAD, PEAK_HEAD
-from eitskin.study.findings_faults import DETACHED, FAULTS, GLITCH, NONE
-from eitskin.study.findings_scenes import IMPERFECT, QUIET_FRAMES, ROWS, Table, drawn, swapped
+from eitskin.study.bench import findings as bench_findings
+from eitskin.study.bench.findings_faults import DETACHED, FAULTS, GLITCH, NONE
+from eitskin.study.bench.findings_page import CROWD_HEAD, DETACHED_HEAD, FAULT_HEAD, IMPERFECT_HEAD, PEAK_HEAD
+from eitskin.study.bench.findings_scenes import IMPERFECT, QUIET_FRAMES, ROWS, Table, drawn, swapped
 
 SCENES, SEED = 4, 6
 PAGE = Path(__file__).parents[3] / "docs" / "findings.md"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.study.bench_frame import pyeit_frames, run, to_text
+from eitskin.study.bench.frame import pyeit_frames, run, to_text
 
 
 def test_all_are_timed_and_said() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from eitskin.cli.main import main
-from eitskin.study import bench_batches, bench_growth
+from eitskin.study.bench import batches as bench_batches
+from eitskin.study.bench import growth as bench_growth
 from eitskin.view.growth_picture import draw_growth
 
 POINTS = (

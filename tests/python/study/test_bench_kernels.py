@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from eitskin.study import bench_kernels
+from eitskin.study.bench import kernels as bench_kernels
 from eitskin.study.sections import put_section, text_table
 
 OUTPUT = """kernels avx2

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from eitskin.core.results import SOLVERS
-from eitskin.study import bench_solve, bench_solve_peers
-from eitskin.study.bench_solve_problems import Problems, make_problems
+from eitskin.study.bench import solve as bench_solve
+from eitskin.study.bench import solve_peers as bench_solve_peers
+from eitskin.study.bench.solve_problems import Problems, make_problems
 from small_models import prebuilt, session
 
 OWN = {f"eitskin {solver}, {width}" for solver in SOLVERS for width in ("float32", "float64")}

@@ -18,10 +18,10 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve import baselines
-from eitskin.study import metrics
-from eitskin.study.compare import Comparison, Settings, compare, truth_masks
-from eitskin.study.compare_table import CSV_COLUMNS, header, to_csv, to_json, to_text
-from eitskin.study.methods import Family, FindsTouches, Learns, Setup, baseline_methods
+from eitskin.study.compare.methods import Family, FindsTouches, Learns, Setup, baseline_methods
+from eitskin.study.compare.run import Comparison, Settings, compare, truth_masks
+from eitskin.study.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
+from eitskin.study.judge import metrics
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
 SMALL = Settings(scenes=8, train_scenes=6, seed=3, elements=1500, simulated_elements=2500, lookup="nearest")

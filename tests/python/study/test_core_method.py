@@ -15,8 +15,8 @@ from eitskin.scene.random_touches import Scene, Touch, TouchSet
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.core_method import core_methods
-from eitskin.study.methods import FindsTouches, Learns, Setup, methods, setup_for
+from eitskin.study.compare.core_method import core_methods
+from eitskin.study.compare.methods import FindsTouches, Learns, Setup, methods, setup_for
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
 PLACES = [(30.0, 20.0), (-45.0, 10.0)]

@@ -10,7 +10,7 @@ import pytest
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.skin.outline import disk
-from eitskin.study.figures_of_merit import figures_of_merit
+from eitskin.study.judge.figures_of_merit import figures_of_merit
 
 GRID = grid_for(disk(194.0), 194)
 XY = GRID.centres_mm()

@@ -7,7 +7,7 @@ import pytest
 
 from eitskin.fem.grid import grid_for
 from eitskin.skin.outline import polygon
-from eitskin.study.image_touches import best_touch_threshold, touches_in_image
+from eitskin.study.judge.image_touches import best_touch_threshold, touches_in_image
 
 GRID = grid_for(polygon([(0, 0), (80, 0), (80, 80), (0, 80)]), 8)
 XY = GRID.centres_mm()

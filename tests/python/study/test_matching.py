@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from eitskin.study.matching import match
+from eitskin.study.judge.matching import match
 
 
 def test_crossed_pairs_are_matched_by_the_sum_not_greedily() -> None:

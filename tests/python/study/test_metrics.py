@@ -10,7 +10,7 @@ import pytest
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.skin.outline import disk, polygon
-from eitskin.study import metrics
+from eitskin.study.judge import metrics
 
 SQUARE = polygon([(0, 0), (30, 0), (30, 30), (0, 30)])
 

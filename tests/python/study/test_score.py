@@ -11,8 +11,8 @@ from eitskin.core.results import Info, Reconstruction, Touch
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.skin.protocol import adjacent
-from eitskin.study import metrics
-from eitskin.study.score import scorer_for
+from eitskin.study.judge import metrics
+from eitskin.study.judge.score import scorer_for
 from small_models import prebuilt, small_model
 
 INFO = Info(60, "iterations", 0, 0, 0, 0, 0, 0, *[0.0] * 7)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eitskin.study.summary import bootstrap_interval, summarise
+from eitskin.study.judge.summary import bootstrap_interval, summarise
 
 
 def test_summary_of_one_to_twenty() -> None:

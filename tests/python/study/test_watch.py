@@ -15,7 +15,7 @@ from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Quality, RawFrame, Solved, SolvedImage, SolvedTouches
 from eitskin.scene.library_scenes import find_scene
-from eitskin.study.scene_truth import SceneTruth
+from eitskin.study.judge.scene_truth import SceneTruth
 from eitskin.study.watch import Watcher, line, spread, table
 from small_models import prebuilt
 

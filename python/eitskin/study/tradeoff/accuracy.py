@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from eitskin.core.results import Reconstruction
 from eitskin.scene.random_touches import Scene
-from eitskin.study import metrics
-from eitskin.study.matching import Matching, match
-from eitskin.study.summary import Summary, summarise
+from eitskin.study.judge import metrics
+from eitskin.study.judge.matching import Matching, match
+from eitskin.study.judge.summary import Summary, summarise
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.engines import Built
 from eitskin.study.tradeoff.scene_sets import Measured, Session, apparent_change_s_per_m_mm2

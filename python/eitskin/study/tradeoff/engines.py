@@ -15,7 +15,7 @@ from eitskin.model.model import Model
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study import metrics
+from eitskin.study.judge import metrics
 from eitskin.study.tradeoff.configuration import Configuration
 
 ELEMENTS = 3000

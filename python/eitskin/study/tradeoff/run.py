@@ -15,7 +15,8 @@ from eitskin.core.engine import load_core
 from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
-from eitskin.study.bench_frame import machine
+from eitskin.study.bench.frame import machine
+from eitskin.study.store import Store
 from eitskin.study.tradeoff.accuracy import Solved, Trained, score, solve_session, train
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.costs import static_costs
@@ -24,7 +25,6 @@ from eitskin.study.tradeoff.engines import ELEMENTS, Built, ModelShop
 from eitskin.study.tradeoff.front import Front, Point, estimated_instructions, load_front
 from eitskin.study.tradeoff.host_times import host_times
 from eitskin.study.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, Progress, Session, Workshop
-from eitskin.study.tradeoff.store import Store
 
 RESULTS = "results.jsonl"
 

@@ -27,7 +27,7 @@ from eitskin.scene.streams import stream
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin.study.metrics import Raster, disc_mask
+from eitskin.study.judge.metrics import Raster, disc_mask
 from eitskin.study.tradeoff.configuration import BASE_SAMPLES
 
 FloatArray = npt.NDArray[np.float64]

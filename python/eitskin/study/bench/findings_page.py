@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from eitskin.study.bench_findings import BETWEEN_DB, HEADLINE_DB, SNRS_DB, Crowd, Findings, Mean, Rate
-from eitskin.study.findings_faults import DETACHED, FAULTS, NONE
+from eitskin.study.bench.findings import BETWEEN_DB, HEADLINE_DB, SNRS_DB, Crowd, Findings, Mean, Rate
+from eitskin.study.bench.findings_faults import DETACHED, FAULTS, NONE
 from eitskin.study.sections import markdown_table, text_table
 
 SNR_WORDS = tuple(f"{snr:g} dB" for snr in SNRS_DB)

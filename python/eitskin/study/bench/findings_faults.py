@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from eitskin.core.results import Info
 from eitskin.scene.streams import stream
-from eitskin.study.findings_scenes import PROTOCOL, ROLE, ROWS, Case
+from eitskin.study.bench.findings_scenes import PROTOCOL, ROLE, ROWS, Case
 
 FloatArray = npt.NDArray[np.float64]
 Spoil = Callable[[Case, FloatArray], FloatArray]

@@ -108,7 +108,7 @@ def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     Raises:
         UsageError: the C core is not built.
     """
-    from eitskin.study.core_method import core_methods
+    from eitskin.study.compare.core_method import core_methods
 
     return (*baseline_methods(setup.jacobian), *core_methods(setup, threads))
 

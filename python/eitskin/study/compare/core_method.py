@@ -10,8 +10,8 @@ from eitskin.errors import FrameError, UsageError
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.methods import Family, Setup
-from eitskin.study.metrics import pixel_cover
+from eitskin.study.compare.methods import Family, Setup
+from eitskin.study.judge.metrics import pixel_cover
 
 FloatArray = npt.NDArray[np.float64]
 

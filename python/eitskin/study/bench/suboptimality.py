@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
 from eitskin.scene.simulate import Simulated
-from eitskin.study import metrics
-from eitskin.study.bench_solve_problems import bench_options, make_problems, models, sessions
-from eitskin.study.compare import truth_masks
+from eitskin.study.bench.solve_problems import bench_options, make_problems, models, sessions
+from eitskin.study.compare.run import truth_masks
+from eitskin.study.judge import metrics
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]

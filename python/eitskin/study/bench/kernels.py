@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import UsageError
-from eitskin.study.bench_frame import machine
+from eitskin.study.bench.frame import machine
 from eitskin.study.emulated import checkout_root, need_tools
 from eitskin.study.sections import markdown_table, text_table
 

@@ -24,7 +24,7 @@ from eitskin.scene.registry import BUILT_IN
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import Bench
 from eitskin.scene.touch_path import Keyframe, TouchTrack
-from eitskin.study.bench_frame import machine
+from eitskin.study.bench.frame import machine
 
 Progress: TypeAlias = Callable[[Sequence[Any]], Iterable[Any]]
 

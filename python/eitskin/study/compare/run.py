@@ -20,11 +20,11 @@ from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches
 from eitskin.scene.simulate import ELEMENTS, Measurement, Simulated, simulate
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin.study import metrics
-from eitskin.study.image_touches import best_touch_threshold, match_all, touches_in_image
-from eitskin.study.matching import GATE_MM, Matching
-from eitskin.study.methods import Family, FindsTouches, Learns, Method, Setup, methods, setup_for
-from eitskin.study.summary import Summary, summarise
+from eitskin.study.compare.methods import Family, FindsTouches, Learns, Method, Setup, methods, setup_for
+from eitskin.study.judge import metrics
+from eitskin.study.judge.image_touches import best_touch_threshold, match_all, touches_in_image
+from eitskin.study.judge.matching import GATE_MM, Matching
+from eitskin.study.judge.summary import Summary, summarise
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any], str], Iterable[Any]]

@@ -27,8 +27,8 @@ from eitskin.scene.random_touches import TouchRules, random_touches
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.bench_frame import machine
-from eitskin.study.metrics import pixel_cover
+from eitskin.study.bench.frame import machine
+from eitskin.study.judge.metrics import pixel_cover
 from eitskin.study.sections import markdown_table, text_table
 
 FloatArray = npt.NDArray[np.float64]

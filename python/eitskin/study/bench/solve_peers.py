@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
-from eitskin.study.bench_solve_problems import Problems, bench_options
+from eitskin.study.bench.solve_problems import Problems, bench_options
 
 Floats = npt.NDArray[np.floating[Any]]
 

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.study.bench_frame import machine
-from eitskin.study.bench_solve_peers import Candidate, candidates, numpy_fista, ours, versions
-from eitskin.study.bench_solve_problems import Problems, make_problems, models, sessions
+from eitskin.study.bench.frame import machine
+from eitskin.study.bench.solve_peers import Candidate, candidates, numpy_fista, ours, versions
+from eitskin.study.bench.solve_problems import Problems, make_problems, models, sessions
 
 LEVELS = (1e-2, 1e-4, 1e-6)
 EQUAL_ITERATIONS = (30, 60, 200)

@@ -73,7 +73,7 @@ def pyeit_frames(reference_v: np.ndarray[Any, Any]) -> dict[str, Callable[[np.nd
     from eitskin.fem.mesh import mesh_for_elements
     from eitskin.skin.protocol import adjacent
     from eitskin.skin.skin import paper_skin
-    from eitskin.study.bench_jacobian import pyeit_case
+    from eitskin.study.bench.jacobian import pyeit_case
 
     skin, protocol = paper_skin(), adjacent(16)
     theirs, pattern, order = pyeit_case(mesh_for_elements(skin, 3000), skin, protocol)

@@ -16,7 +16,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.batch import Batch, check_threads
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.bench_frame import golden_session, machine
+from eitskin.study.bench.frame import golden_session, machine
 from eitskin.study.sections import markdown_table, text_table
 
 

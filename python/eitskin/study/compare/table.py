@@ -8,9 +8,9 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from eitskin.study import metrics
-from eitskin.study.compare import Comparison, Result
-from eitskin.study.summary import Summary
+from eitskin.study.compare.run import Comparison, Result
+from eitskin.study.judge import metrics
+from eitskin.study.judge.summary import Summary
 
 SNR_DEFINITION = "SNR = 20 log10(rms(V0) / sigma), V0 the untouched skin's frame, rms over its rows"
 THRESHOLD_RULE = "touch where x > t max(x), t per method: the best mean MIoU on the training scenes"

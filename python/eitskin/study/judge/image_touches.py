@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import missing_extra
-from eitskin.study.matching import GATE_MM, Matching, match
-from eitskin.study.metrics import touch_mask
+from eitskin.study.judge.matching import GATE_MM, Matching, match
+from eitskin.study.judge.metrics import touch_mask
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def touches_in_image(
 def match_all(
     truths_mm: Sequence[FloatArray], founds_mm: Sequence[FloatArray], gate_mm: float = GATE_MM
 ) -> list[Matching]:
-    """:func:`eitskin.study.matching.match` for each scene."""
+    """:func:`eitskin.study.judge.matching.match` for each scene."""
     return [match(true, found, gate_mm) for true, found in zip(truths_mm, founds_mm, strict=True)]
 
 

@@ -11,8 +11,8 @@ from eitskin.core.results import Reconstruction, Touch
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.skin.skin import size_to_paper
-from eitskin.study import metrics
-from eitskin.study.matching import GATE_MM, Matching, match
+from eitskin.study.judge import metrics
+from eitskin.study.judge.matching import GATE_MM, Matching, match
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

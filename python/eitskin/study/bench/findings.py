@@ -20,10 +20,10 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.random_touches import Scene, spaced_touches
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study import metrics
-from eitskin.study.findings_faults import CROWDED, DETACHED, FAULTS, NONE, Fault
-from eitskin.study.findings_scenes import IMPERFECT, PROTOCOL, QUIET_FRAMES, Case, Table, drawn
-from eitskin.study.score import scorer_for
+from eitskin.study.bench.findings_faults import CROWDED, DETACHED, FAULTS, NONE, Fault
+from eitskin.study.bench.findings_scenes import IMPERFECT, PROTOCOL, QUIET_FRAMES, Case, Table, drawn
+from eitskin.study.judge import metrics
+from eitskin.study.judge.score import scorer_for
 from eitskin.study.tradeoff.scene_sets import copied
 
 FloatArray = npt.NDArray[np.float64]

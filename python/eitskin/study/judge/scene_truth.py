@@ -17,7 +17,7 @@ from eitskin.scene.description import Scene
 from eitskin.scene.random_touches import Touch
 from eitskin.scene.touch_path import touches_at
 from eitskin.skin.skin import size_to_paper
-from eitskin.study.matching import GATE_MM, Matching, match
+from eitskin.study.judge.matching import GATE_MM, Matching, match
 
 FloatArray = npt.NDArray[np.float64]
 Live: TypeAlias = Generator[LiveFrame | Fault | LinkEvent, None, None]

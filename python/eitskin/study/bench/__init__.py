@@ -1,0 +1,1 @@
+"""``eitskin bench``: speed side by side, and what findings are worth."""

@@ -1,0 +1,1 @@
+"""``eitskin compare``: all methods on the same scenes."""

@@ -1,0 +1,1 @@
+"""Judging: metrics of images, matching of touches, summaries."""
