@@ -1,11 +1,12 @@
-"""Pages of benchmarks: a section a command, each replaced by the command that made it."""
+"""Pages whose tables commands write: a section a command, or the places between marks."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from eitskin.errors import ConfigError
 from eitskin.fileio import read_bytes, write_bytes
 
 
@@ -22,6 +23,22 @@ def put_section(path: Path, title: str, section: str, heading: str) -> None:
     replaced, count = pattern.subn(lambda _: whole + "\n", page)
     page = replaced if count else f"{page.rstrip()}\n\n{whole}"
     write_bytes(path, (page.rstrip() + "\n").encode("utf-8"))
+
+
+def fill_marks(page: Path, texts: Mapping[str, str]) -> None:
+    """Write each text between ``<!-- NAME -->`` and ``<!-- end NAME -->`` of ``page``, so that none is ever copied by hand.
+
+    Raises:
+        FileError: the page cannot be read or written.
+        ConfigError: a mark is missing; nothing was written.
+    """
+    text = read_bytes(page, "page").decode("utf-8")
+    for name, content in texts.items():
+        marked = re.compile(f"(<!-- {re.escape(name)} -->\n).*?(<!-- end {re.escape(name)} -->)", re.DOTALL)
+        if not marked.search(text):
+            raise ConfigError(f"{page}: has no marks <!-- {name} --> and <!-- end {name} -->; add them where the text is to be")
+        text = marked.sub(lambda match, content=content: f"{match.group(1)}{content}\n{match.group(2)}", text)  # type: ignore[misc]
+    write_bytes(page, text.encode("utf-8"))
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

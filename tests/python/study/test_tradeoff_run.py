@@ -25,10 +25,11 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
+from eitskin.study.sessions import Session, copied
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.front import Front, Where, front_from
 from eitskin.study.tradeoff.run import RESULTS, RunSettings, run
-from eitskin.study.tradeoff.scene_sets import SETS, Session, Workshop, copied
+from eitskin.study.tradeoff.scene_sets import SETS, Workshop
 from eitskin.study.tradeoff.table import best_points, to_csv, to_json, to_text
 
 ELEMENTS = 1200

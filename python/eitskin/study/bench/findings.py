@@ -24,7 +24,7 @@ from eitskin.study.bench.findings_faults import CROWDED, DETACHED, FAULTS, NONE,
 from eitskin.study.bench.findings_scenes import IMPERFECT, PROTOCOL, QUIET_FRAMES, Case, Table, drawn
 from eitskin.study.judge import metrics
 from eitskin.study.judge.score import scorer_for
-from eitskin.study.tradeoff.scene_sets import copied
+from eitskin.study.sessions import copied
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -22,7 +22,7 @@ from eitskin.scene.session import Bench
 from eitskin.scene.simulate import measure
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
-from eitskin.study.tradeoff.scene_sets import converter_for
+from eitskin.study.sessions import converter_for
 
 FloatArray = npt.NDArray[np.float64]
 

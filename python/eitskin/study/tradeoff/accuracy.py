@@ -13,9 +13,9 @@ from eitskin.scene.random_touches import Scene
 from eitskin.study.judge import metrics
 from eitskin.study.judge.matching import Matching, match
 from eitskin.study.judge.summary import Summary, summarise
+from eitskin.study.sessions import Measured, Session, apparent_change_s_per_m_mm2
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.engines import Built
-from eitskin.study.tradeoff.scene_sets import Measured, Session, apparent_change_s_per_m_mm2
 
 FloatArray = npt.NDArray[np.float64]
 DIGITS = 6

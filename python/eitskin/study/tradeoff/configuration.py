@@ -13,9 +13,9 @@ from eitskin.errors import ConfigError
 from eitskin.model.model import Defaults
 from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_FLOOR
 from eitskin.model.storage import STORAGES
+from eitskin.study.snr import BASE_SAMPLES
 
 SCANS = ("full", "reciprocal")
-BASE_SAMPLES = 80
 PERIOD_SAMPLES = 20
 HELD_FRAMES = 4
 

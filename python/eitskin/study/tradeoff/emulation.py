@@ -20,10 +20,10 @@ from eitskin.study.emulated import (
     need_tools,
     run_frames,
 )
+from eitskin.study.sessions import Measured
 from eitskin.study.tradeoff.accuracy import Solved
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.engines import Built
-from eitskin.study.tradeoff.scene_sets import Measured
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
+from eitskin.study.sessions import Measured, Progress
 from eitskin.study.tradeoff.configuration import Configuration
 from eitskin.study.tradeoff.engines import Built
-from eitskin.study.tradeoff.scene_sets import Measured, Progress
 
 SCENES = 8
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from pathlib import Path
 
-from eitskin.errors import ConfigError, UsageError
-from eitskin.fileio import read_bytes, write_beside, write_bytes
+from eitskin.errors import UsageError
+from eitskin.fileio import write_beside
+from eitskin.study.sections import fill_marks
 from eitskin.study.tradeoff.front import Budget, Front, Point, Where, Wish, choose
 from eitskin.study.tradeoff.table import best_points
 
@@ -108,17 +108,10 @@ def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) 
         FileError: the page cannot be read or written.
         ConfigError: a mark is missing.
     """
-    text = read_bytes(page, "page").decode("utf-8")
-    for name, make in TABLES.items():
-        marked = re.compile(f"(<!-- {name} -->\n).*?(<!-- end {name} -->)", re.DOTALL)
-        if not marked.search(text):
-            raise ConfigError(f"{page}: has no marks <!-- {name} --> and <!-- end {name} -->; add them where the table is to be")
-        table = make(front)
-        text = marked.sub(lambda match, table=table: f"{match.group(1)}{table}\n{match.group(2)}", text)  # type: ignore[misc]
+    fill_marks(page, {name: make(front) for name, make in TABLES.items()})
     folder = page.parent / PICTURES
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
         if (pictures / name).is_file():
             with write_beside(folder / name) as temporary:
                 shutil.copyfile(pictures / name, temporary)
-    write_bytes(page, text.encode("utf-8"))

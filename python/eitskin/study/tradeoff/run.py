@@ -16,6 +16,7 @@ from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
 from eitskin.study.bench.frame import machine
+from eitskin.study.sessions import Progress, Session
 from eitskin.study.store import Store
 from eitskin.study.tradeoff.accuracy import Solved, Trained, score, solve_session, train
 from eitskin.study.tradeoff.configuration import Configuration
@@ -24,7 +25,7 @@ from eitskin.study.tradeoff.emulation import Emulator, count_instructions, make_
 from eitskin.study.tradeoff.engines import ELEMENTS, Built, ModelShop
 from eitskin.study.tradeoff.front import Front, Point, estimated_instructions, load_front
 from eitskin.study.tradeoff.host_times import host_times
-from eitskin.study.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, Progress, Session, Workshop
+from eitskin.study.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, Workshop
 
 RESULTS = "results.jsonl"
 

@@ -5,39 +5,24 @@ The sets "train" and "random" are those of ``eitskin compare``: the same scenes,
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin.errors import GeometryError, UsageError
-from eitskin.fem.cem import ForwardModel
-from eitskin.fem.mesh import Mesh
-from eitskin.fileio import write_beside
 from eitskin.scene.random_touches import Scene, Touch, TouchRules, TouchSet, random_touches, rim_distance_mm, spaced_touches
-from eitskin.scene.simulate import Measurement, conductivity_with, measure
 from eitskin.scene.streams import stream
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin.study.judge.metrics import Raster, disc_mask
-from eitskin.study.tradeoff.configuration import BASE_SAMPLES
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-Progress = Callable[[Sequence[Any], str], Iterable[Any]]
+from eitskin.study.sessions import Drift, Progress, SceneSolver, Session
 
 TRAIN, HEADLINE = "train", "random"
 HEADLINE_DB = 60.0
-FINE_CONVERTER_DB, FINE_BITS = 70.0, 16
-DRIFT_SHEET, DRIFT_CONTACT, DRIFT_AMPLITUDE = 0.03, 0.1, 0.01
+DRIFT = Drift(sheet=0.03, contact=0.1, amplitude=0.01)
 
 
 @dataclass(frozen=True)
@@ -102,92 +87,13 @@ SETS: dict[str, SceneSet] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What a configuration gets: ``quiet_v`` (q, m), and ``frames_v`` (k, h, m): scene k held for h frames, the last judged."""
-
-    quiet_v: FloatArray
-    frames_v: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Session:
-    """A set's scenes, solved: ``exact_v`` (k, m) and ``exact_quiet_v`` (m,) V without noise and converter."""
-
-    name: str
-    protocol: Protocol
-    sheet_s_per_m: float
-    touches: TouchSet
-    exact_v: FloatArray
-    exact_quiet_v: FloatArray
-
-    @property
-    def scenes(self) -> int:
-        """How many."""
-        return len(self.exact_v)
-
-    @cached_property
-    def _truths(self) -> dict[str, Any]:
-        return {}
-
-    @cached_property
-    def _cache(self) -> Any:
-        return lru_cache(maxsize=4)(self._measure)
-
-    def truths(self, raster: Raster) -> BoolArray:
-        """The true discs of each scene on the cells of ``raster``, (k, p); kept for the last raster."""
-        kept = self._truths
-        if kept.get("raster") is not raster:
-            scenes = self.touches.scenes
-            masks = np.array([disc_mask(raster.points_mm, scene.centres_mm(), scene.radii_mm()) for scene in scenes])
-            kept.update(raster=raster, masks=masks)
-        masks = kept["masks"]
-        assert isinstance(masks, np.ndarray)
-        return masks
-
-    def measured(self, snr_db: float, samples: int, scan: str, held: int) -> Measured:
-        """The frames with noise: sigma = rms(V0) 10^(-snr_db / 20) sqrt(80 / samples), then the converter of ``Measurement``,
-        with 16 bits from 70 dB on, where the steps of 12 bits would be the noise. A reciprocal scan copies each measured row,
-        with its sign, to the reciprocal one. Configurations share the random numbers, so that their differences are paired."""
-        measured: Measured = self._cache(snr_db, samples, scan, held)
-        return measured
-
-    def _measure(self, snr_db: float, samples: int, scan: str, held: int) -> Measured:
-        how = converter_for(snr_db)
-        role, seed, quiet = self.touches.role, self.touches.seed, self.exact_quiet_v
-        noise_v = float(np.sqrt((quiet**2).mean())) * 10 ** (-snr_db / 20) * math.sqrt(BASE_SAMPLES / samples)
-        span_v = how.adc_headroom * float(np.abs(quiet).max())
-        lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
-        converter = (noise_v, lsb_v, span_v, seed)
-        quiet_v, _ = measure(np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}")
-        names = [*(f"frame {role}, held {h}" for h in range(held - 1)), f"frame {role}"]
-        frames_v = np.stack([measure(self.exact_v, *converter, name)[0] for name in names], axis=1)
-        if scan == "reciprocal":
-            quiet_v, frames_v = copied(quiet_v, self.protocol), copied(frames_v, self.protocol)
-        return Measured(quiet_v, frames_v)
-
-
-def converter_for(snr_db: float) -> Measurement:
-    """The measurement of ``eitskin compare``, with a finer converter where its steps would be the noise."""
-    return Measurement(snr_db=snr_db, adc_bits=FINE_BITS if snr_db >= FINE_CONVERTER_DB else Measurement.adc_bits)
-
-
-def copied(values_v: FloatArray, protocol: Protocol) -> FloatArray:
-    """``values_v`` (..., m) with each pair's second row copied from the first, as a board's reciprocal scan does it."""
-    fold = protocol.reciprocal_pairs()
-    paired = fold.second >= 0
-    result = values_v.copy()
-    result[..., fold.second[paired]] = fold.sign[paired] * values_v[..., fold.first[paired]]
-    return result
-
-
 class Workshop:
     """Solves the scenes of sets, once: kept in ``folder`` where one is given, so that a run that goes on need not solve again."""
 
     def __init__(self, skin: Skin, protocol: Protocol, seed: int, elements: int, folder: Path | None = None) -> None:
-        self.skin, self.protocol, self.seed, self.elements, self.folder = skin, protocol, seed, elements, folder
+        self.skin, self.seed = skin, seed
+        self._solver = SceneSolver(skin, protocol, elements, folder)
         self._sessions: dict[tuple[str, int], Session] = {}
-        self._mesh: Mesh | None = None
 
     def session(self, name: str, count: int, progress: Progress) -> Session:
         """``count`` scenes of the set ``name``.
@@ -199,52 +105,6 @@ class Workshop:
             raise UsageError(f"no set of scenes is named {name!r}; known are {', '.join(SETS)}")
         if (name, count) not in self._sessions:
             drawn = SETS[name].draw(self.skin.outline, self.seed, count)
-            volts = self._kept(name, count, drawn, progress)
-            self._sessions[name, count] = Session(name, self.protocol, self.skin.conductivity_s_per_m, drawn, volts[1:], volts[0])
+            drift = DRIFT if SETS[name].drifts else None
+            self._sessions[name, count] = self._solver.session(drawn, progress, name, drift)
         return self._sessions[name, count]
-
-    def _kept(self, name: str, count: int, drawn: TouchSet, progress: Progress) -> FloatArray:
-        if self.folder is None:
-            return self._solve(name, drawn, progress)
-        discs = [[list(vars(t).values()) for t in s.touches] for s in drawn.scenes]
-        facts = [drawn.name, self.elements, SETS[name].drifts, discs]
-        digest = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:16]
-        path = self.folder / f"{name.replace(' ', '-')}-{digest}.npy"
-        if path.is_file():
-            volts: FloatArray = np.load(path, allow_pickle=False)
-            if volts.shape == (count + 1, self.protocol.n_rows):
-                return volts
-        volts = self._solve(name, drawn, progress)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with write_beside(path) as temporary:
-            np.save(temporary, volts, allow_pickle=False)
-        return volts
-
-    def _solve(self, name: str, drawn: TouchSet, progress: Progress) -> FloatArray:
-        """The quiet frame, then one a scene, (1 + k, m), solved nonlinearly with the contacts of the set's own session."""
-        from eitskin.fem.mesh import mesh_for_elements
-
-        if self._mesh is None:
-            self._mesh = mesh_for_elements(self.skin, self.elements)
-        mesh, skin, sheet = self._mesh, self.skin, self.skin.conductivity_s_per_m
-        spread = stream(self.seed, f"contact {drawn.role}").uniform(-1.0, 1.0, skin.electrodes.count) * Measurement.contact_spread
-        contact = np.asarray(skin.electrodes.contact_impedance_ohm_m2 * (1.0 + spread))
-        forward = ForwardModel(mesh, skin, self.protocol, contact)
-        volts = [forward.voltages(np.full(mesh.n_elements, sheet))]
-        for k, scene in enumerate(progress(drawn.scenes, f"simulating ({name})")):
-            touched = conductivity_with(mesh, scene.touches, sheet)
-            if not SETS[name].drifts:
-                volts.append(forward.voltages(touched))
-                continue
-            generator = stream(self.seed, f"drift {drawn.role}", k)
-            sheet_by, amplitude_by = 1 + generator.uniform(-1, 1, 2) * (DRIFT_SHEET, DRIFT_AMPLITUDE)
-            contact_by = 1 + DRIFT_CONTACT * generator.uniform(-1, 1, len(contact))
-            volts.append(amplitude_by * forward.voltages(sheet_by * touched, contact * contact_by))
-        return np.array(volts)
-
-
-def apparent_change_s_per_m_mm2(touch: Touch, sheet_s_per_m: float) -> float:
-    """What a touch changes in all: its disc's area times 2 (c - 1) / (c + 1) of the sheet's conductivity, which is how a disc of
-    contrast c answers. A linear method can find no more, however strong the contrast."""
-    return math.pi * touch.radius_mm**2 * 2 * (touch.contrast - 1) / (touch.contrast + 1) * sheet_s_per_m
-
