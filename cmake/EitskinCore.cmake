@@ -5,7 +5,7 @@
 set(EITSKIN_CORE_SOURCES
     types.c model.c kernels.c columns.c kernels_portable.c context.c stages.c baseline.c frame.c observed.c
     electrodes.c glitch.c quiet.c misfit.c solve.c certificate.c fista.c
-    working_set.c coordinate.c active_set.c missing.c factor.c disc.c touch.c crowded.c track.c batch.c self_test.c link.c)
+    working_set.c coordinate.c active_set.c missing.c factor.c disc.c coupling.c fit.c keep.c regroup.c touch.c crowded.c track.c batch.c self_test.c link.c)
 
 set(EITSKIN_WARNINGS -Wall -Wextra -Wconversion -Wdouble-promotion -Werror)
 set(EITSKIN_ARITHMETIC -fno-fast-math -ffp-contract=off -fno-math-errno) # in this order: the first resets the last

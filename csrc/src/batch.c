@@ -14,10 +14,12 @@ eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, s
         eits_result *result = results + k;
         memset(result, 0, sizeof *result);
         eits_forget(ctx);
-        result->status = eits_reconstruct(ctx, frames + k * length, length, images == NULL ? NULL : images + k * pixels, NULL);
+        result->status = eits_reconstruct(ctx, frames + k * length, length, NULL, NULL);
         if (result->status == EITS_OK && touches != NULL)
             (void)eits_find_touches(ctx, touches + k * EITS_MAX_TOUCHES, EITS_MAX_TOUCHES, &result->count);
         result->info = ctx->info;
+        if (images != NULL)
+            eits_copy(images + k * pixels, ctx->image, pixels);
         if (coefficients != NULL)
             eits_copy(coefficients + k * pixels, ctx->x, pixels);
     }

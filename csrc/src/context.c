@@ -46,6 +46,8 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
         .findings = EITS_FINDINGS_ALL,
+        .touch_search = EITS_SEARCH_ALL,
+        .refine = 0,
     };
     *options = chosen;
     return EITS_OK;
@@ -97,6 +99,8 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->sheet_inverse = take_reals(a, stride);
     ctx->sheet_shrink = take_reals(a, stride);
     ctx->y = take_reals(a, stride);
+    ctx->y_straight = take_reals(a, stride);
+    ctx->y_coupled = take_reals(a, stride);
     ctx->basis = take_reals(a, stride + 2 * EITS_PADDED_TRIANGLE(ctx->model->rank));
     ctx->row_scale = take_reals(a, stride);
     ctx->row_strength = take_reals(a, stride);
@@ -169,7 +173,8 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
                       in_range(o->touch_min_radius_mm, R(1e-6), huge) &&
                       in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
                       in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
-                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL;
+                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL &&
+                      o->touch_search <= EITS_SEARCH_ALL && o->refine <= 1;
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)

@@ -18,10 +18,15 @@ static int too_near(const eits_touch *a, const eits_touch *b)
     return eits_fma(dx, dx, dy * dy) < reach * reach;
 }
 
+eits_real eits_expected_noise(const eits_context *ctx)
+{
+    return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->sheet_energy;
+}
+
 static eits_real noise_share(const eits_context *ctx)
 {
     const eits_real energy = ctx->info.data_norm * ctx->info.data_norm;
-    return energy > 0 ? eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->sheet_energy / energy : 0;
+    return energy > 0 ? eits_expected_noise(ctx) / energy : 0;
 }
 
 /* |residual|^2 / |y|^2. */

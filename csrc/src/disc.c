@@ -6,13 +6,13 @@
 #include "observed.h"
 #include "vec.h"
 
-/* The kept pixels that the disc covers: their columns in `matrix` into list_index, their covers and the covers' derivative by distance. */
+/* The kept pixels that the disc covers, in list_index, how much of each, and the cover's derivative by distance, times pixel_mm. */
 typedef struct covered {
     uint32_t count;
     uint32_t *index;
-    eits_matrix matrix; /* the held columns, or S */
-    eits_real *cover;  /* over the column weight, times the column scale */
-    eits_real *ramp;   /* minus the derivative by distance, likewise */
+    eits_matrix matrix; /* whose columns `index` lists: S, or the held columns */
+    eits_real *cover;
+    eits_real *ramp;                /* minus the derivative */
     eits_real *toward_x, *toward_y; /* unit vector from centre to pixel; later the derivatives */
 } covered;
 
@@ -50,20 +50,31 @@ static covered cover(eits_context *ctx, const eits_disc *disc)
             const eits_real share = R(0.5) + (radius - distance);
             if (!(share > 0))
                 continue;
-            const eits_real factor = column_factor(model, j), from = distance > R(1e-6) ? 1 / distance : 0;
+            const eits_real from = distance > R(1e-6) ? 1 / distance : 0;
             ctx->list_index[c.count] = j;
-            c.cover[c.count] = share < 1 ? share * factor : factor;
-            c.ramp[c.count] = share < 1 ? factor / pixel : 0;
+            c.cover[c.count] = share < 1 ? share : 1;
+            c.ramp[c.count] = share < 1 ? 1 : 0;
             c.toward_x[c.count] = dx * from;
             c.toward_y[c.count] = dy * from;
             ++c.count;
         }
     }
-    if (eits_hold_columns(ctx, c.index, c.count)) {
-        eits_slots_of(ctx, c.index, c.count, c.index);
-        c.matrix = eits_held_columns(ctx);
-    }
     return c;
+}
+
+/* Covers become what columns of S are multiplied by: over the column weight, times the column scale. */
+static void weigh(eits_context *ctx, covered *c)
+{
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+    for (uint32_t k = 0; k < c->count; ++k) {
+        const eits_real factor = column_factor(ctx->model, c->index[k]);
+        c->cover[k] *= factor;
+        c->ramp[k] *= factor / pixel;
+    }
+    if (eits_hold_columns(ctx, c->index, c->count)) {
+        eits_slots_of(ctx, c->index, c->count, c->index);
+        c->matrix = eits_held_columns(ctx);
+    }
 }
 
 static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *value, eits_real *out)
@@ -74,7 +85,8 @@ static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *va
 
 uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom, eits_real *const *slope)
 {
-    const covered c = cover(ctx, disc);
+    covered c = cover(ctx, disc);
+    weigh(ctx, &c);
     uint64_t macs = respond(ctx, &c, c.cover, atom);
     if (slope == NULL)
         return macs;
@@ -86,6 +98,19 @@ uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *ato
     macs += respond(ctx, &c, c.toward_y, slope[1]);
     macs += respond(ctx, &c, c.ramp, slope[2]);
     return macs;
+}
+
+uint64_t eits_disc_field(eits_context *ctx, const eits_disc *disc, eits_real *field)
+{
+    const eits_matrix *at = &ctx->model->fields.at;
+    const covered c = cover(ctx, disc);
+    eits_real sum = 0;
+    for (uint32_t k = 0; k < c.count; ++k)
+        sum += c.cover[k];
+    for (uint32_t k = 0; k < c.count; ++k)
+        c.cover[k] /= sum;
+    ctx->kernels->mul(at, c.index, c.cover, c.count, field);
+    return (uint64_t)c.count * at->rows;
 }
 
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc)

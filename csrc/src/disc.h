@@ -16,6 +16,10 @@ typedef struct eits_disc {
  * Returns the multiply-accumulates. */
 uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom, eits_real *const *slope);
 
+/* The model's fields (eits_fields), averaged over the disc's covers: `field` has fields.at.stride numbers, zeros where no pixel is
+ * covered. Uses z, x_next, gradient and the list as scratch. Returns the multiply-accumulates. */
+uint64_t eits_disc_field(eits_context *ctx, const eits_disc *disc, eits_real *field);
+
 /* Whether a kept pixel is at the disc's centre or next to it: data that fit no disc would draw it far beyond the rim. */
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc);
 

@@ -97,6 +97,9 @@ void eits_judge_reference(eits_context *ctx);
 /* The variance of a fold's datum by the noise that was learned, summed over the folds; copied reciprocals are one measurement. */
 eits_real eits_noise_energy(const eits_context *ctx);
 
+/* What of |y|^2 that noise gives. */
+eits_real eits_expected_noise(const eits_context *ctx);
+
 /* info.unexplained, from ctx->residual as the touches' fit left it (0 where nothing was `looked` for), and whether `count` touches
  * are more than can be told apart. */
 void eits_judge_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count);

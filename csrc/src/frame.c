@@ -50,17 +50,20 @@ static int is_dead(const eits_context *ctx, const eits_real *frame)
     return 1;
 }
 
+/* v0 log(v / v0): beyond a ratio of 16 either way it is no touch; and the logarithm must not meet zero or a turned sign. */
+static eits_real log_datum(const eits_context *ctx, eits_real v, eits_real v0)
+{
+    const eits_real q = v / v0, low = R(1.0 / 16.0), high = R(16.0);
+    return ctx->baseline.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
+}
+
 /* The datum of one row from its voltage and its reference, in model volts (or without unit where normalised). */
 static eits_real datum(const eits_context *ctx, eits_real v, eits_real v0)
 {
     switch (ctx->model->data_kind) {
     case EITS_DATA_DIFFERENCE: break;
     case EITS_DATA_NORMALISED: return (v - v0) / v0;
-    case EITS_DATA_LOG_RATIO: {
-        /* beyond a ratio of 16 either way it is no touch; and the logarithm must not meet zero or a turned sign */
-        const eits_real q = v / v0, low = R(1.0 / 16.0), high = R(16.0);
-        return ctx->baseline.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
-    }
+    case EITS_DATA_LOG_RATIO: return log_datum(ctx, v, v0);
     }
     return ctx->baseline.gain * (v - v0);
 }
@@ -181,6 +184,31 @@ static uint32_t reduce(eits_context *ctx, uint64_t *macs)
     return count;
 }
 
+/* y_straight: the same of v0 log(v / v0), for the first places of touches. Rows whose reference is all but zero stay differences. */
+static uint64_t reduce_straight(eits_context *ctx, const eits_real *frame)
+{
+    const eits_real *v0 = ctx->baseline.v0, least = R(1e-6) * ctx->baseline.v0_rms;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_fold fold = ctx->model->fold[k];
+        const uint8_t used = ctx->basis_for[k];
+        eits_real sum = 0;
+        for (uint32_t side = 0; side < 2; ++side) {
+            const uint32_t i = side == 0 ? fold.first : fold.second;
+            if (!(used & (side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND)))
+                continue;
+            const eits_real value = eits_fabs(v0[i]) < least ? datum(ctx, frame[i], v0[i]) : log_datum(ctx, frame[i], v0[i]);
+            sum += side == 1 && fold.sign < 0 ? -value : value;
+        }
+        ctx->list_index[count] = k;
+        ctx->list_value[count] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
+        count += used != EITS_SIDE_NONE;
+    }
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, count, ctx->y_straight);
+    const uint64_t macs = ctx->rewhitened ? eits_observed_data(ctx, ctx->y_straight) : 0;
+    return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, ctx->y_straight);
+}
+
 /* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew. */
 static int examine_reduced(eits_context *ctx, uint64_t *macs)
 {
@@ -237,6 +265,9 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     }
     *macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->y) : 0;
     *macs += eits_project(ctx, ctx->y);
+    ctx->straight = judged && ctx->model->fields.at.data != NULL && model->data_kind == EITS_DATA_DIFFERENCE &&
+                    (ctx->options.touch_search & EITS_SEARCH_STRAIGHT) != 0;
+    *macs += ctx->straight ? reduce_straight(ctx, frame) : 0;
     const uint32_t directions = ctx->rewhitened && count < model->rank ? count : model->rank;
     if (ctx->basis_count >= directions) /* no direction is left: what is there is rounding */
         eits_zero(ctx->y, model->rank);

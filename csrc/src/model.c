@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-enum { HEADER_SIZE = 64, ENTRY_SIZE = 16, DIMS_SIZE = 64, MAX_SECTIONS = 256 };
+enum { HEADER_SIZE = 64, ENTRY_SIZE = 16, DIMS_SIZE = 64, FIELDS_HEAD = 16, MIRROR_ROWS = 4, MAX_SECTIONS = 256 };
 
 typedef struct section {
     const uint8_t *data; /* NULL where absent */
@@ -11,7 +11,7 @@ typedef struct section {
 } section;
 
 typedef struct sections {
-    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta;
+    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds;
 } sections;
 
 static uint32_t read_u32(const uint8_t *bytes)
@@ -100,9 +100,10 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
 
 static section *find_slot(sections *found, const uint8_t *tag)
 {
-    static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETA";
+    static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDS";
     section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref, &found->redu, &found->sens,
-                        &found->scal, &found->colw, &found->grid, &found->defs, &found->gold, &found->meta};
+                        &found->scal, &found->colw, &found->grid, &found->defs, &found->gold, &found->meta,
+                        &found->flds};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];
@@ -272,6 +273,28 @@ static eits_status check_numbers(const eits_model *model)
     return EITS_OK;
 }
 
+/* Section FLDS, where there is one: two numbers, then halves. */
+static eits_status read_fields(eits_model *model, const section *flds)
+{
+    if (flds->data == NULL)
+        return EITS_OK;
+    const uint32_t rows = 2u * model->n_electrodes + MIRROR_ROWS, stride = (rows + 7u) & ~7u;
+    const size_t halves = (size_t)model->n_pixels * stride;
+    if (flds->size != FIELDS_HEAD + halves * 2u)
+        return EITS_E_MODEL_SECTION;
+    model->fields.volts = read_f32(flds->data);
+    model->fields.per_sheet = read_f32(flds->data + 4);
+    model->fields.at = (eits_matrix){.data = flds->data + FIELDS_HEAD,
+                                     .rows = rows,
+                                     .cols = model->n_pixels,
+                                     .stride = stride,
+                                     .storage = EITS_STORAGE_F16};
+    if (!between(model->fields.volts, 0, 1e30f) || !between(model->fields.per_sheet, 0, 1e30f) ||
+        !halves_finite(model->fields.at.data, halves))
+        return EITS_E_MODEL_VALUE;
+    return EITS_OK;
+}
+
 static void point_into(eits_model *model, const sections *found)
 {
     model->protocol = found->prot.data;
@@ -313,6 +336,8 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     status = check_tables(&opened);
     if (status == EITS_OK)
         status = check_numbers(&opened);
+    if (status == EITS_OK)
+        status = read_fields(&opened, &found.flds);
     if (status == EITS_OK)
         *model = opened;
     return status;

@@ -76,8 +76,8 @@ static void run(eits_context *ctx, int gradient_known)
 /* Data whose square is hardly a number any more: objective and gap would be rounding. */
 static const eits_real LEAST_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
 
-/* ctx->info holds what the frame stage counted, and zeros. */
-static eits_status solve(eits_context *ctx)
+/* ctx->info holds what the frame stage counted, and zeros; `from_last`: start from the last coefficients. */
+static eits_status solve(eits_context *ctx, int from_last)
 {
     const eits_options *o = &ctx->options;
     const uint32_t rank = ctx->model->rank;
@@ -106,7 +106,7 @@ static eits_status solve(eits_context *ctx)
         answer_zero(ctx, EITS_STOP_ZERO);
         return EITS_OK;
     }
-    const int warm = o->warm_start && ctx->warm && warm_start(ctx);
+    const int warm = from_last && ctx->warm && warm_start(ctx);
     if (!warm) {
         start_from_zero(ctx);
         ctx->info.nonzeros = 0;
@@ -130,7 +130,24 @@ eits_status eits_solve(eits_context *ctx)
     if (ctx == NULL)
         return EITS_E_ARGUMENT;
     ctx->info = (eits_info){0};
-    return solve(ctx);
+    return solve(ctx, ctx->options.warm_start != 0);
+}
+
+void eits_solve_again(eits_context *ctx, const eits_real *y)
+{
+    const eits_info before = ctx->info;
+    const size_t stride = EITS_STRIDE(ctx->model->rank);
+    eits_copy(ctx->y_straight, ctx->y, stride); /* of no more use for this frame */
+    ctx->straight = 0;
+    eits_copy(ctx->y, y, stride);
+    const eits_status status = solve(ctx, 0);
+    if (status != EITS_OK || !ctx->warm) {
+        eits_copy(ctx->y, ctx->y_straight, stride);
+        (void)solve(ctx, 0);
+    }
+    ctx->info.iterations += before.iterations;
+    ctx->info.step_halvings += before.step_halvings;
+    ctx->info.findings = before.findings; /* judged by the frame as it came */
 }
 
 eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length, eits_real *image, eits_info *info)
@@ -140,7 +157,7 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
     ctx->info = (eits_info){0};
     eits_status status = eits_frame_stage(ctx, frame, length, &ctx->info.masked, &ctx->info.macs);
     if (status == EITS_OK)
-        status = solve(ctx);
+        status = solve(ctx, ctx->options.warm_start != 0);
     else
         answer_zero(ctx, EITS_STOP_GATE);
     if (image != NULL)

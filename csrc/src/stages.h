@@ -10,6 +10,10 @@ uint64_t eits_project(const eits_context *ctx, eits_real *v);
 /* eits_frame_stage without its checks; the baseline need not be finished. */
 eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t *masked, uint64_t *macs);
 
+/* Solve once more, from zero, for the data `y` (stride numbers); ctx->y is then `y`. Adds to what info counts; where nothing comes
+ * of it, the frame's own data are solved again. */
+void eits_solve_again(eits_context *ctx, const eits_real *y);
+
 /* 1 where each of the values is finite. */
 int eits_all_finite(const eits_real *values, size_t count);
 

@@ -23,6 +23,14 @@ typedef enum eits_sign {
     EITS_SIGN_BOTH = 2
 } eits_sign;
 
+/* What the search for touches does beyond fitting discs to the image's peaks. */
+typedef enum eits_search {
+    EITS_SEARCH_STRAIGHT = 1, /* first to v0 log(v / v0), which strong touches bend less; models of differences with fields */
+    EITS_SEARCH_REGROUP = 2,  /* discs that are one touch are joined, those that are two are parted */
+    EITS_SEARCH_COUPLED = 4   /* what touches do to each other's field is taken out of the data; models with fields */
+} eits_search;
+#define EITS_SEARCH_ALL 7u
+
 typedef struct eits_options {
     uint32_t iterations;   /* at most so many; exactly so many where gap_rel is 0 */
     uint32_t gap_every;    /* iterations between checks of the gap and of divergence, and until the working set is chosen
@@ -48,6 +56,10 @@ typedef struct eits_options {
     eits_real follow_mm;   /* a touch that moved at most so far since the last frame keeps its id */
     uint32_t mac_limit;    /* > 0: stop where the next step and the gap after it would take info.macs beyond this; see solve.h */
     uint32_t findings;     /* bits of eits_finding that are looked for; EITS_FINDINGS_ALL by default */
+    uint32_t touch_search; /* bits of eits_search; EITS_SEARCH_ALL by default */
+    uint32_t refine;       /* 1: once more than one touch is found, eits_find_touches solves again with their interplay
+                            * taken out of the data; image and info are then the refined image's. Not with a
+                            * mac_limit */
 } eits_options;
 
 /* Why the solver stopped. */
@@ -134,6 +146,8 @@ typedef struct eits_context {
     eits_real sheet_energy;  /* |P|^2: what unit noise on the folded rows makes of |y|^2 */
     uint32_t sheet_known;    /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
     eits_real *y;            /* stride: reduced data, projected */
+    eits_real *y_straight, *y_coupled; /* stride each: of v0 log(v / v0); y less the touches' interplay */
+    uint32_t straight;       /* 1: y_straight is this frame's */
     eits_real *basis;        /* orthonormal directions to ignore, up to rank of them, stride apart; where rewhitened, at most one,
                               * and behind it two triangles (observed.c) */
     uint32_t basis_count;
@@ -192,7 +206,7 @@ typedef struct eits_context {
  * the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                                          \
     (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +               \
-     (22 + EITS_STRIDE(rank) + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) + \
+     (24 + EITS_STRIDE(rank) + (size_t)(rank) + EITS_MAX_TOUCHES) * EITS_REALS(EITS_STRIDE(rank)) + 5 * EITS_REALS(n_pixels) + \
      EITS_REALS(EITS_LIST(n_pixels, n_folded)) + EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) +                        \
      EITS_ALIGN16((size_t)(n_pixels) * 4u) + EITS_ALIGN16((size_t)(n_cells) * 2u) +                                        \
      EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 2u) +                  \

@@ -12,7 +12,7 @@ extern "C" {
 #endif
 
 #define EITS_MODEL_MAJOR 1
-#define EITS_MODEL_MINOR 1
+#define EITS_MODEL_MINOR 2
 #define EITS_MODEL_ALIGNMENT 16
 #define EITS_MAX_RANK 1024
 #define EITS_MAX_PIXELS 65535
@@ -38,6 +38,14 @@ typedef struct eits_matrix {
     uint32_t stride;
     eits_storage storage;
 } eits_matrix;
+
+/* The fields that the electrodes' currents make in the untouched skin, and the rim's mirror: for what touches do to each other. */
+typedef struct eits_fields {
+    eits_matrix at;   /* f16, a column a pixel: E_x of each electrode's current, E_y of each, then a_x, a_y, b_x, b_y of the mirror
+                       * (docs/eitm-format.md, "FLDS"); data NULL where the model has none */
+    float volts;      /* dV = -volts change area E . E, in V per (S/m mm^2) */
+    float per_sheet;  /* 1 / (2 pi sigma): m/S */
+} eits_fields;
 
 /* One folded row: the mean of row `first` and, with `sign`, of its reciprocal `second`. */
 typedef struct eits_fold {
@@ -110,6 +118,7 @@ typedef struct eits_model {
     eits_matrix reduction;     /* P: rank x n_folded, whitened data y = P d; always f32 */
     eits_matrix sensitivity;   /* S: rank x n_pixels, the reduced Jacobian */
     const float *column_weight; /* n_pixels: image_j = coefficient_j * column_weight_j, in S/m */
+    eits_fields fields;
     const eits_pixel *pixel;   /* n_pixels, ordered by iy, then ix */
     const eits_defaults *defaults;
     eits_golden golden;

@@ -14,6 +14,8 @@ from eitskin.errors import FrameError, UsageError
 SIGNS = ("increase", "decrease", "both")
 SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
+STRAIGHT, REGROUP, COUPLED = 1, 2, 4
+ALL_SEARCH = STRAIGHT | REGROUP | COUPLED
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
 STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
@@ -53,6 +55,8 @@ class Options:
     touch_sweeps: int = 6
     mac_limit: int = 0
     findings: int = ALL_FINDINGS
+    touch_search: int = ALL_SEARCH
+    refine: bool = False
 
 
 WHOLE = {
@@ -63,6 +67,7 @@ WHOLE = {
     "touch_sweeps": (0, 1000),
     "mac_limit": (0, 2**32 - 1),
     "findings": (0, ALL_FINDINGS),
+    "touch_search": (0, ALL_SEARCH),
 }
 SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_share")
 
@@ -78,7 +83,7 @@ def check_options(o: Options) -> None:
             known = SIGNS if name == "sign" else SOLVERS
             if value not in known:
                 raise UsageError(f"options: {name} = {value!r} is not known; use one of {', '.join(known)}")
-        elif name in ("warm_start", "project_baseline"):
+        elif name in ("warm_start", "project_baseline", "refine"):
             if value not in (False, True):
                 raise UsageError(f"options: {name} = {value!r} must be true or false")
         else:

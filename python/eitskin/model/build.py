@@ -13,7 +13,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.model.eitm import MAX_PIXELS, MAX_RANK, encode_model
-from eitskin.model.model import DATA_KINDS, Defaults, Golden, Model
+from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
 from eitskin.model.reduction import (
     DEFAULT_COLUMN_POWER,
     DEFAULT_FLOOR,
@@ -23,12 +23,14 @@ from eitskin.model.reduction import (
     spectral_norm_squared,
 )
 from eitskin.model.storage import STORAGES, store
+from eitskin.skin.mirror import rim_mirror
 from eitskin.skin.protocol import Protocol, protocol_to_table
 from eitskin.skin.skin import Skin, size_to_paper, skin_to_table
 
 FloatArray = npt.NDArray[np.float64]
 
 LIPSCHITZ_MARGIN = 1e-4
+FIELD_PEAK = 1024.0
 LEAST_RATIO_REFERENCE = 1e-6
 # a disc of contrast c in a sheet of conductivity s answers as a change of 2 (c - 1) / (c + 1) s: for c = 3 to 10, 1.0 to 1.64 s
 TOUCH_CHANGE_RATIO = 1.35
@@ -53,12 +55,14 @@ class BuildSettings:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """The skin's linear answer: ``jacobian`` (m, n) V per S/m on ``grid``, ``v0_v`` (m,), and the mesh's element count."""
+    """The skin's linear answer: ``jacobian`` (m, n) V per S/m on ``grid``, ``v0_v`` (m,), and the mesh's element count;
+    ``electrode_fields`` (n, 2, L) V/m per A for what touches do to each other, None to build a model without."""
 
     grid: Grid
     jacobian: FloatArray
     v0_v: FloatArray
     elements: int
+    electrode_fields: FloatArray | None = None
 
 
 def linearise(skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elements: int = 3000) -> Linearisation:
@@ -70,6 +74,7 @@ def linearise(skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elemen
         MissingExtraError: scipy or netgen is not installed.
     """
     from eitskin.fem.cem import ForwardModel
+    from eitskin.fem.fields import electrode_fields
     from eitskin.fem.mesh import mesh_for_elements
     from eitskin.fem.sensitivity import sensitivity
 
@@ -77,7 +82,8 @@ def linearise(skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elemen
     mesh = mesh_for_elements(skin, elements)
     forward = ForwardModel(mesh, skin, protocol)
     jacobian, v0 = sensitivity(forward, skin.conductivity_s_per_m, grid)
-    return Linearisation(grid, jacobian, v0, mesh.n_elements)
+    fields = electrode_fields(forward, skin.conductivity_s_per_m, grid)
+    return Linearisation(grid, jacobian, v0, mesh.n_elements, fields)
 
 
 def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings) -> Model:
@@ -116,6 +122,7 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
         defaults=settings.defaults or scaled_defaults(skin, settings.data_kind, settings.touch_change_ratio),
         golden=Golden(reference, _golden_frame(skin, linear), empty),
         meta=_meta(skin, protocol, linear, settings, rank),
+        fields=stored_fields(skin, protocol, linear) if settings.data_kind == "difference" else None,
     )
     return replace(model, golden=replace(model.golden, image=_golden_image(model)))
 
@@ -155,6 +162,19 @@ def build_model(skin: Skin, protocol: Protocol, settings: BuildSettings | None =
     _refuse_settings(chosen, grid_for(skin.outline, chosen.pixels_across))
     linear = linearise(skin, protocol, pixels_across=chosen.pixels_across, elements=chosen.elements)
     return make_model(skin, protocol, linear, chosen)
+
+
+def stored_fields(skin: Skin, protocol: Protocol, linear: Linearisation) -> Fields | None:
+    """The fields of ``linear`` as a model stores them, the greatest as 1024; None where there are none."""
+    if linear.electrode_fields is None:
+        return None
+    fields = linear.electrode_fields.reshape(linear.grid.n_pixels, -1)
+    unit = float(np.abs(fields).max()) / FIELD_PEAK
+    a, b = rim_mirror(skin.outline, linear.grid.centres_mm())
+    columns = np.column_stack([fields / unit, a.real, a.imag, b.real, b.imag])
+    volts = protocol.current_a * skin.thickness_mm * 1e-3 * 1e-6 * unit**2
+    per_sheet = 1 / (2 * np.pi * skin.conductivity_s_per_m)
+    return Fields(columns.astype(np.float16), float(np.float32(volts)), float(np.float32(per_sheet)))
 
 
 def _golden_frame(skin: Skin, linear: Linearisation) -> npt.NDArray[np.float32]:

@@ -17,17 +17,19 @@ from eitskin.core.results import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
-from eitskin.model.model import DATA_KINDS, Defaults, Golden, Model
+from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 1
+MAJOR, MINOR = 1, 2
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
 DEFAULTS = struct.Struct("<2I12fIf")
+FIELDS_HEAD = struct.Struct("<2f8x")
+MIRROR_ROWS = 4
 REQUIRED = ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD")
 FOLD_DTYPE = np.dtype([("first", "<u2"), ("second", "<u2"), ("sign", "<i2"), ("reserved", "<u2")])
 FOLD_NONE = 0xFFFF
@@ -73,7 +75,15 @@ def encode_model(model: Model) -> bytes:
     }
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
+    if model.fields is not None:
+        halves = np.zeros((len(model.fields.columns), _fields_stride(model.protocol.n_electrodes)), dtype="<f2")
+        halves[:, : model.fields.columns.shape[1]] = model.fields.columns
+        sections["FLDS"] = FIELDS_HEAD.pack(model.fields.volts, model.fields.per_sheet) + halves.tobytes()
     return _assemble(sections, model.protocol.hash)
+
+
+def _fields_stride(n_electrodes: int) -> int:
+    return -(-(2 * n_electrodes + MIRROR_ROWS) // 8) * 8
 
 
 def _check_floats(model: Model) -> None:
@@ -161,7 +171,7 @@ def _split(blob: bytes, where: str) -> Sections:
         name = tag.decode("ascii", "replace")
         if offset < table_end or offset + size > total or offset % 16 or name in sections:
             raise ModelError(f"{where}: section {name!r} is misplaced or repeated; build the model again")
-        if name not in (*REQUIRED, "SCAL", "META"):
+        if name not in (*REQUIRED, "SCAL", "META", "FLDS"):
             if flags & REQUIRED_FLAG:
                 raise ModelError(f"{where}: needs section {name!r}, which this eitskin does not know; upgrade eitskin")
             continue
@@ -288,6 +298,17 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     return d
 
 
+def _read_fields(content: bytes, d: _Dims, where: str) -> Fields:
+    stride = _fields_stride(d.n_electrodes)
+    if len(content) != FIELDS_HEAD.size + 2 * stride * d.n_pixels:
+        _refuse(where, f"section 'FLDS' of {len(content)} bytes where its dimensions ask for others")
+    volts, per_sheet = FIELDS_HEAD.unpack_from(content)
+    columns = np.frombuffer(content, dtype="<f2", offset=FIELDS_HEAD.size).reshape(d.n_pixels, stride)
+    if not (0 <= volts <= HUGE and 0 <= per_sheet <= HUGE and np.isfinite(columns).all()):
+        _refuse(where, "a number in section 'FLDS' that is out of range")
+    return Fields(columns[:, : 2 * d.n_electrodes + MIRROR_ROWS], volts, per_sheet)
+
+
 def _read_meta(content: bytes, where: str) -> dict[str, Any]:
     try:
         meta = parse_json(content.decode("utf-8"))
@@ -326,6 +347,7 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         defaults=_read_defaults(sections["DEFS"], where),
         golden=Golden(golden[: d.n_rows], golden[d.n_rows : 2 * d.n_rows], golden[2 * d.n_rows :]),
         meta=_read_meta(sections["META"], where) if "META" in sections else {},
+        fields=_read_fields(sections["FLDS"], d, where) if "FLDS" in sections else None,
     )
 
 

@@ -52,9 +52,20 @@ class Golden:
 
 
 @dataclass(frozen=True, eq=False)
+class Fields:
+    """For what touches do to each other (section FLDS). ``columns`` (n, 2 L + 4) float16: of each pixel E_x of each electrode's
+    current, E_y of each, then a_x, a_y, b_x, b_y of the rim's mirror (``fem.fields``); ``volts``: dV = -volts change area E . E
+    in V per (S/m mm2); ``per_sheet``: 1 / (2 pi sigma), m/S; both float32."""
+
+    columns: npt.NDArray[np.float16]
+    volts: float
+    per_sheet: float
+
+
+@dataclass(frozen=True, eq=False)
 class Model:
     """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P (r, k) float32;
-    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made.
+    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made; ``fields`` where it has them.
     """
 
     protocol: Protocol
@@ -71,6 +82,7 @@ class Model:
     defaults: Defaults
     golden: Golden
     meta: dict[str, Any] = field(default_factory=dict)
+    fields: Fields | None = None
 
     @cached_property
     def sensitivity(self) -> npt.NDArray[np.float64]:

@@ -75,7 +75,7 @@ def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     Raises:
         UsageError: the C core is not built.
     """
-    linear = Linearisation(setup.grid, setup.jacobian, setup.voltages_v, setup.mesh_elements)
+    linear = Linearisation(setup.grid, setup.jacobian, setup.voltages_v, setup.mesh_elements, setup.electrode_fields)
     model = make_model(setup.skin, setup.protocol, linear, BuildSettings())
 
     def family(iterations: int, painted: bool) -> Family:

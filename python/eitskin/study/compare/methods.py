@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.fem.cem import ForwardModel
+from eitskin.fem.fields import electrode_fields
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import sensitivity
@@ -78,6 +79,7 @@ class Setup:
         skin, protocol, grid: what is reconstructed.
         jacobian: (m, n) in V per (S/m) at the skin's own conductivity.
         voltages_v: (m,) of the untouched skin.
+        electrode_fields: (n, 2, L) in V/m per A of each electrode's current in it.
         mesh_nodes, mesh_elements: size of the mesh that both were computed on.
     """
 
@@ -86,6 +88,7 @@ class Setup:
     grid: Grid
     jacobian: FloatArray
     voltages_v: FloatArray
+    electrode_fields: FloatArray
     mesh_nodes: int
     mesh_elements: int
 
@@ -98,8 +101,10 @@ def setup_for(skin: Skin, protocol: Scan, *, elements: int, pixels_across: int =
     """
     grid = grid_for(skin.outline, pixels_across)
     mesh = mesh_for_elements(skin, elements)
-    jacobian, voltages = sensitivity(ForwardModel(mesh, skin, protocol), skin.conductivity_s_per_m, grid)
-    return Setup(skin, protocol, grid, jacobian, voltages, mesh.n_nodes, mesh.n_elements)
+    forward = ForwardModel(mesh, skin, protocol)
+    jacobian, voltages = sensitivity(forward, skin.conductivity_s_per_m, grid)
+    fields = electrode_fields(forward, skin.conductivity_s_per_m, grid)
+    return Setup(skin, protocol, grid, jacobian, voltages, fields, mesh.n_nodes, mesh.n_elements)
 
 
 def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
+from eitskin.fem.fields import electrode_fields
 from eitskin.fem.grid import grid_for
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import sensitivity
@@ -90,7 +91,8 @@ class ModelShop:
         if pixels not in self._linear:
             grid = grid_for(self.skin.outline, pixels)
             jacobian, v0_v = sensitivity(self._forward, self.skin.conductivity_s_per_m, grid)
-            self._linear[pixels] = Linearisation(grid, jacobian, v0_v, self._forward.mesh.n_elements)
+            fields = electrode_fields(self._forward, self.skin.conductivity_s_per_m, grid)
+            self._linear[pixels] = Linearisation(grid, jacobian, v0_v, self._forward.mesh.n_elements, fields)
         return self._linear[pixels]
 
     def _judge(self, pixels: int) -> metrics.Judge:

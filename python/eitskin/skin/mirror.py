@@ -1,0 +1,38 @@
+"""The rim, which no current crosses, mirrors the dipoles that touches are."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.skin.outline import Outline
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+def rim_mirror(outline: Outline, points_mm: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+    """For a dipole at each of ``points_mm`` (k, 2), a and b (k,) of its mirror: with x + iy for vectors, the rim adds
+    -conj(p) / (a - b z)^2 to the conjugate field at z where the dipole p itself gives p / (z - z_p)^2.
+
+    Exact for a disk, where a = R, b = conj(z_p) / R. Of other outlines the nearest piece of the rim is taken as straight:
+    b = conj(n) of its outward normal n, a = b (z_p + 2 d n) with d the distance to it.
+    """
+    points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
+    place = points[:, 0] + 1j * points[:, 1]
+    if outline.diameter_mm is not None:
+        radius = outline.diameter_mm / 2
+        return np.full(len(place), complex(radius)), np.conj(place) / radius
+    corners = np.asarray(outline.vertices_mm, dtype=np.float64)
+    start = corners[:, 0] + 1j * corners[:, 1]
+    along = np.roll(start, -1) - start
+    offset = place[:, None] - start[None, :]
+    share = np.clip((offset * np.conj(along)).real / np.abs(along) ** 2, 0.0, 1.0)
+    away = share * along - offset  # from the place to the nearest point of each edge
+    nearest = np.argmin(np.abs(away), axis=1)
+    to_rim = away[np.arange(len(place)), nearest]
+    outward = -1j * along[nearest] / np.abs(along[nearest])  # of a counterclockwise rim
+    distance = np.abs(to_rim)
+    inside = outline.contains(points)
+    normal = np.where((distance > 1e-9) & inside, to_rim / np.maximum(distance, 1e-9), outward)
+    b = np.conj(normal)
+    return b * (place + 2 * np.where(inside, distance, 0.0) * normal), b
