@@ -25,8 +25,9 @@ def electrode_fields(forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike,
         UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
     """
     fields = element_fields(forward, forward.solve(conductivity_s_per_m))
-    shared = element_to_pixel(forward.mesh, grid).T.tocsr().multiply(forward.mesh.areas_mm2[None, :]).tocsr()
-    area = np.maximum(np.asarray(shared.sum(axis=1)).ravel(), np.finfo(float).tiny)
-    by_pattern = np.stack([(shared @ fields[:, axis, :]) / area[:, None] for axis in (0, 1)], axis=1)
+    by_pixel = element_to_pixel(forward.mesh, grid).tocsc()
+    by_pixel.data *= forward.mesh.areas_mm2[by_pixel.indices]
+    area = np.maximum(np.asarray(by_pixel.sum(axis=0)).ravel(), np.finfo(float).tiny)
+    by_pattern = np.stack([(by_pixel.T @ fields[:, axis, :]) / area[:, None] for axis in (0, 1)], axis=1)
     incidence = forward.patterns.right_hand_sides(forward.protocol.n_electrodes)
     return np.asarray(by_pattern @ np.linalg.pinv(incidence))

@@ -21,7 +21,7 @@ def rim_mirror(outline: Outline, points_mm: npt.ArrayLike) -> tuple[ComplexArray
     place = points[:, 0] + 1j * points[:, 1]
     if outline.diameter_mm is not None:
         radius = outline.diameter_mm / 2
-        return np.full(len(place), complex(radius)), np.conj(place) / radius
+        return np.full(len(place), complex(radius)), np.asarray(np.conj(place) / radius, dtype=np.complex128)
     corners = np.asarray(outline.vertices_mm, dtype=np.float64)
     start = corners[:, 0] + 1j * corners[:, 1]
     along = np.roll(start, -1) - start

@@ -6,20 +6,26 @@ minimise |y - S x|^2 / 2 + lambda |x|_1 by FISTA (Beck and Teboulle, SIAM J. Ima
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from time import perf_counter_ns
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.findings import FINDINGS, with_findings
-from eitskin.core.results import Baseline, Info, Options, Reconstruction, Touch, check_quiet
+from eitskin.core.results import COUPLED, STRAIGHT, Baseline, Info, Options, Reconstruction, Touch, check_quiet
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
+from eitskin.solve.reference_coupling import interplay
 from eitskin.solve.reference_exact import ActiveSet, coordinate
 from eitskin.solve.reference_findings import Examiner, Folded, Found, Reference
+from eitskin.solve.reference_fista import fista
+from eitskin.solve.reference_fit import Disc, Reduced
 from eitskin.solve.reference_observed import Whitening, form_of, whiten
-from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, certify, greatest, project, shrink
+from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, greatest, project
 from eitskin.solve.reference_quiet import clean
 from eitskin.solve.reference_touches import find_touches
 
@@ -27,67 +33,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 BASIS_TOLERANCE = 1e-6
 LEAST_SQUARE = 2.0**-969
-MAX_STEP_HALVINGS = 8
-PRUNE_EVERY, LOOK_GROWTH = 5, 6
+SOLVED = ("iterations", "gap", "optimum")
 DEAD = "all voltages are zero; is the skin driven and connected?"
-
-
-def fista(
-    s: FloatArray,
-    y: FloatArray,
-    lam: float,
-    lipschitz: float,
-    options: Options,
-    basis: FloatArray,
-    start: FloatArray | None = None,
-) -> Result:
-    """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the misfit.
-
-    With the solver "working-set", columns outside the working set see no gradient until it is chosen anew.
-    """
-    sign, step, t, halvings = options.sign, 1.0 / lipschitz, 1.0, 0
-    x = np.zeros(s.shape[1]) if start is None else start.copy()
-    sx = s @ x
-    z, sz = x.copy(), sx.copy()
-    scale = 0.5 * float(y @ y)
-    working, next_look, interval = np.ones(s.shape[1], dtype=np.bool_), 1, options.gap_every
-    stop, certificate, k = "iterations", Certificate(0.0, scale, float(np.linalg.norm(y))), 0
-    for k in range(1, options.iterations + 1):
-        gradient = s.T @ project(y - sz, basis)
-        if options.solver == "working-set":
-            moving = (x != 0) | (z != 0) | (shrink(gradient, lam, sign) != 0)
-            if k >= next_look:
-                working, next_look = moving, k + interval
-                interval *= 1 if options.gap_rel > 0 else LOOK_GROWTH
-            elif k % PRUNE_EVERY == 1:
-                working = working & moving
-            gradient = np.where(working, gradient, 0.0)
-        x_next = shrink(z + step * gradient, step * lam, sign)
-        t_next = 0.5 * (1 + np.sqrt(1 + 4 * t * t))
-        beta = (t - 1) / t_next
-        sx_next = s @ x_next
-        z, sz = x_next + beta * (x_next - x), sx_next + beta * (sx_next - sx)
-        x, sx, t = x_next, sx_next, t_next
-        last = k == options.iterations
-        if not last and k % options.gap_every:
-            continue
-        none = not x.any()
-        if not last and options.gap_rel == 0 and not none and float(sx @ sx) <= 8 * scale:
-            continue
-        certificate = certify(s, y, x, sx, lam, sign, basis)
-        if not certificate.objective <= scale * (1 + 1e-3) or (none and certificate.gap > 1e-3 * scale):
-            if halvings == MAX_STEP_HALVINGS or last:
-                stop = "diverged"
-                break
-            halvings, step, t = halvings + 1, step / 2, 1.0
-            x, sx = np.zeros_like(x), np.zeros_like(sx)
-            z, sz = x.copy(), sx.copy()
-            next_look, interval = k + 1, options.gap_every
-            continue
-        if options.gap_rel > 0 and certificate.gap <= options.gap_rel * scale:
-            stop = "gap"
-            break
-    return Result(x, k, stop, certificate, halvings)
 
 
 def orthonormal(candidates: list[FloatArray], rank: int) -> FloatArray:
@@ -126,6 +73,8 @@ class ReferenceEngine:
         self._examiner = Examiner(model)
         self._noise_v = self._noise_energy = 0.0
         self._ready = False
+        self._straight: FloatArray | None = None
+        self._known = np.ones(len(model.fold.first), dtype=np.bool_)
 
     def set_options(self, options: Options) -> None:
         """Replace the options.
@@ -207,8 +156,7 @@ class ReferenceEngine:
             raise
         return seen
 
-    def _datum(self, frame: FloatArray, v0: FloatArray) -> FloatArray:
-        kind = self.model.data_kind
+    def _datum(self, frame: FloatArray, v0: FloatArray, kind: str) -> FloatArray:
         with np.errstate(divide="ignore", invalid="ignore"):
             if kind == "normalised":
                 return (frame - v0) / v0
@@ -255,9 +203,17 @@ class ReferenceEngine:
         self._leave_out(known)
         basis = orthonormal(self._directions(folded), self.model.rank)
         y = project(self._reduce(folded.d), basis)
+        self._known, self._straight = known, self._straight_data(frame, unusable, basis)
         directions = len(y) if self._whitening is None else min(len(y), int(known.sum()))
         # where the basis leaves no direction, what is there is rounding
         return y if len(basis) < directions else np.zeros_like(y), basis, int(unusable.sum())
+
+    def _straight_data(self, frame: FloatArray, unusable: BoolArray, basis: FloatArray) -> FloatArray | None:
+        """What v0 log(v / v0) gives (r,), which strong touches bend less; None where it is not asked for."""
+        model = self.model
+        if model.fields is None or model.data_kind != "difference" or not self.options.touch_search & STRAIGHT or not self._ready:
+            return None
+        return project(self._reduce(self._fold(frame, unusable, "log-ratio").d), basis)
 
     def _check_rows(self, frame: FloatArray, unusable: BoolArray) -> BoolArray:
         """``unusable`` (m,), if there are not too many of them.
@@ -271,12 +227,12 @@ class ReferenceEngine:
             raise FrameError(f"frame: {DEAD}")
         return unusable
 
-    def _fold(self, frame: FloatArray, unusable: BoolArray) -> Folded:
-        """The data of ``frame``, folded; zero where a fold is left out."""
+    def _fold(self, frame: FloatArray, unusable: BoolArray, kind: str = "") -> Folded:
+        """The data of ``frame`` of a ``kind``, else of the model's, folded; zero where a fold is left out."""
         assert self._v0 is not None
-        fold, kind = self.model.fold, self.model.data_kind
+        fold, kind = self.model.fold, kind or self.model.data_kind
         out = unusable | ((kind != "difference") & (np.abs(self._v0) < 1e-6 * self._v0_rms))
-        value = np.where(out, 0.0, self._datum(np.where(out, self._v0, frame), self._v0))
+        value = np.where(out, 0.0, self._datum(np.where(out, self._v0, frame), self._v0, kind))
         sign = np.ones_like(fold.sign) if kind == "normalised" else fold.sign
         first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
         one, other = value[fold.first], np.where(second, sign * value[fold.second], 0.0)
@@ -328,33 +284,34 @@ class ReferenceEngine:
             self._warm = None
             raise
         o, norm = self.options, float(np.linalg.norm(y))
+        lambda_noise = self._lambda_noise * self._noise_ratio
         correlation = self.seen.T @ y
-        lambda_max, lambda_noise = greatest(correlation, o.sign), self._lambda_noise * self._noise_ratio
-        self._examiner.stale(correlation, o.sign, lambda_max, lambda_noise)
-        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
-        n = self.model.grid.n_pixels
-        nothing = Certificate(0.0, 0.5 * norm**2, norm)
-        zero = Result(np.zeros(n), 0, "zero", nothing, 0)
-        if o.gate_factor > 0 and lambda_max < o.gate_factor * lambda_noise:
-            result = Result(zero.x, 0, "gate", nothing, 0)
-        elif not lambda_max > lam or norm**2 < LEAST_SQUARE:
-            result = zero
-        else:
-            result = self._run(Problem(self.seen, y, lam, o.sign, basis))
-            if result.stop == "diverged":
-                result = Result(zero.x, result.iterations, "diverged", nothing, result.step_halvings)
-        self._warm = result.x if result.stop in ("iterations", "gap", "optimum") else None
-        image = result.x * self.model.column_weight.astype(np.float64)
+        self._examiner.stale(correlation, o.sign, greatest(correlation, o.sign), lambda_noise)
+        result, lam, lambda_max = self._solve(y, basis, lambda_noise, self._warm if o.warm_start else None)
+        self._warm = result.x if result.stop in SOLVED else None
+        image = self._image(result)
         found: tuple[Touch, ...] = ()
         solved_ns = perf_counter_ns()
         if touches:
-            found, self._next_id, self._examiner.found.unexplained = find_touches(
-                self.model, self.seen, image, y, basis, o, lambda_noise, self._last, self._next_id
+            noise = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum())
+            reduced = Reduced(y, self._straight, self.seen, basis, lambda_noise, noise)
+            added = partial(self._interplay, basis, self._known) if self._couples else None
+            found, self._next_id, self._examiner.found.unexplained, coupled = find_touches(
+                self.model, reduced, image, o, added, self._last, self._next_id
             )
             self._last = found
-            noise_share = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum()) / max(norm**2, 1e-300)
+            noise_share = noise / max(norm**2, 1e-300)
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             self._examiner.crowd(found, o.max_touches, noise_share, clearness)
+            if o.refine and len(found) > 1 and added is not None:
+                first = result.iterations
+                result, lam, lambda_max = self._solve(coupled, basis, lambda_noise, None)
+                if result.stop in SOLVED:
+                    norm = float(np.linalg.norm(coupled))
+                else:
+                    result, lam, lambda_max = self._solve(y, basis, lambda_noise, None)
+                result = replace(result, iterations=first + result.iterations)
+                self._warm, image = result.x if result.stop in SOLVED else None, self._image(result)
         gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,
@@ -364,19 +321,49 @@ class ReferenceEngine:
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)
 
-    def _run(self, problem: Problem) -> Result:
-        """The chosen solver, from the last frame's coefficients or from zero."""
-        start, o = self._start(problem), self.options
+    def _image(self, result: Result) -> FloatArray:
+        return np.asarray(result.x * self.model.column_weight.astype(np.float64))
+
+    @property
+    def _couples(self) -> bool:
+        """Whether this model can tell what touches do to each other, and is asked to."""
+        model = self.model
+        return model.fields is not None and model.data_kind == "difference" and bool(self.options.touch_search & COUPLED)
+
+    def _interplay(self, basis: FloatArray, known: BoolArray, discs: Sequence[Disc]) -> FloatArray:
+        """What discs add to y (r,) by what they do to each other, by the folds that are ``known``."""
+        return project(self._reduce(np.where(known, interplay(self.model, discs), 0.0)), basis)
+
+    def _solve(
+        self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None
+    ) -> tuple[Result, float, float]:
+        """The coefficients for ``y``, with lambda and lambda_max."""
+        o, norm = self.options, float(np.linalg.norm(y))
+        lambda_max = greatest(self.seen.T @ y, o.sign)
+        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
+        nothing, zero = Certificate(0.0, 0.5 * norm**2, norm), np.zeros(self.model.grid.n_pixels)
+        if o.gate_factor > 0 and lambda_max < o.gate_factor * lambda_noise:
+            return Result(zero, 0, "gate", nothing, 0), lam, lambda_max
+        if not lambda_max > lam or norm**2 < LEAST_SQUARE:
+            return Result(zero, 0, "zero", nothing, 0), lam, lambda_max
+        result = self._run(Problem(self.seen, y, lam, o.sign, basis), start)
+        if result.stop == "diverged":
+            result = Result(zero, result.iterations, "diverged", nothing, result.step_halvings)
+        return result, lam, lambda_max
+
+    def _run(self, problem: Problem, last: FloatArray | None) -> Result:
+        """The chosen solver, from the ``last`` coefficients or from zero."""
+        start, o = self._start(problem, last), self.options
         if o.solver == "coordinate":
             return coordinate(problem, o, start)
         if o.solver == "active-set":
             return ActiveSet(problem, o, self.model.grid, self.model.lipschitz).run(start)
         return fista(problem.s, problem.y, problem.lam, self.model.lipschitz, o, problem.basis, start)
 
-    def _start(self, problem: Problem) -> FloatArray | None:
-        """The last frame's coefficients, unless zero is the better start."""
-        if not self.options.warm_start or self._warm is None:
+    def _start(self, problem: Problem, last: FloatArray | None) -> FloatArray | None:
+        """The ``last`` coefficients, unless zero is the better start."""
+        if last is None:
             return None
-        residual = problem.residual(self._warm)
-        worse = residual @ residual + 2 * problem.lam * np.abs(self._warm).sum() >= problem.y @ problem.y
-        return None if worse else self._warm
+        residual = problem.residual(last)
+        worse = residual @ residual + 2 * problem.lam * np.abs(last).sum() >= problem.y @ problem.y
+        return None if worse else last

@@ -1,229 +1,88 @@
-"""The numpy reference of the off-grid touch fit in csrc/src/touch.c and disc.c: the same steps, written for reading."""
+"""The numpy reference of the search for touches in csrc/src/touch.c and track.c: the same steps, written for reading."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import Options, Touch
+from eitskin.core.results import REGROUP, Options, Touch
 from eitskin.model.model import Model
+from eitskin.solve.reference_fit import Disc, Fit, Reduced
+from eitskin.solve.reference_regroup import join, part
 
 FloatArray = npt.NDArray[np.float64]
+Interplay = Callable[[Sequence[Disc]], FloatArray]
 
-STRENGTH_PASSES = 10
-DROP_SWEEPS = 3
-RADIUS_DEVIATION = 0.12
-DAMPING = 1e-3
-SETTLED_PIXELS = 1 / 256
-MOST_RADIUS_STEP_PIXELS = 0.5
+SEARCH_RADIUS, FINAL_RADIUS = 2.0, 0.4
+ROUNDS, LATER_SWEEPS = 2, 2
+MOST_INTERPLAY = 0.25
 
 
-@dataclass(frozen=True)
-class Disc:
-    """A disc of uniform conductivity ``change`` (S/m), whose sign is ``polarity``."""
+def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | None) -> FloatArray:
+    """Discs for the ``image`` (n,), fitted to ``frame``; returns what each explains. ``interplay`` gives what discs add to y (r,)
+    by what they do to each other; None where the model cannot tell."""
+    o = fit.options
+    later, regroups = min(o.touch_sweeps, LATER_SWEEPS), bool(o.touch_search & REGROUP) and o.touch_sweeps > 0
 
-    x_mm: float
-    y_mm: float
-    radius_mm: float
-    change: float
-    polarity: float
+    def couple() -> None:
+        added = interplay(fit.discs) if interplay is not None and len(fit.discs) > 1 else np.zeros_like(frame.y)
+        fit.data = frame.y - added if added @ added <= MOST_INTERPLAY * fit.whole else frame.y
 
-
-class Fit:
-    """One frame's discs: their answers in reduced space, and what they leave of y."""
-
-    def __init__(
-        self, model: Model, seen: FloatArray, y: FloatArray, basis: FloatArray, options: Options, lambda_noise: float
-    ) -> None:
-        self.model, self.seen, self.y, self.basis, self.options = model, seen, y, basis, options
-        self.gate = options.gate_factor * lambda_noise
-        self.centres = model.grid.centres_mm()
-        weight = model.column_weight.astype(np.float64)
-        self.per_change = seen / np.where(weight != 0, weight, np.inf)
-        self.discs: list[Disc] = []
-
-    def answers(self, disc: Disc) -> tuple[FloatArray, FloatArray]:
-        """The atom (r,) and its derivatives by x, y and radius (3, r)."""
-        pixel = self.model.grid.pixel_mm
-        offset = self.centres - (disc.x_mm, disc.y_mm)
-        distance = np.hypot(offset[:, 0], offset[:, 1])
-        share = 0.5 + (disc.radius_mm - distance) / pixel
-        cover = np.clip(share, 0.0, 1.0)
-        ramp = np.where((share > 0) & (share < 1), 1.0 / pixel, 0.0)
-        toward = np.where(distance[:, None] > 1e-6 * pixel, offset / np.maximum(distance, 1e-300)[:, None], 0.0)
-        columns = np.column_stack([cover, ramp * toward[:, 0], ramp * toward[:, 1], ramp])
-        reduced = self.per_change @ columns
-        reduced = reduced - self.basis.T @ (self.basis @ reduced)
-        return reduced[:, 0], reduced[:, 1:].T
-
-    def best_change(self, disc: Disc, atom: FloatArray, target: FloatArray) -> float:
-        """The change that explains ``target`` best along ``atom``, of the disc's own sign."""
-        energy = float(atom @ atom)
-        change = float(atom @ target) / energy if energy > 0 else 0.0
-        return change if change * disc.polarity > 0 else 0.0
-
-    def residual(self, leave_out: int = -1) -> FloatArray:
-        """What the discs, but for one, leave of y."""
-        left = self.y.copy()
-        for k, disc in enumerate(self.discs):
-            if k != leave_out:
-                left -= disc.change * self.answers(disc)[0]
-        return left
-
-    def seed(self, image: FloatArray) -> None:
-        """The greatest local maxima of |image|, in descending order, become discs without strength."""
-        o, grid = self.options, self.model.grid
-        height = np.zeros((grid.ny + 2, grid.nx + 2))
-        height[grid.index[:, 1] + 1, grid.index[:, 0] + 1] = np.abs(image)
-        number = np.pad(grid.number, 1, constant_values=-1)
-        least = o.touch_threshold * np.abs(image).max()
-        peaks = []
-        for j, (ix, iy) in enumerate(grid.index):
-            here = abs(image[j])
-            around, who = height[iy : iy + 3, ix : ix + 3], number[iy : iy + 3, ix : ix + 3]
-            if here <= 0 or here < least or around.max() > here or ((around == here) & (who >= 0) & (who < j)).any():
-                continue
-            peaks.append((-here, j))
-        for _, j in sorted(peaks)[: o.max_touches]:
-            x, y = self.centres[j]
-            self.discs.append(Disc(float(x), float(y), o.touch_seed_radius_mm, 0.0, -1.0 if image[j] < 0 else 1.0))
-
-    def fit_strengths(self) -> None:
-        """All strengths at once by coordinate descent."""
-        atoms = [self.answers(disc)[0] for disc in self.discs]
-        self.discs = [replace(disc, change=0.0) for disc in self.discs]
-        left = self.y.copy()
-        for _ in range(STRENGTH_PASSES):
-            for k, atom in enumerate(atoms):
-                left += self.discs[k].change * atom
-                self.discs[k] = replace(self.discs[k], change=self.best_change(self.discs[k], atom, left))
-                left -= self.discs[k].change * atom
-
-    def expected_radius(self, disc: Disc) -> float:
-        """What strength suggests where the change is known, else the seed's."""
-        o = self.options
-        if o.touch_change_s_per_m <= 0:
-            return o.touch_seed_radius_mm
-        ratio = disc.change * disc.polarity / o.touch_change_s_per_m
-        return float(np.clip(disc.radius_mm * np.sqrt(ratio), o.touch_min_radius_mm, o.touch_max_radius_mm))
-
-    def on_skin(self, disc: Disc) -> bool:
-        """Whether a kept pixel is there or next to it."""
-        grid = self.model.grid
-        cell = np.floor((np.array([disc.x_mm, disc.y_mm]) - grid.origin_mm) / grid.pixel_mm)
-        return bool((np.abs(grid.index - cell) <= 1).all(axis=1).any())
-
-    def move(self, k: int) -> float:
-        """One damped Gauss-Newton step of disc k, others held; returns how far it went, mm."""
-        o, target = self.options, self.residual(leave_out=k)
-        atom, slope = self.answers(self.discs[k])
-        disc = replace(self.discs[k], change=self.best_change(self.discs[k], atom, target))
-        self.discs[k] = disc
-        left = target - disc.change * atom
-        expected = self.expected_radius(disc)
-        weight = o.touch_radius_weight * disc.change**2 * float(atom @ atom) / (RADIUS_DEVIATION * expected) ** 2
-        columns = disc.change * np.vstack([slope, atom])
-        h, g = columns @ columns.T, columns @ left
-        h[2, 2] += weight
-        g[2] += weight * (expected - disc.radius_mm)
-        step = damped_step(h, g)
-        reach = self.model.grid.pixel_mm
-        limit = reach * np.array([1.0, 1.0, MOST_RADIUS_STEP_PIXELS])
-        step = np.clip(step[:3], -limit, limit)
-        cost = float(left @ left) + weight * (disc.radius_mm - expected) ** 2
-        for share in (1.0, 0.5, 0.25):
-            radius = float(np.clip(disc.radius_mm + share * step[2], o.touch_min_radius_mm, o.touch_max_radius_mm))
-            trial = replace(disc, x_mm=disc.x_mm + share * step[0], y_mm=disc.y_mm + share * step[1], radius_mm=radius)
-            if not self.on_skin(trial):
-                continue
-            trial_atom, _ = self.answers(trial)
-            trial = replace(trial, change=self.best_change(trial, trial_atom, target))
-            rest = target - trial.change * trial_atom
-            if float(rest @ rest) + weight * (radius - expected) ** 2 < cost:
-                self.discs[k] = trial
-                return max(abs(trial.x_mm - disc.x_mm), abs(trial.y_mm - disc.y_mm), abs(radius - disc.radius_mm))
-        return 0.0
-
-    def move_all(self, sweeps: int) -> None:
-        """Sweeps over all discs until they settle."""
-        for _ in range(sweeps):
-            if max((self.move(k) for k in range(len(self.discs))), default=0.0) < SETTLED_PIXELS * self.model.grid.pixel_mm:
-                break
-
-    def explained(self) -> FloatArray:
-        """What leaving each disc alone out would add to |residual|^2, relative to |y|^2."""
-        atoms = np.array([self.answers(disc)[0] for disc in self.discs])
-        norm = np.linalg.norm(atoms, axis=1)
-        unit = atoms / np.maximum(norm, 1e-300)[:, None]
-        inverse = np.linalg.inv(unit @ unit.T + 1e-5 * np.eye(len(norm)))
-        size = np.array([disc.change for disc in self.discs]) * norm
-        return np.asarray(size**2 / np.diag(inverse) / float(self.y @ self.y))
-
-    def stands_out(self, k: int) -> bool:
-        """Whether disc k passes the frame's own gate at its place."""
-        if self.gate <= 0:
-            return True
-        disc, pixel = self.discs[k], self.model.grid.pixel_mm
-        near = (np.abs(self.centres - (disc.x_mm, disc.y_mm)) <= pixel).all(axis=1)
-        seen = disc.polarity * (self.seen[:, near].T @ self.residual(leave_out=k))
-        return bool(seen.max(initial=0.0) >= self.gate)
-
-    def keep_real(self) -> FloatArray:
-        """Drop what explains too little or does not stand out; returns what the others explain."""
-        while self.discs:
-            explained = self.explained()
-            weakest = int(np.argmin(explained))
-            enough = explained[0] > 0 if len(self.discs) == 1 else explained[weakest] >= self.options.touch_share
-            if enough and self.stands_out(weakest):
-                return explained
-            del self.discs[weakest]
-            self.move_all(min(self.options.touch_sweeps, DROP_SWEEPS))
-        return np.zeros(0)
-
-
-def damped_step(h: FloatArray, g: FloatArray) -> FloatArray:
-    """Solve H s = g (4, 4) scaled to a unit diagonal and damped; a parameter nothing depends on stays."""
-    diagonal = np.diag(h)
-    scale = np.where(diagonal > 0, 1 / np.sqrt(np.maximum(diagonal, 1e-300)), 0.0)
-    scaled = h * np.outer(scale, scale)
-    np.fill_diagonal(scaled, 1 + DAMPING)
-    return np.asarray(scale * np.linalg.solve(scaled, scale * g))
+    fit.radius_weight = o.touch_radius_weight * (SEARCH_RADIUS if interplay is not None else 1.0)
+    fit.data = frame.y if frame.straight is None else frame.straight
+    fit.seed(image)
+    fit.fit_strengths()
+    if o.touch_change_s_per_m > 0:
+        fit.discs = [replace(disc, radius_mm=fit.expected_radius(disc)) for disc in fit.discs]
+        fit.fit_strengths()
+    fit.move_all(o.touch_sweeps - later)
+    fit.keep_real()
+    if regroups:
+        join(fit)
+    for _ in range(ROUNDS):
+        if interplay is not None and len(fit.discs) > 1:
+            couple()
+            fit.move_all(later)
+    for _ in range(ROUNDS if regroups else 0):
+        joined, parted = join(fit), part(fit)
+        if not joined and not parted:
+            break
+        couple()
+        fit.move_all(later)
+        fit.keep_real()
+    fit.radius_weight = o.touch_radius_weight * (FINAL_RADIUS if interplay is not None else 1.0)
+    couple()
+    fit.move_all(later)
+    return fit.keep_real()
 
 
 def find_touches(
     model: Model,
-    seen: FloatArray,
+    frame: Reduced,
     image: FloatArray,
-    y: FloatArray,
-    basis: FloatArray,
     options: Options,
-    lambda_noise: float,
+    interplay: Interplay | None,
     last: tuple[Touch, ...],
     next_id: int,
-) -> tuple[tuple[Touch, ...], int, float]:
-    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), which ``seen`` (r, n) explains, strongest first,
-    the next free id, and the share of |y|^2 that the touches leave (0 where the image is zero)."""
-    fit = Fit(model, seen, y, basis, options, lambda_noise)
+) -> tuple[tuple[Touch, ...], int, float, FloatArray]:
+    """The touches of an ``image`` (n,) of ``frame``, strongest first, the next free id, the share of |y|^2 that the touches leave
+    (0 where the image is zero), and the data (r,) that they were fitted to in the end."""
+    fit = Fit(model, frame, options)
+    explained = np.zeros(0)
     if np.abs(image).max() > 0:
-        fit.seed(image)
-    if fit.discs:
-        fit.fit_strengths()
-        if options.touch_change_s_per_m > 0:
-            fit.discs = [replace(disc, radius_mm=fit.expected_radius(disc)) for disc in fit.discs]
-            fit.fit_strengths()
-        fit.move_all(options.touch_sweeps)
-    explained = fit.keep_real()
+        explained = search(fit, frame, image, interplay)
     soft_edge = model.grid.pixel_mm**2 / 12  # a disc's covers add up to pi (radius^2 + pixel^2 / 12), averaged over its places
     found = [
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * np.pi * (d.radius_mm**2 + soft_edge), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
-    left, whole = fit.residual(), float(y @ y)
-    unexplained = float(left @ left) / whole if whole > 0 and np.abs(image).max() > 0 else 0.0
-    return *_track(found, last, options.follow_mm, next_id), unexplained
+    unexplained = fit.left() / fit.whole if fit.whole > 0 and np.abs(image).max() > 0 else 0.0
+    touches, next_id = _track(found, last, options.follow_mm, next_id)
+    return touches, next_id, unexplained, fit.data
 
 
 def _track(found: list[Touch], last: tuple[Touch, ...], follow_mm: float, next_id: int) -> tuple[tuple[Touch, ...], int]:

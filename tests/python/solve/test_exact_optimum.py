@@ -11,7 +11,8 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SOLVERS, Options
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.solve.reference import fista, orthonormal
+from eitskin.solve.reference import orthonormal
+from eitskin.solve.reference_fista import fista
 from eitskin.solve.reference_problem import certify
 from small_models import prebuilt, session, small, small_blob, small_model
 

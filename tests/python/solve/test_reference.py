@@ -9,7 +9,8 @@ import pytest
 
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
-from eitskin.solve.reference import ReferenceEngine, fista
+from eitskin.solve.reference import ReferenceEngine
+from eitskin.solve.reference_fista import fista
 from eitskin.solve.reference_problem import greatest, project, shrink
 from eitskin.solve.reference_touches import Disc, Fit, damped_step
 from eitskin.study.judge.metrics import pixel_cover
