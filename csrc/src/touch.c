@@ -69,11 +69,6 @@ static void seed(const eits_context *ctx, eits_fit *f)
 
 /* ---- the search ---- */
 
-static int searches(const eits_context *ctx, eits_search what)
-{
-    return (ctx->options.touch_search & (uint32_t)what) != 0;
-}
-
 /* Later sweeps: few, for they begin near their end. */
 static uint32_t later(const eits_context *ctx)
 {
@@ -83,16 +78,21 @@ static uint32_t later(const eits_context *ctx)
 /* From here on the discs are to explain the data less their interplay, as far as that is known. */
 static void couple(eits_context *ctx, eits_fit *f)
 {
-    f->macs += eits_couple(ctx, f->disc, f->count, ctx->y_coupled);
-    f->data = ctx->y_coupled;
-    eits_fit_restart(ctx, f);
+    const eits_real *before = f->data;
+    f->data = ctx->y;
+    if (f->count > 1 && eits_couples(ctx)) {
+        f->macs += eits_couple(ctx, f->disc, f->count, ctx->y_coupled);
+        f->data = ctx->y_coupled;
+    }
+    if (f->data != before || f->data == ctx->y_coupled)
+        eits_fit_restart(ctx, f);
 }
 
 /* First places: to data that strong touches bend less, if there are any. */
 static void begin(eits_context *ctx, eits_fit *f)
 {
     const eits_options *o = &ctx->options;
-    f->data = ctx->straight ? ctx->y_straight : ctx->y;
+    f->data = ctx->straight && o->touch_sweeps > 0 ? ctx->y_straight : ctx->y;
     seed(ctx, f);
     eits_fit_strengths(ctx, f);
     if (o->touch_change_s_per_m > 0) {
@@ -106,9 +106,11 @@ static void begin(eits_context *ctx, eits_fit *f)
 
 static void search(eits_context *ctx, eits_fit *f)
 {
-    const int regroups = searches(ctx, EITS_SEARCH_REGROUP) && ctx->options.touch_sweeps > 0, couples = eits_couples(ctx);
+    const int regroups = (ctx->options.touch_search & EITS_SEARCH_REGROUP) != 0, couples = eits_couples(ctx);
     f->radius_weight = ctx->options.touch_radius_weight * (couples ? SEARCH_RADIUS : 1);
     begin(ctx, f);
+    if (ctx->options.touch_sweeps == 0)
+        return;
     if (regroups)
         (void)eits_fit_join(ctx, f);
     for (int round = 0; couples && f->count > 1 && round < ROUNDS; ++round) {
@@ -174,7 +176,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     ctx->info.touches = finite;
     ctx->info.touch_macs = f.macs;
     eits_judge_crowd(ctx, looked, found, finite);
-    if (ctx->options.refine && ctx->options.mac_limit == 0 && finite > 1 && eits_couples(ctx))
+    if (ctx->options.refine && ctx->options.mac_limit == 0 && f.count > 1 && f.data == ctx->y_coupled)
         eits_solve_again(ctx, ctx->y_coupled);
     for (uint32_t k = 0; k < finite && k < room; ++k)
         touches[k] = found[k];

@@ -303,7 +303,7 @@ class ReferenceEngine:
             noise_share = noise / max(norm**2, 1e-300)
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             self._examiner.crowd(found, o.max_touches, noise_share, clearness)
-            if o.refine and len(found) > 1 and added is not None:
+            if o.refine and len(found) > 1 and added is not None and o.touch_sweeps > 0:
                 first = result.iterations
                 result, lam, lambda_max = self._solve(coupled, basis, lambda_noise, None)
                 if result.stop in SOLVED:

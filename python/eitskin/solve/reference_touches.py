@@ -25,21 +25,23 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
     """Discs for the ``image`` (n,), fitted to ``frame``; returns what each explains. ``interplay`` gives what discs add to y (r,)
     by what they do to each other; None where the model cannot tell."""
     o = fit.options
-    later, regroups = min(o.touch_sweeps, LATER_SWEEPS), bool(o.touch_search & REGROUP) and o.touch_sweeps > 0
+    later, regroups = min(o.touch_sweeps, LATER_SWEEPS), bool(o.touch_search & REGROUP)
 
     def couple() -> None:
         added = interplay(fit.discs) if interplay is not None and len(fit.discs) > 1 else np.zeros_like(frame.y)
         fit.data = frame.y - added if added @ added <= MOST_INTERPLAY * fit.whole else frame.y
 
     fit.radius_weight = o.touch_radius_weight * (SEARCH_RADIUS if interplay is not None else 1.0)
-    fit.data = frame.y if frame.straight is None else frame.straight
+    fit.data = frame.straight if frame.straight is not None and o.touch_sweeps > 0 else frame.y
     fit.seed(image)
     fit.fit_strengths()
     if o.touch_change_s_per_m > 0:
         fit.discs = [replace(disc, radius_mm=fit.expected_radius(disc)) for disc in fit.discs]
         fit.fit_strengths()
     fit.move_all(o.touch_sweeps - later)
-    fit.keep_real()
+    explained = fit.keep_real()
+    if o.touch_sweeps == 0:
+        return explained
     if regroups:
         join(fit)
     for _ in range(ROUNDS):
