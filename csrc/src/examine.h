@@ -94,7 +94,7 @@ int eits_judge_misfit(eits_context *ctx, uint64_t *macs);
 /* Whether the change goes the way touches cannot; ctx->gradient is S'y, info.lambda_max known. */
 void eits_judge_reference(eits_context *ctx);
 
-/* The variance of a fold's datum by the noise that was learned, summed over the folds; copied reciprocals are one measurement. */
+/* The variance of a fold's datum by the noise that was learned, summed over the folds in use; copied reciprocals are one measurement. */
 eits_real eits_noise_energy(const eits_context *ctx);
 
 /* What of |y|^2 that noise gives. */

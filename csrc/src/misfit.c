@@ -99,6 +99,8 @@ eits_real eits_noise_energy(const eits_context *ctx)
     const eits_real one = b->gain * b->noise_v * (b->gain * b->noise_v);
     eits_real sum = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (ctx->basis_for[k] == EITS_SIDE_NONE) /* it may have no reference at all */
+            continue;
         const eits_real v0 = b->v0[ctx->basis_for[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second : ctx->model->fold[k].first];
         const eits_real each = ctx->model->data_kind == EITS_DATA_NORMALISED ? b->noise_v / v0 * (b->noise_v / v0) : one;
         sum += ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->apart[k] != 0 ? R(0.5) * each : each;

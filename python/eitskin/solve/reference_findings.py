@@ -246,12 +246,13 @@ class Examiner:
     # ---- what no sheet gives ----
 
     def noise_energy(self, folded: Folded, ref: Reference) -> float:
-        """The variance of a fold's datum, summed over the folds; copied reciprocals are one measurement."""
+        """The variance of a fold's datum, summed over the folds in use; copied reciprocals are one measurement."""
         fold = self.model.fold
         v0 = ref.v0[np.where(folded.first, fold.first, fold.second)]
         ratio = self.model.data_kind == "normalised"
         each = (ref.noise_v / v0) ** 2 if ratio else np.full(len(v0), (ref.gain * ref.noise_v) ** 2)
-        return float(np.where(folded.both & (folded.apart != 0), each / 2, each).sum())
+        used = folded.first | folded.second
+        return float(np.where(folded.both & (folded.apart != 0), each / 2, each)[used].sum())
 
     def misfit(self, folded: Folded, along: FloatArray | None, ref: Reference) -> bool:
         """Whether more of d lies outside of the model's sheet than noise explains; ``along`` is the drift that is ignored. Sets

@@ -12,7 +12,7 @@ from eitskin.solve.options import default_options
 from eitskin.solve.reference import ReferenceEngine
 from eitskin.solve.reference_fista import fista
 from eitskin.solve.reference_problem import greatest, project, shrink
-from eitskin.solve.reference_touches import Disc, Fit, damped_step
+from eitskin.solve.reference_fit import Disc, Fit, Reduced, damped_step
 from eitskin.study.judge.metrics import pixel_cover
 from small_models import DATA_KINDS, SIGNS, prebuilt, small, small_model
 
@@ -142,7 +142,7 @@ def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
 def fit_of(model: Model, **options: object) -> Fit:
     chosen = replace(default_options(model), **options)
     y = GENERATOR.normal(size=model.rank)
-    return Fit(model, model.sensitivity, y, np.zeros((0, model.rank)), chosen, 0.0)
+    return Fit(model, Reduced(y, None, model.sensitivity, np.zeros((0, model.rank)), 0.0, 0.0), chosen)
 
 
 def test_a_discs_answer_is_that_of_the_pixels_it_covers() -> None:
