@@ -127,15 +127,15 @@ def draw_bars(path: Path, *, results: Sequence[Result]) -> None:
         figure = matplotlib.figure.Figure(figsize=(8.6, 5.4), layout="constrained")
         axes = figure.add_subplot()
         places = np.arange(len(results))[::-1]
-        for up, colour, label, summaries in (
-            (0.2, FIXED, f"fixed parameter, t = {FIXED_THRESHOLD:g}", [one.at_fixed() for one in results]),
-            (-0.2, BEST, "both chosen on tuning scenes", [one.at_best() for one in results]),
+        for up, colour, ink, label, summaries in (
+            (0.2, FIXED, INK, f"fixed parameter, t = {FIXED_THRESHOLD:g}", [one.at_fixed() for one in results]),
+            (-0.2, BEST, "white", "both chosen on tuning scenes", [one.at_best() for one in results]),
         ):
             means = [s.mean for s in summaries]
             reach = [[s.mean - s.low for s in summaries], [s.high - s.mean for s in summaries]]
             axes.barh(places + up, means, 0.38, color=colour, label=label, xerr=reach, error_kw={"linewidth": 0.8})
             for place, summary in zip(places, summaries, strict=True):
-                axes.text(summary.high + 0.005, place + up, f"{summary.mean:.2f}", va="center", fontsize=7)
+                axes.text(0.01, place + up, f"{summary.mean:.2f}", va="center", fontsize=7, color=ink)
         for place, one in zip(places, results, strict=True):
             if one.entrant.claimed is not None:
                 low, high = one.entrant.claimed

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -41,15 +43,15 @@ class Result:
 
     def at_fixed(self, number: int | None = None, t: float = FIXED_THRESHOLD) -> Summary:
         """MIoU at the fixed value and ``t``; None takes all test scenes."""
-        return summarise(column(_joined(self.fixed, number, metrics.LOOKUP), t))
+        return _summary(tuple(column(_joined(self.fixed, number, metrics.LOOKUP), t)))
 
     def at_best(self, number: int | None = None, lookup: str = metrics.LOOKUP) -> Summary:
         """MIoU at the chosen value and the t that was chosen for ``lookup``."""
-        return summarise(column(_joined(self.best, number, lookup), self.chosen.thresholds[lookup]))
+        return _summary(tuple(column(_joined(self.best, number, lookup), self.chosen.thresholds[lookup])))
 
     def at_each_own(self) -> Summary:
         """MIoU at the chosen value where each test image takes the t that is best for it: no fair number, but a bound."""
-        return summarise(_joined(self.best, None, metrics.LOOKUP).max(axis=1))
+        return _summary(tuple(_joined(self.best, None, metrics.LOOKUP).max(axis=1)))
 
     def curve(self, fixed: bool) -> FloatArray:
         """Mean MIoU of all test scenes at each threshold, (T,)."""
@@ -57,7 +59,8 @@ class Result:
 
     def position_mm(self, number: int) -> float:
         """Median distance of the touches found; nan where none is."""
-        return summarise(self.best[number]["distances_mm"]).median
+        distances_mm = self.best[number]["distances_mm"]
+        return float(np.median(distances_mm)) if len(distances_mm) else math.nan
 
     def exact_count(self, number: int) -> float:
         """Share of scenes with every touch found and nothing else."""
@@ -89,6 +92,12 @@ def result_of(field: Field, entrant: Entrant) -> Result:
         shown=shown(field, entrant, chosen.value, chosen.touch_threshold),
         shown_fixed=shown(field, entrant, entrant.fixed, chosen.touch_threshold),
     )
+
+
+@lru_cache(maxsize=1024)
+def _summary(values: tuple[float, ...]) -> Summary:
+    """The same scenes stand in tables, pictures and data; resampling takes its time."""
+    return summarise(values)
 
 
 def _joined(of_number: dict[int, Arrays], number: int | None, lookup: str) -> FloatArray:
