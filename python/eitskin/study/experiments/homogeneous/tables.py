@@ -81,7 +81,8 @@ def words(rows: Sequence[Row], settings: Settings, sessions: int, measured: bool
         f"{len(usual.findings)} of that instrument."
     )
     tank = (
-        f"The measured frame is the saline reference of {SOURCE}: one frame, so the doctor can tell nothing about its noise."
+        f"The measured frame, `{FILE}` in the folder of `--data`, is the saline reference of {SOURCE}: one frame, so the doctor "
+        "can tell nothing about its noise."
         if measured
         else f"The measured tank was left out: run with `--data FOLDER`, a folder with `{FILE}`."
     )
