@@ -2,11 +2,13 @@
 
 All take the sensitivity J (m, n), V per (S/m), and turn difference frames dv (k, m) in V into images (k, n) of the
 change of conductivity. None is a straw man: each has its regularisation chosen on training scenes (compare.py),
-and FISTA has the exact Lipschitz constant. Strengths are relative, so that they do not depend on units.
+and FISTA has the exact Lipschitz constant. Strengths are relative, so that they do not depend on units. ``macs`` is what
+a frame costs in multiply-accumulates of matrix products, all of J's rows taken; what is made once for a skin is not counted.
 
     linear back projection   x = J' dv, each pixel over the norm of its sensitivities
     Gauss-Newton, one step   x = (J'J + a s_1^2 I)^-1 J' dv                        (Tikhonov)
     NOSER                    x = (J'J + a s_1^2 R / mean(R))^-1 J' dv,  R = diag(J'J)^p, p = 1/2
+    GREIT-like               one matrix, trained to show small targets as blurred discs: see greit.py
     conjugate gradient       CGLS, stopped after a few steps: the stop is the regularisation
     plain FISTA              min 1/2 |J x - dv|^2 + lambda |x|_1, signed or x >= 0, after K iterations
 """
@@ -49,6 +51,11 @@ class LinearMethod:
 
     name: str
     matrix: FloatArray
+
+    @property
+    def macs(self) -> int:
+        """Multiply-accumulates a frame: n m."""
+        return self.matrix.size
 
     def reconstruct(self, dv: npt.ArrayLike) -> FloatArray:
         """Images (k, n) of difference frames (k, m).
@@ -116,6 +123,11 @@ class ConjugateGradient:
     steps: int
     name: str = "conjugate gradient"
 
+    @property
+    def macs(self) -> int:
+        """Multiply-accumulates a frame in products with J and J': one for the start, two a step."""
+        return (1 + 2 * self.steps) * self.jacobian.size
+
     def reconstruct(self, dv: npt.ArrayLike) -> FloatArray:
         """Images (k, n) of difference frames (k, m).
 
@@ -169,6 +181,11 @@ class PlainFista:
     def name(self) -> str:
         """Says sign and iterations."""
         return f"plain FISTA {self.iterations}, {'signed' if self.signed else 'non-negative'}"
+
+    @property
+    def macs(self) -> int:
+        """Multiply-accumulates a frame in products with J and J': one for lambda, two an iteration."""
+        return (1 + 2 * self.iterations) * self.jacobian.size
 
     def lambdas(self, dv: npt.ArrayLike) -> FloatArray:
         """The lambda of each frame: (k,), at least 0."""

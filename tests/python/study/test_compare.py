@@ -14,6 +14,7 @@ pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
 from eitskin.errors import UsageError
+from eitskin.fem.grid import grid_for
 from eitskin.scene.random_touches import random_touches
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -141,21 +142,23 @@ def test_a_method_may_learn_and_may_find_touches_itself() -> None:
 
 
 def test_baselines_do_not_have_those_abilities() -> None:
-    jacobian = np.random.default_rng(0).normal(size=(10, 20))
-    families = baseline_methods(jacobian)
+    grid = grid_for(SKIN.outline, 6)
+    jacobian = np.random.default_rng(0).normal(size=(10, grid.n_pixels))
+    families = baseline_methods(jacobian, grid)
     made = [family.make(family.values[0]) for family in families]
     assert not any(isinstance(method, (Learns, FindsTouches)) for method in made)
     assert [method.name for method in made] == [
         "linear back projection",
         "Gauss-Newton (Tikhonov)",
         "NOSER",
+        "GREIT-like",
         "conjugate gradient",
         "plain FISTA 30, signed",
         "plain FISTA 300, signed",
         "plain FISTA 30, non-negative",
         "plain FISTA 300, non-negative",
     ]
-    assert all(method.reconstruct(np.ones((2, 10))).shape == (2, 20) for method in made)
+    assert all(method.reconstruct(np.ones((2, 10))).shape == (2, grid.n_pixels) for method in made)
 
 
 def test_text_names_every_condition(comparison: Comparison) -> None:

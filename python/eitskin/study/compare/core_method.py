@@ -54,6 +54,10 @@ class CoreMethod:
         """Positions (t, 2) in mm of the touches of each difference frame; raises as :meth:`reconstruct`."""
         return [np.array([(t.x_mm, t.y_mm) for t in r.touches]).reshape(-1, 2) for r in self._solve(dv)]
 
+    def macs_of(self, dv: FloatArray) -> FloatArray:
+        """Multiply-accumulates of each difference frame, solve and touches, (k,); raises as :meth:`reconstruct`."""
+        return np.array([result.info.macs + result.info.touch_macs for result in self._solve(dv)], dtype=np.float64)
+
     def _solve(self, dv: FloatArray) -> list[Reconstruction]:
         if self._reference is None:
             raise UsageError(f"{self.name}: no quiet frames were given; call learn first")

@@ -21,6 +21,7 @@ from eitskin.fem.sensitivity import sensitivity
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
 from eitskin.solve import baselines
+from eitskin.solve.greit import train_greit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -115,11 +116,12 @@ def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     """
     from eitskin.study.compare.core_method import core_methods
 
-    return (*baseline_methods(setup.jacobian), *core_methods(setup, threads))
+    return (*baseline_methods(setup.jacobian, setup.grid), *core_methods(setup, threads))
 
 
-def baseline_methods(jacobian: FloatArray) -> tuple[Family, ...]:
-    """The methods of ``eitskin.solve.baselines`` with the parameter values that are tried for each."""
+def baseline_methods(jacobian: FloatArray, grid: Grid) -> tuple[Family, ...]:
+    """The methods of ``eitskin.solve.baselines`` and ``greit`` with the parameter values that are tried for each."""
+    greit = train_greit(jacobian, grid)
 
     def fista(iterations: int, signed: bool) -> Family:
         return Family(
@@ -130,6 +132,7 @@ def baseline_methods(jacobian: FloatArray) -> tuple[Family, ...]:
         Family("norm", (1.0, 2.0), lambda norm: baselines.back_projection(jacobian, norm)),
         Family("strength", STRENGTHS, lambda strength: baselines.gauss_newton(jacobian, strength)),
         Family("strength", STRENGTHS, lambda strength: baselines.noser(jacobian, strength)),
+        Family("noise weight", STRENGTHS, greit.method),
         Family("steps", tuple(map(float, STEPS)), lambda k: baselines.ConjugateGradient(jacobian, int(k))),
         fista(30, True),
         fista(300, True),

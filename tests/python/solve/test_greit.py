@@ -1,0 +1,93 @@
+"""The GREIT-like matrix: what it is trained for, what it minimises, and that it sees a small target where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eitskin.errors import UsageError
+from eitskin.fem.grid import Grid, grid_for
+from eitskin.skin.skin import paper_skin
+from eitskin.solve import baselines
+from eitskin.solve.greit import DISC_RADIUS, train_greit
+
+GRID = grid_for(paper_skin().outline, 16)
+HALF_MM = GRID.nx * GRID.pixel_mm / 2
+
+
+def smooth(grid: Grid, rows: int) -> np.ndarray:
+    """A Jacobian whose rows are smooth over the skin, as a real one's."""
+    generator = np.random.default_rng(5)
+    waves, phases = generator.normal(size=(rows, 2)) * 4 / HALF_MM, generator.uniform(0, 6, rows)
+    return np.asarray(np.cos(waves @ grid.centres_mm().T + phases[:, None]))
+
+
+J = smooth(GRID, 60)
+
+
+def test_a_small_target_is_shown_as_a_disc_at_its_place() -> None:
+    method = train_greit(J, GRID).method(1e-6)
+    for pixel in (40, 101, 150):
+        image = method.reconstruct(J[:, pixel])[0]
+        place, away = GRID.centres_mm()[pixel], np.hypot(*(GRID.centres_mm() - GRID.centres_mm()[pixel]).T)
+        weight = np.where(image > 0.5 * image.max(), image, 0)
+        assert np.hypot(*(weight @ GRID.centres_mm() / weight.sum() - place)) < GRID.pixel_mm
+        assert image[away > 2.5 * DISC_RADIUS * HALF_MM].max() < 0.35 * image.max()
+
+
+def test_it_is_the_closed_form_and_noise_smooths() -> None:
+    training = train_greit(J, GRID, targets=300)
+    weight = 1e-3
+    noise = weight * np.linalg.eigvalsh(training.spread).max() * np.eye(60)
+    assert training.method(weight).matrix @ (training.spread + noise) == pytest.approx(training.shown, rel=1e-6, abs=1e-9)
+    sizes = [np.linalg.norm(training.method(w).matrix) for w in (1e-6, 1e-4, 1e-2, 1.0)]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_units_and_seeds() -> None:
+    one, again, other = (train_greit(J, GRID, targets=200, seed=seed).method(1e-4).matrix for seed in (3, 3, 4))
+    assert (one == again).all() and not np.allclose(one, other)
+    scaled = train_greit(1e-6 * J, GRID, targets=200, seed=3).method(1e-4).matrix
+    assert 1e-6 * scaled == pytest.approx(one, rel=1e-7)
+
+
+def test_what_it_refuses() -> None:
+    with pytest.raises(UsageError, match="a Jacobian of 3 pixels"):
+        train_greit(J[:, :3], GRID)
+    with pytest.raises(UsageError, match="at least 1 target"):
+        train_greit(J, GRID, targets=0)
+    with pytest.raises(UsageError, match="noise weight 0 must be above 0"):
+        train_greit(J, GRID, targets=9).method(0)
+
+
+class Counting(np.ndarray):
+    """A matrix that counts the multiply-accumulates of the products that it takes part in."""
+
+    macs = 0
+
+    def __matmul__(self, other: np.ndarray) -> np.ndarray:
+        result = np.asarray(self) @ np.asarray(other)
+        Counting.macs += result.size * self.shape[-1]
+        return result
+
+    def __rmatmul__(self, other: np.ndarray) -> np.ndarray:
+        result = np.asarray(other) @ np.asarray(self)
+        Counting.macs += result.size * self.shape[0]
+        return result
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda j: baselines.LinearMethod("one", j.T),
+        lambda j: baselines.ConjugateGradient(j, 7),
+        lambda j: baselines.PlainFista(j, 11, 0.1, True),
+        lambda j: baselines.PlainFista(j, 5, 0.1),
+    ],
+)
+def test_macs_are_those_of_the_products(make) -> None:  # type: ignore[no-untyped-def]
+    method = make(J.view(Counting))
+    Counting.macs = 0
+    frames = np.random.default_rng(1).normal(size=(3, 60))
+    method.reconstruct(frames)
+    assert Counting.macs == 3 * method.macs
