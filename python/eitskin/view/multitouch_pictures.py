@@ -111,7 +111,7 @@ def draw_doubt(path: str | Path, doubts: Doubts) -> None:
     """
     matplotlib = load_matplotlib()
     frames = doubts.mixed[NAMES[0]]
-    says = {"crowded": np.array([f.said for f in frames], dtype=np.bool_), "score": doubts.rules[NAMES[0]].says(frames)}
+    says = {"crowded": np.array([f.said for f in frames], dtype=np.bool_), "score": doubts.rule.says(frames)}
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(11.5, 6.8), layout="constrained")
         for row, (signal, said) in enumerate(says.items()):
@@ -181,7 +181,7 @@ def _trade(axes: Axes, doubts: Doubts) -> None:
         mine = [f for f in found_some(doubts.mixed[name]) if f.snr_db == snr_db]
         if not mine:
             continue
-        exact = np.array([f.exact for f in mine])[np.argsort(-doubts.rules[name].scores(mine), kind="stable")]
+        exact = np.array([f.exact for f in mine])[np.argsort(-doubts.rule.scores(mine), kind="stable")]
         part = np.arange(1, len(exact) + 1) / len(exact)
         so_far = np.cumsum(exact) / np.arange(1, len(exact) + 1)
         axes.plot(part, so_far, color=colour, linewidth=1.2, label=f"score, {snr_db:g} dB")

@@ -67,9 +67,9 @@ def data(counted: Counted, limited: list[Limit], doubted: Doubts) -> dict[str, A
         ],
         "do not fit": [{"places": geometry, "touches": k, "why": why} for (geometry, k), why in counted.unfit.items()],
         "ceiling": [asdict(one) for one in limited],
-        "rules": {name: asdict(rule) for name, rule in doubted.rules.items()},
+        "rule": asdict(doubted.rule),
         "reliability": {
-            name: {snr: asdict(one) for snr, one in doubt_tables.reliabilities(doubted, name).items()} for name in doubted.rules
+            name: {snr: asdict(one) for snr, one in doubt_tables.reliabilities(doubted, name).items()} for name in doubted.mixed
         },
         "tables": {
             table.name: [dict(zip(table.head, row, strict=True)) for row in table.rows]

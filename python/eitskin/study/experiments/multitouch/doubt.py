@@ -21,19 +21,19 @@ from eitskin.study.judge.matching import match
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-# what each feature is, in the order of the coefficients
+# what each feature is, in the order of the coefficients; none may thrive on touches of a scene being equal, as half of these are
 FEATURES = (
     "found touches, of 16 electrodes",
     "nearest pair's distance / sum of its radii, at most 2",
     "widest radius / seed radius",
     "root of the share unexplained",
     "weakest touch over noise: root of its confidence times max(S'y) / that of noise, at most 10",
-    "least strength / greatest",
+    "root of the weakest touch's confidence / the share unexplained, at most 3",
 )
-FAR, STRONG = 2.0, 10.0
+FAR, STRONG, CLEARLY = 2.0, 10.0, 3.0
 ELECTRODES = 16
 RIDGE = 1e-3
-AIM = 0.95
+AIM, BAR_DB = 0.95, 60.0
 BINS = 10
 
 
@@ -79,14 +79,15 @@ def nearest(seen: Seen) -> float:
 def features(seen: Seen, near: float, seed_radius_mm: float) -> tuple[float, ...]:
     """As ``FEATURES`` says; of no touch those of one that is sure."""
     if not seen.x_mm:
-        return 0.0, FAR, 1.0, 0.0, STRONG, 1.0
+        return 0.0, FAR, 1.0, 0.0, STRONG, CLEARLY
+    weakest, left = min(seen.confidence), seen.unexplained
     return (
         float(len(seen.x_mm)),
         min(FAR, near),
         max(seen.radius_mm) / seed_radius_mm,
-        math.sqrt(seen.unexplained),
-        min(STRONG, math.sqrt(min(seen.confidence)) * seen.clear),
-        min(seen.strength) / max(seen.strength),
+        math.sqrt(left),
+        min(STRONG, math.sqrt(weakest) * seen.clear) if seen.clear > 0 else STRONG,
+        math.sqrt(weakest / left) if weakest < CLEARLY**2 * left else CLEARLY,
     )
 
 
@@ -113,7 +114,8 @@ class Rule:
 
 
 def fit_rule(frames: Sequence[Judged], aim: float = AIM) -> Rule:
-    """On tuning frames in which something was found. The bar is the lowest at which a share ``aim`` of what is above is exact.
+    """On tuning frames in which something was found, at whatever SNR. The bar is the lowest at which a share ``aim`` of what is
+    above is exact, of frames at 60 dB and more: below, noise hides touches that no feature knows of.
 
     Raises:
         MissingExtraError: scipy is absent.
@@ -137,7 +139,8 @@ def fit_rule(frames: Sequence[Judged], aim: float = AIM) -> Rule:
     w = np.asarray(minimize(loss, np.zeros(z.shape[1]), jac=True).x)
     weights = tuple(float(f"{one:.4g}") for one in w[:-1] / spread)
     offset = float(f"{w[-1] - np.dot(weights, mean):.4g}")
-    return Rule(weights, offset, _bar(x @ weights + offset, y > 0, aim))
+    calm = np.array([one.snr_db >= BAR_DB for one in used], dtype=np.bool_)
+    return Rule(weights, offset, _bar((x @ weights + offset)[calm], y[calm] > 0, aim))
 
 
 def _bar(scores: FloatArray, exact: BoolArray, aim: float) -> float:

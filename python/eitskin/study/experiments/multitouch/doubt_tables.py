@@ -23,13 +23,12 @@ def doubt_table(doubts: Doubts) -> Table:
     """The core's ``crowded`` and the linear score on the same test frames."""
     rows = []
     for name in NAMES:
-        rule = doubts.rules[name]
         for text, frames in (("mixed", doubts.mixed[name]), ("cells", doubts.cells[name])):
             for snr_db in (*SNRS_DB, None):
                 mine = [one for one in frames if snr_db in (None, one.snr_db)]
                 at = "all" if snr_db is None else f"{snr_db:g}"
                 rows.append((name, text, at, str(len(mine)), "crowded", *_cells(calibration(mine))))
-                rows.append((name, text, at, str(len(mine)), "score", *_cells(calibration(mine, rule.says(mine)))))
+                rows.append((name, text, at, str(len(mine)), "score", *_cells(calibration(mine, doubts.rule.says(mine)))))
     return Table("doubt", ("method", "set", "SNR, dB", "frames", "signal", *HEAD), tuple(rows))
 
 
@@ -40,10 +39,10 @@ def _cells(one: Calibration) -> tuple[str, ...]:
 
 def rule_table(doubts: Doubts) -> Table:
     """The score's coefficients, as the core could take them."""
-    rows = [(text, *(f"{doubts.rules[name].weights[k]:.4g}" for name in NAMES)) for k, text in enumerate(FEATURES)]
-    rows.append(("offset", *(f"{doubts.rules[name].offset:.4g}" for name in NAMES)))
-    rows.append(("said below a score of", *(f"{doubts.rules[name].bar:.3f}" for name in NAMES)))
-    return Table("rule", ("feature", *NAMES), tuple(rows))
+    rule = doubts.rule
+    rows = [(text, f"{weight:.4g}") for text, weight in zip(FEATURES, rule.weights, strict=True)]
+    rows += [("offset", f"{rule.offset:.4g}"), ("said below a score of", f"{rule.bar:.3f}")]
+    return Table("rule", ("feature", "coefficient"), tuple(rows))
 
 
 def found_some(frames: Sequence[Judged]) -> list[Judged]:
@@ -57,7 +56,7 @@ def reliabilities(doubts: Doubts, name: str) -> dict[str, Reliability]:
     for snr_db in (*SNRS_DB, None):
         mine = [one for one in found_some(doubts.mixed[name]) if snr_db in (None, one.snr_db)]
         exact = np.array([one.exact for one in mine], dtype=np.bool_)
-        result["all" if snr_db is None else f"{snr_db:g}"] = reliability(doubts.rules[name].chances(mine), exact)
+        result["all" if snr_db is None else f"{snr_db:g}"] = reliability(doubts.rule.chances(mine), exact)
     return result
 
 
@@ -69,7 +68,7 @@ def chance_table(doubts: Doubts) -> Table:
             mine = [f for f in found_some(doubts.mixed[name]) if snr in ("all", f"{f.snr_db:g}")]
             exact = np.array([f.exact for f in mine], dtype=np.bool_)
             base = float(exact.mean()) if len(exact) else float("nan")
-            area = auc(doubts.rules[name].scores(mine), exact)
+            area = auc(doubts.rule.scores(mine), exact)
             rows.append((name, snr, str(len(mine)), f"{100 * base:.0f}", f"{area:.3f}", f"{one.brier:.3f}",
                          f"{base * (1 - base):.3f}", f"{one.error:.3f}"))  # fmt: skip
     head = ("method", "SNR, dB", "frames", "exact, %", "area under ROC", "Brier score", "of the mean alone", "calibration error")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -24,7 +25,7 @@ from eitskin.study.experiments.multitouch.cells import (
 from eitskin.study.experiments.multitouch.counts import Score, score
 from eitskin.study.experiments.multitouch.doubt import Confidences, Judged, Rule, confidences, fit_rule, judge
 from eitskin.study.experiments.multitouch.lab import CLASSICAL, CLASSICAL_SCENES, HEADLINE_DB, SNRS_DB, Lab
-from eitskin.study.experiments.multitouch.variants import VARIANTS, Seen
+from eitskin.study.experiments.multitouch.variants import VARIANTS, Seen, Variant
 from eitskin.study.judge.matching import match
 from eitskin.study.sessions import Measured
 from eitskin.study.snr import noise_deviation_v
@@ -64,11 +65,12 @@ class Limit:
 
 @dataclass(frozen=True)
 class Doubts:
-    """Frames of every test cell and of the mixed test set, and the rule that tuning scenes gave, for each variant."""
+    """Frames of every test cell and of the mixed test set, and each found touch of these, by variant; and the one rule that the
+    tuning frames of all variants gave: the core has one."""
 
+    rule: Rule
     cells: dict[str, list[Judged]]
     mixed: dict[str, list[Judged]]
-    rules: dict[str, Rule]
     touches: dict[str, Confidences]
 
 
@@ -123,28 +125,25 @@ def _limit(lab: Lab, cell: Cell, snr_db: float, count: int) -> Limit:
 
 def doubts(lab: Lab, desk: Desk, counted: Counted) -> Doubts:
     """The core's own signal on all that was counted, and on mixed scenes; the rule from mixed tuning scenes."""
-    seed_radius_mm = {v.name: lab.seed_radius_mm(v) for v in VARIANTS}
-    cells = [c for c in (*counting_cells(), single_cell(), *uneven_cells()) if (c.geometry, c.touches) not in counted.unfit]
-    parts = list(desk.progress(mixed_cells(), "judging doubt"))
-    found = Doubts({}, {}, {}, {})
-    for variant in VARIANTS:
-        def frames(which: list[Cell], tuning: bool, name: str = variant.name) -> list[Judged]:
-            return [
-                judge(seen, truth, snr_db, seed_radius_mm[name])
-                for cell in which for snr_db in SNRS_DB for seen, truth in _pairs(lab, cell, name, snr_db, tuning)
-            ]  # fmt: skip
 
-        found.rules[variant.name] = fit_rule(frames(parts, True))
-        found.cells[variant.name], found.mixed[variant.name] = frames(cells, False), frames(parts, False)
-        found.touches[variant.name] = confidences(
-            [pair for cell in parts for snr_db in SNRS_DB for pair in _pairs(lab, cell, variant.name, snr_db, False)]
-        )
+    def frames(which: Sequence[Cell], variant: Variant, tuning: bool = False) -> list[Judged]:
+        return [
+            judge(seen, truth, snr_db, lab.seed_radius_mm(variant))
+            for cell in which for snr_db in SNRS_DB for seen, truth in _pairs(lab, cell, variant, snr_db, tuning)
+        ]  # fmt: skip
+
+    cells = [c for c in (*counting_cells(), single_cell(), *uneven_cells()) if (c.geometry, c.touches) not in counted.unfit]
+    parts = mixed_cells()
+    found = Doubts(fit_rule([frame for variant in VARIANTS for frame in frames(parts, variant, tuning=True)]), {}, {}, {})
+    for variant in desk.progress(VARIANTS, "judging doubt"):
+        found.cells[variant.name], found.mixed[variant.name] = frames(cells, variant), frames(parts, variant)
+        pairs = [pair for cell in parts for snr_db in SNRS_DB for pair in _pairs(lab, cell, variant, snr_db)]
+        found.touches[variant.name] = confidences(pairs)
     return found
 
 
-def _pairs(lab: Lab, cell: Cell, variant: str, snr_db: float, tuning: bool) -> list[tuple[Seen, FloatArray]]:
-    chosen = next(one for one in VARIANTS if one.name == variant)
-    return list(zip(lab.seen(cell, chosen, snr_db, tuning), lab.truths_mm(cell, tuning), strict=True))
+def _pairs(lab: Lab, cell: Cell, variant: Variant, snr_db: float, tuning: bool = False) -> list[tuple[Seen, FloatArray]]:
+    return list(zip(lab.seen(cell, variant, snr_db, tuning), lab.truths_mm(cell, tuning), strict=True))
 
 
 def prepare_mixed(lab: Lab, desk: Desk) -> None:

@@ -40,11 +40,11 @@ ASKED = (
 LEAST_MM, AIM_MM = (1.0, 2.5), (0.5, 1.0)  # median and p95 of one touch at 60 dB
 
 
-def percent(share: Share) -> str:
+def percent(share: Share, digits: int = 0) -> str:
     """ "94 (88 to 97)"; "-" of nothing."""
     if share.count == 0:
         return "-"
-    return f"{100 * share.mean:.0f} ({100 * share.low:.0f} to {100 * share.high:.0f})"
+    return f"{100 * share.mean:.{digits}f} ({100 * share.low:.{digits}f} to {100 * share.high:.{digits}f})"
 
 
 def millimetres(value: Quantile) -> str:
@@ -58,11 +58,11 @@ def kmac(score: Score) -> str:
 
 
 def verdict(value: float, best: float, worst: float, asked: float, more: bool = True) -> str:
-    """Whether a value is what was asked, and whether its whole interval (``worst`` end, ``best`` end) is."""
+    """Whether a value is what was asked, and whether its interval is to its ``worst`` end, or reaches it at its ``best``."""
     sign = 1 if more else -1
     if sign * value >= sign * asked:
-        return "yes" if sign * worst >= sign * asked else "yes, interval reaches below" if more else "yes, interval reaches above"
-    return "no, within the interval" if sign * best >= sign * asked else "no"
+        return "yes" if sign * worst >= sign * asked else "mean yes, interval no"
+    return "mean no, interval reaches it" if sign * best >= sign * asked else "no"
 
 
 def asked_table(counted: Counted) -> Table:
@@ -76,7 +76,7 @@ def asked_table(counted: Counted) -> Table:
             e = score.exact
             rows.append((
                 f"exact count, {one.text}, {one.touches} touches", f"{'aim' if one.aim else 'at least'} {100 * one.share:.0f} %",
-                name, f"{percent(e)} %", str(e.count), kmac(score), verdict(e.mean, e.high, e.low, one.share),
+                name, f"{percent(e, 1)} %", str(e.count), kmac(score), verdict(e.mean, e.high, e.low, one.share),
             ))  # fmt: skip
     for name in NAMES:
         score = counted.scores[SINGLE, 1, name, HEADLINE_DB]

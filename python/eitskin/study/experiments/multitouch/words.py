@@ -53,14 +53,14 @@ def closing(counted: Counted, limited: Sequence[Limit], doubted: Doubts) -> str:
         f"One touch at 60 dB is found within {single.median_mm.value:.2f} mm (median). Of {whole} frames of the ceiling's cells "
         f"the core has exactly: {seen}; the nonlinear fit that is told has {sum(one.nonlinear for one in limited)}."
     )
-    rule = doubted.rules[NAMES[0]]
-    frames = [one for one in doubted.mixed[NAMES[0]] if one.snr_db >= HEADLINE_DB]
-    now, new = calibration(frames), calibration(frames, rule.says(frames))
-    parts.append(
-        f"On mixed test scenes at 60 and 80 dB ({NAMES[0]}) the count is right in {_pc(now.right_not_said)} of the frames about "
-        f"which `crowded` is not said, {_pc(now.not_said)} of all; with the score in {_pc(new.right_not_said)} of "
-        f"{_pc(new.not_said)}."
-    )
+    for name in NAMES:
+        frames = [one for one in doubted.mixed[name] if one.snr_db >= HEADLINE_DB]
+        now, new = calibration(frames), calibration(frames, doubted.rule.says(frames))
+        parts.append(
+            f"{name}, mixed test scenes at 60 and 80 dB: `crowded` is not said of {_pc(now.not_said)} of the frames, and of "
+            f"these {_pc(now.right_not_said)} have the right count; the score passes {_pc(new.not_said)}, and of these "
+            f"{_pc(new.right_not_said)}."
+        )
     return "\n".join(f"- {part}" for part in parts)
 
 
