@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 PAPER_TOUCHES = 7
 SNR_COLOURS = {40.0: "#b26a00", 60.0: "#00796b", 80.0: "#283593"}
-CLASSICAL_COLOURS = ("#8a8a8a", "#c2185b")
+CLASSICAL_COLOURS = ("#9e9e9e", "#5d4037", "#c2185b")
 TITLES = {RING: "ring of 60 mm", WIDE: "random, 4 radii apart", NARROW: "random, 2.5 radii apart"}
 NEAREST_EDGES = (0.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.5, 20.0)
 SAID, NOT_SAID = "#c62828", "#00796b"
@@ -47,7 +47,7 @@ def draw_counts(path: str | Path, counted: Counted) -> None:
         figure = matplotlib.figure.Figure(figsize=(11.5, 3.3 * len(NAMES) + 0.5), layout="constrained")
         for row, variant in enumerate(NAMES):
             lines = [(variant, snr_db, SNR_COLOURS[snr_db], f"core, {snr_db:g} dB") for snr_db in SNRS_DB]
-            lines += [(name, HEADLINE_DB, colour, f"{SHORT[name]}, {HEADLINE_DB:g} dB")
+            lines += [(name, HEADLINE_DB, colour, f"{SHORT.get(name, name)}, {HEADLINE_DB:g} dB")
                       for name, colour in zip(CLASSICAL, CLASSICAL_COLOURS, strict=True)]  # fmt: skip
             for column, geometry in enumerate(GEOMETRIES):
                 axes = figure.add_subplot(len(NAMES), 3, 3 * row + column + 1)
@@ -64,7 +64,7 @@ def draw_counts(path: str | Path, counted: Counted) -> None:
                 if column == 0:
                     axes.set_ylabel("share of scenes counted exactly")
         handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, fontsize=8)
+        figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=8)
         save_png(figure, path)
 
 

@@ -50,7 +50,7 @@ def test_outcome_has_every_cell(done: tuple[Path, Outcome]) -> None:
     assert [row[0] for row in tables["exact-ring"].rows] == [str(k) for k in range(2, 13)]
     assert all(len(row) == len(table.head) for table in outcome.tables for row in table.rows)
     methods = {one["method"] for one in outcome.data["counts"]}
-    assert methods >= {variant.name for variant in VARIANTS} and len(methods) == len(VARIANTS) + 2
+    assert methods >= {variant.name for variant in VARIANTS} and len(methods) == len(VARIANTS) + 3
     core = [one for one in outcome.data["counts"] if one["method"] == "default"]
     assert len(core) == 3 * (33 + 1 + 5) and all(one["kmac"] > 0 for one in core)
     single = next(one for one in core if one["places"] == "single" and one["snr_db"] == 80)

@@ -54,7 +54,7 @@ def gallery(lab: Lab, desk: Desk) -> list[Example]:
             solver = Reconstructor(model, options=replace(default_options(model), **VARIANTS[0].options))
             solver.tare(measured.quiet_v)
             result = solver.reconstruct(measured.frames_v[SCENE, -1])
-            method, frame = lab.family(CLASSICAL[0]).make(trained.value), differences_v(measured)[SCENE : SCENE + 1]
+            method, frame = lab.method(CLASSICAL[0]), differences_v(measured)[SCENE : SCENE + 1]
             return {
                 "image": np.asarray(result.image, dtype=np.float64),
                 "found": np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in result.touches]).reshape(-1, 3),

@@ -28,7 +28,7 @@ def conditions(lab: Lab, desk: Desk) -> str:
     """What all tables share."""
     settings = desk.settings
     mixed = MIXED_PARTS * settings.count(MIXED_SCENES, 3)
-    trained = "; ".join(f"{SHORT[name]}: {one.value:g} and t' = {one.threshold:g}" for name in CLASSICAL
+    trained = "; ".join(f"{SHORT.get(name, name)}: {one.value:g} and t' = {one.threshold:g}" for name in CLASSICAL
                         for one in [lab.trained(name)])  # fmt: skip
     return (
         f"Seed {settings.seed}; frames from a mesh of about {SIMULATED_ELEMENTS} elements, contacts +-20 %, models and Jacobians "
