@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError, UsageError
-from eitskin.model.build import BuildSettings, Linearisation, make_model
+from eitskin.model.build import BuildSettings, make_model
 from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.study.compare.methods import Family, Setup
@@ -79,8 +79,7 @@ def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     Raises:
         UsageError: the C core is not built.
     """
-    linear = Linearisation(setup.grid, setup.jacobian, setup.voltages_v, setup.mesh_elements, setup.electrode_fields)
-    model = make_model(setup.skin, setup.protocol, linear, BuildSettings())
+    model = make_model(setup.skin, setup.protocol, setup.linearisation, BuildSettings())
 
     def family(iterations: int, painted: bool) -> Family:
         def make(_: float) -> CoreMethod:

@@ -18,6 +18,7 @@ from eitskin.fem.fields import electrode_fields
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import sensitivity
+from eitskin.model.build import Linearisation
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
 from eitskin.solve import baselines
@@ -92,6 +93,11 @@ class Setup:
     electrode_fields: FloatArray
     mesh_nodes: int
     mesh_elements: int
+
+    @property
+    def linearisation(self) -> Linearisation:
+        """What a model is made of."""
+        return Linearisation(self.grid, self.jacobian, self.voltages_v, self.mesh_elements, self.electrode_fields)
 
 
 def setup_for(skin: Skin, protocol: Scan, *, elements: int, pixels_across: int = 32) -> Setup:

@@ -69,6 +69,7 @@ def _finite(value: Any) -> Any:
 def _command(name: str, page: Path, settings: Settings) -> str:
     more = f" --seed {settings.seed}" if settings.seed != Settings.seed else ""
     more += f" --share {settings.share:g}" if settings.share != Settings.share else ""
+    more += "" if settings.data is None else " --data FOLDER"
     return f"Tables and pictures are written by `eitskin study {name} -o out/{name}{more} --page docs/studies/{page.name}`."
 
 

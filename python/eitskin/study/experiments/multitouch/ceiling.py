@@ -43,8 +43,8 @@ class Told(ReferenceEngine):
         super().__init__(model)
         self.places_mm: FloatArray = np.zeros((0, 2))
 
-    def _run(self, problem: Problem) -> Result:
-        result, centres = super()._run(problem), self.model.grid.centres_mm()
+    def _run(self, problem: Problem, last: FloatArray | None) -> Result:
+        result, centres = super()._run(problem, last), self.model.grid.centres_mm()
         weight, image = self.model.column_weight.astype(np.float64), np.zeros(len(centres))
         for place in self.places_mm:
             image[int(np.argmin(((centres - place) ** 2).sum(axis=1)))] = 1.0

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.model.build import Linearisation, make_model, scaled_defaults
+from eitskin.model.build import make_model, scaled_defaults
 from eitskin.model.model import Model
 from eitskin.scene.random_touches import TouchSet
 from eitskin.skin.protocol import adjacent
@@ -49,8 +49,7 @@ class Lab:
         """The variant's."""
         if variant.name not in self._models:
             s = self.setup
-            linear = Linearisation(s.grid, s.jacobian, s.voltages_v, s.mesh_elements)
-            self._models[variant.name] = make_model(self.skin, self.protocol, linear, variant.settings)
+            self._models[variant.name] = make_model(self.skin, self.protocol, s.linearisation, variant.settings)
         return self._models[variant.name]
 
     def seed_radius_mm(self, variant: Variant) -> float:
@@ -91,7 +90,7 @@ class Lab:
 
     @cached_property
     def _families(self) -> dict[str, Family]:
-        return {one.make(one.values[0]).name: one for one in baseline_methods(self.setup.jacobian)}
+        return {one.make(one.values[0]).name: one for one in baseline_methods(self.setup.jacobian, self.setup.grid)}
 
     def method(self, name: str) -> Method:
         """A classical method, as it was trained."""

@@ -40,6 +40,7 @@ class Variant:
 # the first is what is usual: pictures and the doubt are of it
 VARIANTS = (
     Variant("default"),
+    Variant("peaks alone", options={"touch_search": 0}),
     Variant("log-ratio", BuildSettings(data_kind="log-ratio")),
 )
 
