@@ -77,6 +77,18 @@ def hand_places_mm() -> FloatArray:
     return outline.points_at(arc_mm)
 
 
+def hand_pairs_mm() -> FloatArray:
+    """16 electrodes of which each finger has two, one on either side of its tip; the others at the wrist, the palm's edges and
+    beside the thumb; counterclockwise from the wrist's middle, (16, 2) near the rim."""
+    sides = {}
+    for name, (base, tip, half) in FINGERS.items():
+        along = np.subtract(tip, base) / math.dist(tip, base)
+        sides[name] = [np.asarray(tip) + side * half * np.array([along[1], -along[0]]) for side in (1, -1)]
+    fingers = [place for name in ("little", "ring", "middle", "index") for place in sides[name]]
+    places = [(96, 10), (120, 28), (133, 70), *fingers, (44, 82), *sides["thumb"], (46, 33), (68, 10)]
+    return np.array([np.asarray(place, dtype=np.float64) for place in places])
+
+
 def hand_region(points_mm: npt.ArrayLike) -> list[str]:
     """The finger that each of ``points_mm`` (k, 2) lies on, or "palm"."""
     regions = []
