@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +10,13 @@ from eitskin.view.pictures import STYLE, load_matplotlib, save_png
 
 EQUALS = {"noise": "equal noise a row", "time": "equal time, 20.8 ms a frame"}
 COLOURS = {"noise": "#1565c0", "time": "#ef6c00"}
+DASHES = ("o-", "s--", "^:")
 SHADES = ("#0d47a1", "#1e88e5", "#64b5f6", "#8d6e63", "#bdbdbd")
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A scan: image MIoU with its interval, exact counts of six touches (a share), pairs told apart from (mm, inf for never)."""
+    """A scan: image MIoU with its interval, exact counts of six touches (a share), and of pairs by their distance in mm."""
 
     electrodes: int
     pattern: str
@@ -25,11 +25,11 @@ class Bar:
     low: float
     high: float
     six: float
-    pair_mm: float
+    pairs: tuple[tuple[float, float], ...]
 
 
 def draw_counts(path: str | Path, bars: Sequence[Bar]) -> None:
-    """Image MIoU, six touches counted and pairs told apart over the number of electrodes, adjacent pattern, as a PNG.
+    """Image MIoU and six touches counted over the number of electrodes, pairs over their distance; adjacent pattern; a PNG.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -46,17 +46,22 @@ def draw_counts(path: str | Path, bars: Sequence[Bar]) -> None:
             reach = [[bar.miou - bar.low for bar in mine], [bar.high - bar.miou for bar in mine]]
             axes[0].errorbar(places, [bar.miou for bar in mine], reach, marker="o", capsize=3, color=colour, label=EQUALS[equal])
             axes[1].plot(places, [100 * bar.six for bar in mine], "o-", color=colour)
-            axes[2].plot(places, [bar.pair_mm if math.isfinite(bar.pair_mm) else math.nan for bar in mine], "o-", color=colour)
-            for one in axes:
+            for bar, dashes in zip(mine, DASHES, strict=False):
+                label = f"{bar.electrodes} electrodes" if equal == "noise" else None
+                apart, shares = zip(*bar.pairs, strict=True)
+                axes[2].plot(apart, [100 * share for share in shares], dashes, color=colour, label=label)
+            for one in axes[:2]:
                 one.set_xticks(list(places), [str(bar.electrodes) for bar in mine])
-        titles = ("image MIoU, 1 to 3 touches", "six touches counted exactly (%)", "pairs of radius 9 mm\ntold apart from (mm)")
-        for one, title in zip(axes, titles, strict=True):
+        titles = ("image MIoU, 1 to 3 touches", "six touches counted exactly (%)", "pairs counted exactly (%)")
+        below = ("electrodes, adjacent pattern",) * 2 + ("distance of the centres, radius 9 mm (mm)",)
+        for one, title, label in zip(axes, titles, below, strict=True):
             one.set_title(title)
-            one.set_xlabel("electrodes, adjacent pattern")
+            one.set_xlabel(label)
             one.spines[["top", "right"]].set_visible(False)
         axes[0].legend(frameon=False, loc="best")
-        axes[1].set_ylim(0, 104)
-        axes[2].set_ylim(18, None)
+        axes[2].legend(frameon=False, loc="best")
+        for one in axes[1:]:
+            one.set_ylim(-4, 104)
         save_png(figure, path)
 
 

@@ -16,7 +16,8 @@ from eitskin.study.snr import BASE_SAMPLES
 
 FOUND = (
     "mu, lambda, iterations, t", "image MIoU (95 %)", "worst tenth", "discs MIoU", "exact, 1 to 3 (95 %)",
-    "exact, six apart (95 %)", "false a scene of six", "position, median / p95, mm", "pairs told apart from, mm", "kMAC, mean / most",
+    "exact, six apart (95 %)", "false a scene of six", "position, median / p95, mm",
+    "pairs told apart from, mm", "kMAC, mean / most",
 )  # fmt: skip
 NOISE_HEAD = ("electrodes, pattern", "rows", "of them unique", "scan, ms", "rms(V0), mV", "rank", *FOUND)
 TIME_HEAD = ("electrodes, pattern", "rows", "drives", "samples", "scan, ms", "sigma, relative", "rank", *FOUND)
@@ -29,7 +30,7 @@ SCANS_HEAD = (
 Results = Mapping[Case, Mapping[str, Any]]
 
 
-def tables(results: Results) -> tuple[Table, ...]:
+def all_tables(results: Results) -> tuple[Table, ...]:
     """Equal noise, equal time, ranks and grids, times of scans."""
     adjacent = [case for case in results if case.equal == "noise" and case.pattern == "adjacent"]
     swept = sorted(adjacent, key=lambda case: (case.electrodes, case.pixels, case.rank))

@@ -7,7 +7,7 @@ from typing import Any
 
 from eitskin.study.experiments.experiment import Desk, Outcome
 from eitskin.study.experiments.shapes.measuring import SNR_DB, TEST, TUNING, Maker
-from eitskin.study.experiments.shapes.tables import tables
+from eitskin.study.experiments.shapes.tables import all_tables
 from eitskin.study.experiments.shapes.variants import variants
 from eitskin.view.shapes_pictures import Shape, draw_shapes
 
@@ -29,7 +29,7 @@ def run(desk: Desk) -> Outcome:
         test=settings.count(TEST), tuning=settings.count(TUNING), seed=settings.seed, tuning_seed=settings.tuning_seed, snr=SNR_DB
     )
     return Outcome(
-        tables(both),
+        all_tables(both),
         {"seed": settings.seed, "snr_db": SNR_DB, "shapes": measured},
         {"shapes.png": partial(draw_shapes, shapes=[_shape(*one) for one in both.values()])},
         {"conditions": said},

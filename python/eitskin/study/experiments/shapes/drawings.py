@@ -85,7 +85,7 @@ def hand_pairs_mm() -> FloatArray:
         along = np.subtract(tip, base) / math.dist(tip, base)
         sides[name] = [np.asarray(tip) + side * half * np.array([along[1], -along[0]]) for side in (1, -1)]
     fingers = [place for name in ("little", "ring", "middle", "index") for place in sides[name]]
-    places = [(96, 10), (120, 28), (133, 70), *fingers, (44, 82), *sides["thumb"], (46, 33), (68, 10)]
+    places = [(96, 10), (120, 28), (133, 70), *fingers, (41, 88), *sides["thumb"], (46, 33), (68, 10)]
     return np.array([np.asarray(place, dtype=np.float64) for place in places])
 
 

@@ -24,7 +24,7 @@ FOUND_HEAD = (
 LOST_HEAD = ("shape, electrodes", "where", "touches", "found (95 %)", "position, median, mm", "sensitivity there, median")
 
 
-def tables(measured: Mapping[str, tuple[Variant, Mapping[str, Any]]]) -> tuple[Table, ...]:
+def all_tables(measured: Mapping[str, tuple[Variant, Mapping[str, Any]]]) -> tuple[Table, ...]:
     """The skins, what was found on them, and where."""
     both = list(measured.values())
     return (
