@@ -83,7 +83,7 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     desk = desk_in(tmp_path, Settings(share=0.03), plain)
     first = electrodes.run(desk)
     by_name = {table.name: table for table in first.tables}
-    assert {name: len(table.rows) for name, table in by_name.items()} == {"noise": 4, "time": 4, "ranks": 4, "scans": 4}
+    assert {name: len(table.rows) for name, table in by_name.items()} == {"noise": 4, "time": 4, "ranks": 6, "scans": 4}
     for table in first.tables:
         assert all(len(row) == len(table.head) for row in table.rows)
     cases = {(c["case"]["electrodes"], c["case"]["pattern"], c["case"]["equal"]): c for c in first.data["cases"]}

@@ -46,10 +46,11 @@ SAID = (
 
 
 def cases() -> list[Case]:
-    """Everything that is measured: patterns at equal noise and equal time, then ranks and grids."""
+    """Everything that is measured: patterns at equal noise and equal time, then ranks, grids and columns' weights."""
     usual = [usual_case(count, pattern, equal) for equal in ("noise", "time") for count in COUNTS for pattern in PATTERNS]
     swept = [Case(count, "adjacent", "noise", rank, pixels) for count in COUNTS for pixels in GRIDS for rank in SWEEP[count]]
-    return list(dict.fromkeys([*usual, *swept]))
+    flat = [Case(count, "adjacent", "noise", max(SWEEP[count]), power=1.0) for count in COUNTS]
+    return list(dict.fromkeys([*usual, *swept, *flat]))
 
 
 def run(desk: Desk) -> Outcome:

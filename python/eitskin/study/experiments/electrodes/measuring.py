@@ -16,6 +16,7 @@ from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import sensitivity
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.eitm import encode_model
+from eitskin.model.reduction import DEFAULT_COLUMN_POWER
 from eitskin.scene.random_touches import TouchSet, random_touches, spaced_touches
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.skin.electrodes import Electrodes
@@ -44,13 +45,15 @@ KEPT = ("image", "discs", "exact", "false", "kmac", "error_mm")
 
 @dataclass(frozen=True)
 class Case:
-    """One scan with its model: ``equal`` says what it shares with the others, "noise" in each row or "time" of a frame."""
+    """One scan with its model: ``equal`` says what it shares with the others, "noise" in each row or "time" of a frame;
+    ``power`` is p of the reduction."""
 
     electrodes: int
     pattern: str = "adjacent"
     equal: str = "noise"
     rank: int = 64
     pixels: int = 32
+    power: float = DEFAULT_COLUMN_POWER
 
 
 def usual_case(electrodes: int, pattern: str, equal: str) -> Case:
@@ -137,7 +140,7 @@ class Workshop:
         return dict(self.desk.kept({**facts, "sets": sets}, lambda: self._measure(case, noise_v)))
 
     def _measure(self, case: Case, noise_v: float) -> dict[str, Any]:
-        settings = BuildSettings(rank=case.rank, pixels_across=case.pixels, elements=MODEL_ELEMENTS)
+        settings = BuildSettings(case.rank, case.pixels, elements=MODEL_ELEMENTS, column_power=case.power)
         model = make_model(self.skin, scan_of(case).protocol, self.linear(case), settings)
         judge = metrics.judge_for(self.skin.outline, model.grid)
         chosen_on = [(self.sets[key].scenes, *self.frames(key, case, noise_v)) for key in TRAINING]

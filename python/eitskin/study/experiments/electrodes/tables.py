@@ -21,7 +21,7 @@ FOUND = (
 )  # fmt: skip
 NOISE_HEAD = ("electrodes, pattern", "rows", "of them unique", "scan, ms", "rms(V0), mV", "rank", *FOUND)
 TIME_HEAD = ("electrodes, pattern", "rows", "drives", "samples", "scan, ms", "sigma, relative", "rank", *FOUND)
-RANKS_HEAD = ("electrodes", "rank", "pixels across", "model, kB", *FOUND)
+RANKS_HEAD = ("electrodes", "rank", "pixels across", "p", "model, kB", *FOUND)
 SCANS_HEAD = (
     "electrodes, pattern", "rows", "scan of 80 samples, ms", "of 20 samples, ms",
     "unique rows", "of 80 samples, ms", "of 20 samples, ms", "drives in 20.8 ms",
@@ -33,7 +33,7 @@ Results = Mapping[Case, Mapping[str, Any]]
 def all_tables(results: Results) -> tuple[Table, ...]:
     """Equal noise, equal time, ranks and grids, times of scans."""
     adjacent = [case for case in results if case.equal == "noise" and case.pattern == "adjacent"]
-    swept = sorted(adjacent, key=lambda case: (case.electrodes, case.pixels, case.rank))
+    swept = sorted(adjacent, key=lambda case: (case.electrodes, case.power, case.pixels, case.rank))
     main = {equal: [case for case in results if case.equal == equal and is_usual(case)] for equal in ("noise", "time")}
     return (
         Table("noise", NOISE_HEAD, tuple(_noise_row(case, results[case]) for case in main["noise"])),
@@ -88,7 +88,7 @@ def _time_row(case: Case, result: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _rank_row(case: Case, result: Mapping[str, Any]) -> tuple[str, ...]:
-    head = (f"{case.electrodes}", f"{case.rank}", f"{case.pixels}", f"{result['model_bytes'] / 1000:.0f}")
+    head = (f"{case.electrodes}", f"{case.rank}", f"{case.pixels}", f"{case.power:g}", f"{result['model_bytes'] / 1000:.0f}")
     return (*head, *_found(result))
 
 
