@@ -59,7 +59,7 @@ def draw_counts(path: str | Path, bars: Sequence[Bar]) -> None:
             one.set_xlabel(label)
             one.spines[["top", "right"]].set_visible(False)
         axes[0].legend(frameon=False, loc="best")
-        axes[2].legend(frameon=False, loc="best")
+        axes[2].legend(frameon=False, loc="upper left", fontsize=7.5)
         for one in axes[1:]:
             one.set_ylim(-4, 104)
         save_png(figure, path)

@@ -15,11 +15,11 @@ from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, 
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.drawing import Reading, read_drawing
+from eitskin.skin.example_drawings import forearm_corners, hand_corners, hand_places_mm, hand_svg, main
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.rounded import Corner, as_outline
 from eitskin.skin.skin import Skin, load_skin, skin_from_table, skin_to_table
-from eitskin.study.experiments.shapes.drawings import forearm_corners, hand_corners, hand_places_mm, hand_svg, main
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" {} >{}</svg>'

@@ -13,13 +13,13 @@ from eitskin.errors import UsageError
 from eitskin.fem.cem import Counters, ForwardModel
 from eitskin.fem.grid import grid_for
 from eitskin.model.build import linearise
+from eitskin.skin.example_drawings import FINGERS, forearm_corners, hand_corners, hand_region, main, rectangle_corners
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.rounded import as_outline
 from eitskin.study.experiments import registry, shapes
 from eitskin.study.experiments.experiment import Outcome, Settings, desk_in, plain
 from eitskin.study.experiments.scored import share_text
 from eitskin.study.experiments.shapes import measuring
-from eitskin.study.experiments.shapes.drawings import FINGERS, forearm_corners, hand_corners, hand_region, main, rectangle_corners
 from eitskin.study.experiments.shapes.variants import Variant, variants
 
 

@@ -69,13 +69,13 @@ class Bench:
         return metrics.best_threshold(self.judge.curves(images, self.truths(scenes)))
 
     def scores(self, scenes: Sequence[Scene], quiet_v: FloatArray, frames_v: FloatArray, t: float) -> dict[str, list[Any]]:
-        """Lists fit for JSON: a scene's image and disc MIoU, exact count, false touches, kMAC; of each true touch its place,
-        and the distance of the found one, None where it was missed."""
+        """Lists fit for JSON: a scene's image and disc MIoU, exact count, false touches, kMAC; of each true touch its
+        scene and place, and the distance of the found one, None where it was missed; a scene's found touches [x, y, radius]."""
         results = reconstruct_many(self.model, frames_v, quiet_v, threads=1)
         truths = self.truths(scenes)
         images = np.array([one.image for one in results], dtype=np.float64)
         scored: dict[str, list[Any]] = {"image": self.judge.curves(images, truths, [t])[:, 0].round(DIGITS).tolist()}
-        scored |= {name: [] for name in ("discs", "exact", "false", "kmac", "place_mm", "error_mm", "found")}
+        scored |= {name: [] for name in ("discs", "exact", "false", "kmac", "scene", "place_mm", "error_mm", "found")}
         for scene, truth, one in zip(scenes, truths, results, strict=True):
             pairs = self.matched(scene, one)
             distance = {i: d for (i, _), d in zip(pairs.pairs, pairs.distances_mm, strict=True)}
@@ -83,6 +83,7 @@ class Bench:
             scored["exact"].append(int(pairs.exact))
             scored["false"].append(pairs.false_touches)
             scored["kmac"].append(round((one.info.macs + one.info.touch_macs) / 1e3, 1))
+            scored["scene"] += [len(scored["found"])] * len(scene.touches)
             scored["place_mm"] += scene.centres_mm().round(2).tolist()
             scored["error_mm"] += [None if i not in distance else round(distance[i], 3) for i in range(len(scene.touches))]
             scored["found"].append([[round(float(v), 2) for v in (t.x_mm, t.y_mm, t.radius_mm)] for t in one.touches])

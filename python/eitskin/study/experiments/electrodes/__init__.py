@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -27,6 +28,7 @@ from eitskin.study.experiments.electrodes.patterns import PATTERNS
 from eitskin.study.experiments.electrodes.tables import all_tables, is_usual
 from eitskin.study.experiments.electrodes.tuning import FLOORS, ITERATIONS, LAMBDAS
 from eitskin.study.experiments.experiment import Desk, Outcome
+from eitskin.study.experiments.scored import number_text
 from eitskin.study.judge.summary import summarise
 from eitskin.view.electrodes_pictures import Bar, draw_counts, draw_patterns
 
@@ -71,8 +73,23 @@ def run(desk: Desk) -> Outcome:
         all_tables(results),
         {"seed": settings.seed, "noise_v": sigma_v, "cases": data},
         {"counts.png": partial(draw_counts, bars=bars), "patterns.png": partial(draw_patterns, bars=bars)},
-        {"conditions": said},
+        {"conditions": said, "best": _best(bars)},
     )
+
+
+def _best(bars: Sequence[Bar]) -> str:
+    """The best image at equal noise and at equal time, beside the usual scan's, in a sentence each."""
+    said = []
+    for equal, words in (("noise", "At equal noise"), ("time", "At equal time")):
+        mine = [bar for bar in bars if bar.equal == equal]
+        best = max(mine, key=lambda bar: bar.miou)
+        usual = next(bar for bar in mine if (bar.electrodes, bar.pattern) == (COUNTS[0], "adjacent"))
+        said.append(
+            f"{words} the best image of {len(mine)} is that of {best.electrodes} electrodes, {best.pattern}: {number_text(best.miou)} "
+            f"({number_text(best.low)} to {number_text(best.high)}), where {usual.electrodes} adjacent ones have "
+            f"{number_text(usual.miou)} ({number_text(usual.low)} to {number_text(usual.high)})."
+        )
+    return " ".join([*said, "The best of many flatters a little."])
 
 
 def _bar(case: Case, result: Any) -> Bar:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from eitskin.fem.grid import grid_for
+from eitskin.skin.example_drawings import hand_region
 from eitskin.study.experiments.experiment import Table
 from eitskin.study.experiments.scored import hits_mm, number_text, score_text, share_text
 from eitskin.study.experiments.shapes.variants import Variant
+from eitskin.study.judge.matching import GATE_MM
 from eitskin.study.judge.summary import summarise
 
 SKINS_HEAD = (
@@ -21,7 +24,9 @@ FOUND_HEAD = (
     "shape, electrodes", "t", "image MIoU (95 %)", "worst tenth", "perfect image", "discs MIoU", "exact count (95 %)",
     "false a scene", "position, median / p95, mm", "of the size", "kMAC, mean / most",
 )  # fmt: skip
-LOST_HEAD = ("shape, electrodes", "where", "touches", "found (95 %)", "position, median, mm", "sensitivity there, median")
+LOST_HEAD = (
+    "shape, electrodes", "where", "touches", "found (95 %)", "noticed", "position, median, mm", "sensitivity there, median",
+)  # fmt: skip
 
 
 def all_tables(measured: Mapping[str, tuple[Variant, Mapping[str, Any]]]) -> tuple[Table, ...]:
@@ -75,6 +80,7 @@ def _lost_rows(variant: Variant, result: Mapping[str, Any]) -> list[tuple[str, .
     errors, places = scores["error_mm"], np.array(scores["place_mm"]).reshape(-1, 2)
     where = variant.regions(places, about["deepest_mm"])
     pixels = variant.regions(grid_for(variant.skin.outline).centres_mm(), about["deepest_mm"])
+    noticed = _noticed(variant, scores)
     rows: list[tuple[str, ...]] = []
     for region in sorted(set(where), key=where.count, reverse=True):
         mine = [error for error, place in zip(errors, where, strict=True) if place == region]
@@ -86,8 +92,20 @@ def _lost_rows(variant: Variant, result: Mapping[str, Any]) -> list[tuple[str, .
                 region,
                 f"{len(mine)}",
                 share_text([error is not None for error in mine]),
+                f"{100 * np.mean([seen for seen, place in zip(noticed, where, strict=True) if place == region]):.0f} %",
                 f"{np.median(hits):.1f}" if hits else "-",
                 f"1 / {10 ** -float(np.median(seen)):.0f}" if seen else "-",
             )
         )
     return rows
+
+
+def _noticed(variant: Variant, scores: Mapping[str, Any]) -> list[bool]:
+    """Of each true touch whether anything was found on the same finger, however far along it, or within twice the gate."""
+    gate_mm = 2 * GATE_MM * variant.scale
+    noticed = []
+    for scene, place in zip(scores["scene"], scores["place_mm"], strict=True):
+        found = [(x, y) for x, y, _ in scores["found"][scene]]
+        same = variant.hand and hand_region([place])[0] in set(hand_region(found)) - {"palm"}
+        noticed.append(same or any(math.dist(place, one) <= gate_mm for one in found))
+    return noticed

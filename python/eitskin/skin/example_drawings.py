@@ -1,6 +1,6 @@
 """The shapes that skins have: a rounded rectangle, a forearm's developed sheet, a hand; and the examples' drawings of them.
 
-``python -m eitskin.study.experiments.shapes.drawings examples`` writes hand.svg and forearm.dxf there.
+``python -m eitskin.skin.example_drawings examples`` writes hand.svg and forearm.dxf there.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.errors import UsageError, missing_extra
+from eitskin.errors import EitskinError, UsageError, missing_extra
 from eitskin.fileio import write_beside, write_bytes
 from eitskin.skin.placement import nearest_on_rim
 from eitskin.skin.rounded import Corner, as_outline, as_polyline, as_svg_path
@@ -159,4 +159,7 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    try:
+        main(sys.argv[1:])
+    except EitskinError as problem:
+        sys.exit(f"eitskin: {problem}")
