@@ -85,8 +85,8 @@ def _best(bars: Sequence[Bar]) -> str:
         best = max(mine, key=lambda bar: bar.miou)
         usual = next(bar for bar in mine if (bar.electrodes, bar.pattern) == (COUNTS[0], "adjacent"))
         said.append(
-            f"{words} the best image of {len(mine)} is that of {best.electrodes} electrodes, {best.pattern}: {number_text(best.miou)} "
-            f"({number_text(best.low)} to {number_text(best.high)}), where {usual.electrodes} adjacent ones have "
+            f"{words} the best image of {len(mine)} is that of {best.electrodes} electrodes, {best.pattern}: "
+            f"{number_text(best.miou)} ({number_text(best.low)} to {number_text(best.high)}), where {usual.electrodes} adjacent ones have "
             f"{number_text(usual.miou)} ({number_text(usual.low)} to {number_text(usual.high)})."
         )
     return " ".join([*said, "The best of many flatters a little."])

@@ -17,7 +17,7 @@ from eitskin.study.experiments.scored import Bench, session_in_parts
 from eitskin.study.experiments.shapes.variants import Variant
 from eitskin.study.judge import metrics
 from eitskin.study.judge.matching import GATE_MM
-from eitskin.study.sessions import Session
+from eitskin.study.sessions import SceneSolver, Session
 
 SNR_DB = 60.0
 TUNING, TEST = 40, 160
@@ -65,8 +65,11 @@ class Maker:
 
     def session(self, drawn: TouchSet) -> Session:
         """Its frames."""
-        solver = self.desk.scenes(self.variant.skin, self.protocol)
-        return session_in_parts(solver, drawn, self.desk.progress, f"{self.variant.name.replace(',', '')} {drawn.role}")
+        return session_in_parts(self._solver, drawn, self.desk.progress, f"{self.variant.name.replace(',', '')} {drawn.role}")
+
+    @cached_property
+    def _solver(self) -> SceneSolver:
+        return self.desk.scenes(self.variant.skin, self.protocol)
 
     def measured(self) -> dict[str, Any]:
         """Everything of the shape in plain values: ``t``, ``scores`` of the test scenes, and ``about`` skin and model."""
