@@ -84,10 +84,10 @@ def _best(bars: Sequence[Bar]) -> str:
         mine = [bar for bar in bars if bar.equal == equal]
         best = max(mine, key=lambda bar: bar.miou)
         usual = next(bar for bar in mine if (bar.electrodes, bar.pattern) == (COUNTS[0], "adjacent"))
+        ours, theirs = (f"{number_text(one.miou)} ({number_text(one.low)} to {number_text(one.high)})" for one in (best, usual))
         said.append(
-            f"{words} the best image of {len(mine)} is that of {best.electrodes} electrodes, {best.pattern}: "
-            f"{number_text(best.miou)} ({number_text(best.low)} to {number_text(best.high)}), where {usual.electrodes} adjacent ones have "
-            f"{number_text(usual.miou)} ({number_text(usual.low)} to {number_text(usual.high)})."
+            f"{words} the best image of {len(mine)} is that of {best.electrodes} electrodes, {best.pattern}: {ours}, where "
+            f"{usual.electrodes} adjacent ones have {theirs}."
         )
     return " ".join([*said, "The best of many flatters a little."])
 
