@@ -13,14 +13,19 @@ import numpy.typing as npt
 
 from eitskin.config import check_keys, choice, integer, load_toml, number
 from eitskin.errors import ConfigError, GeometryError
+from eitskin.skin.drawing import TOLERANCE_MM, Drawing, Reading, read_drawing
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT, Electrodes
 from eitskin.skin.outline import MAX_SIZE_MM, MIN_SIZE_MM, Outline, disk, polygon
+from eitskin.skin.placement import SNAP_MM, Placed, by_fractions, by_marks, by_points
 from eitskin.skin.protocol import Protocol, protocol_from_table
 
 FloatArray = npt.NDArray[np.float64]
 
-SKIN_KEYS = ("name", "diameter_mm", "polygon_mm", "thickness_mm", "conductivity_s_per_m")
-ELECTRODE_KEYS = ("count", "width_mm", "start_angle_deg", "direction", "positions_mm", "contact_impedance_ohm_m2")
+OUTLINES = ("diameter_mm", "polygon_mm", "outline")
+DRAWING_KEYS = ("element", "scale_mm", "tolerance_mm")
+SKIN_KEYS = ("name", *OUTLINES, *DRAWING_KEYS, "thickness_mm", "conductivity_s_per_m")
+PLACES = ("positions_mm", "fractions", "points_mm", "marked")
+ELECTRODE_KEYS = ("count", "width_mm", "start_angle_deg", "direction", *PLACES, "snap_mm", "contact_impedance_ohm_m2")
 MIN_GAP_PER_WIDTH = 0.05
 PAPER_DIAMETER_MM = 194.0
 
@@ -100,12 +105,14 @@ def paper_skin() -> Skin:
     return Skin("paper", disk(PAPER_DIAMETER_MM), Electrodes())
 
 
-def skin_from_table(table: Mapping[str, Any], where: str) -> Skin:
-    """The skin in a parsed TOML ``table`` with [skin] and [electrodes]; ``where`` names its source in errors.
+def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = None) -> Skin:
+    """The skin in a parsed TOML ``table`` with [skin] and [electrodes]; ``where`` names its source in errors. A drawing that it
+    names lies in ``folder``; without one (a stored model's table) none is read.
 
     Raises:
         ConfigError: an unknown key, a wrong type or a value out of range.
         GeometryError: outline or electrodes cannot be.
+        FileError, MissingExtraError: a drawing cannot be read.
     """
     check_keys(table, ("skin", "electrodes", "protocol"), where)
     sheet, place = _subtable(table, "skin", where, required=True), f"{where} [skin]"
@@ -113,11 +120,14 @@ def skin_from_table(table: Mapping[str, Any], where: str) -> Skin:
     name = sheet.get("name", "skin")
     if not isinstance(name, str) or not name:
         raise ConfigError(f"{place}: name must be a word in quotes, not {name!r}")
+    contacts = _subtable(table, "electrodes", where)
     try:
+        drawing = _drawing_of(sheet, place, folder)
+        outline = _outline_from_table(sheet, place, drawing, contacts.get("marked"))
         return Skin(
             name=name,
-            outline=_outline_from_table(sheet, place),
-            electrodes=_electrodes_from_table(_subtable(table, "electrodes", where), f"{where} [electrodes]"),
+            outline=outline,
+            electrodes=_electrodes_from_table(contacts, f"{where} [electrodes]", outline, drawing),
             conductivity_s_per_m=number(sheet, "conductivity_s_per_m", 0.01, place, low=0, high=1e8, open_low=True),
             thickness_mm=number(sheet, "thickness_mm", 12.0, place, low=0, high=1e4, open_low=True),
         )
@@ -129,11 +139,12 @@ def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
     """The skin and the protocol in the TOML file ``path``; without [protocol], adjacent drive and measurement.
 
     Raises:
-        FileError: the file cannot be read.
+        FileError: the file, or a drawing that it names, cannot be read.
         ConfigError, GeometryError, ProtocolError: what it describes cannot be.
+        MissingExtraError: a drawing's library is not installed.
     """
     table, where = load_toml(path, "skin description"), str(path)
-    skin = skin_from_table(table, where)
+    skin = skin_from_table(table, where, Path(path).parent)
     return skin, protocol_from_table(_subtable(table, "protocol", where), skin.electrodes.count, f"{where} [protocol]")
 
 
@@ -167,36 +178,100 @@ def _subtable(table: Mapping[str, Any], key: str, where: str, *, required: bool 
     return value
 
 
-def _outline_from_table(sheet: Mapping[str, Any], where: str) -> Outline:
-    if ("diameter_mm" in sheet) == ("polygon_mm" in sheet):
-        raise ConfigError(f"{where}: give either diameter_mm or polygon_mm")
+def _drawing_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> Drawing | None:
+    """The drawing that [skin] names, if any."""
+    if sum(key in sheet for key in OUTLINES) != 1:
+        raise ConfigError(f"{where}: give either diameter_mm or polygon_mm, or outline = a drawing's file")
+    if "outline" not in sheet:
+        for key in DRAWING_KEYS:
+            if key in sheet:
+                raise ConfigError(f"{where}: {key} goes with outline = a drawing's file; remove it")
+        return None
+    name = sheet["outline"]
+    if not isinstance(name, str) or not name or "\0" in name:
+        raise ConfigError(f"{where}: outline must be the name of a drawing's file in quotes, not {name!r}")
+    if folder is None:
+        raise ConfigError(f"{where}: outline = {name!r} cannot be read from here; only a skin description's file names a drawing")
+    scale = number(sheet, "scale_mm", None, where, low=0, high=1e6, open_low=True) if "scale_mm" in sheet else None
+    tolerance = number(sheet, "tolerance_mm", TOLERANCE_MM, where, low=1e-3, high=10)
+    return read_drawing(folder / name, Reading(scale, tolerance))
+
+
+def _outline_from_table(sheet: Mapping[str, Any], where: str, drawing: Drawing | None, marked: object) -> Outline:
+    if drawing is not None:
+        return drawing.outline(_word(sheet, "element", where), marked if isinstance(marked, str) else None)
     if "diameter_mm" in sheet:
         return disk(number(sheet, "diameter_mm", None, where, low=MIN_SIZE_MM, high=MAX_SIZE_MM))
-    points = sheet["polygon_mm"]
-    if not isinstance(points, list):
-        raise ConfigError(f"{where}: polygon_mm must be a list of [x, y] points")
-    for k, point in enumerate(points):
-        if not isinstance(point, list) or len(point) != 2 or not all(_is_number(value) for value in point):
-            raise ConfigError(f"{where}: polygon_mm entry {k} (from 0) must be [x, y], not {point!r}")
-    return polygon(points)
+    return polygon(_points(sheet, "polygon_mm", where))
 
 
-def _electrodes_from_table(table: Mapping[str, Any], where: str) -> Electrodes:
+def _electrodes_from_table(
+    table: Mapping[str, Any], where: str, outline: Outline, drawing: Drawing | None
+) -> Electrodes:
     check_keys(table, ELECTRODE_KEYS, where)
-    positions = table.get("positions_mm")
-    if positions is not None and not (isinstance(positions, list) and all(_is_number(value) for value in positions)):
-        raise ConfigError(f"{where}: positions_mm must be a list of numbers")
     default = Electrodes()
+    start = number(table, "start_angle_deg", default.start_angle_deg, where, low=-360, high=360)
+    way = choice(table, "direction", "counterclockwise", ("clockwise", "counterclockwise"), where)
+    placed = _places(table, where, outline, drawing, start, way == "clockwise")
+    given = len(placed.positions_mm) if placed is not None else None
+    count = given if given is not None and given <= MAX_COUNT and "positions_mm" not in table else default.count
     impedance = default.contact_impedance_ohm_m2
-    direction = choice(table, "direction", "counterclockwise", ("clockwise", "counterclockwise"), where)
     return Electrodes(
-        count=integer(table, "count", default.count, where, low=MIN_COUNT, high=MAX_COUNT),
+        count=integer(table, "count", count, where, low=MIN_COUNT, high=MAX_COUNT),
         width_mm=number(table, "width_mm", default.width_mm, where, low=0, high=MAX_SIZE_MM, open_low=True),
-        start_angle_deg=number(table, "start_angle_deg", default.start_angle_deg, where, low=-360, high=360),
-        clockwise=direction == "clockwise",
-        positions_mm=None if positions is None else tuple(float(value) for value in positions),
+        start_angle_deg=start,
+        clockwise=way == "clockwise" if placed is None else placed.clockwise,
+        positions_mm=None if placed is None else placed.positions_mm,
         contact_impedance_ohm_m2=number(table, "contact_impedance_ohm_m2", impedance, where, low=0, high=1e6),
     )
+
+
+def _places(
+    table: Mapping[str, Any], where: str, outline: Outline, drawing: Drawing | None, start_deg: float, clockwise: bool
+) -> Placed | None:
+    """Where the electrodes are said to be; None for evenly."""
+    said = [key for key in PLACES if key in table]
+    if len(said) > 1:
+        raise ConfigError(f"{where}: {said[0]} and {said[1]} both say where electrodes are; keep one")
+    if "snap_mm" in table and said not in (["points_mm"], ["marked"]):
+        raise ConfigError(f"{where}: snap_mm goes with points_mm or marked; remove it")
+    if not said:
+        return None
+    snap = number(table, "snap_mm", SNAP_MM, where, low=0, high=MAX_SIZE_MM)
+    way = clockwise if "direction" in table else None
+    if said == ["marked"]:
+        mark = _word(table, "marked", where)
+        if drawing is None or mark is None:
+            raise ConfigError(f"{where}: marked names marks of a drawing, but [skin] has no outline = a drawing's file")
+        return by_marks(outline, drawing.marked(mark), start_deg, way, snap)
+    if said == ["points_mm"]:
+        points = _points(table, "points_mm", where)
+        if not points:
+            raise ConfigError(f"{where}: points_mm is empty; give [x, y] for each electrode")
+        return by_points(outline, points, start_deg, way, snap)
+    values = table[said[0]]
+    if not (isinstance(values, list) and all(_is_number(value) for value in values)):
+        raise ConfigError(f"{where}: {said[0]} must be a list of numbers")
+    if said == ["fractions"]:
+        return by_fractions(outline, values, clockwise)
+    return Placed(tuple(float(value) for value in values), clockwise)
+
+
+def _word(table: Mapping[str, Any], key: str, where: str) -> str | None:
+    value = table.get(key)
+    if value is not None and (not isinstance(value, str) or not value):
+        raise ConfigError(f"{where}: {key} must be a word in quotes, not {value!r}")
+    return value
+
+
+def _points(table: Mapping[str, Any], key: str, where: str) -> list[list[float]]:
+    points = table[key]
+    if not isinstance(points, list):
+        raise ConfigError(f"{where}: {key} must be a list of [x, y] points")
+    for k, point in enumerate(points):
+        if not isinstance(point, list) or len(point) != 2 or not all(_is_number(value) for value in point):
+            raise ConfigError(f"{where}: {key} entry {k} (from 0) must be [x, y], not {point!r}")
+    return points
 
 
 def _is_number(value: object) -> bool:

@@ -1,0 +1,153 @@
+"""SVG by svgelements: shapes with their transforms, in mm, y up. (0, 0) is the page's lower left corner."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from eitskin.errors import ConfigError, EitskinError, missing_extra
+from eitskin.skin.drawing import MAX_SHAPES, Reading, Shape, arc_pieces, bezier_pieces, flattened
+
+try:
+    import svgelements
+except ModuleNotFoundError as error:
+    raise missing_extra("drawing", "svgelements") from error
+
+MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
+MM_A_PIXEL = 25.4 / 96
+MAX_DEPTH = 100
+LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
+
+
+@dataclass(frozen=True)
+class Page:
+    """mm a user unit, and the user coordinates of the page's left and lower edge."""
+
+    scale_mm: float
+    left: float
+    bottom: float
+
+
+def read_svg(content: bytes, where: str, reading: Reading) -> list[Shape]:
+    """Every shape of the SVG file ``content``.
+
+    Raises:
+        ConfigError: it is damaged, no SVG, too large, or of no known size.
+    """
+    try:
+        root = ET.fromstring(content)
+    except (ET.ParseError, ValueError, LookupError) as error:
+        raise ConfigError(f"{where}: not valid SVG ({error}); export it again") from None
+    if root.tag.rpartition("}")[2] != "svg":
+        raise ConfigError(f"{where}: not an SVG drawing but <{root.tag.rpartition('}')[2]}>; export it again")
+    _refuse_copies(root, where)
+    page = _page(root, where, reading)
+    for key in ("width", "height", "viewBox", "preserveAspectRatio", "x", "y"):
+        root.attrib.pop(key, None)
+    try:
+        tree = svgelements.SVG.parse(io.BytesIO(ET.tostring(root)), reify=True, ppi=96.0)
+        return list(_shapes(tree, frozenset(), page, reading.tolerance_mm))
+    except EitskinError:
+        raise
+    except Exception as error:  # the parser has no error of its own: whatever a damaged file meets in it
+        raise ConfigError(f"{where}: cannot be read as SVG ({type(error).__name__}: {error}); export it again") from None
+
+
+def _page(root: ET.Element, where: str, reading: Reading) -> Page:
+    try:
+        box = [float(word) for word in re.split(r"[\s,]+", root.get("viewBox", "").strip()) if word]
+    except ValueError:
+        box = []
+    if root.get("viewBox") is not None and (len(box) != 4 or not all(map(math.isfinite, box)) or min(box[2:]) <= 0):
+        raise ConfigError(f"{where}: viewBox = {root.get('viewBox')!r} is not four numbers, width and height above 0; mend it")
+    sizes = [_length_mm(root.get(key)) for key in ("width", "height")]
+    scale = reading.scale_mm
+    if scale is None:
+        given = [size / side if box else MM_A_PIXEL for size, side in zip(sizes, box[2:] or (1, 1), strict=True) if size]
+        if not given:
+            raise ConfigError(f"{where}: width and height have no unit such as mm; give scale_mm, mm a unit")
+        if max(given) > 1.001 * min(given):
+            raise ConfigError(f"{where}: width and height scale it by {given[0]:g} and {given[-1]:g} mm a unit; give scale_mm")
+        scale = given[0]
+    if box:
+        return Page(scale, box[0], box[1] + box[3])
+    return Page(scale, 0.0, sizes[1] / MM_A_PIXEL if sizes[1] else 0.0)
+
+
+def _length_mm(text: str | None) -> float | None:
+    """A length with a physical unit, in mm; None for any other."""
+    found = re.fullmatch(r"\s*\+?(\d*\.?\d+(?:[eE][+-]?\d+)?)\s*([a-zA-Z]+)\s*", text or "")
+    value = float(found[1]) * MM.get(found[2].lower(), 0.0) if found else 0.0
+    return value if math.isfinite(value) and value > 0 else None
+
+
+def _refuse_copies(root: ET.Element, where: str) -> None:
+    """Refuse <use> in circles, and copies of copies that would never end."""
+    by_id = {one.get("id"): one for one in root.iter() if one.get("id")}
+    counts: dict[int, int] = {}
+
+    def count(one: ET.Element, depth: int) -> int:
+        if depth > MAX_DEPTH:
+            raise ConfigError(f"{where}: groups or copies within each other, over {MAX_DEPTH} deep; flatten the drawing")
+        if id(one) not in counts:
+            target = next((value for key, value in one.attrib.items() if key.rpartition("}")[2] == "href"), "")
+            copied = by_id.get(target[1:]) if one.tag.rpartition("}")[2] == "use" and target.startswith("#") else None
+            own = [] if copied is None else [copied]
+            counts[id(one)] = 1 + sum(count(child, depth + 1) for child in [*one, *own])
+        return counts[id(one)]
+
+    if count(root, 0) > MAX_SHAPES:
+        raise ConfigError(f"{where}: over {MAX_SHAPES} elements; export the outline alone")
+
+
+def _shapes(one: Any, around: frozenset[str], page: Page, tolerance_mm: float) -> Iterator[Shape]:
+    attributes = one.values.get("attributes", {}) if isinstance(one.values, dict) else {}
+    if attributes.get("display") == "none" or "display:none" in str(attributes.get("style", "")).replace(" ", ""):
+        return
+    own = {attributes.get("id"), attributes.get(LABEL), *str(attributes.get("class", "")).split()}
+    names = around | {str(name) for name in own if name}
+    if isinstance(one, list) and not isinstance(one, svgelements.Shape):
+        for child in one:
+            yield from _shapes(child, names, page, tolerance_mm)
+    elif isinstance(one, svgelements.Shape):
+        for run in _runs(abs(svgelements.Path(one)), tolerance_mm / page.scale_mm):
+            points = (np.array(run) - (page.left, page.bottom)) * (page.scale_mm, -page.scale_mm)
+            closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(np.ptp(points, axis=0).max())
+            yield Shape(str(attributes.get("id") or ""), names, points[:-1] if closed else points, closed)
+
+
+def _runs(path: Any, tolerance: float) -> Iterator[list[tuple[float, float]]]:
+    """The subpaths as points, flattened; a closed one ends on its first point."""
+    run: list[tuple[float, float]] = []
+    for piece in path:
+        if isinstance(piece, svgelements.Move):
+            if len(run) > 1:
+                yield run
+            run = [_pair(piece.end)]
+        elif isinstance(piece, (svgelements.CubicBezier, svgelements.QuadraticBezier)):
+            pieces = bezier_pieces([_pair(point) for point in _controls(piece)], tolerance)
+            run += flattened(lambda t, curve=piece: _pair(curve.point(t)), pieces)  # type: ignore[misc]
+        elif isinstance(piece, svgelements.Arc):
+            pieces = arc_pieces(max(piece.rx, piece.ry), piece.sweep, tolerance)
+            run += flattened(lambda t, curve=piece: _pair(curve.point(t)), pieces)  # type: ignore[misc]
+        elif piece.end is not None:
+            run.append(_pair(piece.end))
+    if len(run) > 1:
+        yield run
+
+
+def _controls(piece: Any) -> list[Any]:
+    if isinstance(piece, svgelements.QuadraticBezier):
+        return [piece.start, piece.control, piece.end]
+    return [piece.start, piece.control1, piece.control2, piece.end]
+
+
+def _pair(point: Any) -> tuple[float, float]:
+    return float(point.x), float(point.y)

@@ -1,0 +1,114 @@
+"""The experiment on shapes: what is drawn, what is measured once, and what a finger with one electrode cannot show."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eitskin.errors import UsageError
+from eitskin.fem.cem import Counters, ForwardModel
+from eitskin.fem.grid import grid_for
+from eitskin.model.build import linearise
+from eitskin.skin.example_drawings import FINGERS, forearm_corners, hand_corners, hand_region, main, rectangle_corners
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.rounded import as_outline
+from eitskin.study.experiments import registry, shapes
+from eitskin.study.experiments.experiment import Outcome, Settings, desk_in, plain
+from eitskin.study.experiments.scored import share_text
+from eitskin.study.experiments.shapes import measuring
+from eitskin.study.experiments.shapes.variants import Variant, variants
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Variant]:
+    """The skins by name."""
+    return {one.name: one for one in variants(tmp_path_factory.mktemp("drawings"))}
+
+
+def _small(monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], folder: Path) -> Outcome:
+    """A run on two shapes with few elements and scenes."""
+    monkeypatch.setattr(shapes, "variants", lambda _: [known["disk, 16"], known["hand, 16 placed"]])
+    monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
+    monkeypatch.setattr("eitskin.study.experiments.experiment.Desk.scenes.__defaults__", (2000,))
+    return shapes.run(desk_in(folder, Settings(share=0.03), plain))
+
+
+def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], tmp_path: Path) -> None:
+    first = _small(monkeypatch, known, tmp_path)
+    assert [table.name for table in first.tables] == ["skins", "found", "lost"]
+    for table in first.tables:
+        assert table.rows and all(len(row) == len(table.head) for row in table.rows)
+    for result in first.data["shapes"].values():
+        assert 0.5 < np.mean(result["scores"]["image"]) <= 1
+        assert len(result["scores"]["place_mm"]) == len(result["scores"]["error_mm"])
+        assert 0.8 < result["about"]["ceiling"] < 1
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise AssertionError("solved again")
+
+    monkeypatch.setattr(ForwardModel, "solve", refuse)
+    again = _small(monkeypatch, known, tmp_path)
+    assert (again.tables, again.data) == (first.tables, first.data)
+    first.pictures["shapes.png"](tmp_path / "shapes.png")
+    assert (tmp_path / "shapes.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_sets_depend_on_the_seed_only(known: dict[str, Variant], tmp_path: Path) -> None:
+    def drawn(seed: int) -> Any:
+        maker = measuring.Maker(desk_in(tmp_path, Settings(seed=seed, share=0.02), plain), known["forearm, 16"])
+        return maker.test.scenes, maker.tuning.scenes
+
+    assert drawn(1) == drawn(1)
+    assert drawn(1) != drawn(2)
+    assert drawn(1)[0][0].touches != drawn(1)[1][0].touches
+
+
+def test_sizes_are_those_that_the_page_says(known: dict[str, Variant]) -> None:
+    rectangle = as_outline(rectangle_corners())
+    assert rectangle.bounding_box_mm == pytest.approx((-100, -70, 100, 70))
+    assert rectangle.area_mm2 == pytest.approx(200 * 140 - (4 - math.pi) * 400, rel=1e-3)
+    x0, _, x1, _ = as_outline(forearm_corners()).bounding_box_mm
+    assert x1 - x0 == pytest.approx(220)
+    _, y0, _, y1 = as_outline(hand_corners()).bounding_box_mm
+    assert y1 - y0 == pytest.approx(178, abs=0.1)
+    assert known["disk, 16"].scale == 1
+    assert known["hand, 32 evenly"].skin.electrodes.count == 32
+    assert known["hand, 16 placed"].skin.outline == known["hand, 16 in pairs"].skin.outline
+
+
+def test_regions(known: dict[str, Variant]) -> None:
+    assert hand_region([tip for _, tip, _ in FINGERS.values()]) == list(FINGERS)
+    assert hand_region([(85, 60)]) == ["palm"]
+    disk = known["disk, 16"]
+    assert disk.regions([(0, 0), (50, 0), (90, 0)], 97) == ["innermost third", "middle third", "rim third"]
+
+
+def test_a_finger_with_one_electrode_is_blind(known: dict[str, Variant]) -> None:
+    """All current through a finger passes its only electrode, and so would all that is measured there: no row has both."""
+    seen = {}
+    for name in ("hand, 16 placed", "hand, 16 in pairs"):
+        skin = known[name].skin
+        linear = linearise(skin, adjacent(16), elements=2500)
+        norm = np.linalg.norm(linear.jacobian, axis=0)
+        place = grid_for(skin.outline).locate([(FINGERS["middle"][1])])[0]
+        seen[name] = norm[place] / np.median(norm)
+    assert seen["hand, 16 placed"] < 0.05
+    assert seen["hand, 16 in pairs"] > 10 * seen["hand, 16 placed"]
+
+
+def test_shares_have_a_width_where_all_agree() -> None:
+    assert share_text([1] * 20) == "100 % (84 to 100)"
+    assert share_text([0, 1] * 50) == "50 % (40 to 60)"
+
+
+def test_refusals(tmp_path: Path) -> None:
+    for arguments in ([], [str(tmp_path / "none")], ["a", "b"]):
+        with pytest.raises(UsageError, match="name the folder"):
+            main(arguments)
+    with pytest.raises(UsageError, match="no experiment is named 'shape'; did you mean 'shapes'"):
+        registry.load("shape")
+    assert registry.load("shapes").TITLE and Counters().solves == 0
