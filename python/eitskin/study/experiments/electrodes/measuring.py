@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.fem.cem import ForwardModel
+from eitskin.fem.fields import electrode_fields
 from eitskin.fem.grid import grid_for
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import sensitivity
@@ -117,10 +118,11 @@ class Workshop:
         if case.pixels not in self._grids:
             grid = grid_for(self.skin.outline, case.pixels)
             jacobian, v0_v = sensitivity(self._forward, self.skin.conductivity_s_per_m, grid)
-            self._grids[case.pixels] = Linearisation(grid, jacobian, v0_v, self._forward.mesh.n_elements)
+            fields = electrode_fields(self._forward, self.skin.conductivity_s_per_m, grid)
+            self._grids[case.pixels] = Linearisation(grid, jacobian, v0_v, self._forward.mesh.n_elements, fields)
         whole, protocol = self._grids[case.pixels], scan_of(case).protocol
         jacobian = from_transfer(np.ascontiguousarray(whole.jacobian.T), protocol).T
-        return Linearisation(whole.grid, jacobian, from_transfer(whole.v0_v, protocol), whole.elements)
+        return Linearisation(whole.grid, jacobian, from_transfer(whole.v0_v, protocol), whole.elements, whole.electrode_fields)
 
     def frames(self, key: str, case: Case, noise_v: float) -> tuple[FloatArray, FloatArray]:
         """Quiet frames (q, m) and one a scene (k, m) of a set, with white noise of ``noise_v`` in 80 samples and no converter."""

@@ -1,0 +1,59 @@
+"""What is compared: ways of searching for touches, and ways of making the image."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from eitskin.core.results import ALL_SEARCH, COUPLED, REGROUP, STRAIGHT
+from eitskin.model.build import BuildSettings
+
+
+@dataclass(frozen=True)
+class Lever:
+    """The core with a model of ``settings`` and with ``options``."""
+
+    name: str
+    settings: BuildSettings = field(default_factory=BuildSettings)
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def facts(self) -> dict[str, Any]:
+        """All that a result depends on."""
+        return {"settings": repr(self.settings), "options": repr(sorted(self.options.items()))}
+
+
+def _searching(name: str, bits: int, **options: Any) -> Lever:
+    return Lever(name, options={"touch_search": bits, **options})
+
+
+SEARCHES = (
+    _searching("peaks alone", 0),
+    _searching("straight data first", STRAIGHT),
+    _searching("regrouping", REGROUP),
+    _searching("coupling", COUPLED),
+    _searching("straight, regrouping", STRAIGHT | REGROUP),
+    _searching("straight, coupling", STRAIGHT | COUPLED),
+    _searching("regrouping, coupling", REGROUP | COUPLED),
+    _searching("all (the default)", ALL_SEARCH),
+    _searching("all, 12 sweeps", ALL_SEARCH, touch_sweeps=12),
+    Lever("log-ratio model", BuildSettings(data_kind="log-ratio")),
+)
+
+CALM = {"iterations": 120, "lambda_rel": 0.01}
+FINE = {"iterations": 90, "lambda_rel": 0.005}
+BEST = BuildSettings(rank=80, pixels_across=40, floor=0.05)
+LONG = {"iterations": 150, "lambda_rel": 0.003}
+
+IMAGES = (
+    Lever("standard"),
+    Lever("standard, refined", options={"refine": True}),
+    Lever("fine", options=FINE),
+    Lever("fine, refined", options={**FINE, "refine": True}),
+    Lever("calm", BuildSettings(floor=0.1), CALM),
+    Lever("calm, refined", BuildSettings(floor=0.1), {**CALM, "refine": True}),
+    Lever("best", BEST, LONG),
+    Lever("best, refined", BEST, {**LONG, "refine": True}),
+    Lever("log-ratio", BuildSettings(data_kind="log-ratio")),
+    Lever("log-ratio, fine", BuildSettings(data_kind="log-ratio"), FINE),
+)
