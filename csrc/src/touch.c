@@ -1,4 +1,5 @@
 /* Peaks of the image start discs; the discs are fitted to the reduced data off the grid; those that explain nothing go. */
+#include "eitskin/load.h"
 #include "eitskin/touch.h"
 
 #include "column.h"
@@ -383,6 +384,8 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         keep_real(ctx, &f);
     }
     const uint32_t finite = report(&f, (eits_real)ctx->model->pixel_mm, found);
+    for (uint32_t k = 0; k < finite; ++k)
+        found[k].load_n = eits_load_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     eits_track(ctx, found, finite);
     ctx->info.touches = finite;
     ctx->info.touch_macs = f.macs;

@@ -307,6 +307,17 @@ TOUCH = (
     )
 )
 
+LOAD = of(
+    "load.c",
+    ("the gain left out", "eits_fabs(strength_s_per_m_mm2) * gain_at(load, u, v)", "eits_fabs(strength_s_per_m_mm2)", "load"),
+    ("a negative strength's load", "eits_fabs(strength_s_per_m_mm2) *", "strength_s_per_m_mm2 *", "load"),
+    ("a polynomial without bounds", "(gain < MOST_GAIN ? gain : MOST_GAIN)", "gain", "load"),
+    ("beyond where it was calibrated", "if (from > reach) {", "if (0 * from > reach) {", "load"),
+    ("powers of u and v mixed up", "power[degree + 1] = power[degree] * v;", "power[degree + 1] = power[degree] * u;", "load"),
+    ("the table's first piece for all", "while (k < last && strength >", "while (0 && strength >", "load"),
+    ("loads without end", "return found < most ? found : most;", "return found;", "load"),
+)
+
 BYTES = of(
     "model.c",
     (
@@ -316,6 +327,8 @@ BYTES = of(
         "model",
     ),
     ("sections may reach beyond the end", "size > total - offset", "size > total", "model"),
+    ("calibrations that fall", " || !(values[k] > values[k - 1])", "", "load"),
+    ("calibrations that begin above nothing", "return values[0] == 0.0f;", "return 1;", "load"),
     ("halves that are infinite", "(values[i] & 0x7C00u) == 0x7C00u", "(values[i] & 0x7FFFu) == 0x7FFFu", "model_values"),
 ) + of(
     "link.c",
@@ -328,4 +341,4 @@ BYTES = of(
     ),
 )
 
-MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCH + BYTES + FRAMES
+MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCH + LOAD + BYTES + FRAMES

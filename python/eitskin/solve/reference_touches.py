@@ -220,6 +220,8 @@ def find_touches(
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * np.pi * (d.radius_mm**2 + soft_edge), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
+    if model.load is not None:
+        found = [replace(t, load_n=model.load.load_at(t.x_mm, t.y_mm, t.strength_s_per_m_mm2)) for t in found]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     left, whole = fit.residual(), float(y @ y)
     unexplained = float(left @ left) / whole if whole > 0 and np.abs(image).max() > 0 else 0.0
