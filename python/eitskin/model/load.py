@@ -23,6 +23,11 @@ def terms_of(order: int) -> list[tuple[int, int]]:
     return [(degree - b, b) for degree in range(order + 1) for b in range(degree + 1)]
 
 
+def monomials(u: FloatArray, v: FloatArray, order: int) -> FloatArray:
+    """(k, t) numbers: each of :func:`terms_of` at (u, v), both (k,)."""
+    return np.stack([u**a * v**b for a, b in terms_of(order)], axis=1)
+
+
 @dataclass(frozen=True, eq=False)
 class LoadLaw:
     """A calibration. ``strength`` (p,) S/m mm^2 and ``load_n`` (p,) N both ascend from 0: the table where the gain is 1; ``gain`` (t,)
@@ -37,20 +42,21 @@ class LoadLaw:
     reach: float
     uncertainty: float
 
-    def gain_at(self, x_mm: float, y_mm: float) -> float:
-        """What a strength at this place is multiplied by: the polynomial, within a factor of 4 of 1; beyond ``reach`` as on its rim."""
-        place = np.array([x_mm, y_mm]) / self.radius_mm
-        away = float(np.hypot(*place))
-        u, v = place * (self.reach / away) if away > self.reach else place
-        value = sum(float(c) * u**a * v**b for c, (a, b) in zip(self.gain, terms_of(self.order), strict=True))
-        return float(np.clip(value, 1 / MOST_GAIN, MOST_GAIN))
+    def gains_at(self, place_mm: FloatArray) -> FloatArray:
+        """What strengths at places (k, 2) are multiplied by: the polynomial, within a factor of 4 of 1; beyond ``reach`` as there."""
+        u, v = np.asarray(place_mm).T / self.radius_mm
+        away = np.hypot(u, v)
+        inward = np.where(away > self.reach, self.reach / np.maximum(away, 1e-300), 1.0)
+        value = monomials(u * inward, v * inward, self.order) @ self.gain.astype(np.float64)
+        return np.asarray(np.clip(value, 1 / MOST_GAIN, MOST_GAIN))
 
-    def load_at(self, x_mm: float, y_mm: float, strength_s_per_m_mm2: float) -> float:
-        """The load in N; beyond the table its last slope, to twice its greatest load. What eits_load_n in csrc/src/load.c gives."""
-        seen = abs(strength_s_per_m_mm2) * self.gain_at(x_mm, y_mm)
+    def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
+        """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the table its last slope, to twice its
+        greatest load. What eits_load_n in csrc/src/load.c gives."""
+        seen = np.abs(strength) * self.gains_at(place_mm)
         s, n = self.strength.astype(np.float64), self.load_n.astype(np.float64)
-        k = int(np.clip(np.searchsorted(s, seen), 1, len(s) - 1))
-        return float(min(n[k - 1] + (seen - s[k - 1]) / (s[k] - s[k - 1]) * (n[k] - n[k - 1]), 2 * n[-1]))
+        k = np.clip(np.searchsorted(s, seen), 1, len(s) - 1)
+        return np.asarray(np.minimum(n[k - 1] + (seen - s[k - 1]) / (s[k] - s[k - 1]) * (n[k] - n[k - 1]), 2 * n[-1]))
 
 
 def encode_load(law: LoadLaw) -> bytes:

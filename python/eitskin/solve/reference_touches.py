@@ -221,7 +221,9 @@ def find_touches(
         for d, e in zip(fit.discs, explained, strict=True)
     ]
     if model.load is not None:
-        found = [replace(t, load_n=model.load.load_at(t.x_mm, t.y_mm, t.strength_s_per_m_mm2)) for t in found]
+        places = np.array([(t.x_mm, t.y_mm) for t in found]).reshape(-1, 2)
+        loads = model.load.loads_at(places, np.array([t.strength_s_per_m_mm2 for t in found]))
+        found = [replace(t, load_n=float(load)) for t, load in zip(found, loads, strict=True)]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     left, whole = fit.residual(), float(y @ y)
     unexplained = float(left @ left) / whole if whole > 0 and np.abs(image).max() > 0 else 0.0
