@@ -19,7 +19,6 @@ static const eits_real RADIUS_DEVIATION = R(0.12);
 static const eits_real DAMPING = R(1e-3);
 static const eits_real SETTLED_PIXELS = R(1.0 / 256.0);
 static const eits_real MOST_RADIUS_STEP_PIXELS = R(0.5);
-static const eits_real PI = R(3.14159265358979323846);
 
 typedef struct fit {
     eits_disc disc[EITS_MAX_TOUCHES];
@@ -336,11 +335,9 @@ static void keep_real(eits_context *ctx, fit *f)
     }
 }
 
-/* A disc's covers (disc.h) add up to pi (radius^2 + pixel^2 / 12), averaged over its places, where the radius is at least half
- * a pixel: that is the area its change was fitted with. Returns how many there are: those whose numbers are finite. */
-static uint32_t report(const fit *f, eits_real pixel_mm, eits_touch *out)
+/* Returns how many there are: those whose numbers are finite. */
+static uint32_t report(const eits_context *ctx, const fit *f, eits_touch *out)
 {
-    const eits_real soft_edge = pixel_mm * pixel_mm / 12;
     uint32_t count = 0;
     for (uint32_t k = 0; k < f->count; ++k) {
         const eits_disc *disc = &f->disc[k];
@@ -348,7 +345,7 @@ static uint32_t report(const fit *f, eits_real pixel_mm, eits_touch *out)
             .x_mm = disc->x_mm,
             .y_mm = disc->y_mm,
             .radius_mm = disc->radius_mm,
-            .strength_s_per_m_mm2 = disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, soft_edge),
+            .strength_s_per_m_mm2 = disc->change * eits_disc_area(ctx, disc),
             .confidence = f->explained[k] < 1 ? f->explained[k] : 1,
         };
         const eits_real numbers[] = {touch.x_mm, touch.y_mm, touch.radius_mm, touch.strength_s_per_m_mm2, f->explained[k]};
@@ -383,7 +380,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         move_all(ctx, &f, ctx->options.touch_sweeps);
         keep_real(ctx, &f);
     }
-    const uint32_t finite = report(&f, (eits_real)ctx->model->pixel_mm, found);
+    const uint32_t finite = report(ctx, &f, found);
     for (uint32_t k = 0; k < finite; ++k)
         found[k].load_n = eits_load_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     eits_track(ctx, found, finite);

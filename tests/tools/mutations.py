@@ -255,6 +255,7 @@ EXACT = (
 TOUCH = (
     of(
         "disc.c",
+        ("an area of whole pixels", "pixels += share > 0 ? (share < 1 ? share : 1) : 0;", "pixels += share > 0 ? 1 : 0;", "disc"),
         ("covers half a pixel too wide", "share = R(0.5) + (radius - distance)", "share = R(1.0) + (radius - distance)", "disc"),
         ("a rim without slope", "share < 1 ? factor / pixel : 0", "share < 1 ? 0 * factor / pixel : 0", "disc"),
         ("weights not divided by", " / (eits_real)model->column_weight[j];", ";", "disc"),
@@ -290,12 +291,6 @@ TOUCH = (
             "touch_fit",
         ),
         ("no halving of a disc's step", "attempt < 3; ++attempt", "attempt < 1; ++attempt", "track"),
-        (
-            "strength without the soft edge",
-            "eits_fma(disc->radius_mm, disc->radius_mm, soft_edge)",
-            "eits_fma(disc->radius_mm, disc->radius_mm, 0 * soft_edge)",
-            "touch_fit",
-        ),
         ("a radius that strength does not tell", "weight = o->touch_radius_weight * energy", "weight = 0 * energy", "touch_fit"),
         ("touches that noise makes", "return best >= least;", "return best >= 0 * least;", "touch"),
     )

@@ -26,10 +26,12 @@ LEAST_PRESSES, LEAST_WEIGHTS, LEAST_RATIO = 4, 3, 1.5
 SAME_WEIGHT = 1.005    # loads nearer than that are one
 PLACE_MM = 12.0        # presses whose links are nearer than that are at one place
 PLACES_FOR_ORDER = (1, 5, 8, 13, 19)
-WORTH = 0.95           # a higher order, or the second law, must make the error left at most so large
+WORTH = 0.95           # a higher order, or a law of more numbers, must make the error left at most so large
+LAW_ORDER = 2          # of the gain with which laws are compared
 RIDGE = 0.02 / 0.5     # strengths scatter by about 0.02, coefficients are of the order of 0.5
 TABLE_POINTS = 33
 RESAMPLES = 200
+STEP = 1e-5             # of a law's numbers, relative, for their derivatives
 LEAST_EXPONENT = 0.04  # a law as flat as that is none
 MOST_F0 = 30.0         # times the greatest load: beyond, a saturating law is a straight line
 
@@ -162,8 +164,8 @@ def check_presses(presses: Presses) -> None:
         )
 
 
-def calibrate(presses: Presses, radius_mm: float, seed: int = 1) -> Calibration:
-    """The law of a skin whose image reaches ``radius_mm`` from its middle.
+def calibrate(presses: Presses, radius_mm: float, seed: int = 1, resamples: int = RESAMPLES) -> Calibration:
+    """The law of a skin whose image reaches ``radius_mm`` from its middle; the intervals by ``resamples`` of its places.
 
     Raises:
         FrameError: the presses cannot fix a law, or strength does not grow with load.
@@ -178,8 +180,11 @@ def calibrate(presses: Presses, radius_mm: float, seed: int = 1) -> Calibration:
     by_place = groups >= LEAST_PRESSES
     fold = place if by_place else np.arange(len(presses))
     forms = [name for name, shape in FORMS.items() if len(weights_of(presses.load_n)) >= shape.least_weights]
-    tried = {(form, order): _left_out(presses, radius_mm, fold, form, order) for form in forms for order in orders}
-    form, order = _best({key: float(np.mean(np.log1p(errors) ** 2)) for key, errors in tried.items()})
+    middle = min(max(orders), LAW_ORDER)
+    tried = {(form, middle): _left_out(presses, radius_mm, fold, form, middle) for form in forms}
+    form, _ = _best(tried)
+    tried = {(form, order): tried[form, order] if order == middle else _left_out(presses, radius_mm, fold, form, order) for order in orders}
+    _, order = _best(tried)
     fitted = fit(presses, radius_mm, form, order)
     if fitted.numbers[-1] < 1.01 * LEAST_EXPONENT:
         raise FrameError("calibration: strength does not grow with load; look at the list of weights, and at the touches of each")
@@ -189,7 +194,7 @@ def calibrate(presses: Presses, radius_mm: float, seed: int = 1) -> Calibration:
     law = law_of(fitted, presses, radius_mm, float(np.quantile(np.abs(left_out), 0.95)))
     before = tried[form, 0]
     return Calibration(
-        law, fitted, _interval(presses, radius_mm, fitted, place if by_place else fold, seed), left_out, groups, by_place,
+        law, fitted, _interval(presses, radius_mm, fitted, fold, seed, resamples), left_out, groups, by_place,
         (_scatter(presses, before), _scatter(presses, left_out)), tuple(notes),
     )  # fmt: skip
 
@@ -209,6 +214,7 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
     terms, log_strength = monomials(u, v, order)[:, 1:], np.log(presses.strength)
 
     count, scale = len(shape.names), float(np.median(presses.strength))
+    free = terms.shape[1]
     units = np.array([scale, most, 1.0])[:count]
     if form == "power":
         units = np.array([scale, 1.0])
@@ -218,10 +224,20 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
         expected = np.maximum(shape.strength(presses.load_n, *np.exp(p[:count])), 1e-300)
         return np.concatenate([log_strength + np.log(gain) - np.log(expected), RIDGE * p[count:]])
 
-    free = terms.shape[1]
+    def slope(p: FloatArray) -> FloatArray:
+        gain = np.maximum(1 + terms @ p[count:], 0.05)
+        jacobian = np.zeros((len(log_strength) + free, len(p)))
+        for k in range(count):
+            step = np.exp(p[:count] + STEP * (np.arange(count) == k)), np.exp(p[:count] - STEP * (np.arange(count) == k))
+            up, down = (np.log(np.maximum(shape.strength(presses.load_n, *at), 1e-300)) for at in step)
+            jacobian[: len(log_strength), k] = (down - up) / (2 * STEP)
+        jacobian[: len(log_strength), count:] = terms / gain[:, None]
+        jacobian[len(log_strength) :, count:] = RIDGE * np.eye(free)
+        return jacobian
+
     low, high, start = (np.log(np.array(ends) * units).tolist() for ends in (shape.low, shape.high, shape.start))
     bounds = (low + free * [-np.inf], high + free * [np.inf])
-    solved = least_squares(misfit, start + free * [0.0], bounds=bounds, max_nfev=200).x
+    solved = least_squares(misfit, start + free * [0.0], slope, bounds=bounds, max_nfev=100, ftol=1e-7, xtol=1e-7).x
     return Fitted(form, tuple(np.exp(solved[:count]).tolist()), order, np.concatenate([[1.0], solved[count:]]))
 
 
@@ -250,23 +266,27 @@ def _left_out(presses: Presses, radius_mm: float, fold: IntArray, form: str, ord
     return errors
 
 
-def _best(squares: dict[tuple[str, int], float]) -> tuple[str, int]:
-    """The simplest choice that nothing else beats by more than ``WORTH``: laws before orders, in the order that they stand in."""
-    best = ("saturating", 0)
-    for key in sorted(squares, key=lambda key: (key[1], list(FORMS).index(key[0]))):
-        if squares[key] < WORTH**2 * squares[best]:
-            best = key
+def _best(tried: dict[tuple[str, int], FloatArray]) -> tuple[str, int]:
+    """The first choice that no later one beats by more than ``WORTH``, of errors (k,) by law and order."""
+    (best, least), *others = ((key, _rms_log(errors)) for key, errors in tried.items())
+    for key, error in others:
+        if error < WORTH * least:
+            best, least = key, error
     return best
 
 
+def _rms_log(errors: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.log1p(errors) ** 2)))
+
+
 def _interval(
-    presses: Presses, radius_mm: float, fitted: Fitted, fold: IntArray, seed: int
+    presses: Presses, radius_mm: float, fitted: Fitted, fold: IntArray, seed: int, resamples: int
 ) -> tuple[tuple[float, float], ...]:
     """95 % of the law's numbers over fits to folds drawn with replacement."""
     generator, count = np.random.default_rng(seed), int(fold.max()) + 1
     members = [np.flatnonzero(fold == number) for number in range(count)]
     drawn = []
-    for _ in range(RESAMPLES):
+    for _ in range(resamples):
         rows = np.concatenate([members[k] for k in generator.integers(0, count, count)])
         sample = presses.take(rows)
         if len(weights_of(sample.load_n)) >= 2:

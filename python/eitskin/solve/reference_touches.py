@@ -58,6 +58,12 @@ class Fit:
         reduced = reduced - self.basis.T @ (self.basis @ reduced)
         return reduced[:, 0], reduced[:, 1:].T
 
+    def area_mm2(self, disc: Disc) -> float:
+        """What the disc's covers add up to on the pixels that count."""
+        distance = np.hypot(*(self.centres - (disc.x_mm, disc.y_mm)).T)
+        cover = np.clip(0.5 + (disc.radius_mm - distance) / self.model.grid.pixel_mm, 0.0, 1.0)
+        return float(cover[self.model.column_weight != 0].sum()) * self.model.grid.pixel_mm**2
+
     def best_change(self, disc: Disc, atom: FloatArray, target: FloatArray) -> float:
         """The change that explains ``target`` best along ``atom``, of the disc's own sign."""
         energy = float(atom @ atom)
@@ -215,9 +221,8 @@ def find_touches(
             fit.fit_strengths()
         fit.move_all(options.touch_sweeps)
     explained = fit.keep_real()
-    soft_edge = model.grid.pixel_mm**2 / 12  # a disc's covers add up to pi (radius^2 + pixel^2 / 12), averaged over its places
     found = [
-        Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * np.pi * (d.radius_mm**2 + soft_edge), min(1.0, float(e)))
+        Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
     if model.load is not None:
