@@ -20,7 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 RADIUS_SHARES = (0.0, 0.3, 0.6, 0.85)  # of the skin's radius: from the centre to near the rim
 ANGLES_DEG = (12.0, 131.0, 258.0)      # at different distances from electrodes, which are 22.5 degrees apart
 OUTERMOST = 0.87                       # of the radius: weights are put no nearer to the rim
-LIGHT_G = tuple(float(0.4 * 1.5**k) for k in range(15))  # to 117 g
+LIGHT_G = (0.4, 120.0)                 # least and greatest of the light loads
 AT_ONCE = 20
 
 
@@ -98,6 +98,12 @@ def spread_rows(places: FloatArray) -> list[tuple[float, tuple[float, float], in
     return [(grams, (float(x), float(y)), 0, k) for k, (x, y) in enumerate(places) for grams in LOADS_G]
 
 
-def light_rows(radius_mm: float) -> list[tuple[float, tuple[float, float], int, int]]:
-    """A ladder of light loads at the four radii, at two angles."""
-    return [(grams, place, 0, number) for place, number in radius_places(radius_mm, ANGLES_DEG[:2]) for grams in LIGHT_G]
+def light_loads(count: int) -> list[float]:
+    """A ladder of ``count`` light loads, g, by equal factors."""
+    return np.geomspace(*LIGHT_G, count).tolist()
+
+
+def light_rows(radius_mm: float, count: int) -> list[tuple[float, tuple[float, float], int, int]]:
+    """The ladder at the four radii, at two angles."""
+    places = radius_places(radius_mm, ANGLES_DEG[:2])
+    return [(grams, place, 0, number) for place, number in places for grams in light_loads(count)]
