@@ -1,9 +1,10 @@
 """From presses of known load to the law that turns strength and place into load (docs/calibration.md).
 
 The strength of a load F at (x, y) is modelled as law(F) / gain(x, y). Laws, all monotone: *saturating*, s_max (1 - exp(-F / F0));
-*power*, c F^p; and, from four weights on, *stretched*, s_max (1 - exp(-(F / F0)^p)), which has both within it. The gain is 1 + a polynomial without constant in (x / R, y / R), ridge-regularised. What
-is minimised is the sum of squared logarithms of seen over modelled strength. Law and order are those that predict best what
-was left out: one place after another, or one press after another where there are too few places.
+*power*, c F^p; and, from four weights on, *stretched*, s_max (1 - exp(-(F / F0)^p)), which has both within it. The gain is 1 + a
+polynomial without constant in (x / R, y / R), ridge-regularised. What is minimised is the sum of squared logarithms of seen over
+modelled strength. Law and order are those that predict best what was left out: one place after another, or one press after
+another where there are too few places.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ MOST_F0 = 30.0         # times the greatest load: beyond, a saturating law is a 
 
 @dataclass(frozen=True)
 class Form:
-    """A law of some positive numbers: strength by load, and load by strength; their names, where a fit begins and what bounds it.
+    """A law of some positive numbers: strength by load, and load by strength; their names, where a fit begins, its bounds.
 
-    ``start`` and ``low``, ``high`` are relative: to strengths (the first number), to the greatest load (F0), exponents as they are.
+    ``start`` and ``low``, ``high`` are relative: to strengths (the first number) and the greatest load (F0); exponents as they are.
     """
 
     strength: Callable[..., FloatArray]
@@ -176,14 +177,16 @@ def calibrate(presses: Presses, radius_mm: float, seed: int = 1, resamples: int 
     groups, notes = int(place.max()) + 1, []
     orders = [order for order in range(MAX_ORDER + 1) if groups >= PLACES_FOR_ORDER[order]]
     if orders == [0]:
-        notes.append(f"{groups} place{'s' * (groups > 1)}: the gain is taken to be the same everywhere; press at {PLACES_FOR_ORDER[1]} or more places")
+        places = f"{groups} place{'s' * (groups > 1)}"
+        notes.append(f"{places}: the gain is taken to be the same everywhere; press at {PLACES_FOR_ORDER[1]} or more")
     by_place = groups >= LEAST_PRESSES
     fold = place if by_place else np.arange(len(presses))
     forms = [name for name, shape in FORMS.items() if len(weights_of(presses.load_n)) >= shape.least_weights]
     middle = min(max(orders), LAW_ORDER)
     tried = {(form, middle): _left_out(presses, radius_mm, fold, form, middle) for form in forms}
     form, _ = _best(tried)
-    tried = {(form, order): tried[form, order] if order == middle else _left_out(presses, radius_mm, fold, form, order) for order in orders}
+    others = {order: _left_out(presses, radius_mm, fold, form, order) for order in orders if order != middle}
+    tried = {(form, order): others.get(order, tried[form, middle]) for order in orders}
     _, order = _best(tried)
     fitted = fit(presses, radius_mm, form, order)
     if fitted.numbers[-1] < 1.01 * LEAST_EXPONENT:

@@ -20,7 +20,7 @@ MOST_LOAD_N = 1e6
 
 @dataclass(frozen=True)
 class Weight:
-    """One weight on the skin: frames ``first`` to ``last``, both included; ``load_n`` in N; its place in mm, where it is known."""
+    """One weight on the skin: frames ``first`` to ``last``, both included; ``load_n`` N; its place in mm, where known."""
 
     first: int
     last: int

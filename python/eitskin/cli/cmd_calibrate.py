@@ -1,4 +1,4 @@
-"""``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches are told in grams and newtons."""
+"""``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches are told in grams."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "calibrate",
         help="known weights on a skin, so that its touches are told in grams",
-        description="Fit the law that turns a touch's strength and place into its load to recordings of known weights, say how far "
-        "it is to be trusted, and store it in a copy of the model. docs/calibration.md shows how to record them.",
+        description="Fit the law that turns a touch's strength and place into its load to recordings of known weights, say how "
+        "far it is to be trusted, and store it in a copy of the model. docs/calibration.md shows how to record them.",
     )
-    parser.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING", help="frames (.npz) or runs (.eits) of weights")
+    parser.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING", help="frames (.npz) or a run (.eits) of weights")
     parser.add_argument(
         "--weights", action="append", type=Path, required=True, metavar="LIST",
         help="the weights of a recording, .csv or .toml; once for each recording, in their order",
@@ -52,7 +52,8 @@ def run(options: argparse.Namespace) -> int:
 
     if len(options.recordings) != len(options.weights):
         raise UsageError(
-            f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of weights; give --weights once for each"
+            f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of weights; give --weights once "
+            "for each"
         )
     if options.seed < 0:
         raise UsageError(f"--seed {options.seed} must be 0 or above")
@@ -121,10 +122,9 @@ def _lines(found: Calibration) -> list[str]:
     ]
     for key, value, ends in zip(FORMS[found.fitted.form].names, found.fitted.numbers, found.interval, strict=True):
         lines.append(f"  {names[key]:18}{value:.4g}   95 %: {ends[0]:.4g} to {ends[1]:.4g}")
-    lines.append(f"gain over the skin  polynomial of order {law.order}, {len(law.gain)} terms, out to {law.reach * law.radius_mm:.0f} mm")
-    lines.append(
-        f"one load, anywhere  standard deviation {100 * found.scatter[1]:.1f} % of it ({100 * found.scatter[0]:.1f} % with one gain)"
-    )
+    out_mm, (before, after) = law.reach * law.radius_mm, found.scatter
+    lines.append(f"gain over the skin  polynomial of order {law.order}, {len(law.gain)} terms, out to {out_mm:.0f} mm")
+    lines.append(f"one load, anywhere  standard deviation {100 * after:.1f} % of it ({100 * before:.1f} % with one gain)")
     lines.append(
         f"a load left out     off by {100 * facts['error_rms']:.1f} % (rms), 95 % within {100 * facts['error_95']:.1f} %, worst "
         f"{100 * facts['error_worst']:.1f} %; left out by {facts['left_out_by']}"

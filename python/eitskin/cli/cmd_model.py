@@ -151,7 +151,8 @@ def _calibration_text(model: Model) -> str:
 
     if model.load is None:
         return "none; touches have no load"
-    return f"loads to {load_text(model.load.load_n[-1])}, 95 % within {100 * model.load.uncertainty:.1f} %, gain of order {model.load.order}"
+    law = model.load
+    return f"loads to {load_text(law.load_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain of order {law.order}"
 
 
 def run_verify(options: argparse.Namespace) -> int:

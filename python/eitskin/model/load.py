@@ -30,8 +30,8 @@ def monomials(u: FloatArray, v: FloatArray, order: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class LoadLaw:
-    """A calibration. ``strength`` (p,) S/m mm^2 and ``load_n`` (p,) N both ascend from 0: the table where the gain is 1; ``gain`` (t,)
-    are coefficients of :func:`terms_of` (``order``) in u = x / ``radius_mm``, v = y / ``radius_mm``, trusted to ``reach`` =
+    """A calibration. ``strength`` (p,) S/m mm^2 and ``load_n`` (p,) N both ascend from 0: the table where the gain is 1. ``gain``
+    (t,) are coefficients of :func:`terms_of` (``order``) in u = x / ``radius_mm``, v = y / ``radius_mm``, trusted to ``reach`` =
     sqrt(u^2 + v^2); ``uncertainty`` is relative: 95 % of the loads that were left out of the fit were within it. float32 all."""
 
     strength: npt.NDArray[np.float32]
@@ -43,7 +43,7 @@ class LoadLaw:
     uncertainty: float
 
     def gains_at(self, place_mm: FloatArray) -> FloatArray:
-        """What strengths at places (k, 2) are multiplied by: the polynomial, within a factor of 4 of 1; beyond ``reach`` as there."""
+        """What strengths at places (k, 2) are multiplied by: the polynomial, within 1/4 to 4; beyond ``reach`` as there."""
         u, v = np.asarray(place_mm).T / self.radius_mm
         away = np.hypot(u, v)
         inward = np.where(away > self.reach, self.reach / np.maximum(away, 1e-300), 1.0)
@@ -51,8 +51,8 @@ class LoadLaw:
         return np.asarray(np.clip(value, 1 / MOST_GAIN, MOST_GAIN))
 
     def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
-        """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the table its last slope, to twice its
-        greatest load. What eits_load_n in csrc/src/load.c gives."""
+        """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the table by its last slope, to
+        twice its greatest load. What eits_load_n in csrc/src/load.c gives."""
         seen = np.abs(strength) * self.gains_at(place_mm)
         s, n = self.strength.astype(np.float64), self.load_n.astype(np.float64)
         k = np.clip(np.searchsorted(s, seen), 1, len(s) - 1)

@@ -55,8 +55,8 @@ class Golden:
 @dataclass(frozen=True, eq=False)
 class Model:
     """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P (r, k) float32;
-    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made; ``load`` tells loads from strengths,
-    where the skin was calibrated.
+    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made; ``load`` tells loads from
+    strengths, where the skin was calibrated.
     """
 
     protocol: Protocol

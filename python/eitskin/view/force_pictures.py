@@ -71,10 +71,11 @@ def draw_skin(
             errors = 100 * np.nanmean(getattr(judged[name, snr_db], kind), axis=1)
             axes.plot(*rim.T, color=RIM, linewidth=1)
             most = limits[name]
-            shown = axes.scatter(*places_mm.T, c=errors, cmap="RdBu_r", vmin=-most, vmax=most, s=90, edgecolors=INK, linewidths=0.5)
+            style = {"cmap": "RdBu_r", "vmin": -most, "vmax": most, "s": 90, "edgecolors": INK, "linewidths": 0.5}
+            shown = axes.scatter(*places_mm.T, c=errors, **style)
             axes.set_aspect("equal")
             axes.set_axis_off()
-            axes.set_title(f"{name}\n{kind}: deviation {np.nanstd(errors, ddof=1):.1f} %")
+            axes.set_title(f"{name}\n{kind}, mean of {len(LOADS_G)} loads: {np.nanstd(errors, ddof=1):.1f} %")
             if kind == "calibrated":
                 figure.colorbar(shown, ax=figure.axes[-2:] if k else axes, shrink=0.8, label="off by (%)")
         save_png(figure, path)
@@ -96,7 +97,8 @@ def draw_detection(path: Path, found: list[Detection]) -> None:
             told = told[np.isfinite(told[:, 1])]
             top = np.where(np.isfinite(told[:, 3]), told[:, 3], found[0].loads_g[-1])
             bars = np.maximum([told[:, 1] - told[:, 2], top - told[:, 1]], 0)
-            axes.errorbar(told[:, 0] + 0.5 * (radius - 1.5), told[:, 1], bars, fmt="o-", color=colour, label=where, markersize=4, capsize=2)
+            snr_db = told[:, 0] + 0.5 * (radius - 1.5)  # side by side
+            axes.errorbar(snr_db, told[:, 1], bars, fmt="o-", color=colour, label=where, markersize=4, capsize=2)
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(matplotlib.ticker.StrMethodFormatter("{x:g}"))
         axes.set_xlabel("SNR (dB)")

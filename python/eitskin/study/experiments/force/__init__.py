@@ -9,7 +9,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.study.experiments.experiment import Desk, Outcome
 from eitskin.study.experiments.force import anywhere, curves, detection, scenes
-from eitskin.study.experiments.force.law import drawn_laws
+from eitskin.study.experiments.force.law import NOMINAL, drawn_laws
 from eitskin.study.experiments.force.readouts import READOUTS, TOUCH, Instruments, Readout, as_lists, from_lists
 
 if TYPE_CHECKING:
@@ -29,30 +29,31 @@ def run(desk: Desk) -> Outcome:
     protocol = adjacent(skin.electrodes.count)
     radius_mm = (skin.outline.diameter_mm or 0.0) / 2
     solver, instruments = desk.scenes(skin, protocol), Instruments(skin, protocol)
-    laws = drawn_laws(settings.seed, settings.count(16))
+    laws = (NOMINAL, *drawn_laws(settings.seed, settings.count(16)))
     put = partial(scenes.solved, desk, solver)
     nominal = put("force curves", settings.seed, scenes.curve_rows(radius_mm))
     uncertain = put("force laws", settings.seed, scenes.law_rows(radius_mm, len(laws)), laws)
     tuning = scenes.spiral(settings.tuning_seed, settings.count(24, 8), radius_mm)
     tuned = put("force tuning", settings.tuning_seed, scenes.spread_rows(tuning))
-    places = scenes.scattered(settings.seed, settings.count(36, 8), radius_mm)
+    places = scenes.spiral(settings.seed, settings.count(36, 8), radius_mm)
     reported = put("force reported", settings.seed, scenes.spread_rows(places))
     light = put("force light", settings.seed, scenes.light_rows(radius_mm, settings.count(15, 6)))
 
-    drawn = curves.curves_of(nominal, _read(desk, instruments, nominal, SNR_DB), uncertain, _read(desk, instruments, uncertain, SNR_DB))
+    told, of_laws = (_read(desk, instruments, one, SNR_DB) for one in (nominal, uncertain))
+    drawn = curves.curves_of(nominal, told, uncertain, of_laws)
     judged: dict[tuple[str, float], anywhere.Anywhere] = {}
     for snr in desk.progress(SNRS_DB, "calibrating"):
         on, read = (_read(desk, instruments, one, snr) for one in (tuned, reported))
         for name in READOUTS:
-            facts = {"part": "anywhere", "snr_db": snr, "reading": name, "tuned": len(tuned.grams), "reported": len(reported.grams)}
-            one = partial(anywhere.judge, tuned, on[name], reported, read[name], instruments.radius_mm)
-            judged[name, snr] = anywhere.Anywhere.from_dict(desk.kept(facts, lambda one=one: one().as_dict()))
+            facts = {"part": "anywhere", "snr_db": snr, "reading": name, "sets": [tuned.facts, reported.facts]}
+            judge = partial(anywhere.judge, tuned, on[name], reported, read[name], instruments.radius_mm)
+            judged[name, snr] = anywhere.Anywhere.from_dict(desk.kept(facts, lambda judge=judge: judge().as_dict()))  # type: ignore[misc]
     reps, quiet = settings.count(30, 4), settings.count(4000, 80)
     found = []
     for snr in desk.progress(detection.SNRS_DB, "light presses"):
-        facts = {"part": "detection", "snr_db": snr, "reps": reps, "quiet": quiet, "presses": len(light.grams)}
+        facts = {"part": "detection", "snr_db": snr, "reps": reps, "quiet": quiet, "set": light.facts}
         look = partial(detection.detect, instruments, light, snr, reps, quiet)
-        found.append(detection.Detection.from_dict(desk.kept(facts, lambda look=look: look().as_dict())))
+        found.append(detection.Detection.from_dict(desk.kept(facts, lambda look=look: look().as_dict())))  # type: ignore[misc]
 
     both = (SNR_DB, AVERAGED_DB)
     tables = (
@@ -60,7 +61,7 @@ def run(desk: Desk) -> Outcome:
         anywhere.over_snr(judged, SNRS_DB), detection.table_of(found),
     )  # fmt: skip
     data = {
-        "slopes": {name: {"relative": (one.slopes / one.slopes[-1]).tolist(), "mean": one.mean.tolist()} for name, one in drawn.items()},
+        "slopes": {name: {"a_gram": one.slopes.tolist(), "mean": one.mean.tolist()} for name, one in drawn.items()},
         "anywhere": [{"reading": name, "snr_db": snr, **one.as_dict()} for (name, snr), one in judged.items()],
         "detection": [one.as_dict() for one in found],
     }
@@ -78,14 +79,16 @@ def run(desk: Desk) -> Outcome:
 
 
 def _read(desk: Desk, instruments: Instruments, presses: PressSet, snr_db: float) -> dict[str, Readout]:
-    facts = {"part": "readings", "set": presses.session.touches.name, "snr_db": snr_db}
+    facts = {"part": "readings", "set": presses.facts, "snr_db": snr_db}
     return from_lists(desk.kept(facts, lambda: as_lists(instruments.read(presses.session, snr_db))))
 
 
 def _sets(desk: Desk, tuned: PressSet, reported: PressSet, laws: tuple[object, ...], reps: int, touch: anywhere.Anywhere) -> str:
-    a, b = tuned.session.touches, reported.session.touches
+    def of(one: PressSet) -> str:
+        return f"{len(set(map(tuple, one.place_mm.tolist())))} places (`{one.session.touches.name}`)"
+
     return (
-        f"Sets of seed {desk.settings.seed}: calibrated on {len(set(map(tuple, tuned.place_mm.tolist())))} places (`{a.name}`), reported on "
-        f"{len(set(map(tuple, reported.place_mm.tolist())))} others (`{b.name}`), each with five loads; {len(laws)} laws; {reps} frames of each "
-        f"light press. The law that was chosen for the touch at {AVERAGED_DB:g} dB is *{touch.form}*, its gain of order {touch.order}."
+        f"Sets of seed {desk.settings.seed}: calibrated on {of(tuned)}, reported on {of(reported)}, each with five loads; "
+        f"{len(laws) - 1} laws beside the nominal one; {reps} frames of each light press. The law that was chosen for the touch "
+        f"at {AVERAGED_DB:g} dB is *{touch.form}*, its gain of order {touch.order}."
     )

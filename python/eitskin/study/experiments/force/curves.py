@@ -1,4 +1,4 @@
-"""Readings over load at four radii: slopes, how straight they are, and how far the law's uncertainty moves them (Figs. 9 to 11)."""
+"""Readings over load at four radii: slopes, how straight they are, and how far the law's uncertainty moves them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """One readout: ``mean`` (radii, loads) over angles under the nominal law; ``bands`` (laws, radii, loads), one law each."""
+    """One readout: ``mean`` (radii, loads) over angles under the nominal law; ``bands`` (laws, radii, loads) under others."""
 
     mean: FloatArray
     bands: FloatArray
@@ -39,7 +39,7 @@ class Curves:
         return float(low), float(high)
 
     def straightness(self) -> tuple[float, float]:
-        """Least R^2 over the radii; and the greatest distance from the straight line, relative to the reading at the greatest load."""
+        """Least R^2 over the radii; and the greatest distance from the line, relative to the reading at the greatest load."""
         loads = np.array(LOADS_G)
         r2, off = [], []
         for values in self.mean:
@@ -55,15 +55,15 @@ def slopes_of(values: FloatArray) -> FloatArray:
 
 
 def curves_of(nominal: PressSet, read: dict[str, Readout], laws: PressSet, of_laws: dict[str, Readout]) -> dict[str, Curves]:
-    """Each readout's curves."""
+    """Each readout's curves; the first of ``laws`` is the nominal one, to which the others' readings are held."""
     found = {}
     for name in READOUTS:
         mean = [
             [np.nanmean(read[name].value[(nominal.group == radius) & (nominal.grams == grams)]) for grams in LOADS_G]
             for radius in range(len(RADIUS_SHARES))
         ]
-        bands = of_laws[name].value.reshape(-1, len(RADIUS_SHARES), len(LOADS_G))
-        found[name] = Curves(np.array(mean), bands)
+        at_one_angle = of_laws[name].value.reshape(-1, len(RADIUS_SHARES), len(LOADS_G))
+        found[name] = Curves(np.array(mean), np.array(mean) * at_one_angle[1:] / at_one_angle[0])
     return found
 
 
@@ -72,6 +72,8 @@ def table_of(curves: dict[str, Curves]) -> Table:
     rows = []
     for name, one in curves.items():
         relative, (low, high), (r2, off) = one.slopes / one.slopes[-1], one.centre_share_band(), one.straightness()
-        rows.append((name, f"{relative[0]:.2f} ({low:.2f} to {high:.2f})", *(f"{s:.2f}" for s in relative[1:]), f"{r2:.3f}", f"{100 * off:.1f} %"))
-    head = ("reading", "slope at the centre (95 % over laws)", *(f"at {share:g} R" for share in RADIUS_SHARES[1:]), "least R²", "off the line, at most")
+        centre = f"{relative[0]:.2f} ({low:.2f} to {high:.2f})"
+        rows.append((name, centre, *(f"{s:.2f}" for s in relative[1:]), f"{r2:.3f}", f"{100 * off:.1f} %"))
+    radii = (f"at {share:g} R" for share in RADIUS_SHARES[1:])
+    head = ("reading", "slope at the centre (95 % over laws)", *radii, "least R²", "off the line, at most")
     return Table("slopes", head, tuple(rows))

@@ -27,7 +27,7 @@ RESAMPLES = 400
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """At one SNR: ``hits`` (radii, loads) of ``tries`` (radii, loads) presses of ``loads_g`` (loads,); ``false`` of ``quiet`` frames."""
+    """At one SNR: ``hits`` of ``tries``, both (radii, loads), presses of ``loads_g`` (loads,); ``false`` of ``quiet`` frames."""
 
     snr_db: float
     loads_g: FloatArray
@@ -39,16 +39,16 @@ class Detection:
     @classmethod
     def from_dict(cls, facts: dict[str, Any]) -> Detection:
         """From the store."""
-        arrays = (np.array(facts[name], dtype=np.float64) for name in ("loads_g", "hits", "tries"))
-        return cls(float(facts["snr_db"]), *arrays, int(facts["false"]), int(facts["quiet"]))
+        loads, hits, tries = (np.array(facts[name], dtype=np.float64) for name in ("loads_g", "hits", "tries"))
+        return cls(float(facts["snr_db"]), loads, hits, tries, int(facts["false"]), int(facts["quiet"]))
 
     def as_dict(self) -> dict[str, Any]:
         """For the store."""
         return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(self).items()}
 
     def threshold(self, radius: int) -> tuple[float, float, float]:
-        """The load in g that is detected with probability 0.9 at the radius of this number, and its 95 % by the bootstrap; infinite
-        where no load of the ladder is."""
+        """The load in g that is detected with probability 0.9 at the radius of this number, and its 95 % by the bootstrap;
+        infinite where no load of the ladder is."""
         hits, tries = self.hits[radius], self.tries[radius]
         generator = np.random.default_rng(radius)
         drawn = [
@@ -66,7 +66,7 @@ class Detection:
 
 
 def least_load(loads_g: FloatArray, share: FloatArray) -> float:
-    """From which on the ``share`` detected (loads,) stays at 0.9 or more, between two loads by their logarithms; infinite if never."""
+    """From which on the ``share`` detected (loads,) stays at 0.9 or more, between loads by their logarithms; infinite: never."""
     below = np.flatnonzero(share < PROBABILITY)
     if not len(below):
         return float(loads_g[0])
@@ -82,7 +82,8 @@ def detect(instruments: Instruments, light: PressSet, snr_db: float, reps: int, 
     session, seed = light.session, light.session.touches.seed
     how, exact = converter_for(snr_db), session.exact_quiet_v
     span_v = how.adc_headroom * float(np.abs(exact).max())
-    converter = (noise_deviation_v(exact, snr_db), 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits, span_v, seed)
+    lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
+    converter = noise_deviation_v(exact, snr_db), lsb_v, span_v, seed
     false, looked, each = 0, 0, -(-quiet_frames // TARES)
     for tare in range(TARES):
         quiet, _ = measure(np.tile(exact, (QUIET, 1)), *converter, f"force tare {tare} {snr_db:g}")

@@ -1,8 +1,8 @@
 """What a weight does to the sheet, and how sure that is: a disc's radius by Hertz, its contrast by the piezoresistive law.
 
 - Contact radius: a rigid round tip of radius rho on an elastic half-space of reduced modulus E* under load F has
-  a = (3 F rho / (4 E*))^(1/3) (Hertz 1882; Johnson, Contact Mechanics, 1985, section 4.2). Hydrogels of skins have moduli of tens of kPa. The sheet
-  is thin beside the contact for the greatest loads only; that, like the tip, goes into the deviation of the modulus.
+  a = (3 F rho / (4 E*))^(1/3) (Hertz 1882; Johnson, Contact Mechanics, 1985, section 4.2). Hydrogels of skins have moduli of tens
+  of kPa. The sheet, 12 mm, is no half-space beside contacts of 8 mm: that goes into the deviation of the modulus.
 - Contrast: ``scene.laws.Piezoresistive``, 1 + c (1 - exp(-s grams / c)).
 
 Parameters are uncertain by relative standard deviations (log-normal), which say how far real gels and tips may be from this one.
@@ -60,7 +60,6 @@ def drawn_laws(seed: int, count: int) -> tuple[PressLaw, ...]:
     laws = []
     for k in range(count):
         normal = stream(seed, "force law", k).standard_normal(len(DEVIATION))
-        laws.append(
-            PressLaw(**{name: getattr(NOMINAL, name) * float(np.exp(d * z)) for (name, d), z in zip(DEVIATION.items(), normal, strict=True)})
-        )
+        factors = np.exp(np.array(list(DEVIATION.values())) * normal).tolist()
+        laws.append(PressLaw(**{name: getattr(NOMINAL, name) * by for name, by in zip(DEVIATION, factors, strict=True)}))
     return tuple(laws)

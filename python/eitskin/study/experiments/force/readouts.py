@@ -1,10 +1,11 @@
-"""What is read off a frame as the strength of its press: an image's peak or integral, or the strength of the touch off the grid."""
+"""What is read off a frame as the strength of its press: an image's peak or integral, or the touch's strength off the grid."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ FloatArray = npt.NDArray[np.float64]
 
 FISTA_ITERATIONS, FISTA_RATIO = 30, 0.03
 PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH = (
-    "plain FISTA 30, peak", "plain FISTA 30, integral", "eitskin image, peak", "eitskin image, integral", "eitskin touch, strength"
+    "plain FISTA 30, peak", "plain FISTA 30, integral", "eitskin image, peak", "eitskin image, integral", "eitskin touch, strength",
 )  # fmt: skip
 LOG_INTEGRAL, LOG_TOUCH = "log-ratio image, integral", "log-ratio touch, strength"
 READOUTS = (PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH, LOG_INTEGRAL, LOG_TOUCH)
@@ -31,7 +32,7 @@ READOUTS = (PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH, LOG_INTEGRAL, LOG
 
 @dataclass(frozen=True, eq=False)
 class Readout:
-    """Of k frames: ``value`` (k,), NaN where nothing was found; ``place_mm`` (k, 2) where; ``macs`` a frame, 0 where not counted."""
+    """Of k frames: ``value`` (k,), NaN where nothing was found; ``place_mm`` (k, 2) where; ``macs`` a frame, 0: not counted."""
 
     value: FloatArray
     place_mm: FloatArray
@@ -71,7 +72,8 @@ class Instruments:
         measured = session.measured(snr_db)
         frames, quiet = measured.frames_v[:, -1], measured.quiet_v
         centres, area = self.linear.grid.centres_mm(), self.linear.grid.pixel_mm**2
-        plain = PlainFista(self.linear.jacobian, FISTA_ITERATIONS, FISTA_RATIO, signed=True).reconstruct(frames - quiet.mean(axis=0))
+        fista = PlainFista(self.linear.jacobian, FISTA_ITERATIONS, FISTA_RATIO, signed=True)
+        plain = fista.reconstruct(frames - quiet.mean(axis=0))
         peaks = centres[np.abs(plain).argmax(axis=1)]
         found = {
             PEAK: Readout(plain.max(axis=1), peaks, 0.0),
@@ -87,10 +89,16 @@ class Instruments:
             if kind == "difference":
                 found[IMAGE_PEAK] = Readout(images.max(axis=1), places, solve)
             found[names[0]] = Readout(images.sum(axis=1) * area, places, solve)
-            first = [(r.touches[0].strength_s_per_m_mm2, r.touches[0].x_mm, r.touches[0].y_mm) if r.touches else 3 * (np.nan,) for r in results]
-            touch = np.array(first, dtype=np.float64)
+            touch = np.array([_strongest(result) for result in results], dtype=np.float64)
             found[names[1]] = Readout(touch[:, 0], touch[:, 1:], both)
         return {name: found[name] for name in READOUTS}
+
+
+def _strongest(result: Reconstruction) -> tuple[float, float, float]:
+    if not result.touches:
+        return np.nan, np.nan, np.nan
+    touch = result.touches[0]
+    return touch.strength_s_per_m_mm2, touch.x_mm, touch.y_mm
 
 
 def as_lists(readouts: Mapping[str, Readout]) -> dict[str, object]:
@@ -104,12 +112,12 @@ def as_lists(readouts: Mapping[str, Readout]) -> dict[str, object]:
     }
 
 
-def from_lists(lists: Mapping[str, Mapping[str, list[float | None]]]) -> dict[str, Readout]:
+def from_lists(lists: Mapping[str, Mapping[str, Any]]) -> dict[str, Readout]:
     """From the store."""
     def array(values: list[float | None]) -> FloatArray:
         return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
     return {
-        name: Readout(array(one["value"]), np.column_stack([array(one["x"]), array(one["y"])]), float(one["macs"]))  # type: ignore[arg-type]
+        name: Readout(array(one["value"]), np.column_stack([array(one["x"]), array(one["y"])]), one["macs"])
         for name, one in lists.items()
     }

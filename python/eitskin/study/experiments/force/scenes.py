@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,14 +28,20 @@ AT_ONCE = 20
 
 @dataclass(frozen=True, eq=False)
 class PressSet:
-    """k single presses: ``grams`` (k,), ``place_mm`` (k, 2), ``law`` (k,) and ``group`` (k,), numbers of the law and of the radius
-    or place; their solved frames."""
+    """k single presses: ``grams`` (k,), ``place_mm`` (k, 2), ``law`` and ``group`` (k,), numbers of the law and of the radius or
+    place; their solved frames."""
 
     session: Session
     grams: FloatArray
     place_mm: FloatArray
     law: npt.NDArray[np.int64]
     group: npt.NDArray[np.int64]
+
+    @property
+    def facts(self) -> list[str]:
+        """What tells it from any other set: its name, and its discs."""
+        discs = [list(vars(touch).values()) for scene in self.session.touches.scenes for touch in scene.touches]
+        return [self.session.touches.name, hashlib.sha256(json.dumps(discs).encode()).hexdigest()[:16]]
 
 
 def at_radius(share: float, angle_deg: float, radius_mm: float) -> tuple[float, float]:
@@ -47,13 +55,6 @@ def spiral(seed: int, count: int, radius_mm: float) -> FloatArray:
     k = np.arange(count)
     angle = k * math.pi * (3 - math.sqrt(5)) + stream(seed, "force spiral").uniform(0, 2 * math.pi)
     away = OUTERMOST * radius_mm * np.sqrt((k + 0.5) / count)
-    return np.column_stack([away * np.cos(angle), away * np.sin(angle)])
-
-
-def scattered(seed: int, count: int, radius_mm: float) -> FloatArray:
-    """``count`` random places (k, 2), evenly by area to ``OUTERMOST``."""
-    drawn = stream(seed, "force places").uniform(size=(count, 2))
-    away, angle = OUTERMOST * radius_mm * np.sqrt(drawn[:, 0]), 2 * math.pi * drawn[:, 1]
     return np.column_stack([away * np.cos(angle), away * np.sin(angle)])
 
 
@@ -100,7 +101,7 @@ def spread_rows(places: FloatArray) -> list[tuple[float, tuple[float, float], in
 
 def light_loads(count: int) -> list[float]:
     """A ladder of ``count`` light loads, g, by equal factors."""
-    return np.geomspace(*LIGHT_G, count).tolist()
+    return [float(grams) for grams in np.geomspace(*LIGHT_G, count)]
 
 
 def light_rows(radius_mm: float, count: int) -> list[tuple[float, tuple[float, float], int, int]]:
