@@ -33,7 +33,8 @@ RIDGE = 0.02 / 0.5     # strengths scatter by about 0.02, coefficients are of th
 TABLE_POINTS = 33
 RESAMPLES = 200
 STEP = 1e-5             # of a law's numbers, relative, for their derivatives
-LEAST_EXPONENT = 0.04  # a law as flat as that is none
+LEAST_EXPONENT = 0.02
+LEAST_STEEPNESS = 0.05 # a law as flat as that tells no loads
 MOST_F0 = 30.0         # times the greatest load: beyond, a saturating law is a straight line
 
 
@@ -41,7 +42,7 @@ MOST_F0 = 30.0         # times the greatest load: beyond, a saturating law is a 
 class Form:
     """A law of some positive numbers: strength by load, and load by strength; their names, where a fit begins, its bounds.
 
-    ``start`` and ``low``, ``high`` are relative: to strengths (the first number) and the greatest load (F0); exponents as they are.
+    ``start`` and ``low``, ``high`` are relative: to strengths and the greatest load (F0); exponents as they are.
     """
 
     strength: Callable[..., FloatArray]
@@ -189,7 +190,7 @@ def calibrate(presses: Presses, radius_mm: float, seed: int = 1, resamples: int 
     tried = {(form, order): others.get(order, tried[form, middle]) for order in orders}
     _, order = _best(tried)
     fitted = fit(presses, radius_mm, form, order)
-    if fitted.numbers[-1] < 1.01 * LEAST_EXPONENT:
+    if _steepness(fitted, presses.load_n) < LEAST_STEEPNESS:
         raise FrameError("calibration: strength does not grow with load; look at the list of weights, and at the touches of each")
     if form != "power" and fitted.numbers[1] > 0.9 * MOST_F0 * presses.load_n.max():
         notes.append("the strength shows no saturation: beyond the greatest weight the law is a guess")
@@ -200,6 +201,13 @@ def calibrate(presses: Presses, radius_mm: float, seed: int = 1, resamples: int 
         law, fitted, _interval(presses, radius_mm, fitted, fold, seed, resamples), left_out, groups, by_place,
         (_scatter(presses, before), _scatter(presses, left_out)), tuple(notes),
     )  # fmt: skip
+
+
+def _steepness(fitted: Fitted, load_n: FloatArray) -> float:
+    """The exponent of load that strength grows with between the least and the greatest weight."""
+    ends = np.array([load_n.min(), load_n.max()])
+    low, high = np.log(np.maximum(FORMS[fitted.form].strength(ends, *fitted.numbers), 1e-300))
+    return float((high - low) / np.log(ends[1] / ends[0]))
 
 
 def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
@@ -279,7 +287,7 @@ def _best(tried: dict[tuple[str, int], FloatArray]) -> tuple[str, int]:
 
 
 def _rms_log(errors: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.log1p(errors) ** 2)))
+    return float(np.sqrt(np.mean(np.log(np.maximum(1 + errors, 1e-9)) ** 2)))
 
 
 def _interval(

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = ("README.md", "docs/tutorial.md", "docs/scenes.md", "docs/board.md", "docs/tradeoff.md")
+PAGES = ("README.md", "docs/tutorial.md", "docs/scenes.md", "docs/board.md", "docs/calibration.md", "docs/tradeoff.md")
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SET_UP = {"scripts/demo", "scripts/test"}
 

@@ -24,7 +24,8 @@ FloatArray = npt.NDArray[np.float64]
 
 FISTA_ITERATIONS, FISTA_RATIO = 30, 0.03
 PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH = (
-    "plain FISTA 30, peak", "plain FISTA 30, integral", "eitskin image, peak", "eitskin image, integral", "eitskin touch, strength",
+    "plain FISTA 30, peak", "plain FISTA 30, integral",
+    "eitskin image, peak", "eitskin image, integral", "eitskin touch, strength",
 )  # fmt: skip
 LOG_INTEGRAL, LOG_TOUCH = "log-ratio image, integral", "log-ratio touch, strength"
 READOUTS = (PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH, LOG_INTEGRAL, LOG_TOUCH)
