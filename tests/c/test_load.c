@@ -13,7 +13,7 @@ enum { HEAD = 32, MOST = 1024 };
 static uint32_t section_of(uint8_t *bytes, uint32_t order)
 {
     static const float table[] = {0, 2, 3, 0, 1, 5};
-    static const float gain[] = {0.9f, 0.25f, -0.125f, 0.0625f, -0.3f, 0.2f, 0.05f, 0.1f, -0.15f, 0.35f, 0.4f, -0.45f, 0.11f, 0.21f, -0.31f};
+    static const float gain[] = {0.9f, 0.25f, -0.125f, 3.5f, -0.3f, 0.2f, 0.05f, 0.1f, -0.15f, 0.35f, 0.4f, -0.45f, 0.11f, 0.21f, -0.31f};
     const uint32_t terms = (order + 1) * (order + 2) / 2;
     memset(bytes, 0, MOST);
     small_put_u32(bytes, 3);
