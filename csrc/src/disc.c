@@ -113,6 +113,29 @@ uint64_t eits_disc_field(eits_context *ctx, const eits_disc *disc, eits_real *fi
     return (uint64_t)c.count * at->rows;
 }
 
+eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, radius = disc->radius_mm / pixel, reach = radius + R(0.5);
+    const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / pixel;
+    const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / pixel;
+    eits_real pixels = 0;
+    uint32_t x0, x1, y0, y1;
+    cell_range(x, reach, model->nx, &x0, &x1);
+    cell_range(y, reach, model->ny, &y0, &y1);
+    for (uint32_t iy = y0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x0; ix <= x1 && ix < model->nx; ++ix) {
+            const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+            if (j == EITS_NO_PIXEL || model->column_weight[j] == 0.0f)
+                continue;
+            const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y;
+            const eits_real share = reach - eits_sqrt(eits_fma(dx, dx, dy * dy));
+            pixels += share > 0 ? (share < 1 ? share : 1) : 0;
+        }
+    }
+    return pixels * pixel * pixel;
+}
+
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc)
 {
     const eits_model *model = ctx->model;

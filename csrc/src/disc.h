@@ -20,6 +20,10 @@ uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *ato
  * covered. Uses z, x_next, gradient and the list as scratch. Returns the multiply-accumulates. */
 uint64_t eits_disc_field(eits_context *ctx, const eits_disc *disc, eits_real *field);
 
+/* mm^2 that the disc's covers add up to on the pixels that count: what its change was fitted with. On a coarse grid that differs by
+ * per cents from place to place, and near the rim it is only the part on the skin. */
+eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc);
+
 /* Whether a kept pixel is at the disc's centre or next to it: data that fit no disc would draw it far beyond the rim. */
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc);
 

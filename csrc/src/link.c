@@ -30,7 +30,7 @@ PLACE(eits_packet_solved, iterations, 28);
 PLACE(eits_packet_solved, lambda, 44);
 PLACE(eits_packet_solved, findings, 68);
 PLACE(eits_packet_solved, open_electrodes, 80);
-SIZE(eits_packet_touch, 24);
+SIZE(eits_packet_touch, 28);
 SIZE(eits_stage_stats, 16);
 SIZE(eits_packet_stats, 68 + 16 * EITS_STAGES); /* and so has stage[6] as many as there are */
 PLACE(eits_packet_stats, link_packets, 36);

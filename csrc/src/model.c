@@ -11,7 +11,7 @@ typedef struct section {
 } section;
 
 typedef struct sections {
-    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds;
+    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, load;
 } sections;
 
 static uint32_t read_u32(const uint8_t *bytes)
@@ -100,10 +100,9 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
 
 static section *find_slot(sections *found, const uint8_t *tag)
 {
-    static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDS";
-    section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref, &found->redu, &found->sens,
-                        &found->scal, &found->colw, &found->grid, &found->defs, &found->gold, &found->meta,
-                        &found->flds};
+    static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOAD";
+    section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref, &found->redu, &found->sens, &found->scal,
+                        &found->colw, &found->grid, &found->defs, &found->gold, &found->meta, &found->flds, &found->load};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];
@@ -295,6 +294,40 @@ static eits_status read_fields(eits_model *model, const section *flds)
     return EITS_OK;
 }
 
+static int ascends_from_zero(const float *values, uint32_t count)
+{
+    for (uint32_t k = 1; k < count; ++k) {
+        if (!between(values[k], 0, 1e30f) || !(values[k] > values[k - 1]))
+            return 0;
+    }
+    return values[0] == 0.0f;
+}
+
+/* The optional calibration of loads. */
+static eits_status read_load(eits_load *load, const section *found)
+{
+    if (found->data == NULL)
+        return EITS_OK;
+    if (found->size < sizeof(eits_load_head))
+        return EITS_E_MODEL_SECTION;
+    const eits_load_head *head = (const eits_load_head *)(const void *)found->data;
+    if (head->points < 2 || head->points > EITS_MAX_LOAD_POINTS || head->order > EITS_MAX_LOAD_ORDER ||
+        !between(head->radius_mm, 1e-6f, 1e30f) || !between(head->reach, 0, 1e3f) || !between(head->uncertainty, 0, 1e30f))
+        return EITS_E_MODEL_VALUE;
+    const uint32_t terms = (head->order + 1) * (head->order + 2) / 2;
+    if (found->size != sizeof *head + (2 * head->points + terms) * 4)
+        return EITS_E_MODEL_SECTION;
+    const float *numbers = (const float *)(const void *)(head + 1);
+    *load = (eits_load){head, numbers, numbers + head->points, numbers + 2 * head->points};
+    if (!ascends_from_zero(load->strength, head->points) || !ascends_from_zero(load->load_n, head->points))
+        return EITS_E_MODEL_VALUE;
+    for (uint32_t k = 0; k < terms; ++k) {
+        if (!between(load->gain[k], -1e6f, 1e6f))
+            return EITS_E_MODEL_VALUE;
+    }
+    return EITS_OK;
+}
+
 static void point_into(eits_model *model, const sections *found)
 {
     model->protocol = found->prot.data;
@@ -338,6 +371,8 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
         status = check_numbers(&opened);
     if (status == EITS_OK)
         status = read_fields(&opened, &found.flds);
+    if (status == EITS_OK)
+        status = read_load(&opened.load, &found.load);
     if (status == EITS_OK)
         *model = opened;
     return status;

@@ -1,4 +1,5 @@
 /* Peaks of the image start discs; the discs are fitted to the reduced data off the grid; those that explain nothing go. */
+#include "eitskin/load.h"
 #include "eitskin/touch.h"
 
 #include "coupling.h"
@@ -12,7 +13,6 @@
 /* The radius that strength suggests counts for more while it is open which discs there are, and for less once the discs'
  * interplay is known and the data are right to a thousandth. */
 static const eits_real SEARCH_RADIUS = R(2.0), FINAL_RADIUS = R(0.4);
-static const eits_real PI = R(3.14159265358979323846);
 enum { ROUNDS = 2, LATER_SWEEPS = 2 };
 
 /* ---- peaks ---- */
@@ -133,11 +133,9 @@ static void search(eits_context *ctx, eits_fit *f)
 
 /* ---- the report ---- */
 
-/* A disc's covers (disc.h) add up to pi (radius^2 + pixel^2 / 12), averaged over its places, where the radius is at least half
- * a pixel: that is the area its change was fitted with. Returns how many there are: those whose numbers are finite. */
-static uint32_t report(const eits_fit *f, eits_real pixel_mm, eits_touch *out)
+/* Returns how many there are: those whose numbers are finite. */
+static uint32_t report(const eits_context *ctx, const eits_fit *f, eits_touch *out)
 {
-    const eits_real soft_edge = pixel_mm * pixel_mm / 12;
     uint32_t count = 0;
     for (uint32_t k = 0; k < f->count; ++k) {
         const eits_disc *disc = &f->disc[k];
@@ -145,7 +143,7 @@ static uint32_t report(const eits_fit *f, eits_real pixel_mm, eits_touch *out)
             .x_mm = disc->x_mm,
             .y_mm = disc->y_mm,
             .radius_mm = disc->radius_mm,
-            .strength_s_per_m_mm2 = disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, soft_edge),
+            .strength_s_per_m_mm2 = disc->change * eits_disc_area(ctx, disc),
             .confidence = f->explained[k] < 1 ? f->explained[k] : 1,
         };
         const eits_real numbers[] = {touch.x_mm, touch.y_mm, touch.radius_mm, touch.strength_s_per_m_mm2, f->explained[k]};
@@ -171,7 +169,9 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const int looked = stop != EITS_STOP_GATE && stop != EITS_STOP_ZERO && stop != EITS_STOP_DIVERGED;
     if (looked)
         search(ctx, &f);
-    const uint32_t finite = report(&f, (eits_real)ctx->model->pixel_mm, found);
+    const uint32_t finite = report(ctx, &f, found);
+    for (uint32_t k = 0; k < finite; ++k)
+        found[k].load_n = eits_load_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     eits_track(ctx, found, finite);
     ctx->info.touches = finite;
     ctx->info.touch_macs = f.macs;

@@ -286,6 +286,23 @@ small_model small_model_make(small_spec spec)
     return made;
 }
 
+small_model small_model_with_load(const small_model *model, const void *section, uint32_t size)
+{
+    const uint32_t padded = (size + 15u) & ~15u;
+    small_model made = {.size = model->size + padded};
+    made.blob = small_aligned(&made.memory, made.size);
+    memcpy(made.blob, model->blob, model->size);
+    memset(made.blob + model->size, 0, padded);
+    memcpy(made.blob + model->size, section, size);
+    uint8_t *entry = small_model_entry(&made, "XTRA");
+    memcpy(entry, "LOAD", 4);
+    small_put_u32(entry + 4, (uint32_t)model->size);
+    small_put_u32(entry + 8, size);
+    small_put_u32(made.blob + 8, (uint32_t)made.size);
+    small_model_seal(&made);
+    return made;
+}
+
 void small_model_free(small_model *model)
 {
     free(model->memory);
@@ -351,5 +368,5 @@ void small_new_data(eits_context *ctx, uint64_t state)
 int small_same_touch(const eits_touch *a, const eits_touch *b)
 {
     return a->id == b->id && a->x_mm == b->x_mm && a->y_mm == b->y_mm && a->radius_mm == b->radius_mm &&
-           a->strength_s_per_m_mm2 == b->strength_s_per_m_mm2 && a->confidence == b->confidence;
+           a->strength_s_per_m_mm2 == b->strength_s_per_m_mm2 && a->confidence == b->confidence && a->load_n == b->load_n;
 }

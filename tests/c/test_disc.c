@@ -45,33 +45,33 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
     return covered;
 }
 
-/* What a touch's strength is made of: the covers' sum, averaged over places, is pi (radius^2 + pixel^2 / 12). */
+/* What a touch's strength is made of: the covers' sum at its very place; averaged over places, pi (radius^2 + pixel^2 / 12). */
 static void area(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
-    const double pixel = (double)b.c.model.pixel_mm;
+    const double pixel = (double)b.c.model.pixel_mm, span = SIDE * pixel;
     for (double radius = 3; radius <= 15; radius += 4) {
-        double sum = 0;
-        for (int place = 0; place < 24 * 24; ++place) {
-            const eits_disc disc = {.x_mm = (eits_real)(place % 24 * pixel / 24),
-                                    .y_mm = (eits_real)(place / 24 * pixel / 24),
+        double mean = 0;
+        for (int place = 0; place < 24 * 24 + 60; ++place) { /* within a pixel, then all over and beyond the image */
+            const int inside = place < 24 * 24;
+            const eits_disc disc = {.x_mm = (eits_real)(inside ? place % 24 * pixel / 24 : 0.7 * span * sin(place)),
+                                    .y_mm = (eits_real)(inside ? place / 24 * pixel / 24 : 0.7 * span * cos(1.3 * place)),
                                     .radius_mm = (eits_real)radius};
-            eits_real atom[EITS_STRIDE(RANK)];
-            (void)eits_disc_atom(ctx, &disc, atom, NULL);
-            /* the first row of S is constant, but the weights are not: their covers are in list_value, columns where they are held */
-            const double reach = radius / pixel + 0.5;
-            uint32_t k = 0;
+            double sum = 0;
             for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) {
-                const double dx = (double)b.c.model.pixel[j].ix + 0.5 - SIDE / 2.0 - place % 24 / 24.0;
-                const double dy = (double)b.c.model.pixel[j].iy + 0.5 - SIDE / 2.0 - place / 24 / 24.0;
-                if (hypot(dx, dy) >= reach - 1e-6 || k >= ctx->model->n_pixels || ctx->held_column[ctx->list_index[k]] != j)
-                    continue;
-                sum += (double)ctx->list_value[k++] * (double)b.c.model.column_weight[j] * pixel * pixel / (24 * 24);
+                const double dx = ((double)b.c.model.pixel[j].ix + 0.5 - SIDE / 2.0) * pixel - (double)disc.x_mm;
+                const double dy = ((double)b.c.model.pixel[j].iy + 0.5 - SIDE / 2.0) * pixel - (double)disc.y_mm;
+                sum += fmin(1, fmax(0, 0.5 + (radius - hypot(dx, dy)) / pixel)) * pixel * pixel;
             }
+            const double got = (double)eits_disc_area(ctx, &disc);
+            CHECK_NEAR(got, sum, 1000 * EPS * fmax(sum, pixel * pixel));
+            mean += inside ? got / (24 * 24) : 0;
         }
-        CHECK_NEAR(sum, 3.14159265358979 * (radius * radius + pixel * pixel / 12), 0.005 * sum);
+        CHECK_NEAR(mean, 3.14159265358979 * (radius * radius + pixel * pixel / 12), 0.005 * mean);
     }
+    const eits_disc far = {.x_mm = R(1e6), .y_mm = R(-1e6), .radius_mm = R(5.0)};
+    CHECK(eits_disc_area(ctx, &far) == 0);
     dense_bench_close(&b);
 }
 

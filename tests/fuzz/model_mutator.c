@@ -2,9 +2,9 @@
  * Otherwise nearly every input would end at the checksum. */
 #include "fuzz.h"
 
-enum { HEADER = 64, ENTRY = 16, SECTIONS = 12, MOST = 1 << 14 };
-enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META };
-static const char TAGS[] = "DIMSPROTFOLDVREFREDUSENSCOLWGRIDDEFSGOLDSCALMETA";
+enum { HEADER = 64, ENTRY = 16, SECTIONS = 12 /* that every model is laid out with */, MOST = 1 << 14 };
+enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META, LOAD };
+static const char TAGS[] = "DIMSPROTFOLDVREFREDUSENSCOLWGRIDDEFSGOLDSCALMETALOAD";
 
 static uint32_t get(const uint8_t *at)
 {
@@ -144,16 +144,16 @@ static void set_number(uint8_t *data, size_t size, uint32_t seed)
 {
     static const uint32_t odd[] = {0x00000001u, 0x80000001u, 0x007FFFFFu, 0x00800000u, 0x7F7FFFFFu, 0xFF7FFFFFu, 0x7F800000u, 0x7FC00000u,
                                    0x80000000u, 0x7E967699u, 0x01000000u, 0x3F800000u, 0xBF800000u, 0x5F000000u, 0x20000000u, 0u};
-    static const int numbers[] = {VREF, REDU, SENS, COLW, DEFS, GOLD, SCAL, DIMS};
+    static const int numbers[] = {VREF, REDU, SENS, COLW, DEFS, GOLD, SCAL, DIMS, LOAD};
     uint32_t bytes = 0;
-    uint8_t *section = find(data, size, numbers[seed % 8], &bytes);
+    uint8_t *section = find(data, size, numbers[seed % 9], &bytes);
     if (section == NULL || bytes < 4)
         return;
     const uint32_t place = (seed >> 8) % (bytes / 4) * 4, power = (seed >> 3) & 31u;
     if (power < 16)
         put(section + place, odd[power]);
     else /* another unit for all of them: the exponents move */
-        for (uint32_t i = 0; i + 4 <= bytes && numbers[seed % 8] != DIMS && numbers[seed % 8] != DEFS; i += 4) {
+        for (uint32_t i = 0; i + 4 <= bytes && numbers[seed % 9] != DIMS && numbers[seed % 9] != DEFS && numbers[seed % 9] != LOAD; i += 4) {
             const uint32_t bits = get(section + i), exponent = (bits >> 23 & 255u) + (power - 24u) * 9u;
             if ((bits & 0x7F800000u) != 0 && exponent >= 1 && exponent <= 254)
                 put(section + i, (bits & 0x807FFFFFu) | exponent << 23);
@@ -163,7 +163,7 @@ static void set_number(uint8_t *data, size_t size, uint32_t seed)
 static size_t mutate_section(uint8_t *data, size_t size, uint32_t seed)
 {
     uint32_t bytes = 0;
-    uint8_t *section = find(data, size, (int)(seed % SECTIONS), &bytes);
+    uint8_t *section = find(data, size, (int)(seed % (SECTIONS + 1u)), &bytes);
     if (section != NULL && bytes > 0) {
         const size_t kept = LLVMFuzzerMutate(section, bytes, bytes);
         memset(section + kept, 0, bytes - kept);

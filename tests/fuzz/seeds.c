@@ -16,6 +16,27 @@ static void keep(const char *name, unsigned number, const uint8_t *bytes, size_t
     }
 }
 
+/* With a section LOAD, order by order. */
+static void calibrated(unsigned k, const small_model *bare)
+{
+    enum { HEAD = 32, POINTS = 4 };
+    const uint32_t order = k % 5, terms = (order + 1) * (order + 2) / 2;
+    uint8_t load[HEAD + 8 * POINTS + 4 * 15] = {0};
+    small_put_u32(load, POINTS);
+    small_put_u32(load + 4, order);
+    small_put_f32(load + 8, 5.0f);
+    small_put_f32(load + 12, 0.9f);
+    for (uint32_t i = 0; i < POINTS; ++i) {
+        small_put_f32(load + HEAD + 4 * i, (float)i);
+        small_put_f32(load + HEAD + 4 * (POINTS + i), (float)(i * i));
+    }
+    for (uint32_t i = 0; i < terms; ++i)
+        small_put_f32(load + HEAD + 4 * (2 * POINTS + i), i == 0 ? 1.0f : 0.1f);
+    small_model made = small_model_with_load(bare, load, HEAD + 4 * (2 * POINTS + terms));
+    keep("load", k, made.blob, made.size);
+    small_model_free(&made);
+}
+
 static void models(void)
 {
     for (unsigned k = 0; k < 24; ++k) {
@@ -28,6 +49,8 @@ static void models(void)
         small_put_u32(small_model_section(&made, "DEFS", NULL) + 56, k % 4); /* solver */
         small_model_seal(&made);
         keep("small", k, made.blob, made.size);
+        if (k % 4 < 2)
+            calibrated(k, &made);
         if (k % 8 == 0)
             keep("cut", k, made.blob, made.size / 2);
         small_model_free(&made);

@@ -255,6 +255,7 @@ EXACT = (
 TOUCH = (
     of(
         "disc.c",
+        ("an area of whole pixels", "pixels += share > 0 ? (share < 1 ? share : 1) : 0;", "pixels += share > 0 ? 1 : 0;", "disc"),
         ("covers half a pixel too wide", "share = R(0.5) + (radius - distance)", "share = R(1.0) + (radius - distance)", "disc"),
         ("a rim without slope", "share < 1 ? factor / pixel : 0", "share < 1 ? 0 * factor / pixel : 0", "disc"),
         ("weights not divided by", " / (eits_real)model->column_weight[j];", ";", "disc"),
@@ -290,12 +291,6 @@ TOUCH = (
             "touch_fit",
         ),
         ("no halving of a disc's step", "attempt < 3; ++attempt", "attempt < 1; ++attempt", "track"),
-        (
-            "strength without the soft edge",
-            "eits_fma(disc->radius_mm, disc->radius_mm, soft_edge)",
-            "eits_fma(disc->radius_mm, disc->radius_mm, 0 * soft_edge)",
-            "touch_fit",
-        ),
         ("a radius that strength does not tell", "weight = o->touch_radius_weight * energy", "weight = 0 * energy", "touch_fit"),
         ("touches that noise makes", "return best >= least;", "return best >= 0 * least;", "touch"),
     )
@@ -307,6 +302,17 @@ TOUCH = (
     )
 )
 
+LOAD = of(
+    "load.c",
+    ("the gain left out", "eits_fabs(strength_s_per_m_mm2) * gain_at(load, u, v)", "eits_fabs(strength_s_per_m_mm2)", "load"),
+    ("a negative strength's load", "eits_fabs(strength_s_per_m_mm2) *", "strength_s_per_m_mm2 *", "load"),
+    ("a polynomial without bounds", "(gain < MOST_GAIN ? gain : MOST_GAIN)", "gain", "load"),
+    ("beyond where it was calibrated", "if (from > reach) {", "if (0 * from > reach) {", "load"),
+    ("powers of u and v mixed up", "power[degree + 1] = power[degree] * v;", "power[degree + 1] = power[degree] * u;", "load"),
+    ("the table's first piece for all", "while (k < last && strength >", "while (0 && strength >", "load"),
+    ("loads without end", "return found < most ? found : most;", "return found;", "load"),
+)
+
 BYTES = of(
     "model.c",
     (
@@ -316,6 +322,8 @@ BYTES = of(
         "model",
     ),
     ("sections may reach beyond the end", "size > total - offset", "size > total", "model"),
+    ("calibrations that fall", " || !(values[k] > values[k - 1])", "", "load"),
+    ("calibrations that begin above nothing", "return values[0] == 0.0f;", "return 1;", "load"),
     ("halves that are infinite", "(values[i] & 0x7C00u) == 0x7C00u", "(values[i] & 0x7FFFu) == 0x7FFFu", "model_values"),
 ) + of(
     "link.c",
@@ -328,4 +336,4 @@ BYTES = of(
     ),
 )
 
-MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCH + BYTES + FRAMES
+MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCH + LOAD + BYTES + FRAMES

@@ -108,6 +108,7 @@ typedef struct eits_touch {
     eits_real radius_mm;
     eits_real strength_s_per_m_mm2; /* conductivity change integrated over the touch: S/m mm^2 */
     eits_real confidence;           /* share of |y|^2 that leaving this touch out would leave unexplained: 0 to 1 */
+    eits_real load_n;               /* how hard it presses, N; 0 where the model is not calibrated (load.h) */
 } eits_touch;
 
 struct eits_kernels; /* matrix products, chosen at start-up among builds that give the same bits */

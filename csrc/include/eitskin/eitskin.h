@@ -5,6 +5,7 @@
 #include "eitskin/types.h"
 #include "eitskin/findings.h"
 #include "eitskin/model.h"
+#include "eitskin/load.h"
 #include "eitskin/context.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"

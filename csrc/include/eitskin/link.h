@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define EITS_LINK_VERSION 2u       /* the first byte of every packet; another is refused */
+#define EITS_LINK_VERSION 3u       /* the first byte of every packet; another is refused */
 #define EITS_LINK_HEAD 8u
 #define EITS_LINK_MAX_PAYLOAD 16384u
 #define EITS_LINK_MAX_PACKET (EITS_LINK_HEAD + EITS_LINK_MAX_PAYLOAD + 4u)
@@ -178,6 +178,7 @@ typedef struct eits_packet_solved {
 typedef struct eits_packet_touch {
     uint32_t id;
     float x_mm, y_mm, radius_mm, strength_s_per_m_mm2, confidence;
+    float load_n; /* 0 where the model is not calibrated */
 } eits_packet_touch;
 
 /* Stages that are timed, in microseconds. */

@@ -133,6 +133,7 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
         "data": model.data_kind,
         "lipschitz": model.lipschitz,
         "mesh_elements": model.meta.get("mesh_elements"),
+        "calibration": _calibration_text(model),
         "defaults": asdict(model.defaults),
     }
     if as_json:
@@ -143,6 +144,15 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
         print(f"{key.replace('_', ' '):16} {value}")
     shown = (f"{key} {value if isinstance(value, str) else format(value, 'g')}" for key, value in defaults.items())
     print("defaults         " + ", ".join(shown))
+
+
+def _calibration_text(model: Model) -> str:
+    from eitskin.core.results import load_text
+
+    if model.load is None:
+        return "none; touches have no load"
+    law = model.load
+    return f"loads to {load_text(law.load_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain of order {law.order}"
 
 
 def run_verify(options: argparse.Namespace) -> int:

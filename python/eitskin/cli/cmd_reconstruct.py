@@ -224,7 +224,10 @@ def _print(
 ) -> None:
     import numpy as np
 
-    print("frame       touch    x mm     y mm  radius mm  strength S/m mm2   error mm  solve")
+    from eitskin.core.results import NEWTONS_PER_GRAM
+
+    weighed = any(touch.load_n for result in results.values() for touch in result.touches)
+    print(f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'    load g' * weighed}   error mm  solve")
     for number, result in results.items():
         score = scores.get(number)
         errors = {} if score is None else errors_by_touch(score)
@@ -236,7 +239,8 @@ def _print(
             error = f"{errors[k]:10.2f}" if k in errors else ("     false" if score is not None else 10 * " ")
             print(
                 f"{label if k == 0 else '':11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f} {touch.radius_mm:9.2f} "
-                f"{touch.strength_s_per_m_mm2:16.3f}  {error}{f'  {_solve(result)}' if k == 0 else ''}".rstrip()
+                f"{touch.strength_s_per_m_mm2:16.3f}{f'{touch.load_n / NEWTONS_PER_GRAM:10.1f}' if weighed else ''}"
+                f"  {error}{f'  {_solve(result)}' if k == 0 else ''}".rstrip()
             )
         if result.info.findings:
             print(f"{'':11} found: {'; '.join(result.info.found)}")

@@ -12,7 +12,7 @@ from eitskin import __version__
 from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
-    "demo", "model", "reconstruct", "import", "doctor", "scene", "compare", "bench", "tradeoff", "study",
+    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "compare", "bench", "tradeoff", "study",
     "devices", "info", "tare", "stream", "record", "replay", "flash",
 )  # fmt: skip
 

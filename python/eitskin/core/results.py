@@ -134,7 +134,8 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Touch:
-    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame."""
+    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame. ``load_n`` is how
+    hard it presses, in newtons, where the model is calibrated (docs/calibration.md), else 0."""
 
     id: int
     x_mm: float
@@ -142,6 +143,15 @@ class Touch:
     radius_mm: float
     strength_s_per_m_mm2: float
     confidence: float
+    load_n: float = 0.0
+
+
+NEWTONS_PER_GRAM = 9.80665e-3  # grams-force, by the standard acceleration of free fall
+
+
+def load_text(load_n: float) -> str:
+    """A load in words: grams (of force), as weights are marked."""
+    return f"{load_n / NEWTONS_PER_GRAM:.1f} g"
 
 
 @dataclass(frozen=True)

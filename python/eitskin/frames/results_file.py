@@ -41,6 +41,7 @@ def save_results(path: str | Path, model: Model, frames: Frames, results: dict[i
         "touch_radius_mm": np.array([touch.radius_mm for _, touch in touches]),
         "touch_strength_s_per_m_mm2": np.array([touch.strength_s_per_m_mm2 for _, touch in touches]),
         "touch_confidence": np.array([touch.confidence for _, touch in touches]),
+        "touch_load_n": np.array([touch.load_n for _, touch in touches]),
         "info": np.array(json.dumps([results[number].info.as_dict() for number in numbers])),
     }
     with write_beside(path) as temporary, temporary.open("wb") as stream:

@@ -17,13 +17,14 @@ from eitskin.core.results import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
+from eitskin.model.load import decode_load, encode_load
 from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 2
+MAJOR, MINOR = 1, 1  # of files without FLDS and LOAD; with either 1.2
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
@@ -73,6 +74,8 @@ def encode_model(model: Model) -> bytes:
         "GOLD": np.concatenate([golden.reference_v, golden.frame_v, golden.image]).astype("<f4").tobytes(),
         "META": json.dumps(model.meta, sort_keys=True).encode("utf-8"),
     }
+    if model.load is not None:
+        sections["LOAD"] = encode_load(model.load)
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -120,9 +123,10 @@ def _assemble(sections: Sections, protocol_hash: int) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    tail = HEADER.pack(MAGIC, MAJOR, MINOR, offset, 0, len(sections), 0, protocol_hash)[16:]
+    minor = MINOR + ("LOAD" in sections or "FLDS" in sections)
+    tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]
     crc = zlib.crc32(tail + body)
-    return HEADER.pack(MAGIC, MAJOR, MINOR, offset, crc, len(sections), 0, protocol_hash) + body
+    return HEADER.pack(MAGIC, MAJOR, minor, offset, crc, len(sections), 0, protocol_hash) + body
 
 
 def decode_model(blob: bytes, where: str) -> Model:
@@ -171,7 +175,7 @@ def _split(blob: bytes, where: str) -> Sections:
         name = tag.decode("ascii", "replace")
         if offset < table_end or offset + size > total or offset % 16 or name in sections:
             raise ModelError(f"{where}: section {name!r} is misplaced or repeated; build the model again")
-        if name not in (*REQUIRED, "SCAL", "META", "FLDS"):
+        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD"):
             if flags & REQUIRED_FLAG:
                 raise ModelError(f"{where}: needs section {name!r}, which this eitskin does not know; upgrade eitskin")
             continue
@@ -348,6 +352,7 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         golden=Golden(golden[: d.n_rows], golden[d.n_rows : 2 * d.n_rows], golden[2 * d.n_rows :]),
         meta=_read_meta(sections["META"], where) if "META" in sections else {},
         fields=_read_fields(sections["FLDS"], d, where) if "FLDS" in sections else None,
+        load=decode_load(sections["LOAD"], where) if "LOAD" in sections else None,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.fem.grid import Grid
+from eitskin.model.load import LoadLaw
 from eitskin.model.storage import StoredMatrix
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin, skin_from_table
@@ -65,7 +66,8 @@ class Fields:
 @dataclass(frozen=True, eq=False)
 class Model:
     """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P (r, k) float32;
-    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made; ``fields`` where it has them.
+    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made; ``fields`` where it has them;
+    ``load`` tells loads from strengths, where the skin was calibrated.
     """
 
     protocol: Protocol
@@ -83,6 +85,7 @@ class Model:
     golden: Golden
     meta: dict[str, Any] = field(default_factory=dict)
     fields: Fields | None = None
+    load: LoadLaw | None = None
 
     @cached_property
     def sensitivity(self) -> npt.NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from queue import SimpleQueue
 from typing import TypeVar
 
@@ -125,7 +126,7 @@ class Batch:
 
 
 def _numbered(t: Touch, number: int) -> Touch:
-    return Touch(number, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence)
+    return replace(t, id=number)
 
 
 def reconstruct_many(

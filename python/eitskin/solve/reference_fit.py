@@ -73,6 +73,12 @@ class Fit:
         reduced = reduced - self.basis.T @ (self.basis @ reduced)
         return reduced[:, 0], reduced[:, 1:].T
 
+    def area_mm2(self, disc: Disc) -> float:
+        """What the disc's covers add up to on the pixels that count."""
+        distance = np.hypot(*(self.centres - (disc.x_mm, disc.y_mm)).T)
+        cover = np.clip(0.5 + (disc.radius_mm - distance) / self.model.grid.pixel_mm, 0.0, 1.0)
+        return float(cover[self.model.column_weight != 0].sum()) * self.model.grid.pixel_mm**2
+
     def best_change(self, disc: Disc, atom: FloatArray, target: FloatArray) -> float:
         """The change that explains ``target`` best along ``atom``, of the disc's own sign."""
         energy = float(atom @ atom)

@@ -76,11 +76,14 @@ def find_touches(
     explained = np.zeros(0)
     if np.abs(image).max() > 0:
         explained = search(fit, frame, image, interplay)
-    soft_edge = model.grid.pixel_mm**2 / 12  # a disc's covers add up to pi (radius^2 + pixel^2 / 12), averaged over its places
     found = [
-        Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * np.pi * (d.radius_mm**2 + soft_edge), min(1.0, float(e)))
+        Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
+    if model.load is not None:
+        places = np.array([(t.x_mm, t.y_mm) for t in found]).reshape(-1, 2)
+        loads = model.load.loads_at(places, np.array([t.strength_s_per_m_mm2 for t in found]))
+        found = [replace(t, load_n=float(load)) for t, load in zip(found, loads, strict=True)]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     unexplained = fit.left() / fit.whole if fit.whole > 0 and np.abs(image).max() > 0 else 0.0
     touches, next_id = _track(found, last, options.follow_mm, next_id)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.findings import words
-from eitskin.core.results import solve_text
+from eitskin.core.results import load_text, solve_text
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import quality_text
@@ -123,6 +123,7 @@ def _touches_text(seen: Seen) -> str:
         return ""
     found = [
         f"#{t.id} ({t.x_mm:.1f}, {t.y_mm:.1f}) mm, radius {t.radius_mm:.1f} mm, {t.strength_s_per_m_mm2:.2f} S/m mm2"
+        f"{', ' + load_text(t.load_n) if t.load_n else ''}"
         f"{_error(seen, k)}"
         for k, t in enumerate(seen.frame.touches.touches)
     ]

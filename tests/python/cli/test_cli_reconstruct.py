@@ -23,7 +23,7 @@ from small_models import prebuilt, session
 Done = Callable[..., str]
 
 PNG = b"\x89PNG\r\n\x1a\n"
-TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence"}
+TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence", "load_n"}
 INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs", "lambda", "lambda_max",
     "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",

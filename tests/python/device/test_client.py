@@ -174,7 +174,7 @@ def test_a_board_that_talks_for_ever_without_answering_is_given_up() -> None:
         Device(port)
 
 
-@pytest.mark.parametrize(("version", "advice"), [(3, "upgrade eitskin, or flash"), (1, "flash this version's firmware")])
+@pytest.mark.parametrize(("version", "advice"), [(4, "upgrade eitskin, or flash"), (1, "flash this version's firmware")])
 def test_another_link_version_is_refused_with_what_to_do(version: int, advice: str) -> None:
     import zlib
 
@@ -187,7 +187,7 @@ def test_another_link_version_is_refused_with_what_to_do(version: int, advice: s
         else:
             wire += bytes([len(block) + 1]) + block
             block.clear()
-    with pytest.raises(DeviceError, match=f"speaks version {version} of the link protocol and this eitskin 2; {advice}"):
+    with pytest.raises(DeviceError, match=f"speaks version {version} of the link protocol and this eitskin 3; {advice}"):
         Device(Scripted(bytes(wire) + b"\0"))
 
 

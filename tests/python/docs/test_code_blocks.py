@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = ("README.md", "docs/tutorial.md", "docs/scenes.md", "docs/board.md", "docs/tradeoff.md", "docs/shapes.md")
+PAGES = (
+    "README.md", "docs/tutorial.md", "docs/scenes.md", "docs/board.md", "docs/calibration.md", "docs/tradeoff.md", "docs/shapes.md",
+)  # fmt: skip
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SET_UP = {"scripts/demo", "scripts/test"}
 

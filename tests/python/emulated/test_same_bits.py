@@ -16,6 +16,7 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SOLVERS, Options, Reconstruction
 from eitskin.model.eitm import encode_model
+from eitskin.model.load import LoadLaw
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.model.storage import STORAGES, store
@@ -50,7 +51,7 @@ def bits(value: float) -> str:
 def as_printed(result: Reconstruction) -> str:
     """Touches in the emulated program's words."""
     words = [
-        f" {t.id}:" + ":".join(map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence)))
+        f" {t.id}:" + ":".join(map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n)))
         for t in result.touches
     ]
     return f"{len(words)}{''.join(words)}"
@@ -90,6 +91,20 @@ def test_the_same_bits_as_the_host(program: Path, tmp_path: Path, solver: str, s
         assert emulated.macs == expected.info.macs + expected.info.touch_macs
     assert board[0].touches[0] != "0" and board[3].touches == "0"
     assert board[2].image_crc != board[1].image_crc
+
+
+def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
+    model, _ = load_prebuilt()
+    table = np.linspace(0, 6, 9, dtype=np.float32)
+    gain = np.array([1.0, 0.07, -0.11, 0.23, 0.05, 0.19, -0.3, 0.2, 0.11, 0.4], dtype=np.float32)
+    blob = encode_model(replace(model, load=LoadLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02)))
+    random, host = simulated_session(), CoreEngine(blob)
+    quiet, frames, options = random.quiet_v, random.frames_v[:6], default_options(model)
+    host.set_options(options)
+    host.set_baseline(quiet.astype(np.float32).astype(np.float64))
+    results = [host.reconstruct(frame.astype(np.float32)) for frame in frames]
+    assert [one.touches for one in run(program, tmp_path, blob, quiet, frames, options)] == [as_printed(one) for one in results]
+    assert sum(touch.load_n > 0 for one in results for touch in one.touches) >= len(frames)
 
 
 def test_instructions_are_counted_exactly(program: Path, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from small_models import prebuilt, session
 
 FIELDS = {
     "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm", "touch_frame", "touch_id",
-    "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_confidence", "info",
+    "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_confidence", "touch_load_n", "info",
 }  # fmt: skip
 
 
@@ -51,7 +51,7 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
     assert saved["touch_frame"].tolist() == [number for number, _ in touches]
     assert saved["touch_id"].tolist() == [touch.id for _, touch in touches]
     assert saved["touch_xy_mm"].tolist() == [[touch.x_mm, touch.y_mm] for _, touch in touches]
-    for field, name in (("radius_mm",) * 2, ("strength_s_per_m_mm2",) * 2, ("confidence",) * 2):
+    for field, name in (("radius_mm",) * 2, ("strength_s_per_m_mm2",) * 2, ("confidence",) * 2, ("load_n",) * 2):
         assert saved[f"touch_{name}"].tolist() == [getattr(touch, field) for _, touch in touches]
     info = json.loads(str(saved["info"]))
     assert [entry["stop"] for entry in info] == ["iterations"] * 3

@@ -36,7 +36,7 @@ class Outcome:
         """Whether every number that comes out is."""
         numbers = [getattr(self.info, name) for name in NUMBERS]
         for t in self.touches:
-            numbers += [t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence]
+            numbers += [t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n]
         return bool(np.isfinite(self.image).all() and np.isfinite(self.coefficients).all() and np.isfinite(numbers).all())
 
 
@@ -72,7 +72,7 @@ class Host(CoreEngine):
             status = self.solve_frame(numbers)
         self._lib.eits_find_touches(self._context, self._touches, len(self._touches), self._touch_count)
         each = (self._touches[k] for k in range(self._touch_count[0]))
-        found = tuple(Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence) for t in each)
+        found = tuple(Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n) for t in each)
         return Outcome(status, self._image.copy(), self.coefficients(), found, self.last_info())
 
 
@@ -127,7 +127,7 @@ def as_printed(outcome: Outcome) -> tuple[object, ...]:
     info = ":".join([info, str(i.findings), str(i.saturated), str(i.glitches), bits(i.misfit), bits(i.unexplained)])
     info = ":".join([info, *map(_electrode_bits, (i.open_electrodes, i.bridged_electrodes, i.noisy_electrodes))])
     words = [
-        f" {t.id}:" + ":".join(map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence)))
+        f" {t.id}:" + ":".join(map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n)))
         for t in outcome.touches
     ]
     image = zlib.crc32(outcome.image.tobytes())

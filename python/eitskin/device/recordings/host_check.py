@@ -193,7 +193,7 @@ def same_findings(info: Info, raw: RawFrame, solved: Solved, options: Options) -
 
 
 def _numbers(touch: Touch) -> bytes:
-    values = (touch.x_mm, touch.y_mm, touch.radius_mm, touch.strength_s_per_m_mm2, touch.confidence)
+    values = (touch.x_mm, touch.y_mm, touch.radius_mm, touch.strength_s_per_m_mm2, touch.confidence, touch.load_n)
     return np.array(values, dtype="<f4").tobytes()
 
 

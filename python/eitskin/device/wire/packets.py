@@ -14,7 +14,7 @@ import numpy.typing as npt
 from eitskin.core.findings import names, words
 from eitskin.core.results import Touch
 
-LINK_VERSION = 2
+LINK_VERSION = 3
 SHOWN_FRAMES = 3  # EITS_FAULT_SHOWN_FRAMES: in a row, until what a moving touch may look like for a frame is a fault
 CLEAN_FRAMES = 8  # EITS_FAULT_CLEAN_FRAMES: in a row without it, until what was found is over
 MAX_PAYLOAD = 16384

@@ -1,0 +1,317 @@
+"""From presses of known load to the law that turns strength and place into load (docs/calibration.md).
+
+The strength of a load F at (x, y) is modelled as law(F) / gain(x, y). Laws, all monotone: *saturating*, s_max (1 - exp(-F / F0));
+*power*, c F^p; and, from four weights on, *stretched*, s_max (1 - exp(-(F / F0)^p)), which has both within it. The gain is 1 + a
+polynomial without constant in (x / R, y / R), ridge-regularised. What is minimised is the sum of squared logarithms of seen over
+modelled strength. Law and order are those that predict best what was left out: one place after another, or one press after
+another where there are too few places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.calibration.presses import Presses
+from eitskin.errors import FrameError, missing_extra
+from eitskin.model.load import MAX_ORDER, LoadLaw, monomials
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+LEAST_PRESSES, LEAST_WEIGHTS, LEAST_RATIO = 4, 3, 1.5
+SAME_WEIGHT = 1.005    # loads nearer than that are one
+PLACE_MM = 12.0        # presses whose links are nearer than that are at one place
+PLACES_FOR_ORDER = (1, 5, 8, 13, 19)
+WORTH = 0.95           # a higher order, or a law of more numbers, must make the error left at most so large
+LAW_ORDER = 2          # of the gain with which laws are compared
+RIDGE = 0.02 / 0.5     # strengths scatter by about 0.02, coefficients are of the order of 0.5
+TABLE_POINTS = 33
+RESAMPLES = 200
+STEP = 1e-5             # of a law's numbers, relative, for their derivatives
+LEAST_EXPONENT = 0.02
+LEAST_STEEPNESS = 0.05 # a law as flat as that tells no loads
+MOST_F0 = 30.0         # times the greatest load: beyond, a saturating law is a straight line
+
+
+@dataclass(frozen=True)
+class Form:
+    """A law of some positive numbers: strength by load, and load by strength; their names, where a fit begins, its bounds.
+
+    ``start`` and ``low``, ``high`` are relative: to strengths and the greatest load (F0); exponents as they are.
+    """
+
+    strength: Callable[..., FloatArray]
+    load: Callable[..., FloatArray]
+    names: tuple[str, ...]
+    text: str
+    least_weights: int
+    start: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+FORMS = {
+    "saturating": Form(
+        lambda f, most, f0: np.asarray(-most * np.expm1(-f / f0)),
+        lambda s, most, f0: np.asarray(-f0 * np.log1p(-s / most)),
+        ("s_max_s_per_m_mm2", "f0_n"), "s_max (1 - exp(-F / F0))", 3, (2.0, 2.0), (1e-9, 0.05), (1e9, MOST_F0),
+    ),
+    "power": Form(
+        lambda f, c, p: np.asarray(c * f**p),
+        lambda s, c, p: np.asarray((s / c) ** (1 / p)),
+        ("c_s_per_m_mm2_at_1_n", "exponent"), "c F^p", 3, (1.0, 0.9), (1e-9, LEAST_EXPONENT), (1e9, 20.0),
+    ),
+    "stretched": Form(
+        lambda f, most, f0, p: np.asarray(-most * np.expm1(-((f / f0) ** p))),
+        lambda s, most, f0, p: np.asarray(f0 * (-np.log1p(-s / most)) ** (1 / p)),
+        ("s_max_s_per_m_mm2", "f0_n", "exponent"), "s_max (1 - exp(-(F / F0)^p))", 4,
+        (2.0, 2.0, 1.0), (1e-9, 0.05, LEAST_EXPONENT), (1e9, MOST_F0, 20.0),
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """One fit: the ``form``'s numbers, and the ``gain``'s coefficients (t,), the first of them 1."""
+
+    form: str
+    numbers: tuple[float, ...]
+    order: int
+    gain: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What came of it.
+
+    Attributes:
+        law: for the model.
+        fitted: the law and gain in their own numbers.
+        interval: 95 % of each of the law's numbers, by the bootstrap.
+        left_out: relative error (k,) of each press's load when it was left out of the fit.
+        groups: how many places there are; ``by_place``: whether whole places were left out.
+        scatter: relative standard deviation over places of the load that is read, before (one gain) and after.
+        notes: what the data could not fix, in sentences.
+    """
+
+    law: LoadLaw
+    fitted: Fitted
+    interval: tuple[tuple[float, float], ...]
+    left_out: FloatArray
+    groups: int
+    by_place: bool
+    scatter: tuple[float, float]
+    notes: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON and the model's own description."""
+        names = FORMS[self.fitted.form].names
+        return {
+            "law": self.fitted.form,
+            **dict(zip(names, self.fitted.numbers, strict=True)),
+            **{f"{name}_95": list(ends) for name, ends in zip(names, self.interval, strict=True)},
+            "gain_order": self.fitted.order,
+            "presses": len(self.left_out),
+            "places": self.groups,
+            "left_out_by": "place" if self.by_place else "press",
+            "error_rms": float(np.sqrt(np.mean(self.left_out**2))),
+            "error_95": float(self.law.uncertainty),
+            "error_worst": float(np.abs(self.left_out).max()),
+            "scatter_before": self.scatter[0],
+            "scatter_after": self.scatter[1],
+            "greatest_load_n": float(self.law.load_n[-1]),
+            "notes": list(self.notes),
+        }
+
+
+def places_of(place_mm: FloatArray) -> IntArray:
+    """The number of its place for each press (k, 2): presses that a chain of steps below ``PLACE_MM`` joins are at one."""
+    label = np.arange(len(place_mm))
+    near = np.hypot(*(place_mm[:, None] - place_mm[None]).transpose(2, 0, 1)) < PLACE_MM
+    for _ in range(len(label)):
+        joined = np.array([label[row].min() for row in near])
+        if (joined == label).all():
+            break
+        label = joined
+    return np.unique(label, return_inverse=True)[1].astype(np.int64)
+
+
+def weights_of(load_n: FloatArray) -> FloatArray:
+    """The different loads, ascending."""
+    ascending = np.sort(load_n)
+    return np.asarray(ascending[np.concatenate([[True], ascending[1:] > SAME_WEIGHT * ascending[:-1]])])
+
+
+def check_presses(presses: Presses) -> None:
+    """Refuse what cannot fix a law.
+
+    Raises:
+        FrameError: too few presses or weights, or weights too much alike.
+    """
+    if len(presses) < LEAST_PRESSES:
+        raise FrameError(f"calibration: {len(presses)} presses are too few; record at least {LEAST_PRESSES} that show a touch")
+    weights = weights_of(presses.load_n)
+    if len(weights) < LEAST_WEIGHTS:
+        raise FrameError(f"calibration: {len(weights)} different weights are too few; use at least {LEAST_WEIGHTS}")
+    ratio = float(weights[-1] / weights[0])
+    if ratio < LEAST_RATIO:
+        raise FrameError(
+            f"calibration: the greatest weight is {ratio:.2f} times the least, which cannot show a law; use a range of "
+            f"{LEAST_RATIO:g} times or more"
+        )
+
+
+def calibrate(presses: Presses, radius_mm: float, seed: int = 1, resamples: int = RESAMPLES) -> Calibration:
+    """The law of a skin whose image reaches ``radius_mm`` from its middle; the intervals by ``resamples`` of its places.
+
+    Raises:
+        FrameError: the presses cannot fix a law, or strength does not grow with load.
+        MissingExtraError: scipy is not installed.
+    """
+    check_presses(presses)
+    place = places_of(presses.place_mm)
+    groups, notes = int(place.max()) + 1, []
+    orders = [order for order in range(MAX_ORDER + 1) if groups >= PLACES_FOR_ORDER[order]]
+    if orders == [0]:
+        places = f"{groups} place{'s' * (groups > 1)}"
+        notes.append(f"{places}: the gain is taken to be the same everywhere; press at {PLACES_FOR_ORDER[1]} or more")
+    by_place = groups >= LEAST_PRESSES
+    fold = place if by_place else np.arange(len(presses))
+    forms = [name for name, shape in FORMS.items() if len(weights_of(presses.load_n)) >= shape.least_weights]
+    middle = min(max(orders), LAW_ORDER)
+    tried = {(form, middle): _left_out(presses, radius_mm, fold, form, middle) for form in forms}
+    form, _ = _best(tried)
+    others = {order: _left_out(presses, radius_mm, fold, form, order) for order in orders if order != middle}
+    tried = {(form, order): others.get(order, tried[form, middle]) for order in orders}
+    _, order = _best(tried)
+    fitted = fit(presses, radius_mm, form, order)
+    if _steepness(fitted, presses.load_n) < LEAST_STEEPNESS:
+        raise FrameError("calibration: strength does not grow with load; look at the list of weights, and at the touches of each")
+    if form != "power" and fitted.numbers[1] > 0.9 * MOST_F0 * presses.load_n.max():
+        notes.append("the strength shows no saturation: beyond the greatest weight the law is a guess")
+    left_out = tried[form, order]
+    law = law_of(fitted, presses, radius_mm, float(np.quantile(np.abs(left_out), 0.95)))
+    before = tried[form, 0]
+    return Calibration(
+        law, fitted, _interval(presses, radius_mm, fitted, fold, seed, resamples), left_out, groups, by_place,
+        (_scatter(presses, before), _scatter(presses, left_out)), tuple(notes),
+    )  # fmt: skip
+
+
+def _steepness(fitted: Fitted, load_n: FloatArray) -> float:
+    """The exponent of load that strength grows with between the least and the greatest weight."""
+    ends = np.array([load_n.min(), load_n.max()])
+    low, high = np.log(np.maximum(FORMS[fitted.form].strength(ends, *fitted.numbers), 1e-300))
+    return float((high - low) / np.log(ends[1] / ends[0]))
+
+
+def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
+    """One law and order to all ``presses``.
+
+    Raises:
+        MissingExtraError: scipy is not installed.
+    """
+    try:
+        from scipy.optimize import least_squares
+    except ImportError:
+        raise missing_extra("model", "scipy") from None
+    shape, most = FORMS[form], float(presses.load_n.max())
+    u, v = presses.place_mm.T / radius_mm
+    terms, log_strength = monomials(u, v, order)[:, 1:], np.log(presses.strength)
+
+    count, scale = len(shape.names), float(np.median(presses.strength))
+    free = terms.shape[1]
+    units = np.array([scale, most, 1.0])[:count]
+    if form == "power":
+        units = np.array([scale, 1.0])
+
+    def misfit(p: FloatArray) -> FloatArray:
+        gain = np.maximum(1 + terms @ p[count:], 0.05)
+        expected = np.maximum(shape.strength(presses.load_n, *np.exp(p[:count])), 1e-300)
+        return np.concatenate([log_strength + np.log(gain) - np.log(expected), RIDGE * p[count:]])
+
+    def slope(p: FloatArray) -> FloatArray:
+        gain = np.maximum(1 + terms @ p[count:], 0.05)
+        jacobian = np.zeros((len(log_strength) + free, len(p)))
+        for k in range(count):
+            step = np.exp(p[:count] + STEP * (np.arange(count) == k)), np.exp(p[:count] - STEP * (np.arange(count) == k))
+            up, down = (np.log(np.maximum(shape.strength(presses.load_n, *at), 1e-300)) for at in step)
+            jacobian[: len(log_strength), k] = (down - up) / (2 * STEP)
+        jacobian[: len(log_strength), count:] = terms / gain[:, None]
+        jacobian[len(log_strength) :, count:] = RIDGE * np.eye(free)
+        return jacobian
+
+    low, high, start = (np.log(np.array(ends) * units).tolist() for ends in (shape.low, shape.high, shape.start))
+    bounds = (low + free * [-np.inf], high + free * [np.inf])
+    solved = least_squares(misfit, start + free * [0.0], slope, bounds=bounds, max_nfev=100, ftol=1e-7, xtol=1e-7).x
+    return Fitted(form, tuple(np.exp(solved[:count]).tolist()), order, np.concatenate([[1.0], solved[count:]]))
+
+
+def law_of(fitted: Fitted, presses: Presses, radius_mm: float, uncertainty: float) -> LoadLaw:
+    """``fitted`` as a model holds it: the law as a table up to the greatest load of ``presses``, evenly by strength."""
+    shape, most = FORMS[fitted.form], float(presses.load_n.max())
+    top = float(shape.strength(np.array(most), *fitted.numbers))
+    strength = np.linspace(0.0, top, TABLE_POINTS)
+    load = shape.load(strength[:-1], *fitted.numbers)
+    reach = float(np.hypot(*presses.place_mm.T).max()) / radius_mm
+    table = np.concatenate([load, [most]]).astype(np.float32)
+    return LoadLaw(
+        strength.astype(np.float32), table, fitted.gain.astype(np.float32), fitted.order, float(np.float32(radius_mm)),
+        float(np.float32(reach)), float(np.float32(uncertainty)),
+    )  # fmt: skip
+
+
+def _left_out(presses: Presses, radius_mm: float, fold: IntArray, form: str, order: int) -> FloatArray:
+    """Relative error (k,) of each press's load by the fit to the presses of other folds."""
+    errors = np.empty(len(presses))
+    for number in range(int(fold.max()) + 1):
+        out = fold == number
+        kept = presses.take(~out)
+        law = law_of(fit(kept, radius_mm, form, order), kept, radius_mm, 0.0)
+        errors[out] = law.loads_at(presses.place_mm[out], presses.strength[out]) / presses.load_n[out] - 1
+    return errors
+
+
+def _best(tried: dict[tuple[str, int], FloatArray]) -> tuple[str, int]:
+    """The first choice that no later one beats by more than ``WORTH``, of errors (k,) by law and order."""
+    (best, least), *others = ((key, _rms_log(errors)) for key, errors in tried.items())
+    for key, error in others:
+        if error < WORTH * least:
+            best, least = key, error
+    return best
+
+
+def _rms_log(errors: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.log(np.maximum(1 + errors, 1e-9)) ** 2)))
+
+
+def _interval(
+    presses: Presses, radius_mm: float, fitted: Fitted, fold: IntArray, seed: int, resamples: int
+) -> tuple[tuple[float, float], ...]:
+    """95 % of the law's numbers over fits to folds drawn with replacement."""
+    generator, count = np.random.default_rng(seed), int(fold.max()) + 1
+    members = [np.flatnonzero(fold == number) for number in range(count)]
+    drawn = []
+    for _ in range(resamples):
+        rows = np.concatenate([members[k] for k in generator.integers(0, count, count)])
+        sample = presses.take(rows)
+        if len(weights_of(sample.load_n)) >= 2:
+            drawn.append(fit(sample, radius_mm, fitted.form, fitted.order).numbers)
+    ends = np.quantile(np.array(drawn or [fitted.numbers]), [0.025, 0.975], axis=0)
+    return tuple((float(low), float(high)) for low, high in ends.T)
+
+
+def _scatter(presses: Presses, errors: FloatArray) -> float:
+    """Relative standard deviation over places of one load's reading: over all, around each weight's own mean."""
+    residual = 1 + errors
+    squares, count = 0.0, 0
+    for weight in weights_of(presses.load_n):
+        of_it = residual[np.abs(np.log(presses.load_n / weight)) < np.log(SAME_WEIGHT)]
+        squares += float(((of_it / of_it.mean() - 1) ** 2).sum())
+        count += len(of_it) - 1
+    return float(np.sqrt(squares / max(count, 1)))

@@ -1,0 +1,91 @@
+"""What a recording of known weights shows: a strength and a place for each press."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.calibration.weights import Weight
+from eitskin.core.results import Touch
+from eitskin.errors import FrameError
+from eitskin.frames.frames import Frames
+from eitskin.solve.reconstructor import Reconstructor
+
+FloatArray = npt.NDArray[np.float64]
+
+NEAR_MM = 25.0  # a touch that far from where the weight is said to be is not it
+
+
+@dataclass(frozen=True, eq=False)
+class Presses:
+    """k presses: ``load_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over the press's frames, and
+    ``place_mm`` (k, 2) as found, medians too."""
+
+    load_n: FloatArray
+    strength: FloatArray
+    place_mm: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.load_n)
+
+    def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Presses:
+        """Some of them."""
+        return Presses(self.load_n[rows], self.strength[rows], self.place_mm[rows])
+
+
+def joined(parts: Sequence[Presses]) -> Presses:
+    """All of several recordings."""
+    return Presses(
+        np.concatenate([part.load_n for part in parts]),
+        np.concatenate([part.strength for part in parts]),
+        np.concatenate([part.place_mm for part in parts]),
+    )
+
+
+def find_presses(
+    reconstructor: Reconstructor, frames: Frames, numbers: Sequence[int], weights: Sequence[Weight], where: str
+) -> tuple[Presses, list[str]]:
+    """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line for each that shows no touch.
+
+    Raises:
+        FrameError: a press has no frame here, or the quiet frames cannot be used.
+    """
+    at = {number: k for k, number in enumerate(numbers)}
+    reconstructor.tare(frames.reference_voltage_v)
+    seen: list[tuple[float, float, float, float]] = []
+    unseen: list[str] = []
+    for weight in weights:
+        rows = [at[number] for number in range(weight.first, weight.last + 1) if number in at] if len(at) else []
+        name = f"{where}: frames {weight.first} to {weight.last}"
+        if not rows:
+            raise FrameError(f"{name} of the list of weights are not there; it has {_span(numbers)}")
+        touches = [touch for row in rows if (touch := _pressed(reconstructor, frames.voltage_v[row], weight)) is not None]
+        if 2 * len(touches) <= len(rows):
+            unseen.append(f"{name}: {len(touches)} of {len(rows)} show the weight; left out")
+            continue
+        found = np.median([(abs(t.strength_s_per_m_mm2), t.x_mm, t.y_mm) for t in touches], axis=0)
+        seen.append((weight.load_n, *found.tolist()))
+    table = np.array(seen, dtype=np.float64).reshape(-1, 4)
+    return Presses(table[:, 0], table[:, 1], table[:, 2:]), unseen
+
+
+def _span(numbers: Sequence[int]) -> str:
+    return f"frames {min(numbers)} to {max(numbers)}" if len(numbers) else "no frames"
+
+
+def _pressed(reconstructor: Reconstructor, frame_v: FloatArray, weight: Weight) -> Touch | None:
+    """The touch that is the weight: the strongest, or where its place is known the nearest; None where there is none."""
+    reconstructor.forget()
+    try:
+        touches = reconstructor.reconstruct(frame_v).touches
+    except FrameError:
+        return None
+    if weight.place_mm is None or not touches:
+        return touches[0] if touches else None
+    x, y = weight.place_mm
+    away = [float(np.hypot(t.x_mm - x, t.y_mm - y)) for t in touches]
+    nearest = int(np.argmin(away))
+    return touches[nearest] if away[nearest] <= NEAR_MM else None

@@ -1,0 +1,132 @@
+"""``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches are told in grams."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.errors import EitskinError, FrameError, UsageError
+
+if TYPE_CHECKING:
+    from eitskin.calibration.fit import Calibration
+    from eitskin.frames.frames import Frames
+    from eitskin.model.model import Model
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``calibrate``."""
+    parser = subparsers.add_parser(
+        "calibrate",
+        help="known weights on a skin, so that its touches are told in grams",
+        description="Fit the law that turns a touch's strength and place into its load to recordings of known weights, say how "
+        "far it is to be trusted, and store it in a copy of the model. docs/calibration.md shows how to record them.",
+    )
+    parser.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING", help="frames (.npz) or a run (.eits) of weights")
+    parser.add_argument(
+        "--weights", action="append", type=Path, required=True, metavar="LIST",
+        help="the weights of a recording, .csv or .toml; once for each recording, in their order",
+    )  # fmt: skip
+    parser.add_argument("--model", type=Path, metavar="MODEL.eitm", help="default: the prebuilt model of the paper's skin")
+    parser.add_argument("--sign", choices=("increase", "decrease"), default="increase", help="which changes a weight makes")
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the resamples behind the intervals (default: 1)")
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT.eitm", help="the model with its calibration")
+    parser.add_argument("--json", action="store_true")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Find the presses, fit, write, say."""
+    import numpy as np
+
+    from eitskin.calibration.fit import calibrate
+    from eitskin.calibration.presses import find_presses, joined
+    from eitskin.calibration.weights import load_weights
+    from eitskin.cli.cmd_model import load_or_prebuilt
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.model.eitm import save_model
+    from eitskin.solve.reconstructor import Reconstructor
+
+    if len(options.recordings) != len(options.weights):
+        raise UsageError(
+            f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of weights; give --weights once "
+            "for each"
+        )
+    if options.seed < 0:
+        raise UsageError(f"--seed {options.seed} must be 0 or above")
+    refuse_unwritable(options.output)
+    model, blob, name = load_or_prebuilt(options.model)
+    reconstructor = Reconstructor(model, blob=blob)
+    reconstructor.with_options(sign=options.sign)
+    parts, unseen = [], []
+    for recording, list_of_weights in zip(options.recordings, options.weights, strict=True):
+        weights = load_weights(list_of_weights)
+        frames, numbers = _frames(recording, options.model)
+        try:
+            reconstructor.check_protocol(frames.protocol)
+        except EitskinError as error:
+            raise type(error)(f"{recording} and {name}: {error}") from None
+        presses, lines = find_presses(reconstructor, frames, numbers, weights, str(recording))
+        parts.append(presses)
+        unseen += lines
+    for line in unseen:
+        print(f"eitskin: {line}", file=sys.stderr)
+    radius_mm = float(np.hypot(*model.grid.centres_mm().T).max())
+    found = calibrate(joined(parts), radius_mm, options.seed)
+    if options.output is not None:
+        save_model(options.output, calibrated(model, found))
+    if options.json:
+        print(json.dumps({"model": name, "output": str(options.output or ""), "left_out": unseen, **found.as_dict()}, indent=2))
+    else:
+        print("\n".join(_lines(found)))
+        print(f"{options.output}: {name} with this calibration" if options.output else "not stored; name a model with -o")
+    return 0
+
+
+def calibrated(model: Model, found: Calibration) -> Model:
+    """``model`` with the calibration, which its description says too."""
+    return replace(model, load=found.law, meta={**model.meta, "calibration": found.as_dict()})
+
+
+def _frames(path: Path, model: Path | None) -> tuple[Frames, list[int]]:
+    """The frames of a file or run, and the numbers that a list of weights counts them by: a board's own, or from 0."""
+    from eitskin.frames.frames import load_frames
+
+    if path.suffix == ".eits":
+        from eitskin.device.recordings.raw_frames import finite_only
+        from eitskin.device.recordings.recording import frames_of
+
+        frames, _ = finite_only(frames_of(path, model), str(path))
+        numbers = [int(one) for one in frames.frame_name]
+    else:
+        frames = load_frames(path)
+        numbers = list(range(frames.n_frames))
+    if not numbers:
+        raise FrameError(f"{path}: holds a reference but no frame; record the weights too")
+    return frames, numbers
+
+
+def _lines(found: Calibration) -> list[str]:
+    from eitskin.calibration.fit import FORMS
+    from eitskin.core.results import load_text
+
+    facts, law = found.as_dict(), found.law
+    names = {"s_max_s_per_m_mm2": "s_max, S/m mm2", "f0_n": "F0, N", "c_s_per_m_mm2_at_1_n": "c, S/m mm2 at 1 N", "exponent": "p"}
+    lines = [
+        f"{facts['presses']} presses at {facts['places']} place{'s' * (found.groups > 1)}, "
+        f"{load_text(found.law.load_n[-1])} the greatest",
+        f"law                 strength = {FORMS[found.fitted.form].text}",
+    ]
+    for key, value, ends in zip(FORMS[found.fitted.form].names, found.fitted.numbers, found.interval, strict=True):
+        lines.append(f"  {names[key]:18}{value:.4g}   95 %: {ends[0]:.4g} to {ends[1]:.4g}")
+    out_mm, (before, after) = law.reach * law.radius_mm, found.scatter
+    lines.append(f"gain over the skin  polynomial of order {law.order}, {len(law.gain)} terms, out to {out_mm:.0f} mm")
+    lines.append(f"one load, anywhere  standard deviation {100 * after:.1f} % of it ({100 * before:.1f} % with one gain)")
+    lines.append(
+        f"a load left out     off by {100 * facts['error_rms']:.1f} % (rms), 95 % within {100 * facts['error_95']:.1f} %, worst "
+        f"{100 * facts['error_worst']:.1f} %; left out by {facts['left_out_by']}"
+    )
+    return lines + [f"note: {note}" for note in found.notes]

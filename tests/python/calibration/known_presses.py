@@ -1,0 +1,36 @@
+"""Presses whose law and gain are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.calibration.presses import Presses
+
+RADIUS_MM = 97.0
+LOADS_N = np.array([0.5, 0.8, 1.0, 1.5, 2.0])
+
+
+def saturating(load_n: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return np.asarray(-4.0 * np.expm1(-load_n / 1.5))
+
+
+def places(count: int) -> npt.NDArray[np.float64]:
+    """A sunflower's spiral to 85 mm."""
+    k = np.arange(count)
+    angle, away = 2.39996 * k, 85 * np.sqrt((k + 0.5) / count)
+    return np.column_stack([away * np.cos(angle), away * np.sin(angle)])
+
+
+def gain_of(place_mm: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """What a strength is to be multiplied by: tilted and bent."""
+    u, v = place_mm.T / RADIUS_MM
+    return np.asarray(1 + 0.1 * u - 0.05 * v + 0.3 * (u**2 + v**2))
+
+
+def presses(count: int = 24, noise: float = 0.01, bent: bool = True, seed: int = 3) -> Presses:
+    """Every load at each of ``count`` places, with ``noise`` of the strength."""
+    place = np.repeat(places(count), len(LOADS_N), axis=0)
+    load = np.tile(LOADS_N, count)
+    scatter = np.exp(noise * np.random.default_rng(seed).standard_normal(len(load)))
+    return Presses(load, saturating(load) * scatter / (gain_of(place) if bent else 1.0), place)

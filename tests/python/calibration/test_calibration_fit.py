@@ -1,0 +1,124 @@
+"""The fit finds laws and gains that are known, says how sure it is, and refuses what cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_presses import LOADS_N, RADIUS_MM, gain_of, places, presses, saturating
+
+from eitskin.calibration.fit import PLACE_MM, calibrate, places_of, weights_of
+from eitskin.calibration.presses import Presses, joined
+from eitskin.errors import FrameError
+
+
+def test_a_known_law_and_gain_are_found() -> None:
+    found = calibrate(presses(), RADIUS_MM)
+    assert (found.fitted.form, found.fitted.order, found.groups, found.by_place) == ("saturating", 2, 24, True)
+    for value, true, (low, high) in zip(found.fitted.numbers, (4.0, 1.5), found.interval, strict=True):
+        assert value == pytest.approx(true, rel=0.05)
+        assert low < true < high and high - low < 0.3 * true
+    assert found.scatter[0] > 0.1 and found.scatter[1] < 0.025
+    assert found.law.uncertainty == pytest.approx(np.quantile(np.abs(found.left_out), 0.95), rel=1e-6)
+    assert found.notes == ()
+    new = np.array([(10.0, -70.0), (-60.0, 20.0), (0.0, 0.0), (33.0, 44.0)])
+    load = np.array([0.6, 1.2, 1.7, 1.9])
+    told = found.law.loads_at(new, saturating(load) / gain_of(new))
+    assert told == pytest.approx(load, rel=0.02)
+
+
+def test_a_flat_skin_needs_no_gain() -> None:
+    found = calibrate(presses(bent=False), RADIUS_MM, resamples=0)
+    assert found.fitted.order == 0
+    assert found.law.gain.tolist() == [1.0]
+
+
+@pytest.mark.parametrize("exponent", [0.6, 1.3])
+def test_powers_are_told_as_well(exponent: float) -> None:
+    known = presses(noise=0.002, bent=False)
+    strength = 2.0 * known.load_n**exponent * known.strength / saturating(known.load_n)
+    found = calibrate(replace_strength(known, strength), RADIUS_MM, resamples=0)
+    seen = 2.0 * np.array([0.7, 1.9]) ** exponent
+    assert found.law.loads_at(np.zeros((2, 2)), seen) == pytest.approx([0.7, 1.9], rel=0.01)
+
+
+def replace_strength(known: Presses, strength: np.ndarray) -> Presses:
+    return Presses(known.load_n, strength, known.place_mm)
+
+
+def test_the_table_is_the_law() -> None:
+    law = calibrate(presses(noise=0.0), RADIUS_MM, resamples=0).law
+    load = np.linspace(0.02, 2.0, 50)
+    assert law.loads_at(np.zeros((50, 2)), saturating(load)) == pytest.approx(load, rel=2e-3, abs=2e-4)
+    beyond = law.loads_at(np.zeros((3, 2)), np.array([saturating(np.array(2.0)) * 1.02, 100.0, np.inf]))
+    assert beyond[0] > 2.0 and beyond[1] == beyond[2] == 4.0  # the last slope, to twice the greatest load
+
+
+def test_beyond_the_outermost_place_the_gain_stays() -> None:
+    law = calibrate(presses(), RADIUS_MM, resamples=0).law
+    assert law.reach == pytest.approx(np.hypot(*places(24).T).max() / RADIUS_MM)
+    out = law.gains_at(np.array([(law.reach * RADIUS_MM, 0.0), (200.0, 0.0), (1e9, 0.0)]))
+    assert out[1:] == pytest.approx(out[0])
+
+
+def test_one_place_is_told_to_be_one() -> None:
+    one = presses()
+    one = one.take(np.arange(5))
+    found = calibrate(one, RADIUS_MM, resamples=20)
+    assert (found.groups, found.by_place, found.fitted.order) == (1, False, 0)
+    assert found.notes[0].startswith("1 place: the gain is taken to be the same everywhere; press at 5 or more")
+
+
+def test_unlike_intervals_for_unlike_noise() -> None:
+    width = []
+    for noise in (0.005, 0.05):
+        (low, high), *_ = calibrate(presses(noise=noise), RADIUS_MM, resamples=60).interval
+        width.append(high - low)
+    assert width[1] > 3 * width[0]
+
+
+def test_the_same_seed_gives_the_same() -> None:
+    one, other = (calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2))
+    assert one == other
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [
+        (slice(0, 3), "3 presses are too few; record at least 4"),
+        (np.arange(0, 120, 5), "1 different weights are too few; use at least 3"),
+        (np.flatnonzero(np.isin(np.tile(LOADS_N, 24), [1.0, 1.5])), "2 different weights are too few"),
+    ],
+)
+def test_too_little_is_refused(rows: object, text: str) -> None:
+    with pytest.raises(FrameError, match=text):
+        calibrate(presses().take(np.arange(120)[rows]), RADIUS_MM)  # type: ignore[index]
+
+
+def test_weights_too_alike_are_refused() -> None:
+    known = presses()
+    alike = Presses(1 + 0.1 * known.load_n, known.strength, known.place_mm)
+    with pytest.raises(FrameError, match=r"1\.14 times the least, which cannot show a law; use a range of 1\.5 times or more"):
+        calibrate(alike, RADIUS_MM)
+
+
+def test_strength_that_falls_is_refused() -> None:
+    known = presses()
+    with pytest.raises(FrameError, match="strength does not grow with load"):
+        calibrate(replace_strength(known, 1 / known.load_n), RADIUS_MM)
+
+
+def test_places_and_weights_are_told_apart() -> None:
+    chain = np.array([(0.0, 0.0), (0.9 * PLACE_MM, 0.0), (1.8 * PLACE_MM, 0.0), (4 * PLACE_MM, 0.0)])
+    assert places_of(chain).tolist() == [0, 0, 0, 1]
+    assert weights_of(np.array([2.0, 1.0, 1.001, 2.0])).tolist() == [1.0, 2.0]
+    both = joined([presses(3), presses(4)])
+    assert len(both) == 35
+
+
+def test_a_straight_line_is_told_to_have_no_end() -> None:
+    known = presses(noise=0.0, bent=False)
+    found = calibrate(replace_strength(known, 2 * known.load_n), RADIUS_MM, resamples=0)
+    assert "no saturation" in " ".join(found.notes) or found.fitted.form == "power"
+    assert replace(found, notes=()).as_dict()["error_rms"] < 0.01

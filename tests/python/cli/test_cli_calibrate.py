@@ -1,0 +1,147 @@
+"""``eitskin calibrate`` from a simulated bench to loads of presses that it never saw, on the host and on a simulated board."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from math import cos, radians, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.core.results import NEWTONS_PER_GRAM
+from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
+from eitskin.device.client import Device
+from eitskin.device.known_model import board_options
+from eitskin.device.live import LiveFrame, follow, take_reference
+from eitskin.device.recordings.host_check import check_recording
+from eitskin.device.recordings.run_file import RunRecorder
+from eitskin.device.simulated.board import SimBoard
+from eitskin.device.simulated.skin import SceneSkin
+from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.wire.packets import Stream
+from eitskin.model.eitm import decode_model, load_model
+from eitskin.scene.description import load_scene
+from small_models import prebuilt
+
+GRAMS = (50, 80, 100, 150, 200)
+RINGS = [(0, 0), (35, 20), (35, 140), (35, 260), *((72, 60.0 * k + 10) for k in range(6))]
+PLACES = [(r * cos(radians(a)), r * sin(radians(a))) for r, a in RINGS]
+SOME = 0.08  # 95 % of the loads that the fit had not seen are within 5 %
+NEW = [((-20.0, 25.0), 65), ((50.0, -30.0), 120), ((-45.0, -45.0), 180), ((5.0, 62.0), 90)]
+
+Refused = Callable[..., str]
+Done = Callable[..., str]
+
+
+def bench(name: str, presses: list[tuple[tuple[float, float], int]]) -> tuple[str, str]:
+    """A scene of one frame a press by a flat end of 8 mm, and the list of its weights."""
+    scene = ["[scene]", f'name = "{name}"', f"frames = {len(presses)}", "[effects.noise]", "snr_db = 72.0"]
+    weights = ["first,load_g"]
+    for k, ((x, y), grams) in enumerate(presses):
+        scene += ["[[touch]]", f"x_mm = {x:.3f}", f"y_mm = {y:.3f}", "radius_mm = 8.0"]
+        scene += ['law = "piezoresistive"', f"grams = {grams}"]
+        scene += [f"from_s = {k / 20}", f"to_s = {(k + 0.5) / 20}"]
+        weights.append(f"{k},{grams}")
+    return "\n".join(scene), "\n".join(weights)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Frames and weights of the bench and of presses that it does not have, and the model calibrated on the first."""
+    from eitskin.cli.main import main
+
+    path = tmp_path_factory.mktemp("bench")
+    for name, presses in (("weights", [(place, grams) for place in PLACES for grams in GRAMS]), ("new", NEW)):
+        scene, weights = bench(name, presses)
+        (path / f"{name}.toml").write_text(scene)
+        (path / f"{name}.csv").write_text(weights)
+        assert main(["scene", "run", str(path / f"{name}.toml"), "-o", str(path / f"{name}.npz")]) == 0
+    frames, listed, out = (str(path / name) for name in ("weights.npz", "weights.csv", "skin.eitm"))
+    assert main(["calibrate", frames, "--weights", listed, "-o", out]) == 0
+    return path
+
+
+def test_presses_that_it_never_saw_read_their_load(folder: Path, done: Done) -> None:
+    told = json.loads(done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm", "--json"))
+    for frame, (place, grams) in zip(told["frames"], NEW, strict=True):
+        (touch,) = frame["touches"]
+        assert np.hypot(touch["x_mm"] - place[0], touch["y_mm"] - place[1]) < 1
+        assert touch["load_n"] / NEWTONS_PER_GRAM == pytest.approx(grams, rel=SOME)
+    text = done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm")
+    assert "load g" in text.splitlines()[0]
+    assert "load g" not in done("reconstruct", folder / "new.npz").splitlines()[0]
+
+
+def test_it_says_what_it_found(folder: Path, done: Done) -> None:
+    arguments = ("calibrate", folder / "weights.npz", "--weights", folder / "weights.csv")
+    facts = json.loads(done(*arguments, "--json"))
+    model = load_model(folder / "skin.eitm")[0]
+    assert (facts["presses"], facts["places"], facts["left_out"]) == (50, 10, [])
+    assert model.meta["calibration"] == {key: facts[key] for key in model.meta["calibration"]}
+    assert facts["error_rms"] < 0.03 and facts["scatter_after"] < 0.03
+    lines = done(*arguments).splitlines()
+    assert lines[0] == "50 presses at 10 places, 200.0 g the greatest"
+    assert lines[-1] == "not stored; name a model with -o"
+    info = done("model", "info", folder / "skin.eitm")
+    assert "loads to 200.0 g, 95 % within" in info
+    assert "none; touches have no load" in done("model", "info")
+    done("model", "verify", folder / "skin.eitm")
+
+
+def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
+    """The new presses on a simulated board with this model, recorded to ``path``."""
+    board = SimBoard(SceneSkin(load_scene(folder / "new.toml")), [bank_bytes(blob, 1), bytes([ERASED]) * BANK_BYTES])
+    options = board_options(decode_model(blob, "made"))
+    with Device(SimTransport("test", board)) as device, RunRecorder(path, device, options):
+        device.solver(options)
+        take_reference(device, 16, streamed=True)
+        device.start_scene()
+        return [item for item in follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES) if isinstance(item, LiveFrame)]
+
+
+def test_a_board_with_that_model_sends_the_same_load_bits(folder: Path, tmp_path: Path) -> None:
+    live = recorded(folder, (folder / "skin.eitm").read_bytes(), tmp_path / "run.eits")
+    told = [t.load_n / NEWTONS_PER_GRAM for frame in live if frame.touches is not None for t in frame.touches.touches]
+    assert told == pytest.approx([grams for _, grams in NEW], rel=SOME)
+    check, _ = check_recording(tmp_path / "run.eits", folder / "skin.eitm")
+    assert (check.touches, check.different) == (len(NEW), [])
+
+
+def test_a_recorded_run_calibrates_too(folder: Path, tmp_path: Path, done: Done) -> None:
+    path, listed = tmp_path / "run.eits", tmp_path / "run.toml"
+    live = recorded(folder, prebuilt()[1], path)
+    tables = [
+        f"[[press]]\nfirst = {frame.number}\nload_g = {grams}\nx_mm = {place[0]}\ny_mm = {place[1]}"
+        for frame, (place, grams) in zip(live, NEW, strict=True)
+    ]
+    listed.write_text("\n".join(tables))
+    facts = json.loads(done("calibrate", path, "--weights", listed, "--json"))
+    assert (facts["presses"], facts["places"], facts["gain_order"]) == (4, 4, 0)
+    assert "4 places: the gain is taken to be the same everywhere" in facts["notes"][0]
+    both = ("calibrate", path, folder / "weights.npz", "--weights", listed, "--weights", folder / "weights.csv", "--json")
+    assert json.loads(done(*both))["presses"] == 54
+
+
+def test_weights_that_do_not_show_are_named(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from eitskin.cli.main import main
+
+    rows = (folder / "weights.csv").read_text().splitlines()
+    elsewhere = ["first,load_g,x_mm,y_mm", *(f"{row},," for row in rows[1:-1]), f"{rows[-1]},0,0"]  # that one stands near the rim
+    (tmp_path / "w.csv").write_text("\n".join(elsewhere))
+    assert main(["calibrate", str(folder / "weights.npz"), "--weights", str(tmp_path / "w.csv")]) == 0
+    assert "weights.npz: frames 49 to 49: 0 of 1 show the weight; left out" in capsys.readouterr().err
+
+
+def test_refusals(folder: Path, refused: Refused, tmp_path: Path) -> None:
+    frames, listed = folder / "weights.npz", folder / "weights.csv"
+    assert "1 recordings and 2 lists of weights" in refused(2, "calibrate", frames, "--weights", listed, "--weights", listed)
+    (tmp_path / "w.csv").write_text("first,load_g\n50,10\n")
+    assert "frames 50 to 50 of the list of weights are not there; it has frames 0 to 49" in refused(
+        8, "calibrate", frames, "--weights", tmp_path / "w.csv"
+    )
+    (tmp_path / "w.csv").write_text("first,load_g\n0,10\n1,20\n")
+    assert "2 presses are too few" in refused(8, "calibrate", frames, "--weights", tmp_path / "w.csv")
+    assert "no such frames file" in refused(3, "calibrate", tmp_path / "none.npz", "--weights", listed).lower()
+    assert "--seed -1 must be 0 or above" in refused(2, "calibrate", frames, "--weights", listed, "--seed", "-1")

@@ -1,0 +1,100 @@
+"""The section LOAD: written, read by both readers, skipped where it is not there, refused where it is out of range."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from eitskin.core.engine import CoreEngine
+from eitskin.errors import ModelError
+from eitskin.model.eitm import HEADER, decode_model, encode_model
+from eitskin.model.load import HEAD, LoadLaw, decode_load, encode_load, terms_of
+from eitskin.solve.reconstructor import ENGINES, Reconstructor
+from small_models import prebuilt, session
+
+
+def law(order: int = 2) -> LoadLaw:
+    strength = np.array([0.0, 1.0, 2.5, 4.0], dtype=np.float32)
+    load = np.array([0.0, 0.4, 1.2, 2.6], dtype=np.float32)
+    gain = np.resize(np.array([1.0, 0.05, -0.1, 0.2, 0.03, 0.15], dtype=np.float32), len(terms_of(order)))
+    return LoadLaw(strength, load, gain, order, 97.0, 0.9, 0.03)
+
+
+def test_without_it_nothing_changes() -> None:
+    model, blob = prebuilt()
+    assert model.load is None
+    assert encode_model(model) == blob
+    assert HEADER.unpack_from(blob)[1:3] == (1, 1)
+
+
+@pytest.mark.parametrize("order", range(5))
+def test_it_is_read_as_written(order: int) -> None:
+    blob = encode_model(replace(prebuilt()[0], load=law(order)))
+    assert HEADER.unpack_from(blob)[1:3] == (1, 2)
+    read = decode_model(blob, "made").load
+    assert read is not None and encode_load(read) == encode_load(law(order))
+    CoreEngine(blob, "float32")  # opens
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_touches_carry_the_load_of_strength_and_place(engine: str) -> None:
+    model = replace(prebuilt()[0], load=law())
+    skin, bare = Reconstructor(model, engine=engine), Reconstructor(prebuilt()[0], engine=engine)
+    seen = 0
+    for one in (skin, bare):
+        one.tare(session().quiet_v)
+    for frame in session().frames_v[:6]:
+        touches, without = skin.reconstruct(frame).touches, bare.reconstruct(frame).touches
+        assert touches == tuple(replace(t, load_n=touches[k].load_n) for k, t in enumerate(without))  # nothing else differs
+        for touch in touches:
+            expected = law().loads_at(np.array([(touch.x_mm, touch.y_mm)]), np.array([touch.strength_s_per_m_mm2]))[0]
+            assert touch.load_n == pytest.approx(expected, rel=1e-5) and touch.load_n > 0
+            seen += 1
+        assert all(touch.load_n == 0 for touch in without)
+    assert seen >= 6
+
+
+WHOLE = encode_load(law())
+
+
+def changed(at: int, layout: str, value: float) -> bytes:
+    """The section with one number changed."""
+    number = struct.pack(layout, value)
+    return WHOLE[:at] + number + WHOLE[at + len(number) :]
+
+
+WRONG = {
+    "cut": WHOLE[:-4],
+    "longer": WHOLE + bytes(4),
+    "nearly nothing": bytes(8),
+    "too few points": changed(0, "<I", 1),
+    "too many points": changed(0, "<I", 65),
+    "order 5": changed(4, "<I", 5),
+    "no radius": changed(8, "<f", 0.0),
+    "reach of NaN": changed(12, "<f", float("nan")),
+    "less than no uncertainty": changed(16, "<f", -1.0),
+    "a table that falls": changed(HEAD.size + 8, "<f", 0.5),
+    "a table from above 0": changed(HEAD.size, "<f", 0.5),
+    "a load of infinity": changed(HEAD.size + 28, "<f", float("inf")),
+    "a gain of NaN": changed(len(WHOLE) - 4, "<f", float("nan")),
+}
+
+
+@pytest.mark.parametrize("content", WRONG.values(), ids=WRONG)
+def test_both_readers_refuse_what_is_out_of_range(content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ModelError, match=r"calibration \(section 'LOAD'\) that is out of range; calibrate again"):
+        decode_load(content, "made")
+    monkeypatch.setattr("eitskin.model.eitm.encode_load", lambda _: content)
+    blob = encode_model(replace(prebuilt()[0], load=law()))
+    with pytest.raises(ModelError):
+        decode_model(blob, "made")
+    with pytest.raises(ModelError):
+        CoreEngine(blob, "float32")
+
+
+def test_what_no_reader_takes_is_not_written() -> None:
+    with pytest.raises(ModelError):
+        encode_load(replace(law(), radius_mm=-1.0))

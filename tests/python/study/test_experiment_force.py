@@ -1,0 +1,144 @@
+"""The force study, small: what it keeps it does not compute again, seeds tell it, and its physics holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eitskin.study.experiments import force
+from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin.study.experiments.force import anywhere, detection, scenes
+from eitskin.study.experiments.force.law import LOADS_G, NOMINAL, drawn_laws
+from eitskin.study.experiments.force.readouts import PEAK, READOUTS, TOUCH, Readout, as_lists, from_lists
+from eitskin.study.experiments.write import to_json
+from eitskin.study.sessions import SceneSolver
+
+SHARE = 0.01
+
+
+class CountingDesk(Desk):
+    """A desk with a coarse mesh, that counts what is made."""
+
+    made = 0
+
+    def kept(self, facts, make):  # type: ignore[no-untyped-def]
+        def counted() -> object:
+            self.made += 1
+            return make()
+
+        return super().kept(facts, counted)
+
+    def scenes(self, skin, protocol, elements=1500):  # type: ignore[no-untyped-def]
+        return SceneSolver(skin, protocol, elements, self.folder / "frames")
+
+
+def desk(folder: Path) -> CountingDesk:
+    usual = desk_in(folder, Settings(2, SHARE), plain)
+    return CountingDesk(usual.settings, usual.folder, usual.progress, usual.store)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome, int]:
+    folder = tmp_path_factory.mktemp("force")
+    one = desk(folder)
+    return folder, force.run(one), one.made
+
+
+def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, Outcome, int]) -> None:
+    folder, outcome, made = done
+    again = desk(folder)
+    assert to_json(force.run(again)) == to_json(outcome)
+    assert again.made == 0 and made > 30
+
+
+def test_every_table_and_mark_has_its_place_on_the_page(done: tuple[Path, Outcome, int]) -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "studies" / "force.md").read_text(encoding="utf-8")
+    outcome = done[1]
+    assert [table.name for table in outcome.tables] == ["slopes", "anywhere", "by-load", "over-snr", "detection"]
+    for name in (*(table.name for table in outcome.tables), *outcome.words, "command"):
+        assert f"<!-- {name} -->" in page and f"<!-- end {name} -->" in page
+    for table in outcome.tables:
+        assert all(len(row) == len(table.head) for row in table.rows)
+    assert "Infinity" not in to_json(outcome) and "NaN" not in to_json(outcome)
+
+
+def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(done: tuple[Path, Outcome, int]) -> None:
+    slopes = {name: one["a_gram"] for name, one in json.loads(to_json(done[1]))["slopes"].items()}
+    assert slopes[PEAK][0] < 0.3 * slopes[PEAK][-1]
+    assert slopes[PEAK][0] < slopes[PEAK][1] < slopes[PEAK][2] < slopes[PEAK][3]
+    assert slopes[TOUCH][0] == pytest.approx(slopes[TOUCH][-1], rel=0.35)  # on a coarse mesh
+
+
+def test_calibrated_touches_read_one_load_alike(done: tuple[Path, Outcome, int]) -> None:
+    told = {
+        (one["reading"], one["snr_db"]): anywhere.Anywhere.from_dict(one)
+        for one in done[1].data["anywhere"]  # type: ignore[union-attr]
+    }
+    assert set(told) == {(name, snr) for name in READOUTS for snr in force.SNRS_DB}
+    touch, peak = told[TOUCH, 72.0], told[PEAK, 72.0]
+    assert touch.found == 1 and touch.calibrated.shape == (8, len(LOADS_G)) and touch.macs > 1e5
+    assert anywhere.scatter(touch.calibrated) < 0.04 < 0.2 < anywhere.scatter(peak.raw)
+
+
+def test_less_noise_shows_less_load(done: tuple[Path, Outcome, int]) -> None:
+    found = [detection.Detection.from_dict(one) for one in done[1].data["detection"]]
+    thresholds = np.array([[one.threshold(radius)[0] for radius in range(4)] for one in found])
+    assert (thresholds[0] > thresholds[-1]).all() and (thresholds[-1] < 20).all()
+    assert thresholds[-1, 0] > thresholds[-1, 3]  # the centre needs more
+    for one in found:
+        share, upper = one.false_share()
+        assert share < upper <= 1 and one.quiet == 80
+
+
+def test_pictures_are_drawn(done: tuple[Path, Outcome, int], tmp_path: Path) -> None:
+    assert set(done[1].pictures) == {"curves.png", "skin.png", "detection.png"}
+    for name, draw in done[1].pictures.items():
+        draw(tmp_path / name)
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+# ---- pieces ----
+
+
+def test_the_law_is_what_the_page_says() -> None:
+    assert NOMINAL.radius_mm(50) == pytest.approx(4.8, abs=0.05) and NOMINAL.radius_mm(200) == pytest.approx(7.6, abs=0.05)
+    assert NOMINAL.contrast(50) == pytest.approx(1.9, abs=0.05) and NOMINAL.contrast(200) == pytest.approx(4.2, abs=0.05)
+    assert drawn_laws(3, 5)[:2] == drawn_laws(3, 2) != drawn_laws(4, 2)
+    spread = np.std(np.log([law.sensitivity_per_gram for law in drawn_laws(1, 400)]))
+    assert spread == pytest.approx(0.2, rel=0.1)
+
+
+def test_tuning_and_reported_places_differ() -> None:
+    tuned, reported = scenes.spiral(100_001, 24, 97.0), scenes.spiral(1, 36, 97.0)
+    assert np.hypot(*reported.T).max() < 97 * scenes.OUTERMOST
+    assert np.hypot(*(tuned[:, None] - reported[None]).transpose(2, 0, 1)).min() > 0.1
+
+
+def test_the_least_load_lies_between_two() -> None:
+    loads = np.array([1.0, 4.0, 16.0])
+    assert detection.least_load(loads, np.array([0.0, 0.8, 1.0])) == pytest.approx(8.0)
+    assert detection.least_load(loads, np.array([0.95, 1.0, 1.0])) == 1.0
+    assert detection.least_load(loads, np.array([0.95, 1.0, 0.5])) == float("inf")
+    assert detection.least_load(loads, np.array([0.95, 0.5, 1.0])) > 4.0  # once seen is not always seen
+
+
+def test_false_alarms_have_the_exact_bound() -> None:
+    one = detection.Detection(60.0, np.array([1.0]), np.ones((4, 1)), np.ones((4, 1)), 0, 299)
+    assert one.false_share() == (0.0, pytest.approx(0.00997, abs=1e-5))  # 3 / n
+    assert detection.Detection(60.0, one.loads_g, one.hits, one.tries, 5, 5).false_share() == (1.0, 1.0)
+
+
+def test_readings_survive_the_store() -> None:
+    one = {"a": Readout(np.array([1.0, np.nan]), np.array([(1.0, 2.0), (np.nan, np.nan)]), 3.0)}
+    again = from_lists(json.loads(json.dumps(as_lists(one))))
+    np.testing.assert_array_equal(again["a"].value, one["a"].value)
+    np.testing.assert_array_equal(again["a"].place_mm, one["a"].place_mm)
+
+
+def test_scatter_is_around_each_loads_own_mean() -> None:
+    errors = np.array([[0.1, -0.3], [0.1, -0.3], [0.1, -0.3]])
+    assert anywhere.scatter(errors) == pytest.approx(0)
+    assert anywhere.scatter(np.array([[0.01], [-0.01]])) == pytest.approx(0.01 * np.sqrt(2))
