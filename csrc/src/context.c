@@ -46,8 +46,22 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
         .findings = EITS_FINDINGS_ALL,
+        .track_confirm = 0,
+        .track_hold = 0,
+        .track_smooth = 0,
     };
     *options = chosen;
+    return EITS_OK;
+}
+
+eits_status eits_options_track(eits_options *options)
+{
+    if (options == NULL)
+        return EITS_E_ARGUMENT;
+    options->gate_factor *= R(0.75);
+    options->track_confirm = 2;
+    options->track_hold = 2;
+    options->track_smooth = R(0.66);
     return EITS_OK;
 }
 
@@ -169,7 +183,9 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
                       in_range(o->touch_min_radius_mm, R(1e-6), huge) &&
                       in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
                       in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
-                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL;
+                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL &&
+                      o->track_confirm <= EITS_MOST_TRACK_FRAMES && o->track_hold <= EITS_MOST_TRACK_FRAMES &&
+                      in_range(o->track_smooth, 0, huge);
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)
@@ -198,5 +214,5 @@ void eits_forget(eits_context *ctx)
     if (ctx == NULL)
         return;
     ctx->warm = 0;
-    ctx->last_count = 0;
+    ctx->followed_count = 0;
 }

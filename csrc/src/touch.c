@@ -383,13 +383,13 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         keep_real(ctx, &f);
     }
     const uint32_t finite = report(&f, (eits_real)ctx->model->pixel_mm, found);
-    eits_track(ctx, found, finite);
-    ctx->info.touches = finite;
     ctx->info.touch_macs = f.macs;
     eits_judge_crowd(ctx, looked, found, finite);
-    for (uint32_t k = 0; k < finite && k < room; ++k)
+    const uint32_t told = eits_track(ctx, found, finite);
+    ctx->info.touches = told;
+    for (uint32_t k = 0; k < told && k < room; ++k)
         touches[k] = found[k];
     if (count != NULL)
-        *count = finite;
+        *count = told;
     return EITS_OK;
 }

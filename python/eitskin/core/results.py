@@ -14,6 +14,7 @@ from eitskin.errors import FrameError, UsageError
 SIGNS = ("increase", "decrease", "both")
 SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
+MOST_TRACK_FRAMES = 1000
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
 STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
@@ -26,6 +27,8 @@ class Options:
     (every column in every iteration), "working-set" (FISTA on the columns that may differ from zero), "coordinate" (sweeps of
     coordinate descent) or "active-set" (rounds to the exact optimum). ``mac_limit`` (0: none): the best so far when the next
     step would take the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of ``FINDINGS``.
+    ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow touches in time; all 0: each frame by itself
+    (``solve.options.tracking`` sets them, docs/tracking.md).
     """
 
     iterations: int
@@ -53,6 +56,14 @@ class Options:
     touch_sweeps: int = 6
     mac_limit: int = 0
     findings: int = ALL_FINDINGS
+    track_confirm: int = 0
+    track_hold: int = 0
+    track_smooth: float = 0.0
+
+    @property
+    def tracks(self) -> bool:
+        """Whether touches depend on the frames before, beyond their ids."""
+        return self.track_confirm > 1 or self.track_hold > 0 or self.track_smooth > 0
 
 
 WHOLE = {
@@ -63,6 +74,8 @@ WHOLE = {
     "touch_sweeps": (0, 1000),
     "mac_limit": (0, 2**32 - 1),
     "findings": (0, ALL_FINDINGS),
+    "track_confirm": (0, MOST_TRACK_FRAMES),
+    "track_hold": (0, MOST_TRACK_FRAMES),
 }
 SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_share")
 
@@ -129,7 +142,8 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Touch:
-    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame."""
+    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame. One that is held
+    while it is not found has confidence 0."""
 
     id: int
     x_mm: float

@@ -22,6 +22,7 @@ from eitskin.solve.reference_observed import Whitening, form_of, whiten
 from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, certify, greatest, project, shrink
 from eitskin.solve.reference_quiet import clean
 from eitskin.solve.reference_touches import find_touches
+from eitskin.solve.reference_track import Tracker
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -121,8 +122,7 @@ class ReferenceEngine:
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._warm: FloatArray | None = None
-        self._last: tuple[Touch, ...] = ()
-        self._next_id = 1
+        self._tracker = Tracker(model.grid)
         self._examiner = Examiner(model)
         self._noise_v = self._noise_energy = 0.0
         self._ready = False
@@ -146,7 +146,8 @@ class ReferenceEngine:
 
     def forget(self) -> None:
         """Forget the warm start and the touches that were followed."""
-        self._warm, self._last = None, ()
+        self._warm = None
+        self._tracker.forget()
 
     def _fold_reference(self, v0: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Folded reference (k,) and where it is known."""
@@ -348,13 +349,11 @@ class ReferenceEngine:
         found: tuple[Touch, ...] = ()
         solved_ns = perf_counter_ns()
         if touches:
-            found, self._next_id, self._examiner.found.unexplained = find_touches(
-                self.model, self.seen, image, y, basis, o, lambda_noise, self._last, self._next_id
-            )
-            self._last = found
+            found, self._examiner.found.unexplained = find_touches(self.model, self.seen, image, y, basis, o, lambda_noise)
             noise_share = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum()) / max(norm**2, 1e-300)
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             self._examiner.crowd(found, o.max_touches, noise_share, clearness)
+            found = self._tracker.step(found, o, lambda_max, lambda_noise)
         gap = result.certificate.gap
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,

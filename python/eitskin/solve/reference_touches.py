@@ -200,11 +200,9 @@ def find_touches(
     basis: FloatArray,
     options: Options,
     lambda_noise: float,
-    last: tuple[Touch, ...],
-    next_id: int,
-) -> tuple[tuple[Touch, ...], int, float]:
-    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), which ``seen`` (r, n) explains, strongest first,
-    the next free id, and the share of |y|^2 that the touches leave (0 where the image is zero)."""
+) -> tuple[tuple[Touch, ...], float]:
+    """The touches of an ``image`` (n,) with its reduced data ``y`` (r,), which ``seen`` (r, n) explains, strongest first and
+    without ids, and the share of |y|^2 that they leave (0 where the image is zero)."""
     fit = Fit(model, seen, y, basis, options, lambda_noise)
     if np.abs(image).max() > 0:
         fit.seed(image)
@@ -223,23 +221,4 @@ def find_touches(
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     left, whole = fit.residual(), float(y @ y)
     unexplained = float(left @ left) / whole if whole > 0 and np.abs(image).max() > 0 else 0.0
-    return *_track(found, last, options.follow_mm, next_id), unexplained
-
-
-def _track(found: list[Touch], last: tuple[Touch, ...], follow_mm: float, next_id: int) -> tuple[tuple[Touch, ...], int]:
-    """Ids by nearest pairs first within ``follow_mm``; new ones from ``next_id``."""
-    pairs = sorted(
-        (np.hypot(t.x_mm - old.x_mm, t.y_mm - old.y_mm), k, i)
-        for k, t in enumerate(found)
-        for i, old in enumerate(last)
-    )
-    ids: dict[int, int] = {}
-    taken: set[int] = set()
-    for distance, k, i in pairs:
-        if distance <= follow_mm and k not in ids and i not in taken:
-            ids[k] = last[i].id
-            taken.add(i)
-    for k in range(len(found)):
-        if k not in ids:
-            ids[k], next_id = next_id, next_id + 1
-    return tuple(replace(touch, id=ids[k]) for k, touch in enumerate(found)), next_id
+    return tuple(found), unexplained
