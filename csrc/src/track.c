@@ -116,7 +116,8 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
 {
     uint8_t taken[EITS_MAX_TOUCHES] = {0};
     for (;;) { /* at most EITS_MAX_TOUCHES pairs */
-        eits_real nearest = square(told ? ctx->options.follow_mm : NEWBORN_REACH * ctx->options.follow_mm);
+        const eits_real reach = square(told ? ctx->options.follow_mm : NEWBORN_REACH * ctx->options.follow_mm);
+        eits_real nearest = reach;
         uint32_t from = NONE, to = NONE;
         for (uint32_t k = 0; k < count; ++k) {
             for (uint32_t l = 0; owner[k] == NONE && l < ctx->followed_count; ++l) {

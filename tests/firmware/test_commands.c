@@ -25,7 +25,7 @@ static void test_lengths(void)
 {
     const struct { eits_packet_type type; uint32_t size; } expected[] = {
         {EITS_PACKET_GET_INFO, 4},      {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},      {EITS_PACKET_SCAN, 24},
-        {EITS_PACKET_SOLVER, 40},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
+        {EITS_PACKET_SOLVER, 44},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
         {EITS_PACKET_MASK_ROW, 8},      {EITS_PACKET_RESET, 4},     {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
     for (size_t k = 0; k < sizeof expected / sizeof expected[0]; ++k) {
         uint8_t payload[64] = {0};

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from eitskin.core.results import MAX_TOUCHES, Options, Touch
 from eitskin.fem.grid import Grid
+
+FloatArray = npt.NDArray[np.float64]
+Pairing: TypeAlias = Callable[[FloatArray, float], list[tuple[int, int]]]
 
 SURE_SHARE = 0.05
 NEWBORN_REACH = 0.6
@@ -34,10 +39,10 @@ class Followed:
 
 
 class Tracker:
-    """Follows the touches of one stream on the skin of ``grid``."""
+    """Follows the touches of one stream on the skin of ``grid``; ``pairing`` says who is who (None: as the C core)."""
 
-    def __init__(self, grid: Grid) -> None:
-        self._grid = grid
+    def __init__(self, grid: Grid, pairing: Pairing | None = None) -> None:
+        self._grid, self._pairing = grid, nearest_pairs if pairing is None else pairing
         self._followed: list[Followed] = []
         self._next_id = 1
 
@@ -50,8 +55,11 @@ class Tracker:
         now = _Frame(options, lambda_max, lambda_noise, self._grid)
         before = [now.predicted(one) for one in self._followed]
         owner: dict[int, int] = {}
-        _pair(before, found, True, options.follow_mm, owner)
-        _pair(before, found, False, NEWBORN_REACH * options.follow_mm, owner)
+        for known, reach_mm in ((True, options.follow_mm), (False, NEWBORN_REACH * options.follow_mm)):
+            numbers = [number for number, one in enumerate(before) if (one.touch.id != 0) == known]
+            free = [k for k in range(len(found)) if k not in owner]
+            for row, column in self._pairing(_distances(found, free, before, numbers), reach_mm):
+                owner[free[row]] = numbers[column]
         after = []
         for k, touch in enumerate(found):
             one = now.met(before[owner[k]], touch) if k in owner else now.newborn(touch)
@@ -126,16 +134,18 @@ class _Frame:
         )
 
 
-def _pair(before: Sequence[Followed], found: Sequence[Touch], told: bool, reach_mm: float, owner: dict[int, int]) -> None:
-    """Nearest pairs first within ``reach_mm``, among those that were told of or the others, into ``owner``: found to followed."""
-    pairs = sorted(
-        (math.hypot(touch.x_mm - one.touch.x_mm, touch.y_mm - one.touch.y_mm), k, number)
-        for k, touch in enumerate(found)
-        for number, one in enumerate(before)
-        if k not in owner and (one.touch.id != 0) == told
-    )
-    taken: set[int] = set()
-    for distance, k, number in pairs:
-        if distance <= reach_mm and k not in owner and number not in taken:
-            owner[k] = number
-            taken.add(number)
+def _distances(found: Sequence[Touch], rows: list[int], before: Sequence[Followed], columns: list[int]) -> FloatArray:
+    here = np.array([(found[k].x_mm, found[k].y_mm) for k in rows]).reshape(-1, 1, 2)
+    there = np.array([(before[number].touch.x_mm, before[number].touch.y_mm) for number in columns]).reshape(1, -1, 2)
+    return np.asarray(np.hypot(*np.moveaxis(here - there, 2, 0)))
+
+
+def nearest_pairs(distance_mm: FloatArray, reach_mm: float) -> list[tuple[int, int]]:
+    """Pairs (row, column) within ``reach_mm``, the nearest first, each row and column once."""
+    pairs: list[tuple[int, int]] = []
+    for place in np.argsort(distance_mm, axis=None, kind="stable"):
+        row, column = (int(one) for one in np.unravel_index(place, distance_mm.shape))
+        free = all(row != i and column != k for i, k in pairs)
+        if free and distance_mm[row, column] <= reach_mm:
+            pairs.append((row, column))
+    return pairs

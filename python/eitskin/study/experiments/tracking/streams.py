@@ -50,6 +50,11 @@ class Stream:
         places = np.array([(self.samples[i].x_mm[frame], self.samples[i].y_mm[frame]) for i in there]).reshape(-1, 2)
         return there, places, np.array([self.samples[i].radius_mm[frame] for i in there])
 
+    def facts(self) -> list[object]:
+        """All that tells it from another, for JSON."""
+        return [self.name, FRAMES, RATE_HZ, [[list(vars(key).values()) for key in track.keyframes] for track in self.tracks],
+                [vars(track.law) for track in self.tracks], CONTACTS]  # fmt: skip
+
     def scene(self, elements: int = ELEMENTS) -> Scene:
         """For the forward model: without noise, one quiet frame; contacts that differ, as in every other set."""
         return Scene(
