@@ -7,6 +7,7 @@
 
 /* Chosen on tuning streams, docs/tracking.md. */
 static const eits_real SURE_SHARE = R(0.05);     /* a touch that explains less of |y|^2 may be half of another */
+static const eits_real SURE_CLEARNESS = R(1.5);  /* and one whose own S'y is below so many times that of noise may be noise */
 static const eits_real NEWBORN_REACH = R(0.6);   /* of follow_mm, for touches that are not told of yet */
 static const eits_real SPEED_CHANGE = R(0.028);  /* of follow_mm: rms by which a velocity changes from frame to frame */
 static const eits_real FIRST_SPEED = R(0.12);    /* of follow_mm: rms of a new touch's velocity, a frame */
@@ -25,8 +26,8 @@ static eits_real own_lambda(const eits_context *ctx, const eits_touch *touch)
     return ctx->info.lambda_max * eits_sqrt(touch->confidence);
 }
 
-/* Noise alone might look so. */
-static int is_doubtful(const eits_context *ctx, const eits_touch *touch)
+/* Fainter than noise: it may be there all the same when it is not found. */
+static int is_faint(const eits_context *ctx, const eits_touch *touch)
 {
     return own_lambda(ctx, touch) < ctx->info.lambda_noise;
 }
@@ -64,7 +65,7 @@ static eits_followed newborn(const eits_context *ctx, const eits_touch *found)
                            .place_mm2 = place_variance(ctx, found),
                            .speed_mm2 = square(FIRST_SPEED * ctx->options.follow_mm),
                            .seen = 1,
-                           .doubtful = (uint32_t)is_doubtful(ctx, found)};
+                           .faint = (uint32_t)is_faint(ctx, found)};
 }
 
 /* A frame on; a touch that would leave the skin stays where it is. */
@@ -141,7 +142,7 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
 /* An id for a touch that may be told of now. */
 static void name(eits_context *ctx, eits_followed *f)
 {
-    const int clear = !f->doubtful && f->touch.confidence >= SURE_SHARE;
+    const int clear = own_lambda(ctx, &f->touch) >= SURE_CLEARNESS * ctx->info.lambda_noise && f->touch.confidence >= SURE_SHARE;
     if (f->touch.id != 0 || (f->seen < ctx->options.track_confirm && !clear))
         return;
     f->touch.id = ctx->next_id;
@@ -186,7 +187,7 @@ uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count)
     renew(ctx, touches, count, owner);
     for (uint32_t l = 0; l < ctx->followed_count; ++l) {
         const eits_followed *f = &ctx->followed[l];
-        const int held = f->doubtful && f->seen >= KNOWN_FRAMES && told < ctx->options.max_touches;
+        const int held = f->faint && f->seen >= KNOWN_FRAMES && told < ctx->options.max_touches;
         if (f->touch.id == 0 || (f->missed > 0 && !held))
             continue;
         uint32_t place = told++;

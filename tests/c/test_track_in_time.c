@@ -35,7 +35,7 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-/* Its own S'y is 10 sqrt(confidence) times the noise's: 0.009 and less is doubtful, above 0.05 it is sure. */
+/* Its own S'y is 10 sqrt(confidence) times the noise's: faint from 0.009 down; above 0.05 a birth is sure. */
 static eits_touch at(double x, double y, double confidence)
 {
     return (eits_touch){.x_mm = (eits_real)x, .y_mm = (eits_real)y, .radius_mm = 9, .strength_s_per_m_mm2 = 1,
@@ -79,6 +79,10 @@ static void births(void)
     eits_forget(ctx);
     ctx->info.lambda_noise = 5; /* a large share of a frame that is little more than noise */
     CHECK_EQUAL(one(ctx, t, 0, 0.2), 0);
+    eits_forget(ctx);
+    ctx->info.lambda_noise = 2; /* 1.2 times noise: not faint, and not sure either */
+    CHECK_EQUAL(one(ctx, t, 0, 0.06), 0);
+    eits_forget(ctx);
     ctx->info.lambda_noise = 0; /* unknown: nothing is doubted for it */
     CHECK_EQUAL(one(ctx, t, 60, 0.2), 1);
     tear_down(&b);

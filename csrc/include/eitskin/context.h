@@ -111,7 +111,7 @@ typedef struct eits_followed {
     eits_real place_mm2, both_mm2, speed_mm2; /* covariance of place and velocity, along either axis */
     uint32_t seen;          /* frames that it was found in, as far as that is asked */
     uint32_t missed;        /* frames on end that it was not */
-    uint32_t doubtful;      /* 1: when it was last found, it might have been noise */
+    uint32_t faint;         /* 1: its own S'y was below that of noise when it was last found */
 } eits_followed;
 
 struct eits_kernels; /* matrix products, chosen at start-up among builds that give the same bits */

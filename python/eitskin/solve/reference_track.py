@@ -17,6 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 Pairing: TypeAlias = Callable[[FloatArray, float], list[tuple[int, int]]]
 
 SURE_SHARE = 0.05
+SURE_CLEARNESS = 1.5
 NEWBORN_REACH = 0.6
 SPEED_CHANGE = 0.028
 FIRST_SPEED = 0.12
@@ -27,7 +28,8 @@ KNOWN_FRAMES = 4
 @dataclass(frozen=True)
 class Followed:
     """A touch that is followed; its id is 0 until it is told of. Velocities in mm a frame, ``p`` the covariance of place and
-    velocity along either axis: (place, both, speed)."""
+    velocity along either axis: (place, both, speed); ``own_lambda`` its share of max(S'y) when it was last found, ``faint`` where
+    that is below noise's."""
 
     touch: Touch
     vx_mm: float
@@ -35,7 +37,8 @@ class Followed:
     p: tuple[float, float, float]
     seen: int
     missed: int
-    doubtful: bool
+    own_lambda: float
+    faint: bool
 
 
 class Tracker:
@@ -63,7 +66,7 @@ class Tracker:
         after = []
         for k, touch in enumerate(found):
             one = now.met(before[owner[k]], touch) if k in owner else now.newborn(touch)
-            after.append(self._named(one, options))
+            after.append(self._named(one, options, lambda_noise))
         waited = [
             replace(one, missed=one.missed + 1, touch=replace(one.touch, confidence=0.0))
             for number, one in enumerate(before)
@@ -71,12 +74,12 @@ class Tracker:
         ]
         self._followed = [*after, *waited][:MAX_TOUCHES]
         told = [one.touch for one in self._followed if one.touch.id and not one.missed]
-        held = [one.touch for one in self._followed if one.missed and one.doubtful and one.seen >= KNOWN_FRAMES]
+        held = [one.touch for one in self._followed if one.missed and one.faint and one.seen >= KNOWN_FRAMES]
         told += held[: max(0, options.max_touches - len(told))]
         return tuple(sorted(told, key=lambda touch: -abs(touch.strength_s_per_m_mm2)))
 
-    def _named(self, one: Followed, options: Options) -> Followed:
-        sure = not one.doubtful and one.touch.confidence >= SURE_SHARE
+    def _named(self, one: Followed, options: Options, lambda_noise: float) -> Followed:
+        sure = one.own_lambda >= SURE_CLEARNESS * lambda_noise and one.touch.confidence >= SURE_SHARE
         if one.touch.id or not (one.seen >= options.track_confirm or sure):
             return one
         self._next_id += 1
@@ -100,7 +103,7 @@ class _Frame:
         noise = self.lambda_noise / own if own > 0 else 0.0
         place = self.grid.pixel_mm**2 * ((self.options.track_smooth * noise) ** 2 + LEAST_DEVIATION**2)
         speed = (FIRST_SPEED * self.options.follow_mm) ** 2
-        return Followed(replace(touch, id=0), 0.0, 0.0, (place, 0.0, speed), 1, 0, own < self.lambda_noise)
+        return Followed(replace(touch, id=0), 0.0, 0.0, (place, 0.0, speed), 1, 0, own, own < self.lambda_noise)
 
     def predicted(self, one: Followed) -> Followed:
         """A frame on; one that would leave the skin stays."""
