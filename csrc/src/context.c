@@ -48,8 +48,22 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .findings = EITS_FINDINGS_ALL,
         .touch_search = EITS_SEARCH_ALL,
         .refine = 0,
+        .track_confirm = 0,
+        .track_hold = 0,
+        .track_smooth = 0,
     };
     *options = chosen;
+    return EITS_OK;
+}
+
+eits_status eits_options_track(eits_options *options)
+{
+    if (options == NULL)
+        return EITS_E_ARGUMENT;
+    options->gate_factor *= R(0.75);
+    options->track_confirm = 2;
+    options->track_hold = 2;
+    options->track_smooth = R(0.66);
     return EITS_OK;
 }
 
@@ -174,7 +188,8 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
                       in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
                       in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
                       in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL &&
-                      o->touch_search <= EITS_SEARCH_ALL && o->refine <= 1;
+                      o->touch_search <= EITS_SEARCH_ALL && o->refine <= 1 && o->track_confirm <= EITS_MOST_TRACK_FRAMES &&
+                      o->track_hold <= EITS_MOST_TRACK_FRAMES && in_range(o->track_smooth, 0, huge);
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)
@@ -203,5 +218,5 @@ void eits_forget(eits_context *ctx)
     if (ctx == NULL)
         return;
     ctx->warm = 0;
-    ctx->last_count = 0;
+    ctx->followed_count = 0;
 }

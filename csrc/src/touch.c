@@ -170,17 +170,17 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     if (looked)
         search(ctx, &f);
     const uint32_t finite = report(ctx, &f, found);
-    for (uint32_t k = 0; k < finite; ++k)
-        found[k].load_n = eits_load_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
-    eits_track(ctx, found, finite);
-    ctx->info.touches = finite;
     ctx->info.touch_macs = f.macs;
     eits_judge_crowd(ctx, looked, found, finite);
+    const uint32_t told = eits_track(ctx, found, finite);
+    ctx->info.touches = told;
+    for (uint32_t k = 0; k < told; ++k)
+        found[k].load_n = eits_load_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     if (ctx->options.refine && ctx->options.mac_limit == 0 && f.count > 1 && f.data == ctx->y_coupled)
         eits_solve_again(ctx, ctx->y_coupled);
-    for (uint32_t k = 0; k < finite && k < room; ++k)
+    for (uint32_t k = 0; k < told && k < room; ++k)
         touches[k] = found[k];
     if (count != NULL)
-        *count = finite;
+        *count = told;
     return EITS_OK;
 }

@@ -1,11 +1,14 @@
-/* Ids that follow touches from frame to frame. */
+/* Touches followed from frame to frame: births and deaths, ids, places smoothed in time. docs/tracking.md says what each is worth. */
 #ifndef EITSKIN_TRACK_H
 #define EITSKIN_TRACK_H
 
 #include "eitskin/context.h"
 
-/* Give each of `count` touches the id of the nearest touch of the last frame within follow_mm, nearest pairs first, or a
- * new one; keep them as the last frame's. */
-void eits_track(eits_context *ctx, eits_touch *touches, uint32_t count);
+/* From the `count` touches that were found in a frame (room for EITS_MAX_TOUCHES) to those that are told of, in their place,
+ * strongest first; returns how many. ctx->info says how clear the frame is.
+ *
+ * Nearest pairs of a touch that is followed and one that is found, within follow_mm, belong together; those that were told of
+ * choose first. Ids count up from 1 and are given when a touch is first told of. */
+uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count);
 
 #endif

@@ -142,6 +142,19 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     return checked;
 }
 
+/* What tracking changes is the model's own without it. */
+static void set_tracking(const fw_instrument *instrument, eits_options *options, bool track)
+{
+    eits_options usual;
+    (void)eits_options_default(&instrument->engine.model, &usual);
+    options->gate_factor = usual.gate_factor;
+    options->track_confirm = usual.track_confirm;
+    options->track_hold = usual.track_hold;
+    options->track_smooth = usual.track_smooth;
+    if (track)
+        (void)eits_options_track(options);
+}
+
 static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_t size)
 {
     eits_command_solver c;
@@ -155,7 +168,8 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
         share_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
         share_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
         outside(&bad, offsetof(eits_command_solver, solver), c.solver, 0, EITS_SOLVER_ACTIVE_SET) ||
-        outside(&bad, offsetof(eits_command_solver, findings), c.findings, 0, EITS_FINDINGS_ALL))
+        outside(&bad, offsetof(eits_command_solver, findings), c.findings, 0, EITS_FINDINGS_ALL) ||
+        outside(&bad, offsetof(eits_command_solver, track), c.track, 0, 1))
         return bad;
     if (!instrument->engine.open)
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
@@ -169,6 +183,7 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
     options.solver = (eits_solver)c.solver;
     options.mac_limit = c.mac_limit;
     options.findings = c.findings;
+    set_tracking(instrument, &options, c.track != 0);
     const eits_status status = eits_set_options(&instrument->engine.ctx, &options);
     return status == EITS_OK ? ok() : answer(EITS_REPLY_CORE, (int32_t)status, 0);
 }

@@ -68,9 +68,13 @@ static void list_unique(fw_engine *engine)
     }
 }
 
+/* Frames follow one another here, so that touches are followed in time. */
 static eits_status start_core(fw_engine *engine)
 {
-    return eits_init(&engine->ctx, &engine->model, engine->workspace, eits_workspace_size(&engine->model, 0));
+    const eits_status status = eits_init(&engine->ctx, &engine->model, engine->workspace, eits_workspace_size(&engine->model, 0));
+    if (status == EITS_OK)
+        (void)eits_options_track(&engine->ctx.options);
+    return status;
 }
 
 eits_status fw_engine_open(fw_engine *engine, const eits_model *model)

@@ -38,7 +38,7 @@ void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes);
 /* Workspace that a model needs here, frames included. */
 size_t fw_engine_needs(const eits_model *model);
 
-/* Take up an open model (copied) with its default options; not tared. Whatever was open is forgotten.
+/* Take up an open model (copied) with its default options and tracking; not tared. Whatever was open is forgotten.
  * Errors: those of eits_init; EITS_E_WORKSPACE where memory is short; nothing is open then. */
 eits_status fw_engine_open(fw_engine *engine, const eits_model *model);
 void fw_engine_close(fw_engine *engine);

@@ -198,6 +198,16 @@ static void default_options(void)
     CHECK_NEAR(o.touch_change_s_per_m, 0, 0);
     CHECK_NEAR(o.touch_radius_weight, 1e-3f, 0);
     CHECK_NEAR(o.follow_mm, 25, 0);
+    CHECK(o.track_confirm == 0 && o.track_hold == 0 && o.track_smooth == 0);
+    const eits_options usual = o;
+    CHECK_EQUAL(eits_options_track(NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_options_track(&o), EITS_OK);
+    CHECK_NEAR(o.gate_factor, 0.75 * 1.2f, 1e-7);
+    CHECK(o.track_confirm == 2 && o.track_hold == 2 && o.track_smooth == R(0.66));
+    o.gate_factor = usual.gate_factor; /* and nothing else */
+    o.track_confirm = o.track_hold = 0;
+    o.track_smooth = 0;
+    CHECK(memcmp(&o, &usual, sizeof o) == 0);
     small_model_free(&made);
 }
 
@@ -220,6 +230,7 @@ static void options_out_of_range(void)
         REAL(touch_min_radius_mm, 0), REAL(touch_min_radius_mm, 9.1), REAL_WRONG(touch_max_radius_mm), REAL(touch_max_radius_mm, 8.9),
         REAL_WRONG(touch_seed_radius_mm), REAL(touch_seed_radius_mm, 2.9), REAL(touch_seed_radius_mm, 40.1),
         REAL_WRONG(touch_change_s_per_m), REAL_WRONG(touch_radius_weight), REAL_WRONG(follow_mm),
+        WORD(track_confirm, 1001), WORD(track_hold, 1001), REAL_WRONG(track_smooth),
     };
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
     small_context c;
@@ -240,6 +251,8 @@ static void options_out_of_range(void)
     o.max_touches = 0;
     o.max_masked = UINT32_MAX;
     o.touch_sweeps = 1000;
+    o.track_confirm = o.track_hold = EITS_MOST_TRACK_FRAMES;
+    o.track_smooth = R(1e30);
     o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_share = 1;
     o.lambda_abs = o.gate_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm = o.touch_change_s_per_m = R(1e30);
     o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);

@@ -25,7 +25,7 @@ static void test_lengths(void)
 {
     const struct { eits_packet_type type; uint32_t size; } expected[] = {
         {EITS_PACKET_GET_INFO, 4},      {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},      {EITS_PACKET_SCAN, 24},
-        {EITS_PACKET_SOLVER, 40},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
+        {EITS_PACKET_SOLVER, 44},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
         {EITS_PACKET_MASK_ROW, 8},      {EITS_PACKET_RESET, 4},     {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
     for (size_t k = 0; k < sizeof expected / sizeof expected[0]; ++k) {
         uint8_t payload[64] = {0};
@@ -184,7 +184,12 @@ static void test_solver(void)
     c = good;
     c.findings = EITS_FINDINGS_ALL + 1;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 36, EITS_FINDINGS_ALL);
+    c = good;
+    c.track = 2;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 40, 1);
     const eits_options *options = &b.host.instrument.engine.ctx.options;
+    CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
+    CHECK_NEAR(options->gate_factor, 0.75 * 1.2f, 1e-7);
     CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->mac_limit, 0);
     CHECK_EQUAL(options->iterations, 30);
@@ -198,6 +203,16 @@ static void test_solver(void)
     CHECK_EQUAL(options->solver, EITS_SOLVER_COORDINATE);
     CHECK_EQUAL(options->findings, EITS_FINDING_GLITCH);
     CHECK_EQUAL(options->mac_limit, 123456);
+    CHECK(options->track_confirm == 0 && options->track_hold == 0 && options->track_smooth == 0);
+    CHECK_NEAR(options->gate_factor, 1.2f, 0);
+    c = good;
+    c.track = 1;
+    for (int k = 0; k < 2; ++k) { /* as after a start, and not a quarter lower each time */
+        REPLY(solver_with(c), EITS_REPLY_OK, 0, 0);
+        c.iterations += 1; /* another command, not the last one again */
+    }
+    CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
+    CHECK_NEAR(options->gate_factor, 0.75 * 1.2f, 1e-7);
 }
 
 static void test_mask_row(void)

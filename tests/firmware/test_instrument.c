@@ -21,6 +21,7 @@ static void mirror_start(uint32_t quiet)
     memset(&mirror, 0, sizeof mirror);
     CHECK_EQUAL(eits_init(&mirror.ctx, &b.open, mirror.workspace, eits_workspace_size(&b.open, 0)), EITS_OK);
     eits_options options = mirror.ctx.options;
+    CHECK_EQUAL(eits_options_track(&options), EITS_OK); /* as the firmware does */
     options.warm_start = 1; /* of both, so that a frame depends on those before it */
     b.host.instrument.engine.ctx.options.warm_start = 1;
     CHECK_EQUAL(eits_set_options(&mirror.ctx, &options), EITS_OK);

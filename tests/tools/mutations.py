@@ -296,9 +296,47 @@ TOUCH = (
     )
     + of(
         "track.c",
-        ("the farthest for the nearest", "squared <= nearest", "squared <= limit", "track"),
+        ("the farthest for the nearest", "squared <= nearest", "squared <= reach", "track"),
         ("two touches of one id", "        taken[from] = 1;\n", "", "track"),
         ("the id 0", "ctx->next_id == UINT32_MAX ? 1 : ctx->next_id + 1", "ctx->next_id + 1", "track"),
+        (
+            "every birth waits",
+            "f->seen < ctx->options.track_confirm && !clear",
+            "f->seen < ctx->options.track_confirm && !(0 * clear)",
+            "track_in_time",
+        ),
+        ("half of a touch is a touch", " && f->touch.confidence >= SURE_SHARE;", ";", "track_in_time"),
+        ("near noise is sure enough", ">= SURE_CLEARNESS * ctx", ">= 1 * ctx", "track_in_time"),
+        ("noise is never faint", "< ctx->info.lambda_noise;", "< 0;", "track_in_time"),
+        ("a share for its root", "eits_sqrt(touch->confidence)", "touch->confidence", "track_in_time"),
+        (
+            "newborns reach as far as known touches",
+            "told ? ctx->options.follow_mm : NEWBORN_REACH *",
+            "told ? ctx->options.follow_mm :",
+            "track_in_time",
+        ),
+        ("a lifted touch stays", "const int held = f->faint &&", "const int held =", "track_in_time"),
+        ("noise is held", "f->seen >= KNOWN_FRAMES && told", "told", "track_in_time"),
+        ("held touches beyond the most", "&& told < ctx->options.max_touches", "", "track_in_time"),
+        ("ids held for ever", "f->missed >= ctx->options.track_hold", "0", "track_in_time"),
+        ("a held touch still explains", "        f->touch.confidence = 0;\n", "", "track_in_time"),
+        (
+            "a velocity that is not learned",
+            "next.vx_mm = eits_fma(speed_gain, dx, before->vx_mm);",
+            "next.vx_mm = before->vx_mm;",
+            "track_in_time",
+        ),
+        ("a velocity that is not used", "next.touch.x_mm += f->vx_mm;", "next.touch.x_mm += 0;", "track_in_time"),
+        ("ever surer of the place", "next.place_mm2 += eits_fma(", "next.place_mm2 += 0 * eits_fma(", "track_in_time"),
+        ("noise that all touches share", "ctx->info.lambda_noise / own : 0", "1 : 0", "track_in_time"),
+        ("a finger runs off the skin", "is_finite(&next) && on_skin(ctx, &next.touch))", "is_finite(&next))", "track_in_time"),
+        (
+            "a filter that breaks down",
+            "is_finite(&next) && on_skin(ctx, &next.touch) ? next : anew",
+            "1 ? next : anew",
+            "track_in_time",
+        ),
+        ("a radius that lags by itself", "eits_fma(gain, found->radius_mm", "eits_fma(R(0.5), found->radius_mm", "track_in_time"),
     )
 )
 

@@ -15,6 +15,7 @@ extern "C" {
 #endif
 
 #define EITS_MAX_TOUCHES 16
+#define EITS_MOST_TRACK_FRAMES 1000u
 
 /* Which conductivity changes are looked for. */
 typedef enum eits_sign {
@@ -60,6 +61,10 @@ typedef struct eits_options {
     uint32_t refine;       /* 1: once more than one touch is found, eits_find_touches solves again with their interplay
                             * taken out of the data; image and info are then the refined image's. Not with a
                             * mac_limit */
+    uint32_t track_confirm; /* a doubtful touch is told of once it was found in so many frames on end; 0, 1: at once */
+    uint32_t track_hold;    /* a touch that is not found keeps its id for so many frames, and is told of if it was faint before */
+    eits_real track_smooth; /* > 0: follow places, radii and strengths in time; how uncertain the place of a touch is whose S'y is
+                             * as great as noise gives, in pixels */
 } eits_options;
 
 /* Why the solver stopped. */
@@ -107,9 +112,20 @@ typedef struct eits_touch {
     eits_real x_mm, y_mm;
     eits_real radius_mm;
     eits_real strength_s_per_m_mm2; /* conductivity change integrated over the touch: S/m mm^2 */
-    eits_real confidence;           /* share of |y|^2 that leaving this touch out would leave unexplained: 0 to 1 */
+    eits_real confidence;           /* share of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
+                                      * not found in this frame and is held */
     eits_real load_n;               /* how hard it presses, N; 0 where the model is not calibrated (load.h) */
 } eits_touch;
+
+/* A touch that is followed (track.h). */
+typedef struct eits_followed {
+    eits_touch touch;       /* as told of; id 0: not yet */
+    eits_real vx_mm, vy_mm; /* a frame */
+    eits_real place_mm2, both_mm2, speed_mm2; /* covariance of place and velocity, along either axis */
+    uint32_t seen;          /* frames that it was found in, as far as that is asked */
+    uint32_t missed;        /* frames on end that it was not */
+    uint32_t faint;         /* 1: its own S'y was below that of noise when it was last found */
+} eits_followed;
 
 struct eits_kernels; /* matrix products, chosen at start-up among builds that give the same bits */
 
@@ -185,8 +201,8 @@ typedef struct eits_context {
     uint32_t held_next;      /* where to look for room */
     uint32_t *working_slot;  /* EITS_HELD(n_pixels): where the working set's columns are held */
     uint32_t working_held;   /* 1: all of them are */
-    eits_touch last[EITS_MAX_TOUCHES];
-    uint32_t last_count, next_id;
+    eits_followed followed[EITS_MAX_TOUCHES];
+    uint32_t followed_count, next_id;
     uint32_t warm; /* x holds the last frame's coefficients */
     eits_info info; /* of the last frame */
 } eits_context;
@@ -219,6 +235,11 @@ size_t eits_workspace_size(const eits_model *model, int prepared);
 
 /* The model's defaults as options. Errors: EITS_E_ARGUMENT. */
 eits_status eits_options_default(const eits_model *model, eits_options *options);
+
+/* Change `options` to what suits frames that follow one another, 48 or 96 a second (docs/tracking.md): the gate a quarter lower,
+ * and the touches that come of it followed in time, so that those of noise are not told of. A frame by itself then misses faint
+ * touches: each needs those before it. Errors: EITS_E_ARGUMENT. */
+eits_status eits_options_track(eits_options *options);
 
 /* Lay out `ctx` in `workspace`, set the model's default options. With room for it (see `prepared` above) S is also copied
  * into panels, which is faster where memory is plentiful and gives the same bits.

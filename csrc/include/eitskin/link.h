@@ -247,6 +247,7 @@ typedef struct eits_command_solver {
     uint32_t solver;    /* eits_solver */
     uint32_t mac_limit; /* 0: none */
     uint32_t findings;  /* bits of eits_finding that are looked for */
+    uint32_t track;     /* 1: touches are followed in time (eits_options_track), as after a start; 0: each frame by itself */
 } eits_command_solver;
 
 typedef struct eits_command_model_begin { uint32_t request, bytes, crc; } eits_command_model_begin; /* stops the scan */

@@ -41,7 +41,16 @@ def add_parser(subparsers: Any) -> None:
     add_wish(parser)
     parser.add_argument("--warm", action="store_true", help="start each frame from the last one's result")
     parser.add_argument(
-        "--threads", type=int, default=1, metavar="N", help="frames side by side, the same results (default: 1; not with --warm)"
+        "--track",
+        action="store_true",
+        help="the frames are a stream, 48 or 96 a second: confirm births, keep ids, smooth places, as a board does",
+    )
+    parser.add_argument(
+        "--threads",
+        type=int,
+        default=1,
+        metavar="N",
+        help="frames side by side, the same results (default: 1; not with --warm or --track)",
     )
     parser.add_argument("--saturation-v", type=float, metavar="V", help="leave channels at or beyond +-V out")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT.npz", help="write images, touches and solver info")
@@ -92,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
     if options.threads > 1:
         results, refused = _reconstruct_threaded(reconstructor, blob, frames, chosen, options.threads)
     else:
-        results, refused = _reconstruct_all(reconstructor, frames, chosen, options.warm)
+        results, refused = _reconstruct_all(reconstructor, frames, chosen, options.warm or options.track)
     scores = _scores(reconstructor, frames, results, options.sign, None if point is None else point.threshold)
     if options.output is not None and results:
         from eitskin.frames.results_file import save_results
@@ -112,6 +121,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _apply(options: argparse.Namespace, reconstructor: Reconstructor) -> None:
+    from eitskin.solve.options import tracking
+
     changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
     if options.solver is not None:
         changes["solver"] = options.solver
@@ -129,6 +140,8 @@ def _apply(options: argparse.Namespace, reconstructor: Reconstructor) -> None:
             raise UsageError(f"--saturation-v {options.saturation_v:g} must be above 0")
         changes["saturation_v"] = options.saturation_v
     reconstructor.with_options(**changes)
+    if options.track:
+        reconstructor.set_options(tracking(reconstructor.options))
 
 
 def _point(options: argparse.Namespace, reconstructor: Reconstructor) -> Point | None:
@@ -155,14 +168,14 @@ def _chosen(frames: Frames, only: str | None) -> list[int]:
 
 
 def _reconstruct_all(
-    reconstructor: Reconstructor, frames: Frames, chosen: list[int], warm: bool
+    reconstructor: Reconstructor, frames: Frames, chosen: list[int], follow: bool
 ) -> tuple[dict[int, Reconstruction], dict[int, str]]:
     from tqdm import tqdm
 
     results: dict[int, Reconstruction] = {}
     refused: dict[int, str] = {}
     for number in tqdm(chosen, desc="frames", leave=False, disable=not sys.stderr.isatty()):
-        if not warm:
+        if not follow:
             reconstructor.forget()
         try:
             results[number] = reconstructor.reconstruct(frames.voltage_v[number])
@@ -174,8 +187,10 @@ def _reconstruct_all(
 def _check_threads(options: argparse.Namespace) -> None:
     from eitskin.solve.batch import check_threads
 
-    if check_threads(options.threads) > 1 and (options.warm or options.engine == "numpy"):
-        what = "--warm starts each frame from the last one" if options.warm else "the numpy engine has one"
+    if check_threads(options.threads) > 1 and (options.warm or options.track or options.engine == "numpy"):
+        what = "the numpy engine has one"
+        if options.warm or options.track:
+            what = "--warm starts each frame from the last one" if options.warm else "--track needs one frame after another"
         raise UsageError(f"--threads {options.threads}: {what}; use --threads 1")
 
 

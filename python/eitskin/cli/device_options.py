@@ -70,6 +70,9 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     start = solver.add_mutually_exclusive_group()
     start.add_argument("--warm", action="store_true", help="begin each frame from the last one's result")
     start.add_argument("--cold", action="store_true", help="begin each frame from nothing (default)")
+    solver.add_argument(
+        "--no-track", action="store_true", help="touches of each frame by itself (default: births confirmed, places smoothed)"
+    )
     tare = parser.add_argument_group("reference")
     tare.add_argument(
         "--tare",
@@ -200,7 +203,7 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
     warm = True if options.warm else False if options.cold else None
     return SolverSettings(
         options.iterations, options.gap, warm, options.sign, solver=options.solver, mac_limit=options.mac_limit,
-        findings=read_ignored(options.ignore),
+        findings=read_ignored(options.ignore), track=False if options.no_track else None,
     )  # fmt: skip
 
 
@@ -322,17 +325,18 @@ def _wished_solver(options: argparse.Namespace, device: Device, known: KnownMode
     from dataclasses import replace
 
     from eitskin.cli.budget_options import chosen_point, settings_text
-    from eitskin.device.known_model import board_options, need_model
+    from eitskin.device.known_model import need_model
     from eitskin.device.settings import SolverSettings
     from eitskin.study.tradeoff.front import board_takes
 
     if known is None:
         known = need_model(device.board, options.model, device.transport.name, "a budget")
     named = read_solver(options)
-    point = chosen_point(options, known.model, named.applied(board_options(known.model)), "f767", board_takes())
+    point = chosen_point(options, known.model, named.applied(known.model), "f767", board_takes())
     say(settings_text(point, "f767"))
     kept = {name: value for name, value in point.configuration.solver_settings.items() if name in board_takes()}
-    return replace(SolverSettings(**kept), sign=named.sign, warm_start=named.warm_start, findings=named.findings)
+    own = {name: getattr(named, name) for name in ("sign", "warm_start", "findings", "track")}
+    return replace(SolverSettings(**kept), **own)
 
 
 def _refuse_settings(options: argparse.Namespace, name: str) -> None:

@@ -16,6 +16,7 @@ SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
 STRAIGHT, REGROUP, COUPLED = 1, 2, 4
 ALL_SEARCH = STRAIGHT | REGROUP | COUPLED
+MOST_TRACK_FRAMES = 1000
 LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
 STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
@@ -28,6 +29,8 @@ class Options:
     (every column in every iteration), "working-set" (FISTA on the columns that may differ from zero), "coordinate" (sweeps of
     coordinate descent) or "active-set" (rounds to the exact optimum). ``mac_limit`` (0: none): the best so far when the next
     step would take the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of ``FINDINGS``.
+    ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow touches in time; all 0: each frame by itself
+    (``solve.options.tracking`` sets them, docs/tracking.md).
     """
 
     iterations: int
@@ -57,6 +60,14 @@ class Options:
     findings: int = ALL_FINDINGS
     touch_search: int = ALL_SEARCH
     refine: bool = False
+    track_confirm: int = 0
+    track_hold: int = 0
+    track_smooth: float = 0.0
+
+    @property
+    def tracks(self) -> bool:
+        """Whether touches depend on the frames before, beyond their ids."""
+        return self.track_confirm > 1 or self.track_hold > 0 or self.track_smooth > 0
 
 
 WHOLE = {
@@ -68,6 +79,8 @@ WHOLE = {
     "mac_limit": (0, 2**32 - 1),
     "findings": (0, ALL_FINDINGS),
     "touch_search": (0, ALL_SEARCH),
+    "track_confirm": (0, MOST_TRACK_FRAMES),
+    "track_hold": (0, MOST_TRACK_FRAMES),
 }
 SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_share")
 
@@ -134,8 +147,9 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Touch:
-    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame. ``load_n`` is how
-    hard it presses, in newtons, where the model is calibrated (docs/calibration.md), else 0."""
+    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame. One that is held
+    while it is not found has confidence 0. ``load_n`` is how hard it presses, in newtons, where the model is calibrated
+    (docs/calibration.md), else 0."""
 
     id: int
     x_mm: float

@@ -193,7 +193,7 @@ class Device:
 
     def solver(self, options: Options) -> None:
         """Give the board's solver these of ``options``: iterations, max_touches, warm_start, sign, lambda_rel, gap_rel, solver,
-        mac_limit, findings.
+        mac_limit, findings, and whether touches are tracked.
 
         Raises:
             UsageError: one is out of its range.
@@ -204,7 +204,7 @@ class Device:
             commands.Solver(
                 options.iterations, options.max_touches, int(options.warm_start), SIGNS.index(options.sign),
                 options.lambda_rel, options.gap_rel, SOLVERS.index(options.solver), options.mac_limit,
-                options.findings,
+                options.findings, int(options.tracks),
             ),
             ANSWER_S,
         )  # fmt: skip

@@ -85,8 +85,8 @@ def _usual(electrodes: int) -> Iterator[Protocol]:
             yield make(electrodes)
 
 
-def board_options(model: Model) -> Options:
-    """The options that a board starts with: the model's own."""
-    from eitskin.solve.options import default_options
+def board_options(model: Model, *, track: bool = True) -> Options:
+    """The options that a board starts with: the model's own, and touches tracked; or without that."""
+    from eitskin.solve.options import default_options, tracking
 
-    return default_options(model)
+    return tracking(default_options(model)) if track else default_options(model)

@@ -11,7 +11,7 @@ import numpy as np
 
 from eitskin.core.results import Options
 from eitskin.device.client import Device
-from eitskin.device.known_model import NAMES_IT, KnownModel, board_options
+from eitskin.device.known_model import NAMES_IT, KnownModel
 from eitskin.device.link import LinkEvent
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
 from eitskin.device.wire.commands import StreamCommand
@@ -134,7 +134,7 @@ def set_up(device: Device, scan: ScanSettings, solver: SolverSettings, known: Kn
                 f"{device.board.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
             )
         return None
-    options = solver.applied(board_options(known.model))
+    options = solver.applied(known.model)
     device.solver(options)
     return options
 

@@ -7,7 +7,9 @@ from typing import Any
 
 from eitskin.core.results import Options
 from eitskin.device.client import Device
+from eitskin.device.known_model import board_options
 from eitskin.errors import UsageError
+from eitskin.model.model import Model
 
 MOST_TARE = 1024
 
@@ -32,7 +34,8 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at none, ``findings`` at all."""
+    """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at none, ``findings`` at all,
+    ``track`` at on."""
 
     iterations: int | None = None
     gap_rel: float | None = None
@@ -43,15 +46,17 @@ class SolverSettings:
     solver: str | None = None
     mac_limit: int | None = None
     findings: int | None = None
+    track: bool | None = None
 
     @property
     def named(self) -> dict[str, Any]:
         """What is to be changed."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
-    def applied(self, options: Options) -> Options:
-        """``options`` with these changes."""
-        return replace(options, **self.named)
+    def applied(self, model: Model) -> Options:
+        """The options that a board with ``model`` starts with, with these changes."""
+        changes = {name: value for name, value in self.named.items() if name != "track"}
+        return replace(board_options(model, track=self.track is not False), **changes)
 
 
 def check_tare_frames(frames: int) -> int:

@@ -1,9 +1,15 @@
-"""A model's own defaults as options."""
+"""A model's own defaults as options, and what suits a stream."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from eitskin.core.results import MAX_TOUCHES, Options
 from eitskin.model.model import Model
+
+TRACKING = ("gate_factor", "track_confirm", "track_hold", "track_smooth")  # what tracking changes
 
 
 def default_options(model: Model) -> Options:
@@ -26,3 +32,10 @@ def default_options(model: Model) -> Options:
         follow_mm=d.follow_mm,
         solver=d.solver,
     )
+
+
+def tracking(options: Options) -> Options:
+    """``options``, of :func:`default_options`, for frames that follow one another: as eits_options_track in the C core sets them,
+    to the bit in float32. docs/tracking.md says what that is worth."""
+    gate = float(np.float32(options.gate_factor) * np.float32(0.75))
+    return replace(options, gate_factor=gate, track_confirm=2, track_hold=2, track_smooth=float(np.float32(0.66)))

@@ -28,6 +28,7 @@ from eitskin.solve.reference_observed import Whitening, form_of, whiten
 from eitskin.solve.reference_problem import Certificate, FloatArray, Problem, Result, greatest, project
 from eitskin.solve.reference_quiet import clean
 from eitskin.solve.reference_touches import find_touches
+from eitskin.solve.reference_track import Tracker
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -68,8 +69,7 @@ class ReferenceEngine:
         self._v0_rms = 0.0
         self._lambda_noise = 0.0
         self._warm: FloatArray | None = None
-        self._last: tuple[Touch, ...] = ()
-        self._next_id = 1
+        self._tracker = Tracker(model.grid)
         self._examiner = Examiner(model)
         self._noise_v = self._noise_energy = 0.0
         self._ready = False
@@ -95,7 +95,8 @@ class ReferenceEngine:
 
     def forget(self) -> None:
         """Forget the warm start and the touches that were followed."""
-        self._warm, self._last = None, ()
+        self._warm = None
+        self._tracker.forget()
 
     def _fold_reference(self, v0: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Folded reference (k,) and where it is known."""
@@ -296,14 +297,13 @@ class ReferenceEngine:
             noise = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum())
             reduced = Reduced(y, self._straight, self.seen, basis, lambda_noise, noise)
             added = partial(self._interplay, basis, self._known) if self._couples else None
-            found, self._next_id, self._examiner.found.unexplained, coupled = find_touches(
-                self.model, reduced, image, o, added, self._last, self._next_id
-            )
-            self._last = found
+            found, self._examiner.found.unexplained, coupled = find_touches(self.model, reduced, image, o, added)
             noise_share = noise / max(norm**2, 1e-300)
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             self._examiner.crowd(found, o.max_touches, noise_share, clearness)
-            if o.refine and len(found) > 1 and added is not None and o.touch_sweeps > 0:
+            many = len(found) > 1
+            found = self._loaded(self._tracker.step(found, o, lambda_max, lambda_noise))
+            if o.refine and many and added is not None and o.touch_sweeps > 0:
                 first = result.iterations
                 result, lam, lambda_max = self._solve(coupled, basis, lambda_noise, None)
                 if result.stop in SOLVED:
@@ -320,6 +320,14 @@ class ReferenceEngine:
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)
+
+    def _loaded(self, touches: tuple[Touch, ...]) -> tuple[Touch, ...]:
+        """With their loads, where the model is calibrated."""
+        if self.model.load is None:
+            return touches
+        places = np.array([(t.x_mm, t.y_mm) for t in touches]).reshape(-1, 2)
+        loads = self.model.load.loads_at(places, np.array([t.strength_s_per_m_mm2 for t in touches]))
+        return tuple(replace(t, load_n=float(load)) for t, load in zip(touches, loads, strict=True))
 
     def _image(self, result: Result) -> FloatArray:
         return np.asarray(result.x * self.model.column_weight.astype(np.float64))

@@ -62,15 +62,9 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
 
 
 def find_touches(
-    model: Model,
-    frame: Reduced,
-    image: FloatArray,
-    options: Options,
-    interplay: Interplay | None,
-    last: tuple[Touch, ...],
-    next_id: int,
-) -> tuple[tuple[Touch, ...], int, float, FloatArray]:
-    """The touches of an ``image`` (n,) of ``frame``, strongest first, the next free id, the share of |y|^2 that the touches leave
+    model: Model, frame: Reduced, image: FloatArray, options: Options, interplay: Interplay | None
+) -> tuple[tuple[Touch, ...], float, FloatArray]:
+    """The touches of an ``image`` (n,) of ``frame``, strongest first and without ids or loads, the share of |y|^2 that they leave
     (0 where the image is zero), and the data (r,) that they were fitted to in the end."""
     fit = Fit(model, frame, options)
     explained = np.zeros(0)
@@ -80,30 +74,6 @@ def find_touches(
         Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
         for d, e in zip(fit.discs, explained, strict=True)
     ]
-    if model.load is not None:
-        places = np.array([(t.x_mm, t.y_mm) for t in found]).reshape(-1, 2)
-        loads = model.load.loads_at(places, np.array([t.strength_s_per_m_mm2 for t in found]))
-        found = [replace(t, load_n=float(load)) for t, load in zip(found, loads, strict=True)]
     found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
     unexplained = fit.left() / fit.whole if fit.whole > 0 and np.abs(image).max() > 0 else 0.0
-    touches, next_id = _track(found, last, options.follow_mm, next_id)
-    return touches, next_id, unexplained, fit.data
-
-
-def _track(found: list[Touch], last: tuple[Touch, ...], follow_mm: float, next_id: int) -> tuple[tuple[Touch, ...], int]:
-    """Ids by nearest pairs first within ``follow_mm``; new ones from ``next_id``."""
-    pairs = sorted(
-        (np.hypot(t.x_mm - old.x_mm, t.y_mm - old.y_mm), k, i)
-        for k, t in enumerate(found)
-        for i, old in enumerate(last)
-    )
-    ids: dict[int, int] = {}
-    taken: set[int] = set()
-    for distance, k, i in pairs:
-        if distance <= follow_mm and k not in ids and i not in taken:
-            ids[k] = last[i].id
-            taken.add(i)
-    for k in range(len(found)):
-        if k not in ids:
-            ids[k], next_id = next_id, next_id + 1
-    return tuple(replace(touch, id=ids[k]) for k, touch in enumerate(found)), next_id
+    return tuple(found), unexplained, fit.data

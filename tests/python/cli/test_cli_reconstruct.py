@@ -14,9 +14,11 @@ from eitskin.cli.main import main
 from eitskin.core.results import SOLVERS
 from eitskin.frames.frames import load_frames, save_frames
 from eitskin.model.eitm import load_model
-from eitskin.scene.random_touches import TouchRules, random_touches
+from eitskin.scene.random_touches import Scene, TouchRules, TouchSet, random_touches
+from eitskin.scene.random_touches import Touch as Put
 from eitskin.scene.simulate import simulate
-from eitskin.skin.skin import load_skin
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import load_skin, paper_skin
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt, session
 
@@ -94,6 +96,7 @@ def test_threads_change_nothing(done: Done, frames_file: Path, capsys: pytest.Ca
     for arguments, text in (
         (("--threads", "0"), "use 1 to 256"),
         (("--threads", "2", "--warm"), "--warm starts each frame from the last one"),
+        (("--threads", "2", "--track"), "--track needs one frame after another"),
         (("--threads", "2", "--engine", "numpy"), "the numpy engine has one"),
     ):
         assert main(["reconstruct", str(frames_file), *arguments]) == 2
@@ -223,3 +226,19 @@ def test_the_demo(done: Done, tmp_path: Path) -> None:
     assert (tmp_path / "demo.png").read_bytes()[:8] == PNG
     assert facts["difference_to_numpy_over_peak"]["c_float32"] < 1e-4
     assert facts["difference_to_numpy_over_peak"]["c_float64"] < 1e-12
+
+
+def test_tracked_frames_keep_ids_and_confirm_births(done: Done, tmp_path: Path) -> None:
+    """A finger that moves 2 mm a frame keeps one id; each frame by itself counts on."""
+    moving = tuple(Scene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
+    made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()
+    save_frames(tmp_path / "moving.npz", made)
+    alone, tracked = (
+        json.loads(done("reconstruct", tmp_path / "moving.npz", "--json", *more))["frames"] for more in ((), ("--track",))
+    )
+    ids = [[touch["id"] for touch in frame["touches"]] for frame in tracked]
+    assert ids == [[1]] * 8
+    assert len({touch["id"] for frame in alone for touch in frame["touches"]}) == 8
+    assert tracked[0]["touches"][0]["x_mm"] == alone[0]["touches"][0]["x_mm"]
+    assert tracked[7]["touches"][0]["x_mm"] != alone[7]["touches"][0]["x_mm"]
+    assert tracked[7]["touches"][0]["x_mm"] == pytest.approx(-6.0, abs=2.0)

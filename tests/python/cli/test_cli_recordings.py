@@ -110,7 +110,7 @@ def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [["--cold"], ["--iterations", "9"], ["--sign", "both"], ["--tare", "1"], ["--reciprocal", "0"]]
+    "options", [["--cold"], ["--no-track"], ["--iterations", "9"], ["--sign", "both"], ["--tare", "1"], ["--reciprocal", "0"]]
 )
 def test_whatever_the_solver_was_told(options: list[str], done: Done, scene: Path, tmp_path: Path) -> None:
     path = tmp_path / "run.eits"
@@ -155,6 +155,27 @@ def test_frames_after_a_loss_are_not_called_different(done: Done, scene: Path, t
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
     facts = json.loads(done("replay", other, "--check", "--json"))
     assert facts["different"] == [] and facts["same"] == 1 and facts["untold"] == FRAMES - 2 and facts["alone"] == 1
+
+
+def test_touches_after_a_loss_are_not_called_different(done: Done, run: Path, scene: Path, tmp_path: Path) -> None:
+    """Touches that are followed in time began from the frame that is lost; without tracking, every frame can be judged."""
+    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
+    facts = json.loads(done("replay", other, "--check", "--json"))
+    assert facts["different"] == [] and facts["alone"] == 1 and facts["untold"] > 0
+    assert facts["same"] + facts["untold"] == FRAMES - 1
+    alone = tmp_path / "alone.eits"
+    done("record", "--device", f"sim:{scene}", "-o", alone, "--no-track")
+    other = changed(alone, tmp_path / "others.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
+    facts = json.loads(done("replay", other, "--check", "--json"))
+    assert facts["different"] == [] and (facts["same"], facts["untold"], facts["alone"]) == (FRAMES - 1, 0, 1)
+
+
+def test_an_image_after_a_loss_is_judged_all_the_same(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Tracking changes touches only: an image that differs is told, whatever was lost before."""
+    lost = changed(run, tmp_path / "lost.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
+    other = changed(lost, tmp_path / "other.eits", nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400)))
+    assert main(["replay", str(other), "--check", "--json"]) == 10
+    assert len(json.loads(capsys.readouterr().out)["different"]) == 1
 
 
 def test_a_loss_in_the_tare_leaves_nothing_to_compare(

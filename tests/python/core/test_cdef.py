@@ -35,7 +35,7 @@ def test_the_comparison_reads_all_there_is() -> None:
     assert context["slope"] == "eits_real *[3]"
     assert context["sz"] == context["sx"] == "eits_real *"
     assert context["kernels"] == "const struct eits_kernels *"
-    assert context["last"] == "eits_touch[EITS_MAX_TOUCHES]"
+    assert context["followed"] == "eits_followed[EITS_MAX_TOUCHES]"
 
 
 # (what is changed, into what, what must be said of it)

@@ -250,7 +250,7 @@ def test_commands_are_read_as_a_board_reads_them(request: int, what: int, every:
 
 
 def test_floats_of_a_command_are_single() -> None:
-    command = cmd.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37)
+    command = cmd.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37, 1)
     parsed = cmd.parse_command(cmd.Solver, command.payload(5))
     assert parsed is not None
     assert math.isclose(parsed[1].lambda_rel, 0.03, rel_tol=1e-7)

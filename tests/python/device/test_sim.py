@@ -12,6 +12,7 @@ from device_helpers import FRAMES, QUIET, empty_bank, fresh_skin, scene, sim_boa
 from eitskin.core.findings import ALL_FINDINGS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
+from eitskin.device.known_model import board_options
 from eitskin.device.simulated.board import SimBoard
 from eitskin.device.simulated.transport import SimTransport
 from eitskin.device.wire import commands as cmd
@@ -51,7 +52,7 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit() -> None:
     assert [type(item) for item in items[:3]] == [RawFrame, SolvedImage, SolvedTouches]
     true = simulate_frames(compile_scene(scene())).voltage_v.astype(np.float32)
     assert all(raw.voltage_v.tobytes() == frame.tobytes() for raw, frame in zip(raws, true[QUIET:], strict=True))
-    skin = Reconstructor(model, blob=blob, options=default_options(model))
+    skin = Reconstructor(model, blob=blob, options=board_options(model))
     skin.tare(true[:QUIET])
     for raw, image, found in zip(raws, images, touches, strict=True):
         result = skin.reconstruct(raw.voltage_v)
@@ -205,7 +206,7 @@ def refused(device: Device, command: cmd.Command) -> tuple[ReplyStatus, tuple[in
 
 
 SCAN = cmd.Scan(50_000_000, 1_000_000, 80, 16, 1, 0, 0)
-SOLVER = cmd.Solver(30, 5, 1, 0, 0.03, 0.0, 1, 0, ALL_FINDINGS)
+SOLVER = cmd.Solver(30, 5, 1, 0, 0.03, 0.0, 1, 0, ALL_FINDINGS, 1)
 RANGE = ReplyStatus.RANGE
 REFUSALS = [
     (cmd.StreamCommand(8, 1), RANGE, (4, 7)),
@@ -236,6 +237,7 @@ REFUSALS = [
     (replace(SOLVER, lambda_rel=float("nan")), RANGE, (20, 0)),
     (replace(SOLVER, gap_rel=-0.1), RANGE, (24, 0)),
     (replace(SOLVER, solver=4), RANGE, (28, 3)),
+    (replace(SOLVER, track=2), RANGE, (40, 1)),
     (cmd.MaskRow(208, 1), RANGE, (4, 207)),
     (cmd.MaskRow(0, 2), RANGE, (6, 1)),
     (cmd.GetStats(2), RANGE, (4, 1)),

@@ -11,9 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = (
-    "README.md", "docs/tutorial.md", "docs/scenes.md", "docs/board.md", "docs/calibration.md", "docs/tradeoff.md", "docs/shapes.md",
-)  # fmt: skip
+PAGES = ("README.md", *(f"docs/{name}.md" for name in ("tutorial", "scenes", "board", "calibration", "tradeoff", "shapes")))
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SET_UP = {"scripts/demo", "scripts/test"}
 

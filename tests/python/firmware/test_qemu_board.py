@@ -14,6 +14,7 @@ from qemu_board import Run, Script, run_board, skin_bytes
 
 from eitskin.core.engine import CoreEngine
 from eitskin.device.bank import bank_bytes
+from eitskin.device.known_model import board_options
 from eitskin.device.wire.commands import GetInfo, GetStats, ModelBegin, ModelCommit, ModelData, StreamCommand, Tare
 from eitskin.device.wire.packets import (
     BoardInfo,
@@ -28,7 +29,6 @@ from eitskin.device.wire.packets import (
     Stream,
 )
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.solve.options import default_options
 
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 FRAME_US = 120_000
@@ -103,7 +103,7 @@ def test_the_voltages_are_the_skins(run: Run) -> None:
 def test_the_same_bits_as_the_host(run: Run) -> None:
     model, blob = load_prebuilt()
     host = CoreEngine(blob)
-    host.set_options(default_options(model))
+    host.set_options(board_options(model))
     raws = of(RawFrame, run.packets)
     host.set_baseline(np.array([raw.voltage_v for raw in raws if raw.quiet], dtype=np.float64))
     images = {one.solved.frame: one for one in of(SolvedImage, run.packets)}

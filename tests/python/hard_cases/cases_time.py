@@ -64,4 +64,28 @@ CASES = (
         "What follows is bit for bit as in a fresh context; after a tare that is refused, frames are refused until the next.",
         ("hard_cases/test_midstream.py::test_tare_in_midstream",),
     ),
+    Case(
+        "time/tracked-flicker",
+        "Noise that flickers",
+        "Frames of an untouched skin under a gate that is half as high as it should be.",
+        "Each frame's noise has a peak somewhere, and single frames cannot tell it from a faint touch.",
+        "Followed in time, a doubtful touch is told of only once it was found twice at one place.",
+        ("hard_cases/test_tracked.py::test_noise_that_flickers",),
+    ),
+    Case(
+        "time/tracked-lift",
+        "Lift-off while touches are held",
+        "A finger presses clearly, lifts, and presses again five frames later, then again after one frame without it.",
+        "What holds a touch through missed frames may show a ghost after every lift.",
+        "A clear touch is told no more from the first frame without it; the next one has a new id, but not after a single frame.",
+        ("hard_cases/test_tracked.py::test_a_finger_that_lifts",),
+    ),
+    Case(
+        "time/tracked-missing",
+        "Frames missing under a moving finger",
+        "Three frames are refused by the core, or never come, while a finger moves.",
+        "A filter that expects the finger a frame's way further may lose it, or diverge.",
+        "The finger keeps its id and is told where it is.",
+        ("hard_cases/test_tracked.py::test_frames_that_are_missing",),
+    ),
 )

@@ -347,6 +347,9 @@ BAD_OPTIONS = [
     ({"touch_radius_weight": None}, "touch_radius_weight"),
     ({"touch_sweeps": 1001}, "touch_sweeps"),
     ({"follow_mm": -1.0}, "follow_mm"),
+    ({"track_confirm": 1001}, "track_confirm = 1001 is out of range; use 0 to 1000"),
+    ({"track_hold": 1001}, "track_hold"),
+    ({"track_smooth": float("nan")}, "track_smooth"),
     ({"iteration": 5}, "'iteration' is unknown; did you mean 'iterations'"),
 ]
 
@@ -375,6 +378,7 @@ EDGES = {
     "iterations": 1, "gap_every": 2**32 - 1, "max_touches": 16, "max_masked": 0, "lambda_rel": 1.0, "gap_rel": 1.0,
     "lambda_noise_factor": 1e29, "gate_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0, "touch_share": 1.0,
     "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000, "follow_mm": 0.0, "lambda_abs": 1e29,
+    "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
 }  # fmt: skip
 
 

@@ -27,8 +27,8 @@ class HostCheck:
 
     ``same``: every bit of the image, and of the touches but their ids, which count on from whatever the board did before, and
     all that was found in the frame.
-    ``different``: numbers of frames that are not. ``untold``: frames whose solve began from one that was lost on the way, or
-    from a reference that was. ``alone``: solved on the board without its raw frame here.
+    ``different``: numbers of frames that are not. ``untold``: frames whose solve or touches began from one that was lost on the
+    way, or from a reference that was. ``alone``: solved on the board without its raw frame here.
     """
 
     same: int = 0
@@ -72,7 +72,7 @@ class HostTwin:
 
     def __init__(self, known: KnownModel, options: Options) -> None:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)
-        self._warm = options.warm_start
+        self._warm, self._tracks = options.warm_start, options.tracks
         self._quiet: list[RawFrame] = []
         self._tared = self._sure = self._lost = False
         self.check = HostCheck()
@@ -127,24 +127,27 @@ class HostTwin:
         try:
             result = self._core.reconstruct(raw.voltage_v, touches=frame.touches is not None)
         except FrameError:
-            self._judge(frame, frame.refused is not None, 1.0)
+            self._judge(frame, frame.refused is not None, 1.0, self._warm)
             return None
         assert frame.solved is not None
         same, difference = frame.refused is None and same_findings(result.info, raw, frame.solved, self._core.options), 1.0
         if same and frame.image is not None:
             same, difference = same_bits(result.image, frame.image.image), _difference(result.image, frame.image.image)
-        if same and frame.touches is not None:
-            same = same_touches(result.touches, frame.touches.touches)
-        self._judge(frame, same, difference)
+        touched = frame.touches is None or same_touches(result.touches, frame.touches.touches)
+        if same and not touched:
+            self._judge(frame, False, difference, self._warm or self._tracks)
+        else:
+            self._judge(frame, same, difference, self._warm)
         return result
 
-    def _judge(self, frame: LiveFrame, same: bool, difference: float) -> None:
+    def _judge(self, frame: LiveFrame, same: bool, difference: float, from_before: bool) -> None:
+        """``from_before``: what differs may come from frames before, of which one may be missing here."""
         check = self.check
         if same:
             check.same += 1
             check.images += frame.image is not None
             check.touches += frame.touches is not None
-        elif self._sure or not self._warm:
+        elif self._sure or not from_before:
             check.different.append(frame.number)
             check.worst = max(check.worst, difference)
         else:

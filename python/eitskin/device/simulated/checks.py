@@ -90,4 +90,5 @@ def check_solver(command: Solver) -> Answer | None:
     for offset, value in ((20, command.lambda_rel), (24, command.gap_rel)):
         if not 0 <= value <= 1:
             return Answer(Status.RANGE, (offset, 1 if value > 1 else 0))
-    return outside(28, command.solver, 0, len(SOLVERS) - 1) or outside(36, command.findings, 0, ALL_FINDINGS)
+    found = outside(28, command.solver, 0, len(SOLVERS) - 1) or outside(36, command.findings, 0, ALL_FINDINGS)
+    return found or outside(40, command.track, 0, 1)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SIGNS, SOLVERS, Info
+from eitskin.device.known_model import board_options
 from eitskin.device.wire.commands import Solver
 from eitskin.device.wire.packets import (
     PacketType,
@@ -25,7 +26,7 @@ from eitskin.device.wire.payloads import build_image, build_touches
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.model.eitm import decode_model
 from eitskin.model.storage import STORAGES
-from eitskin.solve.options import default_options
+from eitskin.solve.options import TRACKING
 
 E_ARGUMENT = -1
 NOTHING = Info(0, "iterations", 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -62,13 +63,14 @@ class SimSolver:
         self.blob = blob
         self.engine = CoreEngine(blob)
         self.model = decode_model(blob, "the model")
-        self.options = default_options(self.model)
+        self.options = board_options(self.model)
         self.engine.set_options(self.options)
         self.masked = np.zeros(self.model.protocol.n_rows, dtype=np.bool_)
         self.tared = False
 
     def set_options(self, command: Solver) -> int:
         """Change the options that SOLVER names; an eits_status."""
+        usual = board_options(self.model, track=bool(command.track))
         options = replace(
             self.options,
             iterations=command.iterations,
@@ -80,6 +82,7 @@ class SimSolver:
             solver=SOLVERS[command.solver],
             mac_limit=command.mac_limit,
             findings=command.findings,
+            **{name: getattr(usual, name) for name in TRACKING},
         )
         try:
             self.engine.set_options(options)

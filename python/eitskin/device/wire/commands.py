@@ -89,10 +89,10 @@ class Scan(Command):
 @dataclass(frozen=True)
 class Solver(Command):
     """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and ``SOLVERS``, ``findings``
-    what is looked for, bit k of ``FINDINGS``."""
+    what is looked for, bit k of ``FINDINGS``; ``track`` 1: touches are followed in time."""
 
     TYPE = PacketType.SOLVER
-    LAYOUT = struct.Struct("<IIIIIffIII")
+    LAYOUT = struct.Struct("<IIIIIffIIII")
     iterations: int
     max_touches: int
     warm_start: int
@@ -102,6 +102,7 @@ class Solver(Command):
     solver: int
     mac_limit: int
     findings: int
+    track: int
 
 
 @dataclass(frozen=True)

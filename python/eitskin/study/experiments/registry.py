@@ -13,6 +13,7 @@ EXPERIMENTS = {
     "algorithms": "single, double and triple touch by every method, at fixed parameters and at each one's best (Figs. 7, 8)",
     "force": "loads at four radii, calibration, the smallest load that is detected (Figs. 9 to 11)",
     "multitouch": "two to twelve touches: counts, positions, and when the core says that it cannot tell (Fig. 12, Table 1)",
+    "tracking": "touches in streams of moving fingers: births confirmed, ids held, places smoothed",
     "homogeneous": "the 208-value waveform of an untouched skin, and what the doctor reads from it (Fig. 4b)",
     "electrodes": "16, 32 and 64 electrodes and skip patterns, at equal noise and at equal time",
     "shapes": "a rounded rectangle, a forearm and a hand outline",

@@ -76,7 +76,7 @@ def conditions(settings: Settings) -> str:
     return (
         f"Seed {settings.seed}: {settings.count(SCENES)} scenes of 1 to 3 random touches (radius 6 to 12 mm, contrast 3 to 10), "
         f"and {settings.count(60)} of each other set (radius 9 mm, contrast 5); t was chosen on {settings.count(TUNING)} scenes "
-        f"of seed {settings.tuning_seed} at 60 dB for each row of images and kept. Frames from a mesh of about {SIMULATED_ELEMENTS} "
+        f"of seed {settings.tuning_seed} at 60 dB, for each row, and kept. Frames from a mesh of about {SIMULATED_ELEMENTS} "
         f"elements with contacts +-20 %, models from one of about {MODEL_ELEMENTS}; 12 bits, 16 from 70 dB on. Brackets: 95 % "
         "intervals, Wilson's for shares, bootstrap for means."
     )

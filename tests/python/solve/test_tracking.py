@@ -1,0 +1,135 @@
+"""Touches followed in time: the C core's against the numpy reference's, in streams of moving fingers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import Options, Touch
+from eitskin.fem.grid import Grid
+from eitskin.scene.random_touches import Scene, TouchSet
+from eitskin.scene.random_touches import Touch as Put
+from eitskin.scene.simulate import Measurement, simulate
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.solve.options import default_options, tracking
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.solve.reference_track import Tracker, nearest_pairs
+from small_models import prebuilt
+
+FRAMES = 24
+
+
+@cache
+def stream() -> tuple[np.ndarray, np.ndarray]:
+    """Quiet frames and a stream at 40 dB: a finger that stays, one that moves and is lifted, one that comes."""
+    scenes = []
+    for k in range(FRAMES):
+        touches = [Put(-40.0, 10.0, 9.0, 5.0)]
+        if k < 16:
+            touches.append(Put(-10.0 + 3 * k, -45.0, 8.0, 4.0))
+        if k >= 8:
+            touches.append(Put(30.0, 60.0 - k, 9.0, 6.0))
+        scenes.append(Scene(str(k), tuple(touches)))
+    made = simulate(paper_skin(), adjacent(16), TouchSet("stream", 5, tuple(scenes)), measurement=Measurement(snr_db=40.0))
+    return made.quiet_v, made.frames_v
+
+
+def options(**changes: object) -> Options:
+    return replace(tracking(default_options(prebuilt()[0])), **changes)  # type: ignore[arg-type]
+
+
+def told(chosen: Options) -> list[tuple[Touch, ...]]:
+    """Of each frame, by the C core in double."""
+    quiet_v, frames_v = stream()
+    made = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1], options=chosen)
+    made.tare(quiet_v)
+    return [made.reconstruct(frame).touches for frame in frames_v]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"track_confirm": 3, "track_hold": 0},
+        {"track_smooth": 0.0},
+        {"track_confirm": 0, "track_hold": 0, "track_smooth": 0.0},
+        {"track_hold": 5, "follow_mm": 8.0},
+    ],
+    ids=str,
+)
+def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> None:
+    """What the core finds in each frame, followed by numpy, is what the core tells: ids, places, sizes, order, held ones."""
+    quiet_v, frames_v = stream()
+    chosen = options(**changes)
+    bare = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1])
+    bare.set_options(replace(default_options(prebuilt()[0]), gate_factor=chosen.gate_factor))
+    bare.tare(quiet_v)
+    tracker, most = Tracker(prebuilt()[0].grid), 0
+    for frame, expected in zip(frames_v, told(chosen), strict=True):
+        result = bare.reconstruct(frame)
+        mine = tracker.step(result.touches, chosen, result.info.lambda_max, result.info.lambda_noise)
+        assert [touch.id for touch in mine] == [touch.id for touch in expected]
+        for one, other in zip(mine, expected, strict=True):
+            assert (one.x_mm, one.y_mm, one.radius_mm, one.strength_s_per_m_mm2, one.confidence) == pytest.approx(
+                (other.x_mm, other.y_mm, other.radius_mm, other.strength_s_per_m_mm2, other.confidence), rel=1e-9, abs=1e-9
+            )
+        most = max(most, *(touch.id for touch in expected), 0)
+    assert most >= 3
+
+
+def test_tracking_tells_fewer_false_touches_and_fewer_ids() -> None:
+    low = replace(default_options(prebuilt()[0]), gate_factor=0.7)
+    bare, tracked = told(low), told(replace(options(), gate_factor=0.7))
+    ids = [len({touch.id for touches in some for touch in touches}) for some in (bare, tracked)]
+    assert 3 <= ids[1] < ids[0]
+    assert sum(map(len, tracked)) < sum(map(len, bare))
+
+
+def test_what_a_board_sets_is_what_python_sets() -> None:
+    """eits_options_track and ``tracking``: the same float32 numbers."""
+    engine = CoreEngine(prebuilt()[1])
+    ffi, lib = engine._ffi, engine._lib
+    there = ffi.new("eits_options *")
+    usual = default_options(prebuilt()[0])
+    there.gate_factor = usual.gate_factor
+    assert lib.eits_options_track(there) == 0
+    here = tracking(usual)
+    assert np.float32(here.gate_factor) == np.float32(there.gate_factor)
+    assert np.float32(here.track_smooth) == np.float32(there.track_smooth)
+    assert (here.track_confirm, here.track_hold) == (there.track_confirm, there.track_hold)
+    assert here.tracks and not usual.tracks
+
+
+def test_each_frame_by_itself_is_as_it_was() -> None:
+    """Off by default: touches and places are those of a core that forgets before every frame."""
+    quiet_v, frames_v = stream()
+    made = [Reconstructor(prebuilt()[0], blob=prebuilt()[1]) for _ in range(2)]
+    for one in made:
+        one.tare(quiet_v)
+    for frame in frames_v:
+        made[1].forget()
+        followed, fresh = (one.reconstruct(frame).touches for one in made)
+        assert [replace(touch, id=0) for touch in followed] == [replace(touch, id=0) for touch in fresh]
+
+
+def test_touches_stay_on_the_skin() -> None:
+    """A finger that leaves at 20 mm a frame and is waited for does not go on beyond the rim."""
+    grid: Grid = prebuilt()[0].grid
+    tracker, chosen = Tracker(grid), options(track_hold=50)
+    for k in range(5):
+        tracker.step([Touch(0, 20.0 * k - 20, 0.0, 8.0, 1.0, 0.5)], chosen, 10.0 if k < 4 else 1.2, 1.0)
+    places = [tracker.step([], chosen, 0.0, 1.0) for _ in range(30)]
+    assert all(len(one) == 1 and one[0].confidence == 0 for one in places)
+    assert 80 < places[-1][0].x_mm < 97 + 2 * grid.pixel_mm
+
+
+def test_pairs_are_the_nearest_first() -> None:
+    distance = np.array([[3.0, 1.0], [2.0, 1.5]])
+    assert nearest_pairs(distance, 10.0) == [(0, 1), (1, 0)]
+    assert nearest_pairs(distance, 1.2) == [(0, 1)]
+    assert nearest_pairs(np.zeros((0, 2)), 1.0) == []
