@@ -14,6 +14,7 @@ from eitskin.study.judge.metrics import THRESHOLDS
 from eitskin.view.frame_pictures import true_marks
 from eitskin.view.pictures import STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
 
+ROD_MM = 8.0  # as drawn; how thick the rods were is not stated
 SHORT = (
     ("linear back projection", "back projection"),
     (" (Tikhonov)", ""),
@@ -26,7 +27,8 @@ SHORT = (
 
 
 def draw_gallery(path: str | Path, grounds: Grounds, results: Sequence[dict[str, Any]], both: bool) -> None:
-    """A row a frame, a column a method, truth first, as a PNG; all frames where ``both`` signs are shown, else those of metal.
+    """A row a frame, a column a method, truth first, as a PNG; all frames and the rods where ``both`` signs are shown, else those
+    of metal.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -40,9 +42,16 @@ def draw_gallery(path: str | Path, grounds: Grounds, results: Sequence[dict[str,
         marks = true_marks(frames, number)
         panels.append(Panel(f"truth {frames.frame_name[number]}", None, marks, fill_truth=True))
         for one in results:
-            name = f"{_short(one['name'])}\n" if row == 0 else ""
+            name = f"{_short(one['name'])}\n{one['kind']}\n" if row == 0 else ""
             found = tuple(Mark(x, y, radius) for x, y, radius, _ in one[discs][row]) if one[discs] else ()
             panels.append(Panel(f"{name}{one[scores][row]:.2f}", np.array(one[images][row]), marks, found))
+    for k, rods in enumerate(grounds.rods if both else ()):
+        marks = tuple(Mark(x, y, ROD_MM, 1.0) for x, y in rods.metal_mm)
+        marks += tuple(Mark(x, y, ROD_MM, -1.0) for x, y in rods.plastic_mm)
+        panels.append(Panel(f"rods {k + 1}, as stated", None, marks, fill_truth=True))
+        for one in results:
+            found = tuple(Mark(x, y, radius) for x, y, radius, _ in one["rod_discs"][k]) if one["rod_discs"] else ()
+            panels.append(Panel("", np.array(one["rod_images"][k]), marks, found))
     draw_panels(
         path,
         tank()[0],

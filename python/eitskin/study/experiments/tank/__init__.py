@@ -16,6 +16,7 @@ from eitskin.study.experiments.experiment import MODEL_ELEMENTS, Desk, Outcome
 from eitskin.study.experiments.tank import levers as lever_work
 from eitskin.study.experiments.tank import tables
 from eitskin.study.experiments.tank.contest import Grounds, contest
+from eitskin.study.experiments.tank.discs import varied
 from eitskin.study.experiments.tank.imagers import KINDS, Entry, Tank, baseline_entries, core_entries
 from eitskin.study.experiments.tank.judging import jittered_truth
 from eitskin.study.experiments.tank.scenes import simulated
@@ -62,7 +63,8 @@ def run(desk: Desk) -> Outcome:
             asked["levers"] = repr(best)
         results.append(desk.kept(asked, partial(contest, entry, grounds)))
     ceiling = desk.kept({**facts, "what": "ceiling"}, lambda: _ceiling(desk, grounds))
-    return tables.outcome(grounds, results, levers, best, ceiling, desk.settings)
+    discs = varied(desk, ours, grounds, facts)
+    return tables.outcome(grounds, results, levers, best, discs, ceiling, desk.settings)
 
 
 def _watched(desk: Desk, entries: list[Entry]) -> Iterable[Entry]:

@@ -70,9 +70,9 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
     place_threshold = None
     if metal.touches is None:
         place_threshold = best_place_threshold(metal.images, grounds)
-    matchings = match_all(
-        [_places_of(grounds.phantoms, k, 1) for k in chosen], _increases(measured, place_threshold, grounds.grid), grounds.gate_mm
-    )
+    found = increases(measured, place_threshold, grounds.grid)
+    matchings = match_all([places_of(grounds.phantoms, k, 1) for k in chosen], found, grounds.gate_mm)
+    simulated = match_all(grounds.test.conductive_mm, increases(test, place_threshold, grounds.grid), grounds.gate_mm)
     result = {
         "name": entry.name,
         "kind": entry.kind,
@@ -84,6 +84,7 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
         "tuned": trained,
         "tuned_curve": _plain(curves.mean(axis=0)),
         "simulated": _plain(test_curves[:, at]),
+        "simulated_places": _counts(simulated),
         "touch_like": _plain(measured_curves[:, at]),
         "touch_like_curve": _plain(measured_curves.mean(axis=0)),
         "touch_like_places": _counts(matchings),
@@ -141,7 +142,7 @@ def _both_signs(imager: Imager, place_threshold: float | None, grounds: Grounds)
     scores = signed_curves_of(shown, *truths, grounds.judge)[:, metrics.THRESHOLDS.index(threshold)]
     matchings: list[Matching] = []
     for k, found in enumerate(_both(shown, place_threshold, grounds.grid)):
-        matchings += match_signs((_places_of(frames, k, 1), _places_of(frames, k, -1)), found, grounds.gate_mm)
+        matchings += match_signs((places_of(frames, k, 1), places_of(frames, k, -1)), found, grounds.gate_mm)
     at_rods, rod_images, rod_discs = [], [], []
     for one in grounds.rods:
         seen = imager.show(one.frames.reference_voltage_v, one.frames.voltage_v, True)
@@ -163,12 +164,14 @@ def _both_signs(imager: Imager, place_threshold: float | None, grounds: Grounds)
     }
 
 
-def _places_of(frames: Frames, number: int, sign: int) -> FloatArray:
+def places_of(frames: Frames, number: int, sign: int) -> FloatArray:
+    """Centres (t, 2) mm of the objects of one sign."""
     assert frames.touch_xy_mm is not None
     return frames.touch_xy_mm[objects_of(frames, number, sign)]
 
 
-def _increases(shown: Shown, threshold: float | None, grid: Grid) -> list[FloatArray]:
+def increases(shown: Shown, threshold: float | None, grid: Grid) -> list[FloatArray]:
+    """Where increases are found in each image, (t, 2) mm: touches where there are, else groups of pixels beyond ``threshold``."""
     if shown.touches is not None:
         return [_centres(touches, 1) for touches in shown.touches]
     assert threshold is not None

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -141,14 +141,14 @@ class BaselineImager:
 
 
 class CoreImager:
-    """The C core in float32, cold for each frame, with ``levers``; images, or its touches painted as discs."""
+    """The C core in float32, cold for each frame, with ``levers`` and ``options``; images, or its touches as discs."""
 
-    def __init__(self, tank: Tank, levers: Levers, painted: bool = False) -> None:
+    def __init__(self, tank: Tank, levers: Levers, painted: bool = False, options: Mapping[str, Any] | None = None) -> None:
         self._grid, self._painted = tank.grid, painted
         blur = tank.kernel(levers.blur)
         self._paint = (blur / blur.sum(axis=1, keepdims=True)) @ tank.kernel(levers.atom)
         self._solver = Reconstructor(tank.model(levers.kind, levers.floor, levers.atom))
-        self._solver.with_options(iterations=levers.iterations, lambda_rel=levers.lambda_rel)
+        self._solver.with_options(iterations=levers.iterations, lambda_rel=levers.lambda_rel, **(options or {}))
 
     def show(self, quiet_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
         """As :class:`Imager`."""
