@@ -22,6 +22,7 @@ SHORT = (
     ("plain FISTA", "FISTA"),
     ("non-negative", "x >= 0"),
     ("eitskin, image, levers from simulation", "eitskin, levers"),
+    ("eitskin, touches as discs, change from simulation", "eitskin, discs, tuned"),
     ("eitskin, touches as discs", "eitskin, discs"),
 )
 

@@ -19,11 +19,14 @@ from eitskin.study.judge.image_touches import match_all
 KIND = "log-ratio"
 # name, changes of options, of electrodes, whether decreases are looked for too
 VARIANTS: tuple[tuple[str, dict[str, Any], dict[str, Any], bool], ...] = (
-    ("defaults", {}, {}, False),
+    ("defaults: expected change 2 of the water's, weight of the radius 1", {}, {}, False),
     ("weight of the radius 0.3", {"touch_radius_weight": 0.3}, {}, False),
     ("weight of the radius 3", {"touch_radius_weight": 3.0}, {}, False),
     ("expected change 1.5 of the water's", {"touch_change_s_per_m": 0.045}, {}, False),
+    ("expected change 2.25 of the water's", {"touch_change_s_per_m": 0.0675}, {}, False),
+    ("expected change 2.5 of the water's", {"touch_change_s_per_m": 0.075}, {}, False),
     ("expected change 3 of the water's", {"touch_change_s_per_m": 0.09}, {}, False),
+    ("expected change 4 of the water's", {"touch_change_s_per_m": 0.12}, {}, False),
     ("electrodes of 15 mm in the model", {}, {"width_mm": 15.0}, False),
     ("electrodes of 35 mm in the model", {}, {"width_mm": 35.0}, False),
     ("contact impedance 0.0001 ohm m2", {}, {"contact_impedance_ohm_m2": 0.0001}, False),

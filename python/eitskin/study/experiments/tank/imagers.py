@@ -22,8 +22,11 @@ from eitskin.study.judge.metrics import pixel_cover
 
 FloatArray = npt.NDArray[np.float64]
 
+DISCS = "eitskin, touches as discs"
+TUNED_DISCS = "eitskin, touches as discs, change from simulation"
 KINDS = ("difference", "normalised", "log-ratio")
 TOUCH_CHANGE_RATIO = 2.0  # metal in water: a disc of contrast c answers as 2 (c - 1) / (c + 1)
+CHANGE_RATIOS = (1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0, 3.25, 3.5, 4.0)
 LEAST_RATIO, MOST_RATIO = 1 / 16, 16.0
 
 
@@ -191,9 +194,16 @@ def baseline_entries(tank: Tank, kind: str) -> tuple[Entry, ...]:
 
 
 def core_entries(tank: Tank, kind: str) -> tuple[Entry, ...]:
-    """The core's defaults on data of ``kind``: its image, and its touches as discs."""
+    """The core on data of ``kind``: its image, its touches as discs, and where their radius is tied to their strength, on ratios,
+    these with the expected change of a touch over the water's conductivity chosen like any other parameter."""
+    levers, water = Levers(kind=kind), tank.skin.conductivity_s_per_m
 
     def entry(name: str, painted: bool) -> Entry:
-        return Entry(name, kind, "", (0.0,), lambda _: CoreImager(tank, Levers(kind=kind), painted))
+        return Entry(name, kind, "", (0.0,), lambda _: CoreImager(tank, levers, painted))
 
-    return entry("eitskin, image", False), entry("eitskin, touches as discs", True)
+    def with_change(ratio: float) -> CoreImager:
+        return CoreImager(tank, levers, True, {"touch_change_s_per_m": ratio * water})
+
+    tuned = Entry(TUNED_DISCS, kind, "expected change", CHANGE_RATIOS, with_change)
+    plain = entry("eitskin, image", False), entry(DISCS, True)
+    return (*plain, tuned) if kind == "log-ratio" else plain

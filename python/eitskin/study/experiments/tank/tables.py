@@ -9,13 +9,12 @@ import numpy as np
 
 from eitskin.study.experiments.experiment import Outcome, Settings, Table
 from eitskin.study.experiments.tank.contest import Grounds
-from eitskin.study.experiments.tank.imagers import KINDS, Levers
+from eitskin.study.experiments.tank.imagers import DISCS, KINDS, TUNED_DISCS, Levers
 from eitskin.study.experiments.tank.levers import one_by_one, words_of
 from eitskin.study.experiments.tank.tanks import TOUCH_LIKE
 from eitskin.study.judge.summary import summarise
 
 CHOSEN = "eitskin, image, levers from simulation"
-DISCS = "eitskin, touches as discs"
 Found = dict[str, Any]
 
 
@@ -40,7 +39,7 @@ def outcome(
     )
     from eitskin.view import tank_pictures
 
-    shown = [one for one in columns(ranked(of_best_kind(results, "tuned"), "touch_like")) if one["name"] != DISCS]
+    shown = [one for one in columns(ranked(of_best_kind(results, "tuned"), "touch_like")) if one["place_threshold"] is not None]
 
     def draw_metal(path: Path) -> None:
         tank_pictures.draw_gallery(path, grounds, columns(of_best_kind(results, "tuned")), False)
@@ -86,8 +85,8 @@ def ranked(results: list[Found], score: str) -> list[Found]:
 
 
 def columns(results: list[Found]) -> list[Found]:
-    """What a gallery has room for: without short runs of plain FISTA, and discs on normalised data."""
-    return [one for one in results if "FISTA 30," not in one["name"] and (one["name"], one["kind"]) != (DISCS, "normalised")]
+    """What a gallery has room for: without short runs of plain FISTA, and discs of the defaults on ratios only."""
+    return [one for one in results if "FISTA 30," not in one["name"] and (one["name"] != DISCS or one["kind"] == "log-ratio")]
 
 
 def touch_like_table(results: list[Found]) -> Table:
@@ -115,7 +114,7 @@ def touch_like_table(results: list[Found]) -> Table:
 
 def kinds_table(results: list[Found]) -> Table:
     """Touch-like mean, and in brackets that of the simulated set, on each kind of data."""
-    names = list(dict.fromkeys(one["name"] for one in results if one["name"] != CHOSEN))
+    names = list(dict.fromkeys(one["name"] for one in results if one["name"] not in (CHOSEN, TUNED_DISCS)))
     by = {(one["name"], one["kind"]): one for one in results}
 
     def cell(name: str, kind: str) -> str:
@@ -231,7 +230,7 @@ def _parameter(one: Found) -> str:
 
 
 def _threshold(one: Found, name: str) -> str:
-    return "-" if one["name"] == DISCS else f"{one[name]:.2f}"
+    return "-" if one["place_threshold"] is None else f"{one[name]:.2f}"
 
 
 def _places(counts: Found) -> tuple[str, str]:
