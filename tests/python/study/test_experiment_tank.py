@@ -172,7 +172,7 @@ def test_a_run_that_goes_on_computes_nothing_again(outcome: tuple[Desk, Outcome]
 def test_pictures_are_drawn(outcome: tuple[Desk, Outcome], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     assert set(outcome[1].pictures) == {"touch_like.png", "all_frames.png", "curves.png"}
-    for name in ("touch_like.png", "curves.png"):  # all frames are drawn by the same function as touch-like ones, in half a minute
+    for name in ("touch_like.png", "curves.png"):  # all frames: the same function as touch-like ones, in half a minute
         outcome[1].pictures[name](tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
