@@ -3,6 +3,7 @@
 
 #include "columns.h"
 #include "examine.h"
+#include "floor.h"
 #include "kernels.h"
 #include "observed.h"
 #include "vec.h"
@@ -46,6 +47,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
         .findings = EITS_FINDINGS_ALL,
+        .floor_noise_factor = EITS_FLOOR_NOISE_FACTOR,
     };
     *options = chosen;
     return EITS_OK;
@@ -169,12 +171,13 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
                       in_range(o->touch_min_radius_mm, R(1e-6), huge) &&
                       in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
                       in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
-                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL;
+                      in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL &&
+                      in_range(o->floor_noise_factor, 0, huge);
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)
         ctx->warm = 0;
-    if (o->project_baseline != ctx->options.project_baseline)
+    if (o->project_baseline != ctx->options.project_baseline || o->floor_noise_factor != ctx->options.floor_noise_factor)
         ctx->basis_stale = 1;
     ctx->options = *o;
     return EITS_OK;

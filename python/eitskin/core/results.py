@@ -26,6 +26,7 @@ class Options:
     (every column in every iteration), "working-set" (FISTA on the columns that may differ from zero), "coordinate" (sweeps of
     coordinate descent) or "active-set" (rounds to the exact optimum). ``mac_limit`` (0: none): the best so far when the next
     step would take the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of ``FINDINGS``.
+    ``floor_noise_factor``: the whitening's floor is at least this times the tare's noise over rms(V0); 0: as the model has it.
     """
 
     iterations: int
@@ -53,6 +54,7 @@ class Options:
     touch_sweeps: int = 6
     mac_limit: int = 0
     findings: int = ALL_FINDINGS
+    floor_noise_factor: float = 5.0
 
 
 WHOLE = {
@@ -167,6 +169,7 @@ class Info:
     open_electrodes: tuple[int, ...] = ()
     bridged_electrodes: tuple[int, ...] = ()
     noisy_electrodes: tuple[int, ...] = ()
+    floor: float = 0.0
     solve_us: float = field(default=0.0, compare=False)
     touch_us: float = field(default=0.0, compare=False)
 
