@@ -347,6 +347,7 @@ BAD_OPTIONS = [
     ({"touch_radius_weight": None}, "touch_radius_weight"),
     ({"touch_sweeps": 1001}, "touch_sweeps"),
     ({"follow_mm": -1.0}, "follow_mm"),
+    ({"floor_noise_factor": -0.5}, "floor_noise_factor"),
     ({"iteration": 5}, "'iteration' is unknown; did you mean 'iterations'"),
 ]
 
@@ -375,6 +376,7 @@ EDGES = {
     "iterations": 1, "gap_every": 2**32 - 1, "max_touches": 16, "max_masked": 0, "lambda_rel": 1.0, "gap_rel": 1.0,
     "lambda_noise_factor": 1e29, "gate_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0, "touch_share": 1.0,
     "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000, "follow_mm": 0.0, "lambda_abs": 1e29,
+    "floor_noise_factor": 0.0,
 }  # fmt: skip
 
 
