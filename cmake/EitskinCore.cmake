@@ -3,7 +3,7 @@
 # Contraction and re-association stay off: kernels say fma where they mean it, and the bits must not depend on the target.
 
 set(EITSKIN_CORE_SOURCES
-    types.c model.c load.c kernels.c columns.c kernels_portable.c context.c stages.c baseline.c frame.c observed.c
+    types.c model.c load.c kernels.c columns.c kernels_portable.c context.c stages.c baseline.c frame.c floor.c observed.c map.c
     electrodes.c glitch.c quiet.c misfit.c solve.c certificate.c fista.c
     working_set.c coordinate.c active_set.c missing.c factor.c disc.c coupling.c fit.c keep.c regroup.c touch.c crowded.c track.c batch.c self_test.c link.c)
 

@@ -152,6 +152,22 @@ static eits_real unit_for(const eits_context *ctx, const eits_real *frame)
     return unit;
 }
 
+/* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
+static eits_real noise_so_far(const eits_context *ctx)
+{
+    const eits_baseline *b = &ctx->baseline;
+    eits_real sum = 0;
+    uint32_t used = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (has_reference(ctx, i)) {
+            sum += b->m2[i];
+            ++used;
+        }
+    }
+    const eits_real noise_v = used > 0 ? b->m2_unit * eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
+    return eits_is_finite(noise_v) ? noise_v : 0;
+}
+
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
 static void take_in(eits_context *ctx, const eits_real *frame)
 {
@@ -213,8 +229,10 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
     if (b->second_waits)
         weigh_second(ctx, frame);
     const uint32_t left = b->count >= 2 && judged ? eits_quiet_leave_out(ctx, frame) : 0;
-    if (b->count == b->wanted / 2)
+    if (b->count == b->wanted / 2) {
         status = fit_to_model(ctx);
+        b->noise_v = noise_so_far(ctx); /* lambda_noise is learned with the floor that it asks for */
+    }
     if (status == EITS_OK && b->count >= b->wanted / 2)
         status = learn_lambda_noise(ctx, frame);
     if (status == EITS_OK) {
@@ -237,16 +255,7 @@ eits_status eits_baseline_finish(eits_context *ctx)
     const eits_status status = fit_to_model(ctx);
     if (status != EITS_OK)
         return status;
-    eits_real sum = 0;
-    uint32_t used = 0;
-    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (has_reference(ctx, i)) {
-            sum += b->m2[i];
-            ++used;
-        }
-    }
-    const eits_real noise_v = used > 0 ? b->m2_unit * eits_sqrt(sum / ((eits_real)used * (eits_real)(b->count - 1))) : 0;
-    b->noise_v = eits_is_finite(noise_v) ? noise_v : 0; /* out of range: not known */
+    b->noise_v = noise_so_far(ctx);
     b->ready = 1;
     return EITS_OK;
 }

@@ -8,17 +8,7 @@
 
 uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx)
 {
-    const size_t stride = EITS_STRIDE(ctx->model->rank);
-    if (ctx->rewhitened) {
-        eits_copy(ctx->residual, sx, stride);
-        const uint64_t macs = eits_forward(ctx, ctx->residual);
-        for (size_t i = 0; i < stride; ++i)
-            ctx->residual[i] = ctx->y[i] - ctx->residual[i];
-        return macs;
-    }
-    eits_copy(ctx->residual, ctx->y, stride);
-    eits_axpy(ctx, ctx->residual, -1, sx, stride);
-    return eits_forward(ctx, ctx->residual);
+    return eits_residual(ctx, sx, ctx->residual);
 }
 
 uint64_t eits_gradient_macs(const eits_context *ctx)

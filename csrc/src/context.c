@@ -3,6 +3,7 @@
 
 #include "columns.h"
 #include "examine.h"
+#include "floor.h"
 #include "kernels.h"
 #include "observed.h"
 #include "vec.h"
@@ -51,6 +52,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .track_confirm = 0,
         .track_hold = 0,
         .track_smooth = 0,
+        .floor_noise_factor = EITS_FLOOR_NOISE_FACTOR,
     };
     *options = chosen;
     return EITS_OK;
@@ -189,12 +191,13 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
                       in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
                       in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 && o->findings <= EITS_FINDINGS_ALL &&
                       o->touch_search <= EITS_SEARCH_ALL && o->refine <= 1 && o->track_confirm <= EITS_MOST_TRACK_FRAMES &&
-                      o->track_hold <= EITS_MOST_TRACK_FRAMES && in_range(o->track_smooth, 0, huge);
+                      o->track_hold <= EITS_MOST_TRACK_FRAMES && in_range(o->track_smooth, 0, huge) &&
+                      in_range(o->floor_noise_factor, 0, huge);
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)
         ctx->warm = 0;
-    if (o->project_baseline != ctx->options.project_baseline)
+    if (o->project_baseline != ctx->options.project_baseline || o->floor_noise_factor != ctx->options.floor_noise_factor)
         ctx->basis_stale = 1;
     ctx->options = *o;
     return EITS_OK;

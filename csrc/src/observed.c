@@ -1,62 +1,17 @@
 #include "observed.h"
 
 #include "column.h"
+#include "floor.h"
 #include "kernels.h"
 #include "stages.h"
+#include "triangle.h"
 #include "vec.h"
 
-/* The floor for the rows left, over the model's: fewer rows speak of fewer directions, and what is left of the weak ones is to be
- * heard. Chosen on training scenes with one to three electrodes out. */
-static const eits_real LEAST_FLOOR_SHARE = R(0.1);
-static const eits_real LEAST_FLOOR = R(1e-4); /* of s_1^2: what float32 needs */
-/* Noise beyond a share of the reference's rms asks for a higher one: in proportion where an electrode is out, less where little is.
- * Chosen at 40 and 50 dB; without it an electrode out costs three times as much of the MIoU at 40 dB. */
-static const eits_real NOISE_FROM = R(1.0 / 740.0);
-static const eits_real MUCH_MISSING = R(0.25);
 static const eits_real LOST = R(0.01); /* e over mu': how little a direction that no row sees is held to zero */
 static const eits_real ORTHOGONAL = R(1e-5); /* cosine between rows of P */
 static const eits_real FORM = R(0.01); /* |S_i|^2 + mu s_1^2 w_i^2 is 1 within this: S is rounded to 8 bits at worst */
 /* Rounding makes the rows of S a little less than orthogonal, and F with a lower floor must not exceed the stated constant. */
 static const eits_real STEP_MARGIN = R(0.995);
-
-/* Upper triangles, row after row. Row i has its columns from this one on, a multiple of 8, those before i being zero: */
-static uint32_t first_of(uint32_t i)
-{
-    return i & ~7u;
-}
-
-/* Row i, so that [k] is its column k; there is nothing before first_of(i). */
-static eits_real *row_of(const eits_context *ctx, eits_real *triangle, uint32_t i)
-{
-    const size_t stride = EITS_STRIDE(ctx->model->rank), block = i / 8u;
-    return triangle + 8u * (block * stride - 4u * block * block + 4u * block) + i % 8u * (stride - 8u * block) - 8u * block;
-}
-
-/* a . b and out += factor * a over the columns that row i has. */
-static eits_real dot_of_row(const eits_context *ctx, uint32_t i, const eits_real *a, const eits_real *b)
-{
-    return eits_dot(ctx, a + first_of(i), b + first_of(i), EITS_STRIDE(ctx->model->rank) - first_of(i));
-}
-
-static void add_row(const eits_context *ctx, uint32_t i, eits_real *out, eits_real factor, const eits_real *a)
-{
-    eits_axpy(ctx, out + first_of(i), factor, a + first_of(i), EITS_STRIDE(ctx->model->rank) - first_of(i));
-}
-
-static eits_real *map_of(const eits_context *ctx) /* F; behind the basis' one direction */
-{
-    return ctx->basis + EITS_STRIDE(ctx->model->rank);
-}
-
-static eits_real *metric_of(const eits_context *ctx) /* G */
-{
-    return map_of(ctx) + EITS_PADDED_TRIANGLE(ctx->model->rank);
-}
-
-static uint64_t triangle_macs(const eits_context *ctx)
-{
-    return (uint64_t)ctx->model->rank * (ctx->model->rank + 1u) / 2u;
-}
 
 /* ---- the model's form ---- */
 
@@ -144,6 +99,7 @@ void eits_observed_init(eits_context *ctx)
         return;
     squares_of_rows(ctx, ctx->row_strength);
     ctx->rewhitens = (uint32_t)take_form(ctx, greatest);
+    ctx->sheet_energy_stored = ctx->sheet_energy;
 }
 
 /* ---- the map ---- */
@@ -251,7 +207,8 @@ enum { PROBES = 8 };
 
 /* Noise in S'F'y, over that in S'y with all rows. White noise on the rows has the covariance (G'G)^-1 in y; its mean square over S's
  * columns is the trace of S'F' (G'G)^-1 F S, found by PROBES sign vectors that are orthogonal within each PROBES directions. The
- * greatest of the columns grows faster than their mean, by an exponent found on masks of one row to three electrodes. */
+ * greatest of the columns grows faster than their mean does by rows left out, by an exponent found on masks of one row to three
+ * electrodes. */
 static uint64_t measure_noise(eits_context *ctx)
 {
     const uint32_t rank = ctx->model->rank;
@@ -270,8 +227,9 @@ static uint64_t measure_noise(eits_context *ctx)
         const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
         whole = eits_fma(ctx->row_strength[i] * w2, w2, whole);
     }
-    const eits_real ratio = eits_sqrt(ctx->map_square * sum / (PROBES * whole));
-    ctx->noise_ratio = ratio * eits_sqrt(eits_sqrt(ratio));
+    const eits_real of_all = eits_floor_noise(ctx, eits_floor_of_all(ctx));
+    const eits_real ratio = eits_sqrt(ctx->map_square * sum / (PROBES * whole)) / of_all;
+    ctx->noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));
     return PROBES * 2u * triangle_macs(ctx);
 }
 
@@ -280,15 +238,36 @@ eits_real eits_lambda_noise(const eits_context *ctx)
     return ctx->noise_ratio * ctx->baseline.lambda_noise;
 }
 
-/* mu', where the share `missing` of the folded rows is left out. */
-static eits_real floor_for(const eits_context *ctx, eits_real missing)
+/* No row is left out: the floor alone may differ. */
+static void raise_floor(eits_context *ctx)
 {
-    const eits_baseline *b = &ctx->baseline;
-    const eits_real left = 1 - missing, cube = left * left * left, quiet = cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE;
-    const eits_real beyond = b->noise_v > 0 ? b->noise_v / b->v0_rms / NOISE_FROM - 1 : 0;
-    const eits_real much = missing < MUCH_MISSING ? missing / MUCH_MISSING : 1;
-    const eits_real wanted = ctx->floor * quiet * (beyond > 0 ? 1 + much * beyond : 1);
-    return wanted > LEAST_FLOOR ? wanted : LEAST_FLOOR;
+    const eits_real floor = eits_floor_of_all(ctx), noise = eits_floor_noise(ctx, floor);
+    if (!(floor > ctx->floor) || !(noise > 0) || !eits_is_finite(noise)) /* a model's rows may be of any size */
+        return;
+    ctx->rewhitened = EITS_BY_ROW;
+    ctx->floor_in_force = floor;
+    ctx->noise_ratio = noise;
+    ctx->sheet_energy = ctx->sheet_energy_stored * eits_floor_weights(ctx, floor, map_of(ctx));
+}
+
+static uint64_t build_triangle(eits_context *ctx, eits_real floor, uint32_t missing)
+{
+    const eits_real lost = LOST * floor;
+    ctx->map_square = STEP_MARGIN * ctx->strongest_square * (1 + floor) / (1 + lost);
+    eits_real *f = map_of(ctx), *g = metric_of(ctx);
+    uint64_t macs = sum_products(ctx, missing, lost, f);
+    macs += factor_products(ctx, lost, f);
+    macs += factor_metric(ctx, floor, f, g);
+    macs += finish_map(ctx, eits_sqrt(ctx->map_square), g, f);
+    ctx->rewhitened = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank)) ? EITS_BY_TRIANGLE : EITS_AS_STORED;
+    if (ctx->rewhitened)
+        macs += measure_noise(ctx);
+    if (!(ctx->noise_ratio > 0) || !eits_is_finite(ctx->noise_ratio)) {
+        ctx->rewhitened = EITS_AS_STORED;
+        ctx->noise_ratio = 1;
+    }
+    ctx->floor_in_force = ctx->rewhitened ? floor : ctx->floor;
+    return macs;
 }
 
 uint64_t eits_observed_build(eits_context *ctx)
@@ -297,25 +276,16 @@ uint64_t eits_observed_build(eits_context *ctx)
     uint32_t missing = 0;
     for (uint32_t k = 0; k < folded; ++k)
         missing += !in_use(ctx, k);
-    ctx->rewhitened = 0;
+    ctx->rewhitened = EITS_AS_STORED;
     ctx->noise_ratio = 1;
-    if (missing == 0 || !ctx->rewhitens)
+    if (!ctx->rewhitens)
         return 0;
-    const eits_real floor = floor_for(ctx, (eits_real)missing / (eits_real)folded), lost = LOST * floor;
-    ctx->map_square = STEP_MARGIN * ctx->strongest_square * (1 + floor) / (1 + lost);
-    eits_real *f = map_of(ctx), *g = metric_of(ctx);
-    uint64_t macs = sum_products(ctx, missing, lost, f);
-    macs += factor_products(ctx, lost, f);
-    macs += factor_metric(ctx, floor, f, g);
-    macs += finish_map(ctx, eits_sqrt(ctx->map_square), g, f);
-    ctx->rewhitened = (uint32_t)eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank));
-    if (ctx->rewhitened)
-        macs += measure_noise(ctx);
-    if (!(ctx->noise_ratio > 0) || !eits_is_finite(ctx->noise_ratio)) {
-        ctx->rewhitened = 0;
-        ctx->noise_ratio = 1;
-    }
-    return macs;
+    ctx->floor_in_force = ctx->floor;
+    ctx->sheet_energy = ctx->sheet_energy_stored;
+    if (missing > 0)
+        return build_triangle(ctx, eits_floor_of_rest(ctx, (eits_real)missing / (eits_real)folded), missing);
+    raise_floor(ctx);
+    return 0;
 }
 
 /* v = T^-1 v; v = T'^-1 v. */
@@ -340,43 +310,12 @@ static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_
 /* R'^-1 is had from what is kept: R = G F diag(w) but for F's scale, so y = G^-1 G'^-1 F'^-1 diag(1/w^2) P_o d_o. */
 uint64_t eits_observed_data(eits_context *ctx, eits_real *v)
 {
+    if (ctx->rewhitened == EITS_BY_ROW)
+        return eits_map(ctx, v);
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         v[i] *= ctx->map_square * ctx->row_scale[i] * ctx->row_scale[i];
     solve_transposed(ctx, map_of(ctx), v);
     solve_transposed(ctx, metric_of(ctx), v);
     solve(ctx, metric_of(ctx), v);
     return 3u * triangle_macs(ctx);
-}
-
-uint64_t eits_map(const eits_context *ctx, eits_real *v)
-{
-    for (uint32_t i = 0; ctx->rewhitened && i < ctx->model->rank; ++i)
-        v[i] = dot_of_row(ctx, i, row_of(ctx, map_of(ctx), i), v);
-    return eits_adjoint_macs(ctx);
-}
-
-uint64_t eits_forward(const eits_context *ctx, eits_real *v)
-{
-    const uint64_t macs = eits_map(ctx, v);
-    return macs + eits_project(ctx, v);
-}
-
-uint64_t eits_forward_macs(const eits_context *ctx)
-{
-    return eits_adjoint_macs(ctx) + 2u * (uint64_t)ctx->basis_count * ctx->model->rank;
-}
-
-const eits_real *eits_adjoint(const eits_context *ctx, const eits_real *v, eits_real *room)
-{
-    if (!ctx->rewhitened)
-        return v;
-    eits_zero(room, EITS_STRIDE(ctx->model->rank));
-    for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        add_row(ctx, i, room, v[i], row_of(ctx, map_of(ctx), i));
-    return room;
-}
-
-uint64_t eits_adjoint_macs(const eits_context *ctx)
-{
-    return ctx->rewhitened ? triangle_macs(ctx) : 0;
 }

@@ -1,4 +1,5 @@
-/* Rows left out of a frame: the reduction that the model would have had without them, in the stored model's coordinates.
+/* Rows left out of a frame: the reduction that the model would have had without them, in the stored model's coordinates; and with
+ * all rows that of a higher floor (floor.h), where F is diagonal.
  *
  * The builder makes P = diag(w) U' and S = diag(s w) V' with w = (s^2 + mu s_1^2)^-1/2 (docs/eitm-format.md, "Reduction"; "Rows
  * left out"). Of U the rows U_o are left, U_o' U_o + e I = R'R with R upper triangular, and
@@ -13,8 +14,15 @@
  * Otherwise rows left out are minimised over instead (frame.c). Uses ctx->basis and ctx->sz as scratch. */
 void eits_observed_init(eits_context *ctx);
 
-/* Make the map for the folded rows that ctx->basis_for has; sets ctx->rewhitened, 0 where none is left out, the model has not the
- * form, or numbers overflow. Returns the multiply-accumulates. Uses ctx->sz as scratch. */
+/* What ctx->rewhitened says of F. */
+enum {
+    EITS_AS_STORED = 0,   /* there is none: no row is left out and the floor is the model's, or the model has not the form, or
+                           * numbers overflow */
+    EITS_BY_TRIANGLE = 1, /* rows are left out */
+    EITS_BY_ROW = 2       /* none is, but the floor is raised */
+};
+
+/* Make the map for the folded rows that ctx->basis_for has; sets ctx->rewhitened. Returns the multiply-accumulates. Uses ctx->sz as scratch. */
 uint64_t eits_observed_build(eits_context *ctx);
 
 /* lambda_noise for the rows in use. */
@@ -25,6 +33,9 @@ uint64_t eits_observed_data(eits_context *ctx, eits_real *v);
 
 /* v = F v (stride numbers); v as it is where nothing is re-whitened. Returns the multiply-accumulates. */
 uint64_t eits_map(const eits_context *ctx, eits_real *v);
+
+/* out = y - Q F sx (stride numbers each), y being projected already. Returns the multiply-accumulates of F and Q. */
+uint64_t eits_residual(const eits_context *ctx, const eits_real *sx, eits_real *out);
 
 /* v = Q F v, Q taking the basis' directions out. Returns the multiply-accumulates, also beforehand. */
 uint64_t eits_forward(const eits_context *ctx, eits_real *v);

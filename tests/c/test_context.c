@@ -229,7 +229,7 @@ static void options_out_of_range(void)
         REAL(touch_threshold, 1.001), REAL_WRONG(touch_share), REAL(touch_share, 1.001), REAL_WRONG(touch_min_radius_mm),
         REAL(touch_min_radius_mm, 0), REAL(touch_min_radius_mm, 9.1), REAL_WRONG(touch_max_radius_mm), REAL(touch_max_radius_mm, 8.9),
         REAL_WRONG(touch_seed_radius_mm), REAL(touch_seed_radius_mm, 2.9), REAL(touch_seed_radius_mm, 40.1),
-        REAL_WRONG(touch_change_s_per_m), REAL_WRONG(touch_radius_weight), REAL_WRONG(follow_mm),
+        REAL_WRONG(touch_change_s_per_m), REAL_WRONG(touch_radius_weight), REAL_WRONG(follow_mm), REAL_WRONG(floor_noise_factor),
         WORD(track_confirm, 1001), WORD(track_hold, 1001), REAL_WRONG(track_smooth),
     };
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
@@ -255,6 +255,7 @@ static void options_out_of_range(void)
     o.track_smooth = R(1e30);
     o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_share = 1;
     o.lambda_abs = o.gate_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm = o.touch_change_s_per_m = R(1e30);
+    o.floor_noise_factor = R(1e30);
     o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);
     CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
     CHECK(memcmp(&c.ctx.options, &o, sizeof o) == 0);

@@ -99,7 +99,7 @@ static const option option_table[] = {
     WHOLE(touch_sweeps), WHOLE(mac_limit), WHOLE(findings), REAL(lambda_abs), REAL(lambda_rel), REAL(lambda_noise_factor), REAL(gate_factor),
     REAL(gap_rel), REAL(saturation_v), REAL(touch_threshold), REAL(touch_share), REAL(touch_min_radius_mm),
     REAL(touch_max_radius_mm), REAL(touch_seed_radius_mm), REAL(touch_change_s_per_m), REAL(touch_radius_weight), REAL(follow_mm),
-    WHOLE(track_confirm), WHOLE(track_hold), REAL(track_smooth),
+    WHOLE(touch_search), WHOLE(refine), WHOLE(track_confirm), WHOLE(track_hold), REAL(track_smooth), REAL(floor_noise_factor),
 };
 
 /* An option by its name; 0 for one that is none. */

@@ -135,7 +135,7 @@ static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
     eits_real *real[] = {&o->lambda_abs, &o->lambda_rel, &o->lambda_noise_factor, &o->gate_factor, &o->gap_rel, &o->saturation_v,
                          &o->touch_threshold, &o->touch_share, &o->touch_min_radius_mm, &o->touch_max_radius_mm,
                          &o->touch_seed_radius_mm, &o->touch_change_s_per_m, &o->touch_radius_weight, &o->follow_mm,
-                         &o->track_smooth};
+                         &o->track_smooth, &o->floor_noise_factor};
     enum { WHOLE = sizeof whole / sizeof whole[0], REAL = sizeof real / sizeof real[0] };
     const uint32_t k = which % (WHOLE + REAL + 2);
     if (k < WHOLE)

@@ -110,6 +110,7 @@ FRAME = (
             "if (seen < ctx->baseline.lambda_noise)",
             "baseline",
         ),
+        ("lambda_noise learned with the model's floor", "        b->noise_v = noise_so_far(ctx);", "        ;", "floor"),
         ("noise learned against nothing", "b->count == b->wanted / 2", "b->count == b->wanted / 2 + 1", "baseline"),
         ("a warm start over a new reference", "    ctx->warm = 0;\n", "", "solve_state"),
     )

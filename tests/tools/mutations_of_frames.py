@@ -6,15 +6,6 @@ from mutation import of
 
 OBSERVED = of(
     "observed.c",
-    ("the floor for rows left out is the model's", "cube = left * left * left", "cube = 1", "observed"),
-    ("no least floor", "cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE", "cube", "observed"),
-    (
-        "noise asks for no higher floor",
-        "(beyond > 0 ? 1 + much * beyond : 1)",
-        "(beyond > 0 ? 1 : 1)",
-        "observed",
-    ),
-    ("noise asks for more whatever is left out", "1 + much * beyond", "1 + (much > 0 ? beyond : 0)", "observed"),
     ("lost directions weigh a hundred times as much", "LOST = R(0.01)", "LOST = R(1.0)", "observed"),
     ("lost directions are not held", "row[i] += lost;", "row[i] += 0;", "observed"),
     (
@@ -31,12 +22,6 @@ OBSERVED = of(
     ("data whitened by half", "    solve(ctx, metric_of(ctx), v);\n", "", "observed"),
     ("data without the weights", "v[i] *= ctx->map_square * ctx->row_scale[i] * ctx->row_scale[i];", "v[i] *= 1;", "observed"),
     (
-        "the adjoint is the map",
-        "add_row(ctx, i, room, v[i], row_of(ctx, map_of(ctx), i));",
-        "room[i] = dot_of_row(ctx, i, row_of(ctx, map_of(ctx), i), v);",
-        "observed",
-    ),
-    (
         "noise as though no row were left out",
         "return ctx->noise_ratio * ctx->baseline",
         "return ctx->baseline",
@@ -45,12 +30,65 @@ OBSERVED = of(
     ("noise probes not mapped", "        (void)eits_map(ctx, v);\n", "", "observed"),
     (
         "the greatest noise grows as the mean",
-        "ctx->noise_ratio = ratio * eits_sqrt(eits_sqrt(ratio));",
-        "ctx->noise_ratio = ratio;",
+        "ctx->noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));",
+        "ctx->noise_ratio = of_all * ratio;",
         "observed",
     ),
+    ("rows left out beside the model's noise", "(PROBES * whole)) / of_all;", "(PROBES * whole));", "observed"),
+    ("the noise of a raised floor is the model's", "    ctx->noise_ratio = noise;\n", "", "floor"),
+    (
+        "the energy of a raised floor is the model's",
+        "ctx->sheet_energy_stored * eits_floor_weights(ctx, floor, map_of(ctx));",
+        "ctx->sheet_energy_stored + 0 * eits_floor_weights(ctx, floor, map_of(ctx));",
+        "floor",
+    ),
+    ("energies of the rows before", "    ctx->sheet_energy = ctx->sheet_energy_stored;\n    if", "    if", "floor"),
+    ("the floor of the rows before", "    ctx->floor_in_force = ctx->floor;\n    ctx", "    ctx", "floor"),
+    ("numbers that overflow are used", "|| !(noise > 0) || !eits_is_finite(noise))", ")", "floor"),
     ("any P counts as the builder's", "<= FORM))", "<= 1000))", "observed"),
+) + of(
+    "map.c",
     ("forward without the projection", "return macs + eits_project(ctx, v);", "return macs;", "observed"),
+    (
+        "the adjoint is the map",
+        "add_row(ctx, i, room, v[i], row_of(ctx, map_of(ctx), i));",
+        "room[i] = dot_of_row(ctx, i, row_of(ctx, map_of(ctx), i), v);",
+        "observed",
+    ),
+    ("the residual of S, not of D S", "eits_fma(-weight[i], sx[i], ctx->y[i]);", "ctx->y[i] - sx[i];", "floor"),
+    (
+        "the residual's projection forgotten",
+        "return ctx->model->rank + eits_project(ctx, out);",
+        "return ctx->model->rank;",
+        "floor",
+    ),
+    ("the adjoint without its weights", "        weigh(ctx, v, room);\n        return room;\n", "        return v;\n", "floor"),
+    ("the map without its weights", "        weigh(ctx, v, v);\n", "        ;\n", "floor"),
+) + of(
+    "floor.c",
+    ("the floor for rows left out is the model's", "cube = left * left * left", "cube = 1", "observed"),
+    ("no least floor", "cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE", "cube", "observed"),
+    ("noise asks for no higher floor where rows are out", "asked > of_model ? asked : of_model", "of_model", "observed"),
+    ("noise asks for as much of few rows", "asked = left * least_floor(ctx)", "asked = least_floor(ctx)", "observed"),
+    ("no greatest floor", "return asked < MOST_FLOOR ? asked : MOST_FLOOR;", "return asked;", "floor"),
+    ("a lift that cannot be seen", "AS_IT_IS = R(1.01)", "AS_IT_IS = R(1.0)", "floor"),
+    ("noise in volts", "(b->noise_v / b->v0_rms)", "b->noise_v", "floor"),
+    ("the strongest direction loses weight", "ctx->strongest_square * (1 + floor) /", "ctx->strongest_square /", "floor"),
+    ("weights not rooted", "eits_sqrt(square) * ctx->row_scale[i]", "square * ctx->row_scale[i]", "floor"),
+    ("noise weighed once", "eits_fma(square * w2_kept, w2_kept, sum)", "eits_fma(square, w2_kept, sum)", "floor"),
+    ("noise of weak directions forgotten", "ctx->row_strength[i] * w2 * w2;", "ctx->row_strength[i] * w2;", "floor"),
+    ("weights in the padding", "    eits_zero(weight, EITS_STRIDE(ctx->model->rank));\n", "", "floor"),
+) + of(
+    "context.c",
+    (
+        "the floor of the options before",
+        " || o->floor_noise_factor != ctx->options.floor_noise_factor)",
+        ")",
+        "floor",
+    ),
+) + of(
+    "solve.c",
+    ("the floor is not said", "    ctx->info.floor = ctx->floor_in_force;\n", "", "floor"),
 ) + of(
     "frame.c",
     (

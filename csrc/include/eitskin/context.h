@@ -65,6 +65,7 @@ typedef struct eits_options {
     uint32_t track_hold;    /* a touch that is not found keeps its id for so many frames, and is told of if it was faint before */
     eits_real track_smooth; /* > 0: follow places, radii and strengths in time; how uncertain the place of a touch is whose S'y is
                              * as great as noise gives, in pixels */
+    eits_real floor_noise_factor; /* > 0: the whitening's floor is at least this times noise_v / v0_rms, where both are known */
 } eits_options;
 
 /* Why the solver stopped. */
@@ -105,6 +106,7 @@ typedef struct eits_info {
     eits_real misfit;     /* share of |d| beyond noise that the model's sheet cannot give, 0 to 1; 0 where it was not judged */
     eits_real unexplained; /* share of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked for */
     uint64_t open_electrodes, bridged_electrodes, noisy_electrodes; /* bit e: electrode e, of the first 64; ctx->electrode has all */
+    eits_real floor;      /* of the whitening, over s_1^2, as this frame was reduced; 0 where the model does not tell */
 } eits_info;
 
 typedef struct eits_touch {
@@ -160,7 +162,8 @@ typedef struct eits_context {
     eits_real *stray;        /* n_folded: what of that no sheet gives, unless stale */
     uint32_t stray_stale;
     eits_real *sheet_inverse, *sheet_shrink; /* stride each: 1 / |P_i|^2, and so much of it as predicts d (misfit.c) */
-    eits_real sheet_energy;  /* |P|^2: what unit noise on the folded rows makes of |y|^2 */
+    eits_real sheet_energy;  /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where the floor is raised */
+    eits_real sheet_energy_stored; /* as with the model's floor */
     uint32_t sheet_known;    /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
     eits_real *y;            /* stride: reduced data, projected */
     eits_real *y_straight, *y_coupled; /* stride each: of v0 log(v / v0); y less the touches' interplay */
@@ -170,12 +173,13 @@ typedef struct eits_context {
     uint32_t basis_count;
     uint32_t basis_stale;
     uint32_t rewhitens;      /* 1: the model's P and S have the builder's form, so that rows left out can be whitened anew */
-    uint32_t rewhitened;     /* 1: they are, for basis_for: the solver's S is F S (observed.h) */
+    uint32_t rewhitened;     /* other than 0: for basis_for, or for the noise, the solver's S is F S (observed.h) */
     eits_real *row_scale;    /* stride: s_1 of the scaled Jacobian over that of each direction, and over w s_1 of the first */
     eits_real *row_strength; /* stride: (s_i / s_1)^2 */
     eits_real strongest;     /* s_1, in the units of 1 / P */
     eits_real strongest_square; /* |S_1|^2 */
     eits_real floor;         /* mu, by which the model was whitened */
+    eits_real floor_in_force; /* mu' of the frames as basis_for has them */
     eits_real map_square;    /* what F'F is scaled by */
     eits_real noise_ratio;   /* how much more noise max(S'y) has so than with all rows; 1 where nothing is re-whitened */
     eits_real *adjoint;      /* stride: F' of the residual, and scratch */

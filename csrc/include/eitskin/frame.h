@@ -9,7 +9,10 @@
  * "Rows left out"), the floor lower the fewer rows there are; lambda_noise grows with the noise that this lets through. That
  * needs a model of the builder's form, P's rows orthogonal and S whitened by them, which eits_init finds out. Of any other
  * model, the rows' values are minimised over: the span of their columns of P is projected away, too, which loses much of what
- * the rows left know. With no row out there is no F, and no cost.
+ * the rows left know.
+ *
+ * Noise: a floor that suits 60 dB lets too much of it through at 40. What the tare learned raises it (floor_noise_factor): with no
+ * row out F is a weight for each row of S then (docs/eitm-format.md, "Noise and the floor"). Else there is no F, and no cost.
  */
 #ifndef EITSKIN_FRAME_H
 #define EITSKIN_FRAME_H
@@ -25,7 +28,8 @@ extern "C" {
 eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t length);
 
 /* Learn reference and noise from `count` >= 4 quiet frames: begin, add each, finish. The first half gives a first mean; the
- * second half also gives lambda_noise, the greatest max(S'y) that a quiet frame showed; the mean of all is the reference.
+ * second half also gives lambda_noise, the greatest max(S'y) that a quiet frame showed, told as with the model's own floor; the
+ * mean of all is the reference.
  * Until finish returns EITS_OK there is no reference. Single readings that neither their reciprocals nor the other frames bear
  * out are left out of it, and counted (baseline.glitches). Errors as above; EITS_E_BASELINE_SHORT if frames are missing,
  * EITS_E_NOT_FINITE if S'y of a frame would not be finite. A frame that is refused does not count. */

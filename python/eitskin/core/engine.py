@@ -278,6 +278,7 @@ def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
         getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual, i.data_norm,
         i.findings, i.saturated, i.glitches, i.misfit, i.unexplained,
         _bits(i.open_electrodes), _bits(i.bridged_electrodes), _bits(i.noisy_electrodes),
+        i.floor,
         solve_us=solve_ns / 1000, touch_us=touch_ns / 1000,
     )  # fmt: skip
 

@@ -31,6 +31,7 @@ class Options:
     step would take the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of ``FINDINGS``.
     ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow touches in time; all 0: each frame by itself
     (``solve.options.tracking`` sets them, docs/tracking.md).
+    ``floor_noise_factor``: the whitening's floor is at least this times the tare's noise over rms(V0); 0: as the model has it.
     """
 
     iterations: int
@@ -63,6 +64,7 @@ class Options:
     track_confirm: int = 0
     track_hold: int = 0
     track_smooth: float = 0.0
+    floor_noise_factor: float = 5.0
 
     @property
     def tracks(self) -> bool:
@@ -196,6 +198,7 @@ class Info:
     open_electrodes: tuple[int, ...] = ()
     bridged_electrodes: tuple[int, ...] = ()
     noisy_electrodes: tuple[int, ...] = ()
+    floor: float = 0.0
     solve_us: float = field(default=0.0, compare=False)
     touch_us: float = field(default=0.0, compare=False)
 

@@ -126,21 +126,25 @@ class ReferenceEngine:
         """
         check_quiet(frames, self._bad, self.options.saturation_v)
         frames = np.where(self._bad, 0.0, frames)
-        before, self._without_reference = self._without_reference, self._bad.copy()
-        lambda_noise, noise, left = 0.0, 0.0, np.zeros(frames.shape, dtype=np.bool_)
+        before, self._without_reference = (self._without_reference, self._noise_v), self._bad.copy()
+        lambda_noise, self._noise_v, left = 0.0, 0.0, np.zeros(frames.shape, dtype=np.bool_)
         was_ready, self._ready = self._ready, False
         try:
             if len(frames) >= 4:
                 if "glitch" in self._examiner.wanted:
                     frames, left = clean(frames, self.model.fold, ~self._bad)
                 lambda_noise = self._learn_lambda_noise(frames, left)
-                noise = float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
+                self._noise_v = self._noise_of(frames)
             correlation = self._fit_to_model(frames.mean(axis=0))
         except FrameError:
-            self._without_reference, self._ready = before, was_ready and self._v0 is not None
+            (self._without_reference, self._noise_v), self._ready = before, was_ready and self._v0 is not None
             raise
-        self._lambda_noise, self._noise_v, self._ready = lambda_noise, noise, True
-        return Baseline(len(frames), correlation, self._gain, self._v0_rms, noise, lambda_noise, int(left.sum()))
+        self._lambda_noise, self._ready = lambda_noise, True
+        return Baseline(len(frames), correlation, self._gain, self._v0_rms, self._noise_v, lambda_noise, int(left.sum()))
+
+    def _noise_of(self, frames: FloatArray) -> float:
+        """The rms over rows of the deviation of ``frames`` (k, m), V."""
+        return float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
 
     def _learn_lambda_noise(self, frames: FloatArray, left: BoolArray) -> float:
         """The greatest max |S'y| of the second half of ``frames``, each against the mean of those before it; readings in ``left``
@@ -148,6 +152,7 @@ class ReferenceEngine:
         half, seen = len(frames) // 2, 0.0
         try:
             self._fit_to_model(frames[:half].mean(axis=0))
+            self._noise_v = self._noise_of(frames[:half])  # lambda_noise is learned with the floor that it asks for
             for k in range(half, len(frames)):
                 self._v0 = frames[:k].mean(axis=0)
                 y = self.frame_stage(np.where(left[k], np.nan, frames[k]))[0]
@@ -254,10 +259,15 @@ class ReferenceEngine:
     def _noise_ratio(self) -> float:
         return 1.0 if self._whitening is None else self._whitening.noise_ratio
 
+    @property
+    def _floor(self) -> float:
+        stored = 0.0 if self._form is None else self._form.floor
+        return stored if self._whitening is None else self._whitening.floor
+
     def _leave_out(self, known: BoolArray) -> None:
-        """Whiten anew for the folded rows (k,) that are known."""
-        noise = self._noise_v / self._v0_rms if self._ready else 0.0
-        self._whitening = None if self._form is None or known.all() else whiten(self._form, known, noise)
+        """Whiten anew for the folded rows (k,) that are known, and for the noise."""
+        asked = self.options.floor_noise_factor * self._noise_v / self._v0_rms
+        self._whitening = None if self._form is None else whiten(self._form, known, asked)
         self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
 
     def _reduce(self, d: FloatArray) -> FloatArray:
@@ -294,7 +304,8 @@ class ReferenceEngine:
         found: tuple[Touch, ...] = ()
         solved_ns = perf_counter_ns()
         if touches:
-            noise = self._noise_energy / len(self.model.fold.first) * float((self._p**2).sum())
+            whole = float((self._p**2).sum()) * (1.0 if self._whitening is None else self._whitening.energy_ratio)
+            noise = self._noise_energy / len(self.model.fold.first) * whole
             reduced = Reduced(y, self._straight, self.seen, basis, lambda_noise, noise)
             added = partial(self._interplay, basis, self._known) if self._couples else None
             found, self._examiner.found.unexplained, coupled = find_touches(self.model, reduced, image, o, added)
@@ -316,7 +327,7 @@ class ReferenceEngine:
         info = Info(
             result.iterations, result.stop, int(np.count_nonzero(result.x)), masked, result.step_halvings, len(found), 0, 0,
             lam, lambda_max, lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300), result.certificate.residual, norm,
-            **self._examiner.of_frame(),
+            **self._examiner.of_frame(), floor=self._floor,
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)

@@ -29,7 +29,7 @@ TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence"
 INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs", "lambda", "lambda_max",
     "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",
-    "findings", "found", "saturated", "glitches", "misfit", "unexplained",
+    "findings", "found", "saturated", "glitches", "misfit", "unexplained", "floor",
     "open_electrodes", "bridged_electrodes", "noisy_electrodes",
 }  # fmt: skip
 SUMMARY = {

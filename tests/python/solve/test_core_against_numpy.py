@@ -133,6 +133,22 @@ def test_same_images_without_electrodes(storage: str, data_kind: str, solver: st
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
+@pytest.mark.parametrize("storage", ["f32", "i8"])
+def test_same_images_after_a_noisy_tare(storage: str, data_kind: str, solver: str) -> None:
+    """The floor is raised tenfold; also with an electrode out."""
+    s, made = small(), engines(storage, data_kind, solver)
+    for reconstructor in made.values():
+        reconstructor.tare(narrow(s.quiet(1, 8, noise=0.02)))
+    frames = narrow(s.frames(5, 8, noise=0.02))
+    frames[5:, (s.protocol.drive_measure == 3).any(axis=1)] = np.nan
+    worst = agree(made, frames)
+    assert worst["c64"] <= 1e-11 and worst["c"] <= 4 * F32_BOUND[solver], worst
+    for k in (0, 6):
+        floors = [reconstructor.reconstruct(frames[k]).info.floor for reconstructor in made.values()]
+        assert min(floors) > 0.06 and floors == pytest.approx([floors[0]] * len(floors), rel=1e-4)
+
+
+@pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_same_facts_without_an_electrode(data_kind: str, solver: str) -> None:
     """Also where it was out when the reference was learned."""
     s, made = small(), engines("f32", data_kind, solver)

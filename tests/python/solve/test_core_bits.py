@@ -48,6 +48,21 @@ def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> 
 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_noisy_tare(solver: str, width: str) -> None:
+    """The floor of the whitening is raised."""
+    blob, s = small_blob("i8"), small()
+    built = [CoreEngine(blob, width, prepared=prepared, portable=portable) for prepared, portable in BUILDS]
+    for engine in built:
+        engine.set_options(replace(default_options(small_model("i8")), solver=solver))
+        engine.set_baseline(s.quiet(32, 8, noise=0.01))
+    for frame in s.frames(33, 4, noise=0.01):
+        results = [engine.reconstruct(frame) for engine in built]
+        same(results)
+        assert results[0].info.floor == pytest.approx(0.05, rel=0.1) and results[0].image.any()
+
+
+@pytest.mark.parametrize("width", ["float32", "float64"])
 def test_touches_of_simulated_frames(width: str) -> None:
     _, blob = prebuilt()
     frames = session().as_frames()

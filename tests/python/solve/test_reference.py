@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from eitskin.model.build import BuildSettings, make_model
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
 from eitskin.solve.reference import ReferenceEngine
@@ -103,6 +104,39 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
     # directions that no row sees count by a hundredth of the floor
     assert np.linalg.norm(engine.seen.T @ engine.seen - expected, 2) < 0.012
     assert np.linalg.norm(engine.seen.T @ y - gradient) < 0.012 * np.linalg.norm(gradient)
+
+
+@pytest.mark.parametrize("noise", [4e-3, 0.02, 0.5])
+def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> None:
+    """The same S'S, S'y and images, but for a scale, as from a model that was built with that floor."""
+    s, frame = small(), small().frames(4, 1)[0]
+    quiet = s.quiet(6, 8, noise=noise)
+    engine = reference(small_model(), findings=0)  # of discs this strong some rows count as glitches
+    learned = engine.set_baseline(quiet)
+    floor = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
+    settings = BuildSettings(rank=37, floor=floor)
+    other = reference(make_model(s.skin, s.protocol, s.linear, settings), findings=0)
+    other.set_baseline(quiet)
+    scale = (1 + floor) / 1.01
+    y, expected = engine.frame_stage(frame)[0], other.frame_stage(frame)[0]
+    assert engine.seen.T @ engine.seen == pytest.approx(scale * other.seen.T @ other.seen, abs=1e-5)
+    assert engine.seen.T @ y == pytest.approx(scale * other.seen.T @ expected, abs=1e-5 * np.linalg.norm(y))
+    images = []
+    for one in (engine, other):
+        one.set_options(replace(one.options, solver="active-set", lambda_noise_factor=0.0, gate_factor=0.0))
+        result = one.reconstruct(frame)
+        assert result.info.floor == pytest.approx(floor, rel=1e-4)
+        images.append(result.image)
+    assert images[0] == pytest.approx(images[1], abs=2e-3 * images[1].max())
+
+
+@pytest.mark.parametrize("quiet_frames", [1, 8])
+def test_the_floor_stays_where_noise_is_little_or_unknown(quiet_frames: int) -> None:
+    s = small()
+    engine = reference(small_model(), findings=0)
+    engine.set_baseline(s.quiet(6, quiet_frames, noise=1.5e-3 if quiet_frames > 1 else 0.1))
+    assert engine.reconstruct(s.frames(4, 1)[0]).info.floor == pytest.approx(0.01, rel=1e-4)
+    assert engine.seen is small_model().sensitivity
 
 
 def test_one_of_a_pair_stands_for_both() -> None:

@@ -190,7 +190,7 @@ def baseline_entries(tank: Tank, kind: str) -> tuple[Entry, ...]:
         signs = "non-negative" not in name
         return Entry(name, kind, family.parameter, family.values, lambda v: BaselineImager(tank, kind, family.make(v)), signs)
 
-    return tuple(entry(family) for family in baseline_methods(folded))
+    return tuple(entry(family) for family in baseline_methods(folded, tank.grid))
 
 
 def core_entries(tank: Tank, kind: str) -> tuple[Entry, ...]:

@@ -1,0 +1,164 @@
+/* A small whitened model, a frame, and what the core's map makes of S: for tests of rows left out and of the floor. */
+#ifndef EITSKIN_TEST_OBSERVED_BENCH_H
+#define EITSKIN_TEST_OBSERVED_BENCH_H
+
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/solve.h"
+#include "kernels.h"
+#include "observed.h"
+#include "vec.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RANK = 13, STRIDE = 16, SIDE = 6, N = SIDE * SIDE };
+
+static const small_spec WHITENED = {.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED};
+
+typedef struct bench {
+    dense_bench b;
+    eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
+    int out[SMALL_FOLDED];
+} bench;
+
+static inline eits_context *set_up(bench *b, small_spec spec, int project)
+{
+    uint64_t state = 91;
+    memset(b, 0, sizeof *b);
+    eits_context *ctx = dense_bench_open(&b->b, spec, 0);
+    small_reference(ctx->model, 1, b->reference);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
+    eits_options o = ctx->options;
+    o.findings = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
+    o.project_baseline = (uint32_t)project;
+    o.max_masked = SMALL_ROWS;
+    o.iterations = 40;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_baseline_set(ctx, b->reference, SMALL_ROWS), EITS_OK);
+    return ctx;
+}
+
+/* Leave folded row k out. */
+static inline void leave_out(bench *b, uint32_t k)
+{
+    const eits_fold fold = b->b.c.model.fold[k];
+    b->out[k] = 1;
+    b->frame[fold.first] = R(NAN);
+    if (fold.second != EITS_FOLD_NONE)
+        b->frame[fold.second] = R(NAN);
+}
+
+/* As though so much noise had been learned, over the reference's rms. */
+static inline void pretend_noise(eits_context *ctx, double noise)
+{
+    ctx->baseline.noise_v = (eits_real)noise * ctx->baseline.v0_rms;
+    ctx->basis_stale = 1;
+}
+
+static inline uint32_t stage(bench *b)
+{
+    uint32_t masked = 0;
+    uint64_t macs = 0;
+    CHECK_EQUAL(eits_frame_stage(&b->b.c.ctx, b->frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    return masked;
+}
+
+/* Column j of F, or of F S: by the core's own map. */
+static inline void map_column(eits_context *ctx, const double *column, int project, double *out)
+{
+    eits_real v[STRIDE] = {0};
+    for (int i = 0; i < RANK; ++i)
+        v[i] = (eits_real)column[i];
+    if (project)
+        (void)eits_forward(ctx, v);
+    else
+        (void)eits_map(ctx, v);
+    for (int i = 0; i < RANK; ++i)
+        out[i] = (double)v[i];
+}
+
+/* S'F'y of one row's datum, squared and summed over S's columns; with `whole` that of a frame with all rows. */
+static inline double energy_of_row(bench *b, uint32_t k, int whole)
+{
+    eits_context *ctx = &b->b.c.ctx;
+    eits_real y[STRIDE] = {0};
+    for (int i = 0; i < RANK; ++i)
+        y[i] = (eits_real)b->b.d.p[k * RANK + (uint32_t)i];
+    if (!whole)
+        (void)eits_observed_data(ctx, y);
+    double *back = dense_copy(whole ? y : eits_adjoint(ctx, y, ctx->adjoint), RANK), sum = 0;
+    for (int j = 0; j < N; ++j) {
+        const double c = dense_dot(b->b.d.s + j * RANK, back, RANK);
+        sum += c * c;
+    }
+    free(back);
+    return sum;
+}
+
+/* The greatest eigenvalue of the seen S's, by power iteration from below. */
+static inline double greatest_eigenvalue(const double *s)
+{
+    double v[RANK], w[RANK], size = 0;
+    for (int i = 0; i < RANK; ++i)
+        v[i] = 1 + 0.1 * i;
+    for (int step = 0; step < 200; ++step) {
+        memset(w, 0, sizeof w);
+        for (int j = 0; j < N; ++j) {
+            const double along = dense_dot(s + j * RANK, v, RANK);
+            for (int i = 0; i < RANK; ++i)
+                w[i] += along * s[j * RANK + i];
+        }
+        size = sqrt(dense_dot(w, w, RANK));
+        for (int i = 0; i < RANK; ++i)
+            v[i] = w[i] / size;
+    }
+    return size;
+}
+
+/* Each solver solves the problem of F S and y; the gap is the true one; the stated step suffices. The frame is staged. */
+static inline void solve_what_is_seen(bench *b, int sign)
+{
+    eits_context *ctx = &b->b.c.ctx;
+    double greatest;
+    for (int j = 0; j < N; ++j)
+        map_column(ctx, b->b.d.s + j * RANK, 1, b->b.d.s + j * RANK);
+    greatest = greatest_eigenvalue(b->b.d.s);
+    CHECK(greatest <= (double)b->b.c.model.lipschitz);
+    if (ctx->basis_count == 0 && ctx->rewhitened == EITS_BY_ROW)
+        CHECK_NEAR(greatest, b->b.c.model.lipschitz, 1e-3);
+    double *y = dense_copy(ctx->y, RANK), least = 0;
+    eits_options o = ctx->options;
+    o.sign = (eits_sign)sign;
+    o.lambda_rel = R(0.05);
+    o.gate_factor = 0;
+    for (int solver = 3; solver >= 0; --solver) { /* the active set first: its gap bounds the optimum from below */
+        o.solver = (eits_solver)solver;
+        o.iterations = 4000;
+        o.gap_rel = R(BOTH_WIDTHS(1e-5, 1e-9));
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        eits_forget(ctx);
+        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+        const eits_info info = ctx->info;
+        CHECK(info.gap >= 0 && info.nonzeros > 0 && info.step_halvings == 0);
+        double *got = dense_copy(ctx->x, N);
+        const double lambda = (double)info.lambda, scale = 0.5 * dense_dot(y, y, RANK);
+        CHECK_NEAR(info.gap, dense_gap(&b->b.d, y, got, lambda, o.sign), 300 * EPS * scale);
+        const double objective = dense_objective(&b->b.d, y, got, lambda), room = 300 * EPS * scale;
+        if (solver == 3) {
+            CHECK(info.stop == EITS_STOP_GAP || info.stop == EITS_STOP_OPTIMUM);
+            CHECK(info.gap <= BOTH_WIDTHS(1e-5, 1e-9) * scale);
+            least = objective - (double)info.gap - room;
+        }
+        CHECK(objective >= least && objective <= least + (double)info.gap + BOTH_WIDTHS(1.2e-4, 1e-8) * scale);
+        CHECK(info.gap <= R(1e-3) * (eits_real)scale);
+        free(got);
+    }
+    free(y);
+}
+
+#endif

@@ -1,0 +1,226 @@
+/* The floor of the whitening, raised with the noise of the reference: the map against the formula in double, the noise that it lets
+ * through, and when nothing is raised. */
+#include "observed_bench.h"
+
+#include "eitskin/frame.h"
+#include "eitskin/touch.h"
+#include "floor.h"
+
+static const double FACTOR = 5, MOST = 1;
+
+static void choose_factor(eits_context *ctx, double factor)
+{
+    eits_options o = ctx->options;
+    o.floor_noise_factor = (eits_real)factor;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+}
+
+/* D_i of the formula; the strongest direction's is 1. */
+static double weight(int i, double mu)
+{
+    const double square = pow(SMALL_DECAY, 2 * i);
+    return sqrt((square + SMALL_FLOOR) / (square + mu) * (1 + mu) / (1 + SMALL_FLOOR));
+}
+
+/* F is D, and y is D P d, of the floor that the noise asks for. */
+static void the_formula(void)
+{
+    const double noises[] = {2.1e-3, 0.01, 0.1, 0.9};
+    for (size_t n = 0; n < sizeof noises / sizeof noises[0]; ++n) {
+        const double mu = fmin(FACTOR * noises[n], MOST), bound = BOTH_WIDTHS(1e-5, 1e-6); /* P and S are stored as float */
+        bench b;
+        eits_context *ctx = set_up(&b, WHITENED, 0);
+        (void)stage(&b);
+        double *stored = dense_copy(ctx->y, RANK);
+        ctx->basis[STRIDE + RANK] = R(NAN); /* as a map that overflowed may leave it */
+        pretend_noise(ctx, noises[n]);
+        (void)stage(&b);
+        CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+        CHECK_NEAR(ctx->floor_in_force, mu, 1e-5 * mu);
+        CHECK_EQUAL(eits_adjoint_macs(ctx), RANK);
+        CHECK_EQUAL(eits_forward_macs(ctx), RANK);
+        eits_real v[STRIDE];
+        for (int i = 0; i < STRIDE; ++i)
+            v[i] = 1; /* also in the padding, which no map may bring in */
+        eits_real once[STRIDE];
+        memcpy(once, v, sizeof once);
+        CHECK_EQUAL(eits_map(ctx, once), RANK);
+        const eits_real *back = eits_adjoint(ctx, v, ctx->adjoint);
+        for (int i = 0; i < STRIDE; ++i) {
+            CHECK_NEAR(once[i], i < RANK ? weight(i, mu) : 0, bound);
+            CHECK(once[i] <= 1 && back[i] == once[i]);
+        }
+        for (int i = 0; i < RANK; ++i)
+            CHECK_NEAR(ctx->y[i], weight(i, mu) * stored[i], bound * fabs(stored[i]));
+        free(stored);
+        dense_bench_close(&b.b);
+    }
+}
+
+/* White noise on all rows: in the correlations, as a root mean square over S's columns, and in |y|^2. */
+static void noise_through_it(void)
+{
+    bench b;
+    eits_context *ctx = set_up(&b, WHITENED, 0);
+    const double stored = (double)ctx->sheet_energy;
+    double energy = 0, sum = 0, whole = 0;
+    ctx->baseline.lambda_noise = R(3.0);
+    pretend_noise(ctx, 0.01);
+    (void)stage(&b);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        for (int i = 0; i < RANK; ++i)
+            energy += pow(weight(i, 0.05) * b.b.d.p[k * RANK + (uint32_t)i], 2);
+        sum += energy_of_row(&b, k, 0);
+        whole += energy_of_row(&b, k, 1);
+    }
+    CHECK_NEAR(eits_lambda_noise(ctx), 3 * sqrt(sum / whole), 1e-4);
+    CHECK(sum < 0.7 * whole && energy < 0.7 * stored);
+    CHECK_NEAR(ctx->sheet_energy, energy, 1e-4 * energy);
+    leave_out(&b, 3);
+    (void)stage(&b);
+    CHECK_NEAR(ctx->sheet_energy, stored, 0);
+    dense_bench_close(&b.b);
+}
+
+static void solvers_solve_the_seen_problem(void)
+{
+    for (int storage = 0; storage < 4; ++storage) {
+        for (int sign = 0; sign < 3; ++sign) {
+            small_spec spec = WHITENED;
+            spec.storage = (eits_storage)storage;
+            spec.lipschitz_factor = 1.0002; /* the small model finds it from below */
+            bench b;
+            eits_context *ctx = set_up(&b, spec, storage % 2);
+            pretend_noise(ctx, storage < 2 ? 0.02 : 0.1);
+            (void)stage(&b);
+            CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+            CHECK_EQUAL(ctx->basis_count, storage % 2);
+            solve_what_is_seen(&b, sign);
+            dense_bench_close(&b.b);
+        }
+    }
+}
+
+static void reconstruct(bench *b, eits_real image[N])
+{
+    CHECK_EQUAL(eits_reconstruct(&b->b.c.ctx, b->frame, SMALL_ROWS, image, NULL), EITS_OK);
+}
+
+/* The model's own bits where nothing is known of the noise, or nothing asked for, or hardly more than there is; raised ones are the
+ * same from all kernels, and go with the option. */
+static void only_where_asked_for(void)
+{
+    bench b, other;
+    eits_real plain[N], image[N], raised[N];
+    eits_context *ctx = set_up(&b, WHITENED, 1);
+    reconstruct(&b, plain);
+    CHECK(ctx->info.floor == ctx->floor);
+    CHECK_NEAR(ctx->floor, SMALL_FLOOR, 1e-5);
+    const double little[] = {1e-4, SMALL_FLOOR / FACTOR, 1.009 * SMALL_FLOOR / FACTOR};
+    for (size_t k = 0; k < sizeof little / sizeof little[0]; ++k) {
+        pretend_noise(ctx, little[k]);
+        reconstruct(&b, image);
+        CHECK(!ctx->rewhitened && ctx->info.floor == ctx->floor && memcmp(image, plain, sizeof image) == 0);
+    }
+    pretend_noise(ctx, 1.012 * SMALL_FLOOR / FACTOR);
+    reconstruct(&b, image);
+    CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+    CHECK(memcmp(image, plain, sizeof image) != 0);
+    pretend_noise(ctx, 0.02);
+    reconstruct(&b, raised);
+    CHECK_NEAR(ctx->info.floor, 0.1, 1e-5);
+    choose_factor(ctx, 0);
+    reconstruct(&b, image);
+    CHECK(memcmp(image, plain, sizeof image) == 0);
+    choose_factor(ctx, FACTOR);
+    reconstruct(&b, image);
+    CHECK(memcmp(image, raised, sizeof image) == 0);
+    choose_factor(ctx, 1e29);
+    reconstruct(&b, image);
+    CHECK(ctx->info.floor == R(1.0));
+    eits_context *portable = set_up(&other, WHITENED, 1);
+    pretend_noise(portable, 0.02);
+    CHECK_EQUAL(eits_use_portable_kernels(portable, 1), EITS_OK);
+    reconstruct(&other, image);
+    CHECK(memcmp(image, raised, sizeof image) == 0);
+    CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK); /* of one frame nothing is known of the noise */
+    reconstruct(&b, image);
+    CHECK(memcmp(image, plain, sizeof image) == 0);
+    dense_bench_close(&other.b);
+    dense_bench_close(&b.b);
+}
+
+/* Models of another form stay as they are, and so do those whose numbers overflow; one without a floor gets one. */
+static void models_of_other_forms(void)
+{
+    bench b;
+    small_spec spec = WHITENED;
+    spec.shape = SMALL_RANDOM;
+    eits_context *ctx = set_up(&b, spec, 0);
+    pretend_noise(ctx, 0.1);
+    (void)stage(&b);
+    reconstruct(&b, NULL);
+    CHECK(!ctx->rewhitened && ctx->info.floor == 0);
+    dense_bench_close(&b.b);
+    spec.shape = SMALL_IDENTITY; /* whitened with no floor at all; all directions are alike */
+    ctx = set_up(&b, spec, 0);
+    pretend_noise(ctx, 0.1);
+    reconstruct(&b, NULL);
+    CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+    CHECK_NEAR(ctx->info.floor, 0.5, 1e-6);
+    for (int i = 0; i < RANK; ++i)
+        CHECK_NEAR(ctx->y[i], ctx->d[i], 1e-5);
+    ctx->row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160)); /* as of a row of P that is far greater than the others */
+    pretend_noise(ctx, 0.1);
+    reconstruct(&b, NULL);
+    CHECK(!ctx->rewhitened && ctx->noise_ratio == 1 && ctx->info.floor == 0);
+    dense_bench_close(&b.b);
+}
+
+/* The quiet frames' own noise raises the floor for the second half of them already, and lambda_noise is as with the model's. */
+static void learned_with_it(void)
+{
+    enum { QUIET = 4 };
+    bench b;
+    eits_context *ctx = set_up(&b, WHITENED, 0);
+    eits_real quiet[QUIET][SMALL_ROWS], mean[SMALL_ROWS];
+    uint64_t state = 5;
+    double square = 0;
+    for (int k = 0; k < QUIET; ++k) {
+        for (int i = 0; i < SMALL_ROWS; ++i)
+            quiet[k][i] = b.reference[i] + (eits_real)(0.03 * small_random(&state));
+    }
+    for (int i = 0; i < SMALL_ROWS; ++i) {
+        mean[i] = R(0.5) * (quiet[0][i] + quiet[1][i]);
+        square += pow((double)(quiet[1][i] - quiet[0][i]), 2) / 2;
+        quiet[3][i] = (mean[i] + mean[i] + quiet[2][i]) / 3; /* says nothing: the third alone tells */
+    }
+    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
+    for (int k = 0; k < QUIET; ++k)
+        CHECK_EQUAL(eits_baseline_add(ctx, quiet[k], SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    const double learned = (double)ctx->baseline.lambda_noise, noise = sqrt(square / SMALL_ROWS);
+    CHECK_EQUAL(eits_baseline_set(ctx, mean, SMALL_ROWS), EITS_OK);
+    pretend_noise(ctx, noise / (double)ctx->baseline.v0_rms);
+    memcpy(b.frame, quiet[2], sizeof b.frame);
+    (void)stage(&b);
+    CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+    double *back = dense_copy(eits_adjoint(ctx, ctx->y, ctx->adjoint), RANK), most = 0;
+    for (int j = 0; j < N; ++j)
+        most = fmax(most, fabs(dense_dot(b.b.d.s + j * RANK, back, RANK)));
+    CHECK_NEAR(learned, most / (double)ctx->noise_ratio, 1e-4 * learned);
+    CHECK(ctx->noise_ratio < R(0.8));
+    free(back);
+    dense_bench_close(&b.b);
+}
+
+int main(void)
+{
+    the_formula();
+    noise_through_it();
+    solvers_solve_the_seen_problem();
+    only_where_asked_for();
+    models_of_other_forms();
+    learned_with_it();
+    return checks_report("floor");
+}
