@@ -265,8 +265,7 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     }
     *macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->y) : 0;
     *macs += eits_project(ctx, ctx->y);
-    ctx->straight = judged && ctx->model->fields.at.data != NULL && model->data_kind == EITS_DATA_DIFFERENCE &&
-                    (ctx->options.touch_search & EITS_SEARCH_STRAIGHT) != 0;
+    ctx->straight = judged && model->data_kind == EITS_DATA_DIFFERENCE && (ctx->options.touch_search & EITS_SEARCH_STRAIGHT) != 0;
     *macs += ctx->straight ? reduce_straight(ctx, frame) : 0;
     const uint32_t directions = ctx->rewhitened && count < model->rank ? count : model->rank;
     if (ctx->basis_count >= directions) /* no direction is left: what is there is rounding */

@@ -106,7 +106,8 @@ static void begin(eits_context *ctx, eits_fit *f)
 
 static void search(eits_context *ctx, eits_fit *f)
 {
-    const int regroups = (ctx->options.touch_search & EITS_SEARCH_REGROUP) != 0, couples = eits_couples(ctx);
+    const int couples = eits_couples(ctx), straight = ctx->straight || ctx->model->data_kind == EITS_DATA_LOG_RATIO;
+    const int regroups = (ctx->options.touch_search & EITS_SEARCH_REGROUP) != 0 && (straight || couples);
     f->radius_weight = ctx->options.touch_radius_weight * (couples ? SEARCH_RADIUS : 1);
     begin(ctx, f);
     if (ctx->options.touch_sweeps == 0)

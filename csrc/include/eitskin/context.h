@@ -26,9 +26,10 @@ typedef enum eits_sign {
 
 /* What the search for touches does beyond fitting discs to the image's peaks. */
 typedef enum eits_search {
-    EITS_SEARCH_STRAIGHT = 1, /* first to v0 log(v / v0), which strong touches bend less; models of differences with fields */
-    EITS_SEARCH_REGROUP = 2,  /* discs that are one touch are joined, those that are two are parted */
-    EITS_SEARCH_COUPLED = 4   /* what touches do to each other's field is taken out of the data; models with fields */
+    EITS_SEARCH_STRAIGHT = 1, /* first to v0 log(v / v0), which strong touches bend less; models of differences */
+    EITS_SEARCH_REGROUP = 2,  /* discs that are one touch are joined, those that are two are parted; where data are straight or
+                               * coupled, for what bends them looks like more touches */
+    EITS_SEARCH_COUPLED = 4   /* what touches do to each other's field is taken out of the data; models of differences with fields */
 } eits_search;
 #define EITS_SEARCH_ALL 7u
 

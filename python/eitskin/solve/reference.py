@@ -217,7 +217,7 @@ class ReferenceEngine:
     def _straight_data(self, frame: FloatArray, unusable: BoolArray, basis: FloatArray) -> FloatArray | None:
         """What v0 log(v / v0) gives (r,), which strong touches bend less; None where it is not asked for."""
         model = self.model
-        if model.fields is None or model.data_kind != "difference" or not self.options.touch_search & STRAIGHT or not self._ready:
+        if model.data_kind != "difference" or not self.options.touch_search & STRAIGHT or not self._ready:
             return None
         return project(self._reduce(self._fold(frame, unusable, "log-ratio").d), basis)
 

@@ -25,7 +25,8 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
     """Discs for the ``image`` (n,), fitted to ``frame``; returns what each explains. ``interplay`` gives what discs add to y (r,)
     by what they do to each other; None where the model cannot tell."""
     o = fit.options
-    later, regroups = min(o.touch_sweeps, LATER_SWEEPS), bool(o.touch_search & REGROUP)
+    later, straight = min(o.touch_sweeps, LATER_SWEEPS), frame.straight is not None or fit.model.data_kind == "log-ratio"
+    regroups = bool(o.touch_search & REGROUP) and (straight or interplay is not None)
 
     def couple() -> None:
         added = interplay(fit.discs) if interplay is not None and len(fit.discs) > 1 else np.zeros_like(frame.y)

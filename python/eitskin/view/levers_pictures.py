@@ -53,8 +53,8 @@ def draw_images(path: Path, images: Found) -> None:
             here = found[snr]["macs"] / 1e6, found[snr]["image"]["mean"]
             refined = images.get(f"{name}, refined")
             axis.plot(*here, "o", color=FOUND if "refined" in name else INK, markersize=5)
-            below = refined is not None
-            axis.annotate(name, here, xytext=(6, -10 if below else 4), textcoords="offset points", fontsize=8, color=INK)
+            if "refined" not in name:
+                axis.annotate(name, here, xytext=(5, -11), textcoords="offset points", fontsize=8, color=INK)
             if refined is not None:
                 there = refined[snr]["macs"] / 1e6, refined[snr]["image"]["mean"]
                 axis.annotate("", there, xytext=here, arrowprops={"arrowstyle": "->", "color": FOUND})
@@ -62,6 +62,6 @@ def draw_images(path: Path, images: Found) -> None:
         axis.margins(x=0.25, y=0.12)
         axis.set_xlabel("million MACs a frame, image and touches")
         axis.set_ylabel("image MIoU")
-        axis.set_title(f"{snr} dB")
+        axis.set_title(f"{snr} dB; arrows: refined")
     figure.savefig(path, dpi=DPI)
     plt.close(figure)

@@ -30,7 +30,6 @@ def _searching(name: str, bits: int, **options: Any) -> Lever:
 SEARCHES = (
     _searching("peaks alone", 0),
     _searching("straight data first", STRAIGHT),
-    _searching("regrouping", REGROUP),
     _searching("coupling", COUPLED),
     _searching("straight, regrouping", STRAIGHT | REGROUP),
     _searching("straight, coupling", STRAIGHT | COUPLED),
