@@ -108,6 +108,11 @@ eits_real eits_noise_energy(const eits_context *ctx)
     return sum;
 }
 
+eits_real eits_expected_noise(const eits_context *ctx)
+{
+    return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->sheet_energy;
+}
+
 int eits_judge_misfit(eits_context *ctx, uint64_t *macs)
 {
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;

@@ -33,51 +33,70 @@ static int crowded(eits_context *ctx, const eits_touch *touches, uint32_t count)
     return (ctx->info.findings & EITS_FINDING_CROWDED) != 0;
 }
 
+/* The score of crowded.c, in double, from its features. */
+static double score_of(double found, double electrodes, double near, double wide, double left, double above, double clear)
+{
+    return -0.3583 - 0.2429 * found * 16 / electrodes + 3.645 * near - 4.607 * wide - 3.659 * sqrt(left) + 0.1329 * above + 0.7892 * clear;
+}
+
+/* Whether the frame is said to be crowded just as its score asks; a score too near the limit would test rounding. */
+static void said_as(eits_context *ctx, const eits_touch *touches, uint32_t count, double score, int expected)
+{
+    CHECK(fabs(score - 1.078) > 0.01);
+    CHECK_EQUAL(score < 1.078, expected);
+    CHECK_EQUAL(crowded(ctx, touches, count), expected);
+}
+
 static void crowds(void)
 {
     dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
-    eits_touch two[4] = {{.radius_mm = 2, .confidence = 1}, {.x_mm = 3, .y_mm = 4, .radius_mm = 1, .confidence = R(0.02)}};
     eits_options o = ctx->options;
-    o.max_touches = 5;
+    o.max_touches = 4;
+    o.touch_seed_radius_mm = 9;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_zero(ctx->y, EITS_STRIDE(RANK));
     eits_zero(ctx->residual, EITS_STRIDE(RANK));
     ctx->y[0] = ctx->info.data_norm = 10;
-    ctx->info.lambda_max = 3, ctx->info.lambda_noise = R(0.9);
-    CHECK_EQUAL(crowded(ctx, two, 2), 0); /* 5 mm apart, 1.5 times the radii are 4.5 */
-    two[1].radius_mm = R(1.4);
-    CHECK_EQUAL(crowded(ctx, two, 2), 1);
-    CHECK_EQUAL(crowded(ctx, two, 1), 0);
-    two[1].radius_mm = 1;
-    two[1].confidence = R(0.009);
-    CHECK_EQUAL(crowded(ctx, two, 2), 1);
-    CHECK_EQUAL(crowded(ctx, two + 1, 1), 0);
-    two[1].confidence = R(0.02);
-    ctx->residual[0] = R(3.5); /* 0.1225 of |y|^2 */
-    CHECK_EQUAL(crowded(ctx, two, 1), 1);
-    CHECK_NEAR(ctx->info.unexplained, 0.1225, 1e-6);
-    ctx->info.lambda_noise = R(1.1);
-    CHECK_EQUAL(crowded(ctx, two, 1), 0);
-    ctx->info.lambda_noise = R(0.9);
-    ctx->baseline.noise_v = R(0.1); /* which explains some */
-    CHECK_EQUAL(crowded(ctx, two, 1), 0);
-    ctx->baseline.noise_v = 0;
-    ctx->residual[0] = R(3.3);
-    CHECK_EQUAL(crowded(ctx, two, 1), 0);
-    CHECK_EQUAL(crowded(ctx, two, 0), 0);
-    for (int k = 0; k < 4; ++k)
-        two[k] = (eits_touch){.x_mm = (eits_real)(10 * k), .radius_mm = 1, .confidence = R(0.1)};
-    CHECK_EQUAL(crowded(ctx, two, 3), 0);
-    CHECK_EQUAL(crowded(ctx, two, 4), 1); /* of 8 electrodes */
-    o.max_touches = 3;
+    ctx->residual[0] = 1; /* 0.01 of |y|^2 */
+    ctx->info.lambda_max = 20, ctx->info.lambda_noise = 2;
+    eits_touch t[4] = {{.radius_mm = 9, .confidence = 1}, {.x_mm = 18, .y_mm = 24, .radius_mm = 9, .confidence = R(0.04)}};
+    said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.01, 2, 2), 0);
+    CHECK_NEAR(ctx->info.unexplained, 0.01, 1e-6);
+    t[1].x_mm = 12, t[1].y_mm = 16; /* nearer */
+    said_as(ctx, t, 2, score_of(2, 8, 20.0 / 18, 1, 0.01, 2, 2), 1);
+    t[1].x_mm = 0, t[1].y_mm = 30; /* no matter which way */
+    said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.01, 2, 2), 0);
+    t[1].radius_mm = 11; /* wider */
+    said_as(ctx, t, 2, score_of(2, 8, 30.0 / 20, 11.0 / 9, 0.01, 2, 2), 1);
+    t[1].radius_mm = 9;
+    ctx->residual[0] = R(2.6); /* more left, which the weakest is no longer clear of */
+    said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.0676, 2, 2 / 2.6), 1);
+    t[1].x_mm = 100;
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 2, 2 / 2.6), 0); /* far is far */
+    ctx->info.lambda_max = 2; /* hardly above noise: worth a fifth of a logit */
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 0.2, 2 / 2.6), 1);
+    ctx->info.lambda_noise = 0; /* none was learned */
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 10, 2 / 2.6), 0);
+    ctx->info.lambda_noise = 2, ctx->info.lambda_max = 20;
+    t[1].confidence = R(0.0004); /* the weakest explains next to nothing */
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 0.2, 0.2 / 2.6), 1);
+    t[1].confidence = R(0.04);
+    ctx->residual[0] = 1;
+    said_as(ctx, t, 1, score_of(1, 8, 2, 1, 0.01, 10, 3), 0);
+    CHECK_EQUAL(crowded(ctx, t, 0), 0);
+    t[2] = (eits_touch){.x_mm = -40, .radius_mm = 9, .confidence = R(0.04)};
+    t[3] = (eits_touch){.x_mm = -80, .radius_mm = 9, .confidence = R(0.04)};
+    said_as(ctx, t, 3, score_of(3, 8, 2, 1, 0.01, 2, 2), 0);
+    CHECK_EQUAL(crowded(ctx, t, 4), 1); /* as many as may be */
+    o.max_touches = 5;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(crowded(ctx, two, 3), 1);
-    CHECK_EQUAL(crowded(ctx, two, 2), 0);
-    o.findings = EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_CROWDED;
+    said_as(ctx, t, 4, score_of(4, 8, 2, 1, 0.01, 2, 2), 0);
+    o.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(crowded(ctx, two, 3), 0);
-    eits_judge_crowd(ctx, 0, two, 0);
+    t[3].x_mm = -41;
+    CHECK_EQUAL(crowded(ctx, t, 4), 0);
+    eits_judge_crowd(ctx, 0, t, 0);
     CHECK(ctx->info.unexplained == 0);
     dense_bench_close(&b);
 }

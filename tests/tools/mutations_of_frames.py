@@ -281,20 +281,18 @@ MISFIT = of(
 
 CROWDED = of(
     "crowded.c",
-    ("crowded: never too near", "return eits_fma(dx, dx, dy * dy) < reach * reach;", "return 0;", "judgements"),
-    ("crowded: distances of x", "eits_fma(dx, dx, dy * dy)", "dx * dx", "judgements"),
-    (
-        "crowded: noise is unexplained",
-        "eits_fma(-NOISE, noise_share(ctx), ctx->info.unexplained)",
-        "ctx->info.unexplained",
-        "judgements",
-    ),
-    ("crowded: whatever is unexplained", "ctx->info.unexplained) > UNEXPLAINED;", "ctx->info.unexplained) > 1000;", "judgements"),
-    ("crowded: weak touches", "crowded |= touches[k].confidence < WEAKEST;", ";", "judgements"),
-    ("crowded: one touch", "k < count && count > 1; ++k", "k < count; ++k", "judgements"),
-    ("crowded: electrodes a touch", " || ELECTRODES_A_TOUCH * count >= ctx->model->n_electrodes", "", "judgements"),
+    ("crowded: distances of x", "eits_sqrt(eits_fma(dx, dx, dy * dy))", "eits_fabs(dx)", "judgements"),
+    ("crowded: how near", "sum = eits_fma(NEAREST, nearest(touches, count), sum);", "", "judgements"),
+    ("crowded: nearest beyond far", "eits_real least = FAR;", "eits_real least = 100;", "judgements"),
+    ("crowded: how wide", "sum = eits_fma(WIDEST, widest / ctx->options.touch_seed_radius_mm, sum);", "", "judgements"),
+    ("crowded: the first touch's width", "touches[k].radius_mm > widest ? touches[k].radius_mm : widest;", "touches[0].radius_mm;", "judgements"),
+    ("crowded: what is left", "sum = eits_fma(LEFT, eits_sqrt(left), sum);", "", "judgements"),
+    ("crowded: the weakest over noise", "sum = eits_fma(WEAKEST, above, sum);", "", "judgements"),
+    ("crowded: the first is the weakest", "weakest = lesser(weakest, touches[k].confidence);", "", "judgements"),
+    ("crowded: how clear", "return eits_fma(CLEAREST, clear, sum);", "return sum;", "judgements"),
+    ("crowded: how many", "(eits_real)count, OFFSET)", "1, OFFSET)", "judgements"),
+    ("crowded: electrodes", "TOUCHES * OF_ELECTRODES / (eits_real)ctx->model->n_electrodes", "TOUCHES", "judgements"),
     ("crowded: as many as may be", "count >= ctx->options.max_touches || ", "", "judgements"),
-    ("crowded: in noise", " || ctx->info.lambda_max < CLEAR * ctx->info.lambda_noise", "", "judgements"),
     ("crowded: as the frame before", "    ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;\n", "", "judgements"),
 )
 

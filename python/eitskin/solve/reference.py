@@ -309,9 +309,8 @@ class ReferenceEngine:
             reduced = Reduced(y, self._straight, self.seen, basis, lambda_noise, noise)
             added = partial(self._interplay, basis, self._known) if self._couples else None
             found, self._examiner.found.unexplained, coupled = find_touches(self.model, reduced, image, o, added)
-            noise_share = noise / max(norm**2, 1e-300)
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
-            self._examiner.crowd(found, o.max_touches, noise_share, clearness)
+            self._examiner.crowd(found, o, clearness)
             many = len(found) > 1
             found = self._loaded(self._tracker.step(found, o, lambda_max, lambda_noise))
             if o.refine and many and added is not None and o.touch_sweeps > 0:

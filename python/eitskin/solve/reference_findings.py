@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.findings import FINDINGS
-from eitskin.core.results import Touch
+from eitskin.core.results import Options, Touch
 from eitskin.model.model import Model
 
 FloatArray = npt.NDArray[np.float64]
@@ -24,7 +25,8 @@ ROW_GROWN, ROW_SMALL = 8.0, 0.05
 GLITCH_NOISE, GLITCH_ROBUST, GLITCH_LARGEST, GLITCH_SHARE, GLITCH_NEARER, GLITCH_MOST = 6.5, 16.0, 0.03, 0.25, 0.5, 8
 GLITCH_PIVOT, GLITCH_RIDGE, GLITCH_UNPAIRED, GLITCH_ENERGY, NOISY_SHARE = 0.05, 1e-4, 16.0, 0.5, 0.9
 MISFIT_SHARE, MISFIT_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
-CROWD_UNEXPLAINED, CROWD_NOISE, CROWD_NEIGHBOURS, CROWD_WEAKEST, CROWD_CLEAR, ELECTRODES_A_TOUCH = 0.12, 1.5, 1.5, 0.01, 3.0, 2
+CROWD_WEIGHTS, CROWD_OFFSET, CROWD_LEAST = (-0.2429, 3.645, -4.607, -3.659, 0.1329, 0.7892), -0.3583, 1.078
+CROWD_FAR, CROWD_STRONG, CROWD_CLEAR = 2.0, 10.0, 3.0
 ROBUST = 1.4826
 ORTHOGONAL = 1e-3
 
@@ -303,20 +305,23 @@ class Examiner:
         if against > STALE_RATIO * lambda_max and against > STALE_NOISE * lambda_noise:
             self.found.names.add("stale reference")
 
-    def crowd(self, touches: tuple[Touch, ...], most: int, noise_share: float, clearness: float) -> None:
-        """Whether there are more touches than can be told apart; ``found.unexplained`` is known. ``clearness``: max(S'y)
-        over that of noise."""
-        count = len(touches)
-        if not count or "crowded" not in self.wanted or clearness < CROWD_CLEAR:
+    def crowd(self, touches: tuple[Touch, ...], options: Options, clearness: float) -> None:
+        """Whether there are more touches than can be told apart, by the score of csrc/src/crowded.c; ``found.unexplained`` is
+        known. ``clearness``: max(S'y) over that of noise."""
+        count, left = len(touches), self.found.unexplained
+        if not count or "crowded" not in self.wanted:
             return
-        crowded = count >= most or ELECTRODES_A_TOUCH * count >= self.model.protocol.n_electrodes
-        crowded |= self.found.unexplained - CROWD_NOISE * noise_share > CROWD_UNEXPLAINED
-        crowded |= count > 1 and min(touch.confidence for touch in touches) < CROWD_WEAKEST
-        for k, a in enumerate(touches):
-            for b in touches[:k]:
-                reach = CROWD_NEIGHBOURS * (a.radius_mm + b.radius_mm)
-                crowded |= (a.x_mm - b.x_mm) ** 2 + (a.y_mm - b.y_mm) ** 2 < reach**2
-        if crowded:
+        apart = [np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) / (a.radius_mm + b.radius_mm) for a, b in combinations(touches, 2)]
+        weakest = min(touch.confidence for touch in touches)
+        features = (
+            count * 16 / self.model.protocol.n_electrodes,
+            min([CROWD_FAR, *apart]),
+            max(touch.radius_mm for touch in touches) / options.touch_seed_radius_mm,
+            np.sqrt(left),
+            min(CROWD_STRONG, np.sqrt(weakest) * clearness) if np.isfinite(clearness) else CROWD_STRONG,
+            np.sqrt(weakest / left) if weakest < CROWD_CLEAR**2 * left else CROWD_CLEAR,
+        )
+        if count >= options.max_touches or np.dot(CROWD_WEIGHTS, features) + CROWD_OFFSET < CROWD_LEAST:
             self.found.names.add("crowded")
 
     def of_frame(self) -> dict[str, Any]:
