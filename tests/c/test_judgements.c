@@ -43,6 +43,7 @@ static void crowds(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_zero(ctx->y, EITS_STRIDE(RANK));
     eits_zero(ctx->residual, EITS_STRIDE(RANK));
+    memset(ctx->basis_for, EITS_SIDE_FIRST, ctx->model->n_folded); /* all folds are in use, of one row each */
     ctx->y[0] = ctx->info.data_norm = 10;
     ctx->info.lambda_max = 3, ctx->info.lambda_noise = R(0.9);
     CHECK_EQUAL(crowded(ctx, two, 2), 0); /* 5 mm apart, 1.5 times the radii are 4.5 */
