@@ -211,7 +211,7 @@ static void store_s(const small_spec *spec, const double *s, uint32_t n, uint32_
 static void fill_fields(const small_spec *spec, const uint32_t *cells, uint32_t n, uint8_t *flds)
 {
     const double pixel = spec->pixel_mm > 0 ? (double)spec->pixel_mm : 6.0, half = 0.5 * spec->side, radius = 0.75 * spec->side * pixel;
-    small_put_f32(flds, 1e-3f);
+    small_put_f32(flds, 20.0f);
     small_put_f32(flds + 4, 3.0f);
     for (uint32_t j = 0; j < n; ++j) {
         uint8_t *column = flds + 16 + 2 * (size_t)j * SMALL_FIELDS_STRIDE;
