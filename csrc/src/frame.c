@@ -74,6 +74,13 @@ static int ratio_undefined(const eits_context *ctx, eits_real v0)
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE && eits_fabs(v0) < R(1e-6) * ctx->baseline.v0_rms;
 }
 
+/* A row and its reciprocal that differ by less than rounding of their references agree: quantised voltages often do. */
+static int is_apart(const eits_context *ctx, eits_real apart, eits_real v0)
+{
+    const eits_real rounding = sizeof(eits_real) == 4 ? R(0x1p-20) : R(0x1p-49);
+    return eits_fabs(apart) > rounding * (ctx->model->data_kind == EITS_DATA_NORMALISED ? 1 : eits_fabs(ctx->baseline.gain * v0));
+}
+
 /* d_k: the mean of a row and its reciprocal, or whichever is usable; apart_k: their difference. Sets basis_for, and says whether
  * any of it changed. */
 static int fold_data(eits_context *ctx, const eits_real *frame)
@@ -97,7 +104,7 @@ static int fold_data(eits_context *ctx, const eits_real *frame)
             used |= (uint8_t)(side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND);
         }
         ctx->d[k] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
-        ctx->apart[k] = used == EITS_SIDE_BOTH ? apart : 0;
+        ctx->apart[k] = used == EITS_SIDE_BOTH && is_apart(ctx, apart, v0[fold.first]) ? apart : 0;
         changed |= used != ctx->basis_for[k];
         ctx->basis_for[k] = used;
     }

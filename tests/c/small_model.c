@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char TAGS[SMALL_SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
-                                             "COLW", "GRID", "DEFS", "GOLD", "SCAL", "META"};
-enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META };
+static const char TAGS[SMALL_SECTIONS + 1][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW",
+                                                 "GRID", "DEFS", "GOLD", "SCAL", "META", "FLDS"};
+enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META, FLDS };
 
 void *small_aligned(void **memory, size_t size)
 {
@@ -206,7 +206,29 @@ static void store_s(const small_spec *spec, const double *s, uint32_t n, uint32_
     }
 }
 
-static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *const at[SMALL_SECTIONS])
+/* Each electrode's current goes in at its point of a circle of radius R around the image: E = (z - p) / |z - p|^2, times R / 20 mm;
+ * the mirror of the circle is a = R, b = conj(z) / R. */
+static void fill_fields(const small_spec *spec, const uint32_t *cells, uint32_t n, uint8_t *flds)
+{
+    const double pixel = spec->pixel_mm > 0 ? (double)spec->pixel_mm : 6.0, half = 0.5 * spec->side, radius = 0.75 * spec->side * pixel;
+    small_put_f32(flds, 20.0f);
+    small_put_f32(flds + 4, 3.0f);
+    for (uint32_t j = 0; j < n; ++j) {
+        uint8_t *column = flds + 16 + 2 * (size_t)j * SMALL_FIELDS_STRIDE;
+        const double x = pixel * (cells[j] % spec->side + 0.5 - half), y = pixel * (cells[j] / spec->side + 0.5 - half);
+        for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
+            const double angle = 6.28318530717958647692 * e / SMALL_ELECTRODES;
+            const double dx = x - radius * cos(angle), dy = y - radius * sin(angle), unit = radius / 20 / (dx * dx + dy * dy);
+            small_put_u16(column + 2 * e, half_of(unit * dx));
+            small_put_u16(column + 2 * (SMALL_ELECTRODES + e), half_of(unit * dy));
+        }
+        const double mirror[4] = {radius, 0, x / radius, -y / radius};
+        for (uint32_t k = 0; k < 4; ++k)
+            small_put_u16(column + 2 * (2 * SMALL_ELECTRODES + k), half_of(mirror[k]));
+    }
+}
+
+static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *const at[SMALL_SECTIONS + 1])
 {
     uint32_t cells[64 * 64];
     const uint32_t n = kept_cells(spec, cells);
@@ -247,6 +269,8 @@ static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *cons
     for (uint32_t i = 0; i < 2 * SMALL_ROWS; ++i)
         small_put_f32(at[GOLD] + 4 * i, 1.0f + 0.01f * (float)small_random(&state));
     memcpy(at[META], "{}", 2);
+    if (spec->fields)
+        fill_fields(spec, cells, n, at[FLDS]);
 }
 
 small_model small_model_make(small_spec spec)
@@ -255,17 +279,19 @@ small_model small_model_make(small_spec spec)
     uint32_t cells[64 * 64];
     if (spec.side > 64)
         abort();
-    const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u, table = 64 + 16 * SMALL_SECTIONS;
-    const uint32_t sizes[SMALL_SECTIONS] = {64, SMALL_ROWS * 4, SMALL_FOLDED * 8, SMALL_FOLDED * 4, SMALL_FOLDED * stride * 4,
-                                            n * stride * item[spec.storage], n * 4, n * 4, 64, (2 * SMALL_ROWS + n) * 4, n * 4, 2};
+    const uint32_t sections = SMALL_SECTIONS + (spec.fields != 0);
+    const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u, table = 64 + 16 * sections;
+    const uint32_t sizes[SMALL_SECTIONS + 1] = {64, SMALL_ROWS * 4, SMALL_FOLDED * 8, SMALL_FOLDED * 4, SMALL_FOLDED * stride * 4,
+                                            n * stride * item[spec.storage], n * 4, n * 4, 64, (2 * SMALL_ROWS + n) * 4, n * 4, 2,
+                                                16 + n * SMALL_FIELDS_STRIDE * 2};
     const int integer = spec.storage == EITS_STORAGE_I16 || spec.storage == EITS_STORAGE_I8;
     uint32_t total = table, offset = table;
-    for (uint32_t p = 0; p < SMALL_SECTIONS; ++p)
+    for (uint32_t p = 0; p < sections; ++p)
         total += (sizes[p] + 15u) & ~15u;
     small_model made = {.size = total};
     made.blob = small_aligned(&made.memory, total);
-    uint8_t *at[SMALL_SECTIONS];
-    for (uint32_t p = 0; p < SMALL_SECTIONS; ++p) {
+    uint8_t *at[SMALL_SECTIONS + 1] = {NULL};
+    for (uint32_t p = 0; p < sections; ++p) {
         uint8_t *entry = made.blob + 64 + 16 * p;
         /* an absent scale is written under a tag that readers skip */
         memcpy(entry, p == SCAL && !integer ? "XTRA" : TAGS[p], 4);
@@ -279,7 +305,7 @@ small_model small_model_make(small_spec spec)
     memcpy(made.blob, "EITM", 4);
     small_put_u16(made.blob + 4, 1);
     small_put_u32(made.blob + 8, total);
-    small_put_u32(made.blob + 16, SMALL_SECTIONS);
+    small_put_u32(made.blob + 16, sections);
     const uint64_t hash = eits_protocol_hash(SMALL_ELECTRODES, SMALL_ROWS, at[PROT]);
     memcpy(made.blob + 24, &hash, sizeof hash);
     small_model_seal(&made);
@@ -316,7 +342,7 @@ void small_model_seal(small_model *model)
 
 uint8_t *small_model_entry(const small_model *model, const char *tag)
 {
-    for (uint32_t p = 0; p < SMALL_SECTIONS; ++p) {
+    for (uint32_t p = 0; p < small_get_u32(model->blob + 16); ++p) {
         uint8_t *entry = model->blob + 64 + 16 * p;
         if (memcmp(entry, tag, 4) == 0)
             return entry;

@@ -7,7 +7,7 @@
 /* 8 electrodes, adjacent: 40 rows in 19 reciprocal pairs, every fifth measured the other way round, and 2 single rows. */
 #define SMALL_DECAY 0.75
 #define SMALL_FLOOR 0.01
-enum { SMALL_ELECTRODES = 8, SMALL_ROWS = 40, SMALL_PAIRS = 19, SMALL_FOLDED = 21, SMALL_SECTIONS = 12 };
+enum { SMALL_ELECTRODES = 8, SMALL_ROWS = 40, SMALL_PAIRS = 19, SMALL_FOLDED = 21, SMALL_SECTIONS = 12, SMALL_FIELDS_STRIDE = 24 };
 
 typedef enum small_shape {
     SMALL_RANDOM = 0,
@@ -24,6 +24,7 @@ typedef struct small_spec {
     small_shape shape;
     double lipschitz_factor; /* the stated constant over the true greatest eigenvalue of S S'; 0: 1.02 */
     float pixel_mm;          /* 0: 6 mm */
+    int fields;              /* with section FLDS: currents at points on a circle around the image, whose mirror it is */
 } small_spec;
 
 typedef struct small_model {

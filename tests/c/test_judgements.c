@@ -57,6 +57,7 @@ static void crowds(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_zero(ctx->y, EITS_STRIDE(RANK));
     eits_zero(ctx->residual, EITS_STRIDE(RANK));
+    memset(ctx->basis_for, EITS_SIDE_FIRST, ctx->model->n_folded); /* all folds are in use, of one row each */
     ctx->y[0] = ctx->info.data_norm = 10;
     ctx->residual[0] = 1; /* 0.01 of |y|^2 */
     ctx->info.lambda_max = 20, ctx->info.lambda_noise = 2;

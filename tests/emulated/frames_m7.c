@@ -96,7 +96,8 @@ typedef struct option {
 
 static const option option_table[] = {
     WHOLE(iterations), WHOLE(gap_every), WHOLE(max_touches), WHOLE(max_masked), WHOLE(warm_start), WHOLE(project_baseline),
-    WHOLE(touch_sweeps), WHOLE(mac_limit), WHOLE(findings), REAL(lambda_abs), REAL(lambda_rel), REAL(lambda_noise_factor), REAL(gate_factor),
+    WHOLE(touch_sweeps), WHOLE(mac_limit), WHOLE(findings), WHOLE(touch_search), WHOLE(refine),
+    REAL(lambda_abs), REAL(lambda_rel), REAL(lambda_noise_factor), REAL(gate_factor),
     REAL(gap_rel), REAL(saturation_v), REAL(touch_threshold), REAL(touch_share), REAL(touch_min_radius_mm),
     REAL(touch_max_radius_mm), REAL(touch_seed_radius_mm), REAL(touch_change_s_per_m), REAL(touch_radius_weight), REAL(follow_mm),
     WHOLE(touch_search), WHOLE(refine), WHOLE(track_confirm), WHOLE(track_hold), REAL(track_smooth), REAL(floor_noise_factor),

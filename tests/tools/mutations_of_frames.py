@@ -285,7 +285,7 @@ CROWDED = of(
     ("crowded: how near", "sum = eits_fma(NEAREST, nearest(touches, count), sum);", "", "judgements"),
     ("crowded: nearest beyond far", "eits_real least = FAR;", "eits_real least = 100;", "judgements"),
     ("crowded: how wide", "sum = eits_fma(WIDEST, widest / ctx->options.touch_seed_radius_mm, sum);", "", "judgements"),
-    ("crowded: the first touch's width", "touches[k].radius_mm > widest ? touches[k].radius_mm : widest;", "touches[0].radius_mm;", "judgements"),
+    ("crowded: the first touch's width", "widest ? touches[k].radius_mm : widest;", "widest ? 0 : widest;", "judgements"),
     ("crowded: what is left", "sum = eits_fma(LEFT, eits_sqrt(left), sum);", "", "judgements"),
     ("crowded: the weakest over noise", "sum = eits_fma(WEAKEST, above, sum);", "", "judgements"),
     ("crowded: the first is the weakest", "weakest = lesser(weakest, touches[k].confidence);", "", "judgements"),

@@ -32,6 +32,7 @@ from eitskin.solve.reference_track import Tracker
 
 BoolArray = npt.NDArray[np.bool_]
 
+ROUNDING = 2.0**-49
 BASIS_TOLERANCE = 1e-6
 LEAST_SQUARE = 2.0**-969
 SOLVED = ("iterations", "gap", "optimum")
@@ -243,7 +244,9 @@ class ReferenceEngine:
         first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
         one, other = value[fold.first], np.where(second, sign * value[fold.second], 0.0)
         d = (np.where(first, one, 0.0) + other) / np.maximum(first.astype(int) + second, 1)
-        return Folded(d, np.where(first & second, one - other, 0.0), first, second)
+        size = np.ones(len(one)) if kind == "normalised" else np.abs(self._gain * self._v0[fold.first])
+        apart = first & second & (np.abs(one - other) > ROUNDING * size)
+        return Folded(d, np.where(apart, one - other, 0.0), first, second)
 
     def _along(self, folded: Folded) -> FloatArray | None:
         """What drift of the gain makes of the folded data, (k,); None where it is not ignored."""

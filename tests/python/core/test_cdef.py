@@ -61,6 +61,7 @@ CDEF_MUTATIONS = [
     ("    uint8_t *unusable;\n", "    uint32_t *unusable;\n", "struct eits_context"),
     ("    uint32_t basis_count;\n", "    uint32_t basis_counts;\n", "struct eits_context"),
     ("EITS_SIGN_INCREASE, EITS_SIGN_DECREASE", "EITS_SIGN_DECREASE, EITS_SIGN_INCREASE", "enum eits_sign"),
+    ("EITS_SEARCH_STRAIGHT, EITS_SEARCH_REGROUP", "EITS_SEARCH_REGROUP, EITS_SEARCH_STRAIGHT", "enum eits_search"),
     ("EITS_STOP_GAP, ", "", "enum eits_stop"),
     ("EITS_E_NOT_FINITE, ... }", "... }", "enum eits_status"),
     ("EITS_STORAGE_F32,", "EITS_STORAGE_F32 = 1,", "enum eits_storage"),

@@ -327,6 +327,9 @@ BAD_OPTIONS = [
     ({"max_masked": -1}, "max_masked"),
     ({"mac_limit": -1}, "mac_limit"),
     ({"findings": 256}, "findings = 256 is out of range; use 0 to 255"),
+    ({"touch_search": 8}, "touch_search = 8 is out of range; use 0 to 7"),
+    ({"touch_search": -1}, "touch_search"),
+    ({"refine": 2}, "refine = 2 must be true or false"),
     ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),
     ({"solver": "newton"}, "solver = 'newton' is not known; use one of fista, working-set"),
     ({"warm_start": 2}, "warm_start"),
@@ -381,6 +384,7 @@ EDGES = {
     "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000, "follow_mm": 0.0, "lambda_abs": 1e29,
     "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
     "floor_noise_factor": 0.0,
+    "touch_search": 7, "refine": True,
 }  # fmt: skip
 
 

@@ -223,12 +223,13 @@ def test_what_a_disc_explains_is_what_leaving_it_out_costs() -> None:
     fit = fit_of(prebuilt()[0])
     fit.discs = [Disc(-40.0, 20.0, 12.0, 0.0, 1.0), Disc(10.0, -5.0, 15.0, 0.0, 1.0), Disc(20.0, -18.0, 15.0, 0.0, 1.0)]
     atoms = np.array([fit.answers(disc)[0] for disc in fit.discs]).T
-    changes, *_ = np.linalg.lstsq(atoms, fit.y, rcond=None)
+    y = fit.data
+    changes, *_ = np.linalg.lstsq(atoms, y, rcond=None)
     fit.discs = [replace(disc, change=float(c)) for disc, c in zip(fit.discs, changes, strict=True)]
-    whole = float(np.sum((fit.y - atoms @ changes) ** 2))
+    whole = float(np.sum((y - atoms @ changes) ** 2))
     expected = []
     for k in range(3):
         rest = np.delete(atoms, k, axis=1)
-        left = fit.y - rest @ np.linalg.lstsq(rest, fit.y, rcond=None)[0]
-        expected.append((float(left @ left) - whole) / float(fit.y @ fit.y))
+        left = y - rest @ np.linalg.lstsq(rest, y, rcond=None)[0]
+        expected.append((float(left @ left) - whole) / float(y @ y))
     assert fit.explained() == pytest.approx(expected, rel=1e-3)

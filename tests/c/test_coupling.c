@@ -1,0 +1,346 @@
+/* What touches do to each other, against a dense computation with complex numbers; when it is left alone; and v0 log(v / v0). */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "coupling.h"
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+#include "examine.h"
+#include "kernels.h"
+#include "vec.h"
+
+#include <complex.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RANK = 16, SIDE = 12, L = SMALL_ELECTRODES };
+static const double PIXEL = 6, PI = 3.14159265358979323846;
+static const small_spec WITH_FIELDS = {.rank = RANK, .side = SIDE, .fields = 1};
+static const eits_disc THREE[] = {{-14, 3, 8, R(0.02), 1}, {9, 11, 6, R(-0.01), -1}, {5, -17, 10, R(0.03), 1}};
+
+/* A context with a frame's data, where rows of fold `left_out` (below 0: none) are not in use. */
+static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out, eits_real *frame)
+{
+    eits_context *ctx = dense_bench_open(b, spec, 0);
+    eits_options o = ctx->options;
+    o.project_baseline = 0;
+    o.max_masked = SMALL_ROWS;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    uint64_t state = 3;
+    uint32_t masked;
+    uint64_t macs;
+    small_reference(&b->c.model, 1, frame);
+    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        frame[i] *= (eits_real)(1 + 0.05 * small_random(&state));
+    for (int side = 0; left_out >= 0 && side < 2; ++side) {
+        const eits_fold fold = b->c.model.fold[left_out];
+        CHECK_EQUAL(eits_mask_row(ctx, side ? fold.second : fold.first, 1), EITS_OK);
+    }
+    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    return ctx;
+}
+
+/* ---- the dense computation ---- */
+
+typedef struct seen {
+    double complex field[L]; /* E_x + i E_y of each electrode's current, averaged over the disc */
+    double complex place, a, b;
+    double moment;
+} seen;
+
+static seen look(const eits_model *m, const eits_disc *disc)
+{
+    seen s = {.place = (double)disc->x_mm + I * (double)disc->y_mm};
+    double whole = 0, rows[2 * L + 4] = {0};
+    for (uint32_t j = 0; j < m->n_pixels; ++j) {
+        const double x = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * PIXEL, y = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * PIXEL;
+        const double share = 0.5 + ((double)disc->radius_mm - cabs(x + I * y - s.place)) / PIXEL;
+        const double cover = share < 0 ? 0 : share > 1 ? 1 : share;
+        whole += cover;
+        for (uint32_t r = 0; r < 2 * L + 4; ++r)
+            rows[r] += cover * dense_entry(&m->fields.at, j, r);
+    }
+    for (uint32_t e = 0; e < L; ++e)
+        s.field[e] = (rows[e] + I * rows[L + e]) / whole;
+    s.a = (rows[2 * L] + I * rows[2 * L + 1]) / whole;
+    s.b = (rows[2 * L + 2] + I * rows[2 * L + 3]) / whole;
+    s.moment = (double)disc->change * PI * ((double)(disc->radius_mm * disc->radius_mm) + PIXEL * PIXEL / 12);
+    return s;
+}
+
+/* The field that a dipole of `moment` times the vector e, at `from`, has at `at`, by vectors: s (2 (e.u) u - e) / r^2. */
+static double complex direct(double complex e, double complex at, double complex from, double s, double touching)
+{
+    const double r = cabs(at - from), reach = r > touching ? r : touching;
+    if (r == 0)
+        return 0;
+    const double complex u = (at - from) / r;
+    return s / (reach * reach) * (2 * (creal(e) * creal(u) + cimag(e) * cimag(u)) * u - e);
+}
+
+/* P of the interplay, rows of folds that are left out ignored; folds' second rows give the same. */
+static void dense_interplay(const eits_context *ctx, const dense *d, const eits_disc *disc, uint32_t count, double *added)
+{
+    const eits_model *m = ctx->model;
+    seen s[4];
+    memset(added, 0, d->rank * sizeof *added);
+    for (uint32_t i = 0; i < count; ++i)
+        s[i] = look(m, disc + i);
+    double *directions = dense_numbers((size_t)d->rank * d->folded);
+    uint32_t out = 0;
+    for (uint32_t k = 0; k < d->folded; ++k) {
+        const uint8_t *row = m->protocol + 4 * (size_t)m->fold[k].first;
+        double datum = 0;
+        for (uint32_t i = 0; i < count; ++i) {
+            double complex bent = 0;
+            for (uint32_t j = 0; j < count; ++j) {
+                const double complex e = s[j].field[row[0]] - s[j].field[row[1]], far = s[j].a - s[j].b * s[i].place;
+                const double per = s[j].moment * (double)m->fields.per_sheet;
+                if (i != j)
+                    bent += direct(e, s[i].place, s[j].place, per, (double)(disc[i].radius_mm + disc[j].radius_mm)) - conj(per * conj(e) / (far * far));
+            }
+            const double complex measured = s[i].field[row[2]] - s[i].field[row[3]];
+            datum -= (double)m->fields.volts * s[i].moment * (creal(bent) * creal(measured) + cimag(bent) * cimag(measured));
+        }
+        const int used = ctx->basis_for[k] != EITS_SIDE_NONE;
+        for (uint32_t i = 0; i < d->rank; ++i) {
+            added[i] += used ? datum * d->p[(size_t)k * d->rank + i] : 0;
+            directions[(size_t)out * d->rank + i] = d->p[(size_t)k * d->rank + i];
+        }
+        out += !used;
+    }
+    dense_project_out(added, directions, out, d->rank);
+    free(directions);
+}
+
+/* ctx->y less what eits_couple leaves of it, |y| made so great that no limit is reached. */
+static void interplay(eits_context *ctx, const eits_disc *disc, uint32_t count, double *added, uint64_t *macs)
+{
+    eits_real data[RANK + 8];
+    *macs = eits_couple(ctx, disc, count, data);
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        added[i] = (double)ctx->y[i] - (double)data[i];
+}
+
+static double size_of(const double *a)
+{
+    return sqrt(dense_dot(a, a, RANK));
+}
+
+static void as_computed_densely(void)
+{
+    for (int left_out = -1; left_out < 12; left_out += 4) {
+        dense_bench b;
+        eits_real frame[SMALL_ROWS];
+        double added[RANK], expected[RANK];
+        uint64_t macs;
+        eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out, frame);
+        for (uint32_t count = 2; count <= 3; ++count) {
+            dense_interplay(ctx, &b.d, THREE, count, expected);
+            interplay(ctx, THREE, count, added, &macs);
+            CHECK(size_of(expected) > 1e-3);
+            for (int i = 0; i < RANK; ++i)
+                CHECK_NEAR(added[i], expected[i], BOTH_WIDTHS(2e-5, 1e-12) * (size_of(expected) + size_of(added)) + 4 * EPS * fabs((double)ctx->y[i]));
+        }
+        CHECK(left_out < 0 || ctx->basis_for[left_out] == EITS_SIDE_NONE);
+        dense_bench_close(&b);
+    }
+}
+
+/* Products counted one by one: fields over covers, what bends them, what answers, P of the folds in use, two norms. */
+static void work_is_counted(void)
+{
+    dense_bench b;
+    eits_real frame[SMALL_ROWS], field[SMALL_FIELDS_STRIDE];
+    double added[RANK];
+    uint64_t macs, expected = 0;
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    for (int k = 0; k < 3; ++k)
+        expected += eits_disc_field(ctx, &THREE[k], field);
+    CHECK_EQUAL(expected % (2 * L + 4), 0);
+    interplay(ctx, THREE, 3, added, &macs);
+    CHECK_EQUAL(macs, expected + 3 * (2 * 4 * L + 3 * SMALL_FOLDED) + SMALL_FOLDED * RANK + 2 * RANK);
+    dense_bench_close(&b);
+}
+
+/* Driven and measured pairs exchanged: the same datum, to what halves make of the mirror. */
+static void reciprocals_give_the_same(void)
+{
+    dense_bench b, turned;
+    eits_real frame[SMALL_ROWS];
+    double added[RANK], other[RANK];
+    uint64_t macs;
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    interplay(ctx, THREE, 3, added, &macs);
+    small_model made = small_model_make(WITH_FIELDS);
+    uint8_t *fold = small_model_section(&made, "FOLD", NULL);
+    int exchanged = 0;
+    for (int k = 0; k < SMALL_PAIRS; ++k, fold += 8) {
+        uint8_t kept[2];
+        if (fold[4] != 1) /* measured the other way round */
+            continue;
+        memcpy(kept, fold, 2), memcpy(fold, fold + 2, 2), memcpy(fold + 2, kept, 2);
+        ++exchanged;
+    }
+    small_model_seal(&made);
+    CHECK(exchanged > 10);
+    eits_context *now = open_bench(&turned, WITH_FIELDS, -1, frame);
+    CHECK_EQUAL(eits_model_open(&turned.c.model, made.blob, made.size), EITS_OK);
+    interplay(now, THREE, 3, other, &macs);
+    for (int i = 0; i < RANK; ++i)
+        CHECK_NEAR(other[i], added[i], 2e-3 * size_of(added));
+    small_model_free(&made);
+    dense_bench_close(&turned);
+    dense_bench_close(&b);
+}
+
+/* A field that is the same everywhere, and no mirror: 1 / r^2 beyond touching, nothing more within, nothing at all in one place. */
+static void distance_and_overlap(void)
+{
+    dense_bench b;
+    eits_real frame[SMALL_ROWS];
+    double near[RANK], added[RANK];
+    uint64_t macs;
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    uint8_t *halves = small_model_section(&b.made, "FLDS", NULL) + 16;
+    for (uint32_t j = 0; j < b.c.model.n_pixels; ++j, halves += 2 * SMALL_FIELDS_STRIDE) {
+        for (uint32_t r = 0; r < 2 * L + 4; ++r)
+            small_put_u16(halves + 2 * r, r == 2 * L ? 0x7BFFu : r > 2 * L ? 0 : 0x3800u + (r < L ? 37 * r : 5 * (r - L) * (r - L)));
+    }
+    eits_disc two[2] = {{-18, 0, 6, R(0.03), 1}, {-6, 0, 6, R(0.03), 1}}; /* where they touch */
+    interplay(ctx, two, 2, near, &macs);
+    CHECK(size_of(near) > 0);
+    const double tolerance = (4 * EPS * 10 + 1e-6) * size_of(near) + 40 * EPS;
+    for (int step = 1; step <= 3; ++step) {
+        two[1].x_mm = -18 + 12 * (eits_real)(step + 1);
+        interplay(ctx, two, 2, added, &macs);
+        for (int i = 0; i < RANK; ++i)
+            CHECK_NEAR(added[i], near[i] / ((step + 1) * (step + 1)), tolerance);
+    }
+    for (int step = 1; step <= 2; ++step) { /* inside each other */
+        two[1].x_mm = -18 + 4 * (eits_real)step;
+        interplay(ctx, two, 2, added, &macs);
+        for (int i = 0; i < RANK; ++i)
+            CHECK_NEAR(added[i], near[i], tolerance);
+    }
+    two[1].x_mm = -18;
+    interplay(ctx, two, 2, added, &macs);
+    for (int i = 0; i < RANK; ++i)
+        CHECK_NEAR(added[i], 0, tolerance); /* the mirror 65504 mm away */
+    dense_bench_close(&b);
+}
+
+/* Whether the data stay as they are, bit for bit. */
+static int left_alone(eits_context *ctx, const eits_disc *disc, uint32_t count)
+{
+    eits_real data[RANK + 8];
+    (void)eits_couple(ctx, disc, count, data);
+    return memcmp(data, ctx->y, ctx->model->rank * sizeof *data) == 0;
+}
+
+static void when_it_is_left_alone(void)
+{
+    dense_bench b;
+    eits_real frame[SMALL_ROWS];
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    CHECK(eits_couples(ctx) && !left_alone(ctx, THREE, 2));
+    CHECK(left_alone(ctx, THREE, 1) && left_alone(ctx, THREE, 0));
+    eits_disc strong[2] = {THREE[0], THREE[2]};
+    double added[RANK], y[RANK];
+    uint64_t macs;
+    interplay(ctx, strong, 2, added, &macs);
+    for (int i = 0; i < RANK; ++i)
+        y[i] = (double)ctx->y[i];
+    const double most = 0.5 * size_of(y) / size_of(added); /* a quarter of |y|^2; it grows as the product of the changes */
+    CHECK(most > 1);
+    strong[0].change *= (eits_real)(0.99 * most);
+    CHECK(!left_alone(ctx, strong, 2));
+    strong[0].change *= R(1.02);
+    CHECK(left_alone(ctx, strong, 2));
+    eits_options o = ctx->options;
+    o.touch_search = EITS_SEARCH_STRAIGHT | EITS_SEARCH_REGROUP;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK(!eits_couples(ctx) && left_alone(ctx, THREE, 2));
+    dense_bench_close(&b);
+    static const small_spec others[] = {{.rank = RANK, .side = SIDE},
+                                        {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO},
+                                        {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_NORMALISED}};
+    for (int k = 0; k < 3; ++k) {
+        ctx = open_bench(&b, others[k], -1, frame);
+        CHECK(!eits_couples(ctx) && left_alone(ctx, THREE, 3) && ctx->straight == 0);
+        dense_bench_close(&b);
+    }
+    /* fields of three discs and one more do not fit into the factor of rank 9: 9 x 16 numbers hold six of 24 */
+    const small_spec low = {.rank = 9, .side = SIDE, .fields = 1};
+    eits_disc many[6] = {THREE[0], THREE[1], THREE[2], {-20, -20, 5, R(0.01), 1}, {20, 20, 5, R(0.01), 1}, {20, -4, 5, R(0.01), 1}};
+    ctx = open_bench(&b, low, -1, frame);
+    CHECK(!left_alone(ctx, many, 5));
+    CHECK(left_alone(ctx, many, 6));
+    dense_bench_close(&b);
+}
+
+/* The straight data of a model of differences are the data of the same matrices' model of log ratios. */
+static void straight_data(void)
+{
+    for (int left_out = -1; left_out < 9; left_out += 3) {
+        dense_bench b, log_bench;
+        eits_real frame[SMALL_ROWS];
+        eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out, frame);
+        const small_spec spec = {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO};
+        eits_context *log_ctx = open_bench(&log_bench, spec, left_out, frame);
+        CHECK_EQUAL(ctx->straight, 1);
+        CHECK(memcmp(ctx->y_straight, log_ctx->y, RANK * sizeof *ctx->y) == 0);
+        CHECK(memcmp(ctx->y, log_ctx->y, RANK * sizeof *ctx->y) != 0);
+        uint32_t masked;
+        uint64_t with = 0, without = 0;
+        CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with), EITS_OK);
+        eits_options o = ctx->options;
+        o.touch_search = EITS_SEARCH_REGROUP | EITS_SEARCH_COUPLED;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without), EITS_OK);
+        CHECK_EQUAL(ctx->straight, 0);
+        const uint32_t folds = SMALL_FOLDED - (left_out >= 0);
+        CHECK(with - without >= folds * RANK && with - without <= (folds + 2) * RANK);
+        dense_bench_close(&log_bench);
+        dense_bench_close(&b);
+    }
+}
+
+/* Where the reference is all but zero there is no ratio: differences stay, halved over both sides. */
+static void straight_data_without_a_ratio(void)
+{
+    dense_bench b;
+    eits_real frame[SMALL_ROWS], y[RANK];
+    uint32_t masked;
+    uint64_t macs;
+    eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        frame[i] = ctx->baseline.v0[i];
+    const eits_fold fold = b.c.model.fold[3];
+    ctx->baseline.v0[fold.first] = ctx->baseline.v0[fold.second] = 0;
+    frame[fold.first] = frame[fold.second] = R(0.01);
+    eits_options o = ctx->options;
+    o.findings = 0;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    eits_copy(y, ctx->y, RANK);
+    CHECK(eits_dot(ctx, y, y, RANK) > 0);
+    for (int i = 0; i < RANK; ++i)
+        CHECK_NEAR(ctx->y_straight[i], y[i], 4 * EPS * fabs((double)y[i]));
+    dense_bench_close(&b);
+}
+
+int main(void)
+{
+    as_computed_densely();
+    work_is_counted();
+    reciprocals_give_the_same();
+    distance_and_overlap();
+    when_it_is_left_alone();
+    straight_data();
+    straight_data_without_a_ratio();
+    return checks_report("coupling");
+}
