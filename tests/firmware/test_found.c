@@ -98,7 +98,8 @@ static void test_glitch(void)
     uint32_t rows = 0;
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_TOUCHES); ++k) {
         const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_TOUCHES, k));
-        CHECK_EQUAL(head->findings, head->glitches > 0 ? EITS_FINDING_GLITCH : 0);
+        const uint32_t crowded = EITS_FINDING_CROWDED; /* noise that passed for a touch may be said to be a guess */
+        CHECK_EQUAL(head->findings & ~crowded, head->glitches > 0 ? EITS_FINDING_GLITCH : 0);
         CHECK(head->glitches <= 2 && head->masked == head->glitches);
         rows += head->glitches;
     }
