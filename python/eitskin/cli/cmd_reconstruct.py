@@ -41,6 +41,9 @@ def add_parser(subparsers: Any) -> None:
     add_wish(parser)
     parser.add_argument("--warm", action="store_true", help="start each frame from the last one's result")
     parser.add_argument(
+        "--refine", action="store_true", help="solve again with what touches do to each other taken out of the data"
+    )
+    parser.add_argument(
         "--track",
         action="store_true",
         help="the frames are a stream, 48 or 96 a second: confirm births, keep ids, smooth places, as a board does",
@@ -129,6 +132,8 @@ def _apply(options: argparse.Namespace, reconstructor: Reconstructor) -> None:
     check_solver(options)
     if options.iterations is not None:
         changes["iterations"] = options.iterations
+    if options.refine:
+        changes["refine"] = True
     if options.mac_limit is not None:
         changes["mac_limit"] = options.mac_limit
     if options.gap is not None:

@@ -34,6 +34,7 @@ class Configuration:
         warm_start: each frame begins from the last one's image. Judged at the fourth frame of touches that are held, after
             others were: what a user sees of touches that rest, not of those that land.
         touch_sweeps: of the off-grid fit; 0 leaves touches at the image's peaks.
+        refine: the image is solved again with the touches' interplay taken out of the data; not over a board's link.
         samples: of a measurement, at 1 MS/s; white noise falls with the root of them.
         scan: "full" measures every row, "reciprocal" one of each reciprocal pair, in half the time with sqrt(2) of the noise.
     """
@@ -53,6 +54,7 @@ class Configuration:
     touch_sweeps: int = 6
     samples: int = BASE_SAMPLES
     scan: str = "full"
+    refine: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -74,6 +76,7 @@ class Configuration:
             "warm_start": self.warm_start,
             "touch_sweeps": self.touch_sweeps,
         }
+        settings |= {"refine": True} if self.refine else {}
         return settings | ({"mac_limit": self.mac_limit} if self.mac_limit else {})
 
     @property
@@ -93,9 +96,9 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ConfigError(f"{where}: the key 'name' is required: a word or two without commas, for tables and pictures")
     where = f"{where} {name!r}"
-    warm = table.get("warm_start", Configuration.warm_start)
-    if not isinstance(warm, bool):
-        raise ConfigError(f"{where}: warm_start must be true or false, not {warm!r}")
+    for name in ("warm_start", "refine"):
+        if not isinstance(table.get(name, False), bool):
+            raise ConfigError(f"{where}: {name} must be true or false, not {table[name]!r}")
     one = Configuration(
         name=name,
         rank=integer(table, "rank", Configuration.rank, where, low=1, high=1024),
@@ -108,10 +111,11 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
         gap=number(table, "gap", Configuration.gap, where, low=0, high=1),
         mac_limit=integer(table, "mac_limit", Configuration.mac_limit, where, low=0, high=2**62),
         lambda_rel=number(table, "lambda_rel", Configuration.lambda_rel, where, low=0, high=1),
-        warm_start=warm,
+        warm_start=table.get("warm_start", Configuration.warm_start),
         touch_sweeps=integer(table, "touch_sweeps", Configuration.touch_sweeps, where, low=0, high=1000),
         samples=integer(table, "samples", Configuration.samples, where, low=PERIOD_SAMPLES, high=1020),
         scan=choice(table, "scan", Configuration.scan, SCANS, where),
+        refine=table.get("refine", Configuration.refine),
     )
     if one.mac_limit and "mac_limit" not in {entry.name for entry in fields(Options)}:
         raise ConfigError(f"{where}: mac_limit = {one.mac_limit}, but this build's core has no limit of MACs; leave it out")

@@ -39,7 +39,11 @@ SCALE = (
     Configuration("calm light", rank=48, pixels=24, floor=0.1),
 )
 
+REFINABLE = ("quick", "standard", "keen", "fine", "best")
+REFINED = tuple(replace(one, name=f"{one.name} refined", refine=True) for one in SCALE if one.name in REFINABLE)
+
 KNOBS = {
+    "refine": REFINED,
     "iterations": (
         *_turned(STANDARD, "iterations", (10, 20, 30, 45, 90, 150, 300), "{} iterations"),
         *_turned(FINE, "iterations", (30, 60, 120, 180, 300), "{} iterations"),

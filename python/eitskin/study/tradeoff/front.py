@@ -304,7 +304,8 @@ def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") ->
     known = []
     for one in points:
         cost, accuracy = one.cost(wish.unit, wish.board, wish.where, wish.worst), one.accuracy(wish.where)
-        usable = one.configuration.touch_sweeps >= LEAST_SWEEPS and (wish.board == "host" or one.fits_f767)
+        told = wish.board == "host" or (one.fits_f767 and not one.configuration.refine)  # the link has no word for refining
+        usable = one.configuration.touch_sweeps >= LEAST_SWEEPS and told
         if cost is not None and accuracy is not None and usable:
             known.append((cost, accuracy, one))
     if not known:

@@ -33,6 +33,8 @@ class Recommendation:
             options.append("--warm")
         if one.gap:
             options.append(f"--gap {one.gap:g}")
+        if one.refine:
+            options.append("--refine (of reconstruct)")
         return options
 
     def as_dict(self) -> dict[str, Any]:
