@@ -427,6 +427,29 @@ static void directions_that_nearly_agree(void)
     small_model_free(&made);
 }
 
+/* What the two rows of a fold differ by; by less than rounding of their references: nothing. */
+static void reciprocals_that_agree(void)
+{
+    for (int kind = 0; kind < 2; ++kind) {
+        bench b;
+        eits_context *ctx = set_up(&b, (eits_data_kind)kind, 2, 0);
+        const eits_fold fold = b.c.model.fold[4]; /* sign 1 */
+        uint32_t masked;
+        uint64_t macs;
+        CHECK_EQUAL(fold.sign, 1);
+        for (int step = 0; step < 4; ++step) {
+            static const double off[] = {0, 2, 4, 40}; /* in units of the last place */
+            const eits_real v0 = ctx->baseline.v0[fold.first];
+            ctx->baseline.v0[fold.second] = v0 * (eits_real)(1 + off[step] * EPS);
+            b.frame[fold.first] = b.frame[fold.second] = R(1.01) * v0;
+            CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+            CHECK((ctx->apart[4] == 0) == (step < 3));
+            CHECK(ctx->apart[5] != 0);
+        }
+        tear_down(&b);
+    }
+}
+
 int main(void)
 {
     data_of_each_kind();
@@ -440,5 +463,6 @@ int main(void)
     row_without_reference();
     ratios_at_their_limits();
     directions_that_nearly_agree();
+    reciprocals_that_agree();
     return checks_report("frame");
 }

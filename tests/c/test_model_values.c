@@ -152,6 +152,43 @@ static void not_finite_in_each_section(void)
     CHECK_EQUAL(with_number(bytes, "SCAL", 4 * 8, INFINITY), EITS_E_MODEL_VALUE);
 }
 
+/* Section FLDS: of one size, its numbers finite and not negative, each half finite, the padding of columns too. */
+static void fields(void)
+{
+    const small_spec spec = {.rank = 3, .side = 3, .fields = 1};
+    static const float wrong[] = {-1.0f, NAN, INFINITY, -INFINITY, 1.1e30f}, right[] = {0.0f, 1e-30f, 1.0f, 9e29f};
+    for (uint32_t at = 0; at < 8; at += 4) {
+        for (int k = 0; k < 5; ++k)
+            CHECK_EQUAL(with_number(spec, "FLDS", at, wrong[k]), EITS_E_MODEL_VALUE);
+        for (int k = 0; k < 4; ++k)
+            CHECK_EQUAL(with_number(spec, "FLDS", at, right[k]), EITS_OK);
+        CHECK_EQUAL(with_number(spec, "FLDS", at + 8, NAN), EITS_OK); /* reserved: not looked at */
+    }
+    uint32_t size;
+    small_model made = small_model_make(spec);
+    (void)small_model_section(&made, "FLDS", &size);
+    CHECK_EQUAL(size, 16 + 9 * 2 * SMALL_FIELDS_STRIDE);
+    for (uint32_t at = 16; at < size; at += 4) {
+        CHECK_EQUAL(with_word(spec, "FLDS", at, 0x7C00u), EITS_E_MODEL_VALUE);
+        CHECK_EQUAL(with_word(spec, "FLDS", at, 0xFE000000u), EITS_E_MODEL_VALUE);
+        CHECK_EQUAL(with_word(spec, "FLDS", at, 0x7BFFFBFFu), EITS_OK);
+    }
+    static const uint32_t sizes[] = {0, 4, 16, 2};
+    for (int k = 0; k < 8; ++k) {
+        small_put_u32(small_model_entry(&made, "FLDS") + 8, k < 4 ? sizes[k] : k % 2 ? size - sizes[k % 4] : size + sizes[k % 4]);
+        small_model_seal(&made);
+        eits_model model;
+        const eits_status status = eits_model_open(&model, made.blob, made.size);
+        CHECK_EQUAL(status, k == 4 ? EITS_OK : EITS_E_MODEL_SECTION);
+    }
+    small_model_free(&made);
+    made = small_model_make(TINY);
+    eits_model model;
+    CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
+    CHECK(model.fields.at.data == NULL);
+    small_model_free(&made);
+}
+
 static void defaults(void)
 {
     static const struct {
@@ -190,6 +227,7 @@ static void use(const small_model *made)
     eits_options options = ctx.options;
     CHECK_EQUAL(eits_set_options(&ctx, &options), EITS_OK);
     options.iterations = options.iterations < 25 ? options.iterations : 25;
+    options.refine = 1;
     CHECK_EQUAL(eits_set_options(&ctx, &options), EITS_OK);
     eits_real difference = 0;
     (void)eits_self_test(&ctx, &difference);
@@ -210,7 +248,7 @@ static void every_byte_changed_and_sealed(void)
 {
     static const uint8_t changes[] = {0xFF, 0x80, 0x40, 0x01};
     for (int storage = 0; storage < 4; ++storage) {
-        const small_spec spec = {.rank = 3, .side = 3, .storage = (eits_storage)storage, .kind = (eits_data_kind)(storage % 3)};
+        const small_spec spec = {.rank = 3, .side = 3, .storage = (eits_storage)storage, .kind = (eits_data_kind)(storage % 3), .fields = storage == 0};
         small_model made = small_model_make(spec);
         for (size_t at = 16; at < made.size; ++at) {
             for (size_t c = 0; c < sizeof changes; ++c) {
@@ -228,7 +266,7 @@ static void many_bytes_changed_and_sealed(void)
 {
     uint64_t state = 99;
     for (int round = 0; round < 2000; ++round) {
-        const small_spec spec = {.rank = 3, .side = 3, .storage = (eits_storage)(round % 4)};
+        const small_spec spec = {.rank = 3, .side = 3, .storage = (eits_storage)(round % 4), .fields = round % 2};
         small_model made = small_model_make(spec);
         const int changes = 1 + round % 7;
         for (int c = 0; c < changes; ++c) {
@@ -247,6 +285,7 @@ int main(void)
     numbers_of_the_dimensions();
     electrodes_folds_and_pixels();
     not_finite_in_each_section();
+    fields();
     defaults();
     every_byte_changed_and_sealed();
     many_bytes_changed_and_sealed();

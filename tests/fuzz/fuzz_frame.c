@@ -38,6 +38,7 @@ static void make_models(void)
             spec.lipschitz_factor = k == 15 ? 0.2 : 0; /* a step five times too long */
         }
         spec.round = k % 3 == 1;
+        spec.fields = k % 2 == 0;
         blobs[k] = small_model_make(spec);
         spoil(&blobs[k], k);
         MUST(eits_model_open(&models[k], blobs[k].blob, blobs[k].size) == EITS_OK);
@@ -142,9 +143,12 @@ static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
         *whole[k] = which & 0x80 ? fuzz_u32(in) : fuzz_u8(in);
     else if (k < WHOLE + REAL)
         *real[k - WHOLE] = which & 0x80 ? (eits_real)fuzz_f32(in) : (eits_real)fuzz_u8(in) / 64;
-    else if (k == WHOLE + REAL)
-        o->sign = (eits_sign)(fuzz_u8(in) % 4);
-    else
+    else if (k == WHOLE + REAL) {
+        const uint8_t bits = fuzz_u8(in);
+        o->sign = (eits_sign)(bits % 4);
+        o->refine = bits / 4 % 2;
+        o->touch_search = EITS_SEARCH_ALL ^ (bits / 8u % 16u); /* beyond all: refused */
+    } else
         o->solver = (eits_solver)(fuzz_u8(in) % 5);
 }
 
@@ -217,6 +221,9 @@ static void reconstruct(twins *t, fuzz_bytes *in, int touches)
     uint32_t count[2];
     for (int k = 0; k < t->count; ++k)
         MUST(eits_find_touches(&t->ctx[k], found[k], EITS_MAX_TOUCHES, &count[k]) == EITS_OK);
+    same_results(t); /* perhaps solved again */
+    for (uint32_t j = 0; j < t->model.n_pixels; ++j)
+        MUST(eits_is_finite(t->ctx[0].image[j]) && eits_is_finite(t->ctx[0].x[j]));
     MUST(t->count < 2 || count[0] == count[1]);
     for (uint32_t k = 0; t->count == 2 && k < count[0]; ++k) /* past the id: it may be padded */
         MUST(found[0][k].id == found[1][k].id && same_bits(&found[0][k].x_mm, &found[1][k].x_mm, 5 * sizeof(eits_real)));

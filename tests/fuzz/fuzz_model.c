@@ -19,6 +19,8 @@ static void reconstruct(eits_context *ctx, const eits_real *frame)
     fuzz_check_result(ctx, status, 0);
     MUST(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count) == EITS_OK);
     MUST(status == EITS_OK || count == 0);
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) /* perhaps solved again */
+        MUST(eits_is_finite(ctx->image[j]));
     fuzz_check_touches(ctx, touches, count);
 }
 
@@ -52,6 +54,7 @@ static void use(const eits_model *model)
     frame_of(model, model->golden.frame, 1.0f, frame);
     reconstruct(&ctx, frame);
     options.sign = EITS_SIGN_BOTH;
+    options.refine = 1;
     options.solver = (eits_solver)((model->defaults->solver + 1u) % 4u);
     MUST(eits_set_options(&ctx, &options) == EITS_OK);
     frame_of(model, model->golden.frame, 1.5f, frame);

@@ -41,7 +41,7 @@ static void models(void)
 {
     for (unsigned k = 0; k < 24; ++k) {
         const small_spec spec = {.rank = 1 + k % 9, .side = 1 + k % 5, .storage = (eits_storage)(k % 4), .kind = (eits_data_kind)(k % 3),
-                                 .shape = k % 5 == 0 ? SMALL_WAVES : SMALL_RANDOM, .lipschitz_factor = k == 23 ? 0.1 : 0};
+                                 .shape = k % 5 == 0 ? SMALL_WAVES : SMALL_RANDOM, .lipschitz_factor = k == 23 ? 0.1 : 0, .fields = k % 6 == 0};
         if (spec.shape == SMALL_WAVES && spec.side * spec.side < spec.rank)
             continue;
         small_model made = small_model_make(spec);

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mutation import of
 from mutations_of_frames import FRAMES
 from mutations_of_kernels import KERNELS
+from mutations_of_touches import LOAD, TOUCHES
 
 FISTA = of(
     "fista.c",
@@ -44,7 +45,21 @@ FRAME = (
     of(
         "frame.c",
         ("reciprocals added without their sign", "value = turn ? -measured : measured;", "value = measured;", "frame"),
-        ("a fold's sum for its mean", "used == EITS_SIDE_BOTH ? R(0.5) * sum : sum", "sum", "frame"),
+        ("a fold's sum for its mean", "ctx->d[k] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum", "ctx->d[k] = sum", "frame"),
+        (
+            "a straight fold's sum",
+            "ctx->list_value[count] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum",
+            "ctx->list_value[count] = sum",
+            "coupling",
+        ),
+        ("straight reciprocals not turned", "sum += side == 1 && fold.sign < 0 ? -value : value;", "sum += value;", "coupling"),
+        ("a logarithm of no reference", "eits_fabs(v0[i]) < least ? datum(ctx, frame[i], v0[i]) :", "", "coupling"),
+        (
+            "rounding tells two measurements",
+            "const eits_real rounding = sizeof(eits_real) == 4 ? R(0x1p-20) : R(0x1p-49);",
+            "const eits_real rounding = 0;",
+            "frame",
+        ),
         ("NaN let through", "unknown = !eits_is_finite(frame[i]) ? EITS_ROW_UNKNOWN : 0", "unknown = 0", "frame"),
         ("rows without a reference let through", " || !eits_is_finite(ctx->baseline.v0[i])", "", "baseline"),
         ("saturation only beyond the limit", "eits_fabs(frame[i]) >= limit", "eits_fabs(frame[i]) > limit", "frame"),
@@ -119,6 +134,20 @@ FRAME = (
 SOLVE = (
     of(
         "solve.c",
+        (
+            "solved again from the last image",
+            "    const eits_status status = solve(ctx, 0);",
+            "    const eits_status status = solve(ctx, 1);",
+            "regroup",
+        ),
+        ("only the second solve counts", "    ctx->info.iterations += before.iterations;\n", "", "regroup"),
+        ("nothing comes of it, and it stays", "if (status != EITS_OK || !ctx->warm) {", "if (status != EITS_OK) {", "regroup"),
+        (
+            "findings of the refined image",
+            "    ctx->info.findings = before.findings; /* judged by the frame as it came */\n",
+            "",
+            "regroup",
+        ),
         ("no gate", "if (o->gate_factor > 0 && ", "if (0 && ", "solve_state"),
         ("a gate twice as high", "lambda_max < o->gate_factor *", "lambda_max < 2 * o->gate_factor *", "solve_state"),
         ("lambda the less of two", "return by_data > by_noise ?", "return by_data < by_noise ?", "solve_state"),
@@ -253,105 +282,6 @@ EXACT = (
     )
 )
 
-TOUCH = (
-    of(
-        "disc.c",
-        ("an area of whole pixels", "pixels += share > 0 ? (share < 1 ? share : 1) : 0;", "pixels += share > 0 ? 1 : 0;", "disc"),
-        ("covers half a pixel too wide", "share = R(0.5) + (radius - distance)", "share = R(1.0) + (radius - distance)", "disc"),
-        ("a rim without slope", "share < 1 ? factor / pixel : 0", "share < 1 ? 0 * factor / pixel : 0", "disc"),
-        ("weights not divided by", " / (eits_real)model->column_weight[j];", ";", "disc"),
-        ("the skin a cell too wide", "x1 > 2 ? x1 - 2 : 0; ix <= x1 &&", "x1 > 2 ? x1 - 2 : 0; ix <= x1 + 1 &&", "disc"),
-        (
-            "the skin is all of the image",
-            "            if (ctx->cell[(size_t)iy * model->nx + ix] != EITS_NO_PIXEL)\n",
-            "            if (1)\n",
-            "disc",
-        ),
-        ("the skin begins at its first cell", "if (!(x >= -1 && y >= -1 &&", "if (!(x >= 0 && y >= -1 &&", "disc"),
-    )
-    + of(
-        "touch.c",
-        ("touches of the other sign", "return change * disc->polarity > 0 ? change : 0;", "return change;", "touch"),
-        ("too weak a touch is kept", "f->explained[weakest] >= ctx->options.touch_share", "f->explained[weakest] >= 0", "touch"),
-        (
-            "the strongest is dropped",
-            "f->explained[k] < f->explained[weakest] ? k",
-            "f->explained[k] > f->explained[weakest] ? k",
-            "touch",
-        ),
-        (
-            "what is dropped stays explained",
-            "eits_axpy(ctx, ctx->residual, f->disc[k].change, atom_of(ctx, k), rank);\n    --f->count",
-            "--f->count",
-            "touch",
-        ),
-        (
-            "a disc moves downhill only by luck",
-            "g[i] = disc->change * eits_dot(ctx, column[i], left, rank);",
-            "g[i] = -disc->change * eits_dot(ctx, column[i], left, rank);",
-            "touch_fit",
-        ),
-        ("no halving of a disc's step", "attempt < 3; ++attempt", "attempt < 1; ++attempt", "track"),
-        ("a radius that strength does not tell", "weight = o->touch_radius_weight * energy", "weight = 0 * energy", "touch_fit"),
-        ("touches that noise makes", "return best >= least;", "return best >= 0 * least;", "touch"),
-    )
-    + of(
-        "track.c",
-        ("the farthest for the nearest", "squared <= nearest", "squared <= reach", "track"),
-        ("two touches of one id", "        taken[from] = 1;\n", "", "track"),
-        ("the id 0", "ctx->next_id == UINT32_MAX ? 1 : ctx->next_id + 1", "ctx->next_id + 1", "track"),
-        (
-            "every birth waits",
-            "f->seen < ctx->options.track_confirm && !clear",
-            "f->seen < ctx->options.track_confirm && !(0 * clear)",
-            "track_in_time",
-        ),
-        ("half of a touch is a touch", " && f->touch.confidence >= SURE_SHARE;", ";", "track_in_time"),
-        ("near noise is sure enough", ">= SURE_CLEARNESS * ctx", ">= 1 * ctx", "track_in_time"),
-        ("noise is never faint", "< ctx->info.lambda_noise;", "< 0;", "track_in_time"),
-        ("a share for its root", "eits_sqrt(touch->confidence)", "touch->confidence", "track_in_time"),
-        (
-            "newborns reach as far as known touches",
-            "told ? ctx->options.follow_mm : NEWBORN_REACH *",
-            "told ? ctx->options.follow_mm :",
-            "track_in_time",
-        ),
-        ("a lifted touch stays", "const int held = f->faint &&", "const int held =", "track_in_time"),
-        ("noise is held", "f->seen >= KNOWN_FRAMES && told", "told", "track_in_time"),
-        ("held touches beyond the most", "&& told < ctx->options.max_touches", "", "track_in_time"),
-        ("ids held for ever", "f->missed >= ctx->options.track_hold", "0", "track_in_time"),
-        ("a held touch still explains", "        f->touch.confidence = 0;\n", "", "track_in_time"),
-        (
-            "a velocity that is not learned",
-            "next.vx_mm = eits_fma(speed_gain, dx, before->vx_mm);",
-            "next.vx_mm = before->vx_mm;",
-            "track_in_time",
-        ),
-        ("a velocity that is not used", "next.touch.x_mm += f->vx_mm;", "next.touch.x_mm += 0;", "track_in_time"),
-        ("ever surer of the place", "next.place_mm2 += eits_fma(", "next.place_mm2 += 0 * eits_fma(", "track_in_time"),
-        ("noise that all touches share", "ctx->info.lambda_noise / own : 0", "1 : 0", "track_in_time"),
-        ("a finger runs off the skin", "is_finite(&next) && on_skin(ctx, &next.touch))", "is_finite(&next))", "track_in_time"),
-        (
-            "a filter that breaks down",
-            "is_finite(&next) && on_skin(ctx, &next.touch) ? next : anew",
-            "1 ? next : anew",
-            "track_in_time",
-        ),
-        ("a radius that lags by itself", "eits_fma(gain, found->radius_mm", "eits_fma(R(0.5), found->radius_mm", "track_in_time"),
-    )
-)
-
-LOAD = of(
-    "load.c",
-    ("the gain left out", "eits_fabs(strength_s_per_m_mm2) * gain_at(load, u, v)", "eits_fabs(strength_s_per_m_mm2)", "load"),
-    ("a negative strength's load", "eits_fabs(strength_s_per_m_mm2) *", "strength_s_per_m_mm2 *", "load"),
-    ("a polynomial without bounds", "(gain < MOST_GAIN ? gain : MOST_GAIN)", "gain", "load"),
-    ("beyond where it was calibrated", "if (from > reach) {", "if (0 * from > reach) {", "load"),
-    ("powers of u and v mixed up", "power[degree + 1] = power[degree] * v;", "power[degree + 1] = power[degree] * u;", "load"),
-    ("the table's first piece for all", "while (k < last && strength >", "while (0 && strength >", "load"),
-    ("loads without end", "return found < most ? found : most;", "return found;", "load"),
-)
-
 BYTES = of(
     "model.c",
     (
@@ -375,4 +305,4 @@ BYTES = of(
     ),
 )
 
-MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCH + LOAD + BYTES + FRAMES
+MUTATIONS = FISTA + KERNELS + FRAME + SOLVE + WORKING_SET + EXACT + TOUCHES + LOAD + BYTES + FRAMES

@@ -1,0 +1,384 @@
+/* Discs that are one touch are joined, those that are two are parted; the image solved again without the touches' interplay. */
+#include "check.h"
+#include "dense.h"
+#include "small_model.h"
+
+#include "eitskin/batch.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+#include "examine.h"
+#include "fit.h"
+#include "kernels.h"
+#include "stages.h"
+#include "vec.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { SIDE = 20, RANK = 64 };
+static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
+static const small_spec WITH_FIELDS = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1};
+
+/* ctx->y of these discs, each with its change. */
+static void press(eits_context *ctx, const eits_disc *disc, uint32_t count)
+{
+    eits_real atom[RANK];
+    eits_zero(ctx->y, RANK);
+    for (uint32_t k = 0; k < count; ++k) {
+        (void)eits_disc_atom(ctx, disc + k, atom, NULL);
+        eits_axpy(ctx, ctx->y, disc[k].change, atom, RANK);
+    }
+}
+
+/* A fit of ctx->y that begins with these discs. */
+static eits_fit begin(eits_context *ctx, const eits_disc *disc, uint32_t count)
+{
+    eits_fit f = {.data = ctx->y, .whole = eits_dot(ctx, ctx->y, ctx->y, RANK), .radius_weight = ctx->options.touch_radius_weight};
+    f.count = count;
+    memcpy(f.disc, disc, count * sizeof *disc);
+    eits_fit_restart(ctx, &f);
+    f.macs = 0;
+    return f;
+}
+
+/* Whether the fit has this disc, to `apart_mm` in place and radius. */
+static int has(const eits_fit *f, const eits_disc *disc, double apart_mm)
+{
+    for (uint32_t k = 0; k < f->count; ++k) {
+        const double dx = (double)(f->disc[k].x_mm - disc->x_mm), dy = (double)(f->disc[k].y_mm - disc->y_mm);
+        if (fabs(dx) < apart_mm && fabs(dy) < apart_mm && fabs((double)(f->disc[k].radius_mm - disc->radius_mm)) < apart_mm)
+            return 1;
+    }
+    return 0;
+}
+
+/* Whether ctx->residual is what the fit's discs leave of its data. */
+static void check_residual(eits_context *ctx, const eits_fit *f)
+{
+    eits_real left[RANK], atom[RANK];
+    eits_copy(left, f->data, RANK);
+    for (uint32_t k = 0; k < f->count; ++k) {
+        (void)eits_disc_atom(ctx, &f->disc[k], atom, NULL);
+        eits_axpy(ctx, left, -f->disc[k].change, atom, RANK);
+    }
+    const double size = sqrt((double)f->whole);
+    for (int i = 0; i < RANK; ++i)
+        CHECK_NEAR(ctx->residual[i], left[i], 100 * EPS * size);
+}
+
+static void two_halves_become_one(void)
+{
+    dense_bench b;
+    eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+    const eits_disc one = {3, -3, 9, R(0.05), 1}, far = {-39, 33, 9, R(0.05), 1};
+    const eits_disc truth[2] = {one, far};
+    press(ctx, truth, 2);
+    eits_disc halves[3] = {one, far, one};
+    halves[0].x_mm -= 4, halves[2].x_mm += 4;
+    halves[0].change = halves[2].change = R(0.025);
+    eits_fit f = begin(ctx, halves, 3);
+    CHECK_EQUAL(eits_fit_join(ctx, &f), 1);
+    CHECK_EQUAL(f.count, 2);
+    CHECK(has(&f, &one, 0.5) && has(&f, &far, 0.5));
+    check_residual(ctx, &f);
+    CHECK(f.macs > 0);
+    CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+    dense_bench_close(&b);
+}
+
+/* Tried or not, what is not joined stays as it was, bit for bit. */
+static void two_touches_stay_two(void)
+{
+    static const eits_real distances[] = {20, 24, 36};
+    for (int d = 0; d < 3; ++d) {
+        dense_bench b;
+        eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+        const eits_disc truth[2] = {{-distances[d] / 2, 3, 9, R(0.05), 1}, {distances[d] / 2, 3, 9, R(0.04), 1}};
+        press(ctx, truth, 2);
+        eits_fit f = begin(ctx, truth, 2);
+        CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+        CHECK_EQUAL(f.count, 2);
+        CHECK((f.macs > 0) == (d < 2)); /* only those within 0.7 of a radius are tried: 9 x 0.7 + 18 = 24.3 mm */
+        for (int k = 0; k < 2; ++k) {
+            CHECK(f.disc[k].x_mm == truth[k].x_mm && f.disc[k].y_mm == truth[k].y_mm && f.disc[k].radius_mm == truth[k].radius_mm);
+            CHECK(f.disc[k].change == truth[k].change);
+        }
+        check_residual(ctx, &f);
+        dense_bench_close(&b);
+    }
+}
+
+static void opposite_signs_are_never_one(void)
+{
+    dense_bench b;
+    eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+    const eits_disc truth[2] = {{-3, 3, 9, R(0.05), 1}, {3, 3, 9, R(-0.05), -1}};
+    press(ctx, truth, 2);
+    eits_fit f = begin(ctx, truth, 2);
+    CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+    CHECK_EQUAL(f.count, 2);
+    CHECK_EQUAL(f.macs, 0);
+    dense_bench_close(&b);
+}
+
+/* Nearest first: of three in a row whose outer ones are nearer to the middle than to each other, one is left for one touch. */
+static void three_thirds_become_one(void)
+{
+    dense_bench b;
+    eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+    const eits_disc one = {3, 3, 12, R(0.05), 1};
+    press(ctx, &one, 1);
+    eits_disc thirds[3] = {one, one, one};
+    for (int k = 0; k < 3; ++k)
+        thirds[k].x_mm += R(5.0) * (eits_real)(k - 1), thirds[k].change /= 3;
+    eits_fit f = begin(ctx, thirds, 3);
+    CHECK_EQUAL(eits_fit_join(ctx, &f), 1);
+    CHECK_EQUAL(f.count, 1);
+    CHECK(has(&f, &one, 2));
+    dense_bench_close(&b);
+}
+
+static void one_disc_over_two_touches_becomes_two(void)
+{
+    static const eits_real along[4][2] = {{1, 0}, {R(0.70711), R(0.70711)}, {0, 1}, {R(-0.70711), R(0.70711)}};
+    for (int d = 0; d < 4; ++d) {
+        dense_bench b;
+        eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+        eits_disc truth[3] = {{0, 0, 9, R(0.05), 1}, {0, 0, 9, R(0.05), 1}, {-42, -36, 9, R(0.05), 1}};
+        for (int k = 0; k < 2; ++k) {
+            truth[k].x_mm = R(4.0) + (k ? -14 : 14) * along[d][0];
+            truth[k].y_mm = R(6.0) + (k ? -14 : 14) * along[d][1];
+        }
+        press(ctx, truth, 3);
+        const eits_disc seen[2] = {truth[2], {4, 6, 14, R(0.04), 1}};
+        eits_fit f = begin(ctx, seen, 2);
+        eits_fit_move_all(ctx, &f, 3);
+        eits_options o = ctx->options;
+        o.max_touches = 2;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        eits_fit full = f;
+        CHECK_EQUAL(eits_fit_part(ctx, &full), 0); /* no room for a third */
+        CHECK_EQUAL(full.count, 2);
+        o.max_touches = 3;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        eits_fit_restart(ctx, &f);
+        CHECK_EQUAL(eits_fit_part(ctx, &f), 1);
+        CHECK_EQUAL(f.count, 3);
+        for (int k = 0; k < 3; ++k)
+            CHECK(has(&f, &truth[k], 2.0));
+        check_residual(ctx, &f);
+        CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+        dense_bench_close(&b);
+    }
+}
+
+static void one_large_touch_stays_one(void)
+{
+    for (int rest = 0; rest < 2; ++rest) { /* whatever else is in the data */
+        dense_bench b;
+        eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+        const eits_disc truth[2] = {{3, 5, 20, R(0.05), 1}, {-39, -33, 9, R(0.01), 1}};
+        press(ctx, truth, 1u + (uint32_t)rest);
+        eits_fit f = begin(ctx, truth, 1);
+        const eits_disc before = f.disc[0];
+        CHECK_EQUAL(eits_fit_part(ctx, &f), 0);
+        CHECK_EQUAL(f.count, 1);
+        CHECK((f.macs > 0) == rest); /* nothing left: nothing is tried */
+        CHECK(memcmp(&before, &f.disc[0], sizeof before) == 0);
+        check_residual(ctx, &f);
+        f.noise = f.whole; /* all that is left may be noise */
+        f.macs = 0;
+        CHECK_EQUAL(eits_fit_part(ctx, &f), 0);
+        CHECK_EQUAL(f.macs, 0);
+        dense_bench_close(&b);
+    }
+}
+
+/* ---- the whole search ---- */
+
+static uint32_t found(eits_context *ctx, uint32_t bits, eits_touch *touch)
+{
+    uint32_t count = 0;
+    eits_options o = ctx->options;
+    o.touch_search = bits;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count), EITS_OK);
+    return count;
+}
+
+/* Two touches that the image shows as one peak. */
+static void one_peak_two_touches(void)
+{
+    dense_bench b;
+    eits_touch touch[EITS_MAX_TOUCHES];
+    eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+    const eits_disc truth[2] = {{-13, 3, 9, R(0.05), 1}, {15, 3, 9, R(0.05), 1}};
+    press(ctx, truth, 2);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) /* one peak */
+        ctx->image[j] = b.c.model.pixel[j].ix == SIDE / 2 && b.c.model.pixel[j].iy == SIDE / 2 ? 1 : 0;
+    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL - EITS_SEARCH_REGROUP, touch), 1);
+    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 2);
+    eits_options o = ctx->options;
+    o.max_touches = 1;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 1);
+    dense_bench_close(&b);
+}
+
+/* ---- the image solved again ---- */
+
+static const eits_disc PAIR[2] = {{-21, 9, 9, R(0.05), 1}, {21, 3, 9, R(0.05), 1}};
+
+static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t refine, uint32_t mac_limit)
+{
+    eits_context *ctx = dense_bench_open(b, spec, 0);
+    eits_options o = ctx->options;
+    o.refine = refine;
+    o.mac_limit = mac_limit;
+    b->c.model.fields.volts *= 0.01f; /* the interplay some percent of the data */
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    memset(ctx->basis_for, EITS_SIDE_BOTH, b->c.model.n_folded); /* all folds are in use */
+    press(ctx, PAIR, 2);
+    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    return ctx;
+}
+
+static void the_refined_image_is_that_of_coupled_data(void)
+{
+    dense_bench b, plain;
+    eits_touch touch[EITS_MAX_TOUCHES];
+    eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0), *other = open_pair(&plain, WITH_FIELDS, 0, 0);
+    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 2);
+    CHECK_EQUAL(found(other, EITS_SEARCH_ALL, touch), 2);
+    const eits_info first = other->info;
+    CHECK_EQUAL(ctx->info.touch_macs, first.touch_macs);
+    CHECK(memcmp(other->y, other->y_coupled, RANK * sizeof *other->y) != 0);
+    CHECK(memcmp(ctx->y, other->y_coupled, RANK * sizeof *ctx->y) == 0);
+    eits_copy(other->y, other->y_coupled, RANK);
+    eits_forget(other);
+    CHECK_EQUAL(eits_solve(other), EITS_OK);
+    CHECK(memcmp(ctx->image, other->image, b.c.model.n_pixels * sizeof *ctx->image) == 0);
+    CHECK_EQUAL(ctx->info.iterations, first.iterations + other->info.iterations);
+    CHECK_EQUAL(ctx->info.macs, first.macs + other->info.macs);
+    CHECK_EQUAL(ctx->info.step_halvings, first.step_halvings + other->info.step_halvings);
+    CHECK_EQUAL(ctx->info.touches, 2);
+    CHECK_EQUAL(ctx->info.findings, first.findings);
+    CHECK(ctx->info.data_norm == other->info.data_norm && ctx->info.stop == other->info.stop && ctx->info.lambda == other->info.lambda);
+    dense_bench_close(&plain);
+    dense_bench_close(&b);
+}
+
+/* One solve more than without: not for one touch, without fields, uncoupled, or with a limit of multiply-accumulates. */
+static void when_it_is_not_refined(void)
+{
+    static const struct {
+        small_spec spec;
+        uint32_t bits, mac_limit, touches;
+    } cases[] = {{{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES}, EITS_SEARCH_ALL, 0, 2},
+                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL - EITS_SEARCH_COUPLED, 0, 2},
+                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL, 2000000000u, 2},
+                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL, 0, 1}};
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+        dense_bench b;
+        eits_touch touch[EITS_MAX_TOUCHES];
+        eits_context *ctx = open_pair(&b, cases[k].spec, 1, cases[k].mac_limit);
+        eits_options o = ctx->options;
+        o.max_touches = cases[k].touches;
+        CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+        const uint64_t macs = ctx->info.macs;
+        CHECK_EQUAL(found(ctx, cases[k].bits, touch), cases[k].touches);
+        CHECK_EQUAL(ctx->info.macs, macs);
+        dense_bench_close(&b);
+    }
+}
+
+/* Data of which nothing comes: the frame's own image stays, and its data. */
+static void nothing_comes_of_it(void)
+{
+    dense_bench b;
+    eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
+    const eits_real nothing[RANK] = {0};
+    eits_real image[SIDE * SIDE], y[RANK];
+    eits_copy(image, ctx->image, SIDE * SIDE);
+    eits_copy(y, ctx->y, RANK);
+    const eits_info before = ctx->info;
+    ctx->info.findings = 4;
+    eits_solve_again(ctx, nothing);
+    CHECK(memcmp(y, ctx->y, sizeof y) == 0);
+    for (int j = 0; j < SIDE * SIDE; ++j)
+        CHECK(ctx->image[j] == image[j]);
+    CHECK(ctx->info.stop == before.stop && ctx->info.data_norm == before.data_norm && ctx->info.findings == 4);
+    CHECK_EQUAL(ctx->info.iterations, 2 * before.iterations);
+    CHECK_EQUAL(ctx->straight, 0);
+    dense_bench_close(&b);
+}
+
+/* The batch's image is the one that eits_find_touches leaves. */
+static void images_of_a_batch(void)
+{
+    dense_bench b;
+    eits_real frame[2][SMALL_ROWS], image[2][SIDE * SIDE];
+    eits_touch touch[2][EITS_MAX_TOUCHES], alone[EITS_MAX_TOUCHES];
+    eits_result result[2];
+    uint64_t state = 4;
+    uint32_t count, refined = 0;
+    eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
+    small_reference(&b.c.model, 1, frame[0]);
+    CHECK_EQUAL(eits_baseline_set(ctx, frame[0], SMALL_ROWS), EITS_OK);
+    for (int i = 0; i < SMALL_ROWS; ++i) {
+        frame[1][i] = frame[0][i] * (eits_real)(1 + 0.1 * small_random(&state));
+        frame[0][i] *= (eits_real)(1 + 0.05 * small_random(&state));
+    }
+    CHECK_EQUAL(eits_reconstruct(ctx, frame[0], SMALL_ROWS, NULL, NULL), EITS_OK); /* the drift's direction is known from now on */
+    CHECK_EQUAL(eits_reconstruct_batch(ctx, frame[0], SMALL_ROWS, 2, image[0], NULL, touch[0], result), EITS_OK);
+    for (int k = 0; k < 2; ++k) {
+        eits_forget(ctx);
+        CHECK_EQUAL(eits_reconstruct(ctx, frame[k], SMALL_ROWS, NULL, NULL), EITS_OK);
+        const uint64_t macs = ctx->info.macs;
+        CHECK_EQUAL(eits_find_touches(ctx, alone, EITS_MAX_TOUCHES, &count), EITS_OK);
+        refined += ctx->info.macs > macs;
+        CHECK_EQUAL(result[k].count, count);
+        CHECK_EQUAL(result[k].info.macs, ctx->info.macs);
+        CHECK(memcmp(image[k], ctx->image, sizeof image[k]) == 0);
+    }
+    CHECK(refined > 0);
+    dense_bench_close(&b);
+}
+
+static void options_have_ranges(void)
+{
+    dense_bench b;
+    eits_context *ctx = dense_bench_open(&b, WAVES, 0);
+    eits_options o;
+    CHECK_EQUAL(eits_options_default(&b.c.model, &o), EITS_OK);
+    CHECK(o.touch_search == EITS_SEARCH_ALL && EITS_SEARCH_ALL == 7 && o.refine == 0);
+    for (uint32_t bits = 0; bits < 10; ++bits) {
+        o.touch_search = bits;
+        CHECK_EQUAL(eits_set_options(ctx, &o), bits <= EITS_SEARCH_ALL ? EITS_OK : EITS_E_ARGUMENT);
+    }
+    o.touch_search = 0;
+    o.refine = 1;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
+    o.refine = 2;
+    CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
+    CHECK_EQUAL(ctx->options.refine, 1);
+    dense_bench_close(&b);
+}
+
+int main(void)
+{
+    two_halves_become_one();
+    two_touches_stay_two();
+    opposite_signs_are_never_one();
+    three_thirds_become_one();
+    one_disc_over_two_touches_becomes_two();
+    one_large_touch_stays_one();
+    one_peak_two_touches();
+    the_refined_image_is_that_of_coupled_data();
+    when_it_is_not_refined();
+    nothing_comes_of_it();
+    images_of_a_batch();
+    options_have_ranges();
+    return checks_report("regroup");
+}
