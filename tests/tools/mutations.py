@@ -203,12 +203,6 @@ SOLVE = (
             "solve",
         ),
         ("the objective without its penalty", "lane_l1[j % 8] += weight;", "lane_l1[j % 8] += 0 * weight;", "solve_state"),
-        (
-            "a residual of the other sign",
-            "eits_axpy(ctx, ctx->residual, -1, sx, stride);",
-            "eits_axpy(ctx, ctx->residual, 1, sx, stride);",
-            "solve",
-        ),
         ("the gap without the columns", "eits_tree8(lane));\n    c.objective", "0);\n    c.objective", "solve"),
     )
 )

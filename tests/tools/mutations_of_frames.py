@@ -48,6 +48,7 @@ OBSERVED = of(
     ("any P counts as the builder's", "<= FORM))", "<= 1000))", "observed"),
 ) + of(
     "map.c",
+    ("a residual of the other sign", "eits_axpy(ctx, out, -1, sx, stride);", "eits_axpy(ctx, out, 1, sx, stride);", "solve"),
     ("forward without the projection", "return macs + eits_project(ctx, v);", "return macs;", "observed"),
     (
         "the adjoint is the map",
