@@ -14,6 +14,7 @@ static const eits_real LEFT = R(-3.659);                              /* the roo
 static const eits_real WEAKEST = R(0.1329), STRONG = R(10.0);         /* the weakest touch over noise, at most this */
 static const eits_real CLEAREST = R(0.7892), CLEAR = R(3.0);          /* it over what is left, at most this */
 static const eits_real LEAST = R(1.078);                              /* below it the count is a guess */
+static const eits_real FAINT = R(3.0); /* max(S'y) over that of noise: below it what is there may be noise, and no crowd */
 
 static eits_real lesser(eits_real a, eits_real b)
 {
@@ -63,7 +64,7 @@ void eits_judge_crowd(eits_context *ctx, int looked, const eits_touch *touches, 
 {
     ctx->info.unexplained = looked ? unexplained(ctx) : 0;
     ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
-    if (count == 0 || !eits_wants(ctx, EITS_FINDING_CROWDED))
+    if (count == 0 || !eits_wants(ctx, EITS_FINDING_CROWDED) || ctx->info.lambda_max < FAINT * ctx->info.lambda_noise)
         return;
     if (count >= ctx->options.max_touches || score(ctx, touches, count) < LEAST)
         ctx->info.findings |= EITS_FINDING_CROWDED;

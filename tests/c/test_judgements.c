@@ -71,17 +71,19 @@ static void crowds(void)
     t[1].radius_mm = 11; /* wider */
     said_as(ctx, t, 2, score_of(2, 8, 30.0 / 20, 11.0 / 9, 0.01, 2, 2), 1);
     t[1].radius_mm = 9;
-    ctx->residual[0] = R(2.6); /* more left, which the weakest is no longer clear of */
-    said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.0676, 2, 2 / 2.6), 1);
+    ctx->residual[0] = R(2.7); /* more left, which the weakest is no longer clear of */
+    said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.0729, 2, 2 / 2.7), 1);
     t[1].x_mm = 100;
-    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 2, 2 / 2.6), 0); /* far is far */
-    ctx->info.lambda_max = 2; /* hardly above noise: worth a fifth of a logit */
-    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 0.2, 2 / 2.6), 1);
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0729, 2, 2 / 2.7), 0); /* far is far */
+    ctx->info.lambda_max = R(6.1); /* not far above noise: worth a sixth of a logit */
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0729, 0.61, 2 / 2.7), 1);
+    ctx->info.lambda_max = R(5.9); /* it may be noise */
+    CHECK_EQUAL(crowded(ctx, t, 2), 0);
     ctx->info.lambda_noise = 0; /* none was learned */
-    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 10, 2 / 2.6), 0);
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0729, 10, 2 / 2.7), 0);
     ctx->info.lambda_noise = 2, ctx->info.lambda_max = 20;
     t[1].confidence = R(0.0004); /* the weakest explains next to nothing */
-    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0676, 0.2, 0.2 / 2.6), 1);
+    said_as(ctx, t, 2, score_of(2, 8, 2, 1, 0.0729, 0.2, 0.2 / 2.7), 1);
     t[1].confidence = R(0.04);
     ctx->residual[0] = 1;
     said_as(ctx, t, 1, score_of(1, 8, 2, 1, 0.01, 10, 3), 0);

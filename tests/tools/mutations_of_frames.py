@@ -294,6 +294,7 @@ CROWDED = of(
     ("crowded: how many", "(eits_real)count, OFFSET)", "1, OFFSET)", "judgements"),
     ("crowded: electrodes", "TOUCHES * OF_ELECTRODES / (eits_real)ctx->model->n_electrodes", "TOUCHES", "judgements"),
     ("crowded: as many as may be", "count >= ctx->options.max_touches || ", "", "judgements"),
+    ("crowded: in noise", " || ctx->info.lambda_max < FAINT * ctx->info.lambda_noise", "", "judgements"),
     ("crowded: as the frame before", "    ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;\n", "", "judgements"),
 )
 

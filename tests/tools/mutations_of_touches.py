@@ -162,7 +162,7 @@ TOUCHES = (
 
 LOAD = of(
     "load.c",
-    ("a load without its place's gain", "eits_fabs(strength_s_per_m_mm2) * gain_at(load, u, v)", "eits_fabs(strength_s_per_m_mm2)", "load"),
+    ("a load without its place's gain", "(strength_s_per_m_mm2) * gain_at(load, u, v)", "(strength_s_per_m_mm2)", "load"),
     ("a negative strength's load", "eits_fabs(strength_s_per_m_mm2) *", "strength_s_per_m_mm2 *", "load"),
     ("a polynomial without bounds", "(gain < MOST_GAIN ? gain : MOST_GAIN)", "gain", "load"),
     ("beyond where it was calibrated", "if (from > reach) {", "if (0 * from > reach) {", "load"),

@@ -26,7 +26,7 @@ GLITCH_NOISE, GLITCH_ROBUST, GLITCH_LARGEST, GLITCH_SHARE, GLITCH_NEARER, GLITCH
 GLITCH_PIVOT, GLITCH_RIDGE, GLITCH_UNPAIRED, GLITCH_ENERGY, NOISY_SHARE = 0.05, 1e-4, 16.0, 0.5, 0.9
 MISFIT_SHARE, MISFIT_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
 CROWD_WEIGHTS, CROWD_OFFSET, CROWD_LEAST = (-0.2429, 3.645, -4.607, -3.659, 0.1329, 0.7892), -0.3583, 1.078
-CROWD_FAR, CROWD_STRONG, CROWD_CLEAR = 2.0, 10.0, 3.0
+CROWD_FAR, CROWD_STRONG, CROWD_CLEAR, CROWD_FAINT = 2.0, 10.0, 3.0, 3.0
 ROBUST = 1.4826
 ORTHOGONAL = 1e-3
 
@@ -309,7 +309,7 @@ class Examiner:
         """Whether there are more touches than can be told apart, by the score of csrc/src/crowded.c; ``found.unexplained`` is
         known. ``clearness``: max(S'y) over that of noise."""
         count, left = len(touches), self.found.unexplained
-        if not count or "crowded" not in self.wanted:
+        if not count or "crowded" not in self.wanted or clearness < CROWD_FAINT:
             return
         apart = [np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) / (a.radius_mm + b.radius_mm) for a, b in combinations(touches, 2)]
         weakest = min(touch.confidence for touch in touches)

@@ -341,5 +341,5 @@ def test_frames_of_a_recording_give_the_boards_touches(done: Done, scene: Path, 
     model: Model = prebuilt()[0]
     assert frames.protocol.hash == model.protocol.hash and frames.meta["board"]["board"] == "simulated"
     board = json_lines(done("replay", run, "--json"))[:-1]
-    host = strict(done("reconstruct", exported, "--json"))["frames"]
+    host = strict(done("reconstruct", exported, "--track", "--json"))["frames"]
     assert [[t["x_mm"] for t in f["touches"]] for f in host] == [[t["x_mm"] for t in f["touches"]] for f in board]

@@ -45,7 +45,7 @@ OUTLINES = {
 }
 FACTS = (
     "model", "bytes", "made_by", "skin", "electrodes", "protocol_rows", "protocol_hash", "folded_rows", "rank", "pixels",
-    "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "defaults",
+    "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "calibration", "defaults",
 )  # fmt: skip
 QUICK = ("--elements", "900", "--pixels", "14")
 

@@ -96,9 +96,9 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ConfigError(f"{where}: the key 'name' is required: a word or two without commas, for tables and pictures")
     where = f"{where} {name!r}"
-    for name in ("warm_start", "refine"):
-        if not isinstance(table.get(name, False), bool):
-            raise ConfigError(f"{where}: {name} must be true or false, not {table[name]!r}")
+    for key in ("warm_start", "refine"):
+        if not isinstance(table.get(key, False), bool):
+            raise ConfigError(f"{where}: {key} must be true or false, not {table[key]!r}")
     one = Configuration(
         name=name,
         rank=integer(table, "rank", Configuration.rank, where, low=1, high=1024),
