@@ -230,7 +230,7 @@ def test_scales_go_with_integers_only(storage: str) -> None:
     ids=lambda content: repr(content[:12]),
 )
 def test_meta_must_be_an_object(content: bytes) -> None:
-    blob, place = tiny_blob(), sections_of(tiny_blob())["META"]
+    blob = tiny_blob()
     padded = content + bytes(-len(content) % 16)
     whole = bytearray(blob + padded)
     struct.pack_into("<2I", whole, entry_place(blob, "META") + 4, len(blob), len(content))

@@ -68,7 +68,7 @@ def test_wrong_sizes(size: int) -> None:
     struct.pack_into("<I", blob, entry_place(blob, "FLDS") + 8, own + size)
     changed = sealed(bytes(blob))
     assert not accepted(changed)
-    with pytest.raises(ModelError, match="FLDS|misplaced|beyond"):
+    with pytest.raises(ModelError, match="section"):
         decode_model(changed, "x")
 
 

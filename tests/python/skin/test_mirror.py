@@ -42,7 +42,10 @@ def test_no_current_crosses_a_straight_edge(dipole: complex) -> None:
     assert np.abs(seen.imag).max() < 1e-12 * np.abs(seen).max()
 
 
-@pytest.mark.parametrize("outline", [l_shape(), rounded_rectangle(), polygon([(0, 0), (0, 60), (90, 0)])], ids=["l", "rounded", "clockwise"])
+OUTLINES = {"l": l_shape(), "rounded": rounded_rectangle(), "clockwise": polygon([(0, 0), (0, 60), (90, 0)])}
+
+
+@pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
 def test_a_straight_mirror_is_the_image_beyond_the_nearest_edge(outline: Outline) -> None:
     """a / b is the image point, |b| = 1; on the rim it is the point itself, from within as on it and beyond."""
     low, high = np.min(outline.vertices_mm, axis=0), np.max(outline.vertices_mm, axis=0)

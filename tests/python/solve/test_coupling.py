@@ -21,9 +21,12 @@ def folded(frame_v: np.ndarray) -> np.ndarray:
     return np.asarray((frame_v[fold.first] + fold.sign * frame_v[fold.second]) / 2)
 
 
-@pytest.mark.parametrize(("middle", "turn"), [((0.0, 0.0), 0.0), ((30.0, 20.0), 1.0), ((0.0, 62.0), 0.0), ((-40.0, 0.0), np.pi / 2)])
+PLACES = [((0.0, 0.0), 0.0), ((30.0, 20.0), 1.0), ((0.0, 62.0), 0.0), ((-40.0, 0.0), np.pi / 2)]  # middle, turn
+
+
+@pytest.mark.parametrize(("middle", "turn"), PLACES)
 def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(middle: tuple[float, float], turn: float) -> None:
-    """9 mm, contrast 5, 36 mm apart, in the middle and near the rim; a change of 2 (c - 1) / (c + 1) of the sheet's conductivity."""
+    """9 mm, contrast 5, 36 mm apart, in the middle and near the rim; a change of 2 (c - 1) / (c + 1) of the sheet's."""
     skin, model = paper_skin(), prebuilt()[0]
     sheet = skin.conductivity_s_per_m
     forward = ForwardModel(mesh_for_elements(skin, 11_000), skin, model.protocol)

@@ -11,8 +11,8 @@ from eitskin.model.model import Model
 from eitskin.solve.options import default_options
 from eitskin.solve.reference import ReferenceEngine
 from eitskin.solve.reference_fista import fista
-from eitskin.solve.reference_problem import greatest, project, shrink
 from eitskin.solve.reference_fit import Disc, Fit, Reduced, damped_step
+from eitskin.solve.reference_problem import greatest, project, shrink
 from eitskin.study.judge.metrics import pixel_cover
 from small_models import DATA_KINDS, SIGNS, prebuilt, small, small_model
 
