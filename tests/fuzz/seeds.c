@@ -83,7 +83,7 @@ static void scripts(void)
             const uint8_t learn[] = {1, 4, 1, 127, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3, 4, 5, 1, 127, 9, 8, 7, 6, 5, 4, 3, 2, 1, 9, 8, 7, 6, 5,
                                      0, 127, 0, 127};
             const uint8_t once[] = {0, 0, 127};
-            const uint8_t options[] = {3, 2, 23, (uint8_t)solver, 22, (uint8_t)(model % 3), 4, (uint8_t)(model % 2)};
+            const uint8_t options[] = {3, 2, 23, (uint8_t)solver, 22, (uint8_t)(model % 3 + (solver > 1 ? 4 : 0) + (model == 2 ? 8 : 0)), 4, (uint8_t)(model % 2)};
             const uint8_t frames[] = {6, 1, 127, 30, 0, 40, 0, 50, 0, 60, 0, 20, 0, 9, 0, 90, 0, 6, 6, 127, 5, 0, 0, 0xC0, 0x7F,
                                       5, 1, 127, 1, 30, 2, 40, 0, 50, 0, 60, 0, 20, 0, 9, 0, 90};
             memcpy(script + at, solver % 2 ? learn : once, solver % 2 ? sizeof learn : sizeof once);

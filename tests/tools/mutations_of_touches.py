@@ -84,7 +84,6 @@ TOUCHES = (
         ),
         ("a moment without the soft edge", "pixel * pixel / 12);", "0 * pixel);", "coupling"),
         ("each in its own field", "            if (j != i)\n", "            if (j != i || count == 2)\n", "coupling"),
-        ("folds left out count", "count += ctx->basis_for[k] != EITS_SIDE_NONE;", "count += 1;", "coupling"),
         (
             "directions to ignore are not ignored",
             "ctx->model->rank + eits_project(ctx, out)",

@@ -24,7 +24,7 @@ from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 1  # of files without FLDS and LOAD; with either 1.2
+MAJOR, MINOR = 1, 2
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
@@ -123,10 +123,9 @@ def _assemble(sections: Sections, protocol_hash: int) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    minor = MINOR + ("LOAD" in sections or "FLDS" in sections)
-    tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]
+    tail = HEADER.pack(MAGIC, MAJOR, MINOR, offset, 0, len(sections), 0, protocol_hash)[16:]
     crc = zlib.crc32(tail + body)
-    return HEADER.pack(MAGIC, MAJOR, minor, offset, crc, len(sections), 0, protocol_hash) + body
+    return HEADER.pack(MAGIC, MAJOR, MINOR, offset, crc, len(sections), 0, protocol_hash) + body
 
 
 def decode_model(blob: bytes, where: str) -> Model:

@@ -46,6 +46,18 @@ def crowds() -> dict[str, tuple[Touch, ...]]:
     }
 
 
+def entangled() -> dict[str, tuple[Touch, ...]]:
+    """Touches that bend each other's field beyond what two dipoles tell, or hide each other's peaks."""
+    return {
+        "two that overlap": (*at(6.0, 30.0), *at(6.0, 210.0)),
+        "two that touch, of opposite change": (*at(9.0, 80.0), *at(9.0, 260.0, 9.0, 0.1)),
+        "three metals in a row": tuple(Touch(x, 0.0, 12.0, 1000.0) for x in (-25.0, 0.0, 25.0)),
+        "12 metals on a ring": tuple(Touch(t.x_mm, t.y_mm, t.radius_mm, 1000.0) for t in ring(12, 70.0, 12.0)),
+        "a pair at the rim": (*at(88.0, 5.0), *at(88.0, 17.0)),
+        "one of half the skin": at(20.0, 130.0, 60.0),
+    }
+
+
 def groups() -> dict[str, list[tuple[Touch, ...]]]:
     """Touches of every scene, by what is hard."""
     return {
@@ -59,6 +71,7 @@ def groups() -> dict[str, list[tuple[Touch, ...]]]:
         "insulating": [at(50.0, 200.0, 9.0, c) for c in INSULATING],
         "presses": [at(50.0, 45.0 * k, 9.0, c) for c in PRESSES for k in range(PRESS_PLACES)],
         "crowds": list(crowds().values()),
+        "entangled": list(entangled().values()),
     }
 
 
