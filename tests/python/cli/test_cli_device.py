@@ -121,7 +121,9 @@ def test_scan_options_reach_the_board(
 
 def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     def infos(*options: str) -> list[dict[str, Any]]:
-        return [line["info"] for line in json_lines(done("stream", "--device", f"sim:{scene}", "--json", *options))[:-1]]
+        quietly = () if "--ignore" in options else ("--ignore", "crowded")  # a press that fades, solved coarsely, may be called so
+        lines = json_lines(done("stream", "--device", f"sim:{scene}", "--json", *options, *quietly))
+        return [line["info"] for line in lines[:-1]]
 
     assert {info["iterations"] for info in infos("--iterations", "7")} == {7}
     assert {info["stop"] for info in infos("--gap", "0.05", "--iterations", "1000")} == {"gap"}
