@@ -142,12 +142,6 @@ SOLVE = (
         ),
         ("only the second solve counts", "    ctx->info.iterations += before.iterations;\n", "", "regroup"),
         ("nothing comes of it, and it stays", "if (status != EITS_OK || !ctx->warm) {", "if (status != EITS_OK) {", "regroup"),
-        (
-            "findings of the refined image",
-            "    ctx->info.findings = before.findings; /* judged by the frame as it came */\n",
-            "",
-            "regroup",
-        ),
         ("no gate", "if (o->gate_factor > 0 && ", "if (0 && ", "solve_state"),
         ("a gate twice as high", "lambda_max < o->gate_factor *", "lambda_max < 2 * o->gate_factor *", "solve_state"),
         ("lambda the less of two", "return by_data > by_noise ?", "return by_data < by_noise ?", "solve_state"),

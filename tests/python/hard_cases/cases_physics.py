@@ -20,7 +20,8 @@ CASES = (
         "Touches that merge and part",
         "Two touches of 9 mm come from 80 mm apart to 18 mm, where they touch, and part again.",
         "Between two pixels' distance and none there is no telling whether it is one or two.",
-        "From 30 mm on, two, each within half of its radius; nearer, one between them or two as near to their places; ids are never shared.",
+        "From 30 mm on, two, each within half of its radius; nearer, one between them or two as near to their places; ids are "
+        "never shared.",
         ("hard_cases/test_hard_touches.py::test_merge_and_part",),
     ),
     Case(
@@ -84,8 +85,8 @@ CASES = (
         "Two that overlap, two of opposite change side by side, three and twelve pieces of metal, a pair at the rim, one of half "
         "the skin; every part of the search by itself and all together, images refined.",
         "What dipoles tell of each other's field ends where discs touch; discs joined, parted and coupled in turn may run away.",
-        "Finite numbers, every centre within a pixel of the skin, no more touches than asked for; two that overlap are one or two "
-        "within their outline.",
+        "Finite numbers, every centre within a pixel of the skin, no more touches than asked for; two that overlap are one or "
+        "two within their outline.",
         ("hard_cases/test_entangled.py::test_touches_in_each_others_field",),
     ),
 )

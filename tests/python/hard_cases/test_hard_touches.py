@@ -61,8 +61,8 @@ def test_on_an_electrode(same_everywhere: SameEverywhere, margins: Margins, wher
 
 
 def test_merge_and_part(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Two touches of 9 mm: apart by 30 mm (12 mm of sheet between them, two pixels), two; nearer, two as near or one between them; then
-    two again. Ids are never shared, and one that stays keeps its own."""
+    """Two touches of 9 mm: apart by 30 mm (12 mm of sheet between them, two pixels), two; nearer, two as near or one between
+    them; then two again. Ids are never shared, and one that stays keeps its own."""
     case, outcomes = "physics/merge-and-part", reconstruct(same_everywhere, frames_of("merging"))
     for one, truths, apart in zip(outcomes, groups()["merging"], touch_scenes.APART_MM, strict=True):
         if apart >= 30:
