@@ -121,7 +121,8 @@ def test_scan_options_reach_the_board(
 
 def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     def infos(*options: str) -> list[dict[str, Any]]:
-        quietly = () if "--ignore" in options else ("--ignore", "crowded")  # a press that fades, solved coarsely, may be called so
+        # a press that fades, solved coarsely, may be called crowded
+        quietly = () if "--ignore" in options else ("--ignore", "crowded")
         lines = json_lines(done("stream", "--device", f"sim:{scene}", "--json", *options, *quietly))
         return [line["info"] for line in lines[:-1]]
 

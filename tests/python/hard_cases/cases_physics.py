@@ -76,7 +76,7 @@ CASES = (
         "10 to 14 touches, 5 within 30 mm, and 6 in a row a millimetre apart.",
         "There are fewer directions in the data than numbers to find; discs are fitted to what no disc made.",
         "Finite numbers, every centre within a pixel of the skin, no more touches than asked for; the finding crowded says that "
-        "count and places are a guess. A group within the size of one touch is found as one.",
+        "count and places are a guess, or each is found all the same. A group within the size of one touch is found as one.",
         ("hard_cases/test_hard_touches.py::test_more_touches_than_can_be_told_apart",),
     ),
     Case(
