@@ -141,8 +141,8 @@ void eits_solve_again(eits_context *ctx, const eits_real *y)
     eits_copy(ctx->y_straight, ctx->y, stride); /* of no more use for this frame */
     ctx->straight = 0;
     eits_copy(ctx->y, y, stride);
-    const eits_status status = solve(ctx, 0);
-    if (status != EITS_OK || !ctx->warm) {
+    (void)solve(ctx, 0);
+    if (!ctx->warm) { /* it came to nothing, or to no number */
         eits_copy(ctx->y, ctx->y_straight, stride);
         (void)solve(ctx, 0);
     }

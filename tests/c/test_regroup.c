@@ -326,7 +326,7 @@ static void nothing_comes_of_it(void)
 {
     dense_bench b;
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
-    const eits_real nothing[RANK] = {0};
+    const eits_real nothing[RANK] = {0}, infinite[RANK] = {R(INFINITY)};
     eits_real image[SIDE * SIDE], y[RANK];
     eits_copy(image, ctx->image, SIDE * SIDE);
     eits_copy(y, ctx->y, RANK);
@@ -339,6 +339,8 @@ static void nothing_comes_of_it(void)
     CHECK(ctx->info.stop == before.stop && ctx->info.data_norm == before.data_norm && ctx->info.findings == 4);
     CHECK_EQUAL(ctx->info.iterations, 2 * before.iterations);
     CHECK_EQUAL(ctx->straight, 0);
+    eits_solve_again(ctx, infinite);
+    CHECK(memcmp(y, ctx->y, sizeof y) == 0 && memcmp(image, ctx->image, sizeof image) == 0);
     dense_bench_close(&b);
 }
 
