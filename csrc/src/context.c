@@ -47,7 +47,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
         .findings = EITS_FINDINGS_ALL,
-        .touch_search = EITS_SEARCH_ALL,
+        .touch_search = EITS_SEARCH_ALL & ~d->search_left_out,
         .refine = 0,
         .track_confirm = 0,
         .track_hold = 0,

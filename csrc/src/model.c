@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-enum { HEADER_SIZE = 64, ENTRY_SIZE = 16, DIMS_SIZE = 64, FIELDS_HEAD = 16, MIRROR_ROWS = 4, MAX_SECTIONS = 256 };
+enum { HEADER_SIZE = 64, ENTRY_SIZE = 16, DIMS_SIZE = 64, FIELDS_HEAD = 16, MIRROR_ROWS = 4, MOST_SEARCH = 7, MAX_SECTIONS = 256 };
 
 typedef struct section {
     const uint8_t *data; /* NULL where absent */
@@ -247,7 +247,7 @@ static int between(float value, float low, float high)
 static int defaults_in_range(const eits_defaults *d)
 {
     const float huge = 1e30f;
-    return d->iterations >= 1 && d->iterations <= EITS_MAX_MODEL_ITERATIONS && d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET &&
+    return d->iterations >= 1 && d->iterations <= EITS_MAX_MODEL_ITERATIONS && d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET && d->search_left_out <= MOST_SEARCH &&
            between(d->lambda_rel, 0, 1) && between(d->mask_threshold, 0, 1) &&
            between(d->touch_threshold, 0, 1) && between(d->touch_share, 0, 1) && between(d->lambda_noise_factor, 0, huge) &&
            between(d->gate_factor, 0, huge) && between(d->touch_change_s_per_m, 0, huge) && between(d->follow_mm, 0, huge) &&

@@ -210,7 +210,8 @@ static void defaults(void)
     CHECK_EQUAL(with_number(TINY, "DEFS", 32, 1e-7f), EITS_E_MODEL_VALUE); /* less than an option may be */
     for (uint32_t solver = 0; solver < 6; ++solver)
         CHECK_EQUAL(with_word(TINY, "DEFS", 56, solver), solver <= EITS_SOLVER_ACTIVE_SET ? EITS_OK : EITS_E_MODEL_VALUE);
-    CHECK_EQUAL(with_number(TINY, "DEFS", 60, 5.0f), EITS_OK); /* what is reserved is not looked at */
+    for (uint32_t bits = 0; bits < 9; ++bits)
+        CHECK_EQUAL(with_word(TINY, "DEFS", 60, bits), bits <= EITS_SEARCH_ALL ? EITS_OK : EITS_E_MODEL_VALUE);
 }
 
 /* Whatever opens has defaults that its own context accepts again, runs, and never shows a number that is not finite. */

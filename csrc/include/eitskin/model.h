@@ -88,7 +88,7 @@ typedef struct eits_defaults {
     float follow_mm;
     float touch_radius_weight;
     uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
-    float reserved;
+    uint32_t search_left_out; /* bits of eits_search (context.h) that are not set by default; files before 1.2 have 0 here */
 } eits_defaults;
 
 /* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */

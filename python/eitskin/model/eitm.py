@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import SOLVERS
+from eitskin.core.results import ALL_SEARCH, SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
@@ -28,7 +28,7 @@ MAJOR, MINOR = 1, 2
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
-DEFAULTS = struct.Struct("<2I12fIf")
+DEFAULTS = struct.Struct("<2I12f2I")
 FIELDS_HEAD = struct.Struct("<2f8x")
 MIRROR_ROWS = 4
 REQUIRED = ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD")
@@ -70,7 +70,7 @@ def encode_model(model: Model) -> bytes:
         "SENS": stored.columns.tobytes(),
         "COLW": model.column_weight.astype("<f4").tobytes(),
         "GRID": model.grid.index.astype("<u2").tobytes(),
-        "DEFS": DEFAULTS.pack(*astuple(model.defaults)[:-1], SOLVERS.index(model.defaults.solver), 0.0),
+        "DEFS": _encode_defaults(model.defaults),
         "GOLD": np.concatenate([golden.reference_v, golden.frame_v, golden.image]).astype("<f4").tobytes(),
         "META": json.dumps(model.meta, sort_keys=True).encode("utf-8"),
     }
@@ -83,6 +83,10 @@ def encode_model(model: Model) -> bytes:
         halves[:, : model.fields.columns.shape[1]] = model.fields.columns
         sections["FLDS"] = FIELDS_HEAD.pack(model.fields.volts, model.fields.per_sheet) + halves.tobytes()
     return _assemble(sections, model.protocol.hash)
+
+
+def _encode_defaults(defaults: Defaults) -> bytes:
+    return DEFAULTS.pack(*astuple(defaults)[:-2], SOLVERS.index(defaults.solver), defaults.search_left_out)
 
 
 def _fields_stride(n_electrodes: int) -> int:
@@ -292,6 +296,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     sizes = (d.lambda_noise_factor, d.gate_factor, d.touch_change_s_per_m, d.follow_mm, d.touch_radius_weight)
     in_range = (
         1 <= d.iterations <= MAX_ITERATIONS
+        and d.search_left_out <= ALL_SEARCH
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
         and LEAST_RADIUS_MM <= d.touch_min_radius_mm <= d.touch_seed_radius_mm <= d.touch_max_radius_mm <= HUGE

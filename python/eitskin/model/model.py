@@ -23,7 +23,7 @@ class Defaults:
     """What the model's maker chose, in the file's order; csrc/include/eitskin/context.h says what each does.
 
     Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t max(x); ``solver`` is one
-    of ``core.results.SOLVERS``.
+    of ``core.results.SOLVERS``; ``search_left_out``: bits of ``Options.touch_search`` that are not set.
     """
 
     iterations: int = 60
@@ -41,6 +41,7 @@ class Defaults:
     follow_mm: float = 25.0
     touch_radius_weight: float = 1e-3
     solver: str = "working-set"
+    search_left_out: int = 0
 
 
 @dataclass(frozen=True, eq=False)

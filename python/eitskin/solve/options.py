@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from eitskin.core.results import MAX_TOUCHES, Options
+from eitskin.core.results import ALL_SEARCH, MAX_TOUCHES, Options
 from eitskin.model.model import Model
 
 TRACKING = ("gate_factor", "track_confirm", "track_hold", "track_smooth")  # what tracking changes
@@ -31,6 +31,7 @@ def default_options(model: Model) -> Options:
         touch_radius_weight=d.touch_radius_weight,
         follow_mm=d.follow_mm,
         solver=d.solver,
+        touch_search=ALL_SEARCH & ~d.search_left_out,
     )
 
 

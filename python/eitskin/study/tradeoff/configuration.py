@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.config import check_keys, choice, integer, load_toml, number
-from eitskin.core.results import SOLVERS, Options
+from eitskin.core.results import ALL_SEARCH, SOLVERS, Options
 from eitskin.errors import ConfigError
 from eitskin.model.model import Defaults
 from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_FLOOR
@@ -34,6 +34,7 @@ class Configuration:
         warm_start: each frame begins from the last one's image. Judged at the fourth frame of touches that are held, after
             others were: what a user sees of touches that rest, not of those that land.
         touch_sweeps: of the off-grid fit; 0 leaves touches at the image's peaks.
+        search: parts of the search for touches (``core.results``: straight data 1, regrouping 2, coupling 4).
         refine: the image is solved again with the touches' interplay taken out of the data; not over a board's link.
         samples: of a measurement, at 1 MS/s; white noise falls with the root of them.
         scan: "full" measures every row, "reciprocal" one of each reciprocal pair, in half the time with sqrt(2) of the noise.
@@ -55,6 +56,7 @@ class Configuration:
     samples: int = BASE_SAMPLES
     scan: str = "full"
     refine: bool = False
+    search: int = ALL_SEARCH
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -75,6 +77,7 @@ class Configuration:
             "lambda_rel": self.lambda_rel,
             "warm_start": self.warm_start,
             "touch_sweeps": self.touch_sweeps,
+            "touch_search": self.search,
         }
         settings |= {"refine": True} if self.refine else {}
         return settings | ({"mac_limit": self.mac_limit} if self.mac_limit else {})
@@ -116,6 +119,7 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
         samples=integer(table, "samples", Configuration.samples, where, low=PERIOD_SAMPLES, high=1020),
         scan=choice(table, "scan", Configuration.scan, SCANS, where),
         refine=table.get("refine", Configuration.refine),
+        search=integer(table, "search", Configuration.search, where, low=0, high=ALL_SEARCH),
     )
     if one.mac_limit and "mac_limit" not in {entry.name for entry in fields(Options)}:
         raise ConfigError(f"{where}: mac_limit = {one.mac_limit}, but this build's core has no limit of MACs; leave it out")

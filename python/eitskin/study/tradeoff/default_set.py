@@ -39,10 +39,16 @@ SCALE = (
     Configuration("calm light", rank=48, pixels=24, floor=0.1),
 )
 
+PLAIN = tuple(
+    replace(one, name=f"{one.name} plain", search=0)
+    for one in SCALE
+    if one.name in ("tiny", "mini", "small", "light", "lean", "modest", "quick", "standard")
+)
 REFINABLE = ("quick", "standard", "keen", "fine", "best")
 REFINED = tuple(replace(one, name=f"{one.name} refined", refine=True) for one in SCALE if one.name in REFINABLE)
 
 KNOBS = {
+    "search": PLAIN,
     "refine": REFINED,
     "iterations": (
         *_turned(STANDARD, "iterations", (10, 20, 30, 45, 90, 150, 300), "{} iterations"),

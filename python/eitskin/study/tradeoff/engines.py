@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from eitskin.core.results import ALL_SEARCH
 from eitskin.errors import UsageError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.fields import electrode_fields
@@ -26,7 +27,10 @@ def build_settings(one: Configuration, skin: Skin, mask_threshold: float | None 
     """How the model of a configuration is built; its solver's settings and t become the model's defaults, as far as a model has
     them: not the gap, a limit of MACs, the warm start and the sweeps."""
     usual = scaled_defaults(skin, "difference")
-    defaults = replace(usual, solver=one.solver, iterations=one.iterations, lambda_rel=one.lambda_rel)
+    left_out = ALL_SEARCH & ~one.search
+    defaults = replace(
+        usual, solver=one.solver, iterations=one.iterations, lambda_rel=one.lambda_rel, search_left_out=left_out
+    )
     if mask_threshold is not None:
         defaults = replace(defaults, mask_threshold=mask_threshold)
     return BuildSettings(

@@ -40,6 +40,7 @@ SEARCHES = (
 )
 
 CALM = {"iterations": 120, "lambda_rel": 0.01}
+GOOD = {"lambda_rel": 0.01}
 FINE = {"iterations": 90, "lambda_rel": 0.005}
 BEST = BuildSettings(rank=80, pixels_across=40, floor=0.05)
 LONG = {"iterations": 150, "lambda_rel": 0.003}
@@ -47,6 +48,8 @@ LONG = {"iterations": 150, "lambda_rel": 0.003}
 IMAGES = (
     Lever("standard"),
     Lever("standard, refined", options={"refine": True}),
+    Lever("good", options=GOOD),
+    Lever("good, refined", options={**GOOD, "refine": True}),
     Lever("fine", options=FINE),
     Lever("fine, refined", options={**FINE, "refine": True}),
     Lever("calm", BuildSettings(floor=0.1), CALM),
