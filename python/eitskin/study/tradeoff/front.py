@@ -27,7 +27,7 @@ LEAST_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost 
 SHIPPED_SCORES = (
     "scenes", "image", "discs", "exact_count", "position_mm", "force_error", "solve_macs", "touch_macs", "most_macs",
 )  # fmt: skip
-MODEL_HOLDS = {"solver", "iterations", "lambda_rel"}  # of the solver's settings
+MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_search"}  # of the solver's settings
 
 
 @dataclass(frozen=True)
@@ -304,8 +304,7 @@ def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") ->
     known = []
     for one in points:
         cost, accuracy = one.cost(wish.unit, wish.board, wish.where, wish.worst), one.accuracy(wish.where)
-        told = wish.board == "host" or (one.fits_f767 and not one.configuration.refine)  # the link has no word for refining
-        usable = one.configuration.touch_sweeps >= LEAST_SWEEPS and told
+        usable = one.configuration.touch_sweeps >= LEAST_SWEEPS and (wish.board == "host" or one.fits_f767)
         if cost is not None and accuracy is not None and usable:
             known.append((cost, accuracy, one))
     if not known:
