@@ -1,0 +1,121 @@
+"""What all experiments have in common: their names and pages, the command, the files that they leave."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from eitskin.cli.main import main
+from eitskin.errors import ConfigError, UsageError
+from eitskin.study.experiments import registry
+from eitskin.study.experiments.experiment import Desk, Outcome, Settings, Table, desk_in, plain
+from eitskin.study.experiments.write import to_json, write_all, write_page
+
+PAGES = Path(__file__).parents[3] / "docs" / "studies"
+
+
+class Small:
+    """An experiment of one number, which counts how often it is computed."""
+
+    TITLE = "small"
+
+    def __init__(self) -> None:
+        self.computed = 0
+
+    def run(self, desk: Desk) -> Outcome:
+        def make() -> Mapping[str, Any]:
+            self.computed += 1
+            return {"mean": 0.5, "none": float("nan")}
+
+        values = desk.kept({"part": "small"}, make)
+        table = Table("small", ("what", "value"), (("mean", f"{values['mean']:g}"),))
+        return Outcome((table,), values, {"small.png": lambda path: path.write_bytes(b"png")}, {"said": "so"})  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> Small:
+    one = Small()
+    monkeypatch.setitem(registry.EXPERIMENTS, "small", "one number")
+    monkeypatch.setattr(registry, "load", lambda _: one)
+    return one
+
+
+@pytest.mark.parametrize("name", registry.EXPERIMENTS)
+def test_each_has_a_title_and_a_page_that_its_command_fills(name: str) -> None:
+    experiment = registry.load(name)
+    assert experiment.TITLE and callable(experiment.run)
+    page = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    assert f"`eitskin study {name} -o out/{name}" in page and "<!-- command -->\n<!-- end command -->" not in page
+    assert f"[{name}]({name}.md)" in (PAGES / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_command_lists_runs_and_goes_on(small: Small, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "list"]) == 0
+    assert "small        one number" in capsys.readouterr().out
+    page = tmp_path / "small.md"
+    page.write_text("".join(f"<!-- {mark} -->\nold\n<!-- end {mark} -->\n" for mark in ("command", "small", "said")))
+    for _ in range(2):
+        assert main(["study", "small", "-o", str(tmp_path / "out"), "--seed", "3", "--page", str(page)]) == 0
+        assert "mean    0.5" in capsys.readouterr().out
+    assert small.computed == 1
+    assert main(["study", "small", "-o", str(tmp_path / "out"), "--seed", "4", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"mean": 0.5, "none": None} and small.computed == 2
+    text = page.read_text(encoding="utf-8")
+    assert "| mean | 0.5 |" in text and "old" not in text and "--seed 3 --page docs/studies/small.md" in text
+    assert (tmp_path / "pictures" / "small" / "small.png").read_bytes() == b"png"
+    assert (tmp_path / "out" / "small.csv").read_text(encoding="utf-8") == "what,value\nmean,0.5\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["nothing"], "no experiment is named 'nothing'"),
+        (["levres"], "did you mean 'levers'?"),
+        (["levers", "--share", "0"], "--share 0 is out of range"),
+        (["levers", "--seed", "-1"], "--seed -1 must be 0 or above"),
+        (["levers", "-o", "FILE"], "this is a file; name a folder"),
+        (["levers", "--page", "no/such/page.md"], "does not exist"),
+        (["tank", "--data", "no/such"], "no such folder"),
+    ],
+)
+def test_what_cannot_be_is_refused_on_one_line(
+    arguments: list[str], text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(b"")
+    assert main(["study", *(str(file) if one == "FILE" else one for one in arguments)]) != 0
+    out, err = capsys.readouterr()
+    assert out == "" and text in err and err.count("\n") == 1
+
+
+def test_a_page_without_its_marks_stays_as_it_is(tmp_path: Path) -> None:
+    outcome = Small().run(desk_in(tmp_path / "out", Settings(), plain))
+    write_all(outcome, tmp_path / "out", pictures=False)
+    page = tmp_path / "small.md"
+    page.write_text("<!-- small -->\nold\n<!-- end small -->\n")
+    with pytest.raises(ConfigError, match="has no marks <!-- said -->"):
+        write_page(outcome, tmp_path / "out", page, "small", Settings())
+    assert "old" in page.read_text(encoding="utf-8") and "NaN" not in to_json(outcome)
+    assert not (tmp_path / "out" / "small.png").exists()
+
+
+def test_a_torn_line_is_computed_again(tmp_path: Path) -> None:
+    one = Small()
+    one.run(desk_in(tmp_path, Settings(), plain))
+    kept = tmp_path / "results.jsonl"
+    kept.write_bytes(kept.read_bytes()[:-9])
+    one.run(desk_in(tmp_path, Settings(), plain))
+    assert one.computed == 2
+    one.run(desk_in(tmp_path, Settings(), plain))
+    assert one.computed == 2
+
+
+def test_sets_to_choose_on_are_not_those_that_are_reported() -> None:
+    settings = Settings(seed=7, share=0.1)
+    assert settings.tuning_seed != settings.seed and (settings.count(40), settings.count(3)) == (4, 2)
+    with pytest.raises(UsageError):
+        Settings(share=101)
