@@ -207,7 +207,8 @@ static void default_options(void)
     o.gate_factor = usual.gate_factor; /* and nothing else */
     o.track_confirm = o.track_hold = 0;
     o.track_smooth = 0;
-    CHECK(memcmp(&o, &usual, sizeof o) == 0);
+    const size_t padded = offsetof(eits_options, touch_sweeps) + sizeof o.touch_sweeps, on = offsetof(eits_options, follow_mm);
+    CHECK(memcmp(&o, &usual, padded) == 0 && memcmp((char *)&o + on, (const char *)&usual + on, sizeof o - on) == 0);
     small_model_free(&made);
 }
 
