@@ -2,7 +2,6 @@
 
 #include "examine.h"
 #include "kernels.h"
-#include "observed.h"
 #include "stages.h"
 #include "vec.h"
 
@@ -41,7 +40,7 @@ static eits_real moment(const eits_context *ctx, const eits_disc *disc)
     return disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, pixel * pixel / 12);
 }
 
-/* What disc j, in `source`, adds to the field of each electrode's current at disc i, in `place`: into `bent`, L numbers for x,
+/* What disc j, in `source`, adds to the field of each electrode's current at disc i: into `bent`, L numbers for x,
  * then L for y, as the fields are. */
 static void bend(const eits_context *ctx, const eits_disc *i, const eits_disc *j, const eits_real *source, eits_real *bent)
 {
@@ -78,7 +77,7 @@ static void answer(const eits_context *ctx, const eits_disc *i, const eits_real 
     }
 }
 
-/* P of the folds in use, projected as the data are. */
+/* The folds' sums in ctx->list_value, of those in use, reduced. */
 static uint64_t reduce(eits_context *ctx, eits_real *out)
 {
     uint32_t count = 0;
@@ -87,9 +86,7 @@ static uint64_t reduce(eits_context *ctx, eits_real *out)
         ctx->list_value[count] = ctx->list_value[k];
         count += ctx->basis_for[k] != EITS_SIDE_NONE;
     }
-    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, count, out);
-    const uint64_t macs = ctx->rewhitened ? eits_observed_data(ctx, out) : 0;
-    return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, out);
+    return eits_reduce(ctx, count, out);
 }
 
 uint64_t eits_couple(eits_context *ctx, const eits_disc *disc, uint32_t count, eits_real *data)

@@ -211,9 +211,7 @@ static uint64_t reduce_straight(eits_context *ctx, const eits_real *frame)
         ctx->list_value[count] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
         count += used != EITS_SIDE_NONE;
     }
-    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, count, ctx->y_straight);
-    const uint64_t macs = ctx->rewhitened ? eits_observed_data(ctx, ctx->y_straight) : 0;
-    return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, ctx->y_straight);
+    return eits_reduce(ctx, count, ctx->y_straight);
 }
 
 /* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew. */

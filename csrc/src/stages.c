@@ -1,6 +1,7 @@
 #include "stages.h"
 
 #include "kernels.h"
+#include "observed.h"
 #include "vec.h"
 
 uint64_t eits_project(const eits_context *ctx, eits_real *v)
@@ -12,6 +13,13 @@ uint64_t eits_project(const eits_context *ctx, eits_real *v)
         eits_axpy(ctx, v, -eits_dot(ctx, direction, v, rank), direction, rank);
     }
     return (uint64_t)ctx->basis_count * 2u * rank;
+}
+
+uint64_t eits_reduce(eits_context *ctx, uint32_t count, eits_real *out)
+{
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, count, out);
+    const uint64_t macs = ctx->rewhitened ? eits_observed_data(ctx, out) : 0;
+    return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, out);
 }
 
 int eits_all_finite(const eits_real *values, size_t count)

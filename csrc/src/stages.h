@@ -7,6 +7,10 @@
 /* Take the basis' directions out of v (stride numbers); returns the multiply-accumulates. */
 uint64_t eits_project(const eits_context *ctx, eits_real *v);
 
+/* out (stride numbers) = P of the `count` folds in ctx->list_index with the data in ctx->list_value, whitened and projected as the
+ * frame's data are. Returns the multiply-accumulates. */
+uint64_t eits_reduce(eits_context *ctx, uint32_t count, eits_real *out);
+
 /* eits_frame_stage without its checks; the baseline need not be finished. */
 eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t *masked, uint64_t *macs);
 

@@ -84,12 +84,6 @@ TOUCHES = (
         ),
         ("a moment without the soft edge", "pixel * pixel / 12);", "0 * pixel);", "coupling"),
         ("each in its own field", "            if (j != i)\n", "            if (j != i || count == 2)\n", "coupling"),
-        (
-            "directions to ignore are not ignored",
-            "ctx->model->rank + eits_project(ctx, out)",
-            "ctx->model->rank + 0 * eits_project(ctx, ctx->sz)",
-            "coupling",
-        ),
         ("interplay added, not taken out", "data[i] -= ctx->sx[i];", "data[i] += ctx->sx[i];", "coupling"),
     )
     + of(

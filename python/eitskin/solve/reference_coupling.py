@@ -12,7 +12,6 @@ from eitskin.solve.reference_fit import Disc
 
 FloatArray = npt.NDArray[np.float64]
 
-MOST = 0.25
 NO_DIPOLE_MM2 = 1e-6
 
 
