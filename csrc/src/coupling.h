@@ -6,7 +6,7 @@
  * dipole. The Jacobian knows each disc in the untouched field only; to second order in the changes, what it leaves out is
  *     dV(drive, measure) = - C sum over discs i of change_i area_i dE_i(drive) . E_i(measure),
  * dE_i the field that the others add at disc i. With x + iy for vectors, conj(dE) = s (E / r^2 - conj(E) / D^2), D = a - b z of the
- * place z, where a and b describe the mirror at the source's place (docs/eitm-format.md, "FLDS"). */
+ * place z, where a and b describe the mirror at the source's place (docs/reference/eitm-format.md, "FLDS"). */
 #ifndef EITSKIN_COUPLING_H
 #define EITSKIN_COUPLING_H
 

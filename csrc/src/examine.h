@@ -7,7 +7,7 @@
 /* Which rows of a fold are in use: ctx->basis_for. */
 enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_BOTH = 3 };
 
-/* Thresholds; docs/findings.md says what they were chosen on. */
+/* Thresholds; docs/reference/diagnostics.md says what they were chosen on. */
 #define EITS_ROW_SIGNIFICANT R(0.3)   /* of the reference's rms: rows that tell whether an electrode lives */
 #define EITS_ROW_DEAD_SHARE R(0.02)   /* of the reference */
 #define EITS_ROW_DEAD_NOISE R(5.0)    /* times the noise; a significant row's reference is at least ten times that */

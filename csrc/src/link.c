@@ -1,4 +1,4 @@
-/* Packets on a wire: head, payload and checksum, stuffed between zeros. docs/link-protocol.md specifies the bytes. */
+/* Packets on a wire: head, payload and checksum, stuffed between zeros. docs/reference/link-protocol.md specifies the bytes. */
 #include "eitskin/link.h"
 
 #include "eitskin/model.h"

@@ -1,4 +1,4 @@
-/* From a touch's strength and place to its load, by the model's calibration (docs/calibration.md). */
+/* From a touch's strength and place to its load, by the model's calibration (docs/guide/calibration.md). */
 #include "eitskin/load.h"
 
 #include "vec.h"

@@ -5,7 +5,7 @@
 #include "disc.h"
 #include "vec.h"
 
-/* Chosen on tuning streams, docs/tracking.md. */
+/* Chosen on tuning streams, docs/guide/tracking.md. */
 static const eits_real SURE_SHARE = R(0.05);     /* a touch that explains less of |y|^2 may be half of another */
 static const eits_real SURE_CLEARNESS = R(1.5);  /* and one whose own S'y is below so many times that of noise may be noise */
 static const eits_real NEWBORN_REACH = R(0.6);   /* of follow_mm, for touches that are not told of yet */

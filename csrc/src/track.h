@@ -1,4 +1,4 @@
-/* Touches followed from frame to frame: births and deaths, ids, places smoothed in time. docs/tracking.md says what each is worth. */
+/* Touches followed from frame to frame: births and deaths, ids, places smoothed in time. docs/guide/tracking.md says what each is worth. */
 #ifndef EITSKIN_TRACK_H
 #define EITSKIN_TRACK_H
 

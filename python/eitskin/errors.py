@@ -1,6 +1,6 @@
 """Everything that eitskin refuses, one class a kind, each with the exit code that the command line returns.
 
-An error's text is one line that says what was wrong, where, and what to do about it. docs/error-codes.md lists the codes.
+An error's text is one line that says what was wrong, where, and what to do about it. docs/reference/error-codes.md lists the codes.
 """
 
 from __future__ import annotations

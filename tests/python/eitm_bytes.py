@@ -1,4 +1,4 @@
-"""The bytes of an .eitm file by docs/eitm-format.md alone, without the project's own reader: to look, to break, to seal."""
+"""The bytes of an .eitm file by docs/reference/eitm-format.md alone, without the project's own reader: to look, to break, to seal."""
 
 from __future__ import annotations
 

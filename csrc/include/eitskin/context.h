@@ -241,7 +241,7 @@ size_t eits_workspace_size(const eits_model *model, int prepared);
 /* The model's defaults as options. Errors: EITS_E_ARGUMENT. */
 eits_status eits_options_default(const eits_model *model, eits_options *options);
 
-/* Change `options` to what suits frames that follow one another, 48 or 96 a second (docs/tracking.md): the gate a quarter lower,
+/* Change `options` to what suits frames that follow one another, 48 or 96 a second (docs/guide/tracking.md): the gate a quarter lower,
  * and the touches that come of it followed in time, so that those of noise are not told of. A frame by itself then misses faint
  * touches: each needs those before it. Errors: EITS_E_ARGUMENT. */
 eits_status eits_options_track(eits_options *options);

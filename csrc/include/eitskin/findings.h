@@ -1,4 +1,4 @@
-/* eitskin: what is found wrong with a frame, said by name. docs/findings.md has each rule and what to do about it.
+/* eitskin: what is found wrong with a frame, said by name. docs/reference/diagnostics.md has each rule and what to do about it.
  *
  * The frame stage looks at rows and electrodes before anything is solved, and leaves out what would spoil the image; the solver
  * and the touch fit look at what came of it. A finding is no error: the frame is imaged as well as what is left of it allows, and

@@ -5,14 +5,14 @@
  * direction that drift of the gain takes, which carries no news, is projected away.
  *
  * Rows left out: of a reciprocal pair the other row stands for both. Where both are out, what is left is whitened anew: the
- * solver then meets the data by F S instead of S, as the reduction would have had it without those rows (docs/eitm-format.md,
+ * solver then meets the data by F S instead of S, as the reduction would have had it without those rows (docs/reference/eitm-format.md,
  * "Rows left out"), the floor lower the fewer rows there are; lambda_noise grows with the noise that this lets through. That
  * needs a model of the builder's form, P's rows orthogonal and S whitened by them, which eits_init finds out. Of any other
  * model, the rows' values are minimised over: the span of their columns of P is projected away, too, which loses much of what
  * the rows left know.
  *
  * Noise: a floor that suits 60 dB lets too much of it through at 40. What the tare learned raises it (floor_noise_factor): with no
- * row out F is a weight for each row of S then (docs/eitm-format.md, "Noise and the floor"). Else there is no F, and no cost.
+ * row out F is a weight for each row of S then (docs/reference/eitm-format.md, "Noise and the floor"). Else there is no F, and no cost.
  */
 #ifndef EITSKIN_FRAME_H
 #define EITSKIN_FRAME_H

@@ -1,4 +1,4 @@
-/* eitskin: packets between a board and a host, and their framing. docs/link-protocol.md specifies the bytes.
+/* eitskin: packets between a board and a host, and their framing. docs/reference/link-protocol.md specifies the bytes.
  *
  * A packet is an 8-byte head (u8 version, u8 type, u16 bytes of payload, u32 sequence number), a payload and a CRC-32 of both,
  * stuffed by COBS (Cheshire and Baker, IEEE/ACM Trans. Networking 7 (1999) 159-172) between two zero bytes. Both sides use

@@ -1,4 +1,4 @@
-/* eitskin: a view of an .eitm model, read in place (docs/eitm-format.md specifies the bytes).
+/* eitskin: a view of an .eitm model, read in place (docs/reference/eitm-format.md specifies the bytes).
  *
  * Nothing is copied: the view points into the blob, which must stay where it is, unchanged, as long as the view is used.
  */
@@ -42,7 +42,7 @@ typedef struct eits_matrix {
 /* The fields that the electrodes' currents make in the untouched skin, and the rim's mirror: for what touches do to each other. */
 typedef struct eits_fields {
     eits_matrix at;   /* f16, a column a pixel: E_x of each electrode's current, E_y of each, then a_x, a_y, b_x, b_y of the mirror
-                       * (docs/eitm-format.md, "FLDS"); data NULL where the model has none */
+                       * (docs/reference/eitm-format.md, "FLDS"); data NULL where the model has none */
     float volts;      /* dV = -volts change area E . E, in V per (S/m mm^2) */
     float per_sheet;  /* 1 / (2 pi sigma): m/S */
 } eits_fields;

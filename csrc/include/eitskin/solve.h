@@ -3,7 +3,7 @@
  *     minimise  |y - S x|^2 / 2 + lambda |x|_1     over x >= 0, x <= 0 or all x
  *
  * FISTA: Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183-202, doi 10.1137/080716542. The rows of S are whitened and its columns
- * scaled beforehand, so that the step is known and few iterations do (docs/eitm-format.md, "Reduction").
+ * scaled beforehand, so that the step is known and few iterations do (docs/reference/eitm-format.md, "Reduction").
  *
  * EITS_SOLVER_WORKING_SET runs the same iterations on those columns that are not zero or would move, and looks at all of them
  * now and then, and for the gap at the end: a sixth of the work. Its image after a number of iterations is FISTA's but for what
@@ -13,7 +13,7 @@
  * sweep. EITS_SOLVER_ACTIVE_SET finds the optimum itself, by Newton's steps on a few columns that come and go; an iteration is a
  * look at every column, and few are needed. The support never exceeds the directions that the data have; where the factor is of
  * no use coordinate descent goes on, and the gap tells how far that came. The optimum is not the best image: it is sparser than
- * a touch (docs/benchmarks.md).
+ * a touch (docs/results/benchmarks.md).
  *
  * With mac_limit > 0 each solver stops with the best so far (FISTA: the last so far) where the next step, and the gap after it,
  * would take info.macs beyond the limit. The frame stage's MACs count but are always spent; where S'y is not to be had for the

@@ -1,4 +1,4 @@
-/* The board that QEMU's mps2-an500 makes: an instrument whose skin, link and flash are files (docs/hardware.md).
+/* The board that QEMU's mps2-an500 makes: an instrument whose skin, link and flash are files (docs/guide/hardware.md).
  *
  * Its clock counts instructions: run with -icount shift=6, an instruction takes 64 ns of QEMU's time, which are 1.6 ticks of
  * a 25 MHz timer, and 5 ns of the board's, as if 200 MHz did one instruction a cycle. Runs are reproducible to the bit. */

@@ -1,7 +1,7 @@
 /* The NUCLEO-F767ZI as the application sees it. */
 #include "nucleo.h"
 
-/* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA and 1.5 would (docs/hardware.md). */
+/* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA and 1.5 would (docs/guide/hardware.md). */
 enum { FULL_SCALE_CODE = 4095, REFERENCE_UV = 3300000, FRONT_END_GAIN_PPM = 1500000 };
 
 /* No 8 MHz: nothing that follows would be right. The red light blinks, from the 16 MHz oscillator, and that is all. */

@@ -1,4 +1,4 @@
-/* What the files of this board need of one another. Memory and pins: docs/hardware.md. */
+/* What the files of this board need of one another. Memory and pins: docs/guide/hardware.md. */
 #ifndef NUCLEO_H
 #define NUCLEO_H
 

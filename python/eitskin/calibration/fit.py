@@ -1,4 +1,4 @@
-"""From presses of known load to the law that turns strength and place into load (docs/calibration.md).
+"""From presses of known load to the law that turns strength and place into load (docs/guide/calibration.md).
 
 The strength of a load F at (x, y) is modelled as law(F) / gain(x, y). Laws, all monotone: *saturating*, s_max (1 - exp(-F / F0));
 *power*, c F^p; and, from four weights on, *stretched*, s_max (1 - exp(-(F / F0)^p)), which has both within it. The gain is 1 + a

@@ -33,7 +33,7 @@ def load_weights(path: Path) -> list[Weight]:
 
     Raises:
         FileError: it cannot be read.
-        ConfigError: a line is not what docs/calibration.md says.
+        ConfigError: a line is not what docs/guide/calibration.md says.
     """
     rows = _toml_rows(path) if path.suffix.lower() == ".toml" else _csv_rows(path)
     if not rows:

@@ -41,7 +41,7 @@ def add_parser(subparsers: Any) -> None:
     board.add_argument("--seed", type=int, default=1, help="of the scenes (default: %(default)s)")
     board.add_argument("--frames", type=int, default=8, help="on the emulated NUCLEO, 0 for none (default: %(default)s)")
     board.add_argument("--build", type=Path, metavar="DIR", help="keep the build there, or take up an earlier one")
-    board.add_argument("--markdown", type=Path, metavar="FILE.md", help="write the page docs/board-cost.md is")
+    board.add_argument("--markdown", type=Path, metavar="FILE.md", help="write the page docs/results/board-cost.md is")
     board.add_argument("--json", action="store_true")
     board.set_defaults(run=run_board)
     kernels = what.add_parser(
@@ -70,7 +70,7 @@ def add_parser(subparsers: Any) -> None:
     findings = what.add_parser(
         "findings",
         help="how often faults are called by their name, and what they cost the image",
-        description="Spoil frames of random scenes in every way that docs/findings.md names, count how often that is said in "
+        description="Spoil frames of random scenes in every way that docs/reference/diagnostics.md names, count how often that is said in "
         "that very frame, and compare the image with that of the same frame without the fault; some five minutes.",
     )
     findings.add_argument("--scenes", type=int, default=640, help="that every fault is put on (default: %(default)s)")

@@ -23,7 +23,7 @@ def add_parser(subparsers: Any) -> None:
         "calibrate",
         help="known weights on a skin, so that its touches are told in grams",
         description="Fit the law that turns a touch's strength and place into its load to recordings of known weights, say how "
-        "far it is to be trusted, and store it in a copy of the model. docs/calibration.md shows how to record them.",
+        "far it is to be trusted, and store it in a copy of the model. docs/guide/calibration.md shows how to record them.",
     )
     parser.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING", help="frames (.npz) or a run (.eits) of weights")
     parser.add_argument(

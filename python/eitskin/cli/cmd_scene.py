@@ -19,7 +19,7 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "scene",
         help="simulate what happens on a skin, with the imperfections that a scene names",
-        description="A scene file says what happens on a skin and which imperfections take part; docs/scenes.md.",
+        description="A scene file says what happens on a skin and which imperfections take part; docs/guide/scenes.md.",
     )
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     one = what.add_parser("run", help="simulate a scene: frames with their truth")

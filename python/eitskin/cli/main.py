@@ -37,7 +37,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code (docs/error-codes.md) and prints errors as one line on stderr."""
+    """Run one command; returns the exit code (docs/reference/error-codes.md) and prints errors as one line on stderr."""
     traceback = False
     try:
         options = build_parser().parse_args(arguments)

@@ -1,4 +1,4 @@
-"""What was found wrong with a frame, by name and in a few words (csrc/include/eitskin/findings.h, docs/findings.md)."""
+"""What was found wrong with a frame, by name and in a few words (csrc/include/eitskin/findings.h, docs/reference/diagnostics.md)."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Options:
     coordinate descent) or "active-set" (rounds to the exact optimum). ``mac_limit`` (0: none): the best so far when the next
     step would take the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of ``FINDINGS``.
     ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow touches in time; all 0: each frame by itself
-    (``solve.options.tracking`` sets them, docs/tracking.md).
+    (``solve.options.tracking`` sets them, docs/guide/tracking.md).
     ``floor_noise_factor``: the whitening's floor is at least this times the tare's noise over rms(V0); 0: as the model has it.
     """
 
@@ -151,7 +151,7 @@ class Baseline:
 class Touch:
     """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame. One that is held
     while it is not found has confidence 0. ``load_n`` is how hard it presses, in newtons, where the model is calibrated
-    (docs/calibration.md), else 0."""
+    (docs/guide/calibration.md), else 0."""
 
     id: int
     x_mm: float

@@ -1,6 +1,6 @@
 """The bytes of a model bank: the model from its start, and in its last 32 bytes the record that makes it valid.
 
-The firmware programs the record last, as the commit of an upload; docs/link-protocol.md, "Model banks", specifies it.
+The firmware programs the record last, as the commit of an upload; docs/reference/link-protocol.md, "Model banks", specifies it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Frames: boundary voltages with their reference, protocol and (where known) truth, and the one file that holds them.
 
-The file is an .npz; docs/frames-format.md lists its fields. It is read without pickle and checked whole.
+The file is an .npz; docs/reference/frames-format.md lists its fields. It is read without pickle and checked whole.
 """
 
 from __future__ import annotations
@@ -244,7 +244,7 @@ def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Fram
             raise FrameError(f"the field {name!r} is missing; make the file again")
     unknown = sorted(set(arrays) - {*required, *optional, "format", "version", "truth_mask_extent_mm"})
     if unknown:
-        raise FrameError(f"unknown field {unknown[0]!r}; docs/frames-format.md lists the fields")
+        raise FrameError(f"unknown field {unknown[0]!r}; docs/reference/frames-format.md lists the fields")
     try:
         meta = parse_json(str(arrays["meta"]))
     except ValueError:

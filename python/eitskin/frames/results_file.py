@@ -1,4 +1,4 @@
-"""Results as a file: images, touches and solver info of each frame, named and with units (docs/frames-format.md)."""
+"""Results as a file: images, touches and solver info of each frame, named and with units (docs/reference/frames-format.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The .eitm file, byte by byte as docs/eitm-format.md specifies; this reader is independent of the C one."""
+"""The .eitm file, byte by byte as docs/reference/eitm-format.md specifies; this reader is independent of the C one."""
 
 from __future__ import annotations
 

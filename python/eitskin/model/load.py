@@ -1,4 +1,4 @@
-"""How a touch's strength and place tell its load: the optional section LOAD of a model (docs/calibration.md), read and used."""
+"""How a touch's strength and place tell its load: the optional section LOAD of a model (docs/guide/calibration.md), read and used."""
 
 from __future__ import annotations
 

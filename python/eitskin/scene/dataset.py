@@ -106,7 +106,7 @@ def job_of(scene: Scene, count: int, seed: int, *, chunk: int = DEFAULT_CHUNK, r
 
 
 def make_chunk(job: Job, chunk: int, bench: Bench | None = None) -> bytes:
-    """The .npz of one chunk: c scenes of f frames, t touches; every field is listed in docs/scenes.md.
+    """The .npz of one chunk: c scenes of f frames, t touches; every field is listed in docs/guide/scenes.md.
 
     Raises:
         EitskinError: a drawn scene cannot be; the text names its number.

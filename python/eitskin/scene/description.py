@@ -1,6 +1,6 @@
 """A scene: what happens on a skin, and which imperfections take part. Read from TOML, checked whole.
 
-Effects' tables are kept as they are; the compiler reads them when it imports their modules. The schema: docs/scenes.md.
+Effects' tables are kept as they are; the compiler reads them when it imports their modules. The schema: docs/guide/scenes.md.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ class Registry:
 def _check_contract(module: object, name: str, where: str) -> None:
     for attribute in ("NAME", "STAGE", "ORDER", "SUMMARY", "Parameters", "make"):
         if not hasattr(module, attribute):
-            raise ConfigError(f"{where}: its module defines no {attribute}; docs/scenes.md says what an effect defines")
+            raise ConfigError(f"{where}: its module defines no {attribute}; docs/guide/scenes.md says what an effect defines")
     if name != module.NAME or not isinstance(module.STAGE, Stage):  # type: ignore[attr-defined]
         raise ConfigError(f"{where}: its module's NAME must be {name!r} and its STAGE a Stage; mend the module")
 

@@ -30,7 +30,7 @@ class Reconstructor:
     """One skin's reconstruction: tare on quiet frames, then turn frames into images and touches.
 
     ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or "numpy" (the reference). What is
-    wrong with a frame is found, left out where that helps, and named in ``info.found`` (docs/findings.md); the option
+    wrong with a frame is found, left out where that helps, and named in ``info.found`` (docs/reference/diagnostics.md); the option
     ``findings`` chooses what is looked for.
 
     Raises:

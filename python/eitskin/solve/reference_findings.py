@@ -1,6 +1,6 @@
 """What is found wrong with a frame, in numpy: the rules of csrc/src/{electrodes,glitch,misfit,crowded}.c, written for reading.
 
-docs/findings.md says what each rule is for and what its thresholds were chosen on.
+docs/reference/diagnostics.md says what each rule is for and what its thresholds were chosen on.
 """
 
 from __future__ import annotations

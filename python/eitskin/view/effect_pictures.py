@@ -1,7 +1,7 @@
 """One picture an effect: its law on the left, on the right what it adds to a frame.
 
 The frame is that of a press on the paper's skin; on the right stands the frame with the effect minus the frame without
-it. Parameters are chosen to be seen, and stand above the picture. docs/effects/README.md shows all.
+it. Parameters are chosen to be seen, and stand above the picture. docs/reference/effects/README.md shows all.
 ``eitskin scene effect-picture NAME -o PNG`` makes one picture.
 """
 

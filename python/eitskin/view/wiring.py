@@ -1,4 +1,4 @@
-"""Which pin of the NUCLEO-F767ZI goes where: the table of docs/hardware.md and the drawing are made from it.
+"""Which pin of the NUCLEO-F767ZI goes where: the table of docs/guide/hardware.md and the drawing are made from it.
 
 Connectors and pins after ST's UM1974, tables 18 and 25: the Zio connectors CN7 to CN10 take plugs, the morpho ones CN11 and
 CN12 are holes in the board, with every pin of the processor.
@@ -63,7 +63,7 @@ WIRES = _wires()
 
 
 def wire_table() -> str:
-    """The table of docs/hardware.md, as Markdown."""
+    """The table of docs/guide/hardware.md, as Markdown."""
     lines = ["| pin | Zio | morpho | firmware | wire to |", "|---|---|---|---|---|"]
     lines += [f"| {one.pin} | {one.zio} | {one.morpho} | {one.function} | {one.to} |" for one in WIRES]
     return "\n".join(lines) + "\n"

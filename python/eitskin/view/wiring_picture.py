@@ -1,4 +1,4 @@
-"""The drawing of docs/hardware.md: board, generator, current source, multiplexers, skin and receiver.
+"""The drawing of docs/guide/hardware.md: board, generator, current source, multiplexers, skin and receiver.
 
 Made by ``python -m eitskin.view.wiring_picture docs/pictures/wiring.png``.
 """

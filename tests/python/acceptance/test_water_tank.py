@@ -1,4 +1,4 @@
-"""Measured frames that nobody here made, from raw arrays to touches by the commands that docs/tank.md gives.
+"""Measured frames that nobody here made, from raw arrays to touches by the commands that docs/guide/tank.md gives.
 
 The data are not part of the project; without them these tests are skipped.
 """

@@ -26,7 +26,7 @@ def test_round_trip(packet_type: int, sequence: int, payload: bytes) -> None:
 
 
 def test_the_bytes_are_the_documented_ones() -> None:
-    """Worked out by hand in docs/link-protocol.md."""
+    """Worked out by hand in docs/reference/link-protocol.md."""
     head = bytes([LINK_VERSION, 0x80, 4, 0, 7, 0, 0, 0])
     payload = bytes([1, 2, 0, 3])
     checksum = zlib.crc32(head + payload).to_bytes(4, "little")

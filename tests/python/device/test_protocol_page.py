@@ -1,4 +1,4 @@
-"""docs/link-protocol.md says what the code does: sizes, offsets, numbers, the worked example."""
+"""docs/reference/link-protocol.md says what the code does: sizes, offsets, numbers, the worked example."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eitskin.device.wire import packets as pk
 from eitskin.device.wire.codec import encode
 from eitskin.device.wire.commands import COMMANDS, ModelData
 
-PAGE = (Path(__file__).resolve().parents[3] / "docs" / "link-protocol.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "link-protocol.md").read_text(encoding="utf-8")
 
 
 def section(title: str) -> str:

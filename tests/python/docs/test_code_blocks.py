@@ -11,7 +11,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = ("README.md", *(f"docs/{name}.md" for name in ("tutorial", "scenes", "board", "calibration", "tradeoff", "shapes")))
+PAGES = (
+    "README.md",
+    *(f"docs/guide/{name}.md" for name in ("tutorial", "scenes", "board", "calibration", "shapes")),
+    "docs/results/tradeoff.md",
+)
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SET_UP = {"scripts/demo", "scripts/test"}
 

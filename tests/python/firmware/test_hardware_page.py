@@ -1,4 +1,4 @@
-"""The pins of docs/hardware.md, of its drawing and of the firmware are the same."""
+"""The pins of docs/guide/hardware.md, of its drawing and of the firmware are the same."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eitskin.view.wiring import MULTIPLEXERS, WIRES, wire_table
 
 ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
-PAGE = (ROOT / "docs" / "hardware.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "guide" / "hardware.md").read_text(encoding="utf-8")
 MODES = {"MCO1": ("PIN_ALTERNATE", 0), "SPI3": ("PIN_ALTERNATE", 6), "USART3": ("PIN_ALTERNATE", 7), "ADC1": ("PIN_ANALOG", 0)}
 CONSTANTS = {"FSYNC": 2, "LED_GREEN": 0, "LED_BLUE": 7, "LED_RED": 14}
 

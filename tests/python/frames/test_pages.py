@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[3]
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize("page", ("frames-format.md", "import-and-doctor.md"))
+@pytest.mark.parametrize("page", ("reference/frames-format.md", "guide/import-and-doctor.md"))
 def test_blocks_run(page: str, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     programs, work = tmp_path / "bin", tmp_path / "work"

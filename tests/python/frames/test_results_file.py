@@ -59,8 +59,8 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
 
 
 def test_the_documented_fields_are_the_saved_ones(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
-    """Names and types of the table in docs/frames-format.md, row by row."""
-    page = (Path(__file__).resolve().parents[3] / "docs" / "frames-format.md").read_text(encoding="utf-8")
+    """Names and types of the table in docs/reference/frames-format.md, row by row."""
+    page = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "frames-format.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (`.*?) \| (.*?) \|", page.split("# The results file")[1], re.MULTILINE)
     documented = {name: kind for names, kind in rows for name in re.findall(r"`(\w+)`", names)}
     save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), results)

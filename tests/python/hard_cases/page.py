@@ -1,4 +1,4 @@
-"""docs/hard-cases.md: the catalogue, and how near to its bound each case came. ``scripts/hard-cases`` makes it."""
+"""docs/results/hard-cases.md: the catalogue, and how near to its bound each case came. ``scripts/hard-cases`` makes it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from hard_case import GROUPS, Case
 
 from margins import TARGETS, Margin, Margins, read_margins, worst_of_cases
 
-PAGE = ROOT / "docs" / "hard-cases.md"
-PICTURES = ROOT / "docs" / "pictures"
+PAGE = ROOT / "docs" / "results" / "hard-cases.md"
+PICTURES = ROOT / "docs" / "results" / "pictures"
 
 HEAD = """# Hard cases
 
@@ -96,7 +96,7 @@ def _measures(case: Case) -> bool:
 
 def main() -> int:
     """Run the hard cases, or read what a run left, then write page and pictures."""
-    parser = argparse.ArgumentParser(description="run the hard cases and write docs/hard-cases.md and its pictures")
+    parser = argparse.ArgumentParser(description="run the hard cases and write docs/results/hard-cases.md and its pictures")
     parser.add_argument("--margins", type=Path, help="what  pytest --margins FOLDER  left there, in place of a run")
     parser.add_argument("--only-page", action="store_true", help="leave the pictures as they are")
     given = parser.parse_args()

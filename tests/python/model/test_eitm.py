@@ -1,4 +1,4 @@
-"""The .eitm file: what is written is read again, the bytes lie where docs/eitm-format.md says, and damage is refused."""
+"""The .eitm file: what is written is read again, the bytes lie where docs/reference/eitm-format.md says, and damage is refused."""
 
 from __future__ import annotations
 

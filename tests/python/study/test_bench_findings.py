@@ -20,7 +20,7 @@ from eitskin.study.bench.findings_page import CROWD_HEAD, DETACHED_HEAD, FAULT_H
 from eitskin.study.bench.findings_scenes import IMPERFECT, QUIET_FRAMES, ROWS, Table, drawn, swapped
 
 SCENES, SEED = 4, 6
-PAGE = Path(__file__).parents[3] / "docs" / "findings.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "diagnostics.md"
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from eitskin.study.experiments.algorithms.scenes import NUMBERS, shown_set, touc
 from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
 from eitskin.study.judge import metrics
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "studies" / "algorithms.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "algorithms.md"
 KEPT = (
     *("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"),
     *(f"plain FISTA {iterations}, non-negative" for iterations in (30, 300, 3000)),

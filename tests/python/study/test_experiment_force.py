@@ -55,7 +55,7 @@ def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, Outcome, in
 
 
 def test_every_table_and_mark_has_its_place_on_the_page(done: tuple[Path, Outcome, int]) -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "studies" / "force.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[3] / "docs" / "results" / "force.md").read_text(encoding="utf-8")
     outcome = done[1]
     assert [table.name for table in outcome.tables] == ["slopes", "anywhere", "by-load", "over-snr", "detection"]
     for name in (*(table.name for table in outcome.tables), *outcome.words, "command"):

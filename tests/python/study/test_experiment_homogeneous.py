@@ -21,7 +21,7 @@ from eitskin.study.experiments.homogeneous.cases import CASES, IDEAL, INSTRUMENT
 from eitskin.study.experiments.homogeneous.measured import FILE, load_tank
 from eitskin.study.experiments.homogeneous.uniformity import deviations_percent, fold_for, uniformity
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "studies" / "homogeneous.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "homogeneous.md"
 PROTOCOL = adjacent(16)
 ROWS = PROTOCOL.drive_measure.astype(np.int64)
 EVEN_V = predicted(paper_skin(), 16).voltages(ROWS, 1e-3)
@@ -164,7 +164,7 @@ def test_the_measured_tank(shared_data: Path) -> None:
     assert tank is not None
     reference = tank.frames.reference_voltage_v.mean(axis=0)
     found = uniformity(reference, tank.frames.protocol, fold_for(tank.frames.protocol))
-    assert 3 < found.spread < 7 and found.reciprocity == pytest.approx(5.3, abs=0.1)  # as docs/tank.md says
+    assert 3 < found.spread < 7 and found.reciprocity == pytest.approx(5.3, abs=0.1)  # as docs/guide/tank.md says
 
 
 def test_pictures_and_marks(outcome: Outcome, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from eitskin.study.experiments.write import write_all, write_page
 from eitskin.study.sessions import SceneSolver
 
 OUTLINE = paper_skin().outline
-PAGE = Path(__file__).parents[3] / "docs" / "studies" / "multitouch.md"
+PAGE = Path(__file__).parents[3] / "docs" / "results" / "multitouch.md"
 COARSE = 2500
 
 

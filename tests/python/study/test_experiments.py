@@ -15,7 +15,7 @@ from eitskin.study.experiments import registry
 from eitskin.study.experiments.experiment import Desk, Outcome, Settings, Table, desk_in, plain
 from eitskin.study.experiments.write import to_json, write_all, write_page
 
-PAGES = Path(__file__).parents[3] / "docs" / "studies"
+PAGES = Path(__file__).parents[3] / "docs" / "results"
 
 
 class Small:
@@ -65,7 +65,7 @@ def test_the_command_lists_runs_and_goes_on(small: Small, tmp_path: Path, capsys
     assert main(["study", "small", "-o", str(tmp_path / "out"), "--seed", "4", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"mean": 0.5, "none": None} and small.computed == 2
     text = page.read_text(encoding="utf-8")
-    assert "| mean | 0.5 |" in text and "old" not in text and "--seed 3 --page docs/studies/small.md" in text
+    assert "| mean | 0.5 |" in text and "old" not in text and "--seed 3 --page docs/results/small.md" in text
     assert (tmp_path / "pictures" / "small" / "small.png").read_bytes() == b"png"
     assert (tmp_path / "out" / "small.csv").read_text(encoding="utf-8") == "what,value\nmean,0.5\n"
 

@@ -192,7 +192,7 @@ def test_the_shipped_results_are_of_the_built_in_set_and_reach_the_targets() -> 
     front = load_front()
     names = {one.name for one in front.points}
     missing = {one.name for one in default_set()} - names
-    assert not missing, f"make the shipped results anew (docs/tradeoff.md): {sorted(missing)} are not in them"
+    assert not missing, f"make the shipped results anew (docs/results/tradeoff.md): {sorted(missing)} are not in them"
     assert all(one.instructions is not None and one.instructions["kind"] == "counted" for one in front.points)
     assert choose(front.points, wish("2.5Minstructions")).accuracy(HERE) >= 0.84  # type: ignore[operator]
     assert choose(front.points, wish("2.5Minstructions", worst=True)).accuracy(HERE) >= 0.84  # type: ignore[operator]
@@ -214,7 +214,7 @@ def test_what_ships_is_smaller_and_reads_the_same() -> None:
 
 
 def test_the_page_shows_the_shipped_results(tmp_path: Path) -> None:
-    page = Path(__file__).resolve().parents[3] / "docs" / "tradeoff.md"
+    page = Path(__file__).resolve().parents[3] / "docs" / "results" / "tradeoff.md"
     text, front = page.read_text(encoding="utf-8"), load_front()
     for name, make in TABLES.items():
         marked = f"<!-- {name} -->\n{make(front)}\n<!-- end {name} -->"

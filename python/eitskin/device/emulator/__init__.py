@@ -1,3 +1,3 @@
 """An emulated NUCLEO-F767ZI: the unmodified firmware image, peripherals by registers, simulated analog parts;
-docs/emulated-board.md.
+docs/guide/emulated-board.md.
 """

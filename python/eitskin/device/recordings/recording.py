@@ -1,5 +1,5 @@
 """Recordings (.eits): the packets of a link as they were received, one after another, flushed each, so that a killed recorder
-loses at most the last. Reading one goes through the live decoder. docs/link-protocol.md, "Recordings", specifies the file.
+loses at most the last. Reading one goes through the live decoder. docs/reference/link-protocol.md, "Recordings", specifies the file.
 """
 
 from __future__ import annotations

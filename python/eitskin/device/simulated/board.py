@@ -2,7 +2,7 @@
 
 What the firmware does with registers is left out: there is no converter (no saturated rows, and open electrodes only once there
 is a reference, by the core) and no processor time; every time that would tell of one is 0. The clock runs only while the board
-scans for someone. All else is as docs/link-protocol.md says, and the packets are the very bytes.
+scans for someone. All else is as docs/reference/link-protocol.md says, and the packets are the very bytes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the firmware refuses of a command by itself, and how it times a scan; docs/link-protocol.md lists the limits."""
+"""What the firmware refuses of a command by itself, and how it times a scan; docs/reference/link-protocol.md lists the limits."""
 
 from __future__ import annotations
 

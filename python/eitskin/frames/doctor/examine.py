@@ -29,7 +29,7 @@ RENUMBER_FIRST = (
 
 
 def examine(subject: Subject) -> Report:
-    """What is wrong with ``subject``, with evidence and remedy; see docs/import-and-doctor.md for every check.
+    """What is wrong with ``subject``, with evidence and remedy; see docs/guide/import-and-doctor.md for every check.
 
     Raises:
         UsageError: the skin has another number of electrodes than the frames.

@@ -292,7 +292,7 @@ def as_text(result: BoardCost) -> str:
 
 
 def as_markdown(result: BoardCost, command: str) -> str:
-    """The page that ``docs/board-cost.md`` is; ``command`` made it."""
+    """The page that ``docs/results/board-cost.md`` is; ``command`` made it."""
     stack = max(cost.stack_bytes for cost in result.costs if cost.kernels != "portable")
     f32 = {c.storage: c for c in result.costs if c.kernels != "portable" and not c.warm}
     ratios = ", ".join(f"{name} {f32[name].mean / f32['f32'].mean:.2f}" for name in STORAGES if name != "f32")

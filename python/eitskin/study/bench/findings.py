@@ -1,7 +1,7 @@
 """How often what is wrong with a frame is called by its name, and what it costs the image, with the findings and without.
 
 Every frame is compared with the same one without the fault: same scene, contacts, noise and reference. Rules and thresholds were
-chosen under other seeds (docs/findings.md).
+chosen under other seeds (docs/reference/diagnostics.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The results of ``eitskin bench findings`` as text, and as the section "Rates" of docs/findings.md."""
+"""The results of ``eitskin bench findings`` as text, and as the section "Rates" of docs/reference/diagnostics.md."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def _command(name: str, page: Path, settings: Settings) -> str:
     more = f" --seed {settings.seed}" if settings.seed != Settings.seed else ""
     more += f" --share {settings.share:g}" if settings.share != Settings.share else ""
     more += "" if settings.data is None else " --data FOLDER"
-    return f"Tables and pictures are written by `eitskin study {name} -o out/{name}{more} --page docs/studies/{page.name}`."
+    return f"Tables and pictures are written by `eitskin study {name} -o out/{name}{more} --page docs/results/{page.name}`."
 
 
 def _csv(table: Table) -> str:

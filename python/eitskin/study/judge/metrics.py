@@ -1,6 +1,6 @@
 """How well an image shows where the touches are: MIoU on a fine raster, as a curve over the threshold.
 
-The exact rule, with every choice that moves the number, is in docs/metrics.md. In short: MIoU = (IoU(background) +
+The exact rule, with every choice that moves the number, is in docs/reference/metrics.md. In short: MIoU = (IoU(background) +
 IoU(touch)) / 2 over the cells of a fine raster inside the skin; a cell of the image is a touch where x > t max(x); the
 fraction t is chosen once per method, on training scenes, and then kept. A cell shows the nearest pixel, or is
 interpolated between pixels: the choice moves every number, so it is always named.

@@ -75,7 +75,7 @@ def train(built: Built, session: Session, solved: Solved) -> Trained:
 
 
 def score(built: Built, session: Session, solved: Solved, trained: Trained) -> dict[str, Any]:
-    """Everything about the accuracy in plain values fit for JSON; see ``docs/tradeoff.md`` for what each is."""
+    """Everything about the accuracy in plain values fit for JSON; see ``docs/results/tradeoff.md`` for what each is."""
     truths = session.truths(built.judge.raster)
     image = built.judge.curves(solved.images, truths, [trained.threshold])[:, 0]
     discs = [

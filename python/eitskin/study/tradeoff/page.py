@@ -1,4 +1,4 @@
-"""The tables of docs/tradeoff.md, written by the command between the page's marks, so that they are never copied by hand."""
+"""The tables of docs/results/tradeoff.md, written by the command between the page's marks, so that they are never copied by hand."""
 
 from __future__ import annotations
 

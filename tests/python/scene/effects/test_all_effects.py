@@ -168,7 +168,7 @@ def test_an_effect_declares_what_it_is(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(STRONG))
 def test_the_page_tells_of_every_effect_and_parameter(name: str) -> None:
-    folder = Path(__file__).resolve().parents[4] / "docs" / "effects"
+    folder = Path(__file__).resolve().parents[4] / "docs" / "reference" / "effects"
     page = (folder / "README.md").read_text(encoding="utf-8")
     section = page.split(f"\n## {name}\n", 1)[1].split("\n## ", 1)[0]
     module = importlib.import_module(BUILT_IN[name])

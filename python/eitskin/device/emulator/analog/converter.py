@@ -1,4 +1,4 @@
-"""From the voltage between the electrodes to codes: the amplifier's gain, half the reference as bias, 12 bits (docs/hardware.md).
+"""From the voltage between the electrodes to codes: the amplifier's gain, half the reference as bias, 12 bits (docs/guide/hardware.md).
 
 The converter's transfer is ideal: code k from k - 1/2 to k + 1/2 steps of VREF / 4096, and its ends beyond. No noise: that is the
 scene's.

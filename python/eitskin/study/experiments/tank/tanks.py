@@ -60,7 +60,7 @@ def folder_of(data: Path | None) -> Path:
         raise UsageError(f"study tank: needs measured frames, which are not part of the project; give --data DIR with {PHANTOMS}")
     for name in (PHANTOMS, *(rods[0] for rods in RODS)):
         if not (data / name).is_file():
-            raise UsageError(f"--data {data}: has no {name}; docs/studies/tank.md says where the measured frames are to be had")
+            raise UsageError(f"--data {data}: has no {name}; docs/results/tank.md says where the measured frames are to be had")
     return data
 
 

@@ -20,7 +20,7 @@ from eitskin.skin.outline import Outline
 
 FloatArray = npt.NDArray[np.float64]
 
-RATE_HZ = 48.0  # of a board that scans both rows of each pair (docs/board.md)
+RATE_HZ = 48.0  # of a board that scans both rows of each pair (docs/guide/board.md)
 FRAMES = 72
 ELEMENTS = 11_000
 LIGHT = 0.3  # of full contact, as a finger lands and lifts
