@@ -1,4 +1,5 @@
-"""Write the C source of one cffi module: ``build_cffi.py MODULE float|double OUTPUT.c``. Called by CMake."""
+"""Write the C source of one cffi module: ``build_cffi.py MODULE float|double OUTPUT.c``. Called by
+CMake."""
 
 import sys
 from pathlib import Path

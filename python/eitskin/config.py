@@ -1,4 +1,5 @@
-"""TOML tables to dataclasses, strictly: an unknown key is an error that names the nearest known one."""
+"""TOML tables to dataclasses, strictly: an unknown key is an error that names the nearest known
+one."""
 
 from __future__ import annotations
 
@@ -28,14 +29,17 @@ def load_toml(path: str | Path, what: str) -> dict[str, Any]:
         return tomllib.loads(read_bytes(path, what).decode("utf-8"))
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not UTF-8 text, so not a {what}") from None
-    except ValueError as error:  # TOMLDecodeError is one; whole numbers of thousands of digits are another
+    except (
+        ValueError
+    ) as error:  # TOMLDecodeError is one; whole numbers of thousands of digits are another
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
     except RecursionError:
         raise ConfigError(f"{path}: not a {what}: nested too deeply") from None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A remedy for the unknown ``name``: the nearest of ``known``, or all of them where none is near."""
+    """A remedy for the unknown ``name``: the nearest of ``known``, or all of them where none is
+    near."""
     choices = sorted(known)
     close = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
     return f"did you mean {close[0]!r}?" if close else f"known are: {', '.join(choices)}"
@@ -63,7 +67,8 @@ def number(
     high: float = float("inf"),
     open_low: bool = False,
 ) -> float:
-    """The number at ``key``, or ``default`` (None: required), within [low, high] ((low, high] with ``open_low``).
+    """The number at ``key``, or ``default`` (None: required), within [low, high] ((low, high] with
+    ``open_low``).
 
     Raises:
         ConfigError: it is absent and required, no number, not finite, or out of range.
@@ -80,10 +85,14 @@ def number(
     try:
         return float(value)
     except OverflowError:
-        raise ConfigError(f"{where}: {key} is a number of {len(str(value))} digits; no float holds it") from None
+        raise ConfigError(
+            f"{where}: {key} is a number of {len(str(value))} digits; no float holds it"
+        ) from None
 
 
-def integer(table: Mapping[str, Any], key: str, default: int | None, where: str, *, low: int, high: int) -> int:
+def integer(
+    table: Mapping[str, Any], key: str, default: int | None, where: str, *, low: int, high: int
+) -> int:
     """The whole number at ``key``, or ``default`` (None: required), within [low, high].
 
     Raises:
@@ -95,7 +104,9 @@ def integer(table: Mapping[str, Any], key: str, default: int | None, where: str,
     return int(value)
 
 
-def choice(table: Mapping[str, Any], key: str, default: str | None, known: Iterable[str], where: str) -> str:
+def choice(
+    table: Mapping[str, Any], key: str, default: str | None, known: Iterable[str], where: str
+) -> str:
     """The word at ``key``, or ``default`` (None: required), one of ``known``.
 
     Raises:
@@ -106,5 +117,7 @@ def choice(table: Mapping[str, Any], key: str, default: str | None, known: Itera
     if value is None:
         raise ConfigError(f"{where}: the key {key!r} is required; one of {', '.join(options)}")
     if not isinstance(value, str) or value not in options:
-        raise ConfigError(f"{where}: {key} = {value!r} is not known; {nearest(str(value), options)}")
+        raise ConfigError(
+            f"{where}: {key} = {value!r} is not known; {nearest(str(value), options)}"
+        )
     return value

@@ -1,6 +1,8 @@
-"""Everything that eitskin refuses, one class a kind, each with the exit code that the command line returns.
+"""Everything that eitskin refuses, one class a kind, each with the exit code that the command line
+returns.
 
-An error's text is one line that says what was wrong, where, and what to do about it. docs/reference/error-codes.md lists the codes.
+An error's text is one line that says what was wrong, where, and what to do about it.
+docs/reference/error-codes.md lists the codes.
 """
 
 from __future__ import annotations
@@ -9,16 +11,22 @@ LONGEST, ENDING = 3000, 1000  # characters of a line, and of its end
 
 
 class EitskinError(Exception):
-    """Base of all errors that a user can cause or mend; ``exit_code`` is the command line's status. Its text stays one line,
-    whatever names and values out of files it tells of."""
+    """Base of all errors that a user can cause or mend; ``exit_code`` is the command line's status.
+    Its text stays one line, whatever names and values out of files it tells of."""
 
     exit_code = 1
 
     def __str__(self) -> str:
         text = super().__str__()
-        if len(text) > LONGEST:  # somebody's very long word in the middle: what to do is said at the end
+        if (
+            len(text) > LONGEST
+        ):  # somebody's very long word in the middle: what to do is said at the end
             text = f"{text[: LONGEST - ENDING - 5]} ... {text[-ENDING:]}"
-        return text if text.isprintable() else "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
+        return (
+            text
+            if text.isprintable()
+            else "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
+        )
 
 
 class UsageError(EitskinError):
@@ -40,7 +48,8 @@ class ConfigError(EitskinError):
 
 
 class GeometryError(EitskinError):
-    """An outline or its electrodes cannot be: self-intersecting, overlapping, too small; or meshing failed."""
+    """An outline or its electrodes cannot be: self-intersecting, overlapping, too small; or meshing
+    failed."""
 
     exit_code = 5
 
@@ -76,11 +85,14 @@ class VerificationError(EitskinError):
 
 
 class DeviceError(EitskinError):
-    """A board or its link cannot be used: no port, no answer, another version, another model, a command refused."""
+    """A board or its link cannot be used: no port, no answer, another version, another model, a
+    command refused."""
 
     exit_code = 12  # 11 is doctor's
 
 
 def missing_extra(extra: str, package: str) -> MissingExtraError:
     """The error for an absent optional ``package`` that the extra named ``extra`` brings."""
-    return MissingExtraError(f"this needs {package}, which is not installed: run  pip install 'eitskin[{extra}]'")
+    return MissingExtraError(
+        f"this needs {package}, which is not installed: run  pip install 'eitskin[{extra}]'"
+    )

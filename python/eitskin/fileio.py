@@ -14,7 +14,8 @@ from eitskin.errors import FileError
 
 
 def refuse_unwritable(*paths: str | Path | None) -> None:
-    """Refuse before long work the outputs that ``write_beside`` would refuse after it; None stands for no output.
+    """Refuse before long work the outputs that ``write_beside`` would refuse after it; None stands
+    for no output.
 
     Raises:
         FileError: a path's folder does not exist, or the path is a folder itself.
@@ -28,17 +29,22 @@ def refuse_unwritable(*paths: str | Path | None) -> None:
 
 @contextmanager
 def write_beside(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path in the folder of ``path``; rename it to ``path`` if the block succeeds, else remove it.
+    """Yield a temporary path in the folder of ``path``; rename it to ``path`` if the block
+    succeeds, else remove it.
 
     Raises:
         FileError: the folder does not exist or cannot be written.
     """
     target = Path(path)
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent)
+        handle, name = tempfile.mkstemp(
+            prefix=f".{target.name}.", suffix=target.suffix, dir=target.parent
+        )
         os.close(handle)
     except OSError as error:
-        raise FileError(f"{target}: cannot write there ({error.strerror}); name a file in an existing folder") from error
+        raise FileError(
+            f"{target}: cannot write there ({error.strerror}); name a file in an existing folder"
+        ) from error
     temporary = Path(name)
     try:
         yield temporary
@@ -73,7 +79,9 @@ def read_bytes(path: str | Path, what: str) -> bytes:
     except FileNotFoundError:
         raise FileError(f"{path}: no such {what}; check the path") from None
     except (OSError, ValueError) as error:  # a ValueError: zero bytes in the path
-        raise FileError(f"{path}: cannot read this {what} ({getattr(error, 'strerror', error)})") from error
+        raise FileError(
+            f"{path}: cannot read this {what} ({getattr(error, 'strerror', error)})"
+        ) from error
 
 
 def parse_json(text: str | bytes) -> Any:

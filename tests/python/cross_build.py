@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from eitskin.study.emulated import build_cortex_m7
+from eitskin_studies.harness.emulated import build_cortex_m7
 
 __all__ = ["ROOT", "build_cortex_m7"]
 

@@ -1,4 +1,5 @@
-"""The bytes of an .eitm file by docs/reference/eitm-format.md alone, without the project's own reader: to look, to break, to seal."""
+"""The bytes of an .eitm file by docs/reference/eitm-format.md alone, without the project's own
+reader: to look, to break, to seal."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ class Place(NamedTuple):
 def sections_of(blob: bytes | bytearray) -> dict[str, Place]:
     """The section table, in its order."""
     count = struct.unpack_from("<I", blob, 16)[0]
-    entries = [struct.unpack_from("<4sIII", blob, HEADER_SIZE + ENTRY_SIZE * k) for k in range(count)]
+    entries = [
+        struct.unpack_from("<4sIII", blob, HEADER_SIZE + ENTRY_SIZE * k) for k in range(count)
+    ]
     return {tag.decode(): Place(offset, size, flags) for tag, offset, size, flags in entries}
 
 
@@ -39,9 +42,14 @@ def fnv1a(content: bytes) -> int:
 
 
 def sealed(
-    blob: bytes | bytearray, *, total: int | None = None, count: int | None = None, rehash: bool = False
+    blob: bytes | bytearray,
+    *,
+    total: int | None = None,
+    count: int | None = None,
+    rehash: bool = False,
 ) -> bytes:
-    """``blob`` with its checksum mended, and its size, number of sections and protocol hash where wanted."""
+    """``blob`` with its checksum mended, and its size, number of sections and protocol hash where
+    wanted."""
     out = bytearray(blob)
     if total is not None:
         struct.pack_into("<I", out, 8, total)
@@ -49,7 +57,9 @@ def sealed(
         struct.pack_into("<I", out, 16, count)
     if rehash:
         dims, table = sections_of(out)["DIMS"], sections_of(out)["PROT"]
-        head = struct.pack("<HH", *(value & 0xFFFF for value in struct.unpack_from("<2I", out, dims.offset)))
+        head = struct.pack(
+            "<HH", *(value & 0xFFFF for value in struct.unpack_from("<2I", out, dims.offset))
+        )
         struct.pack_into("<Q", out, 24, fnv1a(head + out[table.offset : table.offset + table.size]))
     size = struct.unpack_from("<I", out, 8)[0]
     struct.pack_into("<I", out, 12, zlib.crc32(bytes(out[16:size])))

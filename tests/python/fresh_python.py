@@ -17,13 +17,19 @@ def without(*packages: str) -> str:
     return "import sys\n" + "".join(f"sys.modules[{name!r}] = None\n" for name in packages)
 
 
-def run_python(code: str, *arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def run_python(
+    code: str, *arguments: object, cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run ``code`` with this project importable."""
     return run_command([sys.executable, "-c", code, *map(str, arguments)], cwd=cwd)
 
 
 def run_command(command: list[str], cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run ``command`` with this project importable, one thread in BLAS."""
-    path = os.pathsep.join(filter(None, [str(Path(eitskin.__file__).parents[1]), os.environ.get("PYTHONPATH")]))
+    path = os.pathsep.join(
+        filter(None, [str(Path(eitskin.__file__).parents[1]), os.environ.get("PYTHONPATH")])
+    )
     environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}
-    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=cwd, timeout=120, check=False)
+    return subprocess.run(
+        command, capture_output=True, text=True, env=environment, cwd=cwd, timeout=120, check=False
+    )

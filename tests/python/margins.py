@@ -1,6 +1,8 @@
-"""How near to its bound each hard case came: recorded by tests, gathered over processes, shown at the end of a run.
+"""How near to its bound each hard case came: recorded by tests, gathered over processes, shown at
+the end of a run.
 
-``conftest.py`` takes the hooks from here. ``--margins FOLDER`` keeps what was recorded, JSON lines, for ``scripts/hard-cases``.
+``conftest.py`` takes the hooks from here. ``--margins FOLDER`` keeps what was recorded, JSON lines,
+for ``scripts/hard-cases``.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ HARD_CASES = "hard_cases/"
 
 @dataclass(frozen=True)
 class Margin:
-    """``what`` was ``measured`` on ``target`` where at most ``bound`` is allowed, both in ``unit``."""
+    """``what`` was ``measured`` on ``target`` where at most ``bound`` is allowed, both in
+    ``unit``."""
 
     case: str
     what: str
@@ -43,17 +46,23 @@ class Margin:
     @property
     def text(self) -> str:
         """Measured and bound, to two digits."""
-        return f"{self.what}: {self.measured:.2g} of {self.bound:.2g}{' ' + self.unit if self.unit else ''}"
+        return (
+            f"{self.what}: {self.measured:.2g} of"
+            f" {self.bound:.2g}{' ' + self.unit if self.unit else ''}"
+        )
 
 
 class Margins:
-    """The worst of every (case, what, target) in this process, and the hard cases' tests that passed in it."""
+    """The worst of every (case, what, target) in this process, and the hard cases' tests that
+    passed in it."""
 
     def __init__(self) -> None:
         self.worst: dict[tuple[str, str, str], Margin] = {}
         self.passed: set[str] = set()
 
-    def record(self, case: str, what: str, target: str, measured: float, bound: float, unit: str = "") -> None:
+    def record(
+        self, case: str, what: str, target: str, measured: float, bound: float, unit: str = ""
+    ) -> None:
         """Keep the worst, and assert that ``measured`` is finite and at most ``bound``."""
         assert target in TARGETS, target
         given = Margin(case, what, target, float(measured), float(bound), unit)
@@ -63,14 +72,19 @@ class Margins:
             self.worst[case, what, target] = given
         assert given.measured <= given.bound, given
 
-    def everywhere(self, case: str, what: str, measured: float, bound: float, unit: str = "") -> None:
-        """The same for host f32 and M7, where ``same_everywhere`` has shown that both give the same bits."""
+    def everywhere(
+        self, case: str, what: str, measured: float, bound: float, unit: str = ""
+    ) -> None:
+        """The same for host f32 and M7, where ``same_everywhere`` has shown that both give the same
+        bits."""
         for target in ("host f32", "M7"):
             self.record(case, what, target, measured, bound, unit)
 
     def write(self, folder: Path) -> None:
         """A file of this process's own."""
-        lines = [asdict(margin) for margin in self.worst.values()] + [{"passed": name} for name in sorted(self.passed)]
+        lines = [asdict(margin) for margin in self.worst.values()] + [
+            {"passed": name} for name in sorted(self.passed)
+        ]
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (folder / f"{os.getpid()}.jsonl").write_text(text, encoding="utf-8")
 
@@ -111,7 +125,11 @@ def margins() -> Margins:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--margins", metavar="FOLDER", help="keep the hard cases' margins in this folder, JSON lines")
+    parser.addoption(
+        "--margins",
+        metavar="FOLDER",
+        help="keep the hard cases' margins in this folder, JSON lines",
+    )
 
 
 def _is_worker(config: pytest.Config) -> bool:
@@ -120,7 +138,9 @@ def _is_worker(config: pytest.Config) -> bool:
 
 def pytest_configure(config: pytest.Config) -> None:
     if not _is_worker(config):  # workers of pytest-xdist inherit the environment
-        os.environ[FOLDER] = config.getoption("--margins") or tempfile.mkdtemp(prefix="eitskin-margins-")
+        os.environ[FOLDER] = config.getoption("--margins") or tempfile.mkdtemp(
+            prefix="eitskin-margins-"
+        )
         Path(os.environ[FOLDER]).mkdir(parents=True, exist_ok=True)
 
 
@@ -149,7 +169,9 @@ def summary_lines(found: Margins) -> Iterator[str]:
         said: dict[str, list[str]] = {}
         for target in TARGETS:
             if target in of_case:
-                said.setdefault(f"{100 * of_case[target].share:.3g} % ({of_case[target].text})", []).append(target)
+                said.setdefault(
+                    f"{100 * of_case[target].share:.3g} % ({of_case[target].text})", []
+                ).append(target)
         yield f"{case}: {'; '.join(f'{joined(targets)} {text}' for text, targets in said.items())}"
 
 

@@ -1,4 +1,5 @@
-"""Small skins, their models and frames, each made once and shared by many tests. Nothing here is random without a seed."""
+"""Small skins, their models and frames, each made once and shared by many tests. Nothing here is
+random without a seed."""
 
 from __future__ import annotations
 
@@ -65,18 +66,30 @@ class Small:
         size, change = np.ptp(centres, axis=0).min(), np.zeros(len(centres))
         for _ in range(count):
             middle = centres[generator.integers(len(centres))]
-            inside = np.linalg.norm(centres - middle, axis=1) <= generator.uniform(0.05, 0.12) * size
-            change[inside] = generator.choice(changes) * generator.uniform(0.5, 1) * self.skin.conductivity_s_per_m
+            inside = (
+                np.linalg.norm(centres - middle, axis=1) <= generator.uniform(0.05, 0.12) * size
+            )
+            change[inside] = (
+                generator.choice(changes)
+                * generator.uniform(0.5, 1)
+                * self.skin.conductivity_s_per_m
+            )
         return change
 
-    def frames(self, seed: int, count: int, sign: str = "increase", noise: float = 1e-3) -> FloatArray:
-        """Frames (count, m) V of the linear answer to one to three discs, with white noise of ``noise`` rms(V0).
+    def frames(
+        self, seed: int, count: int, sign: str = "increase", noise: float = 1e-3
+    ) -> FloatArray:
+        """Frames (count, m) V of the linear answer to one to three discs, with white noise of
+        ``noise`` rms(V0).
 
         ``sign``: conductivity rises in all discs, falls in all, or "both".
         """
         generator, v0 = np.random.default_rng(seed), self.linear.v0_v
         sigma = noise * float(np.sqrt(np.mean(v0**2)))
-        clean = [v0 + self.linear.jacobian @ self.discs(generator, int(generator.integers(1, 4)), sign) for _ in range(count)]
+        clean = [
+            v0 + self.linear.jacobian @ self.discs(generator, int(generator.integers(1, 4)), sign)
+            for _ in range(count)
+        ]
         return np.array(clean) + sigma * generator.normal(size=(count, len(v0)))
 
     def quiet(self, seed: int, count: int, noise: float = 1e-3) -> FloatArray:
@@ -88,7 +101,13 @@ class Small:
 @cache
 def small(outline: str = "disk", kind: str = "adjacent", electrodes: int = 16) -> Small:
     """A skin of some 100 mm with about 150 pixels, and its linear answer."""
-    skin = Skin(outline, OUTLINES[outline](), Electrodes(electrodes, 3.0), conductivity_s_per_m=0.02, thickness_mm=5.0)
+    skin = Skin(
+        outline,
+        OUTLINES[outline](),
+        Electrodes(electrodes, 3.0),
+        conductivity_s_per_m=0.02,
+        thickness_mm=5.0,
+    )
     protocol = PROTOCOLS[kind](electrodes)
     return Small(skin, protocol, linearise(skin, protocol, pixels_across=PIXELS, elements=ELEMENTS))
 
@@ -102,8 +121,11 @@ def small_model(
     electrodes: int = 16,
     rank: int = 37,
 ) -> Model:
-    """A model of ``small``, as read from its bytes; the rank is no multiple of 8, so that padding is at work."""
-    return decode_model(small_blob(storage, data_kind, outline, kind, electrodes, rank), "small model")
+    """A model of ``small``, as read from its bytes; the rank is no multiple of 8, so that padding
+    is at work."""
+    return decode_model(
+        small_blob(storage, data_kind, outline, kind, electrodes, rank), "small model"
+    )
 
 
 @cache
@@ -124,9 +146,13 @@ def small_blob(
 @cache
 def tiny_blob(storage: str = "f32") -> bytes:
     """A model of a few kB, every byte of which can be tried: 8 electrodes, rank 5."""
-    skin = Skin("tiny", disk(DISK_MM), Electrodes(8, 3.0), conductivity_s_per_m=0.02, thickness_mm=5.0)
+    skin = Skin(
+        "tiny", disk(DISK_MM), Electrodes(8, 3.0), conductivity_s_per_m=0.02, thickness_mm=5.0
+    )
     linear = linearise(skin, adjacent(8), pixels_across=6, elements=300)
-    return encode_model(make_model(skin, adjacent(8), linear, BuildSettings(rank=5, storage=storage)))
+    return encode_model(
+        make_model(skin, adjacent(8), linear, BuildSettings(rank=5, storage=storage))
+    )
 
 
 @cache
@@ -137,7 +163,8 @@ def prebuilt() -> tuple[Model, bytes]:
 
 @cache
 def session(role: str = "test", scenes: int = 20, seed: int = 3, snr_db: float = 60.0) -> Simulated:
-    """The paper's skin, touched one to three times a scene, simulated nonlinearly on another mesh with 64 quiet frames."""
+    """The paper's skin, touched one to three times a scene, simulated nonlinearly on another mesh
+    with 64 quiet frames."""
     skin = paper_skin()
     touches = random_touches(skin.outline, seed, scenes, role)
     return simulate(skin, adjacent(16), touches, measurement=Measurement(snr_db=snr_db))

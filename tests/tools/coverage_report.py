@@ -1,4 +1,5 @@
-"""Lines, branches and error branches of the core that a test run reached: a table by file; fails where that is too little.
+"""Lines, branches and error branches of the core that a test run reached: a table by file; fails
+where that is too little.
 
     python tests/tools/coverage_report.py BUILD
 
@@ -21,8 +22,11 @@ LEAST_LINES_PERCENT = 95.0
 SOURCES = "csrc/src"
 LIBRARIES = "/eitskin_f"  # the objects of both libraries, not the tests'
 NOT_COMPILED = {
-    "csrc/src/kernels_m7.c": "is compiled for the Cortex-M7 only and is not in these numbers. Emulated, its bits are held "
-    "against the portable kernels' for every storage type and product: tests/python/emulated.",
+    "csrc/src/kernels_m7.c": (
+        "is compiled for the Cortex-M7 only and is not in these numbers. Emulated, its bits are"
+        " held against the portable kernels' for every storage type and product:"
+        " tests/python/emulated."
+    )
 }
 
 
@@ -36,7 +40,9 @@ class Row:
     sites: tuple[int, int]
 
     def __str__(self) -> str:
-        return f"{self.name:28s}" + "".join(f"{_share(part):>24s}" for part in (self.lines, self.branches, self.sites))
+        return f"{self.name:28s}" + "".join(
+            f"{_share(part):>24s}" for part in (self.lines, self.branches, self.sites)
+        )
 
 
 def _share(part: tuple[int, int]) -> str:
@@ -58,7 +64,12 @@ def _total(rows: Sequence[Row]) -> Row:
     def added(parts: Sequence[tuple[int, int]]) -> tuple[int, int]:
         return sum(part[0] for part in parts), sum(part[1] for part in parts)
 
-    return Row("all", added([r.lines for r in rows]), added([r.branches for r in rows]), added([r.sites for r in rows]))
+    return Row(
+        "all",
+        added([r.lines for r in rows]),
+        added([r.branches for r in rows]),
+        added([r.sites for r in rows]),
+    )
 
 
 def _ranges(numbers: Sequence[int]) -> str:
@@ -76,7 +87,10 @@ def report(counts: dict[str, FileCounts], sites: Sequence[Site]) -> list[str]:
     """Print the tables; returns what is wrong, a line each."""
     rows, wrong = [], []
     unrun: list[str] = []
-    by_file = {name: [site for site in sites if site.file == name] for name in sorted({*counts, *(site.file for site in sites)})}
+    by_file = {
+        name: [site for site in sites if site.file == name]
+        for name in sorted({*counts, *(site.file for site in sites)})
+    }
     for name, own in by_file.items():
         if name in NOT_COMPILED:
             continue
@@ -94,12 +108,17 @@ def report(counts: dict[str, FileCounts], sites: Sequence[Site]) -> list[str]:
         print("lines never run:", *unrun, sep="\n  ")
     reached, whole = _total(rows).lines
     if 100 * reached < LEAST_LINES_PERCENT * whole:
-        wrong.append(f"{100 * reached / whole:.1f} % of lines were run; at least {LEAST_LINES_PERCENT:g} % must be")
+        wrong.append(
+            f"{100 * reached / whole:.1f} % of lines were run; at least {LEAST_LINES_PERCENT:g} %"
+            " must be"
+        )
     return wrong
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("build", type=Path)
     build: Path = parser.parse_args().build
     counts = read_counts(build, ROOT, SOURCES, LIBRARIES)

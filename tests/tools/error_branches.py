@@ -2,15 +2,19 @@
 
 A *site* is one of these, found in the text (comments and preprocessor lines aside):
 
-- **value**: a statement that returns, assigns or passes an ``EITS_E_...`` or ``EITS_STOP_...``: it must have run.
+- **value**: a statement that returns, assigns or passes an ``EITS_E_...`` or ``EITS_STOP_...``: it
+  must have run.
 - **passed on**: ``return status;`` under an ``if`` that asks for a status: it must have run.
-- **counted**: ``++...errors`` or ``++...overruns``, and ``return 0;`` of a function that returns a size: it must have run.
-- **choice**: a statement that chooses between a status and another (``? :``): each of its branches must have been taken.
-- **guard**: the condition of the ``if`` right above a site, and each condition that compares a status with ``EITS_OK``: each
-  branch must have been taken, so that every operand of ``||`` and ``&&`` has been what decided.
+- **counted**: ``++...errors`` or ``++...overruns``, and ``return 0;`` of a function that returns a
+  size: it must have run.
+- **choice**: a statement that chooses between a status and another (``? :``): each of its branches
+  must have been taken.
+- **guard**: the condition of the ``if`` right above a site, and each condition that compares a
+  status with ``EITS_OK``: each branch must have been taken, so that every operand of ``||`` and
+  ``&&`` has been what decided.
 - **flag**: the definition of a variable that a choice or guard names: likewise.
-- **predicate**: each ``return`` of a function of the same file that returns ``int`` and that a choice, guard or flag calls: it
-  must have run, and each of its branches must have been taken.
+- **predicate**: each ``return`` of a function of the same file that returns ``int`` and that a
+  choice, guard or flag calls: it must have run, and each of its branches must have been taken.
 """
 
 from __future__ import annotations
@@ -44,7 +48,8 @@ class Span:
 
 @dataclass(frozen=True)
 class Leaf:
-    """A statement without its conditions; ``guard`` is the nearest of those, where it is an ``if``."""
+    """A statement without its conditions; ``guard`` is the nearest of those, where it is an
+    ``if``."""
 
     span: Span
     guard: Span | None
@@ -54,7 +59,8 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Site:
-    """``branches``: each branch on its lines must have been taken; else one of its lines must have run."""
+    """``branches``: each branch on its lines must have been taken; else one of its lines must have
+    run."""
 
     file: str
     kind: str
@@ -82,7 +88,9 @@ def find_sites(file: str, source: str) -> list[Site]:
     def add(kind: str, span: Span, branches: bool) -> None:
         found.setdefault((kind, span), Site(file, kind, span, branches))
 
-    asked: list[tuple[str, Span]] = []  # conditions whose names matter, and the function that they are in
+    asked: list[
+        tuple[str, Span]
+    ] = []  # conditions whose names matter, and the function that they are in
     for leaf in leaves:
         kind = _kind(leaf)
         if kind:
@@ -97,10 +105,18 @@ def find_sites(file: str, source: str) -> list[Site]:
         function, span = asked.pop()
         names = set(NAME.findall(span.text))
         for leaf in leaves:
-            if leaf.function == function and _defines(leaf.span.text) in names and ("flag", leaf.span) not in found:
+            if (
+                leaf.function == function
+                and _defines(leaf.span.text) in names
+                and ("flag", leaf.span) not in found
+            ):
                 add("flag", leaf.span, True)
                 asked.append((function, leaf.span))
-            if leaf.function in names - called and leaf.returns == "int" and leaf.span.text.startswith("return"):
+            if (
+                leaf.function in names - called
+                and leaf.returns == "int"
+                and leaf.span.text.startswith("return")
+            ):
                 add("predicate", leaf.span, False)
                 add("predicate", leaf.span if not leaf.guard else leaf.guard, True)
                 asked.append((leaf.function, leaf.span))
@@ -119,7 +135,12 @@ def find_missed(site: Site, counts: FileCounts) -> list[Missed]:
     if not site.branches:
         return []
     return [
-        Missed(site, line, f"operand {k // 2 + 1} of the {(len(taken) + 1) // 2} on this line always came out the same")
+        Missed(
+            site,
+            line,
+            f"operand {k // 2 + 1} of the {(len(taken) + 1) // 2} on this line always came out the"
+            " same",
+        )
         for line in lines
         for taken in [counts.branches.get(line, [])]
         for k, count in enumerate(taken)
@@ -167,7 +188,10 @@ def _leaves(source: str) -> Iterator[Leaf]:
         if end == "{":
             declared = FUNCTION.match(span.text) if not guards else None
             if declared:
-                function, returns = declared[2], declared[1].replace("static", "").replace("inline", "").strip()
+                function, returns = (
+                    declared[2],
+                    declared[1].replace("static", "").replace("inline", "").strip(),
+                )
             guards.append(guard if not declared else None)
         elif guards and rest.text:
             yield Leaf(rest, guard, function, returns)
@@ -183,11 +207,16 @@ def _bare(source: str) -> str:
 
     source = re.sub(r"/\*.*?\*/", blank, source, flags=re.DOTALL)
     source = re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", blank, source, flags=re.MULTILINE)
-    return re.sub(r'"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'', lambda match: '"' + " " * (len(match[0]) - 2) + '"', source)
+    return re.sub(
+        r'"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'',
+        lambda match: '"' + " " * (len(match[0]) - 2) + '"',
+        source,
+    )
 
 
 def _pieces(bare: str) -> Iterator[tuple[Span, str]]:
-    """The text between each two of ``;``, ``{`` and ``}`` that stand in no parenthesis, and which of them ends it."""
+    """The text between each two of ``;``, ``{`` and ``}`` that stand in no parenthesis, and which
+    of them ends it."""
     depth = start = 0
     for at, character in enumerate(bare):
         depth += (character == "(") - (character == ")")
@@ -225,4 +254,8 @@ def _split_head(span: Span, head: re.Match[str]) -> tuple[Span, Span]:
 def sites_below(root: Path, folder: str) -> list[Site]:
     """Of every C source and header in ``root / folder``."""
     files = sorted([*(root / folder).glob("*.c"), *(root / folder).glob("*.h")])
-    return [site for file in files for site in find_sites(file.relative_to(root).as_posix(), file.read_text())]
+    return [
+        site
+        for file in files
+        for site in find_sites(file.relative_to(root).as_posix(), file.read_text())
+    ]

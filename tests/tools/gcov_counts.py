@@ -1,4 +1,5 @@
-"""What gcov counted: how often each line ran and each branch was taken, summed over the objects that a source is in."""
+"""What gcov counted: how often each line ran and each branch was taken, summed over the objects
+that a source is in."""
 
 from __future__ import annotations
 
@@ -13,17 +14,21 @@ from typing import Any
 
 @dataclass
 class FileCounts:
-    """Of one source: a count for each line that has code; for each line with branches, how often each was taken."""
+    """Of one source: a count for each line that has code; for each line with branches, how often
+    each was taken."""
 
     lines: dict[int, int] = field(default_factory=dict)
     branches: dict[int, list[int]] = field(default_factory=dict)
 
     def add(self, other: FileCounts) -> None:
-        """Add the counts of the same source in another object. The branches of a line have the same order in each."""
+        """Add the counts of the same source in another object. The branches of a line have the same
+        order in each."""
         for line, count in other.lines.items():
             self.lines[line] = self.lines.get(line, 0) + count
         for line, taken in other.branches.items():
-            self.branches[line] = [a + b for a, b in zip_longest(self.branches.get(line, []), taken, fillvalue=0)]
+            self.branches[line] = [
+                a + b for a, b in zip_longest(self.branches.get(line, []), taken, fillvalue=0)
+            ]
 
 
 def read_counts(build: Path, root: Path, below: str, pattern: str) -> dict[str, FileCounts]:
@@ -43,14 +48,19 @@ def read_counts(build: Path, root: Path, below: str, pattern: str) -> dict[str, 
 
 def _counts_of(data: Path, root: Path) -> dict[str, FileCounts]:
     done = subprocess.run(
-        ["gcov", "--json-format", "--stdout", "--branch-probabilities", str(data)], check=True, capture_output=True, text=True
+        ["gcov", "--json-format", "--stdout", "--branch-probabilities", str(data)],
+        check=True,
+        capture_output=True,
+        text=True,
     )
     report: dict[str, Any] = json.loads(done.stdout)
     found: dict[str, FileCounts] = {}
     for file in report["files"]:
         path = Path(report["current_working_directory"], file["file"]).resolve()
         if path.is_relative_to(root):
-            found.setdefault(path.relative_to(root).as_posix(), FileCounts()).add(_file_counts(file["lines"]))
+            found.setdefault(path.relative_to(root).as_posix(), FileCounts()).add(
+                _file_counts(file["lines"])
+            )
     return found
 
 
@@ -61,5 +71,7 @@ def _file_counts(lines: Iterable[dict[str, Any]]) -> FileCounts:
         number = int(line["line_number"])
         counts.add(FileCounts({number: int(line["count"])}))
         if line["branches"]:
-            counts.branches.setdefault(number, []).extend(int(branch["count"]) for branch in line["branches"])
+            counts.branches.setdefault(number, []).extend(
+                int(branch["count"]) for branch in line["branches"]
+            )
     return counts

@@ -2,9 +2,10 @@
 
     python tests/tools/mutate.py [--only WORD] [--workers COUNT]
 
-Each worker has a copy of the sources in a temporary folder, where what a mutation changes is built anew and the C tests run, the
-likeliest first, until one fails, crashes or does not end. A test that fails is run on the unchanged sources too. Ends with 1
-where a mutation survives, does not compile, or no longer fits the sources.
+Each worker has a copy of the sources in a temporary folder, where what a mutation changes is built
+anew and the C tests run, the likeliest first, until one fails, crashes or does not end. A test that
+fails is run on the unchanged sources too. Ends with 1 where a mutation survives, does not compile,
+or no longer fits the sources.
 """
 
 from __future__ import annotations
@@ -26,7 +27,16 @@ from mutation import Mutation
 from mutations import MUTATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
-COPIED = ("CMakeLists.txt", "cmake", "csrc", "firmware", "tests/c", "tests/fuzz", "tests/firmware", "tests/soak")
+COPIED = (
+    "CMakeLists.txt",
+    "cmake",
+    "csrc",
+    "firmware",
+    "tests/c",
+    "tests/fuzz",
+    "tests/firmware",
+    "tests/soak",
+)
 SOURCES = Path("csrc") / "src"
 MOST_CPU_SECONDS = 12
 SLOW_LAST = ("solve_state", "solve", "touch", "working_set", "exact", "mac_limit", "model_values")
@@ -62,7 +72,16 @@ class Tree:
                 shutil.copytree(ROOT / name, self.root / name)
             else:
                 shutil.copy(ROOT / name, self.root / name)
-        command = ["cmake", "-S", str(self.root), "-B", str(self.build), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=None"]
+        command = [
+            "cmake",
+            "-S",
+            str(self.root),
+            "-B",
+            str(self.build),
+            "-G",
+            "Ninja",
+            "-DCMAKE_BUILD_TYPE=None",
+        ]
         subprocess.run([*command, "-DCMAKE_C_FLAGS=-O1 -w"], check=True, capture_output=True)
 
     def failure(self, test: str) -> str:
@@ -72,10 +91,18 @@ class Tree:
             ChildProcessError: it cannot be built.
         """
         built = subprocess.run(
-            ["cmake", "--build", str(self.build), "--target", test, "-j", "1"], capture_output=True, text=True, check=False
+            ["cmake", "--build", str(self.build), "--target", test, "-j", "1"],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if built.returncode != 0:
-            raise ChildProcessError(next((line for line in built.stdout.splitlines() if "error:" in line), built.stdout[-300:]))
+            raise ChildProcessError(
+                next(
+                    (line for line in built.stdout.splitlines() if "error:" in line),
+                    built.stdout[-300:],
+                )
+            )
         program = self.build / "tests" / "c" / test
         limited = ["sh", "-c", f'ulimit -t {MOST_CPU_SECONDS}; exec "$0"', str(program)]
         done = subprocess.run(limited, capture_output=True, check=False)
@@ -88,7 +115,9 @@ class Tree:
 
 def c_tests() -> tuple[str, ...]:
     """The names in tests/c/CMakeLists.txt, quick ones first."""
-    listed = re.search(r"set\(EITSKIN_C_TESTS ([^)]*)\)", (ROOT / "tests" / "c" / "CMakeLists.txt").read_text())
+    listed = re.search(
+        r"set\(EITSKIN_C_TESTS ([^)]*)\)", (ROOT / "tests" / "c" / "CMakeLists.txt").read_text()
+    )
     names = listed[1].split() if listed else []
     return tuple(sorted(names, key=lambda name: SLOW_LAST.index(name) if name in SLOW_LAST else -1))
 
@@ -145,7 +174,10 @@ def run_all(mutations: Sequence[Mutation], tests: Sequence[str], workers: int) -
         print(outcome, flush=True)
         return outcome
 
-    with tempfile.TemporaryDirectory(prefix="eitskin-mutate-") as folder, ThreadPoolExecutor(workers) as pool:
+    with (
+        tempfile.TemporaryDirectory(prefix="eitskin-mutate-") as folder,
+        ThreadPoolExecutor(workers) as pool,
+    ):
         made = [Tree(Path(folder) / str(number)) for number in range(workers)]
         for tree in made:
             tree.root.mkdir()
@@ -156,8 +188,12 @@ def run_all(mutations: Sequence[Mutation], tests: Sequence[str], workers: int) -
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", metavar="WORD", default="", help="mutations whose name or file has this")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--only", metavar="WORD", default="", help="mutations whose name or file has this"
+    )
     parser.add_argument("--workers", metavar="COUNT", type=int, default=2)
     options = parser.parse_args()
     chosen = [m for m in MUTATIONS if options.only in m.name or options.only in m.file]
@@ -167,7 +203,9 @@ def main() -> int:
         return 1
     outcomes = run_all(chosen, c_tests(), options.workers)
     bad = [outcome for outcome in outcomes if not outcome.noticed]
-    print(f"{len(outcomes)} mutations, {len(outcomes) - len(bad)} noticed", *map(str, bad), sep="\n  ")
+    print(
+        f"{len(outcomes)} mutations, {len(outcomes) - len(bad)} noticed", *map(str, bad), sep="\n  "
+    )
     return 1 if bad else 0
 
 

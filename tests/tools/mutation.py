@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Mutation:
-    """``original``, which stands once in ``csrc/src/file``, becomes ``replacement``. ``first`` is the C test to ask first."""
+    """``original``, which stands once in ``csrc/src/file``, becomes ``replacement``. ``first`` is
+    the C test to ask first."""
 
     name: str
     file: str
@@ -18,4 +19,7 @@ class Mutation:
 
 def of(file: str, *rows: tuple[str, str, str, str]) -> tuple[Mutation, ...]:
     """Of each row: name, original, replacement, first."""
-    return tuple(Mutation(name, file, original, replacement, first) for name, original, replacement, first in rows)
+    return tuple(
+        Mutation(name, file, original, replacement, first)
+        for name, original, replacement, first in rows
+    )

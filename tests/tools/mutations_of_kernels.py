@@ -1,4 +1,5 @@
-"""Mistakes in the products with vectors and without, in reading stored numbers, and in which columns are held."""
+"""Mistakes in the products with vectors and without, in reading stored numbers, and in which
+columns are held."""
 
 from __future__ import annotations
 
@@ -16,12 +17,42 @@ KERNELS = (
             "kernels",
         ),
         ("an overflow ends as a zero", "up + down + (v - v)", "up + down", "kernels"),
-        ("no extrapolation", "z[j] = eits_fma(beta, moved - x[j], moved);", "z[j] = moved;", "kernels"),
-        ("product's chain not fused", "a5 = eits_fma(READ(c[5]), v, a5);", "a5 += READ(c[5]) * v;", "kernels"),
-        ("transposed product loses the last column", "for (; k < count; ++k) { ", "for (; k + 1 < count; ++k) { ", "kernels"),
-        ("scales of other columns", "matrix->scale[index == NULL ? k : index[k]]", "matrix->scale[k]", "kernels"),
-        ("8-bit numbers without sign", "DEFINE_UNPACK(i8, int8_t, (float))", "DEFINE_UNPACK(i8, uint8_t, (float))", "kernels"),
-        ("the dot product forgets the rest", "i + l < count; ++l)", "i + l + 1 < count; ++l)", "kernels"),
+        (
+            "no extrapolation",
+            "z[j] = eits_fma(beta, moved - x[j], moved);",
+            "z[j] = moved;",
+            "kernels",
+        ),
+        (
+            "product's chain not fused",
+            "a5 = eits_fma(READ(c[5]), v, a5);",
+            "a5 += READ(c[5]) * v;",
+            "kernels",
+        ),
+        (
+            "transposed product loses the last column",
+            "for (; k < count; ++k) { ",
+            "for (; k + 1 < count; ++k) { ",
+            "kernels",
+        ),
+        (
+            "scales of other columns",
+            "matrix->scale[index == NULL ? k : index[k]]",
+            "matrix->scale[k]",
+            "kernels",
+        ),
+        (
+            "8-bit numbers without sign",
+            "DEFINE_UNPACK(i8, int8_t, (float))",
+            "DEFINE_UNPACK(i8, uint8_t, (float))",
+            "kernels",
+        ),
+        (
+            "the dot product forgets the rest",
+            "i + l < count; ++l)",
+            "i + l + 1 < count; ++l)",
+            "kernels",
+        ),
         (
             "dots forget the rest",
             "for (uint32_t l = 0; i + l < rows; ++l)",
@@ -40,8 +71,18 @@ KERNELS = (
             "high = sign != EITS_SIGN_INCREASE ?",
             "numbers",
         ),
-        ("the last few never the greatest", "lane[0] = a[i] > lane[0] ? a[i] : lane[0];", ";", "kernels"),
-        ("the last few never the least", "lane[0] = a[i] < lane[0] ? a[i] : lane[0];", ";", "kernels"),
+        (
+            "the last few never the greatest",
+            "lane[0] = a[i] > lane[0] ? a[i] : lane[0];",
+            ";",
+            "kernels",
+        ),
+        (
+            "the last few never the least",
+            "lane[0] = a[i] < lane[0] ? a[i] : lane[0];",
+            ";",
+            "kernels",
+        ),
         ("non-zeros that are zeros", "found += a[j] != 0;", "found += 1;", "kernels"),
         (
             "extrapolated from the older point",
@@ -55,13 +96,28 @@ KERNELS = (
             "    for (uint32_t k = 1; k < count; ++k)\n        NAME(axpy)",
             "kernels",
         ),
-        ("the second panel left out", "; j += 2 * EITS_PANEL)", "; j += 3 * EITS_PANEL)", "kernels"),
+        (
+            "the second panel left out",
+            "; j += 2 * EITS_PANEL)",
+            "; j += 3 * EITS_PANEL)",
+            "kernels",
+        ),
     )
     + of(
         "kernels_avx2.c",
-        ("AVX2: soft threshold does not shrink", "up_mask), SUB(v, high))", "up_mask), v)", "kernels"),
+        (
+            "AVX2: soft threshold does not shrink",
+            "up_mask), SUB(v, high))",
+            "up_mask), v)",
+            "kernels",
+        ),
         ("AVX2: sign rule ignored", "allow_down ? EVERYWHERE : ZERO()", "EVERYWHERE", "kernels"),
-        ("AVX2: an overflow ends as a zero", "ADD(ADD(up, down), SUB(v, v))", "ADD(up, down)", "kernels"),
+        (
+            "AVX2: an overflow ends as a zero",
+            "ADD(ADD(up, down), SUB(v, v))",
+            "ADD(up, down)",
+            "kernels",
+        ),
         (
             "AVX2: the last few coefficients not fused",
             "eits_fma(step, gradient[j], z[j])",
@@ -95,7 +151,12 @@ KERNELS = (
             "for (uint32_t i = whole; i + 1 < rows; ++i)",
             "kernels",
         ),
-        ("AVX2: lanes crossed", "row[1] = _mm256_blend_ps(ad, d, 0xCC)", "row[1] = _mm256_blend_ps(d, ad, 0xCC)", "kernels"),
+        (
+            "AVX2: lanes crossed",
+            "row[1] = _mm256_blend_ps(ad, d, 0xCC)",
+            "row[1] = _mm256_blend_ps(d, ad, 0xCC)",
+            "kernels",
+        ),
     )
     + of(
         "kernels_avx2_dots.h",
@@ -107,8 +168,14 @@ KERNELS = (
         ),
         (
             "AVX2: dots lose the rest",
-            "lanes[2][w] = CHOOSE(lanes[2][w], FMA(lanes_##TAG(c2 + at), some, lanes[2][w]), rest[w]);",
-            "lanes[2][w] = lanes[2][w];                                                               ",
+            (
+                "lanes[2][w] = CHOOSE(lanes[2][w], FMA(lanes_##TAG(c2 + at), some, lanes[2][w]),"
+                " rest[w]);"
+            ),
+            (
+                "lanes[2][w] = lanes[2][w];                                                        "
+                "       "
+            ),
             "kernels",
         ),
         (
@@ -135,8 +202,18 @@ KERNELS = (
             "flip = sign == EITS_SIGN_INCREASE ? minus",
             "kernels",
         ),
-        ("AVX2: the greatest by magnitude", "clear = sign == EITS_SIGN_BOTH ? minus : ZERO()", "clear = ZERO()", "kernels"),
-        ("AVX2: the last never the greatest", "greatest = value > greatest ? value : greatest;", ";", "kernels"),
+        (
+            "AVX2: the greatest by magnitude",
+            "clear = sign == EITS_SIGN_BOTH ? minus : ZERO()",
+            "clear = ZERO()",
+            "kernels",
+        ),
+        (
+            "AVX2: the last never the greatest",
+            "greatest = value > greatest ? value : greatest;",
+            ";",
+            "kernels",
+        ),
         (
             "AVX2: the greatest of three",
             "MAX(MAX(most[0], most[1]), MAX(most[2], most[3]))",
@@ -149,8 +226,18 @@ KERNELS = (
             "{L(2), L(1), L(3), NO}, {L(0), L(1), L(2), L(3)}",
             "kernels",
         ),
-        ("AVX2: non-zeros miscounted", "{0, 1, 1, 2, 1, 2, 2, 3, 1,", "{0, 1, 1, 2, 1, 2, 2, 2, 1,", "kernels"),
-        ("AVX2: non-zeros of the first four", "places = _mm_add_epi32(places, _mm_set1_epi32(4));", ";", "kernels"),
+        (
+            "AVX2: non-zeros miscounted",
+            "{0, 1, 1, 2, 1, 2, 2, 3, 1,",
+            "{0, 1, 1, 2, 1, 2, 2, 2, 1,",
+            "kernels",
+        ),
+        (
+            "AVX2: non-zeros of the first four",
+            "places = _mm_add_epi32(places, _mm_set1_epi32(4));",
+            ";",
+            "kernels",
+        ),
     )
     + of(
         "kernels.c",

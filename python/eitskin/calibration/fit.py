@@ -1,10 +1,12 @@
-"""From presses of known load to the law that turns strength and place into load (docs/guide/calibration.md).
+"""From presses of known load to the law that turns strength and place into load
+(docs/guide/calibration.md).
 
-The strength of a load F at (x, y) is modelled as law(F) / gain(x, y). Laws, all monotone: *saturating*, s_max (1 - exp(-F / F0));
-*power*, c F^p; and, from four weights on, *stretched*, s_max (1 - exp(-(F / F0)^p)), which has both within it. The gain is 1 + a
-polynomial without constant in (x / R, y / R), ridge-regularised. What is minimised is the sum of squared logarithms of seen over
-modelled strength. Law and order are those that predict best what was left out: one place after another, or one press after
-another where there are too few places.
+The strength of a load F at (x, y) is modelled as law(F) / gain(x, y). Laws, all monotone:
+*saturating*, s_max (1 - exp(-F / F0)); *power*, c F^p; and, from four weights on, *stretched*,
+s_max (1 - exp(-(F / F0)^p)), which has both within it. The gain is 1 + a polynomial without
+constant in (x / R, y / R), ridge-regularised. What is minimised is the sum of squared logarithms of
+seen over modelled strength. Law and order are those that predict best what was left out: one place
+after another, or one press after another where there are too few places.
 """
 
 from __future__ import annotations
@@ -18,31 +20,33 @@ import numpy.typing as npt
 
 from eitskin.calibration.presses import Presses
 from eitskin.errors import FrameError, missing_extra
-from eitskin.model.load import MAX_ORDER, LoadLaw, monomials
+from eitskin.model.force_law import MAX_ORDER, LoadLaw, monomials
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 LEAST_PRESSES, LEAST_WEIGHTS, LEAST_RATIO = 4, 3, 1.5
-SAME_WEIGHT = 1.005    # loads nearer than that are one
-PLACE_MM = 12.0        # presses whose links are nearer than that are at one place
+SAME_WEIGHT = 1.005  # loads nearer than that are one
+PLACE_MM = 12.0  # presses whose links are nearer than that are at one place
 PLACES_FOR_ORDER = (1, 5, 8, 13, 19)
-WORTH = 0.95           # a higher order, or a law of more numbers, must make the error left at most so large
-LAW_ORDER = 2          # of the gain with which laws are compared
-RIDGE = 0.02 / 0.5     # strengths scatter by about 0.02, coefficients are of the order of 0.5
+WORTH = 0.95  # a higher order, or a law of more numbers, must make the error left at most so large
+LAW_ORDER = 2  # of the gain with which laws are compared
+RIDGE = 0.02 / 0.5  # strengths scatter by about 0.02, coefficients are of the order of 0.5
 TABLE_POINTS = 33
 RESAMPLES = 200
-STEP = 1e-5             # of a law's numbers, relative, for their derivatives
+STEP = 1e-5  # of a law's numbers, relative, for their derivatives
 LEAST_EXPONENT = 0.02
-LEAST_STEEPNESS = 0.05 # a law as flat as that tells no loads
-MOST_F0 = 30.0         # times the greatest load: beyond, a saturating law is a straight line
+LEAST_STEEPNESS = 0.05  # a law as flat as that tells no loads
+MOST_F0 = 30.0  # times the greatest load: beyond, a saturating law is a straight line
 
 
 @dataclass(frozen=True)
 class Form:
-    """A law of some positive numbers: strength by load, and load by strength; their names, where a fit begins, its bounds.
+    """A law of some positive numbers: strength by load, and load by strength; their names, where a
+    fit begins, its bounds.
 
-    ``start`` and ``low``, ``high`` are relative: to strengths and the greatest load (F0); exponents as they are.
+    ``start`` and ``low``, ``high`` are relative: to strengths and the greatest load (F0); exponents
+    as they are.
     """
 
     strength: Callable[..., FloatArray]
@@ -59,12 +63,14 @@ FORMS = {
     "saturating": Form(
         lambda f, most, f0: np.asarray(-most * np.expm1(-f / f0)),
         lambda s, most, f0: np.asarray(-f0 * np.log1p(-s / most)),
-        ("s_max_s_per_m_mm2", "f0_n"), "s_max (1 - exp(-F / F0))", 3, (2.0, 2.0), (1e-9, 0.05), (1e9, MOST_F0),
+        ("s_max_s_per_m_mm2", "f0_n"), "s_max (1 - exp(-F / F0))", 3, (2.0, 2.0), (1e-9, 0.05),
+        (1e9, MOST_F0),
     ),
     "power": Form(
         lambda f, c, p: np.asarray(c * f**p),
         lambda s, c, p: np.asarray((s / c) ** (1 / p)),
-        ("c_s_per_m_mm2_at_1_n", "exponent"), "c F^p", 3, (1.0, 0.9), (1e-9, LEAST_EXPONENT), (1e9, 20.0),
+        ("c_s_per_m_mm2_at_1_n", "exponent"), "c F^p", 3, (1.0, 0.9), (1e-9, LEAST_EXPONENT),
+        (1e9, 20.0),
     ),
     "stretched": Form(
         lambda f, most, f0, p: np.asarray(-most * np.expm1(-((f / f0) ** p))),
@@ -77,7 +83,8 @@ FORMS = {
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """One fit: the ``form``'s numbers, and the ``gain``'s coefficients (t,), the first of them 1."""
+    """One fit: the ``form``'s numbers, and the ``gain``'s coefficients (t,), the first of them
+    1."""
 
     form: str
     numbers: tuple[float, ...]
@@ -95,7 +102,8 @@ class Calibration:
         interval: 95 % of each of the law's numbers, by the bootstrap.
         left_out: relative error (k,) of each press's load when it was left out of the fit.
         groups: how many places there are; ``by_place``: whether whole places were left out.
-        scatter: relative standard deviation over places of the load that is read, before (one gain) and after.
+        scatter: relative standard deviation over places of the load that is read, before (one gain)
+            and after.
         notes: what the data could not fix, in sentences.
     """
 
@@ -130,7 +138,8 @@ class Calibration:
 
 
 def places_of(place_mm: FloatArray) -> IntArray:
-    """The number of its place for each press (k, 2): presses that a chain of steps below ``PLACE_MM`` joins are at one."""
+    """The number of its place for each press (k, 2): presses that a chain of steps below
+    ``PLACE_MM`` joins are at one."""
     label = np.arange(len(place_mm))
     near = np.hypot(*(place_mm[:, None] - place_mm[None]).transpose(2, 0, 1)) < PLACE_MM
     for _ in range(len(label)):
@@ -144,7 +153,9 @@ def places_of(place_mm: FloatArray) -> IntArray:
 def weights_of(load_n: FloatArray) -> FloatArray:
     """The different loads, ascending."""
     ascending = np.sort(load_n)
-    return np.asarray(ascending[np.concatenate([[True], ascending[1:] > SAME_WEIGHT * ascending[:-1]])])
+    return np.asarray(
+        ascending[np.concatenate([[True], ascending[1:] > SAME_WEIGHT * ascending[:-1]])]
+    )
 
 
 def check_presses(presses: Presses) -> None:
@@ -154,20 +165,29 @@ def check_presses(presses: Presses) -> None:
         FrameError: too few presses or weights, or weights too much alike.
     """
     if len(presses) < LEAST_PRESSES:
-        raise FrameError(f"calibration: {len(presses)} presses are too few; record at least {LEAST_PRESSES} that show a touch")
+        raise FrameError(
+            f"calibration: {len(presses)} presses are too few; record at least {LEAST_PRESSES} that"
+            " show a touch"
+        )
     weights = weights_of(presses.load_n)
     if len(weights) < LEAST_WEIGHTS:
-        raise FrameError(f"calibration: {len(weights)} different weights are too few; use at least {LEAST_WEIGHTS}")
+        raise FrameError(
+            f"calibration: {len(weights)} different weights are too few; use at least"
+            f" {LEAST_WEIGHTS}"
+        )
     ratio = float(weights[-1] / weights[0])
     if ratio < LEAST_RATIO:
         raise FrameError(
-            f"calibration: the greatest weight is {ratio:.2f} times the least, which cannot show a law; use a range of "
-            f"{LEAST_RATIO:g} times or more"
+            f"calibration: the greatest weight is {ratio:.2f} times the least, which cannot show a"
+            f" law; use a range of {LEAST_RATIO:g} times or more"
         )
 
 
-def calibrate(presses: Presses, radius_mm: float, seed: int = 1, resamples: int = RESAMPLES) -> Calibration:
-    """The law of a skin whose image reaches ``radius_mm`` from its middle; the intervals by ``resamples`` of its places.
+def calibrate(
+    presses: Presses, radius_mm: float, seed: int = 1, resamples: int = RESAMPLES
+) -> Calibration:
+    """The law of a skin whose image reaches ``radius_mm`` from its middle; the intervals by
+    ``resamples`` of its places.
 
     Raises:
         FrameError: the presses cannot fix a law, or strength does not grow with load.
@@ -179,26 +199,43 @@ def calibrate(presses: Presses, radius_mm: float, seed: int = 1, resamples: int 
     orders = [order for order in range(MAX_ORDER + 1) if groups >= PLACES_FOR_ORDER[order]]
     if orders == [0]:
         places = f"{groups} place{'s' * (groups > 1)}"
-        notes.append(f"{places}: the gain is taken to be the same everywhere; press at {PLACES_FOR_ORDER[1]} or more")
+        notes.append(
+            f"{places}: the gain is taken to be the same everywhere; press at {PLACES_FOR_ORDER[1]}"
+            " or more"
+        )
     by_place = groups >= LEAST_PRESSES
     fold = place if by_place else np.arange(len(presses))
-    forms = [name for name, shape in FORMS.items() if len(weights_of(presses.load_n)) >= shape.least_weights]
+    forms = [
+        name
+        for name, shape in FORMS.items()
+        if len(weights_of(presses.load_n)) >= shape.least_weights
+    ]
     middle = min(max(orders), LAW_ORDER)
     tried = {(form, middle): _left_out(presses, radius_mm, fold, form, middle) for form in forms}
     form, _ = _best(tried)
-    others = {order: _left_out(presses, radius_mm, fold, form, order) for order in orders if order != middle}
+    others = {
+        order: _left_out(presses, radius_mm, fold, form, order)
+        for order in orders
+        if order != middle
+    }
     tried = {(form, order): others.get(order, tried[form, middle]) for order in orders}
     _, order = _best(tried)
     fitted = fit(presses, radius_mm, form, order)
     if _steepness(fitted, presses.load_n) < LEAST_STEEPNESS:
-        raise FrameError("calibration: strength does not grow with load; look at the list of weights, and at the touches of each")
+        raise FrameError(
+            "calibration: strength does not grow with load; look at the list of weights, and at the"
+            " touches of each"
+        )
     if form != "power" and fitted.numbers[1] > 0.9 * MOST_F0 * presses.load_n.max():
-        notes.append("the strength shows no saturation: beyond the greatest weight the law is a guess")
+        notes.append(
+            "the strength shows no saturation: beyond the greatest weight the law is a guess"
+        )
     left_out = tried[form, order]
     law = law_of(fitted, presses, radius_mm, float(np.quantile(np.abs(left_out), 0.95)))
     before = tried[form, 0]
     return Calibration(
-        law, fitted, _interval(presses, radius_mm, fitted, fold, seed, resamples), left_out, groups, by_place,
+        law, fitted, _interval(presses, radius_mm, fitted, fold, seed, resamples), left_out, groups,
+        by_place,
         (_scatter(presses, before), _scatter(presses, left_out)), tuple(notes),
     )  # fmt: skip
 
@@ -239,21 +276,33 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
         gain = np.maximum(1 + terms @ p[count:], 0.05)
         jacobian = np.zeros((len(log_strength) + free, len(p)))
         for k in range(count):
-            step = np.exp(p[:count] + STEP * (np.arange(count) == k)), np.exp(p[:count] - STEP * (np.arange(count) == k))
-            up, down = (np.log(np.maximum(shape.strength(presses.load_n, *at), 1e-300)) for at in step)
+            step = (
+                np.exp(p[:count] + STEP * (np.arange(count) == k)),
+                np.exp(p[:count] - STEP * (np.arange(count) == k)),
+            )
+            up, down = (
+                np.log(np.maximum(shape.strength(presses.load_n, *at), 1e-300)) for at in step
+            )
             jacobian[: len(log_strength), k] = (down - up) / (2 * STEP)
         jacobian[: len(log_strength), count:] = terms / gain[:, None]
         jacobian[len(log_strength) :, count:] = RIDGE * np.eye(free)
         return jacobian
 
-    low, high, start = (np.log(np.array(ends) * units).tolist() for ends in (shape.low, shape.high, shape.start))
+    low, high, start = (
+        np.log(np.array(ends) * units).tolist() for ends in (shape.low, shape.high, shape.start)
+    )
     bounds = (low + free * [-np.inf], high + free * [np.inf])
-    solved = least_squares(misfit, start + free * [0.0], slope, bounds=bounds, max_nfev=100, ftol=1e-7, xtol=1e-7).x
-    return Fitted(form, tuple(np.exp(solved[:count]).tolist()), order, np.concatenate([[1.0], solved[count:]]))
+    solved = least_squares(
+        misfit, start + free * [0.0], slope, bounds=bounds, max_nfev=100, ftol=1e-7, xtol=1e-7
+    ).x
+    return Fitted(
+        form, tuple(np.exp(solved[:count]).tolist()), order, np.concatenate([[1.0], solved[count:]])
+    )
 
 
 def law_of(fitted: Fitted, presses: Presses, radius_mm: float, uncertainty: float) -> LoadLaw:
-    """``fitted`` as a model holds it: the law as a table up to the greatest load of ``presses``, evenly by strength."""
+    """``fitted`` as a model holds it: the law as a table up to the greatest load of ``presses``,
+    evenly by strength."""
     shape, most = FORMS[fitted.form], float(presses.load_n.max())
     top = float(shape.strength(np.array(most), *fitted.numbers))
     strength = np.linspace(0.0, top, TABLE_POINTS)
@@ -261,24 +310,30 @@ def law_of(fitted: Fitted, presses: Presses, radius_mm: float, uncertainty: floa
     reach = float(np.hypot(*presses.place_mm.T).max()) / radius_mm
     table = np.concatenate([load, [most]]).astype(np.float32)
     return LoadLaw(
-        strength.astype(np.float32), table, fitted.gain.astype(np.float32), fitted.order, float(np.float32(radius_mm)),
+        strength.astype(np.float32), table, fitted.gain.astype(np.float32), fitted.order,
+        float(np.float32(radius_mm)),
         float(np.float32(reach)), float(np.float32(uncertainty)),
     )  # fmt: skip
 
 
-def _left_out(presses: Presses, radius_mm: float, fold: IntArray, form: str, order: int) -> FloatArray:
+def _left_out(
+    presses: Presses, radius_mm: float, fold: IntArray, form: str, order: int
+) -> FloatArray:
     """Relative error (k,) of each press's load by the fit to the presses of other folds."""
     errors = np.empty(len(presses))
     for number in range(int(fold.max()) + 1):
         out = fold == number
         kept = presses.take(~out)
         law = law_of(fit(kept, radius_mm, form, order), kept, radius_mm, 0.0)
-        errors[out] = law.loads_at(presses.place_mm[out], presses.strength[out]) / presses.load_n[out] - 1
+        errors[out] = (
+            law.loads_at(presses.place_mm[out], presses.strength[out]) / presses.load_n[out] - 1
+        )
     return errors
 
 
 def _best(tried: dict[tuple[str, int], FloatArray]) -> tuple[str, int]:
-    """The first choice that no later one beats by more than ``WORTH``, of errors (k,) by law and order."""
+    """The first choice that no later one beats by more than ``WORTH``, of errors (k,) by law and
+    order."""
     (best, least), *others = ((key, _rms_log(errors)) for key, errors in tried.items())
     for key, error in others:
         if error < WORTH * least:
@@ -307,7 +362,8 @@ def _interval(
 
 
 def _scatter(presses: Presses, errors: FloatArray) -> float:
-    """Relative standard deviation over places of one load's reading: over all, around each weight's own mean."""
+    """Relative standard deviation over places of one load's reading: over all, around each weight's
+    own mean."""
     residual = 1 + errors
     squares, count = 0.0, 0
     for weight in weights_of(presses.load_n):

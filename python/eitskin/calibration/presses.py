@@ -21,8 +21,8 @@ NEAR_MM = 25.0  # a touch that far from where the weight is said to be is not it
 
 @dataclass(frozen=True, eq=False)
 class Presses:
-    """k presses: ``load_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over the press's frames, and
-    ``place_mm`` (k, 2) as found, medians too."""
+    """k presses: ``load_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over
+    the press's frames, and ``place_mm`` (k, 2) as found, medians too."""
 
     load_n: FloatArray
     strength: FloatArray
@@ -46,9 +46,14 @@ def joined(parts: Sequence[Presses]) -> Presses:
 
 
 def find_presses(
-    reconstructor: Reconstructor, frames: Frames, numbers: Sequence[int], weights: Sequence[Weight], where: str
+    reconstructor: Reconstructor,
+    frames: Frames,
+    numbers: Sequence[int],
+    weights: Sequence[Weight],
+    where: str,
 ) -> tuple[Presses, list[str]]:
-    """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line for each that shows no touch.
+    """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line
+    for each that shows no touch.
 
     Raises:
         FrameError: a press has no frame here, or the quiet frames cannot be used.
@@ -58,11 +63,21 @@ def find_presses(
     seen: list[tuple[float, float, float, float]] = []
     unseen: list[str] = []
     for weight in weights:
-        rows = [at[number] for number in range(weight.first, weight.last + 1) if number in at] if len(at) else []
+        rows = (
+            [at[number] for number in range(weight.first, weight.last + 1) if number in at]
+            if len(at)
+            else []
+        )
         name = f"{where}: frames {weight.first} to {weight.last}"
         if not rows:
-            raise FrameError(f"{name} of the list of weights are not there; it has {_span(numbers)}")
-        touches = [touch for row in rows if (touch := _pressed(reconstructor, frames.voltage_v[row], weight)) is not None]
+            raise FrameError(
+                f"{name} of the list of weights are not there; it has {_span(numbers)}"
+            )
+        touches = [
+            touch
+            for row in rows
+            if (touch := _pressed(reconstructor, frames.voltage_v[row], weight)) is not None
+        ]
         if 2 * len(touches) <= len(rows):
             unseen.append(f"{name}: {len(touches)} of {len(rows)} show the weight; left out")
             continue
@@ -77,7 +92,8 @@ def _span(numbers: Sequence[int]) -> str:
 
 
 def _pressed(reconstructor: Reconstructor, frame_v: FloatArray, weight: Weight) -> Touch | None:
-    """The touch that is the weight: the strongest, or where its place is known the nearest; None where there is none."""
+    """The touch that is the weight: the strongest, or where its place is known the nearest; None
+    where there is none."""
     reconstructor.forget()
     try:
         touches = reconstructor.reconstruct(frame_v).touches

@@ -1,4 +1,5 @@
-"""The list of known weights that belongs to a recording: CSV with a header, or TOML with ``[[press]]`` tables."""
+"""The list of known weights that belongs to a recording: CSV with a header, or TOML with
+``[[press]]`` tables."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ MOST_LOAD_N = 1e6
 
 @dataclass(frozen=True)
 class Weight:
-    """One weight on the skin: frames ``first`` to ``last``, both included; ``load_n`` N; its place in mm, where known."""
+    """One weight on the skin: frames ``first`` to ``last``, both included; ``load_n`` N; its place
+    in mm, where known."""
 
     first: int
     last: int
@@ -65,7 +67,16 @@ def _csv_rows(path: Path) -> list[tuple[Mapping[str, Any], str]]:
         where = f"{path}: row {k + 1} below the header"
         if len(cells) != len(head):
             raise ConfigError(f"{where}: {len(cells)} cells under {len(head)} names; give as many")
-        rows.append(({name: _number(cell, name, where) for name, cell in zip(head, cells, strict=True) if cell.strip()}, where))
+        rows.append(
+            (
+                {
+                    name: _number(cell, name, where)
+                    for name, cell in zip(head, cells, strict=True)
+                    if cell.strip()
+                },
+                where,
+            )
+        )
     return rows
 
 
@@ -79,14 +90,22 @@ def _number(cell: str, name: str, where: str) -> float:
 def _weight(row: Mapping[str, Any], where: str) -> Weight:
     check_keys(row, KEYS, where)
     if ("load_g" in row) == ("load_n" in row):
-        raise ConfigError(f"{where}: give the load as load_g (grams) or as load_n (newtons), one of them")
+        raise ConfigError(
+            f"{where}: give the load as load_g (grams) or as load_n (newtons), one of them"
+        )
     if ("x_mm" in row) != ("y_mm" in row):
         raise ConfigError(f"{where}: a place needs x_mm and y_mm; give both or none")
     first = integer(row, "first", None, where, low=0, high=MOST_FRAMES)
     last = integer(row, "last", first, where, low=first, high=MOST_FRAMES)
     if "load_g" in row:
-        load_n = NEWTONS_PER_GRAM * number(row, "load_g", None, where, low=0, high=MOST_LOAD_N / NEWTONS_PER_GRAM, open_low=True)
+        load_n = NEWTONS_PER_GRAM * number(
+            row, "load_g", None, where, low=0, high=MOST_LOAD_N / NEWTONS_PER_GRAM, open_low=True
+        )
     else:
         load_n = number(row, "load_n", None, where, low=0, high=MOST_LOAD_N, open_low=True)
-    place = (number(row, "x_mm", None, where), number(row, "y_mm", None, where)) if "x_mm" in row else None
+    place = (
+        (number(row, "x_mm", None, where), number(row, "y_mm", None, where))
+        if "x_mm" in row
+        else None
+    )
     return Weight(first, last, load_n, place)

@@ -1,4 +1,5 @@
-"""``--budget`` and ``--accuracy`` where a model is given already: the solver's settings of a measured point that it can take."""
+"""``--budget`` and ``--accuracy`` where a model is given already: the solver's settings of a
+measured point that it can take."""
 
 from __future__ import annotations
 
@@ -10,16 +11,25 @@ from eitskin.errors import UsageError
 if TYPE_CHECKING:
     from eitskin.core.results import Options
     from eitskin.model.model import Model
-    from eitskin.study.tradeoff.configuration import Configuration
-    from eitskin.study.tradeoff.front import Point
+    from eitskin.tuning.configuration import Configuration
+    from eitskin.tuning.front import Point, Where
 
 EXCLUDED = ("solver", "iterations", "gap", "mac_limit", "macs")
 
 
 def add_wish(parser: Any) -> None:
     """Add both."""
-    parser.add_argument("--budget", metavar="COST", help="of solve and touches: 10ms, 800us, 600kMACs, 2.5Minstructions")
-    parser.add_argument("--accuracy", type=float, metavar="MIOU", help="at least: of images of 1 to 3 random touches, 60 dB")
+    parser.add_argument(
+        "--budget",
+        metavar="COST",
+        help="of solve and touches: 10ms, 800us, 600kMACs, 2.5Minstructions",
+    )
+    parser.add_argument(
+        "--accuracy",
+        type=float,
+        metavar="MIOU",
+        help="at least: of images of 1 to 3 random touches, 60 dB",
+    )
 
 
 def wished(options: argparse.Namespace) -> bool:
@@ -32,30 +42,61 @@ def wished(options: argparse.Namespace) -> bool:
         return False
     for name in EXCLUDED:
         if getattr(options, name, None) is not None:
-            raise UsageError(f"--{name.replace('_', '-')} is chosen by --budget and --accuracy; leave one or the other out")
+            raise UsageError(
+                f"--{name.replace('_', '-')} is chosen by --budget and --accuracy; leave one or the"
+                " other out"
+            )
     return True
 
 
+def read_wish(
+    options: argparse.Namespace, board: str, where: Where | None = None, period: str | None = None
+) -> Any:
+    """What ``--budget`` and ``--accuracy`` ask for.
+
+    Raises:
+        UsageError: nothing, or what cannot be.
+    """
+    from eitskin.tuning.front import Where as Place
+    from eitskin.tuning.front import Wish, check_wish, read_budget
+
+    budget = None if options.budget is None else read_budget(options.budget)
+    frame = None if period is None else read_budget(period)
+    if frame is not None and frame.unit != "us":
+        raise UsageError(f"--period {period}: give a time, such as 12ms")
+    period_us, worst = None if frame is None else frame.value, getattr(options, "worst", False)
+    wish = Wish(budget, options.accuracy, board, where or Place(), period_us, worst)
+    return check_wish(wish)
+
+
 def chosen_point(
-    options: argparse.Namespace, model: Model, now: Options, board: str, settable: set[str] | None = None
+    options: argparse.Namespace,
+    model: Model,
+    now: Options,
+    board: str,
+    settable: set[str] | None = None,
 ) -> Point:
-    """The measured point whose settings ``model`` is to be solved with: of its rank, grid, storage and reduction, scanned fully
-    with 80 samples, and with no other settings than ``now`` but those in ``settable`` (None: any).
+    """The measured point whose settings ``model`` is to be solved with: of its rank, grid, storage
+    and reduction, scanned fully with 80 samples, and with no other settings than ``now`` but those
+    in ``settable`` (None: any).
 
     Raises:
         UsageError: there is none, or none that does what is asked for.
         FileError, ConfigError: there are no results.
     """
-    from eitskin.cli.cmd_tradeoff import read_wish
-    from eitskin.study.tradeoff.configuration import Configuration
-    from eitskin.study.tradeoff.front import choose, load_front
+    from eitskin.tuning.configuration import Configuration
+    from eitskin.tuning.front import choose, load_front
 
     wish = read_wish(options, board)
     usual = Configuration("")
     points = []
     for point in load_front().points:
         one = point.configuration
-        other = {name for name, value in one.solver_settings.items() if not _same(value, getattr(now, name, None))}
+        other = {
+            name
+            for name, value in one.solver_settings.items()
+            if not _same(value, getattr(now, name, None))
+        }
         if (
             _is_of(one, point, model)
             and (one.samples, one.scan) == (usual.samples, usual.scan)
@@ -65,9 +106,10 @@ def chosen_point(
             points.append(point)
     if not points:
         raise UsageError(
-            f"--budget and --accuracy: no measured point has this model's rank {model.rank}, {model.grid.n_pixels} pixels in "
-            f"{model.stored.storage}{' and starts warm' if now.warm_start else ''}; make a model of one by  "
-            "eitskin tradeoff recommend -o MODEL.eitm"
+            f"--budget and --accuracy: no measured point has this model's rank {model.rank},"
+            f" {model.grid.n_pixels} pixels in"
+            f" {model.stored.storage}{' and starts warm' if now.warm_start else ''}; make a model"
+            " of one by  eitskin tradeoff recommend -o MODEL.eitm"
         )
     return choose(points, wish, "measured point of this model")
 
@@ -89,16 +131,27 @@ def _is_of(one: Configuration, point: Point, model: Model) -> bool:
     reduction = (("floor", one.floor), ("column_power", one.column_power))
     if not all(_same(build.get(name, value), value) for name, value in reduction):
         return False
-    return (one.rank, one.storage, "difference") == (model.rank, model.stored.storage, model.data_kind)
+    return (one.rank, one.storage, "difference") == (
+        model.rank,
+        model.stored.storage,
+        model.data_kind,
+    )
 
 
 def settings_text(point: Point, board: str) -> str:
     """What was chosen, in a line."""
-    from eitskin.study.tradeoff.front import Where
+    from eitskin.tuning.front import Where
 
     one = point.configuration
-    score, typical, most = point.accuracy(Where()), point.cost("us", board, Where()), point.cost("us", board, Where(), True)
-    text = f"settings of {point.name!r}: {one.solver}, {one.iterations} iterations at most, lambda_rel {one.lambda_rel:g}"
+    score, typical, most = (
+        point.accuracy(Where()),
+        point.cost("us", board, Where()),
+        point.cost("us", board, Where(), True),
+    )
+    text = (
+        f"settings of {point.name!r}: {one.solver}, {one.iterations} iterations at most, lambda_rel"
+        f" {one.lambda_rel:g}"
+    )
     text += f", gap {one.gap:g}" if one.gap else ""
     text += f", at most {one.mac_limit} MACs" if one.mac_limit else ""
     if score is not None:

@@ -1,4 +1,5 @@
-"""``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches are told in grams."""
+"""``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches
+are told in grams."""
 
 from __future__ import annotations
 
@@ -22,18 +23,45 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "calibrate",
         help="known weights on a skin, so that its touches are told in grams",
-        description="Fit the law that turns a touch's strength and place into its load to recordings of known weights, say how "
-        "far it is to be trusted, and store it in a copy of the model. docs/guide/calibration.md shows how to record them.",
+        description=(
+            "Fit the law that turns a touch's strength and place into its load to recordings of"
+            " known weights, say how far it is to be trusted, and store it in a copy of the model."
+            " docs/guide/calibration.md shows how to record them."
+        ),
     )
-    parser.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING", help="frames (.npz) or a run (.eits) of weights")
+    parser.add_argument(
+        "recordings",
+        nargs="+",
+        type=Path,
+        metavar="RECORDING",
+        help="frames (.npz) or a run (.eits) of weights",
+    )
     parser.add_argument(
         "--weights", action="append", type=Path, required=True, metavar="LIST",
         help="the weights of a recording, .csv or .toml; once for each recording, in their order",
     )  # fmt: skip
-    parser.add_argument("--model", type=Path, metavar="MODEL.eitm", help="default: the prebuilt model of the paper's skin")
-    parser.add_argument("--sign", choices=("increase", "decrease"), default="increase", help="which changes a weight makes")
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of the resamples behind the intervals (default: 1)")
-    parser.add_argument("-o", "--output", type=Path, metavar="OUT.eitm", help="the model with its calibration")
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="MODEL.eitm",
+        help="default: the prebuilt model of the paper's skin",
+    )
+    parser.add_argument(
+        "--sign",
+        choices=("increase", "decrease"),
+        default="increase",
+        help="which changes a weight makes",
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=1,
+        metavar="S",
+        help="of the resamples behind the intervals (default: 1)",
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="OUT.eitm", help="the model with its calibration"
+    )
     parser.add_argument("--json", action="store_true")
     parser.set_defaults(run=run)
 
@@ -52,8 +80,8 @@ def run(options: argparse.Namespace) -> int:
 
     if len(options.recordings) != len(options.weights):
         raise UsageError(
-            f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of weights; give --weights once "
-            "for each"
+            f"calibrate: {len(options.recordings)} recordings and {len(options.weights)} lists of"
+            " weights; give --weights once for each"
         )
     if options.seed < 0:
         raise UsageError(f"--seed {options.seed} must be 0 or above")
@@ -79,10 +107,24 @@ def run(options: argparse.Namespace) -> int:
     if options.output is not None:
         save_model(options.output, calibrated(model, found))
     if options.json:
-        print(json.dumps({"model": name, "output": str(options.output or ""), "left_out": unseen, **found.as_dict()}, indent=2))
+        print(
+            json.dumps(
+                {
+                    "model": name,
+                    "output": str(options.output or ""),
+                    "left_out": unseen,
+                    **found.as_dict(),
+                },
+                indent=2,
+            )
+        )
     else:
         print("\n".join(_lines(found)))
-        print(f"{options.output}: {name} with this calibration" if options.output else "not stored; name a model with -o")
+        print(
+            f"{options.output}: {name} with this calibration"
+            if options.output
+            else "not stored; name a model with -o"
+        )
     return 0
 
 
@@ -92,7 +134,8 @@ def calibrated(model: Model, found: Calibration) -> Model:
 
 
 def _frames(path: Path, model: Path | None) -> tuple[Frames, list[int]]:
-    """The frames of a file or run, and the numbers that a list of weights counts them by: a board's own, or from 0."""
+    """The frames of a file or run, and the numbers that a list of weights counts them by: a board's
+    own, or from 0."""
     from eitskin.frames.frames import load_frames
 
     if path.suffix == ".eits":
@@ -114,19 +157,35 @@ def _lines(found: Calibration) -> list[str]:
     from eitskin.core.results import load_text
 
     facts, law = found.as_dict(), found.law
-    names = {"s_max_s_per_m_mm2": "s_max, S/m mm2", "f0_n": "F0, N", "c_s_per_m_mm2_at_1_n": "c, S/m mm2 at 1 N", "exponent": "p"}
+    names = {
+        "s_max_s_per_m_mm2": "s_max, S/m mm2",
+        "f0_n": "F0, N",
+        "c_s_per_m_mm2_at_1_n": "c, S/m mm2 at 1 N",
+        "exponent": "p",
+    }
     lines = [
-        f"{facts['presses']} presses at {facts['places']} place{'s' * (found.groups > 1)}, "
-        f"{load_text(found.law.load_n[-1])} the greatest",
+        (
+            f"{facts['presses']} presses at {facts['places']} place{'s' * (found.groups > 1)}, "
+            f"{load_text(found.law.load_n[-1])} the greatest"
+        ),
         f"law                 strength = {FORMS[found.fitted.form].text}",
     ]
-    for key, value, ends in zip(FORMS[found.fitted.form].names, found.fitted.numbers, found.interval, strict=True):
+    for key, value, ends in zip(
+        FORMS[found.fitted.form].names, found.fitted.numbers, found.interval, strict=True
+    ):
         lines.append(f"  {names[key]:18}{value:.4g}   95 %: {ends[0]:.4g} to {ends[1]:.4g}")
     out_mm, (before, after) = law.reach * law.radius_mm, found.scatter
-    lines.append(f"gain over the skin  polynomial of order {law.order}, {len(law.gain)} terms, out to {out_mm:.0f} mm")
-    lines.append(f"one load, anywhere  standard deviation {100 * after:.1f} % of it ({100 * before:.1f} % with one gain)")
     lines.append(
-        f"a load left out     off by {100 * facts['error_rms']:.1f} % (rms), 95 % within {100 * facts['error_95']:.1f} %, worst "
-        f"{100 * facts['error_worst']:.1f} %; left out by {facts['left_out_by']}"
+        f"gain over the skin  polynomial of order {law.order}, {len(law.gain)} terms, out to"
+        f" {out_mm:.0f} mm"
+    )
+    lines.append(
+        f"one load, anywhere  standard deviation {100 * after:.1f} % of it ({100 * before:.1f} %"
+        " with one gain)"
+    )
+    lines.append(
+        f"a load left out     off by {100 * facts['error_rms']:.1f} % (rms), 95 % within"
+        f" {100 * facts['error_95']:.1f} %, worst {100 * facts['error_worst']:.1f} %; left out by"
+        f" {facts['left_out_by']}"
     )
     return lines + [f"note: {note}" for note in found.notes]

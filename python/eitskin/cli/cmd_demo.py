@@ -1,4 +1,5 @@
-"""``eitskin demo``: three simulated touches, found by the C core and by an emulated board, beside the truth."""
+"""``eitskin demo``: three simulated touches, found by the C core and by an emulated board, beside
+the truth."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.errors import FileError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
-    from eitskin.study.demo_board import BoardDemo
+    from eitskin.demo.demo_board import BoardDemo
 
 BOARD = "emu:demo"
 
@@ -21,14 +22,32 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "demo",
         help="three simulated touches, reconstructed in C, beside the truth",
-        description="Simulate three touches on the paper's skin (nonlinear forward model on another, finer mesh, noise), "
-        "reconstruct them with the C core and the prebuilt model, and draw them; then let the firmware find them on an emulated "
-        "board, and compare what it sends with this host's results bit by bit.",
+        description=(
+            "Simulate three touches on the paper's skin (nonlinear forward model on another, finer"
+            " mesh, noise), reconstruct them with the C core and the prebuilt model, and draw them;"
+            " then let the firmware find them on an emulated board, and compare what it sends with"
+            " this host's results bit by bit."
+        ),
     )
-    parser.add_argument("--snr-db", type=float, default=60.0, metavar="DB", help="20 log10(rms(V0)/sigma) (default: %(default)g)")
-    parser.add_argument("--seed", type=int, default=1, help="of noise and contacts (default: %(default)s)")
-    parser.add_argument("--picture", type=Path, default=Path("demo.png"), metavar="PNG", help="default: %(default)s")
-    parser.add_argument("--frames", type=Path, metavar="NPZ", help="also write the simulated frames, with their truth")
+    parser.add_argument(
+        "--snr-db",
+        type=float,
+        default=60.0,
+        metavar="DB",
+        help="20 log10(rms(V0)/sigma) (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=1, help="of noise and contacts (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--picture", type=Path, default=Path("demo.png"), metavar="PNG", help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--frames",
+        type=Path,
+        metavar="NPZ",
+        help="also write the simulated frames, with their truth",
+    )
     parser.add_argument("--no-board", action="store_true", help="leave the emulated board out")
     parser.add_argument("--json", action="store_true")
     parser.set_defaults(run=run)
@@ -36,9 +55,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate, reconstruct, print, draw."""
+    from eitskin.demo.demo import run_demo, to_json, to_text
     from eitskin.fileio import refuse_unwritable
     from eitskin.frames.frames import save_frames
-    from eitskin.study.demo import run_demo, to_json, to_text
     from eitskin.view.demo_picture import draw_demo
     from eitskin.view.pictures import load_matplotlib
 
@@ -54,17 +73,23 @@ def run(options: argparse.Namespace) -> int:
         print(f"{to_text(demo)}\npicture: {options.picture}", flush=True)
     board = None if options.no_board else _board()
     if options.json:
-        print(json.dumps({**to_json(demo), "picture": str(options.picture), "board": _board_json(board)}, indent=2))
+        print(
+            json.dumps(
+                {**to_json(demo), "picture": str(options.picture), "board": _board_json(board)},
+                indent=2,
+            )
+        )
     elif board is not None:
-        from eitskin.study.demo_board import to_text as board_text
+        from eitskin.demo.demo_board import to_text as board_text
 
         print(f"\n{board_text(board)}")
     return 0
 
 
 def _board() -> BoardDemo | None:
-    """The same touches on the emulated board; None, with a word on stderr, where emulator or firmware are not installed."""
-    from eitskin.study.demo_board import run_board_demo
+    """The same touches on the emulated board; None, with a word on stderr, where emulator or
+    firmware are not installed."""
+    from eitskin.demo.demo_board import run_board_demo
 
     try:
         return run_board_demo(BOARD)
@@ -74,6 +99,6 @@ def _board() -> BoardDemo | None:
 
 
 def _board_json(board: BoardDemo | None) -> dict[str, Any] | None:
-    from eitskin.study.demo_board import to_json
+    from eitskin.demo.demo_board import to_json
 
     return None if board is None else to_json(board)

@@ -1,4 +1,5 @@
-"""``eitskin devices``: serial ports, the boards that answer on them, and how everything else is named."""
+"""``eitskin devices``: serial ports, the boards that answer on them, and how everything else is
+named."""
 
 from __future__ import annotations
 
@@ -23,8 +24,11 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "devices",
         help="serial ports, boards that answer, and how simulated ones are named",
-        description="List the serial ports of this computer and ask those that look like a board's what they are. Ports that do "
-        "not are left alone: name one with  eitskin info --device serial:PORT.",
+        description=(
+            "List the serial ports of this computer and ask those that look like a board's what"
+            " they are. Ports that do not are left alone: name one with  eitskin info --device"
+            " serial:PORT."
+        ),
     )
     parser.add_argument("--quiet", action="store_true", help="ask no board")
     parser.add_argument("--json", action="store_true", help="print for programs")
@@ -40,7 +44,10 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({"ports": [port.as_dict() for port in found], "urls": URLS}, indent=2))
         return 0
     if not found:
-        print("no serial port; without a board, play with  --device sim:two_touch  or  --device emu:two_touch")
+        print(
+            "no serial port; without a board, play with  --device sim:two_touch  or  --device"
+            " emu:two_touch"
+        )
     for port in found:
         print(_line(port))
     print("--device takes:")
@@ -55,7 +62,10 @@ def _line(found: FoundPort) -> str:
     described = "" if port.description in ("", "n/a") else f"  {port.description}"
     line = f"serial:{port.path}{described}{usb}: "
     if found.board is not None:
-        return f"{line}{found.board.board}, firmware {found.board.firmware_text}, serial {found.board.serial}"
+        return (
+            f"{line}{found.board.board}, firmware {found.board.firmware_text}, serial"
+            f" {found.board.serial}"
+        )
     if found.why is not None:
         return f"{line}{found.why}"
     return line + ("a board's, not asked" if port.is_board else "no board's")

@@ -27,26 +27,49 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "doctor",
         help="say what is wrong with measured frames or a board: order, sign, wiring, noise, gains",
-        description="Say what is wrong with measured frames before an image is made of them: channel order, sign, "
-        "numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains, noise and drift. Takes a "
-        "frames file, any source that import reads, or with --device a board whose skin is not touched, and then also says "
-        "which faults the board itself reports. Exit code 0: nothing must be mended; 11: something must.",
+        description=(
+            "Say what is wrong with measured frames before an image is made of them: channel order,"
+            " sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains,"
+            " noise and drift. Takes a frames file, any source that import reads, or with --device"
+            " a board whose skin is not touched, and then also says which faults the board itself"
+            " reports. Exit code 0: nothing must be mended; 11: something must."
+        ),
     )
-    parser.add_argument("source", type=Path, nargs="?", help="frames file, or CSV, NPZ, MAT as for import")
+    parser.add_argument(
+        "source", type=Path, nargs="?", help="frames file, or CSV, NPZ, MAT as for import"
+    )
     device = parser.add_argument_group("a board in place of a source")
     device.add_argument("--device", metavar="URL", help=DEVICE_HELP)
-    device.add_argument("--frames", type=int, default=32, metavar="N", help="to be measured, 4 to 1024 (default: %(default)s)")
-    device.add_argument("--model", type=Path, metavar="MODEL.eitm", help="the board's, where it is not the prebuilt one")
+    device.add_argument(
+        "--frames",
+        type=int,
+        default=32,
+        metavar="N",
+        help="to be measured, 4 to 1024 (default: %(default)s)",
+    )
+    device.add_argument(
+        "--model",
+        type=Path,
+        metavar="MODEL.eitm",
+        help="the board's, where it is not the prebuilt one",
+    )
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
-    parser.add_argument("--picture", type=Path, metavar="PNG", help="draw what was measured (needs matplotlib)")
+    parser.add_argument(
+        "--picture", type=Path, metavar="PNG", help="draw what was measured (needs matplotlib)"
+    )
     parser.add_argument(
         "--touch",
         action="append",
         default=[],
         metavar="X,Y[,R]",
-        help="a touch at a known place in mm, to check the numbering; write --touch=-10,5 where X is negative",
+        help=(
+            "a touch at a known place in mm, to check the numbering; write --touch=-10,5 where X is"
+            " negative"
+        ),
     )
-    parser.add_argument("--touch-in", metavar="FRAME", help="the frame with these touches; else the largest change")
+    parser.add_argument(
+        "--touch-in", metavar="FRAME", help="the frame with these touches; else the largest change"
+    )
     add_import_options(parser)
     parser.set_defaults(run=run)
 
@@ -62,7 +85,9 @@ def run(options: argparse.Namespace) -> int:
     if options.device is not None:
         return _run_device(options, skin)
     assert options.source is not None
-    subject = subject_from_source(options.source, read_options(options), protocol, skin, n_electrodes)
+    subject = subject_from_source(
+        options.source, read_options(options), protocol, skin, n_electrodes
+    )
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
     report, case = examine_case(subject)
@@ -70,11 +95,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
-    """Measure, examine, say; with ``--touch`` the second half of the frames is of the touched skin."""
+    """Measure, examine, say; with ``--touch`` the second half of the frames is of the touched
+    skin."""
     from eitskin.cli.device_options import open_named, say, whole
+    from eitskin.device.diagnose_board import board_findings, board_subject, measure
     from eitskin.device.known_model import find_model
     from eitskin.frames.doctor.examine import examine_case
-    from eitskin.study.board_doctor import board_findings, board_subject, measure
 
     whole("--frames", options.frames, 4, 1024)
     with open_named(options) as device:
@@ -87,7 +113,9 @@ def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
 
         if not simulated:
             say(f"leave the skin untouched: measuring {options.frames} frames")
-        found = measure(device, options.frames, touched=bool(options.touch), before_touches=before_touches)
+        found = measure(
+            device, options.frames, touched=bool(options.touch), before_touches=before_touches
+        )
         subject = board_subject(device, found, known, skin)
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
@@ -116,10 +144,16 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
         values = floats(text, "--touch")
         if len(values) not in (2, 3):
             raise UsageError(f"--touch {text}: must be X,Y or X,Y,RADIUS in mm")
-        radius = values[2] if len(values) == 3 else TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
+        radius = (
+            values[2]
+            if len(values) == 3
+            else TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
+        )
         touches.append((values[0], values[1], radius))
     if not subject.skin.outline.contains([touch[:2] for touch in touches]).all():
-        raise UsageError("--touch: a touch lies outside the skin; give millimetres from the outline's centre")
+        raise UsageError(
+            "--touch: a touch lies outside the skin; give millimetres from the outline's centre"
+        )
     readings = tuple((order, _touched(frames, touches, name)) for order, frames in subject.readings)
     return replace(subject, readings=readings)
 
@@ -130,7 +164,9 @@ def _touched(frames: Frames, touches: list[tuple[float, float, float]], name: st
     if not frames.n_frames:
         raise UsageError("--touch: there is no frame besides the quiet ones")
     if name is not None and name not in frames.frame_name:
-        raise UsageError(f"--touch-in {name}: no such frame; frames are {', '.join(frames.frame_name[:20])}")
+        raise UsageError(
+            f"--touch-in {name}: no such frame; frames are {', '.join(frames.frame_name[:20])}"
+        )
     change = np.nan_to_num(np.abs(frames.voltage_v - frames.reference_v)).sum(axis=1)
     frame = int(np.argmax(change)) if name is None else frames.frame_name.index(name)
     given = np.array(touches)

@@ -19,15 +19,28 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "flash",
         help="put firmware and a model on a NUCLEO-F767ZI",
-        description="Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank, by whichever of "
-        "openocd, st-flash and pyocd is installed. The exact commands are printed first. What is not named is what ships with "
-        "eitskin.",
+        description=(
+            "Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank,"
+            " by whichever of openocd, st-flash and pyocd is installed. The exact commands are"
+            " printed first. What is not named is what ships with eitskin."
+        ),
     )
-    parser.add_argument("--image", type=Path, metavar="BIN", help="firmware (default: the prebuilt one)")
-    parser.add_argument("--model", type=Path, metavar="MODEL.eitm", help="default: the prebuilt model of the paper's skin")
-    parser.add_argument("--no-model", action="store_true", help="leave the board's models as they are")
+    parser.add_argument(
+        "--image", type=Path, metavar="BIN", help="firmware (default: the prebuilt one)"
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="MODEL.eitm",
+        help="default: the prebuilt model of the paper's skin",
+    )
+    parser.add_argument(
+        "--no-model", action="store_true", help="leave the board's models as they are"
+    )
     parser.add_argument("--tool", choices=TOOLS, help="default: the first that is installed")
-    parser.add_argument("--serial", metavar="NUMBER", help="the ST-LINK's, where several boards are plugged in")
+    parser.add_argument(
+        "--serial", metavar="NUMBER", help="the ST-LINK's, where several boards are plugged in"
+    )
     parser.add_argument("--dry-run", action="store_true", help="print the commands and do nothing")
     parser.add_argument("--json", action="store_true", help="print for programs; with --dry-run")
     parser.set_defaults(run=run)
@@ -47,7 +60,9 @@ def run(options: argparse.Namespace) -> int:
     model = None
     if not options.no_model:
         model = (load_prebuilt() if options.model is None else load_model(options.model))[1]
-    plan = plan_flash(image, model, tool=options.tool, serial=options.serial, installed=not options.dry_run)
+    plan = plan_flash(
+        image, model, tool=options.tool, serial=options.serial, installed=not options.dry_run
+    )
     if options.dry_run:
         facts = {"tool": plan.tool, "commands": [list(command) for command in plan.commands]}
         print(json.dumps(facts, indent=2) if options.json else "\n".join(plan.lines()))

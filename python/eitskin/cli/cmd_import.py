@@ -15,11 +15,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "import",
         help="turn a CSV, NPZ or MAT file of measured voltages into a frames file",
-        description="Turn a CSV, NPZ or MAT file of measured voltages into a frames file, in the protocol's order, "
-        "signed, in volts. Run  eitskin doctor SOURCE  first to learn which options it needs.",
+        description=(
+            "Turn a CSV, NPZ or MAT file of measured voltages into a frames file, in the protocol's"
+            " order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which options it"
+            " needs."
+        ),
     )
-    parser.add_argument("source", type=Path, help="CSV or other text table, NPZ, MAT, or a frames file to mend")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.npz", help="frames file to write")
+    parser.add_argument(
+        "source", type=Path, help="CSV or other text table, NPZ, MAT, or a frames file to mend"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="OUT.npz", help="frames file to write"
+    )
     parser.add_argument("--json", action="store_true", help="say what was written as JSON")
     add_import_options(parser)
     parser.set_defaults(run=run)
@@ -48,8 +55,12 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(said))
         return 0
     print(
-        f"{options.output}: {said['frames']} frame(s) of {said['channels']} channels, {said['quiet_frames']} quiet, "
-        f"{said['electrodes']} electrodes, {said['touches']} known touches; unit {said['unit']}"
+        f"{options.output}: {said['frames']} frame(s) of {said['channels']} channels,"
+        f" {said['quiet_frames']} quiet, {said['electrodes']} electrodes, {said['touches']} known"
+        f" touches; unit {said['unit']}"
     )
-    print(f"next: eitskin doctor {options.output}" + (f" --skin {options.skin}" if options.skin is not None else ""))
+    print(
+        f"next: eitskin doctor {options.output}"
+        + (f" --skin {options.skin}" if options.skin is not None else "")
+    )
     return 0

@@ -17,7 +17,10 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
         help="what a board is, its model, its scan, its faults and statistics",
-        description="Ask a board what it is, which model it has, how it scans, which faults it reports and what it has counted.",
+        description=(
+            "Ask a board what it is, which model it has, how it scans, which faults it reports and"
+            " what it has counted."
+        ),
     )
     add_device(parser)
     parser.add_argument("--reset-statistics", action="store_true", help="count anew after this")
@@ -44,32 +47,48 @@ def run(options: argparse.Namespace) -> int:
 def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
     from eitskin.model.storage import STORAGES
 
-    facts = {"device": url, "board": info.board, "firmware": info.firmware_text, "serial": info.serial}
+    facts = {
+        "device": url,
+        "board": info.board,
+        "firmware": info.firmware_text,
+        "serial": info.serial,
+    }
     facts["processor"] = f"{info.f_cpu_hz / 1e6:g} MHz" if info.f_cpu_hz else "none (simulated)"
     if info.has_model:
         storage = STORAGES[info.storage] if info.storage < len(STORAGES) else info.storage
         facts["model"] = (
-            f"{info.model_bytes} of {info.bank_bytes} bytes in bank {info.bank}, checksum {info.model_crc:08x}; "
-            f"{info.n_pixels} pixels, rank {info.rank}, {storage}"
+            f"{info.model_bytes} of {info.bank_bytes} bytes in bank {info.bank}, checksum"
+            f" {info.model_crc:08x}; {info.n_pixels} pixels, rank {info.rank}, {storage}"
         )
         rows = f"{info.n_electrodes} electrodes, {info.n_rows} rows, {info.n_folded} folded"
         facts["protocol"] = f"{info.protocol_hash:016x}: {rows}"
     else:
         facts["model"] = "none; upload one with  eitskin model upload MODEL.eitm"
     facts["excitation"] = f"{info.excitation_millihz / 1e3:.3f} Hz"
-    facts["sampling"] = f"{info.samples} samples at {info.sample_rate_hz} a second, {info.settle_us} us after switching"
+    facts["sampling"] = (
+        f"{info.samples} samples at {info.sample_rate_hz} a second, {info.settle_us} us after"
+        " switching"
+    )
     facts["scan"] = f"{_rows(info)}; {info.slot_us} us a row, {info.frame_us / 1e3:.2f} ms a frame"
-    facts["reference"] = "taken" if info.tared else "none; leave the skin untouched and run  eitskin tare"
+    facts["reference"] = (
+        "taken" if info.tared else "none; leave the skin untouched and run  eitskin tare"
+    )
     step_uv = info.volts_per_code_nv / 1e3
-    facts["converter"] = f"{step_uv:.1f} uV a step at the electrodes" if step_uv else "none (simulated)"
-    facts["faults"] = ", ".join(code.name.lower().replace("_", " ") for code in info.fault_codes) or "none"
+    facts["converter"] = (
+        f"{step_uv:.1f} uV a step at the electrodes" if step_uv else "none (simulated)"
+    )
+    facts["faults"] = (
+        ", ".join(code.name.lower().replace("_", " ") for code in info.fault_codes) or "none"
+    )
     return facts
 
 
 def _rows(info: BoardInfo) -> str:
     if info.check_every == 1:
         return "all rows"
-    return "one row of each reciprocal pair" + (f", all in one frame of {info.check_every}" if info.check_every else "")
+    return "one row of each reciprocal pair" + (
+        f", all in one frame of {info.check_every}" if info.check_every else ""
+    )
 
 
 def _used(used: int, room: int) -> str:
@@ -77,11 +96,17 @@ def _used(used: int, room: int) -> str:
 
 
 def _counted(stats: BoardStats) -> dict[str, Any]:
-    link = f"{stats.link_packets} packets, {stats.link_crc_errors} bad checksums, {stats.link_framing_errors} broken, "
+    link = (
+        f"{stats.link_packets} packets, {stats.link_crc_errors} bad checksums,"
+        f" {stats.link_framing_errors} broken, "
+    )
     return {
         "up": f"{stats.uptime_ms / 1e3:.1f} s",
-        "frames": f"{stats.frames_scanned} scanned, {stats.frames_solved} solved; {stats.deadlines_missed} deadlines missed, "
-        f"{stats.slots_repeated} measurements repeated",
+        "frames": (
+            f"{stats.frames_scanned} scanned, {stats.frames_solved} solved;"
+            f" {stats.deadlines_missed} deadlines missed, {stats.slots_repeated} measurements"
+            " repeated"
+        ),
         "sent": f"{stats.packets_sent} packets, {stats.packets_dropped} dropped for lack of room",
         "received": f"{link}{stats.link_overruns} too long",
         "stack": _used(stats.stack_used, stats.stack_bytes),

@@ -23,42 +23,71 @@ def add_parser(subparsers: Any) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
     build.add_argument("skin", nargs="?", type=Path, metavar="SKIN.toml", help="skin description")
-    build.add_argument("--paper", action="store_true", help="the paper's 194 mm disk instead of a file")
+    build.add_argument(
+        "--paper", action="store_true", help="the paper's 194 mm disk instead of a file"
+    )
     build.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL.eitm")
-    build.add_argument("--rank", type=int, default=0, help="rows of the reduced Jacobian (default: 64, or all if fewer)")
-    build.add_argument("--pixels", type=int, default=32, help="pixels along the longer side (default: %(default)s)")
+    build.add_argument(
+        "--rank",
+        type=int,
+        default=0,
+        help="rows of the reduced Jacobian (default: 64, or all if fewer)",
+    )
+    build.add_argument(
+        "--pixels", type=int, default=32, help="pixels along the longer side (default: %(default)s)"
+    )
     build.add_argument("--storage", choices=("f32", "f16", "i16", "i8"), default="f32")
     build.add_argument(
         "--data",
         choices=("difference", "normalised", "log-ratio"),
         default="difference",
-        help="what is solved for: v - v0; (v - v0)/v0, where channels have gains of their own; or v0 log(v/v0)",
+        help=(
+            "what is solved for: v - v0; (v - v0)/v0, where channels have gains of their own; or v0"
+            " log(v/v0)"
+        ),
     )
-    build.add_argument("--elements", type=int, default=3000, help="about how many the mesh has (default: %(default)s)")
-    build.add_argument("--floor", type=float, default=0.01, help="mu of the whitening (default: %(default)g)")
+    build.add_argument(
+        "--elements",
+        type=int,
+        default=3000,
+        help="about how many the mesh has (default: %(default)s)",
+    )
+    build.add_argument(
+        "--floor", type=float, default=0.01, help="mu of the whitening (default: %(default)g)"
+    )
     build.add_argument(
         "--touch-change",
         type=float,
         default=1.35,
         metavar="RATIO",
-        help="expected change under a touch over the skin's conductivity: 1.35 for contrasts 3 to 10, 2 for metal, "
-        "0 for unknown (default: %(default)g)",
+        help=(
+            "expected change under a touch over the skin's conductivity: 1.35 for contrasts 3 to"
+            " 10, 2 for metal, 0 for unknown (default: %(default)g)"
+        ),
     )
     build.add_argument("--json", action="store_true")
     build.set_defaults(run=run_build)
     info = actions.add_parser("info", help="what is in a model")
-    info.add_argument("model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one")
+    info.add_argument(
+        "model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one"
+    )
     info.add_argument("--json", action="store_true")
     info.set_defaults(run=run_info)
-    verify = actions.add_parser("verify", help="run the golden frame through the C core in both widths and through numpy")
-    verify.add_argument("model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one")
+    verify = actions.add_parser(
+        "verify", help="run the golden frame through the C core in both widths and through numpy"
+    )
+    verify.add_argument(
+        "model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one"
+    )
     verify.add_argument("--json", action="store_true")
     verify.set_defaults(run=run_verify)
     upload = actions.add_parser(
         "upload",
         help="put a model on a board",
-        description="Put a model into the bank of a board's flash that is not in use. The board verifies it, then swaps; "
-        "cut at any byte, it keeps its old model. The reference is forgotten.",
+        description=(
+            "Put a model into the bank of a board's flash that is not in use. The board verifies"
+            " it, then swaps; cut at any byte, it keeps its old model. The reference is forgotten."
+        ),
     )
     upload.add_argument("model", type=Path, metavar="MODEL.eitm")
     upload.add_argument("--device", default="auto", metavar="URL", help=DEVICE_HELP)
@@ -88,9 +117,13 @@ def run_build(options: argparse.Namespace) -> int:
         raise UsageError("model build: name a SKIN.toml, or give --paper, not both")
     refuse_unwritable(options.output)
     if not 100 <= options.elements <= 500_000:
-        raise UsageError(f"model build: --elements {options.elements} is out of range; use 100 to 500000")
+        raise UsageError(
+            f"model build: --elements {options.elements} is out of range; use 100 to 500000"
+        )
     if not 0 <= options.touch_change <= 100:
-        raise UsageError(f"model build: --touch-change {options.touch_change:g} is out of range; use 0 to 100")
+        raise UsageError(
+            f"model build: --touch-change {options.touch_change:g} is out of range; use 0 to 100"
+        )
     skin, protocol = (paper_skin(), adjacent(16)) if options.paper else load_skin(options.skin)
     settings = BuildSettings(
         rank=options.rank,
@@ -142,7 +175,10 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
     defaults = facts.pop("defaults")
     for key, value in facts.items():
         print(f"{key.replace('_', ' '):16} {value}")
-    shown = (f"{key} {value if isinstance(value, str) else format(value, 'g')}" for key, value in defaults.items())
+    shown = (
+        f"{key} {value if isinstance(value, str) else format(value, 'g')}"
+        for key, value in defaults.items()
+    )
     print("defaults         " + ", ".join(shown))
 
 
@@ -152,7 +188,10 @@ def _calibration_text(model: Model) -> str:
     if model.load is None:
         return "none; touches have no load"
     law = model.load
-    return f"loads to {load_text(law.load_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain of order {law.order}"
+    return (
+        f"loads to {load_text(law.load_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain of"
+        f" order {law.order}"
+    )
 
 
 def run_verify(options: argparse.Namespace) -> int:
@@ -169,22 +208,38 @@ def run_verify(options: argparse.Namespace) -> int:
     peak = float(np.abs(model.golden.image).max()) or 1.0
     differences = {
         "C float32": CoreEngine(blob, "float32").self_test(),
-        "C float32, portable": CoreEngine(blob, "float32", prepared=False, portable=True).self_test(),
+        "C float32, portable": (
+            CoreEngine(blob, "float32", prepared=False, portable=True).self_test()
+        ),
         "C float64": CoreEngine(blob, "float64").self_test(),
         "numpy float64": float(np.abs(image - model.golden.image).max()) / peak,
     }
     same_bits = differences["C float32"] == 0 and differences["C float32, portable"] == 0
     within = max(differences.values()) <= NUMPY_BOUND
     if options.json:
-        print(json.dumps({"model": name, "difference_to_golden_over_peak": differences, "ok": same_bits and within}, indent=2))
+        print(
+            json.dumps(
+                {
+                    "model": name,
+                    "difference_to_golden_over_peak": differences,
+                    "ok": same_bits and within,
+                },
+                indent=2,
+            )
+        )
     else:
         print(f"{name}: golden frame, greatest difference to the stored image over its peak")
         for engine, difference in differences.items():
             print(f"  {engine:20} {'the same bits' if difference == 0 else f'{difference:.2e}'}")
     if not same_bits:
-        raise VerificationError(f"{name}: the C core does not give the golden image's bits; rebuild the model with this version")
+        raise VerificationError(
+            f"{name}: the C core does not give the golden image's bits; rebuild the model with this"
+            " version"
+        )
     if not within:
-        raise VerificationError(f"{name}: an engine is further than {NUMPY_BOUND:g} from the golden image; report this")
+        raise VerificationError(
+            f"{name}: an engine is further than {NUMPY_BOUND:g} from the golden image; report this"
+        )
     return 0
 
 
@@ -197,7 +252,15 @@ def run_upload(options: argparse.Namespace) -> int:
 
     _, blob = load_model(options.model)
     with open_device(options.device) as device:
-        with tqdm(total=len(blob), desc="upload", unit="B", unit_scale=True, leave=False, disable=not sys.stderr.isatty()) as bar:
+        with tqdm(
+            total=len(blob),
+            desc="upload",
+            unit="B",
+            unit_scale=True,
+            leave=False,
+            disable=not sys.stderr.isatty(),
+        ) as bar:
+
             def show(done: int, total: int) -> None:
                 bar.update(done - bar.n)
 
@@ -205,7 +268,12 @@ def run_upload(options: argparse.Namespace) -> int:
         url = device.transport.url
     if options.json:
         facts = {"device": url, "model": str(options.model), "bytes": len(blob)}
-        print(json.dumps(facts | {"model_crc": f"{info.model_crc:08x}", "bank": info.bank}, indent=2))
+        print(
+            json.dumps(facts | {"model_crc": f"{info.model_crc:08x}", "bank": info.bank}, indent=2)
+        )
     else:
-        print(f"{url}: {options.model} is in bank {info.bank}, {len(blob)} bytes, checksum {info.model_crc:08x}; tare anew")
+        print(
+            f"{url}: {options.model} is in bank {info.bank}, {len(blob)} bytes, checksum"
+            f" {info.model_crc:08x}; tare anew"
+        )
     return 0

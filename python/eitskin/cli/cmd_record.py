@@ -1,4 +1,5 @@
-"""``eitskin record``: every packet of a board into a file, for ``replay`` and for whoever has no board."""
+"""``eitskin record``: every packet of a board into a file, for ``replay`` and for whoever has no
+board."""
 
 from __future__ import annotations
 
@@ -34,14 +35,19 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "record",
         help="write every packet of a board to a file",
-        description="Take the reference, then write every packet of a board to a file as it comes, the reference's raw frames "
-        "included. A recording that is cut, even by kill -9, can be read up to its last whole packet. Stop with Ctrl-C.",
+        description=(
+            "Take the reference, then write every packet of a board to a file as it comes, the"
+            " reference's raw frames included. A recording that is cut, even by kill -9, can be"
+            " read up to its last whole packet. Stop with Ctrl-C."
+        ),
     )
     add_device(parser)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="RUN.eits")
     parser.add_argument("--overwrite", action="store_true", help="write over a file that exists")
     add_stream(parser, "raw,image,touches")
-    parser.add_argument("--seconds", type=float, metavar="S", help="stop after S seconds of the board's time")
+    parser.add_argument(
+        "--seconds", type=float, metavar="S", help="stop after S seconds of the board's time"
+    )
     add_scan(parser)
     parser.set_defaults(run=run)
 
@@ -51,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.device.known_model import find_model
     from eitskin.device.live import LiveSummary, finish, follow
     from eitskin.device.wire.packets import Stream
-    from eitskin.study.judge.scene_truth import truth_of, until_over
+    from eitskin.scoring.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)
     check_scan(options)
@@ -65,19 +71,29 @@ def run(options: argparse.Namespace) -> int:
         known = find_model(device.board, options.model, device.transport.name)
         needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
         truth = truth_of(options.device, options.sign or "increase")
-        recorder = prepare(options, device, known, needs_reference=needed, record=options.output, truth=truth)
+        recorder = prepare(
+            options, device, known, needs_reference=needed, record=options.output, truth=truth
+        )
         assert recorder is not None
         with recorder:
             items = follow(device, what, every=chosen_every(device, what, every), frames=frames)
             try:
-                _count(_until(until_over(items, None if frames else truth), options.seconds), summary, frames)
+                _count(
+                    _until(until_over(items, None if frames else truth), options.seconds),
+                    summary,
+                    frames,
+                )
             except KeyboardInterrupt:
                 print("eitskin: stopped", file=sys.stderr)
             finally:
                 items.close()
         finish(summary, device)
     if options.json:
-        facts = {"recording": str(options.output), "packets": recorder.packets, "bytes": recorder.bytes}
+        facts = {
+            "recording": str(options.output),
+            "packets": recorder.packets,
+            "bytes": recorder.bytes,
+        }
         print(json.dumps(facts | summary.as_dict(), indent=2))
     else:
         print("\n".join(summary.lines()))
@@ -96,10 +112,14 @@ def check_output(path: Path | None, overwrite: bool) -> None:
 
     refuse_unwritable(path)
     if path is not None and path.exists() and not overwrite:
-        raise FileError(f"{path}: exists already; name another file, or write over it with  --overwrite")
+        raise FileError(
+            f"{path}: exists already; name another file, or write over it with  --overwrite"
+        )
 
 
-def _until(items: Iterator[LiveFrame | Fault | LinkEvent], seconds: float | None) -> Iterator[LiveFrame | Fault | LinkEvent]:
+def _until(
+    items: Iterator[LiveFrame | Fault | LinkEvent], seconds: float | None
+) -> Iterator[LiveFrame | Fault | LinkEvent]:
     from eitskin.device.live import LiveFrame
 
     for item in items:
@@ -108,7 +128,9 @@ def _until(items: Iterator[LiveFrame | Fault | LinkEvent], seconds: float | None
             return
 
 
-def _count(items: Iterable[LiveFrame | Fault | LinkEvent], summary: LiveSummary, frames: int) -> None:
+def _count(
+    items: Iterable[LiveFrame | Fault | LinkEvent], summary: LiveSummary, frames: int
+) -> None:
     from tqdm import tqdm
 
     from eitskin.device.live import LiveFrame
@@ -116,7 +138,9 @@ def _count(items: Iterable[LiveFrame | Fault | LinkEvent], summary: LiveSummary,
     from eitskin.device.wire.packets import Fault
 
     news = News()
-    with tqdm(desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()) as bar:
+    with tqdm(
+        desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()
+    ) as bar:
         for item in items:
             for text in news.lines(item):
                 bar.write(f"eitskin: {text}", file=sys.stderr)

@@ -1,4 +1,5 @@
-"""``eitskin replay``: a recording as it was streamed, as frames, or held against this host's core."""
+"""``eitskin replay``: a recording as it was streamed, as frames, or held against this host's
+core."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from eitskin.cli.device_options import read_mode, whole
 from eitskin.errors import EitskinError, FrameError, UsageError, VerificationError
 
 if TYPE_CHECKING:
-    from eitskin.study.judge.scene_truth import SceneTruth
+    from eitskin.scoring.scene_truth import SceneTruth
 
 
 def add_parser(subparsers: Any) -> None:
@@ -19,16 +20,37 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "replay",
         help="show a recording, export its frames, or check its images",
-        description="Show a recording as  eitskin stream  showed it; write its raw frames as a frames file; or put them through "
-        "this host's core and compare every bit of the images and touches with what the board sent.",
+        description=(
+            "Show a recording as  eitskin stream  showed it; write its raw frames as a frames file;"
+            " or put them through this host's core and compare every bit of the images and touches"
+            " with what the board sent."
+        ),
     )
     parser.add_argument("recording", type=Path, metavar="RUN.eits")
-    parser.add_argument("--mode", metavar="KIND[,KIND]", help="raw, image, touches, or several (default: touches)")
+    parser.add_argument(
+        "--mode", metavar="KIND[,KIND]", help="raw, image, touches, or several (default: touches)"
+    )
     parser.add_argument("--first", type=int, metavar="N", help="the first N frames only")
-    parser.add_argument("--model", type=Path, metavar="MODEL.eitm", help="the board's model where it is not the prebuilt one")
-    parser.add_argument("--picture", type=Path, metavar="PNG", help="draw images and touches, a panel a frame")
-    parser.add_argument("--frames", type=Path, metavar="OUT.npz", help="write the raw frames for  reconstruct  and  doctor")
-    parser.add_argument("--check", action="store_true", help="solve again here and compare; exit code 10 where bits differ")
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="MODEL.eitm",
+        help="the board's model where it is not the prebuilt one",
+    )
+    parser.add_argument(
+        "--picture", type=Path, metavar="PNG", help="draw images and touches, a panel a frame"
+    )
+    parser.add_argument(
+        "--frames",
+        type=Path,
+        metavar="OUT.npz",
+        help="write the raw frames for  reconstruct  and  doctor",
+    )
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help="solve again here and compare; exit code 10 where bits differ",
+    )
     parser.add_argument("--json", action="store_true", help="print for programs")
     parser.set_defaults(run=run)
 
@@ -41,7 +63,10 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.picture, options.frames)
     if options.check or options.frames is not None:
         if options.mode is not None or options.picture is not None or options.first is not None:
-            raise UsageError("replay: --mode, --picture and --first show a recording; leave them out with --check and --frames")
+            raise UsageError(
+                "replay: --mode, --picture and --first show a recording; leave them out with"
+                " --check and --frames"
+            )
         if options.frames is not None:
             _export(options)
         if options.check:
@@ -63,22 +88,34 @@ def _show(options: argparse.Namespace) -> None:
     with open_device(f"file:{options.recording}") as device:
         name = device.transport.name
         info, path = device.board, options.model
-        known = need_model(info, path, name, "a picture") if options.picture is not None else find_model(info, path, name)
+        known = (
+            need_model(info, path, name, "a picture")
+            if options.picture is not None
+            else find_model(info, path, name)
+        )
         items = replayed(device, what, frames=options.first or 0)
-        show(options, items, device, known, _truth(options.recording) if what & (Stream.IMAGE | Stream.TOUCHES) else None)
+        show(
+            options,
+            items,
+            device,
+            known,
+            _truth(options.recording) if what & (Stream.IMAGE | Stream.TOUCHES) else None,
+        )
 
 
 def _truth(path: Path) -> SceneTruth | None:
     """Of the scene that the recorded board saw, where that is still to be found."""
     from eitskin.device.recordings.recording import read_head
     from eitskin.device.recordings.run_file import recorded_options
-    from eitskin.study.judge.matching import match
-    from eitskin.study.judge.scene_truth import truth_of
+    from eitskin.scoring.matching import match
+    from eitskin.scoring.scene_truth import truth_of
 
     solver = recorded_options(path)
     try:
         match([], [])  # scipy, without which nothing can be held against anything
-        return truth_of(str(read_head(path).get("url", "")), "increase" if solver is None else solver.sign)
+        return truth_of(
+            str(read_head(path).get("url", "")), "increase" if solver is None else solver.sign
+        )
     except EitskinError:
         return None
 
@@ -91,13 +128,19 @@ def _export(options: argparse.Namespace) -> None:
     frames = frames_of(options.recording, options.model)
     kept, left_out = finite_only(frames, str(options.recording))
     save_frames(options.frames, kept)
-    facts = {"recording": str(options.recording), "frames_file": str(options.frames), "frames": kept.n_frames}
+    facts = {
+        "recording": str(options.recording),
+        "frames_file": str(options.frames),
+        "frames": kept.n_frames,
+    }
     facts |= {"quiet_frames": len(kept.reference_voltage_v), "left_out": left_out}
     if options.json:
         print(json.dumps(facts))
     else:
         more = f"; {left_out} with rows that could not be measured left out" if left_out else ""
-        print(f"{options.frames}: {kept.n_frames} frames, {len(kept.reference_voltage_v)} quiet{more}")
+        print(
+            f"{options.frames}: {kept.n_frames} frames, {len(kept.reference_voltage_v)} quiet{more}"
+        )
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -106,13 +149,22 @@ def _check(options: argparse.Namespace) -> None:
     check, noted = check_recording(options.recording, options.model)
     if not check.compared:
         raise FrameError(
-            f"{options.recording}: nothing to compare: it takes a recording of raw frames and images or touches, from the tare "
-            "on, as  eitskin record  makes by default"
+            f"{options.recording}: nothing to compare: it takes a recording of raw frames and"
+            " images or touches, from the tare on, as  eitskin record  makes by default"
         )
     if options.json:
-        print(json.dumps({"recording": str(options.recording), "solver_noted": noted} | check.as_dict(), indent=2))
+        print(
+            json.dumps(
+                {"recording": str(options.recording), "solver_noted": noted} | check.as_dict(),
+                indent=2,
+            )
+        )
     else:
         print(check.text())
     if check.different:
-        why = "" if noted else "; the recording does not note the solver's options, so the model's own were taken"
+        why = (
+            ""
+            if noted
+            else "; the recording does not note the solver's options, so the model's own were taken"
+        )
         raise VerificationError(f"{options.recording}: this host's images are not the board's{why}")

@@ -1,4 +1,5 @@
-"""``eitskin scene run | plan | picture | list | effects | effect-picture | dataset``: simulated sessions."""
+"""``eitskin scene run | plan | picture | list | effects | effect-picture | dataset``: simulated
+sessions."""
 
 from __future__ import annotations
 
@@ -19,28 +20,44 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "scene",
         help="simulate what happens on a skin, with the imperfections that a scene names",
-        description="A scene file says what happens on a skin and which imperfections take part; docs/guide/scenes.md.",
+        description=(
+            "A scene file says what happens on a skin and which imperfections take part;"
+            " docs/guide/scenes.md."
+        ),
     )
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     one = what.add_parser("run", help="simulate a scene: frames with their truth")
     one.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
-    one.add_argument("-o", "--output", metavar="FRAMES", type=Path, required=True, help="frames file to write (.npz)")
+    one.add_argument(
+        "-o",
+        "--output",
+        metavar="FRAMES",
+        type=Path,
+        required=True,
+        help="frames file to write (.npz)",
+    )
     pixels = "of mask and conductivity; 0: none (default: %(default)s)"
     one.add_argument("--truth-pixels", metavar="N", type=int, default=64, help=pixels)
     one.add_argument("--json", action="store_true")
     one.set_defaults(run=run_scene)
-    plan = what.add_parser("plan", help="what a scene will compute, step by step, and what that costs")
+    plan = what.add_parser(
+        "plan", help="what a scene will compute, step by step, and what that costs"
+    )
     plan.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
     plan.add_argument("--json", action="store_true")
     plan.set_defaults(run=run_plan)
-    picture = what.add_parser("picture", help="draw a scene: touches on the skin, voltages over time")
+    picture = what.add_parser(
+        "picture", help="draw a scene: touches on the skin, voltages over time"
+    )
     picture.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
     picture.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
     picture.set_defaults(run=run_picture)
     names = what.add_parser("list", help="the scenes that come with the package")
     names.add_argument("--json", action="store_true")
     names.set_defaults(run=run_list)
-    effects = what.add_parser("effects", help="the effects that a scene can name, or one effect's parameters")
+    effects = what.add_parser(
+        "effects", help="the effects that a scene can name, or one effect's parameters"
+    )
     effects.add_argument("name", metavar="NAME", nargs="?", help="an effect")
     effects.add_argument("--json", action="store_true")
     effects.set_defaults(run=run_effects)
@@ -55,17 +72,31 @@ def _add_dataset(what: Any) -> None:
     dataset = what.add_parser(
         "dataset",
         help="many seeded scenes drawn from ranges, in chunks; an interrupted run resumes",
-        description="Draw scenes from the table [dataset] of a scene and simulate them into a folder of chunks. The "
-        "result depends on the description and the seed only. Run the same command again to resume.",
+        description=(
+            "Draw scenes from the table [dataset] of a scene and simulate them into a folder of"
+            " chunks. The result depends on the description and the seed only. Run the same command"
+            " again to resume."
+        ),
     )
     dataset.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
     dataset.add_argument("--count", metavar="N", type=int, required=True, help="how many scenes")
     dataset.add_argument("--seed", metavar="S", type=int, default=1, help="default: %(default)s")
-    dataset.add_argument("--ranges", metavar="TOML", type=Path, help="file with [dataset] in place of the scene's own")
+    dataset.add_argument(
+        "--ranges",
+        metavar="TOML",
+        type=Path,
+        help="file with [dataset] in place of the scene's own",
+    )
     dataset.add_argument("-o", "--output", metavar="FOLDER", type=Path, required=True)
-    dataset.add_argument("--jobs", metavar="J", type=int, default=1, help="processes (default: %(default)s)")
-    dataset.add_argument("--chunk", metavar="N", type=int, default=100, help="scenes a file (default: %(default)s)")
-    dataset.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://HOST:8786")
+    dataset.add_argument(
+        "--jobs", metavar="J", type=int, default=1, help="processes (default: %(default)s)"
+    )
+    dataset.add_argument(
+        "--chunk", metavar="N", type=int, default=100, help="scenes a file (default: %(default)s)"
+    )
+    dataset.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://HOST:8786"
+    )
     dataset.add_argument("--json", action="store_true")
     dataset.set_defaults(run=run_dataset)
 
@@ -79,7 +110,9 @@ def solve_progress(states: range) -> Iterable[int]:
     """A bar on stderr where that is a terminal; nothing otherwise."""
     from tqdm import tqdm
 
-    shown: Iterable[int] = tqdm(states, desc="solving", unit="", leave=False, disable=not sys.stderr.isatty())
+    shown: Iterable[int] = tqdm(
+        states, desc="solving", unit="", leave=False, disable=not sys.stderr.isatty()
+    )
     return shown
 
 
@@ -87,7 +120,9 @@ def scene_progress(done: Iterable[int], total: int) -> Iterable[int]:
     """A bar over ``total`` scenes that ``done`` numbers bring nearer."""
     from tqdm import tqdm
 
-    with tqdm(total=total, desc="scenes", unit="", leave=False, disable=not sys.stderr.isatty()) as bar:
+    with tqdm(
+        total=total, desc="scenes", unit="", leave=False, disable=not sys.stderr.isatty()
+    ) as bar:
         for scenes in done:
             bar.update(scenes)
             yield scenes
@@ -106,13 +141,26 @@ def run_scene(options: argparse.Namespace) -> int:
     save_frames(options.output, frames)
     counters = frames.meta["counters"]
     if options.json:
-        facts: dict[str, Any] = {"scene": scene.name, "frames": scene.frames, "quiet_frames": scene.quiet_frames}
-        facts |= {"effects": list(scene.effects), "counters": counters, "output": str(options.output)}
+        facts: dict[str, Any] = {
+            "scene": scene.name,
+            "frames": scene.frames,
+            "quiet_frames": scene.quiet_frames,
+        }
+        facts |= {
+            "effects": list(scene.effects),
+            "counters": counters,
+            "output": str(options.output),
+        }
         print(json.dumps(facts, indent=2))
         return 0
-    print(f"{scene.name}: {scene.frames} frames after {scene.quiet_frames} quiet ones -> {options.output}")
+    print(
+        f"{scene.name}: {scene.frames} frames after {scene.quiet_frames} quiet ones ->"
+        f" {options.output}"
+    )
     print(f"effects: {', '.join(scene.effects) or 'none'}")
-    print(", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counters.items() if value))
+    print(
+        ", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counters.items() if value)
+    )
     return 0
 
 
@@ -136,7 +184,9 @@ def run_picture(options: argparse.Namespace) -> int:
     _check_folder(options.output)
     load_matplotlib()
     scene = find_scene(options.scene)
-    draw_scene(options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=solve_progress))
+    draw_scene(
+        options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=solve_progress)
+    )
     print(f"picture: {options.output}")
     return 0
 
@@ -173,15 +223,27 @@ def run_effects(options: argparse.Namespace) -> int:
     parameters = plain(describe_parameters(module))
     if options.json:
         stage = module.STAGE.name.lower()
-        facts = {"name": module.NAME, "stage": stage, "summary": module.SUMMARY, "parameters": parameters}
+        facts = {
+            "name": module.NAME,
+            "stage": stage,
+            "summary": module.SUMMARY,
+            "parameters": parameters,
+        }
         print(json.dumps(facts, indent=2))
         return 0
     print(f"[effects.{module.NAME}]   {module.SUMMARY}   (stage: {module.STAGE.name.lower()})")
     for one in parameters:
-        bounds = f"[{one.get('low', '')} .. {one.get('high', '')}]" if "low" in one or "high" in one else ""
+        bounds = (
+            f"[{one.get('low', '')} .. {one.get('high', '')}]"
+            if "low" in one or "high" in one
+            else ""
+        )
         allowed = f"one of {', '.join(one['choices'])}" if "choices" in one else bounds
         unit = one.get("unit", "")
-        print(f"  {one['name']:<24} {one['default']!s:<12} {unit:<8} {allowed:<18} {one.get('doc', '')}".rstrip())
+        print(
+            f"  {one['name']:<24} {one['default']!s:<12} {unit:<8} {allowed:<18}"
+            f" {one.get('doc', '')}".rstrip()
+        )
     return 0
 
 
@@ -204,9 +266,15 @@ def run_dataset(options: argparse.Namespace) -> int:
 
     _check_folder(options.output)
     if options.scheduler is not None and options.jobs != 1:
-        raise UsageError("dataset: --jobs goes with this computer, --scheduler with a cluster; give one of them")
+        raise UsageError(
+            "dataset: --jobs goes with this computer, --scheduler with a cluster; give one of them"
+        )
     job = job_of(
-        find_scene(options.scene), options.count, options.seed, chunk=options.chunk, ranges_file=options.ranges
+        find_scene(options.scene),
+        options.count,
+        options.seed,
+        chunk=options.chunk,
+        ranges_file=options.ranges,
     )
     start = perf_counter()
     done = write_dataset(
@@ -217,5 +285,8 @@ def run_dataset(options: argparse.Namespace) -> int:
         print(json.dumps({**done, "seconds": seconds, "output": str(options.output)}, indent=2))
         return 0
     kept = f", {done['chunks_kept']} chunks were there already" if done["chunks_kept"] else ""
-    print(f"{done['scenes_made']} scenes in {done['chunks_made']} chunks{kept} -> {options.output} ({seconds:.1f} s)")
+    print(
+        f"{done['scenes_made']} scenes in {done['chunks_made']} chunks{kept} -> {options.output}"
+        f" ({seconds:.1f} s)"
+    )
     return 0

@@ -1,4 +1,5 @@
-"""``eitskin stream``: a board's touches, images or raw frames as they come, and what they amounted to."""
+"""``eitskin stream``: a board's touches, images or raw frames as they come, and what they amounted
+to."""
 
 from __future__ import annotations
 
@@ -28,14 +29,24 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "stream",
         help="touches, images or raw frames of a board as they come",
-        description="Follow a board: a line a frame on standard output, faults and events of the link on standard error, a "
-        "summary at the end. What is seen on a simulated or emulated board is held against its scene's truth. With --json each "
-        "line is a JSON object, the last one the summary.",
+        description=(
+            "Follow a board: a line a frame on standard output, faults and events of the link on"
+            " standard error, a summary at the end. What is seen on a simulated or emulated board"
+            " is held against its scene's truth. With --json each line is a JSON object, the last"
+            " one the summary."
+        ),
     )
     add_device(parser)
     add_stream(parser, "touches")
-    parser.add_argument("--picture", type=Path, metavar="PNG", help="draw images and touches, a panel a frame")
-    parser.add_argument("--record", type=Path, metavar="RUN.eits", help="also record every packet, as  eitskin record  does")
+    parser.add_argument(
+        "--picture", type=Path, metavar="PNG", help="draw images and touches, a panel a frame"
+    )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="RUN.eits",
+        help="also record every packet, as  eitskin record  does",
+    )
     parser.add_argument("--overwrite", action="store_true", help="record over a file that exists")
     add_scan(parser)
     parser.set_defaults(run=run)
@@ -49,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.device.live import follow, replayed
     from eitskin.device.wire.packets import Stream
     from eitskin.fileio import refuse_unwritable
-    from eitskin.study.judge.scene_truth import truth_of, until_over
+    from eitskin.scoring.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)
     check_scan(options)
@@ -60,14 +71,23 @@ def run(options: argparse.Namespace) -> int:
         name = device.transport.name
         known: KnownModel | None
         if what & Stream.IMAGE or options.picture is not None:
-            known = need_model(device.board, options.model, name, "an image" if what & Stream.IMAGE else "a picture")
+            known = need_model(
+                device.board,
+                options.model,
+                name,
+                "an image" if what & Stream.IMAGE else "a picture",
+            )
         else:
             known = find_model(device.board, options.model, name)
         needed = bool(what & (Stream.IMAGE | Stream.TOUCHES))
         truth = truth_of(options.device, options.sign or "increase")
-        recorder = prepare(options, device, known, needs_reference=needed, record=options.record, truth=truth)
+        recorder = prepare(
+            options, device, known, needs_reference=needed, record=options.record, truth=truth
+        )
         every = chosen_every(device, what, every)
         with nullcontext() if recorder is None else recorder:
-            items = (replayed if device.transport.replays else follow)(device, what, every=every, frames=frames)
+            items = (replayed if device.transport.replays else follow)(
+                device, what, every=every, frames=frames
+            )
             show(options, until_over(items, None if frames else truth), device, known, truth)
     return 0

@@ -14,11 +14,20 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "tare",
         help="take a board's reference from its untouched skin",
-        description="Take a board's reference frame from its untouched skin; four frames or more also tell it the noise. It is "
-        "kept until the board is reset, the scan is changed or another model comes.",
+        description=(
+            "Take a board's reference frame from its untouched skin; four frames or more also tell"
+            " it the noise. It is kept until the board is reset, the scan is changed or another"
+            " model comes."
+        ),
     )
     add_device(parser)
-    parser.add_argument("--frames", type=int, default=TARE_FRAMES, metavar="N", help="1, or 4 to 1024 (default: %(default)s)")
+    parser.add_argument(
+        "--frames",
+        type=int,
+        default=TARE_FRAMES,
+        metavar="N",
+        help="1, or 4 to 1024 (default: %(default)s)",
+    )
     parser.set_defaults(run=run)
 
 

@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from eitskin.device.recordings.run_file import RunRecorder
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.packets import Stream
-    from eitskin.study.judge.scene_truth import SceneTruth
+    from eitskin.scoring.scene_truth import SceneTruth
 
 DEVICE_HELP = (
-    "auto (the one board that is plugged in, default), serial:/dev/ttyACM0, sim:SCENE (simulated), emu:SCENE (the firmware on "
-    "an emulated board), file:RUN.eits (a recording); SCENE is a file or a scene of  eitskin scene list"
+    "auto (the one board that is plugged in, default), serial:/dev/ttyACM0, sim:SCENE (simulated),"
+    " emu:SCENE (the firmware on an emulated board), file:RUN.eits (a recording); SCENE is a file"
+    " or a scene of  eitskin scene list"
 )
 KINDS = ("raw", "image", "touches")
 TARE_FRAMES = 16
@@ -34,9 +35,17 @@ def add_device(parser: argparse.ArgumentParser, *, model: bool = True) -> None:
             "--model",
             type=Path,
             metavar="MODEL.eitm",
-            help="the board's model where it is not the prebuilt one; a simulated or emulated board is given it",
+            help=(
+                "the board's model where it is not the prebuilt one; a simulated or emulated board"
+                " is given it"
+            ),
         )
-        parser.add_argument("--firmware", type=Path, metavar="BIN", help="of an emulated board (default: the prebuilt one)")
+        parser.add_argument(
+            "--firmware",
+            type=Path,
+            metavar="BIN",
+            help="of an emulated board (default: the prebuilt one)",
+        )
     parser.add_argument("--json", action="store_true", help="print for programs")
 
 
@@ -45,51 +54,96 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     scan = parser.add_argument_group("scan; what is not named stays as the board has it")
     scan.add_argument("--excitation-hz", type=float, metavar="HZ", help="of the generator")
     scan.add_argument("--sample-rate-hz", type=int, metavar="HZ", help="of the converter")
-    scan.add_argument("--samples", type=int, metavar="N", help="of a measurement: a whole number of periods")
-    scan.add_argument("--settle-us", type=int, metavar="US", help="from switching the multiplexers to the first sample")
-    scan.add_argument("--frame-period-us", type=int, metavar="US", help="from frame to frame; 0: as fast as the scan goes")
+    scan.add_argument(
+        "--samples", type=int, metavar="N", help="of a measurement: a whole number of periods"
+    )
+    scan.add_argument(
+        "--settle-us",
+        type=int,
+        metavar="US",
+        help="from switching the multiplexers to the first sample",
+    )
+    scan.add_argument(
+        "--frame-period-us",
+        type=int,
+        metavar="US",
+        help="from frame to frame; 0: as fast as the scan goes",
+    )
     rows = scan.add_mutually_exclusive_group()
     rows.add_argument("--full", action="store_true", help="measure every row of the protocol")
     rows.add_argument(
         "--reciprocal",
         type=int,
         metavar="N",
-        help="measure one row of each reciprocal pair, and all rows in every N-th frame as a check (0: never)",
+        help=(
+            "measure one row of each reciprocal pair, and all rows in every N-th frame as a check"
+            " (0: never)"
+        ),
     )
     solver = parser.add_argument_group("solver")
     add_solver(solver)
-    solver.add_argument("--gap", type=float, metavar="REL", help="stop once the duality gap is below this share of |y|^2 / 2")
+    solver.add_argument(
+        "--gap",
+        type=float,
+        metavar="REL",
+        help="stop once the duality gap is below this share of |y|^2 / 2",
+    )
     add_wish(solver)
-    solver.add_argument("--sign", choices=("increase", "decrease", "both"), help="which changes to look for (default: increase)")
+    solver.add_argument(
+        "--sign",
+        choices=("increase", "decrease", "both"),
+        help="which changes to look for (default: increase)",
+    )
     solver.add_argument(
         "--ignore",
         metavar="FINDING[,FINDING]",
-        help="do not look for saturated, electrode-open, electrodes-bridged, glitch, electrode-noisy, misfit, stale-reference, "
-        "crowded, or all (default: look for all)",
+        help=(
+            "do not look for saturated, electrode-open, electrodes-bridged, glitch,"
+            " electrode-noisy, misfit, stale-reference, crowded, or all (default: look for all)"
+        ),
     )
     start = solver.add_mutually_exclusive_group()
-    start.add_argument("--warm", action="store_true", help="begin each frame from the last one's result")
-    start.add_argument("--cold", action="store_true", help="begin each frame from nothing (default)")
+    start.add_argument(
+        "--warm", action="store_true", help="begin each frame from the last one's result"
+    )
+    start.add_argument(
+        "--cold", action="store_true", help="begin each frame from nothing (default)"
+    )
     solver.add_argument(
-        "--no-track", action="store_true", help="touches of each frame by itself (default: births confirmed, places smoothed)"
+        "--no-track",
+        action="store_true",
+        help="touches of each frame by itself (default: births confirmed, places smoothed)",
     )
     tare = parser.add_argument_group("reference")
     tare.add_argument(
         "--tare",
         type=int,
         metavar="N",
-        help=f"take the reference from N frames of the untouched skin first (1, or 4 to 1024); without it, from {TARE_FRAMES} "
-        "where the board has none, and always on a simulated or emulated board",
+        help=(
+            "take the reference from N frames of the untouched skin first (1, or 4 to 1024);"
+            f" without it, from {TARE_FRAMES} where the board has none, and always on a simulated"
+            " or emulated board"
+        ),
     )
 
 
 def add_solver(parser: Any) -> None:
     """Which solver, and what ends it."""
     known = ("fista", "working-set", "coordinate", "active-set")
-    parser.add_argument("--solver", choices=known, help="default: the model's; all minimise the same objective")
-    parser.add_argument("--iterations", type=int, metavar="N", help="of FISTA, sweeps or rounds, at most (default: the model's)")
     parser.add_argument(
-        "--mac-limit", type=int, metavar="N", help="return the best so far when the next step would pass N multiply-accumulates"
+        "--solver", choices=known, help="default: the model's; all minimise the same objective"
+    )
+    parser.add_argument(
+        "--iterations",
+        type=int,
+        metavar="N",
+        help="of FISTA, sweeps or rounds, at most (default: the model's)",
+    )
+    parser.add_argument(
+        "--mac-limit",
+        type=int,
+        metavar="N",
+        help="return the best so far when the next step would pass N multiply-accumulates",
     )
 
 
@@ -106,10 +160,23 @@ def check_solver(options: argparse.Namespace) -> None:
 def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
     """What is streamed, and how much of it."""
     parser.add_argument(
-        "--mode", default=default, metavar="KIND[,KIND]", help="raw, image, touches, or several (default: %(default)s)"
+        "--mode",
+        default=default,
+        metavar="KIND[,KIND]",
+        help="raw, image, touches, or several (default: %(default)s)",
     )
-    parser.add_argument("--every", type=int, metavar="N", help="every N-th frame (default: as many as the line carries)")
-    parser.add_argument("--frames", type=int, metavar="N", help="stop after N (default: go on until Ctrl-C, or the scene ends)")
+    parser.add_argument(
+        "--every",
+        type=int,
+        metavar="N",
+        help="every N-th frame (default: as many as the line carries)",
+    )
+    parser.add_argument(
+        "--frames",
+        type=int,
+        metavar="N",
+        help="stop after N (default: go on until Ctrl-C, or the scene ends)",
+    )
 
 
 def read_mode(text: str) -> Stream:
@@ -135,11 +202,15 @@ def read_every(options: argparse.Namespace) -> tuple[int, int]:
     Raises:
         UsageError: one is out of range.
     """
-    return whole("--every", options.every, 1, 0xFFFF), whole("--frames", options.frames, 1, 2**32 - 1) or 0
+    return (
+        whole("--every", options.every, 1, 0xFFFF),
+        whole("--frames", options.frames, 1, 2**32 - 1) or 0,
+    )
 
 
 def chosen_every(device: Device, what: Stream, every: int) -> int:
-    """``every``, or where that is 0 the least that the line carries, said on stderr where that is not every frame."""
+    """``every``, or where that is 0 the least that the line carries, said on stderr where that is
+    not every frame."""
     from eitskin.device.bandwidth import carried_every
 
     if every:
@@ -147,7 +218,9 @@ def chosen_every(device: Device, what: Stream, every: int) -> int:
     carried = carried_every(device, what)
     if carried > 1:
         kinds = ",".join(kind for kind in KINDS if what & type(what)[kind.upper()])
-        say(f"the line carries one frame in {carried} of {kinds}; name another number with  --every")
+        say(
+            f"the line carries one frame in {carried} of {kinds}; name another number with  --every"
+        )
     return carried
 
 
@@ -171,14 +244,19 @@ def read_scan(options: argparse.Namespace) -> ScanSettings:
     from eitskin.device.settings import ScanSettings
 
     if options.excitation_hz is not None and not 1 <= options.excitation_hz <= 250_000:
-        raise UsageError(f"--excitation-hz {options.excitation_hz:g} is out of range; use 1 to 250000")
+        raise UsageError(
+            f"--excitation-hz {options.excitation_hz:g} is out of range; use 1 to 250000"
+        )
     whole("--sample-rate-hz", options.sample_rate_hz, 1000, 5_000_000)
     whole("--samples", options.samples, 4, 1024)
     whole("--settle-us", options.settle_us, 0, 0xFFFF)
     whole("--frame-period-us", options.frame_period_us, 0, 2**32 - 1)
     whole("--reciprocal", options.reciprocal, 0, 0xFFFF)
     if options.reciprocal == 1:
-        raise UsageError("--reciprocal 1 would check every frame, which is a full scan; use --full, or at least 2 (0: no checks)")
+        raise UsageError(
+            "--reciprocal 1 would check every frame, which is a full scan; use --full, or at least"
+            " 2 (0: no checks)"
+        )
     return ScanSettings(
         excitation_hz=options.excitation_hz,
         sample_rate_hz=options.sample_rate_hz,
@@ -202,14 +280,15 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
         raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
     warm = True if options.warm else False if options.cold else None
     return SolverSettings(
-        options.iterations, options.gap, warm, options.sign, solver=options.solver, mac_limit=options.mac_limit,
+        options.iterations, options.gap, warm, options.sign, solver=options.solver,
+        mac_limit=options.mac_limit,
         findings=read_ignored(options.ignore), track=False if options.no_track else None,
     )  # fmt: skip
 
 
 def read_ignored(text: str | None) -> int | None:
-    """The findings that are left, bit k of ``core.findings.FINDINGS``, without those in "glitch,electrode-noisy" or "all"; None
-    for None.
+    """The findings that are left, bit k of ``core.findings.FINDINGS``, without those in
+    "glitch,electrode-noisy" or "all"; None for None.
 
     Raises:
         UsageError: one is unknown.
@@ -239,7 +318,7 @@ def check_scan(options: argparse.Namespace) -> None:
     read_scan(options)
     read_solver(options)
     if wished(options):
-        from eitskin.cli.cmd_tradeoff import read_wish
+        from eitskin.cli.budget_options import read_wish
 
         read_wish(options, "f767")
     if options.tare is not None:
@@ -258,7 +337,10 @@ def open_named(options: argparse.Namespace) -> Device:
     blob = load_model(options.model)[1] if getattr(options, "model", None) is not None else None
     firmware = getattr(options, "firmware", None)
     if firmware is not None and not options.device.startswith("emu:"):
-        raise UsageError(f"--firmware {firmware}: only emu: runs an image; a board is given one with  eitskin flash --image")
+        raise UsageError(
+            f"--firmware {firmware}: only emu: runs an image; a board is given one with  eitskin"
+            " flash --image"
+        )
     return open_device(options.device, model=blob, image=firmware)
 
 
@@ -276,8 +358,9 @@ def prepare(
     record: Path | None = None,
     truth: SceneTruth | None = None,
 ) -> RunRecorder | None:
-    """Scan, solver and reference as the options say; then what is to be touched begins, and ``truth`` is told when. Recording
-    begins before the reference is taken; the recorder is the caller's to close.
+    """Scan, solver and reference as the options say; then what is to be touched begins, and
+    ``truth`` is told when. Recording begins before the reference is taken; the recorder is the
+    caller's to close.
 
     Raises:
         EitskinError: a setting cannot be, the board refuses it, or the recording cannot be written.
@@ -294,7 +377,12 @@ def prepare(
     recorder = None if record is None else RunRecorder(record, device, solver, overwrite=True)
     try:
         simulated = device.transport.synchronous
-        if options.tare is not None or simulated or record is not None or (needs_reference and not device.board.tared):
+        if (
+            options.tare is not None
+            or simulated
+            or record is not None
+            or (needs_reference and not device.board.tared)
+        ):
             frames = TARE_FRAMES if options.tare is None else options.tare
             if not simulated:
                 say(f"leave the skin untouched: taking the reference from {frames} frames")
@@ -315,8 +403,11 @@ def prepare(
     return recorder
 
 
-def _wished_solver(options: argparse.Namespace, device: Device, known: KnownModel | None) -> SolverSettings:
-    """The settings of the measured point that ``--budget`` and ``--accuracy`` choose for the board's model.
+def _wished_solver(
+    options: argparse.Namespace, device: Device, known: KnownModel | None
+) -> SolverSettings:
+    """The settings of the measured point that ``--budget`` and ``--accuracy`` choose for the
+    board's model.
 
     Raises:
         UsageError: no point does what is asked for.
@@ -327,14 +418,18 @@ def _wished_solver(options: argparse.Namespace, device: Device, known: KnownMode
     from eitskin.cli.budget_options import chosen_point, settings_text
     from eitskin.device.known_model import need_model
     from eitskin.device.settings import SolverSettings
-    from eitskin.study.tradeoff.front import board_takes
+    from eitskin.tuning.front import board_takes
 
     if known is None:
         known = need_model(device.board, options.model, device.transport.name, "a budget")
     named = read_solver(options)
     point = chosen_point(options, known.model, named.applied(known.model), "f767", board_takes())
     say(settings_text(point, "f767"))
-    kept = {name: value for name, value in point.configuration.solver_settings.items() if name in board_takes()}
+    kept = {
+        name: value
+        for name, value in point.configuration.solver_settings.items()
+        if name in board_takes()
+    }
     own = {name: getattr(named, name) for name in ("sign", "warm_start", "findings", "track")}
     return replace(SolverSettings(**kept), **own)
 
@@ -342,10 +437,15 @@ def _wished_solver(options: argparse.Namespace, device: Device, known: KnownMode
 def _refuse_settings(options: argparse.Namespace, name: str) -> None:
     """A recording takes no settings."""
     settings: dict[str, Any] = {**read_scan(options).named, **read_solver(options).named}
-    settings |= {name: True for name in ("budget", "accuracy") if getattr(options, name) is not None}
+    settings |= {
+        name: True for name in ("budget", "accuracy") if getattr(options, name) is not None
+    }
     if settings or options.tare is not None:
         what = next(iter(settings), "tare").replace("_", "-")
-        raise UsageError(f"{name} is a recording, {what} cannot be set any more; leave the options of scan, solver and tare out")
+        raise UsageError(
+            f"{name} is a recording, {what} cannot be set any more; leave the options of scan,"
+            " solver and tare out"
+        )
 
 
 def print_table(facts: dict[str, Any]) -> None:

@@ -26,7 +26,8 @@ def add_import_options(parser: argparse.ArgumentParser) -> None:
 
 
 def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | None, int | None]:
-    """The wanted protocol (None: the source's own table), the skin where one is given, the number of electrodes.
+    """The wanted protocol (None: the source's own table), the skin where one is given, the number
+    of electrodes.
 
     Raises:
         UsageError: options that contradict each other.
@@ -38,7 +39,9 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
     skin, protocol = load_skin(options.skin) if options.skin is not None else (None, None)
     count = options.electrodes if skin is None else skin.electrodes.count
     if skin is not None and options.electrodes not in (None, count):
-        raise UsageError(f"--electrodes {options.electrodes}: the skin {options.skin} has {count}; leave it out")
+        raise UsageError(
+            f"--electrodes {options.electrodes}: the skin {options.skin} has {count}; leave it out"
+        )
     if options.skip is not None and options.protocol != "skip":
         raise UsageError("--skip goes with --protocol skip")
     if options.protocol is None or options.protocol == "table":
@@ -142,27 +145,50 @@ def _four(text: str) -> tuple[float, float, float, float]:
 def _add_protocol(group: Any) -> None:
     add = group.add_argument
     add("--skin", type=Path, metavar="FILE", help="skin description (TOML) with its protocol")
-    add("--protocol", choices=("adjacent", "opposite", "skip", "table"), help="table: keep the source's own")
+    add(
+        "--protocol",
+        choices=("adjacent", "opposite", "skip", "table"),
+        help="table: keep the source's own",
+    )
     add("--skip", type=int, metavar="K", help="electrodes skipped, with --protocol skip")
     add("--electrodes", type=int, metavar="N", help="number of electrodes, where no skin says so")
-    add("--current-a", type=float, metavar="A", help="drive current in A, instead of the protocol's")
+    add(
+        "--current-a", type=float, metavar="A", help="drive current in A, instead of the protocol's"
+    )
 
 
 def _add_place(group: Any) -> None:
     add = group.add_argument
     add("--voltage", metavar="KEY", help="NPZ, MAT: array of the frames")
     add("--reference", metavar="KEY", help="NPZ, MAT: array of the quiet frame or frames")
-    add("--columns", metavar="LIST", help="text: columns of the voltages, from 0 or by name: 2 or 1:209")
+    add(
+        "--columns",
+        metavar="LIST",
+        help="text: columns of the voltages, from 0 or by name: 2 or 1:209",
+    )
     add("--reference-columns", metavar="LIST", help="text: columns of the quiet frames")
-    add("--reference-frames", metavar="LIST", help="which of the frames are the quiet ones, as in 0:20")
+    add(
+        "--reference-frames",
+        metavar="LIST",
+        help="which of the frames are the quiet ones, as in 0:20",
+    )
     add("--names", metavar="KEY", help="NPZ, MAT: array of the frames' names")
     add("--time", metavar="KEY", help="array or column of the frames' times in s")
     layouts = ("auto", "frames-in-rows", "channels-in-rows")
     add("--layout", choices=layouts, default="auto", help="needed only where both sides fit")
     parts = ("real", "imag", "abs", "in-phase")
     add("--complex-part", choices=parts, help="of complex numbers; in text, of column pairs re,im")
-    add("--scale", type=float, metavar="FACTOR", help="times the source's numbers gives volts; 1 for volts")
-    add("--delimiter", metavar="WORD", help="comma, semicolon, tab, bar, space, a character; else found")
+    add(
+        "--scale",
+        type=float,
+        metavar="FACTOR",
+        help="times the source's numbers gives volts; 1 for volts",
+    )
+    add(
+        "--delimiter",
+        metavar="WORD",
+        help="comma, semicolon, tab, bar, space, a character; else found",
+    )
     add("--header-rows", type=int, metavar="N", help="rows before the numbers; else found")
 
 
@@ -171,20 +197,59 @@ def _add_mending(group: Any) -> None:
     add("--order", choices=ORDERS, default="fixed", help="how the source lists its channels")
     add("--table-file", metavar="FILE", help="text table of the source's rows: I+, I-, V+, V-")
     add("--protocol-table", metavar="KEY", help="NPZ, MAT: array with that table")
-    add("--table-base", type=int, default=0, metavar="N", help="the table's number of the first electrode")
+    add(
+        "--table-base",
+        type=int,
+        default=0,
+        metavar="N",
+        help="the table's number of the first electrode",
+    )
     signs = ("signed", "reversed", "magnitude")
-    add("--sign", choices=signs, default="signed", help="magnitude: signs from the homogeneous prediction")
-    add("--rotate", type=int, default=0, metavar="K", help="the source's first electrode is electrode K")
+    add(
+        "--sign",
+        choices=signs,
+        default="signed",
+        help="magnitude: signs from the homogeneous prediction",
+    )
+    add(
+        "--rotate",
+        type=int,
+        default=0,
+        metavar="K",
+        help="the source's first electrode is electrode K",
+    )
     turned = group.add_mutually_exclusive_group()
-    turned.add_argument("--mirror", action="store_true", help="the source numbers its electrodes the other way round")
+    turned.add_argument(
+        "--mirror",
+        action="store_true",
+        help="the source numbers its electrodes the other way round",
+    )
     text = "the source numbers clockwise: mirror it unless the skin does"
     turned.add_argument("--clockwise", action="store_true", help=text)
-    add("--swap", action="append", default=[], metavar="I,J", help="wires of these electrodes are exchanged")
-    add("--flip-channels", metavar="LIST", help="change the sign of these channels (numbers in our order)")
+    add(
+        "--swap",
+        action="append",
+        default=[],
+        metavar="I,J",
+        help="wires of these electrodes are exchanged",
+    )
+    add(
+        "--flip-channels",
+        metavar="LIST",
+        help="change the sign of these channels (numbers in our order)",
+    )
     add("--impute-channels", metavar="LIST", help="fill these channels from their reciprocals")
-    add("--drop-channels", metavar="LIST", help="leave these channels out (the result is a table protocol)")
+    add(
+        "--drop-channels",
+        metavar="LIST",
+        help="leave these channels out (the result is a table protocol)",
+    )
     add("--drop-electrodes", metavar="LIST", help="leave out all channels of these electrodes")
-    add("--equalise", action="store_true", help="give each channel the gain of the homogeneous prediction")
+    add(
+        "--equalise",
+        action="store_true",
+        help="give each channel the gain of the homogeneous prediction",
+    )
 
 
 def _add_truth(group: Any) -> None:
@@ -194,7 +259,17 @@ def _add_truth(group: Any) -> None:
     add("--truth-radius", metavar="KEY", help="touches: radii (t,)")
     add("--truth-sign", metavar="KEY", help="touches: true or above 0 where more conductive")
     add("--truth-strength", metavar="KEY", help="touches: relative conductivity change")
-    add("--truth-unit-mm", type=float, default=1.0, metavar="MM", help="mm in a unit of centres and radii")
+    add(
+        "--truth-unit-mm",
+        type=float,
+        default=1.0,
+        metavar="MM",
+        help="mm in a unit of centres and radii",
+    )
     add("--truth-mask", metavar="KEY", help="masks (frames, rows, columns) of +1, -1, 0")
     add("--truth-mask-extent", metavar="X,Y,X,Y", help="the masks' box in mm; else the skin's")
-    add("--truth-mask-top-first", action="store_true", help="row 0 of a mask is the top, not the bottom")
+    add(
+        "--truth-mask-top-first",
+        action="store_true",
+        help="row 0 of a mask is the top, not the bottom",
+    )

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from eitskin.device.link import LinkEvent
     from eitskin.device.live import LiveFrame, LiveSummary
     from eitskin.device.wire.packets import Fault, Stream
-    from eitskin.study.judge.scene_truth import SceneTruth
-    from eitskin.study.watch import Watcher
+    from eitskin.scoring.scene_truth import SceneTruth
+    from eitskin.scoring.stream_check import Watcher
 
 
 def check_picture(path: Path | None, what: Stream) -> None:
@@ -35,7 +35,9 @@ def check_picture(path: Path | None, what: Stream) -> None:
     if path is None:
         return
     if not what & (Stream.IMAGE | Stream.TOUCHES):
-        raise UsageError("--picture draws images and touches; use  --mode image  or  --mode image,touches")
+        raise UsageError(
+            "--picture draws images and touches; use  --mode image  or  --mode image,touches"
+        )
     load_matplotlib()
 
 
@@ -46,7 +48,8 @@ def show(
     known: KnownModel | None,
     truth: SceneTruth | None,
 ) -> LiveSummary:
-    """Print every frame and all news of ``items``, draw ``--picture``, print the summary; Ctrl-C ends it in good order.
+    """Print every frame and all news of ``items``, draw ``--picture``, print the summary; Ctrl-C
+    ends it in good order.
 
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
@@ -54,7 +57,7 @@ def show(
     from eitskin.device.live import LiveFrame, LiveSummary, finish
     from eitskin.device.news import News
     from eitskin.device.wire.packets import Fault
-    from eitskin.study.watch import Watcher, line, table
+    from eitskin.scoring.stream_check import Watcher, line, table
     from eitskin.view.stream_picture import Album, draw_stream
 
     summary, watcher, album, news = LiveSummary(), Watcher(known, truth), Album(), News()
@@ -81,7 +84,12 @@ def show(
     if broken is None:
         finish(summary, device)
     if options.picture is not None and album.count and known is not None:
-        draw_stream(options.picture, known.model, album, title=f"{device.board.board} {device.transport.url}")
+        draw_stream(
+            options.picture,
+            known.model,
+            album,
+            title=f"{device.board.board} {device.transport.url}",
+        )
     if summary.frames or broken is None:
         _print_summary(summary, watcher, options)
     if broken is not None:

@@ -1,4 +1,5 @@
-"""The command line: ``eitskin COMMAND``. One file a command beside this one; each imports what it needs only when it runs."""
+"""The command line: ``eitskin COMMAND``. One file a command beside this one; each imports what it
+needs only when it runs."""
 
 from __future__ import annotations
 
@@ -6,15 +7,17 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
+from importlib.metadata import entry_points
 from typing import NoReturn
 
 from eitskin import __version__
 from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
-    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "compare", "bench", "tradeoff", "study",
+    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate",
     "devices", "info", "tare", "stream", "record", "replay", "flash",
 )  # fmt: skip
+ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages; eitskin-studies names its own there
 
 
 class Parser(argparse.ArgumentParser):
@@ -26,18 +29,26 @@ class Parser(argparse.ArgumentParser):
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The whole parser; each module ``cmd_NAME`` has ``add_parser(subparsers)``, which sets ``run``."""
-    parser = Parser(prog="eitskin", description="Electrical impedance tomography skins, from model to touches.")
+    """The whole parser; each module ``cmd_NAME`` has ``add_parser(subparsers)``, which sets
+    ``run``."""
+    parser = Parser(
+        prog="eitskin", description="Electrical impedance tomography skins, from model to touches."
+    )
     parser.add_argument("--version", action="version", version=f"eitskin {__version__}")
-    parser.add_argument("--traceback", action="store_true", help="on an error, show where in the code it arose")
+    parser.add_argument(
+        "--traceback", action="store_true", help="on an error, show where in the code it arose"
+    )
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
         importlib.import_module(f"eitskin.cli.cmd_{name}").add_parser(subparsers)
+    for command in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
+        command.load().add_parser(subparsers)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code (docs/reference/error-codes.md) and prints errors as one line on stderr."""
+    """Run one command; returns the exit code (docs/reference/error-codes.md) and prints errors as
+    one line on stderr."""
     traceback = False
     try:
         options = build_parser().parse_args(arguments)

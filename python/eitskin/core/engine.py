@@ -12,7 +12,17 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.findings import with_findings
-from eitskin.core.results import SIGNS, SOLVERS, STOPS, Baseline, Info, Options, Reconstruction, Touch, check_quiet
+from eitskin.core.results import (
+    SIGNS,
+    SOLVERS,
+    STOPS,
+    Baseline,
+    Info,
+    Options,
+    Reconstruction,
+    Touch,
+    check_quiet,
+)
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
 
 WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
@@ -27,7 +37,9 @@ def load_core(width: str) -> Any:
     try:
         return importlib.import_module(f"eitskin.core.{WIDTHS[width]}")
     except ImportError as error:
-        raise UsageError(f"the C core is not built ({error}); install with  pip install .  in the project's root") from None
+        raise UsageError(
+            f"the C core is not built ({error}); install with  pip install .  in the project's root"
+        ) from None
 
 
 def _aligned(size: int) -> npt.NDArray[np.uint8]:
@@ -38,26 +50,34 @@ def _aligned(size: int) -> npt.NDArray[np.uint8]:
 
 
 class CoreEngine:
-    """One context of the C core. ``prepared`` keeps a second copy of S in panels (faster, same bits); ``portable``
-    forbids processor-specific kernels (slower, same bits).
+    """One context of the C core. ``prepared`` keeps a second copy of S in panels (faster, same
+    bits); ``portable`` forbids processor-specific kernels (slower, same bits).
 
     Raises:
         ModelError: the core refuses the model.
         UsageError: the core is not built.
     """
 
-    def __init__(self, blob: bytes, width: str = "float32", *, prepared: bool = True, portable: bool = False) -> None:
+    def __init__(
+        self, blob: bytes, width: str = "float32", *, prepared: bool = True, portable: bool = False
+    ) -> None:
         module = load_core(width)
         self._lib, self._ffi = module.lib, module.ffi
         self.dtype = np.dtype(np.float32 if width == "float32" else np.float64)
         self._blob = _aligned(len(blob))
         self._blob[:] = np.frombuffer(blob, dtype=np.uint8)
         self._model = self._ffi.new("eits_model *")
-        self._check(self._lib.eits_model_open(self._model, self._ffi.from_buffer(self._blob), len(blob)), "model", ModelError)
+        self._check(
+            self._lib.eits_model_open(self._model, self._ffi.from_buffer(self._blob), len(blob)),
+            "model",
+            ModelError,
+        )
         self.workspace_bytes = int(self._lib.eits_workspace_size(self._model, int(prepared)))
         self._workspace = _aligned(self.workspace_bytes)
         self._context = self._ffi.new("eits_context *")
-        status = self._lib.eits_init(self._context, self._model, self._ffi.from_buffer(self._workspace), self.workspace_bytes)
+        status = self._lib.eits_init(
+            self._context, self._model, self._ffi.from_buffer(self._workspace), self.workspace_bytes
+        )
         self._check(status, "workspace", UsageError)
         self._lib.eits_use_portable_kernels(self._context, int(portable))
         self.n_rows, self.n_pixels = int(self._model.n_rows), int(self._model.n_pixels)
@@ -78,7 +98,9 @@ class CoreEngine:
 
     def _view(self, pointer: Any, count: int) -> npt.NDArray[Any]:
         """An array over ``count`` reals of the context's memory, not a copy."""
-        return np.frombuffer(self._ffi.buffer(pointer, count * self.dtype.itemsize), dtype=self.dtype)
+        return np.frombuffer(
+            self._ffi.buffer(pointer, count * self.dtype.itemsize), dtype=self.dtype
+        )
 
     def _check(self, status: int, what: str, kind: type[EitskinError]) -> None:
         if status != 0:
@@ -96,15 +118,21 @@ class CoreEngine:
         """
         values = asdict(options)
         try:
-            values["sign"], values["solver"] = SIGNS.index(options.sign), SOLVERS.index(options.solver)
-            given = self._ffi.new("eits_options *", {name: _plain(value) for name, value in values.items()})
+            values["sign"], values["solver"] = (
+                SIGNS.index(options.sign),
+                SOLVERS.index(options.solver),
+            )
+            given = self._ffi.new(
+                "eits_options *", {name: _plain(value) for name, value in values.items()}
+            )
         except (ValueError, TypeError, OverflowError) as error:
             raise UsageError(f"options: {error}") from None
         self._check(self._lib.eits_set_options(self._context, given), "options", UsageError)
         self._saturation_v = float(options.saturation_v)
 
     def set_baseline(self, frames: npt.NDArray[np.float64]) -> Baseline:
-        """Take the reference from quiet ``frames`` (k, m) volts: one as it is, four or more also for the noise.
+        """Take the reference from quiet ``frames`` (k, m) volts: one as it is, four or more also
+        for the noise.
 
         Raises:
             FrameError: a frame cannot be used.
@@ -112,22 +140,39 @@ class CoreEngine:
         check_quiet(frames, self._masked, self._saturation_v)
         if len(frames) < 4:
             self._frame[:] = frames.mean(axis=0)
-            self._check_frame(self._lib.eits_baseline_set(self._context, self._frame_pointer, self.n_rows), "reference frame")
+            self._check_frame(
+                self._lib.eits_baseline_set(self._context, self._frame_pointer, self.n_rows),
+                "reference frame",
+            )
         else:
-            self._check_frame(self._lib.eits_baseline_begin(self._context, len(frames)), "reference frames")
+            self._check_frame(
+                self._lib.eits_baseline_begin(self._context, len(frames)), "reference frames"
+            )
             for number, frame in enumerate(frames):
                 self._frame[:] = frame
-                status = self._lib.eits_baseline_add(self._context, self._frame_pointer, self.n_rows)
+                status = self._lib.eits_baseline_add(
+                    self._context, self._frame_pointer, self.n_rows
+                )
                 self._check_frame(status, f"reference frame {number} (from 0)")
             self._check_frame(self._lib.eits_baseline_finish(self._context), "reference frames")
         b = self._context.baseline
-        return Baseline(int(b.count), b.correlation, b.gain, b.v0_rms, b.noise_v, b.lambda_noise, int(b.glitches))
+        return Baseline(
+            int(b.count),
+            b.correlation,
+            b.gain,
+            b.v0_rms,
+            b.noise_v,
+            b.lambda_noise,
+            int(b.glitches),
+        )
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
         self._masked = rows.copy()
         for row in range(self.n_rows):
-            self._check(self._lib.eits_mask_row(self._context, row, int(rows[row])), "mask", UsageError)
+            self._check(
+                self._lib.eits_mask_row(self._context, row, int(rows[row])), "mask", UsageError
+            )
 
     def forget(self) -> None:
         """Forget the warm start and the touches that were followed."""
@@ -138,29 +183,42 @@ class CoreEngine:
             self._check(status, what, FrameError)
 
     def solve_frame(self, frame: npt.NDArray[np.floating[Any]]) -> int:
-        """Frame stage and solver alone, results left in the core; returns the status. For benchmarks."""
+        """Frame stage and solver alone, results left in the core; returns the status. For
+        benchmarks."""
         self._frame[:] = frame
-        return int(self._lib.eits_reconstruct(self._context, self._frame_pointer, self.n_rows, self._null, self._null))
+        return int(
+            self._lib.eits_reconstruct(
+                self._context, self._frame_pointer, self.n_rows, self._null, self._null
+            )
+        )
 
-    def bare_calls(self, frame: npt.NDArray[np.floating[Any]]) -> tuple[Callable[[], Any], Callable[[], Any]]:
-        """The two C calls for ``frame``, solve and touches, with nothing of Python around them. For benchmarks."""
+    def bare_calls(
+        self, frame: npt.NDArray[np.floating[Any]]
+    ) -> tuple[Callable[[], Any], Callable[[], Any]]:
+        """The two C calls for ``frame``, solve and touches, with nothing of Python around them. For
+        benchmarks."""
         self._frame[:] = frame
         lib, context, null = self._lib, self._context, self._null
         return (
             lambda: lib.eits_reconstruct(context, self._frame_pointer, self.n_rows, null, null),
-            lambda: lib.eits_find_touches(context, self._touches, len(self._touches), self._touch_count),
+            lambda: lib.eits_find_touches(
+                context, self._touches, len(self._touches), self._touch_count
+            ),
         )
 
     def bare_solve(self, y: npt.NDArray[np.floating[Any]]) -> Callable[[], Any]:
-        """The solver's C call alone on reduced data ``y`` (r,), which it takes now; the result is in ``coefficients``. For
-        benchmarks."""
+        """The solver's C call alone on reduced data ``y`` (r,), which it takes now; the result is
+        in ``coefficients``. For benchmarks."""
         self._view(self._context.y, int(self._model.rank))[:] = y
         lib, context = self._lib, self._context
         return lambda: lib.eits_solve(context)
 
     def bare_solves(self, many: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:
         """``bare_solve`` of each of ``many`` (k, r), one after another: their x (k, n)."""
-        y, x = self._view(self._context.y, int(self._model.rank)), np.empty((len(many), self.n_pixels), dtype=self.dtype)
+        y, x = (
+            self._view(self._context.y, int(self._model.rank)),
+            np.empty((len(many), self.n_pixels), dtype=self.dtype),
+        )
         solve, context = self._lib.eits_solve, self._context
         for k in range(len(many)):
             y[:] = many[k]
@@ -176,14 +234,18 @@ class CoreEngine:
         """y of the last frame as the solver saw it, projected, (stride,)."""
         return self._view(self._context.y, (int(self._model.rank) + 7) // 8 * 8).copy()
 
-    def reconstruct(self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True) -> Reconstruction:
+    def reconstruct(
+        self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True
+    ) -> Reconstruction:
         """One frame (m,) volts to image and touches.
 
         Raises:
             FrameError: the frame cannot be used.
         """
         if frame.shape != (self.n_rows,):
-            raise FrameError(f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows")
+            raise FrameError(
+                f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows"
+            )
         began_ns = perf_counter_ns()
         status = self.solve_frame(frame)
         if status != 0:
@@ -191,7 +253,9 @@ class CoreEngine:
         solved_ns = found_ns = perf_counter_ns()
         found: tuple[Touch, ...] = ()
         if touches:
-            self._lib.eits_find_touches(self._context, self._touches, len(self._touches), self._touch_count)
+            self._lib.eits_find_touches(
+                self._context, self._touches, len(self._touches), self._touch_count
+            )
             found_ns = perf_counter_ns()
             found = tuple(_touch(self._touches[k]) for k in range(self._touch_count[0]))
         coefficients = self._view(self._context.x, self.n_pixels).copy()
@@ -199,50 +263,72 @@ class CoreEngine:
         return Reconstruction(self._image.copy(), coefficients, found, info)
 
     def follow(self, frames: npt.NDArray[np.floating[Any]]) -> None:
-        """Be as after ``frames`` (k, m) volts, the last that can be used, so that the next frame costs what it costs there: the
-        directions to ignore are built anew where other rows are usable than in the frame before."""
+        """Be as after ``frames`` (k, m) volts, the last that can be used, so that the next frame
+        costs what it costs there: the directions to ignore are built anew where other rows are
+        usable than in the frame before."""
         masked, macs = self._ffi.new("uint32_t *"), self._ffi.new("uint64_t *")
         for frame in frames[::-1]:
             self._frame[:] = frame
-            status = self._lib.eits_frame_stage(self._context, self._frame_pointer, self.n_rows, masked, macs)
+            status = self._lib.eits_frame_stage(
+                self._context, self._frame_pointer, self.n_rows, masked, macs
+            )
             if status in (self._lib.EITS_OK, self._lib.EITS_E_NOT_FINITE):
                 return
 
     def reconstruct_block(
         self, frames: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> list[Reconstruction | FrameError]:
-        """Frames (k, m) volts, each as after :meth:`forget`, in one call of C, which runs without Python's lock; a frame that
-        cannot be used gives its error, and the others are done.
+        """Frames (k, m) volts, each as after :meth:`forget`, in one call of C, which runs without
+        Python's lock; a frame that cannot be used gives its error, and the others are done.
 
         Raises:
             FrameError: frames of another length than the model's.
         """
         if frames.ndim != 2 or frames.shape[1] != self.n_rows:
-            raise FrameError(f"frames: have shape {frames.shape}, but the model's protocol has {self.n_rows} rows")
+            raise FrameError(
+                f"frames: have shape {frames.shape}, but the model's protocol has {self.n_rows}"
+                " rows"
+            )
         count = len(frames)
         given = np.ascontiguousarray(frames, dtype=self.dtype)
-        images, coefficients = (np.empty((count, self.n_pixels), dtype=self.dtype) for _ in range(2))
+        images, coefficients = (
+            np.empty((count, self.n_pixels), dtype=self.dtype) for _ in range(2)
+        )
         results = self._ffi.new("eits_result[]", max(count, 1))
         room = int(self._lib.EITS_MAX_TOUCHES)
         found = self._ffi.new("eits_touch[]", max(count, 1) * room) if touches else self._null
         status = self._lib.eits_reconstruct_batch(
-            self._context, self._reals(given), self.n_rows, count, self._reals(images), self._reals(coefficients), found, results
+            self._context,
+            self._reals(given),
+            self.n_rows,
+            count,
+            self._reals(images),
+            self._reals(coefficients),
+            found,
+            results,
         )
         self._check(status, "batch", UsageError)
         done: list[Reconstruction | FrameError] = []
         for k in range(count):
             r = results[k]
             if r.status != 0:
-                done.append(FrameError(with_findings(f"frame: {self._status_text(r.status)}", _info(r.info))))
+                done.append(
+                    FrameError(
+                        with_findings(f"frame: {self._status_text(r.status)}", _info(r.info))
+                    )
+                )
                 continue
             each = tuple(_touch(found[room * k + i]) for i in range(r.count))
             done.append(Reconstruction(images[k], coefficients[k], each, _info(r.info)))
         return done
 
     def bare_block(self, frames: npt.NDArray[np.floating[Any]]) -> Callable[[], Any]:
-        """The one C call of :meth:`reconstruct_block` for ``frames`` (k, m), with nothing of Python around it. For benchmarks."""
+        """The one C call of :meth:`reconstruct_block` for ``frames`` (k, m), with nothing of Python
+        around it. For benchmarks."""
         given, count = np.ascontiguousarray(frames, dtype=self.dtype), len(frames)
-        images, coefficients = (np.empty((count, self.n_pixels), dtype=self.dtype) for _ in range(2))
+        images, coefficients = (
+            np.empty((count, self.n_pixels), dtype=self.dtype) for _ in range(2)
+        )
         found = self._ffi.new("eits_touch[]", count * int(self._lib.EITS_MAX_TOUCHES))
         results = self._ffi.new("eits_result[]", count)
         pointers = [self._reals(array) for array in (given, images, coefficients)]
@@ -274,8 +360,10 @@ def _plain(value: Any) -> Any:
 
 def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
     return Info(
-        i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs, i.touch_macs,
-        getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual, i.data_norm,
+        i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs,
+        i.touch_macs,
+        getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual,
+        i.data_norm,
         i.findings, i.saturated, i.glitches, i.misfit, i.unexplained,
         _bits(i.open_electrodes), _bits(i.bridged_electrodes), _bits(i.noisy_electrodes),
         i.floor,

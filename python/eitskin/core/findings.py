@@ -1,4 +1,5 @@
-"""What was found wrong with a frame, by name and in a few words (csrc/include/eitskin/findings.h, docs/reference/diagnostics.md)."""
+"""What was found wrong with a frame, by name and in a few words (csrc/include/eitskin/findings.h,
+docs/reference/diagnostics.md)."""
 
 from __future__ import annotations
 
@@ -61,7 +62,10 @@ def words(found: Found) -> tuple[str, ...]:
         "saturated": f"{plural(found.saturated, 'row')} saturated",
         "electrode open": f"{_electrodes(found.open_electrodes)} open",
         "electrodes bridged": f"{_electrodes(found.bridged_electrodes)} bridged",
-        "glitch": f"{plural(found.glitches, 'row')} left out as {'glitches' if found.glitches > 1 else 'a glitch'}",
+        "glitch": (
+            f"{plural(found.glitches, 'row')} left out as"
+            f" {'glitches' if found.glitches > 1 else 'a glitch'}"
+        ),
         "electrode noisy": f"{_electrodes(found.noisy_electrodes)} noisy",
         "misfit": f"misfit {100 * found.misfit:.1f} %" if found.misfit > 0 else "misfit",
         "stale reference": "stale reference: tare again",

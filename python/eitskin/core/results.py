@@ -23,15 +23,19 @@ STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
 @dataclass(frozen=True)
 class Options:
-    """The solver's options; csrc/include/eitskin/context.h documents each. Lambdas in the units of S'y.
+    """The solver's options; csrc/include/eitskin/context.h documents each. Lambdas in the units of
+    S'y.
 
-    ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both". ``solver`` is "fista"
-    (every column in every iteration), "working-set" (FISTA on the columns that may differ from zero), "coordinate" (sweeps of
-    coordinate descent) or "active-set" (rounds to the exact optimum). ``mac_limit`` (0: none): the best so far when the next
-    step would take the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of ``FINDINGS``.
-    ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow touches in time; all 0: each frame by itself
-    (``solve.options.tracking`` sets them, docs/guide/tracking.md).
-    ``floor_noise_factor``: the whitening's floor is at least this times the tare's noise over rms(V0); 0: as the model has it.
+    ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both".
+    ``solver`` is "fista" (every column in every iteration), "working-set" (FISTA on the columns
+    that may differ from zero), "coordinate" (sweeps of coordinate descent) or "active-set" (rounds
+    to the exact optimum). ``mac_limit`` (0: none): the best so far when the next step would take
+    the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of
+    ``FINDINGS``. ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow
+    touches in time; all 0: each frame by itself (``solve.options.tracking`` sets them,
+    docs/guide/tracking.md).
+    ``floor_noise_factor``: the whitening's floor is at least this times the tare's noise over
+        rms(V0); 0: as the model has it.
     """
 
     iterations: int
@@ -97,13 +101,20 @@ def check_options(o: Options) -> None:
         if name in ("sign", "solver"):
             known = SIGNS if name == "sign" else SOLVERS
             if value not in known:
-                raise UsageError(f"options: {name} = {value!r} is not known; use one of {', '.join(known)}")
+                raise UsageError(
+                    f"options: {name} = {value!r} is not known; use one of {', '.join(known)}"
+                )
         elif name in ("warm_start", "project_baseline", "refine"):
             if value not in (False, True):
                 raise UsageError(f"options: {name} = {value!r} must be true or false")
         else:
             _check_number(name, value, *WHOLE.get(name, (0, 1) if name in SHARES else (0, HUGE)))
-    if not LEAST_RADIUS_MM <= o.touch_min_radius_mm <= o.touch_seed_radius_mm <= o.touch_max_radius_mm:
+    if (
+        not LEAST_RADIUS_MM
+        <= o.touch_min_radius_mm
+        <= o.touch_seed_radius_mm
+        <= o.touch_max_radius_mm
+    ):
         raise UsageError(
             f"options: touch radii of {o.touch_min_radius_mm:g}, {o.touch_seed_radius_mm:g} and "
             f"{o.touch_max_radius_mm:g} mm (least, seed, most) must ascend from above 0"
@@ -113,13 +124,18 @@ def check_options(o: Options) -> None:
 def _check_number(name: str, value: Any, low: float, high: float) -> None:
     kind = (int, np.integer) if name in WHOLE else (int, float, np.integer, np.floating)
     if isinstance(value, bool) or not isinstance(value, kind):
-        raise UsageError(f"options: {name} = {value!r} must be a {'whole ' if name in WHOLE else ''}number")
+        raise UsageError(
+            f"options: {name} = {value!r} must be a {'whole ' if name in WHOLE else ''}number"
+        )
     if not low <= value <= high:
         raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
 
 
-def check_quiet(frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float) -> None:
-    """Refuse quiet ``frames`` (k, m) with an unusable voltage in a row that is not ``masked`` (m,); 0: no saturation.
+def check_quiet(
+    frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float
+) -> None:
+    """Refuse quiet ``frames`` (k, m) with an unusable voltage in a row that is not ``masked`` (m,);
+    0: no saturation.
 
     Raises:
         FrameError: naming the first such frame and row.
@@ -129,14 +145,17 @@ def check_quiet(frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], 
     if unusable.any():
         frame, row = (int(place[0]) for place in np.nonzero(unusable))
         raise FrameError(
-            f"reference frame {frame} (from 0): row {row} (from 0) is not finite or saturated; mask it or measure again"
+            f"reference frame {frame} (from 0): row {row} (from 0) is not finite or saturated; mask"
+            " it or measure again"
         )
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """The reference as learned: ``correlation`` with the model's own, ``gain`` in model volts per measured volt,
-    ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was given; ``glitches`` readings were left out."""
+    """The reference as learned: ``correlation`` with the model's own, ``gain`` in model volts per
+    measured volt, ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was
+    given; ``glitches`` readings were left out.
+    """
 
     frames: int
     correlation: float
@@ -149,9 +168,9 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Touch:
-    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from frame to frame. One that is held
-    while it is not found has confidence 0. ``load_n`` is how hard it presses, in newtons, where the model is calibrated
-    (docs/guide/calibration.md), else 0."""
+    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from
+    frame to frame. One that is held while it is not found has confidence 0. ``load_n`` is how hard
+    it presses, in newtons, where the model is calibrated (docs/guide/calibration.md), else 0."""
 
     id: int
     x_mm: float
@@ -172,8 +191,10 @@ def load_text(load_n: float) -> str:
 
 @dataclass(frozen=True)
 class Info:
-    """What a frame cost and how its solve ended (eits_info in csrc/include/eitskin/context.h). ``solve_us`` and ``touch_us`` are
-    this host's, by its clock, the frame stage with the solve; two runs that differ in nothing else are equal."""
+    """What a frame cost and how its solve ended (eits_info in csrc/include/eitskin/context.h).
+    ``solve_us`` and ``touch_us`` are this host's, by its clock, the frame stage with the solve; two
+    runs that differ in nothing else are equal.
+    """
 
     iterations: int
     stop: str
@@ -204,7 +225,8 @@ class Info:
 
     @property
     def found(self) -> tuple[str, ...]:
-        """What was found wrong with the frame, each in a few words: "electrode 5 open", "2 rows left out as glitches"..."""
+        """What was found wrong with the frame, each in a few words: "electrode 5 open", "2 rows
+        left out as glitches"..."""
         return words(self)
 
     @property
@@ -227,7 +249,8 @@ def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: f
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """One frame's result: ``image`` (n,) S/m on the model's pixels, ``coefficients`` (n,), touches strongest first, info."""
+    """One frame's result: ``image`` (n,) S/m on the model's pixels, ``coefficients`` (n,), touches
+    strongest first, info."""
 
     image: npt.NDArray[np.floating[Any]]
     coefficients: npt.NDArray[np.floating[Any]]

@@ -1,1 +1,2 @@
-"""Boards: real ones, simulated ones, emulated ones, and recordings of them, behind one set of commands."""
+"""Boards: real ones, simulated ones, emulated ones, and recordings of them, behind one set of
+commands."""

@@ -26,7 +26,8 @@ def frame_bytes(info: BoardInfo, what: Stream) -> int:
 
 
 def least_every(info: BoardInfo, what: Stream, baud: int) -> int:
-    """The least N with which every N-th frame of ``what`` fits a line of ``baud``; 1 where all do."""
+    """The least N with which every N-th frame of ``what`` fits a line of ``baud``; 1 where all
+    do."""
     if not info.has_model:
         return 1
     line_us = 1e6 * frame_bytes(info, what) * BITS_A_BYTE / (USED * baud)
@@ -34,7 +35,8 @@ def least_every(info: BoardInfo, what: Stream, baud: int) -> int:
 
 
 def carried_every(device: Device, what: Stream) -> int:
-    """As ``least_every``, of the line to ``device``; 1 where there is none (simulated boards, recordings)."""
+    """As ``least_every``, of the line to ``device``; 1 where there is none (simulated boards,
+    recordings)."""
     if device.transport.url.partition(":")[0] not in ("serial", "emu"):
         return 1
     return least_every(device.board, what, int(getattr(device.transport, "baud", BAUD)))

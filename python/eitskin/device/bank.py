@@ -1,6 +1,8 @@
-"""The bytes of a model bank: the model from its start, and in its last 32 bytes the record that makes it valid.
+"""The bytes of a model bank: the model from its start, and in its last 32 bytes the record that
+makes it valid.
 
-The firmware programs the record last, as the commit of an upload; docs/reference/link-protocol.md, "Model banks", specifies it.
+The firmware programs the record last, as the commit of an upload; docs/reference/link-protocol.md,
+"Model banks", specifies it.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ RECORD_BYTES = _RECORD.size
 
 @dataclass(frozen=True)
 class BankRecord:
-    """Which model a bank holds: ``generation`` counts uploads (mod 2^32), ``model_crc`` is zlib's CRC-32 of the whole file."""
+    """Which model a bank holds: ``generation`` counts uploads (mod 2^32), ``model_crc`` is zlib's
+    CRC-32 of the whole file."""
 
     generation: int
     model_bytes: int
@@ -39,7 +42,8 @@ def record_bytes(model: bytes, generation: int) -> bytes:
 
 
 def bank_bytes(model: bytes, generation: int, bank_bytes: int = BANK_BYTES) -> bytes:
-    """A whole bank of ``bank_bytes`` with ``model`` and its record; what lies between is as erased flash reads, 0xFF.
+    """A whole bank of ``bank_bytes`` with ``model`` and its record; what lies between is as erased
+    flash reads, 0xFF.
 
     Raises:
         DeviceError: the model is longer than the bank's room.
@@ -47,14 +51,15 @@ def bank_bytes(model: bytes, generation: int, bank_bytes: int = BANK_BYTES) -> b
     room = record_offset(bank_bytes)
     if len(model) > room:
         raise DeviceError(
-            f"the model has {len(model)} bytes and a bank of the board holds {room}; build it with fewer pixels, a lower rank "
-            "or a smaller storage type (eitskin model build --help)"
+            f"the model has {len(model)} bytes and a bank of the board holds {room}; build it with"
+            " fewer pixels, a lower rank or a smaller storage type (eitskin model build --help)"
         )
     return model + bytes([ERASED]) * (room - len(model)) + record_bytes(model, generation)
 
 
 def read_record(bank: bytes) -> BankRecord | None:
-    """The record of a ``bank``, or None where there is none or it is damaged. The model itself is not looked at."""
+    """The record of a ``bank``, or None where there is none or it is damaged. The model itself is
+    not looked at."""
     if len(bank) < _RECORD.size:
         return None
     tail = bank[-_RECORD.size :]
@@ -65,8 +70,8 @@ def read_record(bank: bytes) -> BankRecord | None:
 
 
 def newest_bank(banks: list[bytes]) -> int | None:
-    """The number of the bank that a board would start from: a valid record, its model's checksum right, the generation the
-    latest by a comparison that wraps. None where no bank is valid."""
+    """The number of the bank that a board would start from: a valid record, its model's checksum
+    right, the generation the latest by a comparison that wraps. None where no bank is valid."""
     best: tuple[int, BankRecord] | None = None
     for number, bank in enumerate(banks):
         record = read_record(bank)

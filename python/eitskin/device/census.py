@@ -13,7 +13,8 @@ from eitskin.errors import EitskinError
 
 @dataclass(frozen=True)
 class FoundPort:
-    """A port; the ``board`` that answered on it, or ``why`` none did; neither where it was not asked."""
+    """A port; the ``board`` that answered on it, or ``why`` none did; neither where it was not
+    asked."""
 
     port: Port
     board: BoardInfo | None = None
@@ -22,12 +23,17 @@ class FoundPort:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         board = None if self.board is None else self.board.as_dict()
-        port = {"url": f"serial:{self.port.path}", **asdict(self.port), "is_board": self.port.is_board}
+        port = {
+            "url": f"serial:{self.port.path}",
+            **asdict(self.port),
+            "is_board": self.port.is_board,
+        }
         return port | {"board": board, "why": self.why}
 
 
 def census(*, ask: bool = True) -> list[FoundPort]:
-    """All serial ports, boards first; where ``ask``, those that look like a board's are asked what they are."""
+    """All serial ports, boards first; where ``ask``, those that look like a board's are asked what
+    they are."""
     return [_asked(port) if ask and port.is_board else FoundPort(port) for port in list_devices()]
 
 

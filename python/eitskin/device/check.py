@@ -1,4 +1,5 @@
-"""Whether a board is the one that is meant: versions, model, identity; and why one does not answer."""
+"""Whether a board is the one that is meant: versions, model, identity; and why one does not
+answer."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ def check_board(info: BoardInfo, name: str) -> None:
     if info.firmware[0] != host_major():
         newer = info.firmware[0] > host_major()
         raise DeviceError(
-            f"{name}: the board's firmware is {info.firmware_text} and this eitskin is {__version__}; "
+            f"{name}: the board's firmware is {info.firmware_text} and this eitskin is"
+            f" {__version__}; "
             + (f"install eitskin {info.firmware[0]}.x, or {FLASH}" if newer else FLASH)
         )
 
@@ -39,19 +41,29 @@ def no_answer(link: Link, what: str, waited_s: float) -> str:
     other = link.decoder.other_version
     if other is not None and not counters.packets:
         advice = FLASH if other < LINK_VERSION else f"upgrade eitskin, or {FLASH}"
-        return f"{name}: the board speaks version {other} of the link protocol and this eitskin {LINK_VERSION}; {advice}"
+        return (
+            f"{name}: the board speaks version {other} of the link protocol and this eitskin"
+            f" {LINK_VERSION}; {advice}"
+        )
     if link.ended and what == "TARE":
         return f"{name}: the scene is over, and a tare waits for frames; open the device anew"
     if counters.packets:
-        return f"{name}: packets arrive, but {what} is not answered within {waited_s:g} s; reset the board, or {FLASH}"
+        return (
+            f"{name}: packets arrive, but {what} is not answered within {waited_s:g} s; reset the"
+            f" board, or {FLASH}"
+        )
     if counters.bytes:
         baud = getattr(link.transport, "baud", None)
         at = f" at {baud} baud" if baud else ""
         return (
-            f"{name}: {counters.bytes} bytes arrive but no packet decodes{at}: the baud rate is another, or this is no eitskin "
-            f"board; give the rate with  serial:PORT?baud=N  or {FLASH}"
+            f"{name}: {counters.bytes} bytes arrive but no packet decodes{at}: the baud rate is"
+            " another, or this is no eitskin board; give the rate with  serial:PORT?baud=N  or"
+            f" {FLASH}"
         )
-    return f"{name}: no answer within {waited_s:g} s; is this the board's port, and its firmware running? {FLASH}"
+    return (
+        f"{name}: no answer within {waited_s:g} s; is this the board's port, and its firmware"
+        f" running? {FLASH}"
+    )
 
 
 def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
@@ -61,22 +73,27 @@ def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
         DeviceError: the protocol or the model differs.
     """
     if not info.has_model:
-        raise DeviceError(f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm")
+        raise DeviceError(
+            f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm"
+        )
     if info.protocol_hash != model.protocol.hash:
         raise DeviceError(
-            f"{name}: the board scans protocol {info.protocol_hash:016x} ({info.n_electrodes} electrodes, {info.n_rows} rows) "
-            f"and the model here {model.protocol.hash:016x} ({model.protocol.n_electrodes} electrodes, {model.protocol.n_rows} "
-            "rows); put yours on the board with  eitskin model upload FILE  or name the board's with  --model FILE"
+            f"{name}: the board scans protocol {info.protocol_hash:016x} ({info.n_electrodes}"
+            f" electrodes, {info.n_rows} rows) and the model here {model.protocol.hash:016x}"
+            f" ({model.protocol.n_electrodes} electrodes, {model.protocol.n_rows} rows); put yours"
+            " on the board with  eitskin model upload FILE  or name the board's with  --model FILE"
         )
     if info.model_crc != zlib.crc32(blob):
         raise DeviceError(
-            f"{name}: the board's model has checksum {info.model_crc:08x} and the model here {zlib.crc32(blob):08x}; put yours "
-            "on the board with  eitskin model upload FILE  or name the board's with  --model FILE"
+            f"{name}: the board's model has checksum {info.model_crc:08x} and the model here"
+            f" {zlib.crc32(blob):08x}; put yours on the board with  eitskin model upload FILE  or"
+            " name the board's with  --model FILE"
         )
 
 
 def model_of(info: BoardInfo, path: str | Path | None, name: str) -> tuple[Model, bytes]:
-    """The board's own model on the host: the file ``path``, or the prebuilt one where that is what the board has.
+    """The board's own model on the host: the file ``path``, or the prebuilt one where that is what
+    the board has.
 
     Raises:
         FileError, ModelError: the file cannot be read.

@@ -1,4 +1,5 @@
-"""A board's commands with their answers, and what it streams, whatever kind of device is behind it."""
+"""A board's commands with their answers, and what it streams, whatever kind of device is behind
+it."""
 
 from __future__ import annotations
 
@@ -43,16 +44,18 @@ TARE_FRAMES = 16
 
 
 def _asked_millihz(info: BoardInfo) -> int:
-    """The excitation that the board was asked for: a whole number of its periods fills a burst. INFO tells what the generator
-    makes of it, which is not quite the same."""
+    """The excitation that the board was asked for: a whole number of its periods fills a burst.
+    INFO tells what the generator makes of it, which is not quite the same."""
     rate_millihz = 1000 * info.sample_rate_hz
     periods = round(info.excitation_millihz * info.samples / rate_millihz)
     return periods * rate_millihz // info.samples
 
 
 class Deadline:
-    """Counts down ``timeout_s`` by the host's clock; where the board runs only while it is asked, by what it sends: no packet
-    takes less than a millisecond there, so that a board that talks without answering is given up too."""
+    """Counts down ``timeout_s`` by the host's clock; where the board runs only while it is asked,
+    by what it sends: no packet takes less than a millisecond there, so that a board that talks
+    without answering is given up too.
+    """
 
     def __init__(self, synchronous: bool, timeout_s: float) -> None:
         self._end = None if synchronous else time.monotonic() + timeout_s
@@ -67,16 +70,20 @@ class Deadline:
 
 
 class Device:
-    """A board that was found, whose version fits and that answers. ``open_device`` makes one from a URL.
+    """A board that was found, whose version fits and that answers. ``open_device`` makes one from a
+    URL.
 
-    Commands are sent again with the same request number where no answer comes, so that one lost packet is not noticed; after
-    ``TRIES`` the board is taken to be dead. ``board`` is what INFO last said.
+    Commands are sent again with the same request number where no answer comes, so that one lost
+    packet is not noticed; after ``TRIES`` the board is taken to be dead. ``board`` is what INFO
+    last said.
 
     Raises:
         DeviceError: no answer, or another version.
     """
 
-    def __init__(self, transport: Transport, *, room: int = 1024, reconnect: Reconnect | None = None) -> None:
+    def __init__(
+        self, transport: Transport, *, room: int = 1024, reconnect: Reconnect | None = None
+    ) -> None:
         self.link: Link
         if transport.synchronous:
             self.link = PumpedLink(transport)
@@ -97,7 +104,12 @@ class Device:
     def __enter__(self) -> Device:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
     @property
@@ -114,8 +126,8 @@ class Device:
         self.link.close()
 
     def record(self, tap: Tap | None) -> None:
-        """Give each packet that is accepted to ``tap`` as it comes, before anything else; None stops that. A ``Recorder`` goes
-        beside it."""
+        """Give each packet that is accepted to ``tap`` as it comes, before anything else; None
+        stops that. A ``Recorder`` goes beside it."""
         if self._tap is not None:
             self.link.end_tap(self._tap)
         self._tap = tap
@@ -159,7 +171,8 @@ class Device:
         self.board = replace(self.board, tared=1)
 
     def start_scene(self) -> None:
-        """Begin what is to be touched, on a simulated or emulated board; call it after ``tare``. Nothing on a real one."""
+        """Begin what is to be touched, on a simulated or emulated board; call it after ``tare``.
+        Nothing on a real one."""
         self.transport.begin_scene()
 
     def scan(
@@ -180,7 +193,9 @@ class Device:
         """
         now = self.board
         command = commands.Scan(
-            excitation_millihz=_asked_millihz(now) if excitation_hz is None else round(1000 * excitation_hz),
+            excitation_millihz=(
+                _asked_millihz(now) if excitation_hz is None else round(1000 * excitation_hz)
+            ),
             sample_rate_hz=now.sample_rate_hz if sample_rate_hz is None else sample_rate_hz,
             samples=now.samples if samples is None else samples,
             settle_us=now.settle_us if settle_us is None else settle_us,
@@ -192,8 +207,8 @@ class Device:
         return self.info()
 
     def solver(self, options: Options) -> None:
-        """Give the board's solver these of ``options``: iterations, max_touches, warm_start, sign, lambda_rel, gap_rel, solver,
-        mac_limit, findings, and whether touches are tracked.
+        """Give the board's solver these of ``options``: iterations, max_touches, warm_start, sign,
+        lambda_rel, gap_rel, solver, mac_limit, findings, and whether touches are tracked.
 
         Raises:
             UsageError: one is out of its range.
@@ -202,8 +217,10 @@ class Device:
         check_options(options)
         self._command(
             commands.Solver(
-                options.iterations, options.max_touches, int(options.warm_start), SIGNS.index(options.sign),
-                options.lambda_rel, options.gap_rel, SOLVERS.index(options.solver), options.mac_limit,
+                options.iterations, options.max_touches, int(options.warm_start),
+                SIGNS.index(options.sign),
+                options.lambda_rel, options.gap_rel, SOLVERS.index(options.solver),
+                options.mac_limit,
                 options.findings, int(options.tracks),
             ),
             ANSWER_S,
@@ -234,8 +251,11 @@ class Device:
         finally:
             self._connected = True
 
-    def upload_model(self, model: str | Path | bytes, progress: Callable[[int, int], None] | None = None) -> BoardInfo:
-        """Put a model into the board's other bank; the board verifies it, then swaps. ``progress(done, total)`` in bytes.
+    def upload_model(
+        self, model: str | Path | bytes, progress: Callable[[int, int], None] | None = None
+    ) -> BoardInfo:
+        """Put a model into the board's other bank; the board verifies it, then swaps.
+        ``progress(done, total)`` in bytes.
 
         Raises:
             FileError, ModelError: it cannot be read, or is no model.
@@ -248,16 +268,21 @@ class Device:
 
     # ---- streaming ----
 
-    def stream(self, what: Stream = Stream.TOUCHES, *, every: int = 1, frames: int = 0) -> Iterator[Streamed]:
-        """``what`` of every ``every``-th frame, ``frames`` of them (0: until the iterator is closed), with faults and events of
-        the link between them. Ends when a scene or a recording does.
+    def stream(
+        self, what: Stream = Stream.TOUCHES, *, every: int = 1, frames: int = 0
+    ) -> Iterator[Streamed]:
+        """``what`` of every ``every``-th frame, ``frames`` of them (0: until the iterator is
+        closed), with faults and events of the link between them. Ends when a scene or a recording
+        does.
 
         Raises:
             UsageError: ``what``, ``every`` or ``frames`` cannot be.
             DeviceError: the board refuses (no model, not tared), is gone, or has gone silent.
         """
         if not 0 < what <= 7 or not 1 <= every <= 0xFFFF or not 0 <= frames < 2**32:
-            raise UsageError(f"stream: what = {int(what)}, every = {every}, frames = {frames} cannot be")
+            raise UsageError(
+                f"stream: what = {int(what)}, every = {every}, frames = {frames} cannot be"
+            )
         from eitskin.device.streaming import stream
 
         return stream(self, what, every, frames)
@@ -269,7 +294,8 @@ class Device:
         return max(self.board.frame_us, 1000)
 
     def next_item(self, timeout_s: float) -> Streamed | None:
-        """What comes next, kept back or from the link; None if nothing does within ``timeout_s``. Replies are passed over."""
+        """What comes next, kept back or from the link; None if nothing does within ``timeout_s``.
+        Replies are passed over."""
         if self._inbox:
             return self._inbox.popleft()
         for _ in range(10_000):
@@ -279,10 +305,13 @@ class Device:
             self._keep(item)
             if self._inbox:
                 return self._inbox.popleft()
-        raise DeviceError(f"{self.transport.name}: ten thousand packets and none of use; is it an eitskin board?")
+        raise DeviceError(
+            f"{self.transport.name}: ten thousand packets and none of use; is it an eitskin board?"
+        )
 
     def drop_kept(self) -> None:
-        """Forget the frames that came while commands waited for their answers; faults and events stay."""
+        """Forget the frames that came while commands waited for their answers; faults and events
+        stay."""
         self._inbox = deque(item for item in self._inbox if isinstance(item, Fault | LinkEvent))
 
     def _keep(self, item: Packet | LinkEvent) -> Answer | None:
@@ -291,7 +320,11 @@ class Device:
             self._put(item)
             return None
         if item.lost:
-            self._put(LinkEvent("gap", item.lost, "lost on the way, or dropped by the board for lack of room"))
+            self._put(
+                LinkEvent(
+                    "gap", item.lost, "lost on the way, or dropped by the board for lack of room"
+                )
+            )
         try:
             content = parse(item.type, item.payload)
         except MalformedPacket:
@@ -320,7 +353,10 @@ class Device:
                 assert isinstance(content, BoardInfo)
                 return content
             self._keep(item)
-        raise DeviceError(f"{self.transport.name}: the recording holds no INFO of its board; it was cut before it began")
+        raise DeviceError(
+            f"{self.transport.name}: the recording holds no INFO of its board; it was cut before it"
+            " began"
+        )
 
     def _command(self, command: Command, timeout_s: float) -> Reply:
         answer = self._ask(command, timeout_s)
@@ -339,12 +375,16 @@ class Device:
 
     def _ask(self, command: Command, timeout_s: float, *, refuse: bool = True) -> Answer:
         if self.transport.replays:
-            raise DeviceError(f"{self.transport.name} is a recording: {command_name(command.TYPE)} needs a board")
+            raise DeviceError(
+                f"{self.transport.name} is a recording: {command_name(command.TYPE)} needs a board"
+            )
         self._request = self._request % (2**32 - 1) + 1
         try:
             payload = command.payload(self._request)
         except Exception as error:
-            raise UsageError(f"{command_name(command.TYPE)}: a number does not fit its field ({error})") from None
+            raise UsageError(
+                f"{command_name(command.TYPE)}: a number does not fit its field ({error})"
+            ) from None
         for attempt in range(TRIES):
             if attempt == TRIES - 1:
                 self.link.decoder.forget_sequence()
@@ -366,7 +406,10 @@ class Device:
             if answer is None or answer.request != self._request:
                 continue
             if isinstance(answer, Reply):
-                expects_more = command.TYPE in (PacketType.GET_INFO, PacketType.GET_STATS) and answer.status == ReplyStatus.OK
+                expects_more = (
+                    command.TYPE in (PacketType.GET_INFO, PacketType.GET_STATS)
+                    and answer.status == ReplyStatus.OK
+                )
                 if answer.command == command.TYPE and not expects_more:
                     return answer
             elif isinstance(answer, BoardInfo) == (command.TYPE == PacketType.GET_INFO):

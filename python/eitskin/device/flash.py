@@ -1,4 +1,5 @@
-"""Putting firmware, and a model beside it, on a NUCLEO-F767ZI by whichever programmer's tool is installed."""
+"""Putting firmware, and a model beside it, on a NUCLEO-F767ZI by whichever programmer's tool is
+installed."""
 
 from __future__ import annotations
 
@@ -28,8 +29,8 @@ INSTALL = "install one:  apt install openocd  or  apt install stlink-tools  or  
 
 @dataclass(frozen=True)
 class FlashPlan:
-    """What will be run, in order: ``commands`` as argument lists, for ``tool``. ``bank_file`` holds the model's bank, if one goes
-    along."""
+    """What will be run, in order: ``commands`` as argument lists, for ``tool``. ``bank_file`` holds
+    the model's bank, if one goes along."""
 
     tool: str
     commands: tuple[tuple[str, ...], ...]
@@ -42,8 +43,8 @@ class FlashPlan:
 
 
 def find_tool(wanted: str | None = None, *, installed: bool = True) -> str:
-    """The programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed; where it need not be ``installed``, else
-    the first of them.
+    """The programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed; where it need
+    not be ``installed``, else the first of them.
 
     Raises:
         UsageError: it is not a known one.
@@ -54,7 +55,10 @@ def find_tool(wanted: str | None = None, *, installed: bool = True) -> str:
     choice = [wanted] if wanted else list(TOOLS)
     found = [tool for tool in choice if shutil.which(tool)] or ([] if installed else choice)
     if not found:
-        raise DeviceError(f"{wanted + ' is not' if wanted else 'none of ' + ', '.join(TOOLS) + ' is'} installed; {INSTALL}")
+        raise DeviceError(
+            f"{wanted + ' is not' if wanted else 'none of ' + ', '.join(TOOLS) + ' is'} installed;"
+            f" {INSTALL}"
+        )
     return found[0]
 
 
@@ -66,8 +70,9 @@ def plan_flash(
     serial: str | None = None,
     installed: bool = True,
 ) -> FlashPlan:
-    """The commands that put the firmware ``image`` (.bin) on a board and, where given, ``model`` in its first bank; the record of
-    the second bank is then erased, so that the first one counts. ``serial``: the ST-LINK's, where several boards are plugged in.
+    """The commands that put the firmware ``image`` (.bin) on a board and, where given, ``model`` in
+    its first bank; the record of the second bank is then erased, so that the first one counts.
+    ``serial``: the ST-LINK's, where several boards are plugged in.
     ``installed``: the tool must be there; not to show only what would be run.
 
     Raises:
@@ -82,7 +87,10 @@ def plan_flash(
     bank_file = None
     if model is not None:
         folder = Path(tempfile.gettempdir())
-        bank_file, no_record = folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin", folder / "eitskin-no-record.bin"
+        bank_file, no_record = (
+            folder / f"eitskin-bank-{zlib.crc32(model):08x}.bin",
+            folder / "eitskin-no-record.bin",
+        )
         write_bytes(bank_file, bank_bytes(model, 1))
         write_bytes(no_record, bytes([ERASED]) * RECORD_BYTES)
         # the other bank may hold a model of a later generation, which would win
@@ -99,18 +107,26 @@ def check_image(path: Path, image: bytes) -> None:
     if image[:4] == b"\x7fELF":
         raise DeviceError(f"{path}: this is an .elf; give the .bin beside it")
     if len(image) > FIRMWARE_ROOM:
-        raise DeviceError(f"{path}: {len(image)} bytes, but firmware has room for {FIRMWARE_ROOM}; is this the right file?")
+        raise DeviceError(
+            f"{path}: {len(image)} bytes, but firmware has room for {FIRMWARE_ROOM}; is this the"
+            " right file?"
+        )
     stack, start = struct.unpack("<II", image[:8]) if len(image) >= LEAST_IMAGE else (0, 0)
     in_flash = FIRMWARE_ADDRESS <= start < FIRMWARE_ADDRESS + len(image) and start & 1
     if not (RAM[0] < stack <= RAM[1] and stack % 8 == 0 and in_flash):
-        raise DeviceError(f"{path}: no firmware image of this board (its first words are no stack and start in its memory)")
+        raise DeviceError(
+            f"{path}: no firmware image of this board (its first words are no stack and start in"
+            " its memory)"
+        )
 
 
 def run_flash(plan: FlashPlan, echo: Callable[[str], None] | None = None) -> None:
-    """Run the plan; ``echo`` gets each command before it runs. The tool's own output goes where it likes.
+    """Run the plan; ``echo`` gets each command before it runs. The tool's own output goes where it
+    likes.
 
     Raises:
-        DeviceError: a command fails; the firmware may then be half written, and flashing again mends it.
+        DeviceError: a command fails; the firmware may then be half written, and flashing again
+            mends it.
     """
     for command, line in zip(plan.commands, plan.lines(), strict=True):
         if echo is not None:
@@ -121,8 +137,8 @@ def run_flash(plan: FlashPlan, echo: Callable[[str], None] | None = None) -> Non
             raise DeviceError(f"{plan.tool}: cannot be run ({error.strerror}); {INSTALL}") from None
         if code:
             raise DeviceError(
-                f"flashing failed: {line} ended with {code}; is the board plugged in by its ST-LINK port, and no debugger on it? "
-                "flash again"
+                f"flashing failed: {line} ended with {code}; is the board plugged in by its ST-LINK"
+                " port, and no debugger on it? flash again"
             )
 
 
@@ -137,13 +153,27 @@ def _openocd(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tup
 
 def _st_flash(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple[str, ...]]:
     which = ("--serial", serial) if serial is not None else ()
-    return [("st-flash", *which, "--reset", "write", str(path), f"0x{address:08x}") for path, address in pieces]
+    return [
+        ("st-flash", *which, "--reset", "write", str(path), f"0x{address:08x}")
+        for path, address in pieces
+    ]
 
 
 def _pyocd(pieces: Sequence[tuple[Path, int]], serial: str | None) -> list[tuple[str, ...]]:
     which = ("--uid", serial) if serial is not None else ()
     return [
-        ("pyocd", "load", "--target", "stm32f767zi", *which, "--format", "bin", "--base-address", f"0x{address:08x}", str(path))
+        (
+            "pyocd",
+            "load",
+            "--target",
+            "stm32f767zi",
+            *which,
+            "--format",
+            "bin",
+            "--base-address",
+            f"0x{address:08x}",
+            str(path),
+        )
         for path, address in pieces
     ]
 

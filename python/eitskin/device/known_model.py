@@ -1,4 +1,5 @@
-"""The board's model on the host, where the host has it: what turns pixels into places and rows into electrodes."""
+"""The board's model on the host, where the host has it: what turns pixels into places and rows into
+electrodes."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ class KnownModel:
 
 
 def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | None:
-    """The board's model: the file ``path``, or the prebuilt one where that is what the board has; None where it has another.
+    """The board's model: the file ``path``, or the prebuilt one where that is what the board has;
+    None where it has another.
 
     Raises:
         FileError, ModelError: the file cannot be read.
@@ -42,7 +44,9 @@ def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | No
     if path is not None:
         return KnownModel(*model_of(info, path, name))
     model, blob = load_prebuilt()
-    return KnownModel(model, blob) if info.has_model and zlib.crc32(blob) == info.model_crc else None
+    return (
+        KnownModel(model, blob) if info.has_model and zlib.crc32(blob) == info.model_crc else None
+    )
 
 
 def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> KnownModel:
@@ -53,11 +57,14 @@ def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> Know
         DeviceError: the board has no model, or another one.
     """
     if not info.has_model:
-        raise DeviceError(f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm")
+        raise DeviceError(
+            f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm"
+        )
     known = find_model(info, path, name)
     if known is None:
         raise DeviceError(
-            f"{name}: {what} needs the board's model, {info.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
+            f"{name}: {what} needs the board's model, {info.model_crc:08x}, which is not the"
+            f" prebuilt one; {NAMES_IT}"
         )
     return known
 
@@ -73,7 +80,10 @@ def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Pr
     for protocol in _usual(info.n_electrodes):
         if protocol.hash == info.protocol_hash:
             return protocol
-    raise DeviceError(f"{name}: which rows the board scans (protocol {info.protocol_hash:016x}) only its model tells; {NAMES_IT}")
+    raise DeviceError(
+        f"{name}: which rows the board scans (protocol {info.protocol_hash:016x}) only its model"
+        f" tells; {NAMES_IT}"
+    )
 
 
 def _usual(electrodes: int) -> Iterator[Protocol]:
@@ -86,7 +96,8 @@ def _usual(electrodes: int) -> Iterator[Protocol]:
 
 
 def board_options(model: Model, *, track: bool = True) -> Options:
-    """The options that a board starts with: the model's own, and touches tracked; or without that."""
+    """The options that a board starts with: the model's own, and touches tracked; or without
+    that."""
     from eitskin.solve.options import default_options, tracking
 
     return tracking(default_options(model)) if track else default_options(model)

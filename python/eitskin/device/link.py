@@ -1,4 +1,5 @@
-"""A transport with its decoder: packets come out, commands go in. With a thread for real boards, without one for the others."""
+"""A transport with its decoder: packets come out, commands go in. With a thread for real boards,
+without one for the others."""
 
 from __future__ import annotations
 
@@ -20,8 +21,10 @@ READ_S = 0.1
 
 @dataclass(frozen=True)
 class LinkEvent:
-    """Something happened to the link itself. ``kind``: "gap" (``missing`` packets by their numbers, at least), "dropped"
-    (``missing`` left out of the host's queue), "unplugged", "reconnected", "restarted" (the board began anew)."""
+    """Something happened to the link itself. ``kind``: "gap" (``missing`` packets by their numbers,
+    at least), "dropped" (``missing`` left out of the host's queue), "unplugged", "reconnected",
+    "restarted" (the board began anew).
+    """
 
     kind: str
     missing: int = 0
@@ -39,14 +42,15 @@ class Link(Protocol):
     decoder: Decoder
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
-        """Call ``begin`` with the last packet's sequence number, then ``tap`` with each packet after it, before anyone else gets
-        it. An error of ``tap`` comes out of ``next``."""
+        """Call ``begin`` with the last packet's sequence number, then ``tap`` with each packet
+        after it, before anyone else gets it. An error of ``tap`` comes out of ``next``."""
 
     def end_tap(self, tap: Tap) -> None:
         """No more of that; nothing where it was not begun."""
 
     def next(self, timeout_s: float) -> Packet | LinkEvent | None:
-        """The next packet or event; None if there is none within ``timeout_s`` (of the board's time where it is synchronous).
+        """The next packet or event; None if there is none within ``timeout_s`` (of the board's time
+        where it is synchronous).
 
         Raises:
             DeviceError: the port is gone for good.
@@ -121,10 +125,14 @@ class Reconnect:
 
 
 class ThreadedLink:
-    """A thread empties the port into a queue of ``room`` packets, so that a slow reader never makes the port wait: where the
-    queue is full the oldest frame packets are dropped and counted. A port that goes is opened again (``Reconnect``)."""
+    """A thread empties the port into a queue of ``room`` packets, so that a slow reader never makes
+    the port wait: where the queue is full the oldest frame packets are dropped and counted. A port
+    that goes is opened again (``Reconnect``).
+    """
 
-    def __init__(self, transport: Transport, *, room: int = 1024, reconnect: Reconnect | None = None) -> None:
+    def __init__(
+        self, transport: Transport, *, room: int = 1024, reconnect: Reconnect | None = None
+    ) -> None:
         self.transport, self.counters = transport, LinkCounters()
         self.decoder = Decoder(self.counters)
         self._taps: list[Tap] = []
@@ -137,7 +145,9 @@ class ThreadedLink:
         self._failed: EitskinError | None = None
         self._dropped = 0
         self._sequence = 0
-        self._thread = threading.Thread(target=self._run, name=f"eitskin {transport.name}", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, name=f"eitskin {transport.name}", daemon=True
+        )
         self._thread.start()
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
@@ -154,7 +164,9 @@ class ThreadedLink:
         with self._changed:
             while True:
                 if self._dropped:
-                    event = LinkEvent("dropped", self._dropped, "frames came faster than they were fetched")
+                    event = LinkEvent(
+                        "dropped", self._dropped, "frames came faster than they were fetched"
+                    )
                     self._dropped = 0
                     return event
                 if self._queue:
@@ -172,7 +184,8 @@ class ThreadedLink:
         except DeviceError:
             if self._failed is not None:
                 raise
-            # else the reader is opening the port again, and whoever sent this sends it again when no answer comes
+            # else the reader is opening the port again, and whoever sent this sends it again when no answer
+            # comes
         self._sequence += 1
 
     @property
@@ -247,5 +260,9 @@ class ThreadedLink:
                 self._event(LinkEvent("reconnected", text=self.transport.name))
                 return True
         waited = self._reconnect.tries * self._reconnect.every_s
-        self._fail(DeviceError(f"{error}; it did not come back within {waited:g} s: plug it in and start again"))
+        self._fail(
+            DeviceError(
+                f"{error}; it did not come back within {waited:g} s: plug it in and start again"
+            )
+        )
         return False

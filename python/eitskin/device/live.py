@@ -1,4 +1,5 @@
-"""A session with a board: set it up, take its reference, and follow its frames, each with everything that came of it."""
+"""A session with a board: set it up, take its reference, and follow its frames, each with
+everything that came of it."""
 
 from __future__ import annotations
 
@@ -16,7 +17,15 @@ from eitskin.device.link import LinkEvent
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
 from eitskin.device.wire.commands import StreamCommand
 from eitskin.device.wire.explain import status_text
-from eitskin.device.wire.packets import BoardStats, Fault, RawFrame, Solved, SolvedImage, SolvedTouches, Stream
+from eitskin.device.wire.packets import (
+    BoardStats,
+    Fault,
+    RawFrame,
+    Solved,
+    SolvedImage,
+    SolvedTouches,
+    Stream,
+)
 from eitskin.errors import DeviceError
 
 WRAP_US = 2**32
@@ -25,8 +34,9 @@ CLOCK_TIMER, TIMER_COUNT = 5, 0x24  # of the emulated board: its microsecond clo
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
-    """What came of one frame. ``time_us`` counts from the first frame of the stream and does not wrap; ``board_us`` is the
-    board's own clock when the scan began. At least one of the three packets is there."""
+    """What came of one frame. ``time_us`` counts from the first frame of the stream and does not
+    wrap; ``board_us`` is the board's own clock when the scan began. At least one of the three
+    packets is there."""
 
     number: int
     time_us: int
@@ -45,12 +55,17 @@ class LiveFrame:
     @property
     def refused(self) -> str | None:
         """Why the board's core refused the frame; None where it did not."""
-        return status_text(self.solved.status) if self.solved is not None and self.solved.status else None
+        return (
+            status_text(self.solved.status)
+            if self.solved is not None and self.solved.status
+            else None
+        )
 
 
 @dataclass
 class LiveSummary:
-    """What a stream amounted to. Times are the board's own, in us: solve and touches of each solved frame."""
+    """What a stream amounted to. Times are the board's own, in us: solve and touches of each solved
+    frame."""
 
     frames: int = 0
     refused: int = 0
@@ -79,7 +94,8 @@ class LiveSummary:
 
     @property
     def solve_quantiles_us(self) -> tuple[float, float] | None:
-        """Median and 99th percentile; None where nothing was solved, or the board tells no times (a simulated one)."""
+        """Median and 99th percentile; None where nothing was solved, or the board tells no times (a
+        simulated one)."""
         if not self.solve_us or not max(self.solve_us):
             return None
         p50, p99 = np.percentile(np.asarray(self.solve_us), [50, 99])
@@ -103,14 +119,19 @@ class LiveSummary:
         """For reading."""
         rate = "" if self.rate_hz is None else f", {self.rate_hz:.1f} a second of the board's time"
         link = self.link
-        text = f"{self.frames} frames{rate}; {link.get('gaps', 0)} gaps ({link.get('missing', 0)} packets missing)"
+        text = (
+            f"{self.frames} frames{rate}; {link.get('gaps', 0)} gaps ({link.get('missing', 0)}"
+            " packets missing)"
+        )
         text += f", {link.get('dropped', 0)} dropped here"
         if self.board is not None:
             text += f", {self.board.packets_dropped} dropped by the board"
         lines = [text]
         if self.solve_quantiles_us is not None:
             p50, p99 = self.solve_quantiles_us
-            lines.append(f"solve and touches on the board: p50 {p50 / 1e3:.2f} ms, p99 {p99 / 1e3:.2f} ms")
+            lines.append(
+                f"solve and touches on the board: p50 {p50 / 1e3:.2f} ms, p99 {p99 / 1e3:.2f} ms"
+            )
         if self.faults:
             lines.append(f"{self.faults} faults were reported")
         if self.refused:
@@ -118,9 +139,12 @@ class LiveSummary:
         return lines
 
 
-def set_up(device: Device, scan: ScanSettings, solver: SolverSettings, known: KnownModel | None) -> Options | None:
-    """Set scan and solver; returns the solver's options as they now are, None where the model is not known here and nothing of
-    the solver was asked for: then they stay what they are, whatever that is.
+def set_up(
+    device: Device, scan: ScanSettings, solver: SolverSettings, known: KnownModel | None
+) -> Options | None:
+    """Set scan and solver; returns the solver's options as they now are, None where the model is
+    not known here and nothing of the solver was asked for: then they stay what they are, whatever
+    that is.
 
     Raises:
         UsageError: a number is out of its range.
@@ -130,8 +154,8 @@ def set_up(device: Device, scan: ScanSettings, solver: SolverSettings, known: Kn
     if known is None:
         if solver.named:
             raise DeviceError(
-                f"{device.transport.name}: changing the solver needs the defaults of the board's model, "
-                f"{device.board.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
+                f"{device.transport.name}: changing the solver needs the defaults of the board's"
+                f" model, {device.board.model_crc:08x}, which is not the prebuilt one; {NAMES_IT}"
             )
         return None
     options = solver.applied(known.model)
@@ -156,8 +180,10 @@ def take_reference(device: Device, frames: int, *, streamed: bool = False) -> No
 
 
 def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
-    """Let what is to be touched begin, on a simulated or emulated board, and the scan under way end, which still shows the
-    untouched skin. Returns the board's clock at the scene's time 0 (None for others), and news that came meanwhile."""
+    """Let what is to be touched begin, on a simulated or emulated board, and the scan under way
+    end, which still shows the untouched skin. Returns the board's clock at the scene's time 0 (None
+    for others), and news that came meanwhile.
+    """
     transport, news = device.transport, []
     device.start_scene()
     board = getattr(transport, "board", None)
@@ -165,7 +191,9 @@ def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
         return (int(board.time_us) if board is not None else None), []
     began = int(board.timers[CLOCK_TIMER].read(TIMER_COUNT, 4)) if board is not None else None
     info = device.board
-    while (item := device.next_item(1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us))) is not None:
+    while (
+        item := device.next_item(1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us))
+    ) is not None:
         if isinstance(item, Fault | LinkEvent):
             news.append(item)
     return began, news
@@ -174,8 +202,8 @@ def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
 def follow(
     device: Device, what: Stream, *, every: int = 1, frames: int = 0
 ) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
-    """``Device.stream``, the packets of each frame put together. A frame is complete when its last kind came or another frame
-    begins.
+    """``Device.stream``, the packets of each frame put together. A frame is complete when its last
+    kind came or another frame begins.
 
     Raises:
         UsageError, DeviceError: as ``Device.stream``.
@@ -183,7 +211,9 @@ def follow(
     return put_together(device.stream(what, every=every, frames=frames), what)
 
 
-def put_together(items: Iterator[Any], what: Stream) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
+def put_together(
+    items: Iterator[Any], what: Stream
+) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
     """Frames out of a stream's packets; ``items`` is closed with it."""
     try:
         yield from _put_together(items, what)
@@ -218,8 +248,8 @@ def _put_together(items: Iterator[Any], what: Stream) -> Iterator[LiveFrame | Fa
 def replayed(
     device: Device, what: Stream, *, every: int = 1, frames: int = 0
 ) -> Generator[LiveFrame | Fault | LinkEvent, None, None]:
-    """As ``follow``, of a recording: what a live stream would have shown, which is all but the quiet frames of tares, timed from
-    the first frame that is none."""
+    """As ``follow``, of a recording: what a live stream would have shown, which is all but the
+    quiet frames of tares, timed from the first frame that is none."""
     start: int | None = None
     count = 0
     for item in follow(device, what):
@@ -260,7 +290,8 @@ def _frame(clock: _Clock, parts: dict[str, Any]) -> LiveFrame:
 
 
 def finish(summary: LiveSummary, device: Device) -> LiveSummary:
-    """Add what the link and the board counted; a board that does not answer any more leaves its part out."""
+    """Add what the link and the board counted; a board that does not answer any more leaves its
+    part out."""
     summary.link = device.counters.as_dict()
     if not device.transport.replays and not device.link.ended:
         try:

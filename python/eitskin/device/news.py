@@ -1,6 +1,8 @@
-"""What a stream tells beside its frames, in lines: faults, events of the link, what is found in frames once it rises and goes.
+"""What a stream tells beside its frames, in lines: faults, events of the link, what is found in
+frames once it rises and goes.
 
-A board tells most of what it finds as faults, and all of it in the head of each frame. What both tell is said once.
+A board tells most of what it finds as faults, and all of it in the head of each frame. What both
+tell is said once.
 """
 
 from __future__ import annotations
@@ -9,7 +11,15 @@ from eitskin.core.findings import names, words
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import fault_text
-from eitskin.device.wire.packets import CLEAN_FRAMES, DOUBTFUL_FAULTS, FOUND_FAULTS, SHOWN_FRAMES, Fault, FaultCode, Solved
+from eitskin.device.wire.packets import (
+    CLEAN_FRAMES,
+    DOUBTFUL_FAULTS,
+    FOUND_FAULTS,
+    SHOWN_FRAMES,
+    Fault,
+    FaultCode,
+    Solved,
+)
 
 Key = tuple[str, int]  # a name of core.findings.FINDINGS, and which electrode; -1: none
 
@@ -22,18 +32,25 @@ _NAMES = {
     FaultCode.STALE_REFERENCE: "stale reference",
 }
 _DOUBTFUL = frozenset(_NAMES[code] for code in DOUBTFUL_FAULTS)
-_OF_ELECTRODES = {"electrode open": "open", "electrodes bridged": "bridged", "electrode noisy": "noisy"}
+_OF_ELECTRODES = {
+    "electrode open": "open",
+    "electrodes bridged": "bridged",
+    "electrode noisy": "noisy",
+}
 
 
 class News:
     """Turns what a stream gives into lines, as it comes."""
 
     def __init__(self) -> None:
-        self._clean: dict[Key, int] = {}  # what has been said to be there: frames in a row without it
+        self._clean: dict[
+            Key, int
+        ] = {}  # what has been said to be there: frames in a row without it
         self._shown: dict[Key, int] = {}  # what the last frame showed: how many in a row
 
     def lines(self, item: LiveFrame | Fault | LinkEvent) -> list[str]:
-        """What is new with ``item``; of a frame only what it shows and those before it did not, or what has gone."""
+        """What is new with ``item``; of a frame only what it shows and those before it did not, or
+        what has gone."""
         if isinstance(item, LinkEvent):
             return [link_text(item)]
         if isinstance(item, Fault):
@@ -56,7 +73,9 @@ class News:
         now, said = _found(solved), []
         self._shown = {key: self._shown.get(key, 0) + 1 for key in now}
         for key, text in now.items():
-            if key not in self._clean and self._shown[key] >= (SHOWN_FRAMES if key[0] in _DOUBTFUL else 1):
+            if key not in self._clean and self._shown[key] >= (
+                SHOWN_FRAMES if key[0] in _DOUBTFUL else 1
+            ):
                 said.append(f"{text}, frame {solved.frame}")
                 self._clean[key] = 0
         for key in list(self._clean):
@@ -77,7 +96,11 @@ def _keys(fault: Fault) -> list[Key]:
     name = _NAMES[FaultCode(fault.code)]
     if name not in _OF_ELECTRODES:
         return [(name, -1)]
-    partner = [(name, fault.value)] if fault.code == FaultCode.BRIDGED and fault.raised and fault.value >= 0 else []
+    partner = (
+        [(name, fault.value)]
+        if fault.code == FaultCode.BRIDGED and fault.raised and fault.value >= 0
+        else []
+    )
     return [(name, fault.index), *partner]
 
 

@@ -1,4 +1,5 @@
-"""Devices are URLs: auto, serial:PORT, sim:SCENE, emu:SCENE, file:RUN.eits. The same frames, commands and errors behind each."""
+"""Devices are URLs: auto, serial:PORT, sim:SCENE, emu:SCENE, file:RUN.eits. The same frames,
+commands and errors behind each."""
 
 from __future__ import annotations
 
@@ -22,25 +23,36 @@ MOST_BAUD = 20_000_000
 
 
 def open_device(
-    url: str, *, model: bytes | None = None, image: Path | None = None, room: int = 1024, reconnect: Reconnect | None = None
+    url: str,
+    *,
+    model: bytes | None = None,
+    image: Path | None = None,
+    room: int = 1024,
+    reconnect: Reconnect | None = None,
 ) -> Device:
     """The device behind ``url``, asked what it is.
 
-    ``model`` is put into the bank of a simulated or emulated board (without it, the prebuilt model); a real board's and a
-    recording's must be the same. ``image`` is the firmware of an emulated board (without it, the one that ships with eitskin).
-    ``room``: packets that are queued for a slow reader. ``reconnect``: how long an unplugged board is waited for.
+    ``model`` is put into the bank of a simulated or emulated board (without it, the prebuilt
+    model); a real board's and a recording's must be the same. ``image`` is the firmware of an
+    emulated board (without it, the one that ships with eitskin).
+    ``room``: packets that are queued for a slow reader. ``reconnect``: how long an unplugged board
+        is waited for.
 
     Raises:
-        DeviceError: it cannot be opened, does not answer, is of another version, or has another model.
+        DeviceError: it cannot be opened, does not answer, is of another version, or has another
+            model.
         UsageError: the URL cannot be read.
-        FileError, ConfigError, ModelError, MissingExtraError: of the scene, recording, model or emulator that it names.
+        FileError, ConfigError, ModelError, MissingExtraError: of the scene, recording, model or
+            emulator that it names.
     """
     device = Device(open_transport(url, model=model, image=image), room=room, reconnect=reconnect)
     if model is not None and device.board.has_model:
         from eitskin.model.eitm import decode_model
 
         try:
-            check_model(device.board, decode_model(model, "the model"), model, device.transport.name)
+            check_model(
+                device.board, decode_model(model, "the model"), model, device.transport.name
+            )
         except BaseException:
             device.close()
             raise
@@ -54,13 +66,16 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
         if scheme.startswith("/") or scheme.upper().startswith("COM"):
             raise UsageError(f"device {url!r}: write  serial:{url}")
         raise UsageError(
-            f"device {url!r}: {nearest(scheme, SCHEMES)}, as in auto, serial:/dev/ttyACM0, sim:two_touch, emu:two_touch, "
-            "file:RUN.eits"
+            f"device {url!r}: {nearest(scheme, SCHEMES)}, as in auto, serial:/dev/ttyACM0,"
+            " sim:two_touch, emu:two_touch, file:RUN.eits"
         )
     if scheme == "auto":
         return SerialTransport(only_board().path)
     if not rest:
-        raise UsageError(f"device {url!r}: something must follow the colon, as in serial:/dev/ttyACM0 or sim:two_touch")
+        raise UsageError(
+            f"device {url!r}: something must follow the colon, as in serial:/dev/ttyACM0 or"
+            " sim:two_touch"
+        )
     if scheme == "serial":
         return SerialTransport(*_path_and_baud(url, rest))
     if scheme == "sim":
@@ -68,7 +83,7 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
 
         return open_simulated(rest, model=model)
     if scheme == "emu":
-        from eitskin.device.emulator.transport import open_emulated
+        from eitskin.emulator.transport import open_emulated
 
         transport: Transport = open_emulated(rest, model=model, image=image)
         return transport
@@ -83,15 +98,22 @@ def list_devices() -> list[Port]:
 
 
 def find_device_scene(name: str) -> Scene:
-    """The scene behind ``sim:NAME`` and ``emu:NAME``: a file, or a library scene with or without ".toml".
+    """The scene behind ``sim:NAME`` and ``emu:NAME``: a file, or a library scene with or without
+    ".toml".
 
     Raises:
-        FileError, ConfigError, GeometryError, ProtocolError: as ``scene.library_scenes.find_scene``.
+        FileError, ConfigError, GeometryError, ProtocolError: as
+            ``scene.library_scenes.find_scene``.
     """
     from eitskin.scene.library_scenes import find_scene, library
 
     path = Path(name)
-    if path.suffix == ".toml" and not path.exists() and str(path.parent) == "." and path.stem in library():
+    if (
+        path.suffix == ".toml"
+        and not path.exists()
+        and str(path.parent) == "."
+        and path.stem in library()
+    ):
         name = path.stem
     return find_scene(name)
 
@@ -104,5 +126,3 @@ def _path_and_baud(url: str, rest: str) -> tuple[str, int]:
     if not match or not 0 < int(match.group(1)) <= MOST_BAUD or not path:
         raise UsageError(f"device {url!r}: what follows '?' must be baud=N, N up to {MOST_BAUD}")
     return path, int(match.group(1))
-
-

@@ -12,7 +12,9 @@ from eitskin.errors import DeviceError
 
 BAUD = 1_000_000  # of the ST-LINK's virtual port, as the firmware sets its USART
 ST_VENDOR = 0x0483
-ST_LINKS = frozenset((0x374A, 0x374B, 0x3752, 0x374D, 0x374E, 0x374F, 0x3753, 0x3754, 0x3755, 0x3757))  # with a virtual port
+ST_LINKS = frozenset(
+    (0x374A, 0x374B, 0x3752, 0x374D, 0x374E, 0x374F, 0x3753, 0x3754, 0x3755, 0x3757)
+)  # with a virtual port
 WRITE_S = 1.0
 ALLOW = (
     """run  echo 'SUBSYSTEM=="tty", ATTRS{idVendor}=="0483", MODE="0660", TAG+="uaccess"' | sudo tee """
@@ -23,7 +25,8 @@ ALLOW = (
 
 @dataclass(frozen=True)
 class Port:
-    """A serial port. ``vendor`` and ``product`` are its USB numbers, None where it is not on USB."""
+    """A serial port. ``vendor`` and ``product`` are its USB numbers, None where it is not on
+    USB."""
 
     path: str
     description: str = ""
@@ -41,13 +44,21 @@ def ports() -> list[Port]:
     """All serial ports of this computer, by path."""
     from serial.tools import list_ports
 
-    found = (Port(p.device, p.description or "", p.vid, p.pid, p.serial_number) for p in list_ports.comports())
+    found = (
+        Port(p.device, p.description or "", p.vid, p.pid, p.serial_number)
+        for p in list_ports.comports()
+    )
     return sorted(found, key=lambda port: port.path)
 
 
 def listing(found: list[Port]) -> str:
     """The ports in one line."""
-    return ", ".join(f"{port.path} ({port.description})" if port.description else port.path for port in found) or "none"
+    return (
+        ", ".join(
+            f"{port.path} ({port.description})" if port.description else port.path for port in found
+        )
+        or "none"
+    )
 
 
 def only_board() -> Port:
@@ -62,10 +73,12 @@ def only_board() -> Port:
         return boards[0]
     if not boards:
         raise DeviceError(
-            f"auto: no ST-LINK port is there (serial ports: {listing(found)}); plug the board in, name the port with "
-            " --device serial:PORT  or play with  --device sim:two_touch"
+            f"auto: no ST-LINK port is there (serial ports: {listing(found)}); plug the board in,"
+            " name the port with  --device serial:PORT  or play with  --device sim:two_touch"
         )
-    raise DeviceError(f"auto: several boards are there ({listing(boards)}); name one with  --device serial:PORT")
+    raise DeviceError(
+        f"auto: several boards are there ({listing(boards)}); name one with  --device serial:PORT"
+    )
 
 
 class SerialTransport:
@@ -82,7 +95,9 @@ class SerialTransport:
     def __init__(self, path: str, baud: int = BAUD) -> None:
         self.url = f"serial:{path}" + (f"?baud={baud}" if baud != BAUD else "")
         self.name, self.baud = path, baud
-        self._serial_number = next((port.serial_number for port in ports() if port.path == path), None)
+        self._serial_number = next(
+            (port.serial_number for port in ports() if port.path == path), None
+        )
         self._lock = threading.Lock()
         self._closed = False
         self._port = open_port(path, baud)
@@ -94,7 +109,11 @@ class SerialTransport:
                 port.timeout = timeout_s
             first = port.read(1)
             return bytes(first + port.read(port.in_waiting)) if first else b""
-        except (OSError, TypeError, ValueError) as error:  # pyserial's own is an OSError; a port just closed gives the others
+        except (
+            OSError,
+            TypeError,
+            ValueError,
+        ) as error:  # pyserial's own is an OSError; a port just closed gives the others
             raise DeviceError(f"{self.name}: the port is gone ({_reason(error)})") from None
 
     def write(self, data: bytes) -> None:
@@ -103,12 +122,15 @@ class SerialTransport:
         try:
             self._port.write(data)
         except SerialTimeoutException:
-            raise DeviceError(f"{self.name}: takes no bytes; reset the board or plug it in again") from None
+            raise DeviceError(
+                f"{self.name}: takes no bytes; reset the board or plug it in again"
+            ) from None
         except (OSError, TypeError, ValueError) as error:
             raise DeviceError(f"{self.name}: the port is gone ({_reason(error)})") from None
 
     def reopen(self) -> bool:
-        """The port with the same USB serial number, whatever its path now is; without a number, the same path.
+        """The port with the same USB serial number, whatever its path now is; without a number, the
+        same path.
 
         Raises:
             DeviceError: it is there, but may not be opened.
@@ -119,7 +141,9 @@ class SerialTransport:
             _close(self._port)
             path = self.name
             if self._serial_number is not None:
-                path = next((port.path for port in ports() if port.serial_number == self._serial_number), "")
+                path = next(
+                    (port.path for port in ports() if port.serial_number == self._serial_number), ""
+                )
             if not path:
                 return False
             try:
@@ -159,12 +183,19 @@ def open_port(path: str, baud: int) -> Any:
         if code in (errno.EACCES, errno.EPERM):
             raise DeviceError(f"{path}: no permission to open it; {ALLOW}") from None
         if code in (errno.EBUSY, errno.EAGAIN):
-            raise _NotNow(f"{path}: another program uses it; close that (find it with  fuser {path} )") from None
+            raise _NotNow(
+                f"{path}: another program uses it; close that (find it with  fuser {path} )"
+            ) from None
         if code in (errno.ENOTTY, errno.EINVAL, errno.EISDIR) or code is None:
-            raise DeviceError(f"{path}: no serial port that does {baud} baud ({_reason(error)}); see  eitskin devices") from None
+            raise DeviceError(
+                f"{path}: no serial port that does {baud} baud ({_reason(error)}); see  eitskin"
+                " devices"
+            ) from None
         raise _NotNow(f"{path}: cannot open it ({_reason(error)})") from None
     except Exception as error:  # termios.error, which is no OSError
-        raise DeviceError(f"{path}: no serial port that does {baud} baud ({_reason(error)}); see  eitskin devices") from None
+        raise DeviceError(
+            f"{path}: no serial port that does {baud} baud ({_reason(error)}); see  eitskin devices"
+        ) from None
 
 
 def _close(port: Any) -> None:

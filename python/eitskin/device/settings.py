@@ -16,8 +16,8 @@ MOST_TARE = 1024
 
 @dataclass(frozen=True)
 class ScanSettings:
-    """How frames are scanned; None stays as it is. ``check_every`` as in ``commands.Scan``: 1 scans every row, n > 1 one of each
-    reciprocal pair with every n-th frame whole, 0 never whole."""
+    """How frames are scanned; None stays as it is. ``check_every`` as in ``commands.Scan``: 1 scans
+    every row, n > 1 one of each reciprocal pair with every n-th frame whole, 0 never whole."""
 
     excitation_hz: float | None = None
     sample_rate_hz: int | None = None
@@ -34,8 +34,8 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at none, ``findings`` at all,
-    ``track`` at on."""
+    """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at
+    none, ``findings`` at all, ``track`` at on."""
 
     iterations: int | None = None
     gap_rel: float | None = None

@@ -48,7 +48,11 @@ class _Progress:
         return max(self.wanted - max(self._came.values()), 1) if self.wanted else 0
 
 
-_KIND: dict[type, Stream] = {RawFrame: Stream.RAW, SolvedImage: Stream.IMAGE, SolvedTouches: Stream.TOUCHES}
+_KIND: dict[type, Stream] = {
+    RawFrame: Stream.RAW,
+    SolvedImage: Stream.IMAGE,
+    SolvedTouches: Stream.TOUCHES,
+}
 
 
 def stream(device: Device, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
@@ -88,40 +92,53 @@ def _start(device: Device, progress: _Progress, every: int) -> None:
 
 
 def _stop(device: Device) -> None:
-    """However the stream ended; a board that is gone cannot be stopped, and that is not what went wrong."""
+    """However the stream ended; a board that is gone cannot be stopped, and that is not what went
+    wrong."""
     with suppress(EitskinError):
         device.send_command(StreamCommand(0), COMMAND_S)
 
 
 def _resume(device: Device, progress: _Progress, every: int) -> None:
-    """Go on after the board was away: only if it is the same, with the same model and, for images, still with its reference."""
+    """Go on after the board was away: only if it is the same, with the same model and, for images,
+    still with its reference."""
     before = device.board
     now = device.info()
     name = device.transport.name
     if now.serial != before.serial:
-        raise DeviceError(f"{name}: another board came back ({now.serial} for {before.serial}); start again")
+        raise DeviceError(
+            f"{name}: another board came back ({now.serial} for {before.serial}); start again"
+        )
     if now.model_crc != before.model_crc:
         raise DeviceError(f"{name}: the board came back with another model; start again")
     if progress.what & (Stream.IMAGE | Stream.TOUCHES) and not now.tared:
-        raise DeviceError(f"{name}: the board restarted and has no reference frame; leave the skin untouched and start again")
+        raise DeviceError(
+            f"{name}: the board restarted and has no reference frame; leave the skin untouched and"
+            " start again"
+        )
     _start(device, progress, every)
 
 
 def _is_over(device: Device, progress: _Progress, every: int, silent: int) -> bool:
-    """Nothing came for a while: whether that is because the board has sent all, found out by asking it."""
+    """Nothing came for a while: whether that is because the board has sent all, found out by asking
+    it."""
     before = device.board
     now = device.info()
     if device.link.ended:
         return True
     if now.streaming == 0:
-        same = now.serial == before.serial and now.tared == before.tared and device.counters.restarts == progress.restarts
+        same = (
+            now.serial == before.serial
+            and now.tared == before.tared
+            and device.counters.restarts == progress.restarts
+        )
         if progress.wanted and same:
             return True  # it has sent all that was asked for, and some of it was lost
         _resume(device, progress, every)
     elif silent >= SILENCES:
         faults = ", ".join(code.name.lower().replace("_", " ") for code in now.fault_codes)
         raise DeviceError(
-            f"{device.transport.name}: the board answers but sends no frame; it reports {faults or 'no fault'}: reset it"
+            f"{device.transport.name}: the board answers but sends no frame; it reports"
+            f" {faults or 'no fault'}: reset it"
         )
     return False
 

@@ -12,11 +12,12 @@ class Transport(Protocol):
     Attributes:
         url: what it was opened by, such as "serial:/dev/ttyACM0".
         name: one word or two for messages, such as "/dev/ttyACM0".
-        synchronous: the board only runs while ``read`` is called (simulated, emulated, recorded). It is then pumped by whoever
-            asks, without a thread, and runs are reproducible; timeouts count in the board's own time.
+        synchronous: the board only runs while ``read`` is called (simulated, emulated, recorded).
+            It is then pumped by whoever asks, without a thread, and runs are reproducible; timeouts
+            count in the board's own time.
         replays: it is a recording: nothing can be asked of it.
-        ended: a scene or a recording is over: no frame will come again. Commands are still answered, but by recordings. Never
-            true of a real board.
+        ended: a scene or a recording is over: no frame will come again. Commands are still
+            answered, but by recordings. Never true of a real board.
     """
 
     @property
@@ -45,10 +46,12 @@ class Transport(Protocol):
         """
 
     def reopen(self) -> bool:
-        """Try once to open the same board again after ``read`` or ``write`` failed; False if it is not there (yet)."""
+        """Try once to open the same board again after ``read`` or ``write`` failed; False if it is
+        not there (yet)."""
 
     def begin_scene(self) -> None:
-        """Begin what is to be touched: until then a simulated or emulated skin is untouched. Nothing on a real board."""
+        """Begin what is to be touched: until then a simulated or emulated skin is untouched.
+        Nothing on a real board."""
 
     def close(self) -> None:
         """Let go of the port; may be called twice."""

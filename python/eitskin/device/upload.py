@@ -1,4 +1,5 @@
-"""A model over the wire into a board's other bank: announced, sent in pieces, committed. Cut at any byte, the old model stays."""
+"""A model over the wire into a board's other bank: announced, sent in pieces, committed. Cut at any
+byte, the old model stays."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ VERIFY_S = 20.0
 GOING_BACK = 10
 
 
-def upload(device: Device, model: str | Path | bytes, progress: Callable[[int, int], None] | None) -> None:
+def upload(
+    device: Device, model: str | Path | bytes, progress: Callable[[int, int], None] | None
+) -> None:
     """See ``Device.upload_model``."""
     blob = _checked(device, model)
     name, crc = device.transport.name, zlib.crc32(blob)
@@ -38,11 +41,15 @@ def upload(device: Device, model: str | Path | bytes, progress: Callable[[int, i
         raise
     except DeviceError as error:
         raise DeviceError(
-            f"{error} -- the upload was cut after {done} of {len(blob)} bytes, the board keeps its old model; upload again"
+            f"{error} -- the upload was cut after {done} of {len(blob)} bytes, the board keeps its"
+            " old model; upload again"
         ) from None
     info = device.info()
     if info.model_crc != crc:
-        raise DeviceError(f"{name}: the board says it has model {info.model_crc:08x} after {crc:08x} was uploaded; upload again")
+        raise DeviceError(
+            f"{name}: the board says it has model {info.model_crc:08x} after {crc:08x} was"
+            " uploaded; upload again"
+        )
 
 
 class _Refused(DeviceError):
@@ -65,12 +72,14 @@ def _checked(device: Device, model: str | Path | bytes) -> bytes:
     info, name = device.board, device.transport.name
     if len(blob) > info.bank_bytes:
         raise DeviceError(
-            f"{name}: the model has {len(blob)} bytes and the board takes {info.bank_bytes}; build it with fewer pixels, a lower "
-            "rank or a smaller storage type (eitskin model build --help)"
+            f"{name}: the model has {len(blob)} bytes and the board takes {info.bank_bytes}; build"
+            " it with fewer pixels, a lower rank or a smaller storage type (eitskin model build"
+            " --help)"
         )
     if decoded.protocol.n_electrodes > info.electrodes:
         raise DeviceError(
-            f"{name}: the model's protocol needs {decoded.protocol.n_electrodes} electrodes and the board has {info.electrodes}"
+            f"{name}: the model's protocol needs {decoded.protocol.n_electrodes} electrodes and the"
+            f" board has {info.electrodes}"
         )
     return blob
 
@@ -81,7 +90,11 @@ def _send_pieces(device: Device, blob: bytes, done: int) -> Iterator[int]:
     back = 0
     while done < len(blob):
         reply = device.send_command(ModelData(done, blob[done : done + size]), PIECE_S)
-        if reply.status == ReplyStatus.OFFSET and 0 <= reply.detail[0] <= len(blob) and back < GOING_BACK:
+        if (
+            reply.status == ReplyStatus.OFFSET
+            and 0 <= reply.detail[0] <= len(blob)
+            and back < GOING_BACK
+        ):
             done, back = reply.detail[0], back + 1  # the board knows what it has
             continue
         _demand(device, reply)

@@ -1,1 +1,2 @@
-"""The model path: grid, mesh, complete electrode model, sensitivity. Only its users need scipy and netgen."""
+"""The model path: grid, mesh, complete electrode model, sensitivity. Only its users need scipy and
+netgen."""

@@ -1,11 +1,15 @@
-"""The complete electrode model on linear triangles (Somersalo, Cheney and Isaacson, SIAM J. Appl. Math. 52, 1992).
+"""The complete electrode model on linear triangles (Somersalo, Cheney and Isaacson, SIAM J. Appl.
+Math. 52, 1992).
 
-A sheet of thickness t carries currents in its plane only. With potential phi inside and U_l on electrode l, weakly
+A sheet of thickness t carries currents in its plane only. With potential phi inside and U_l on
+electrode l, weakly
 
-    sum_e sigma_e t int grad phi . grad v  +  sum_l (t / z_l) int_{E_l} (phi - U_l)(v - V_l)  =  sum_l I_l V_l .
+    sum_e sigma_e t int grad phi . grad v  +  sum_l (t / z_l) int_{E_l} (phi - U_l)(v - V_l)  =
+    sum_l I_l V_l .
 
-An electrode without contact impedance is an ideal shunt: its nodes and U_l are one unknown. The last electrode's U is
-fixed at 0, which leaves the matrix symmetric positive definite; potentials are then shifted to zero electrode mean.
+An electrode without contact impedance is an ideal shunt: its nodes and U_l are one unknown. The
+last electrode's U is fixed at 0, which leaves the matrix symmetric positive definite; potentials
+are then shifted to zero electrode mean.
 """
 
 from __future__ import annotations
@@ -35,7 +39,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass
 class Counters:
-    """What a forward model has done: sparsity patterns made, factorisations, right-hand sides solved."""
+    """What a forward model has done: sparsity patterns made, factorisations, right-hand sides
+    solved."""
 
     patterns: int = 0
     factorisations: int = 0
@@ -44,7 +49,8 @@ class Counters:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Potentials in V per A of each solved pattern (``ForwardModel.patterns``), zero mean over the electrodes.
+    """Potentials in V per A of each solved pattern (``ForwardModel.patterns``), zero mean over the
+    electrodes.
 
     ``nodes`` is (N, P), ``electrodes`` (L, P).
     """
@@ -55,10 +61,12 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The matrix's sparsity pattern for one choice of shunted electrodes, and the maps that fill it.
+    """The matrix's sparsity pattern for one choice of shunted electrodes, and the maps that fill
+    it.
 
-    ``unknown`` (N + L,) numbers the unknown of each node and then electrode; ``size`` itself is the grounded one.
-    The stored values are ``filling`` (nnz, E + L) times the conductivities and then the electrodes' admittances 1 / z.
+    ``unknown`` (N + L,) numbers the unknown of each node and then electrode; ``size`` itself is the
+    grounded one. The stored values are ``filling`` (nnz, E + L) times the conductivities and then
+    the electrodes' admittances 1 / z.
     """
 
     shunted: BoolArray
@@ -76,22 +84,30 @@ class System:
 
 
 class ForwardModel:
-    """Boundary voltages of a skin for any conductivity of the mesh's elements; the sparsity pattern is made only once.
+    """Boundary voltages of a skin for any conductivity of the mesh's elements; the sparsity pattern
+    is made only once.
 
-    ``contact_impedance_ohm_m2`` is one number or (L,); None takes the skin's. ``counters`` tells the work done.
+    ``contact_impedance_ohm_m2`` is one number or (L,); None takes the skin's. ``counters`` tells
+    the work done.
 
     Raises:
         ProtocolError: the protocol has another number of electrodes than the skin.
-        UsageError: a contact impedance is negative or not finite, or there is not one for each electrode.
+        UsageError: a contact impedance is negative or not finite, or there is not one for each
+            electrode.
     """
 
     def __init__(
-        self, mesh: Mesh, skin: Skin, protocol: Protocol, contact_impedance_ohm_m2: npt.ArrayLike | None = None
+        self,
+        mesh: Mesh,
+        skin: Skin,
+        protocol: Protocol,
+        contact_impedance_ohm_m2: npt.ArrayLike | None = None,
     ) -> None:
         count = skin.electrodes.count
         if protocol.n_electrodes != count:
             raise ProtocolError(
-                f"protocol for {protocol.n_electrodes} electrodes, but skin {skin.name!r} has {count}; make them agree"
+                f"protocol for {protocol.n_electrodes} electrodes, but skin {skin.name!r} has"
+                f" {count}; make them agree"
             )
         self.mesh, self.skin, self.protocol = mesh, skin, protocol
         self.patterns: Patterns = patterns_for(protocol)
@@ -104,11 +120,15 @@ class ForwardModel:
         self._system = self._make_system(self._impedance == 0)
 
     def solve(
-        self, conductivity_s_per_m: npt.ArrayLike, contact_impedance_ohm_m2: npt.ArrayLike | None = None
+        self,
+        conductivity_s_per_m: npt.ArrayLike,
+        contact_impedance_ohm_m2: npt.ArrayLike | None = None,
     ) -> Solution:
-        """Solve every pattern for conductivities (E,), or one for all elements, with a single factorisation.
+        """Solve every pattern for conductivities (E,), or one for all elements, with a single
+        factorisation.
 
-        ``contact_impedance_ohm_m2`` replaces the model's for this call; changing which are 0 makes a new pattern.
+        ``contact_impedance_ohm_m2`` replaces the model's for this call; changing which are 0 makes
+        a new pattern.
 
         Raises:
             UsageError: a shape is wrong, or a value not finite and above 0 (impedances may be 0).
@@ -131,17 +151,21 @@ class ForwardModel:
         return Solution(potentials[system.unknown[:n_nodes]] - shift, electrodes - shift)
 
     def system_for(self, shunted: BoolArray) -> System:
-        """The system in which the electrodes ``shunted`` (L,) are ideal; made anew only when they change."""
+        """The system in which the electrodes ``shunted`` (L,) are ideal; made anew only when they
+        change."""
         if not np.array_equal(shunted, self._system.shunted):
             self._system = self._make_system(shunted)
         return self._system
 
     def voltages_of(self, solution: Solution) -> FloatArray:
-        """The boundary voltages (m,) in V that the protocol reads off ``solution``, at the protocol's current."""
+        """The boundary voltages (m,) in V that the protocol reads off ``solution``, at the
+        protocol's current."""
         return self.patterns.voltages(solution.electrodes) * self.protocol.current_a
 
     def voltages(
-        self, conductivity_s_per_m: npt.ArrayLike, contact_impedance_ohm_m2: npt.ArrayLike | None = None
+        self,
+        conductivity_s_per_m: npt.ArrayLike,
+        contact_impedance_ohm_m2: npt.ArrayLike | None = None,
     ) -> FloatArray:
         """The boundary voltages (m,) in V; arguments and errors as ``solve``."""
         return self.voltages_of(self.solve(conductivity_s_per_m, contact_impedance_ohm_m2))
@@ -152,8 +176,8 @@ class ForwardModel:
             conductivity = np.full(self.mesh.n_elements, float(conductivity))
         if conductivity.shape != (self.mesh.n_elements,):
             raise UsageError(
-                f"forward model: conductivity of shape {conductivity.shape} for {self.mesh.n_elements} elements; "
-                "give one value for each element or one for all"
+                f"forward model: conductivity of shape {conductivity.shape} for"
+                f" {self.mesh.n_elements} elements; give one value for each element or one for all"
             )
         if not (conductivity.min() > 0 and conductivity.max() < np.inf):
             raise UsageError("forward model: every conductivity must be finite and above 0 S/m")
@@ -162,12 +186,17 @@ class ForwardModel:
     def _make_system(self, shunted: BoolArray) -> System:
         self.counters.patterns += 1
         volumes_m3 = self.mesh.areas_mm2 * (1e-6 * self.thickness_m)
-        return _system(self.mesh, shunted, _stiffness(self.gradients_per_m, volumes_m3), self.thickness_m)
+        return _system(
+            self.mesh, shunted, _stiffness(self.gradients_per_m, volumes_m3), self.thickness_m
+        )
 
 
 def factorise(matrix: csc_matrix) -> Any:
-    """The factors (scipy's SuperLU object) of a symmetric ``matrix``, real or complex, that needs no pivoting."""
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    """The factors (scipy's SuperLU object) of a symmetric ``matrix``, real or complex, that needs
+    no pivoting."""
+    return splu(
+        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
 
 
 def shape_gradients(mesh: Mesh) -> FloatArray:
@@ -183,9 +212,13 @@ def _checked_impedance(given: npt.ArrayLike, count: int) -> FloatArray:
     if impedance.ndim == 0:
         impedance = np.full(count, float(impedance))
     if impedance.shape != (count,):
-        raise UsageError(f"forward model: contact impedance of shape {impedance.shape} for {count} electrodes")
+        raise UsageError(
+            f"forward model: contact impedance of shape {impedance.shape} for {count} electrodes"
+        )
     if not (impedance.min() >= 0 and impedance.max() < np.inf):
-        raise UsageError("forward model: every contact impedance must be finite and at least 0 ohm m2")
+        raise UsageError(
+            "forward model: every contact impedance must be finite and at least 0 ohm m2"
+        )
     return impedance.copy()
 
 
@@ -197,7 +230,8 @@ def _stiffness(gradients_per_m: FloatArray, volumes_m3: FloatArray) -> FloatArra
 
 
 def _number_unknowns(mesh: Mesh, shunted: BoolArray) -> tuple[IntArray, int]:
-    """The unknown of each node and then electrode, (N + L,), and how many there are; that number is the ground's."""
+    """The unknown of each node and then electrode, (N + L,), and how many there are; that number is
+    the ground's."""
     count = len(shunted)
     leader = np.arange(mesh.n_nodes + count)
     for k in np.flatnonzero(shunted):
@@ -209,11 +243,16 @@ def _number_unknowns(mesh: Mesh, shunted: BoolArray) -> tuple[IntArray, int]:
     return number[leader], size
 
 
-def _contact_terms(mesh: Mesh, shunted: BoolArray, thickness_m: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """Rim edges' matrices on (node, node, electrode): places (B, 3), electrodes (B,), values (B, 3, 3) m2 per 1/z."""
+def _contact_terms(
+    mesh: Mesh, shunted: BoolArray, thickness_m: float
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Rim edges' matrices on (node, node, electrode): places (B, 3), electrodes (B,), values (B, 3,
+    3) m2 per 1/z."""
     touching = np.flatnonzero(~shunted)
     owner = np.repeat(touching, [len(mesh.electrode_edges[k]) for k in touching])
-    edges = np.concatenate([np.zeros((0, 2), np.int64), *(mesh.electrode_edges[k] for k in touching)])
+    edges = np.concatenate(
+        [np.zeros((0, 2), np.int64), *(mesh.electrode_edges[k] for k in touching)]
+    )
     steps = mesh.nodes_mm[edges[:, 1]] - mesh.nodes_mm[edges[:, 0]]
     area_m2 = np.hypot(steps[:, 0], steps[:, 1]) * 1e-3 * thickness_m
     one = np.array([[2, 1, -3], [1, 2, -3], [-3, -3, 6]]) / 6
@@ -225,7 +264,9 @@ def _system(mesh: Mesh, shunted: BoolArray, stiffness: FloatArray, thickness_m: 
     contact_places, contact_owner, contact_values = _contact_terms(mesh, shunted, thickness_m)
     places = unknown[np.concatenate([mesh.triangles, contact_places])]
     rows, columns = np.repeat(places, 3, axis=1).ravel(), np.tile(places, (1, 3)).ravel()
-    owners = np.repeat(np.concatenate([np.arange(mesh.n_elements), mesh.n_elements + contact_owner]), 9)
+    owners = np.repeat(
+        np.concatenate([np.arange(mesh.n_elements), mesh.n_elements + contact_owner]), 9
+    )
     values = np.concatenate([stiffness.ravel(), contact_values.ravel()])
     kept = np.flatnonzero((rows < size) & (columns < size))
     order = kept[_counting_order(rows[kept], size)]
@@ -245,6 +286,9 @@ def _system(mesh: Mesh, shunted: BoolArray, stiffness: FloatArray, thickness_m: 
 
 
 def _counting_order(keys: IntArray, size: int) -> IntArray:
-    """The stable order of ``keys`` in [0, size); scipy's turn from rows to columns is a counting sort, so is faster."""
-    one_a_row = csr_matrix((np.ones(len(keys), np.int8), keys, np.arange(len(keys) + 1)), shape=(len(keys), size))
+    """The stable order of ``keys`` in [0, size); scipy's turn from rows to columns is a counting
+    sort, so is faster."""
+    one_a_row = csr_matrix(
+        (np.ones(len(keys), np.int8), keys, np.arange(len(keys) + 1)), shape=(len(keys), size)
+    )
     return np.asarray(one_a_row.tocsc().indices)

@@ -1,7 +1,8 @@
 """The fields that the electrodes' currents make in the untouched skin.
 
-The Jacobian knows products of fields, each touch by itself. What touches do to each other needs the fields themselves: each touch
-answers as a dipole in the field that the others bend (csrc/src/coupling.h has the formula).
+The Jacobian knows products of fields, each touch by itself. What touches do to each other needs the
+fields themselves: each touch answers as a dipole in the field that the others bend
+(csrc/src/coupling.h has the formula).
 """
 
 from __future__ import annotations
@@ -16,10 +17,14 @@ from eitskin.fem.sensitivity import element_fields, element_to_pixel
 FloatArray = npt.NDArray[np.float64]
 
 
-def electrode_fields(forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike, grid: Grid) -> FloatArray:
-    """The mean gradient of the potential over each pixel for a current into each electrode, (n, 2, L) in V/m per A.
+def electrode_fields(
+    forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike, grid: Grid
+) -> FloatArray:
+    """The mean gradient of the potential over each pixel for a current into each electrode, (n, 2,
+    L) in V/m per A.
 
-    Only differences between electrodes have a meaning: the field of a pair is that of its first less that of its second.
+    Only differences between electrodes have a meaning: the field of a pair is that of its first
+    less that of its second.
 
     Raises:
         UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
@@ -28,6 +33,8 @@ def electrode_fields(forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike,
     by_pixel = element_to_pixel(forward.mesh, grid).tocsc()
     by_pixel.data *= forward.mesh.areas_mm2[by_pixel.indices]
     area = np.maximum(np.asarray(by_pixel.sum(axis=0)).ravel(), np.finfo(float).tiny)
-    by_pattern = np.stack([(by_pixel.T @ fields[:, axis, :]) / area[:, None] for axis in (0, 1)], axis=1)
+    by_pattern = np.stack(
+        [(by_pixel.T @ fields[:, axis, :]) / area[:, None] for axis in (0, 1)], axis=1
+    )
     incidence = forward.patterns.right_hand_sides(forward.protocol.n_electrodes)
     return np.asarray(by_pattern @ np.linalg.pinv(incidence))

@@ -1,4 +1,5 @@
-"""The image grid: square pixels over the outline's bounding box, of which those with their centre inside are kept."""
+"""The image grid: square pixels over the outline's bounding box, of which those with their centre
+inside are kept."""
 
 from __future__ import annotations
 
@@ -20,9 +21,11 @@ MAX_PIXELS_ACROSS = 512
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """nx by ny square pixels, of which n are kept, ordered row by row from the lowest y, each row from the lowest x.
+    """nx by ny square pixels, of which n are kept, ordered row by row from the lowest y, each row
+    from the lowest x.
 
-    ``origin_mm`` is the lower-left corner (x, y); ``index`` (n, 2) int64 holds each kept pixel's (ix, iy).
+    ``origin_mm`` is the lower-left corner (x, y); ``index`` (n, 2) int64 holds each kept pixel's
+    (ix, iy).
     """
 
     nx: int
@@ -61,7 +64,10 @@ class Grid:
         """
         flat = np.asarray(values, dtype=np.float64)
         if flat.shape != (self.n_pixels,):
-            raise UsageError(f"grid: values of shape {flat.shape} for {self.n_pixels} pixels; give one value a pixel")
+            raise UsageError(
+                f"grid: values of shape {flat.shape} for {self.n_pixels} pixels; give one value a"
+                " pixel"
+            )
         picture = np.full((self.ny, self.nx), np.nan)
         picture[self.index[:, 1], self.index[:, 0]] = flat
         return picture
@@ -74,31 +80,42 @@ class Grid:
         """
         picture = np.asarray(image, dtype=np.float64)
         if picture.shape != (self.ny, self.nx):
-            raise UsageError(f"grid: an image of shape {picture.shape} on a grid of {(self.ny, self.nx)}")
+            raise UsageError(
+                f"grid: an image of shape {picture.shape} on a grid of {(self.ny, self.nx)}"
+            )
         return picture[self.index[:, 1], self.index[:, 0]]
 
     def neighbours(self) -> IntArray:
-        """Each kept pixel's neighbours left, right, below, above: places among the kept, (n, 4); -1 for none."""
+        """Each kept pixel's neighbours left, right, below, above: places among the kept, (n, 4); -1
+        for none."""
         framed = np.pad(self.number, 1, constant_values=-1)
         ix, iy = self.index[:, 0] + 1, self.index[:, 1] + 1
-        return np.column_stack([framed[iy, ix - 1], framed[iy, ix + 1], framed[iy - 1, ix], framed[iy + 1, ix]])
+        return np.column_stack(
+            [framed[iy, ix - 1], framed[iy, ix + 1], framed[iy - 1, ix], framed[iy + 1, ix]]
+        )
 
     def locate(self, points_mm: npt.ArrayLike) -> IntArray:
         """The kept pixel in which each of ``points_mm`` (k, 2) lies, (k,); -1 outside of all."""
-        cell = np.floor((np.asarray(points_mm, dtype=np.float64).reshape(-1, 2) - self.origin_mm) / self.pixel_mm)
+        cell = np.floor(
+            (np.asarray(points_mm, dtype=np.float64).reshape(-1, 2) - self.origin_mm)
+            / self.pixel_mm
+        )
         known = (cell >= 0).all(axis=1) & (cell[:, 0] < self.nx) & (cell[:, 1] < self.ny)
         ix, iy = np.where(known[:, None], cell, 0).astype(np.int64).T
         return np.asarray(np.where(known, self.number[iy, ix], -1))
 
 
 def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
-    """The grid with ``pixels_across`` pixels along the bounding box's longer side; the shorter side's cover is centred.
+    """The grid with ``pixels_across`` pixels along the bounding box's longer side; the shorter
+    side's cover is centred.
 
     Raises:
         UsageError: ``pixels_across`` is not within 4 to 512.
     """
     if not 4 <= pixels_across <= MAX_PIXELS_ACROSS:
-        raise UsageError(f"grid: {pixels_across} pixels across is out of range; use 4 to {MAX_PIXELS_ACROSS}")
+        raise UsageError(
+            f"grid: {pixels_across} pixels across is out of range; use 4 to {MAX_PIXELS_ACROSS}"
+        )
     x0, y0, x1, y1 = outline.bounding_box_mm
     pixel_mm = max(x1 - x0, y1 - y0) / pixels_across
     nx, ny = (max(1, ceil(side / pixel_mm - 1e-9)) for side in (x1 - x0, y1 - y0))

@@ -1,4 +1,5 @@
-"""Triangle meshes of a skin, refined at its electrodes. Netgen makes them in a process of its own (mesh_worker.py)."""
+"""Triangle meshes of a skin, refined at its electrodes. Netgen makes them in a process of its own
+(mesh_worker.py)."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ COUNT_TOLERANCE = 0.15
 class Mesh:
     """Linear triangles: ``nodes_mm`` (N, 2), ``triangles`` (E, 3) counterclockwise.
 
-    ``electrode_edges`` holds for each electrode the rim edges under it as (k, 2) nodes, in order counterclockwise; an
-    electrode's two ends are nodes. Arrays are read-only.
+    ``electrode_edges`` holds for each electrode the rim edges under it as (k, 2) nodes, in order
+    counterclockwise; an electrode's two ends are nodes. Arrays are read-only.
     """
 
     nodes_mm: FloatArray
@@ -54,7 +55,10 @@ class Mesh:
     @cached_property
     def areas_mm2(self) -> FloatArray:
         """Each triangle's area, (E,)."""
-        u, v = (self.nodes_mm[self.triangles[:, k]] - self.nodes_mm[self.triangles[:, 0]] for k in (1, 2))
+        u, v = (
+            self.nodes_mm[self.triangles[:, k]] - self.nodes_mm[self.triangles[:, 0]]
+            for k in (1, 2)
+        )
         return np.asarray((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)
 
     def centroids_mm(self) -> FloatArray:
@@ -71,9 +75,14 @@ class Mesh:
 
 
 def build_mesh(
-    skin: Skin, *, max_size_mm: float, electrode_size_mm: float | None = None, timeout_s: float = 60.0
+    skin: Skin,
+    *,
+    max_size_mm: float,
+    electrode_size_mm: float | None = None,
+    timeout_s: float = 60.0,
 ) -> Mesh:
-    """Mesh ``skin`` with edges up to about ``max_size_mm``, ``electrode_size_mm`` on electrodes (their width / 4).
+    """Mesh ``skin`` with edges up to about ``max_size_mm``, ``electrode_size_mm`` on electrodes
+    (their width / 4).
 
     A disk's rim nodes lie on the circle. The same arguments give the same mesh.
 
@@ -82,12 +91,20 @@ def build_mesh(
         UsageError: a size is not above 0, or so small that the mesh would be enormous.
         MissingExtraError: netgen is not installed.
     """
-    size = electrode_size_mm if electrode_size_mm is not None else min(max_size_mm, skin.electrodes.width_mm / 4)
+    size = (
+        electrode_size_mm
+        if electrode_size_mm is not None
+        else min(max_size_mm, skin.electrodes.width_mm / 4)
+    )
     if not (0 < max_size_mm < float("inf") and 0 < size < float("inf")):
         raise UsageError(f"mesh: sizes of {max_size_mm:g} and {size:g} mm; both must be above 0")
-    if skin.outline.area_mm2 / max_size_mm**2 > MAX_ELEMENTS or skin.outline.perimeter_mm / size > MAX_ELEMENTS:
+    if (
+        skin.outline.area_mm2 / max_size_mm**2 > MAX_ELEMENTS
+        or skin.outline.perimeter_mm / size > MAX_ELEMENTS
+    ):
         raise UsageError(
-            f"mesh: sizes of {max_size_mm:g} and {size:g} mm would give over {MAX_ELEMENTS} elements; use larger ones"
+            f"mesh: sizes of {max_size_mm:g} and {size:g} mm would give over {MAX_ELEMENTS}"
+            " elements; use larger ones"
         )
     pieces, owner = _rim_pieces(skin, max_size_mm, min(size, max_size_mm))
     arrays = run_mesher({"max_size": max_size_mm, "pieces": pieces}, timeout_s, skin.name)
@@ -95,19 +112,25 @@ def build_mesh(
 
 
 def mesh_for_elements(skin: Skin, elements: int = 3000, *, timeout_s: float = 60.0) -> Mesh:
-    """A mesh of about ``elements`` triangles: within 15 %, or the nearest of four tries where the electrodes need more.
+    """A mesh of about ``elements`` triangles: within 15 %, or the nearest of four tries where the
+    electrodes need more.
 
     Raises:
         UsageError: ``elements`` is not within 200 to 200,000.
         GeometryError, MissingExtraError: as ``build_mesh``.
     """
     if not MIN_ELEMENTS <= elements <= MAX_ELEMENTS:
-        raise UsageError(f"mesh: {elements} elements is out of range; use {MIN_ELEMENTS} to {MAX_ELEMENTS}")
+        raise UsageError(
+            f"mesh: {elements} elements is out of range; use {MIN_ELEMENTS} to {MAX_ELEMENTS}"
+        )
     aim, best = float(elements), None
     for _ in range(4):
         max_size_mm = _size_for(skin, aim)
         mesh = build_mesh(
-            skin, max_size_mm=max_size_mm, electrode_size_mm=_electrode_size(skin, max_size_mm), timeout_s=timeout_s
+            skin,
+            max_size_mm=max_size_mm,
+            electrode_size_mm=_electrode_size(skin, max_size_mm),
+            timeout_s=timeout_s,
         )
         if best is None or abs(mesh.n_elements - elements) < abs(best.n_elements - elements):
             best = mesh
@@ -119,7 +142,8 @@ def mesh_for_elements(skin: Skin, elements: int = 3000, *, timeout_s: float = 60
 
 
 def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[npt.NDArray[Any]]:
-    """Run mesh_worker.py on ``request``, killing it after ``timeout_s``; returns its four arrays. ``name``: the skin.
+    """Run mesh_worker.py on ``request``, killing it after ``timeout_s``; returns its four arrays.
+    ``name``: the skin.
 
     Raises:
         GeometryError: it failed or was killed.
@@ -143,18 +167,25 @@ def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[npt
             )
         except subprocess.TimeoutExpired:
             raise GeometryError(
-                f"skin {name!r}: meshing took longer than {timeout_s:g} s and was stopped; simplify the outline, "
-                "use a larger element size or allow more time"
+                f"skin {name!r}: meshing took longer than {timeout_s:g} s and was stopped; simplify"
+                " the outline, use a larger element size or allow more time"
             ) from None
         if done.returncode != 0:
-            lines = done.stderr.decode(errors="replace").strip().splitlines() or [f"exit status {done.returncode}"]
-            raise GeometryError(f"skin {name!r}: the mesher failed ({lines[-1]}); simplify the outline")
+            lines = done.stderr.decode(errors="replace").strip().splitlines() or [
+                f"exit status {done.returncode}"
+            ]
+            raise GeometryError(
+                f"skin {name!r}: the mesher failed ({lines[-1]}); simplify the outline"
+            )
         with reply.open("rb") as arrays:
             return [np.load(arrays) for _ in range(4)]
 
 
-def _rim_pieces(skin: Skin, max_size_mm: float, electrode_size_mm: float) -> tuple[list[list[Any]], IntArray]:
-    """The rim cut at electrode ends and corners, as mesh_worker.py wants it; each piece's electrode or -1, (k,)."""
+def _rim_pieces(
+    skin: Skin, max_size_mm: float, electrode_size_mm: float
+) -> tuple[list[list[Any]], IntArray]:
+    """The rim cut at electrode ends and corners, as mesh_worker.py wants it; each piece's electrode
+    or -1, (k,)."""
     outline, perimeter = skin.outline, skin.outline.perimeter_mm
     spans = skin.electrode_spans_mm()
     corners = outline.corner_arc_lengths_mm()
@@ -178,14 +209,21 @@ def _rim_pieces(skin: Skin, max_size_mm: float, electrode_size_mm: float) -> tup
         stretch = 1 / np.cos((ends - cuts) / (2 * radius))
         controls = (outline.points_at(middles) * stretch[:, None]).tolist()
     sizes = np.where(owner >= 0, electrode_size_mm, max_size_mm)
-    return [[x, y, c, s] for (x, y), c, s in zip(points.tolist(), controls, sizes.tolist(), strict=True)], owner
+    return [
+        [x, y, c, s] for (x, y), c, s in zip(points.tolist(), controls, sizes.tolist(), strict=True)
+    ], owner
 
 
 def _without_long_arcs(cuts: FloatArray, perimeter: float) -> FloatArray:
-    """``cuts`` of a circle, and more where two are over a quarter of it apart: the tangents of a long arc's ends do not meet."""
+    """``cuts`` of a circle, and more where two are over a quarter of it apart: the tangents of a
+    long arc's ends do not meet."""
     arcs = np.append(cuts[1:], cuts[0] + perimeter) - cuts
     parts = np.ceil(arcs / (perimeter / 4)).astype(int)
-    more = [cut + arc * k / count for cut, arc, count in zip(cuts, arcs, parts, strict=True) for k in range(1, count)]
+    more = [
+        cut + arc * k / count
+        for cut, arc, count in zip(cuts, arcs, parts, strict=True)
+        for k in range(1, count)
+    ]
     return np.unique(np.mod([*cuts, *more], perimeter))
 
 
@@ -197,13 +235,17 @@ def _checked_mesh(skin: Skin, arrays: list[npt.NDArray[Any]], owner: IntArray) -
         array.flags.writeable = False
     mesh = Mesh(nodes, triangles, electrode_edges)
     area = float(mesh.areas_mm2.sum())
-    if not (len(triangles) and mesh.areas_mm2.min() > 0 and abs(area / skin.outline.area_mm2 - 1) < 0.05):
+    if not (
+        len(triangles) and mesh.areas_mm2.min() > 0 and abs(area / skin.outline.area_mm2 - 1) < 0.05
+    ):
         raise GeometryError(
-            f"skin {skin.name!r}: the mesh does not fill the outline ({area:g} of {skin.outline.area_mm2:g} mm2); "
-            "use a smaller element size"
+            f"skin {skin.name!r}: the mesh does not fill the outline ({area:g} of"
+            f" {skin.outline.area_mm2:g} mm2); use a smaller element size"
         )
     if len(np.unique(triangles)) != len(nodes) or min(len(e) for e in electrode_edges) < 1:
-        raise GeometryError(f"skin {skin.name!r}: the mesh has loose nodes or bare electrodes; use a smaller size")
+        raise GeometryError(
+            f"skin {skin.name!r}: the mesh has loose nodes or bare electrodes; use a smaller size"
+        )
     return mesh
 
 
@@ -219,15 +261,18 @@ def _chained(edges: IntArray) -> IntArray:
 
 
 def _electrode_size(skin: Skin, max_size_mm: float) -> float:
-    """A quarter of an electrode's width, less where the mesh is fine all over, more where it is very coarse."""
+    """A quarter of an electrode's width, less where the mesh is fine all over, more where it is
+    very coarse."""
     coarse = sqrt(skin.outline.area_mm2) / 24
     return min(skin.electrodes.width_mm / 4 * max(1.0, max_size_mm / coarse), max_size_mm / 3)
 
 
 def _expected_elements(skin: Skin, max_size_mm: float) -> float:
-    """Netgen's element count: the integral of 1 / size^2, where the size grows with the distance from an electrode.
+    """Netgen's element count: the integral of 1 / size^2, where the size grows with the distance
+    from an electrode.
 
-    It is taken over one electrode's share of the skin, as a rectangle on the rim. Slope and density are fitted.
+    It is taken over one electrode's share of the skin, as a rectangle on the rim. Slope and density
+    are fitted.
     """
     growth, density, points = 0.3, 2.2, 40
     along = skin.outline.perimeter_mm / skin.electrodes.count / 2
@@ -235,7 +280,9 @@ def _expected_elements(skin: Skin, max_size_mm: float) -> float:
     u = (np.arange(points) + 0.5) / points
     weight = 3 * u**2 / points
     beyond = np.maximum(along * u**3 - skin.electrodes.width_mm / 2, 0.0)
-    size = _electrode_size(skin, max_size_mm) + growth * np.hypot(beyond[:, None], deep * u[None, :] ** 3)
+    size = _electrode_size(skin, max_size_mm) + growth * np.hypot(
+        beyond[:, None], deep * u[None, :] ** 3
+    )
     per_area = weight @ np.minimum(size, max_size_mm) ** -2.0 @ weight
     return density * skin.outline.area_mm2 * float(per_area)
 

@@ -15,11 +15,13 @@ IntArray = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Patterns:
-    """P solved patterns and the Q different pairs of a protocol's m rows, drives and measurements alike.
+    """P solved patterns and the Q different pairs of a protocol's m rows, drives and measurements
+    alike.
 
-    A pattern drives 1 A into ``solved[p, 0]`` and out of ``solved[p, 1]``. Pair q is the sum of patterns weighted by
-    ``mix[q]`` (Q, P). Row r drives ``drive_sign[r]`` times pair ``drive[r]``, and measures ``measure_sign[r]`` times
-    pair ``measure[r]``; ``voltage_pairs`` (m, 2) are its electrodes V+ and V-. All is per ampere.
+    A pattern drives 1 A into ``solved[p, 0]`` and out of ``solved[p, 1]``. Pair q is the sum of
+    patterns weighted by ``mix[q]`` (Q, P). Row r drives ``drive_sign[r]`` times pair ``drive[r]``,
+    and measures ``measure_sign[r]`` times pair ``measure[r]``; ``voltage_pairs`` (m, 2) are its
+    electrodes V+ and V-. All is per ampere.
     """
 
     solved: IntArray
@@ -33,7 +35,9 @@ class Patterns:
     @property
     def mixes(self) -> bool:
         """Whether a pair is more than just one solved pattern."""
-        return len(self.mix) != len(self.solved) or not np.array_equal(self.mix, np.eye(len(self.mix)))
+        return len(self.mix) != len(self.solved) or not np.array_equal(
+            self.mix, np.eye(len(self.mix))
+        )
 
     def right_hand_sides(self, n_electrodes: int) -> FloatArray:
         """The currents in A into each electrode, (L, P)."""
@@ -47,11 +51,14 @@ class Patterns:
         """Boundary voltages (m,) in V per A from the patterns' electrode potentials (L, P)."""
         potentials = electrodes @ self.mix.T if self.mixes else electrodes
         plus, minus = self.voltage_pairs[:, 0], self.voltage_pairs[:, 1]
-        return np.asarray((potentials[plus, self.drive] - potentials[minus, self.drive]) * self.drive_sign)
+        return np.asarray(
+            (potentials[plus, self.drive] - potentials[minus, self.drive]) * self.drive_sign
+        )
 
 
 def patterns_for(protocol: Protocol) -> Patterns:
-    """Each different pair is one pattern; where those outnumber the electrodes, neighbours' pairs make them up."""
+    """Each different pair is one pattern; where those outnumber the electrodes, neighbours' pairs
+    make them up."""
     rows = protocol.drive_measure.astype(np.int64)
     m, n = len(rows), protocol.n_electrodes
     pairs = rows.reshape(-1, 2)

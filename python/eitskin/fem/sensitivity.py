@@ -1,7 +1,9 @@
-"""How boundary voltages change with each pixel's conductivity: the adjoint method, straight onto the pixel grid.
+"""How boundary voltages change with each pixel's conductivity: the adjoint method, straight onto
+the pixel grid.
 
-For a drive field u and a measuring field w, both per ampere, dV / dsigma_pixel = -I t int_pixel grad u . grad w
-(Geselowitz, IEEE Trans. Biomed. Eng. 18, 1971). A field is solved once; a pixel takes one small product of gradients.
+For a drive field u and a measuring field w, both per ampere, dV / dsigma_pixel = -I t int_pixel
+grad u . grad w (Geselowitz, IEEE Trans. Biomed. Eng. 18, 1971). A field is solved once; a pixel
+takes one small product of gradients.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ PIXELS_AT_ONCE = 64  # keeps a block's gradients and products in cache
 
 
 def element_to_pixel(mesh: Mesh, grid: Grid) -> csr_matrix:
-    """The fraction of each element's area that lies in each pixel, (E, n), exact to rounding; rows sum to at most 1."""
+    """The fraction of each element's area that lies in each pixel, (E, n), exact to rounding; rows
+    sum to at most 1."""
     elements, pixels = _candidates(mesh, grid)
     alone = np.bincount(elements)[elements] == 1
     elements, pixels, alone = (values[pixels >= 0] for values in (elements, pixels, alone))
@@ -40,7 +43,9 @@ def element_to_pixel(mesh: Mesh, grid: Grid) -> csr_matrix:
     x, y = (mesh.nodes_mm[:, axis][corners] - (grid.origin_mm[axis] + low[axis]) for axis in (0, 1))
     share[cut] = _area_in_square(x, y, grid.pixel_mm) / mesh.areas_mm2[elements[cut]]
     kept = share > 1e-12
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(elements[kept], minlength=mesh.n_elements))])
+    indptr = np.concatenate(
+        [[0], np.cumsum(np.bincount(elements[kept], minlength=mesh.n_elements))]
+    )
     return csr_matrix((share[kept], pixels[kept], indptr), shape=(mesh.n_elements, grid.n_pixels))
 
 
@@ -52,23 +57,28 @@ def sensitivity(
     rows: npt.ArrayLike | None = None,
     weights: csr_matrix | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """The Jacobian (m, n) in V per (S/m) and the voltages (m,) in V at a conductivity, (E,) or one number.
+    """The Jacobian (m, n) in V per (S/m) and the voltages (m,) in V at a conductivity, (E,) or one
+    number.
 
-    ``rows`` picks rows of the protocol, such as one of each reciprocal pair. ``weights`` is ``element_to_pixel`` of the
-    same mesh and grid, for those who call repeatedly.
+    ``rows`` picks rows of the protocol, such as one of each reciprocal pair. ``weights`` is
+    ``element_to_pixel`` of the same mesh and grid, for those who call repeatedly.
 
     Raises:
         UsageError: the conductivity has a wrong shape, or a value not finite and above 0.
     """
     solution = forward.solve(conductivity_s_per_m)
-    chosen = np.arange(forward.protocol.n_rows) if rows is None else np.asarray(rows, dtype=np.int64)
+    chosen = (
+        np.arange(forward.protocol.n_rows) if rows is None else np.asarray(rows, dtype=np.int64)
+    )
     by_pixel = (element_to_pixel(forward.mesh, grid) if weights is None else weights).tocsc()
     by_pixel.data *= forward.mesh.areas_mm2[by_pixel.indices] * 1e-6
     fields = element_fields(forward, solution)
     jacobian = np.empty((len(chosen), grid.n_pixels))
     for begin in range(0, grid.n_pixels, PIXELS_AT_ONCE):
         block = slice(begin, min(begin + PIXELS_AT_ONCE, grid.n_pixels))
-        jacobian[:, block] = _rows_of_products(forward.patterns, _field_products(fields, by_pixel, block), chosen)
+        jacobian[:, block] = _rows_of_products(
+            forward.patterns, _field_products(fields, by_pixel, block), chosen
+        )
     sign = (forward.patterns.drive_sign * forward.patterns.measure_sign)[chosen]
     jacobian *= (-forward.protocol.current_a * forward.thickness_m * sign)[:, None]
     return jacobian, forward.voltages_of(solution)[chosen]
@@ -95,16 +105,21 @@ def _field_products(fields: FloatArray, by_pixel: csc_matrix, block: slice) -> F
     weighted = (plain * by_pixel.data[mine, None, None]).reshape(-1, n_patterns)
     plain = plain.reshape(-1, n_patterns)
     products = np.empty((len(bounds) - 1, n_patterns, n_patterns))
-    for product, (begin, end) in zip(products, pairwise((2 * (bounds - bounds[0])).tolist()), strict=True):
+    for product, (begin, end) in zip(
+        products, pairwise((2 * (bounds - bounds[0])).tolist()), strict=True
+    ):
         np.dot(plain[begin:end].T, weighted[begin:end], out=product)
     return products
 
 
 def _rows_of_products(patterns: Patterns, products: FloatArray, rows: IntArray) -> FloatArray:
-    """The products (b, P, P) that belong to the protocol's ``rows``, without their signs, (k, b)."""
+    """The products (b, P, P) that belong to the protocol's ``rows``, without their signs, (k,
+    b)."""
     drive, measure = patterns.drive[rows], patterns.measure[rows]
     if not patterns.mixes:
-        return np.asarray(products.reshape(len(products), -1)[:, drive * products.shape[1] + measure].T)
+        return np.asarray(
+            products.reshape(len(products), -1)[:, drive * products.shape[1] + measure].T
+        )
     picked = np.empty((len(rows), len(products)))
     for pair in np.unique(drive):
         mine = np.flatnonzero(drive == pair)
@@ -113,7 +128,8 @@ def _rows_of_products(patterns: Patterns, products: FloatArray, rows: IntArray) 
 
 
 def _candidates(mesh: Mesh, grid: Grid) -> tuple[IntArray, IntArray]:
-    """Elements and the pixels whose squares meet their bounding boxes, (k,) each, by element; -1 for cells not kept."""
+    """Elements and the pixels whose squares meet their bounding boxes, (k,) each, by element; -1
+    for cells not kept."""
     cell = np.floor((mesh.nodes_mm - grid.origin_mm) / grid.pixel_mm).astype(np.int64)
     a, b, c = np.clip(cell, 0, np.array([grid.nx, grid.ny]) - 1)[mesh.triangles.T]
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
@@ -126,10 +142,11 @@ def _candidates(mesh: Mesh, grid: Grid) -> tuple[IntArray, IntArray]:
 
 
 def _area_in_square(x: FloatArray, y: FloatArray, side: float) -> FloatArray:
-    """The area of each counterclockwise triangle (corners x and y, (3, k)) within the square [0, side]^2, (k,).
+    """The area of each counterclockwise triangle (corners x and y, (3, k)) within the square [0,
+    side]^2, (k,).
 
-    By Green's theorem it is the integral of clip(x, 0, side) dy around the triangle, over the parts with y in
-    [0, side]; on a straight edge the clipped x has a closed integral.
+    By Green's theorem it is the integral of clip(x, 0, side) dy around the triangle, over the parts
+    with y in [0, side]; on a straight edge the clipped x has a closed integral.
     """
     area = np.zeros(x.shape[1])
     for begin, end in ((0, 1), (1, 2), (2, 0)):

@@ -1,4 +1,5 @@
-"""The prebuilt image of the NUCLEO-F767ZI, and its manifest: compiler, hash of the sources, size and hash of the image."""
+"""The prebuilt image of the NUCLEO-F767ZI, and its manifest: compiler, hash of the sources, size
+and hash of the image."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ SOURCES = ("csrc", "firmware", "cmake", "CMakeLists.txt", "CMakePresets.json")
 
 @dataclass(frozen=True)
 class Manifest:
-    """What an image was built from: the compiler's version line, SHA-256 of the sources and of the image, its bytes."""
+    """What an image was built from: the compiler's version line, SHA-256 of the sources and of the
+    image, its bytes."""
 
     compiler: str
     sources_sha256: str
@@ -37,14 +39,21 @@ def load_image() -> tuple[bytes, Manifest]:
         image = folder.joinpath(IMAGE).read_bytes()
         manifest = Manifest(**json.loads(folder.joinpath(MANIFEST).read_text(encoding="utf-8")))
     except (OSError, TypeError, ValueError):
-        raise FileError(f"the prebuilt firmware {IMAGE} is missing from this installation; install eitskin again") from None
+        raise FileError(
+            f"the prebuilt firmware {IMAGE} is missing from this installation; install eitskin"
+            " again"
+        ) from None
     if hashlib.sha256(image).hexdigest() != manifest.image_sha256:
-        raise FileError(f"the prebuilt firmware {IMAGE} is not the one that its manifest states; install eitskin again")
+        raise FileError(
+            f"the prebuilt firmware {IMAGE} is not the one that its manifest states; install"
+            " eitskin again"
+        )
     return image, manifest
 
 
 def hash_of_sources(root: Path) -> str:
-    """SHA-256 over names and contents of everything that the image is built from, in a checkout at ``root``."""
+    """SHA-256 over names and contents of everything that the image is built from, in a checkout at
+    ``root``."""
     total = hashlib.sha256()
     for name in SOURCES:
         top = root / name
@@ -75,7 +84,8 @@ def ship(root: Path, built: Path, compiler: str) -> Manifest:
 
 
 def main(root: str, built: str, compiler: str) -> None:
-    """``python -m eitskin.firmware.prebuilt ROOT IMAGE COMPILER``: what ``scripts/firmware --prebuilt`` calls."""
+    """``python -m eitskin.firmware.prebuilt ROOT IMAGE COMPILER``: what ``scripts/firmware
+    --prebuilt`` calls."""
     manifest = ship(Path(root), Path(built), compiler)
     print(f"{IMAGE}: {manifest.image_bytes} bytes, {manifest.compiler}")
 

@@ -1,1 +1,2 @@
-"""Frames: the file that holds boundary voltages, the import of other people's files, and the doctor."""
+"""Frames: the file that holds boundary voltages, the import of other people's files, and the
+doctor."""

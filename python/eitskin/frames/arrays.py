@@ -1,4 +1,5 @@
-"""Named arrays of .npz and .mat files, and picking one of them with an error that lists what is there."""
+"""Named arrays of .npz and .mat files, and picking one of them with an error that lists what is
+there."""
 
 from __future__ import annotations
 
@@ -23,7 +24,9 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
         FileError: it cannot be read.
         MissingExtraError: a .mat file without scipy.
     """
-    return read_npz(path, "file of arrays") if Path(path).suffix.lower() == ".npz" else _read_mat(path)
+    return (
+        read_npz(path, "file of arrays") if Path(path).suffix.lower() == ".npz" else _read_mat(path)
+    )
 
 
 def pick(arrays: Mapping[str, NDArray[Any]], key: str, option: str, where: str) -> NDArray[Any]:
@@ -55,13 +58,19 @@ def _read_mat(path: str | Path) -> dict[str, NDArray[Any]]:
     except FileNotFoundError:
         raise FileError(f"{path}: no such MAT file; check the path") from None
     except NotImplementedError:
-        raise FileError(f"{path}: a MATLAB 7.3 file (HDF5); save it with  save('-v7', ...)") from None
+        raise FileError(
+            f"{path}: a MATLAB 7.3 file (HDF5); save it with  save('-v7', ...)"
+        ) from None
     except OSError as error:
         raise FileError(f"{path}: cannot read this MAT file ({error.strerror or error})") from None
     except Exception:  # of a damaged file scipy raises whatever its parser meets
-        raise FileError(f"{path}: not a readable MAT file: damaged, cut short, or another kind of file") from None
+        raise FileError(
+            f"{path}: not a readable MAT file: damaged, cut short, or another kind of file"
+        ) from None
     arrays: dict[str, NDArray[Any]] = {}
-    _flatten({name: value for name, value in content.items() if not name.startswith("__")}, "", arrays)
+    _flatten(
+        {name: value for name, value in content.items() if not name.startswith("__")}, "", arrays
+    )
     return arrays
 
 

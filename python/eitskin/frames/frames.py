@@ -1,6 +1,8 @@
-"""Frames: boundary voltages with their reference, protocol and (where known) truth, and the one file that holds them.
+"""Frames: boundary voltages with their reference, protocol and (where known) truth, and the one
+file that holds them.
 
-The file is an .npz; docs/reference/frames-format.md lists its fields. It is read without pickle and checked whole.
+The file is an .npz; docs/reference/frames-format.md lists its fields. It is read without pickle and
+checked whole.
 """
 
 from __future__ import annotations
@@ -30,18 +32,21 @@ TOUCH_FIELDS = ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength
 class Frames:
     """Measured or simulated frames, in the channel order of ``protocol``.
 
-    Shapes: n frames, m channels, k quiet frames, t touches, masks of h rows (row 0 at the lowest y) and w columns.
+    Shapes: n frames, m channels, k quiet frames, t touches, masks of h rows (row 0 at the lowest y)
+        and w columns.
     ``voltage_v`` (n, m) and ``reference_voltage_v`` (k, m), or (m,) which becomes (1, m), in volts.
-    ``frame_name`` n names ("0", "1", ... where none are given); ``time_s`` (n,) seconds from any start.
-    Truth, where known: ``touch_frame`` (t,) index of the touch's frame, ``touch_xy_mm`` (t, 2) in the skin's
-    coordinates, ``touch_radius_mm`` (t,), ``touch_strength`` (t,) relative conductivity change inside the touch (NaN:
-    unknown), ``touch_sign`` (t,) +1 more conductive, -1 less (from the strength where not given);
-    ``truth_mask`` (n, h, w) +1/-1/0 over ``truth_mask_extent_mm`` (xmin, ymin, xmax, ymax);
-    ``truth_conductivity_s_per_m`` (n, h, w) float32 on the same raster, NaN outside the skin.
-    ``meta`` says how the frames were made (JSON values only).
+    ``frame_name`` n names ("0", "1", ... where none are given); ``time_s`` (n,) seconds from any
+    start. Truth, where known: ``touch_frame`` (t,) index of the touch's frame, ``touch_xy_mm`` (t,
+    2) in the skin's coordinates, ``touch_radius_mm`` (t,), ``touch_strength`` (t,) relative
+    conductivity change inside the touch (NaN: unknown), ``touch_sign`` (t,) +1 more conductive, -1
+    less (from the strength where not given); ``truth_mask`` (n, h, w) +1/-1/0 over
+    ``truth_mask_extent_mm`` (xmin, ymin, xmax, ymax); ``truth_conductivity_s_per_m`` (n, h, w)
+    float32 on the same raster, NaN outside the skin. ``meta`` says how the frames were made (JSON
+    values only).
 
     Raises:
-        FrameError: a shape disagrees, or a value is not finite (unless ``allow_nonfinite``, for examination only).
+        FrameError: a shape disagrees, or a value is not finite (unless ``allow_nonfinite``, for
+            examination only).
     """
 
     protocol: Protocol
@@ -63,7 +68,9 @@ class Frames:
     def __post_init__(self) -> None:
         channels = len(self.protocol.drive_measure)
         reference = np.atleast_2d(_floats(self.reference_voltage_v, "reference_voltage_v"))
-        self._set("reference_voltage_v", _shaped(reference, (None, channels), "reference_voltage_v"))
+        self._set(
+            "reference_voltage_v", _shaped(reference, (None, channels), "reference_voltage_v")
+        )
         if not len(reference):
             raise FrameError("reference_voltage_v is empty; frames need at least one quiet frame")
         voltage = _shaped(_floats(self.voltage_v, "voltage_v"), (None, channels), "voltage_v")
@@ -91,23 +98,43 @@ class Frames:
         if self.touch_frame is None:
             given = [name for name in TOUCH_FIELDS if getattr(self, name) is not None]
             if given:
-                raise FrameError(f"{given[0]} without touch_frame; touches need frame, position and radius")
+                raise FrameError(
+                    f"{given[0]} without touch_frame; touches need frame, position and radius"
+                )
             return
         if self.touch_xy_mm is None or self.touch_radius_mm is None:
-            raise FrameError("touch_frame without touch_xy_mm and touch_radius_mm; touches need all three")
+            raise FrameError(
+                "touch_frame without touch_xy_mm and touch_radius_mm; touches need all three"
+            )
         frame = np.asarray(self.touch_frame)
         if frame.ndim != 1 or (frame.size and not np.issubdtype(frame.dtype, np.integer)):
-            raise FrameError(f"touch_frame must be whole numbers of shape (t,), not {frame.dtype} {frame.shape}")
+            raise FrameError(
+                f"touch_frame must be whole numbers of shape (t,), not {frame.dtype} {frame.shape}"
+            )
         if frame.size and (frame.min() < 0 or frame.max() >= n):
-            raise FrameError(f"touch_frame holds {int(frame.min())} to {int(frame.max())}; there are 0 to {n - 1}")
+            raise FrameError(
+                f"touch_frame holds {int(frame.min())} to {int(frame.max())}; there are 0 to"
+                f" {n - 1}"
+            )
         t = len(frame)
         self._set("touch_frame", frame.astype(np.int64))
-        self._set("touch_xy_mm", _finite(_shaped(_floats(self.touch_xy_mm, "touch_xy_mm"), (t, 2), "touch_xy_mm")))
+        self._set(
+            "touch_xy_mm",
+            _finite(_shaped(_floats(self.touch_xy_mm, "touch_xy_mm"), (t, 2), "touch_xy_mm")),
+        )
         radius = _shaped(_floats(self.touch_radius_mm, "touch_radius_mm"), (t,), "touch_radius_mm")
         self._set("touch_radius_mm", _finite(radius))
-        strength = np.full(t, np.nan) if self.touch_strength is None else _floats(self.touch_strength, "touch_strength")
+        strength = (
+            np.full(t, np.nan)
+            if self.touch_strength is None
+            else _floats(self.touch_strength, "touch_strength")
+        )
         self._set("touch_strength", _shaped(strength, (t,), "touch_strength"))
-        sign = np.sign(np.nan_to_num(strength)) if self.touch_sign is None else np.asarray(self.touch_sign)
+        sign = (
+            np.sign(np.nan_to_num(strength))
+            if self.touch_sign is None
+            else np.asarray(self.touch_sign)
+        )
         if sign.shape != (t,) or not np.isin(sign, (-1, 0, 1)).all():
             raise FrameError(f"touch_sign must be {t} values of +1, -1 or 0 (unknown)")
         self._set("touch_sign", sign.astype(np.int8))
@@ -115,21 +142,33 @@ class Frames:
     def _check_mask(self, n: int) -> None:
         if self.truth_mask is None:
             if self.truth_conductivity_s_per_m is not None:
-                raise FrameError("truth_conductivity_s_per_m without truth_mask; it lies on the mask's raster")
+                raise FrameError(
+                    "truth_conductivity_s_per_m without truth_mask; it lies on the mask's raster"
+                )
             return
         mask = np.asarray(self.truth_mask)
         if mask.ndim != 3 or len(mask) != n or not np.isin(mask, (-1, 0, 1)).all():
-            raise FrameError(f"truth_mask must be ({n}, rows, columns) of +1, -1, 0; it is {mask.dtype} {mask.shape}")
+            raise FrameError(
+                f"truth_mask must be ({n}, rows, columns) of +1, -1, 0; it is {mask.dtype}"
+                f" {mask.shape}"
+            )
         self._set("truth_mask", mask.astype(np.int8))
-        extent = () if self.truth_mask_extent_mm is None else tuple(float(v) for v in self.truth_mask_extent_mm)
+        extent = (
+            ()
+            if self.truth_mask_extent_mm is None
+            else tuple(float(v) for v in self.truth_mask_extent_mm)
+        )
         if len(extent) != 4 or not (extent[0] < extent[2] and extent[1] < extent[3]):
             raise FrameError("truth_mask needs truth_mask_extent_mm: xmin, ymin, xmax, ymax")
         self._set("truth_mask_extent_mm", extent)
         if self.truth_conductivity_s_per_m is not None:
-            conductivity = _floats(self.truth_conductivity_s_per_m, "truth_conductivity_s_per_m").astype(np.float32)
+            conductivity = _floats(
+                self.truth_conductivity_s_per_m, "truth_conductivity_s_per_m"
+            ).astype(np.float32)
             if conductivity.shape != mask.shape:
                 raise FrameError(
-                    f"truth_conductivity_s_per_m is {conductivity.shape}, truth_mask {mask.shape}; make them equal"
+                    f"truth_conductivity_s_per_m is {conductivity.shape}, truth_mask {mask.shape};"
+                    " make them equal"
                 )
             self._set("truth_conductivity_s_per_m", conductivity)
 
@@ -144,7 +183,8 @@ class Frames:
         return np.asarray(self.reference_voltage_v.mean(axis=0))
 
     def touches_in(self, frame: int) -> IntArray:
-        """Indices (.,) into the touch fields of the touches in ``frame``; empty where no truth is known."""
+        """Indices (.,) into the touch fields of the touches in ``frame``; empty where no truth is
+        known."""
         if self.touch_frame is None:
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(self.touch_frame == frame)
@@ -170,7 +210,13 @@ def save_frames(path: str | Path, frames: Frames) -> None:
         "frame_name": np.array(frames.frame_name, dtype=np.str_),
         "meta": np.array(json.dumps(dict(frames.meta), sort_keys=True, allow_nan=False)),
     }
-    for name in ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_mask_extent_mm", "truth_conductivity_s_per_m"):
+    for name in (
+        "time_s",
+        *TOUCH_FIELDS,
+        "truth_mask",
+        "truth_mask_extent_mm",
+        "truth_conductivity_s_per_m",
+    ):
         value = getattr(frames, name)
         if value is not None:
             fields[name] = np.asarray(value)
@@ -179,7 +225,8 @@ def save_frames(path: str | Path, frames: Frames) -> None:
 
 
 def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
-    """Read a frames file; ``allow_nonfinite`` lets NaN and Inf voltages through, for ``eitskin doctor``.
+    """Read a frames file; ``allow_nonfinite`` lets NaN and Inf voltages through, for ``eitskin
+    doctor``.
 
     Raises:
         FileError: the file cannot be read.
@@ -189,26 +236,33 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
     where = str(path)
     if "format" not in arrays or str(arrays["format"]) != FORMAT:
         raise FrameError(
-            f"{where}: not an eitskin frames file (its arrays: {', '.join(sorted(arrays)) or 'none'}); "
-            f"convert it with  eitskin import {where} -o OUT.npz  and the options that say what its arrays are"
+            f"{where}: not an eitskin frames file (its arrays:"
+            f" {', '.join(sorted(arrays)) or 'none'}); convert it with  eitskin import {where} -o"
+            " OUT.npz  and the options that say what its arrays are"
         )
     version = arrays.get("version")
     if version is None or version.shape != () or not np.issubdtype(version.dtype, np.integer):
-        raise FrameError(f"{where}: the field 'version' is missing or no whole number; make the file again")
+        raise FrameError(
+            f"{where}: the field 'version' is missing or no whole number; make the file again"
+        )
     if int(version) != VERSION:
         raise FrameError(
-            f"{where}: frames format version {int(version)}; this eitskin reads {VERSION}; make the file again"
+            f"{where}: frames format version {int(version)}; this eitskin reads {VERSION}; make the"
+            " file again"
         )
     try:
         return _from_arrays(arrays, allow_nonfinite)
     except EitskinError as error:
         raise type(error)(f"{where}: {error}") from None
     except (ValueError, TypeError, OverflowError) as error:
-        raise FrameError(f"{where}: a field has the wrong type ({error}); make the file again") from None
+        raise FrameError(
+            f"{where}: a field has the wrong type ({error}); make the file again"
+        ) from None
 
 
 def read_npz(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
-    """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects are left out.
+    """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects
+    are left out.
 
     Raises:
         FileError: it cannot be read, or is no .npz.
@@ -233,18 +287,32 @@ def read_npz(path: str | Path, what: str) -> dict[str, NDArray[Any]]:
     except OSError as error:
         raise FileError(f"{path}: cannot read this {what} ({error.strerror or error})") from None
     except Exception:  # of a damaged file numpy and zipfile raise whatever their parsers meet
-        raise FileError(f"{path}: not a readable .npz {what}: damaged, cut short, or another kind of file") from None
+        raise FileError(
+            f"{path}: not a readable .npz {what}: damaged, cut short, or another kind of file"
+        ) from None
 
 
 def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Frames:
     optional = ("time_s", *TOUCH_FIELDS, "truth_mask", "truth_conductivity_s_per_m")
-    required = ("voltage_v", "reference_voltage_v", "drive_measure", "n_electrodes", "current_a", "frame_name", "meta")
+    required = (
+        "voltage_v",
+        "reference_voltage_v",
+        "drive_measure",
+        "n_electrodes",
+        "current_a",
+        "frame_name",
+        "meta",
+    )
     for name in required:
         if name not in arrays:
             raise FrameError(f"the field {name!r} is missing; make the file again")
-    unknown = sorted(set(arrays) - {*required, *optional, "format", "version", "truth_mask_extent_mm"})
+    unknown = sorted(
+        set(arrays) - {*required, *optional, "format", "version", "truth_mask_extent_mm"}
+    )
     if unknown:
-        raise FrameError(f"unknown field {unknown[0]!r}; docs/reference/frames-format.md lists the fields")
+        raise FrameError(
+            f"unknown field {unknown[0]!r}; docs/reference/frames-format.md lists the fields"
+        )
     try:
         meta = parse_json(str(arrays["meta"]))
     except ValueError:
@@ -253,7 +321,11 @@ def _from_arrays(arrays: dict[str, NDArray[Any]], allow_nonfinite: bool) -> Fram
         raise FrameError("the field 'meta' is not a JSON object; make the file again")
     extent = arrays.get("truth_mask_extent_mm")
     return Frames(
-        protocol=table(int(arrays["n_electrodes"]), arrays["drive_measure"].tolist(), float(arrays["current_a"])),
+        protocol=table(
+            int(arrays["n_electrodes"]),
+            arrays["drive_measure"].tolist(),
+            float(arrays["current_a"]),
+        ),
         voltage_v=arrays["voltage_v"],
         reference_voltage_v=arrays["reference_voltage_v"],
         frame_name=tuple(str(name) for name in np.atleast_1d(arrays["frame_name"])),
@@ -272,9 +344,13 @@ def _floats(values: object, name: str) -> FloatArray:
 
 
 def _shaped(values: FloatArray, shape: tuple[int | None, ...], name: str) -> FloatArray:
-    if values.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, values.shape, strict=True)):
+    if values.ndim != len(shape) or any(
+        want not in (None, got) for want, got in zip(shape, values.shape, strict=True)
+    ):
         wanted = ", ".join("any" if want is None else str(want) for want in shape)
-        raise FrameError(f"{name} has shape {values.shape}; the protocol and the frames ask for ({wanted})")
+        raise FrameError(
+            f"{name} has shape {values.shape}; the protocol and the frames ask for ({wanted})"
+        )
     return values
 
 
@@ -289,6 +365,6 @@ def _refuse_nonfinite(values: FloatArray, name: str) -> None:
     if len(bad):
         frame, channel = bad[0]
         raise FrameError(
-            f"{name}: frame {frame}, channel {channel} is {values[frame, channel]} ({len(bad)} such values); "
-            "run  eitskin doctor  on the source, or leave those channels out"
+            f"{name}: frame {frame}, channel {channel} is {values[frame, channel]} ({len(bad)} such"
+            " values); run  eitskin doctor  on the source, or leave those channels out"
         )

@@ -1,11 +1,13 @@
-"""The frame of a homogeneous skin, predicted: closed form for a disk (numpy only), else finite elements.
+"""The frame of a homogeneous skin, predicted: closed form for a disk (numpy only), else finite
+elements.
 
-Closed form. On a disk of radius R with sheet conductivity s = sigma t, a current I that enters at the rim point a
-and leaves evenly along the rim gives u(x) = -I / (pi s) ln|x - a| + const: ln|x - a| is harmonic inside, its normal
-derivative on |x| = R is 1 / (2 R) everywhere but at a, and a half circle of radius e about a carries
-(I / (pi s e)) s (pi e) = I. With as much current out as in, the even parts cancel. This is Neumann's function of the
-circle with the source on the rim (for instance Kellogg, Foundations of Potential Theory, or Barber and Brown,
-J. Phys. E 17 (1984) 723). An electrode of finite width is taken as an even current density: averages of ln over widths.
+Closed form. On a disk of radius R with sheet conductivity s = sigma t, a current I that enters at
+the rim point a and leaves evenly along the rim gives u(x) = -I / (pi s) ln|x - a| + const: ln|x -
+a| is harmonic inside, its normal derivative on |x| = R is 1 / (2 R) everywhere but at a, and a half
+circle of radius e about a carries (I / (pi s e)) s (pi e) = I. With as much current out as in, the
+even parts cancel. This is Neumann's function of the circle with the source on the rim (for instance
+Kellogg, Foundations of Potential Theory, or Barber and Brown, J. Phys. E 17 (1984) 723). An
+electrode of finite width is taken as an even current density: averages of ln over widths.
 """
 
 from __future__ import annotations
@@ -29,32 +31,38 @@ DEFAULT_WIDTH_PER_PITCH = 0.2
 class Homogeneous:
     """What a homogeneous skin would measure.
 
-    ``transfer_ohm`` (n, n): potential at electrode i per ampere into j, up to a constant for each row and column.
-    ``source`` says how it was computed.
+    ``transfer_ohm`` (n, n): potential at electrode i per ampere into j, up to a constant for each
+    row and column. ``source`` says how it was computed.
     """
 
     transfer_ohm: FloatArray
     source: str
 
     def voltages(self, rows: IntArray, current_a: float = 1.0) -> FloatArray:
-        """The boundary voltages (m,) of ``rows`` (m, 4), in volts; rough where a row measures a driving electrode."""
+        """The boundary voltages (m,) of ``rows`` (m, 4), in volts; rough where a row measures a
+        driving electrode."""
         return voltages_of(self.transfer_ohm, rows) * current_a
 
 
 def voltages_of(transfer_ohm: FloatArray, rows: IntArray) -> FloatArray:
-    """Boundary voltages (..., m) per ampere for ``rows`` (..., m, 4), from a transfer matrix (n, n)."""
+    """Boundary voltages (..., m) per ampere for ``rows`` (..., m, 4), from a transfer matrix (n,
+    n)."""
     a, b, c, d = np.moveaxis(np.asarray(rows), -1, 0)
-    return np.asarray(transfer_ohm[c, a] - transfer_ohm[d, a] - transfer_ohm[c, b] + transfer_ohm[d, b])
+    return np.asarray(
+        transfer_ohm[c, a] - transfer_ohm[d, a] - transfer_ohm[c, b] + transfer_ohm[d, b]
+    )
 
 
 def shorted(transfer_ohm: FloatArray, i: int, j: int) -> FloatArray:
-    """``transfer_ohm`` (n, n) with i and j joined by a wire: Z - u u' / (u_i - u_j), u = Z (e_i - e_j)."""
+    """``transfer_ohm`` (n, n) with i and j joined by a wire: Z - u u' / (u_i - u_j), u = Z (e_i -
+    e_j)."""
     u = transfer_ohm[:, i] - transfer_ohm[:, j]
     return np.asarray(transfer_ohm - np.outer(u, u) / (u[i] - u[j]))
 
 
 def shorted_frames(transfer_ohm: FloatArray, pairs: IntArray, rows: IntArray) -> FloatArray:
-    """Boundary voltages (h, m) per ampere of ``rows`` (m, 4) with each of ``pairs`` (h, 2) joined: as ``shorted``."""
+    """Boundary voltages (h, m) per ampere of ``rows`` (m, 4) with each of ``pairs`` (h, 2) joined:
+    as ``shorted``."""
     u = transfer_ohm[pairs[:, 0]] - transfer_ohm[pairs[:, 1]]
     across = np.take_along_axis(u, pairs, axis=1)
     a, b, c, d = rows.T
@@ -63,7 +71,8 @@ def shorted_frames(transfer_ohm: FloatArray, pairs: IntArray, rows: IntArray) ->
 
 
 def homogeneous(skin: Skin | None, n_electrodes: int) -> Homogeneous:
-    """The prediction for ``skin``, or for a disk of 1 S sheet conductivity with ``n_electrodes`` even electrodes.
+    """The prediction for ``skin``, or for a disk of 1 S sheet conductivity with ``n_electrodes``
+    even electrodes.
 
     Raises:
         UsageError: the skin has another number of electrodes.
@@ -74,19 +83,27 @@ def homogeneous(skin: Skin | None, n_electrodes: int) -> Homogeneous:
         width = DEFAULT_WIDTH_PER_PITCH * 2 * np.pi / n_electrodes
         return Homogeneous(disk_transfer(angles, width), "closed form, disk with even electrodes")
     if skin.electrodes.count != n_electrodes:
-        raise UsageError(f"skin {skin.name!r} has {skin.electrodes.count} electrodes, the frames have {n_electrodes}")
+        raise UsageError(
+            f"skin {skin.name!r} has {skin.electrodes.count} electrodes, the frames have"
+            f" {n_electrodes}"
+        )
     sheet_s = skin.conductivity_s_per_m * skin.thickness_mm * 1e-3
     if skin.outline.diameter_mm is None:
         from eitskin.frames.homogeneous_fem import fem_prediction
 
         return Homogeneous(fem_prediction(skin).transfer_ohm(), "finite elements")
     radius_mm = skin.outline.diameter_mm / 2
-    transfer = disk_transfer(electrode_angles_rad(skin), skin.electrodes.width_mm / radius_mm) / sheet_s
+    transfer = (
+        disk_transfer(electrode_angles_rad(skin), skin.electrodes.width_mm / radius_mm) / sheet_s
+    )
     return Homogeneous(transfer, "closed form, disk")
 
 
-def touch_transfer(skin: Skin, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]) -> FloatArray:
-    """How touches change the transfer matrix (n, n), up to a positive factor: as ``disk_touch_transfer``, in mm.
+def touch_transfer(
+    skin: Skin, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]
+) -> FloatArray:
+    """How touches change the transfer matrix (n, n), up to a positive factor: as
+    ``disk_touch_transfer``, in mm.
 
     Raises:
         MissingExtraError: the outline is no disk and the extra ``model`` is not installed.
@@ -100,7 +117,8 @@ def touch_transfer(skin: Skin, xy_mm: FloatArray, radius_mm: FloatArray, sign: N
 
 
 def electrode_angles_rad(skin: Skin) -> FloatArray:
-    """Angle of each electrode's centre about the centre of a disk, (count,), counterclockwise from x.
+    """Angle of each electrode's centre about the centre of a disk, (count,), counterclockwise from
+    x.
 
     Raises:
         GeometryError: the skin is no disk.
@@ -112,10 +130,11 @@ def electrode_angles_rad(skin: Skin) -> FloatArray:
 
 
 def disk_transfer(angle_rad: FloatArray, width_rad: float) -> FloatArray:
-    """Transfer matrix (n, n) of a disk of 1 S sheet conductivity, electrodes ``width_rad`` wide at ``angle_rad`` (n,).
+    """Transfer matrix (n, n) of a disk of 1 S sheet conductivity, electrodes ``width_rad`` wide at
+    ``angle_rad`` (n,).
 
-    Off the diagonal the mean of -ln|x - a| / pi over both widths (midpoint rule); on it the same mean over one width
-    for a straight electrode, -(ln w - 3/2) / pi, contact impedance left out.
+    Off the diagonal the mean of -ln|x - a| / pi over both widths (midpoint rule); on it the same
+    mean over one width for a straight electrode, -(ln w - 3/2) / pi, contact impedance left out.
     """
     n = len(angle_rad)
     across = (np.arange(WIDTH_SAMPLES) + 0.5) / WIDTH_SAMPLES - 0.5
@@ -131,11 +150,15 @@ def disk_transfer(angle_rad: FloatArray, width_rad: float) -> FloatArray:
 def disk_touch_transfer(
     angle_rad: FloatArray, xy: FloatArray, radius: FloatArray, sign: NDArray[np.int8]
 ) -> FloatArray:
-    """Change (n, n) of a unit disk's transfer matrix by small touches, up to a positive factor, point electrodes.
+    """Change (n, n) of a unit disk's transfer matrix by small touches, up to a positive factor,
+    point electrodes.
 
-    Touches at ``xy`` (t, 2) with ``radius`` (t,) and ``sign`` (t,): the sum of -sign area grad u_i . grad u_j.
+    Touches at ``xy`` (t, 2) with ``radius`` (t,) and ``sign`` (t,): the sum of -sign area grad u_i
+    . grad u_j.
     """
     rim = np.column_stack([np.cos(angle_rad), np.sin(angle_rad)])
     away = np.asarray(xy)[:, None, :] - rim[None]
     gradient = -away / np.maximum((away**2).sum(axis=2, keepdims=True), 1e-12)
-    return np.asarray(-np.einsum("t,tid,tjd->ij", sign * np.asarray(radius) ** 2, gradient, gradient))
+    return np.asarray(
+        -np.einsum("t,tid,tjd->ij", sign * np.asarray(radius) ** 2, gradient, gradient)
+    )

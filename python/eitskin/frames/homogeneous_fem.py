@@ -1,4 +1,5 @@
-"""The homogeneous prediction by finite elements, for outlines without a closed form. Needs the extra ``model``."""
+"""The homogeneous prediction by finite elements, for outlines without a closed form. Needs the
+extra ``model``."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ def fem_prediction(skin: Skin) -> FemPrediction:
 
 
 class FemPrediction:
-    """One mesh of ``skin``, solved homogeneous or with touches; every frame is read off a transfer matrix (n, n)."""
+    """One mesh of ``skin``, solved homogeneous or with touches; every frame is read off a transfer
+    matrix (n, n)."""
 
     def __init__(self, skin: Skin) -> None:
         self._skin, self._n = skin, skin.electrodes.count
@@ -34,20 +36,28 @@ class FemPrediction:
         self._forward = ForwardModel(self._mesh, skin, protocol)
 
     def transfer_ohm(self, conductivity_s_per_m: FloatArray | None = None) -> FloatArray:
-        """Potentials (n, n) of each electrode per ampere into another and out at electrode 0, which is grounded."""
+        """Potentials (n, n) of each electrode per ampere into another and out at electrode 0, which
+        is grounded."""
         uniform = np.full(self._mesh.n_elements, self._skin.conductivity_s_per_m)
-        voltages = self._forward.voltages(uniform if conductivity_s_per_m is None else conductivity_s_per_m)
+        voltages = self._forward.voltages(
+            uniform if conductivity_s_per_m is None else conductivity_s_per_m
+        )
         transfer = np.zeros((self._n, self._n))
         j, k = np.array(self._pairs).T
         transfer[j, k] = transfer[k, j] = voltages
         return transfer
 
-    def touch_transfer(self, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]) -> FloatArray:
-        """The change (n, n) of the transfer matrix by touches (t, 2), (t,), (t,): centre, radius, +1 or -1."""
+    def touch_transfer(
+        self, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]
+    ) -> FloatArray:
+        """The change (n, n) of the transfer matrix by touches (t, 2), (t,), (t,): centre, radius,
+        +1 or -1."""
         conductivity = np.full(self._mesh.n_elements, self._skin.conductivity_s_per_m)
         centroids = self._mesh.centroids_mm()
         for xy, radius, direction in zip(xy_mm, radius_mm, sign, strict=True):
             distance = np.hypot(*(centroids - xy).T)
             inside = distance <= max(float(radius), float(distance.min()))
-            conductivity[inside] = self._skin.conductivity_s_per_m * TOUCH_CONTRAST ** int(direction)
+            conductivity[inside] = self._skin.conductivity_s_per_m * TOUCH_CONTRAST ** int(
+                direction
+            )
         return self.transfer_ohm(conductivity) - self.transfer_ohm()

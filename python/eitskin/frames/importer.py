@@ -1,7 +1,9 @@
-"""Import: somebody else's file to frames in this project's order, sign and units; every step is recorded in ``meta``.
+"""Import: somebody else's file to frames in this project's order, sign and units; every step is
+recorded in ``meta``.
 
-The steps, in this order: read; number the electrodes as the skin does; put the rows in the protocol's order; undo a
-swap of wires; set the sign; negate channels, fill channels from their reciprocals; leave channels out; equalise gains.
+The steps, in this order: read; number the electrodes as the skin does; put the rows in the
+protocol's order; undo a swap of wires; set the sign; negate channels, fill channels from their
+reciprocals; leave channels out; equalise gains.
 """
 
 from __future__ import annotations
@@ -42,13 +44,17 @@ ASSUMED_QUIET = "no quiet frames were named; the first frame is taken for one"
 class ImportOptions:
     """How to mend a source; the defaults change nothing.
 
-    ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns). ``keep_table``: keep the source's own
-    table. ``sign``: "reversed" negates, "magnitude" takes each channel's sign from the homogeneous prediction.
-    ``rotate``, ``mirror``: our number of source electrode 0, and whether counting then goes down. ``clockwise``: the
-    source counts clockwise, so mirror if the skin does not. ``swaps``: pairs of our electrodes whose wires were
-    exchanged. ``flip_channels``, ``impute_channels``, ``drop_channels``: channels of the protocol's order to negate, to
-    fill from their reciprocals, and to leave out; ``drop_electrodes``: every channel that uses them. ``equalise``: give
-    each channel the gain that makes the reference the homogeneous prediction. ``current_a``: instead of the protocol's.
+    ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns). ``keep_table``: keep
+        the source's own
+    table. ``sign``: "reversed" negates, "magnitude" takes each channel's sign from the homogeneous
+    prediction.
+    ``rotate``, ``mirror``: our number of source electrode 0, and whether counting then goes down.
+        ``clockwise``: the
+    source counts clockwise, so mirror if the skin does not. ``swaps``: pairs of our electrodes
+    whose wires were exchanged. ``flip_channels``, ``impute_channels``, ``drop_channels``: channels
+    of the protocol's order to negate, to fill from their reciprocals, and to leave out;
+    ``drop_electrodes``: every channel that uses them. ``equalise``: give each channel the gain that
+    makes the reference the homogeneous prediction. ``current_a``: instead of the protocol's.
     """
 
     source: SourceOptions = field(default_factory=SourceOptions)
@@ -80,9 +86,10 @@ def import_frames(
 ) -> Frames:
     """Read ``path`` and mend it as ``options`` say.
 
-    ``protocol`` is the wanted order (None, or ``keep_table``: the source's own table is kept, with ``n_electrodes``);
-    ``skin`` gives numbering direction and prediction where known. An eitskin frames file may be mended again.
-    ``lenient`` is for examination: NaN and Inf pass, and where no quiet frames are named the first frame is taken.
+    ``protocol`` is the wanted order (None, or ``keep_table``: the source's own table is kept, with
+    ``n_electrodes``); ``skin`` gives numbering direction and prediction where known. An eitskin
+    frames file may be mended again. ``lenient`` is for examination: NaN and Inf pass, and where no
+    quiet frames are named the first frame is taken.
 
     Raises:
         EitskinError: each of its kinds, for what cannot be read or does not fit.
@@ -94,18 +101,26 @@ def import_frames(
     if quiet is None:
         if not lenient:
             raise UsageError(
-                f"{path}: say which frames are quiet: --reference KEY, --reference-columns LIST, --reference-frames A:B"
+                f"{path}: say which frames are quiet: --reference KEY, --reference-columns LIST,"
+                " --reference-frames A:B"
             )
         quiet = raw.voltage[:1]
     rows, index, sign = _placed(raw, options, protocol, skin, n_electrodes, str(path))
     voltage, reference = raw.voltage[:, index] * sign, quiet[:, index] * sign
     n = _count(protocol, n_electrodes)
     rows = relabel(rows, swap_map(n, options.swaps))
-    prediction = homogeneous(skin, n).voltages(rows) if options.sign == "magnitude" or options.equalise else None
+    prediction = (
+        homogeneous(skin, n).voltages(rows)
+        if options.sign == "magnitude" or options.equalise
+        else None
+    )
     keep = kept_channels(rows, n, options.drop_channels, options.drop_electrodes)
     voltage, reference = (
         imputed(
-            flipped(signed(values, options.sign, prediction), options.flip_channels), rows, n, options.impute_channels
+            flipped(signed(values, options.sign, prediction), options.flip_channels),
+            rows,
+            n,
+            options.impute_channels,
         )[:, keep]
         for values in (voltage, reference)
     )
@@ -115,7 +130,10 @@ def import_frames(
     if base is None:
         names = raw.names or tuple(str(k) for k in range(len(voltage)))
         box = None if skin is None else skin.outline.bounding_box_mm
-        carried = {"time_s": raw.time_s, **truth_fields(raw.arrays, options.truth, names, box, str(path))}
+        carried = {
+            "time_s": raw.time_s,
+            **truth_fields(raw.arrays, options.truth, names, box, str(path)),
+        }
     else:
         names, carried = base.frame_name, {}
     current_a = options.current_a or (protocol.current_a if protocol is not None else 1e-3)
@@ -124,7 +142,10 @@ def import_frames(
         "voltage_v": voltage,
         "reference_voltage_v": reference,
         "frame_name": names,
-        "meta": _meta(path, options, base, skin) | ({} if raw.reference is not None else {"assumed": ASSUMED_QUIET}),
+        "meta": (
+            _meta(path, options, base, skin)
+            | ({} if raw.reference is not None else {"assumed": ASSUMED_QUIET})
+        ),
         "allow_nonfinite": lenient,
         **carried,
     }
@@ -139,8 +160,15 @@ def _read(
 ) -> tuple[RawFrames, Frames | None, Protocol | None]:
     """The raw frames; where ``path`` already is a frames file also that, and its own protocol."""
     if is_frames_file(path):
-        if options.source != SourceOptions() or options.table_file is not None or options.truth != TruthOptions():
-            raise UsageError(f"{path}: a frames file already; options that say where its arrays are do not go with it")
+        if (
+            options.source != SourceOptions()
+            or options.table_file is not None
+            or options.truth != TruthOptions()
+        ):
+            raise UsageError(
+                f"{path}: a frames file already; options that say where its arrays are do not go"
+                " with it"
+            )
         frames = load_frames(path, allow_nonfinite=True)
         _check_protocol(path, frames, protocol)
         return RawFrames(frames.voltage_v, frames.reference_voltage_v), frames, frames.protocol
@@ -150,10 +178,14 @@ def _read(
 
 def _check_protocol(path: str | Path, frames: Frames, protocol: Protocol | None) -> None:
     if protocol is not None and protocol.hash != frames.protocol.hash:
-        raise ProtocolError(f"{path}: was made with another protocol than the one given; leave those options out")
+        raise ProtocolError(
+            f"{path}: was made with another protocol than the one given; leave those options out"
+        )
 
 
-def accepted_counts(options: ImportOptions, protocol: Protocol | None) -> tuple[tuple[int, ...], str]:
+def accepted_counts(
+    options: ImportOptions, protocol: Protocol | None
+) -> tuple[tuple[int, ...], str]:
     """How many rows a source frame may have, and the words that say why.
 
     Raises:
@@ -165,11 +197,20 @@ def accepted_counts(options: ImportOptions, protocol: Protocol | None) -> tuple[
         rows = read_table(options.table_file).cells
         return (len(rows),), f"the table {options.table_file}"
     if protocol is None:
-        raise UsageError("say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table")
+        raise UsageError(
+            "say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table"
+        )
     if options.order == "table":
-        raise UsageError("--order table needs --table-file FILE, or --protocol-table KEY of the source's own table")
+        raise UsageError(
+            "--order table needs --table-file FILE, or --protocol-table KEY of the source's own"
+            " table"
+        )
     n, count = protocol.n_electrodes, len(source_table(options.order, protocol))
-    hint = "" if options.order.endswith("-all") else f"; with pairs at driving electrodes {n * n}, --order fixed-all"
+    hint = (
+        ""
+        if options.order.endswith("-all")
+        else f"; with pairs at driving electrodes {n * n}, --order fixed-all"
+    )
     return (count,), f"{n} electrodes, --order {options.order}{hint}"
 
 
@@ -187,18 +228,27 @@ def _placed(
     if options.table_file is not None:
         text = read_table(options.table_file)
         if text.n_columns != 4:
-            raise FrameError(f"{options.table_file}: has {text.n_columns} columns; a table has four: I+, I-, V+, V-")
-        given = electrode_table(text.numbers(range(4)), options.source.table_base, options.table_file)
+            raise FrameError(
+                f"{options.table_file}: has {text.n_columns} columns; a table has four: I+, I-,"
+                " V+, V-"
+            )
+        given = electrode_table(
+            text.numbers(range(4)), options.source.table_base, options.table_file
+        )
     if given is None:
         if protocol is None:
-            raise UsageError("say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table")
+            raise UsageError(
+                "say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table"
+            )
         given = source_table(options.order, protocol)
     elif given.min(initial=0) < 0 or given.max(initial=0) >= n:
         raise FrameError(
-            f"{where}: the table names electrodes {given.min()} to {given.max()}, but they are 0 to {n - 1}; "
-            "if it counts from 1 say --table-base 1"
+            f"{where}: the table names electrodes {given.min()} to {given.max()}, but they are 0 to"
+            f" {n - 1}; if it counts from 1 say --table-base 1"
         )
-    flipped = options.mirror or (options.clockwise and not (skin is not None and skin.electrodes.clockwise))
+    flipped = options.mirror or (
+        options.clockwise and not (skin is not None and skin.electrodes.clockwise)
+    )
     ours = relabel(given, electrode_map(n, options.rotate, flipped))
     if protocol is None or options.keep_table:
         return ours, np.arange(len(ours)), np.ones(len(ours), dtype=np.int64)
@@ -215,7 +265,9 @@ def _count(protocol: Protocol | None, n_electrodes: int | None) -> int:
     return n_electrodes
 
 
-def _meta(path: str | Path, options: ImportOptions, base: Frames | None, skin: Skin | None) -> dict[str, Any]:
+def _meta(
+    path: str | Path, options: ImportOptions, base: Frames | None, skin: Skin | None
+) -> dict[str, Any]:
     changed: dict[str, Any] = {}
     for group in (options, options.source, options.truth):
         defaults = type(group)()
@@ -236,4 +288,3 @@ def _meta(path: str | Path, options: ImportOptions, base: Frames | None, skin: S
     if base is not None:
         meta["before"] = dict(base.meta)
     return meta
-

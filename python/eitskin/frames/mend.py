@@ -1,4 +1,5 @@
-"""What import does to channels: their sign, filling them from reciprocals, leaving them out, making gains equal."""
+"""What import does to channels: their sign, filling them from reciprocals, leaving them out, making
+gains equal."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ LEAST_GAIN = 0.05
 
 
 def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> FloatArray:
-    """``values`` (n, m) as they are, negated, or their magnitudes with the signs of ``prediction`` (m,).
+    """``values`` (n, m) as they are, negated, or their magnitudes with the signs of ``prediction``
+    (m,).
 
     Raises:
         UsageError: an unknown sign.
@@ -44,10 +46,13 @@ def flipped(values: FloatArray, channels: Sequence[int]) -> FloatArray:
 
 
 def partners(rows: IntArray, n_electrodes: int) -> dict[int, tuple[int, int]]:
-    """For each channel that has a reciprocal one in ``rows`` (m, 4): that channel and the sign between them."""
+    """For each channel that has a reciprocal one in ``rows`` (m, 4): that channel and the sign
+    between them."""
     pairs = table(n_electrodes, rows).reciprocal_pairs()
     partner: dict[int, tuple[int, int]] = {}
-    for first, second, sign in zip(pairs.first.tolist(), pairs.second.tolist(), pairs.sign.tolist(), strict=True):
+    for first, second, sign in zip(
+        pairs.first.tolist(), pairs.second.tolist(), pairs.sign.tolist(), strict=True
+    ):
         if second >= 0:
             partner |= {first: (second, sign), second: (first, sign)}
     return partner
@@ -56,7 +61,8 @@ def partners(rows: IntArray, n_electrodes: int) -> dict[int, tuple[int, int]]:
 def kept_channels(
     rows: IntArray, n_electrodes: int, drop_channels: Sequence[int], drop_electrodes: Sequence[int]
 ) -> NDArray[np.bool_]:
-    """Which channels (m,) stay when ``drop_channels`` and all channels that use ``drop_electrodes`` go.
+    """Which channels (m,) stay when ``drop_channels`` and all channels that use ``drop_electrodes``
+    go.
 
     Raises:
         UsageError: a number is out of range, or nothing stays.
@@ -70,7 +76,9 @@ def kept_channels(
     return np.asarray(keep)
 
 
-def imputed(values: FloatArray, rows: IntArray, n_electrodes: int, channels: Sequence[int]) -> FloatArray:
+def imputed(
+    values: FloatArray, rows: IntArray, n_electrodes: int, channels: Sequence[int]
+) -> FloatArray:
     """``values`` (n, m) with ``channels`` replaced by their reciprocal channels of ``rows`` (m, 4).
 
     Raises:
@@ -83,7 +91,8 @@ def imputed(values: FloatArray, rows: IntArray, n_electrodes: int, channels: Seq
     for channel in channels:
         if channel not in partner or partner[channel][0] in channels:
             raise UsageError(
-                f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use --drop-channels"
+                f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use"
+                " --drop-channels"
             )
         other, sign = partner[channel]
         filled[:, channel] = sign * values[:, other]
@@ -101,8 +110,9 @@ def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArra
     weak = np.flatnonzero(~(relative > LEAST_GAIN))
     if len(weak):
         raise FrameError(
-            f"channel {weak[0]} has {relative[weak[0]]:.3g} of its predicted reference ({len(weak)} such): equalising "
-            "would only raise noise; leave such channels out first (--drop-channels, --drop-electrodes)"
+            f"channel {weak[0]} has {relative[weak[0]]:.3g} of its predicted reference ({len(weak)}"
+            " such): equalising would only raise noise; leave such channels out first"
+            " (--drop-channels, --drop-electrodes)"
         )
     return np.asarray(1 / relative)
 

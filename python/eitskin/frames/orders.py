@@ -1,4 +1,5 @@
-"""Channel orders: how others list a protocol's rows, how they number electrodes, and how rows are matched to ours."""
+"""Channel orders: how others list a protocol's rows, how they number electrodes, and how rows are
+matched to ours."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ IntArray = NDArray[np.int64]
 
 ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all")
 
-# A row under another name, best first: as it is, both pairs turned, one turned (-1); then the same of its reciprocal.
+# A row under another name, best first: as it is, both pairs turned, one turned (-1); then the same
+# of its reciprocal.
 PREFERENCE = tuple(
     ([columns[k] for k in flip], sign)
     for columns in ((0, 1, 2, 3), (2, 3, 0, 1))
@@ -25,7 +27,8 @@ PREFERENCE = tuple(
 
 @dataclass(frozen=True, eq=False)
 class RowMatch:
-    """Where each wanted row stands in a source: row ``index[r]`` times ``sign[r]`` (both (m,) int64)."""
+    """Where each wanted row stands in a source: row ``index[r]`` times ``sign[r]`` (both (m,)
+    int64)."""
 
     index: IntArray
     sign: IntArray
@@ -34,14 +37,19 @@ class RowMatch:
 def source_table(order: str, protocol: Protocol) -> IntArray:
     """The rows [I+, I-, V+, V-] of ``protocol`` as a source in ``order`` lists them, (rows, 4).
 
-    "fixed": for each drive the measuring pairs ascend from electrode 0 (this project's order). "rotating": they ascend
-    from the drive's I+ onwards, modulo the number of electrodes. "-all": pairs that touch a driving electrode, too.
+    "fixed": for each drive the measuring pairs ascend from electrode 0 (this project's order).
+    "rotating": they ascend from the drive's I+ onwards, modulo the number of electrodes. "-all":
+    pairs that touch a driving electrode, too.
 
     Raises:
-        UsageError: an unknown order, or "-all" for a protocol whose measuring pairs are not all of one step.
+        UsageError: an unknown order, or "-all" for a protocol whose measuring pairs are not all of
+            one step.
     """
     if order not in ORDERS:
-        raise UsageError(f"order {order!r} is not known; use one of {', '.join(ORDERS)}, or table with a table file")
+        raise UsageError(
+            f"order {order!r} is not known; use one of {', '.join(ORDERS)}, or table with a table"
+            " file"
+        )
     rows = np.asarray(protocol.drive_measure, dtype=np.int64)
     if order.endswith("-all"):
         rows = _with_driven_pairs(rows, protocol.n_electrodes)
@@ -53,9 +61,11 @@ def source_table(order: str, protocol: Protocol) -> IntArray:
 
 
 def match_rows(source: IntArray, wanted: IntArray) -> RowMatch:
-    """Find each row of ``wanted`` (m, 4) in ``source`` (rows, 4), up to the direction of either pair.
+    """Find each row of ``wanted`` (m, 4) in ``source`` (rows, 4), up to the direction of either
+    pair.
 
-    A row that is not in the source is taken from its reciprocal (drive and measuring pair exchanged) if that is there.
+    A row that is not in the source is taken from its reciprocal (drive and measuring pair
+    exchanged) if that is there.
 
     Raises:
         FrameError: a wanted row, and its reciprocal, is absent.
@@ -65,18 +75,21 @@ def match_rows(source: IntArray, wanted: IntArray) -> RowMatch:
         for row, key in enumerate(np.asarray(source)[:, columns].tolist()):
             place.setdefault(tuple(key), (row, sign))
     found = [place.get(tuple(row)) for row in np.asarray(wanted).tolist()]
-    absent = [row for row, hit in zip(np.asarray(wanted).tolist(), found, strict=True) if hit is None]
+    absent = [
+        row for row, hit in zip(np.asarray(wanted).tolist(), found, strict=True) if hit is None
+    ]
     if absent:
         raise FrameError(
-            f"{len(absent)} of the protocol's {len(found)} rows are not in the source, first {absent[0]} "
-            "[I+, I-, V+, V-]; keep the source's own table with  --protocol table"
+            f"{len(absent)} of the protocol's {len(found)} rows are not in the source, first"
+            f" {absent[0]} [I+, I-, V+, V-]; keep the source's own table with  --protocol table"
         )
     hits = np.array([hit for hit in found if hit is not None], dtype=np.int64).reshape(-1, 2)
     return RowMatch(hits[:, 0], hits[:, 1])
 
 
 def electrode_map(n: int, rotate: int = 0, mirror: bool = False) -> IntArray:
-    """Our number of each source electrode, (n,): source 0 is our ``rotate``, then counting up (``mirror``: down)."""
+    """Our number of each source electrode, (n,): source 0 is our ``rotate``, then counting up
+    (``mirror``: down)."""
     steps = np.arange(n, dtype=np.int64)
     return np.asarray((rotate - steps if mirror else rotate + steps) % n)
 
@@ -90,7 +103,9 @@ def swap_map(n: int, pairs: Iterable[Sequence[int]]) -> IntArray:
     mapped = np.arange(n, dtype=np.int64)
     for pair in pairs:
         if len(set(pair)) != 2 or not all(0 <= electrode < n for electrode in pair):
-            raise UsageError(f"swap {','.join(map(str, pair))}: name two different electrodes of 0 to {n - 1}")
+            raise UsageError(
+                f"swap {','.join(map(str, pair))}: name two different electrodes of 0 to {n - 1}"
+            )
         i, j = pair
         mapped = np.where(mapped == i, j, np.where(mapped == j, i, mapped))
     return mapped
@@ -109,7 +124,10 @@ def touching(rows: IntArray, electrodes: Iterable[int]) -> NDArray[np.bool_]:
 def _with_driven_pairs(rows: IntArray, n: int) -> IntArray:
     step = (rows[:, 3] - rows[:, 2]) % n
     if len(set(step.tolist())) != 1:
-        raise UsageError("an order with all pairs goes only with adjacent, opposite or skip; give a table file instead")
+        raise UsageError(
+            "an order with all pairs goes only with adjacent, opposite or skip; give a table file"
+            " instead"
+        )
     places = np.sort(np.unique(rows[:, :2], axis=0, return_index=True)[1])
     k = np.arange(n)
     drives = rows[places, :2]

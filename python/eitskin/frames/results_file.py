@@ -1,4 +1,5 @@
-"""Results as a file: images, touches and solver info of each frame, named and with units (docs/reference/frames-format.md)."""
+"""Results as a file: images, touches and solver info of each frame, named and with units
+(docs/reference/frames-format.md)."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ FORMAT = "eitskin-results"
 VERSION = 1
 
 
-def save_results(path: str | Path, model: Model, frames: Frames, results: dict[int, Reconstruction]) -> None:
+def save_results(
+    path: str | Path, model: Model, frames: Frames, results: dict[int, Reconstruction]
+) -> None:
     """Write the ``results`` by frame number to ``path`` (.npz), whole or not at all.
 
     Raises:
@@ -39,7 +42,9 @@ def save_results(path: str | Path, model: Model, frames: Frames, results: dict[i
         "touch_id": np.array([touch.id for _, touch in touches], dtype=np.int64),
         "touch_xy_mm": np.array([(touch.x_mm, touch.y_mm) for _, touch in touches]).reshape(-1, 2),
         "touch_radius_mm": np.array([touch.radius_mm for _, touch in touches]),
-        "touch_strength_s_per_m_mm2": np.array([touch.strength_s_per_m_mm2 for _, touch in touches]),
+        "touch_strength_s_per_m_mm2": np.array(
+            [touch.strength_s_per_m_mm2 for _, touch in touches]
+        ),
         "touch_confidence": np.array([touch.confidence for _, touch in touches]),
         "touch_load_n": np.array([touch.load_n for _, touch in touches]),
         "info": np.array(json.dumps([results[number].info.as_dict() for number in numbers])),

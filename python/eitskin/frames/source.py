@@ -1,4 +1,5 @@
-"""A measured source, CSV, NPZ or MAT, read into frames of channels that still stand in the source's own order."""
+"""A measured source, CSV, NPZ or MAT, read into frames of channels that still stand in the source's
+own order."""
 
 from __future__ import annotations
 
@@ -28,9 +29,10 @@ COMPLEX_PARTS = ("real", "imag", "abs", "in-phase")
 class SourceOptions:
     """Where in a source the frames are.
 
-    NPZ and MAT: ``voltage``, ``reference``, ``names``, ``time``, ``protocol_table`` name arrays. Text: ``columns`` and
-    ``reference_columns`` choose columns ("2", "0,2", "1:209", header names), ``time`` one column. ``reference_frames``
-    chooses quiet frames among the frames. ``scale`` turns the source's numbers into volts (None: unknown, taken as 1).
+    NPZ and MAT: ``voltage``, ``reference``, ``names``, ``time``, ``protocol_table`` name arrays.
+    Text: ``columns`` and ``reference_columns`` choose columns ("2", "0,2", "1:209", header names),
+    ``time`` one column. ``reference_frames`` chooses quiet frames among the frames. ``scale`` turns
+    the source's numbers into volts (None: unknown, taken as 1).
     ``complex_part``: what to keep of complex numbers; in text, columns then come in pairs re, im.
     """
 
@@ -52,7 +54,8 @@ class SourceOptions:
 
 @dataclass(frozen=True, eq=False)
 class RawFrames:
-    """Frames as the source orders them: ``voltage`` (n, rows), ``reference`` (k, rows) or None where none was named.
+    """Frames as the source orders them: ``voltage`` (n, rows), ``reference`` (k, rows) or None
+    where none was named.
 
     ``table`` (rows, 4) where the source has one, ``arrays`` everything an NPZ or MAT file holds.
     """
@@ -72,8 +75,11 @@ def is_frames_file(path: str | Path) -> bool:
     return str(read_arrays(path).get("format")) == FORMAT
 
 
-def read_source(path: str | Path, options: SourceOptions, row_counts: Iterable[int], asked: str) -> RawFrames:
-    """Read ``path``; a frame may have any of ``row_counts`` channels, and ``asked`` says why in errors.
+def read_source(
+    path: str | Path, options: SourceOptions, row_counts: Iterable[int], asked: str
+) -> RawFrames:
+    """Read ``path``; a frame may have any of ``row_counts`` channels, and ``asked`` says why in
+    errors.
 
     Raises:
         FileError: the file cannot be read.
@@ -87,18 +93,30 @@ def read_source(path: str | Path, options: SourceOptions, row_counts: Iterable[i
         return _from_text(path, options, tuple(row_counts), asked)
     if suffix in ARRAY_SUFFIXES:
         return _from_arrays(path, options, tuple(row_counts), asked)
-    raise UsageError(f"{path}: the suffix {suffix!r} is not known; use {', '.join((*TEXT_SUFFIXES, *ARRAY_SUFFIXES))}")
+    raise UsageError(
+        f"{path}: the suffix {suffix!r} is not known; use"
+        f" {', '.join((*TEXT_SUFFIXES, *ARRAY_SUFFIXES))}"
+    )
 
 
 def electrode_table(rows: NDArray[Any], base: int, where: str) -> IntArray:
-    """A source's protocol table as (rows, 4) electrodes from 0; ``base`` is the source's number of its first electrode.
+    """A source's protocol table as (rows, 4) electrodes from 0; ``base`` is the source's number of
+    its first electrode.
 
     Raises:
         FrameError: it is not (rows, 4) whole numbers.
     """
     table = np.asarray(rows)
-    if table.ndim != 2 or table.shape[1] != 4 or table.dtype.kind not in "fiu" or (table != np.round(table)).any():
-        raise FrameError(f"{where}: a protocol table is (rows, 4) whole numbers [I+, I-, V+, V-], not {table.shape}")
+    if (
+        table.ndim != 2
+        or table.shape[1] != 4
+        or table.dtype.kind not in "fiu"
+        or (table != np.round(table)).any()
+    ):
+        raise FrameError(
+            f"{where}: a protocol table is (rows, 4) whole numbers [I+, I-, V+, V-], not"
+            f" {table.shape}"
+        )
     return table.astype(np.int64) - base
 
 
@@ -113,8 +131,8 @@ def refuse_nonfinite(raw: RawFrames, where: str) -> None:
         if values is not None and len(bad):
             frame, row = (int(k) for k in bad[0])
             raise FrameError(
-                f"{where}: {what}: frame {frame}, row {row} (from 0) is {values[frame, row]} ({len(bad)} such values); "
-                "mend the source, or leave those frames out"
+                f"{where}: {what}: frame {frame}, row {row} (from 0) is {values[frame, row]}"
+                f" ({len(bad)} such values); mend the source, or leave those frames out"
             )
 
 
@@ -124,7 +142,9 @@ def _check_words(options: SourceOptions) -> None:
         ("complex-part", options.complex_part, (None, *COMPLEX_PARTS)),
     ):
         if value not in known:
-            raise UsageError(f"--{name} {value}: use one of {', '.join(word for word in known if word)}")
+            raise UsageError(
+                f"--{name} {value}: use one of {', '.join(word for word in known if word)}"
+            )
     if options.scale is not None and not (np.isfinite(options.scale) and options.scale != 0):
         raise UsageError(f"--scale {options.scale:g}: must be finite and not 0")
 
@@ -135,20 +155,31 @@ def _refuse(options: SourceOptions, names: Iterable[str], kind: str) -> None:
             raise UsageError(f"--{name.replace('_', '-')} does not go with a {kind} file")
 
 
-def _from_text(path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str) -> RawFrames:
+def _from_text(
+    path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
+) -> RawFrames:
     _refuse(options, ("voltage", "reference", "names", "protocol_table"), "text")
     table = read_table(path, options.delimiter, options.header_rows)
     quiet = _columns(table, options.reference_columns, "--reference-columns")
     time = _columns(table, options.time, "--time")
     columns = _columns(table, options.columns, "--columns")
     if columns is None:
-        columns = tuple(k for k in range(table.n_columns) if k not in (quiet or ()) and k not in (time or ()))
+        columns = tuple(
+            k for k in range(table.n_columns) if k not in (quiet or ()) and k not in (time or ())
+        )
     where = f"{path}: {len(table.cells)} rows, {len(columns)} chosen columns"
     values = _paired(table.numbers(columns), options.complex_part, "--columns")
-    reference = None if quiet is None else _paired(table.numbers(quiet), options.complex_part, "--reference-columns")
+    reference = (
+        None
+        if quiet is None
+        else _paired(table.numbers(quiet), options.complex_part, "--reference-columns")
+    )
     in_rows = _frames_in_rows(values.shape, row_counts, options.layout, where, asked)
     if in_rows and quiet is not None:
-        raise UsageError("--reference-columns needs channels in rows; where frames are rows use --reference-frames")
+        raise UsageError(
+            "--reference-columns needs channels in rows; where frames are rows use"
+            " --reference-frames"
+        )
     if not in_rows:
         values, reference = values.T, None if reference is None else reference.T
     if time is not None and (not in_rows or len(time) != 1):
@@ -160,25 +191,37 @@ def _from_text(path: str | Path, options: SourceOptions, row_counts: tuple[int, 
     return _finish(values, reference, names, times, None, {}, options)
 
 
-def _from_arrays(path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str) -> RawFrames:
+def _from_arrays(
+    path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
+) -> RawFrames:
     _refuse(options, ("columns", "reference_columns", "delimiter", "header_rows"), "NPZ or MAT")
     arrays, where = read_arrays(path), str(path)
     if options.voltage is None:
-        raise UsageError(f"{where}: say with --voltage KEY which array holds the frames; it holds {listing(arrays)}")
+        raise UsageError(
+            f"{where}: say with --voltage KEY which array holds the frames; it holds"
+            f" {listing(arrays)}"
+        )
     table = None
     if options.protocol_table is not None:
         given = pick(arrays, options.protocol_table, "--protocol-table", where)
         table = electrode_table(given, options.table_base, f"{where}: {options.protocol_table}")
         row_counts, asked = (len(table),), f"its table {options.protocol_table}"
-    voltage, in_rows = _frames_of(arrays, options.voltage, "--voltage", row_counts, options.layout, where, asked)
+    voltage, in_rows = _frames_of(
+        arrays, options.voltage, "--voltage", row_counts, options.layout, where, asked
+    )
     reference = None
     if options.reference is not None:
         layout = options.layout if in_rows is None else LAYOUTS[1] if in_rows else LAYOUTS[2]
         counts = (voltage.shape[1],)
-        reference, _ = _frames_of(arrays, options.reference, "--reference", counts, layout, where, "the frames")
+        reference, _ = _frames_of(
+            arrays, options.reference, "--reference", counts, layout, where, "the frames"
+        )
     names: tuple[str, ...] = ()
     if options.names is not None:
-        names = tuple(str(name) for name in np.atleast_1d(pick(arrays, options.names, "--names", where)).ravel())
+        names = tuple(
+            str(name)
+            for name in np.atleast_1d(pick(arrays, options.names, "--names", where)).ravel()
+        )
     times = None
     if options.time is not None:
         times = _times(pick(arrays, options.time, "--time", where), f"{where}: {options.time}")
@@ -211,7 +254,10 @@ def _finish(
         times = None if times is None else times[rest]
     if np.iscomplexobj(voltage) or (reference is not None and np.iscomplexobj(reference)):
         if options.complex_part is None:
-            raise UsageError(f"the numbers are complex; say with --complex-part which part: {', '.join(COMPLEX_PARTS)}")
+            raise UsageError(
+                "the numbers are complex; say with --complex-part which part:"
+                f" {', '.join(COMPLEX_PARTS)}"
+            )
         phase = _common_phase(voltage[:1] if reference is None else reference)
         voltage = _part(voltage, options.complex_part, phase)
         reference = None if reference is None else _part(reference, options.complex_part, phase)
@@ -227,7 +273,8 @@ def _finish(
 
 
 def _common_phase(values: NDArray[Any]) -> float:
-    """The phase (radians, within +-pi/2) that puts most of ``values`` on the real axis: half the angle of sum z^2."""
+    """The phase (radians, within +-pi/2) that puts most of ``values`` on the real axis: half the
+    angle of sum z^2."""
     finite = np.asarray(values)[np.isfinite(values)]
     return float(np.angle((finite.astype(np.complex128) ** 2).sum()) / 2)
 
@@ -237,15 +284,21 @@ def _part(values: NDArray[Any], part: str, phase: float) -> FloatArray:
         return np.asarray(np.abs(values))
     if part == "imag":
         return np.asarray(np.imag(values), dtype=np.float64)
-    return np.asarray((values * np.exp(-1j * phase) if part == "in-phase" else values).real, dtype=np.float64)
+    return np.asarray(
+        (values * np.exp(-1j * phase) if part == "in-phase" else values).real, dtype=np.float64
+    )
 
 
 def _paired(values: NDArray[Any], complex_part: str | None, option: str) -> NDArray[Any]:
-    """Columns (rows, 2c) re, im as complex (rows, c), where a complex part is asked for and the cells are real."""
+    """Columns (rows, 2c) re, im as complex (rows, c), where a complex part is asked for and the
+    cells are real."""
     if complex_part is None or np.iscomplexobj(values):
         return values
     if values.shape[1] % 2:
-        raise UsageError(f"{option}: with --complex-part columns come in pairs re,im; {values.shape[1]} are named")
+        raise UsageError(
+            f"{option}: with --complex-part columns come in pairs re,im; {values.shape[1]} are"
+            " named"
+        )
     return np.asarray(values[:, 0::2] + 1j * values[:, 1::2])
 
 
@@ -258,7 +311,8 @@ def _frames_of(
     where: str,
     asked: str,
 ) -> tuple[NDArray[Any], bool | None]:
-    """The array ``key`` as (frames, channels), and whether its frames were rows (None: it is one frame)."""
+    """The array ``key`` as (frames, channels), and whether its frames were rows (None: it is one
+    frame)."""
     values = pick(arrays, key, option, where)
     where = f"{where}: {key} {values.shape}"
     if values.dtype.kind not in "fiuc":
@@ -266,7 +320,9 @@ def _frames_of(
     if values.ndim == 1 and len(values) in row_counts:
         return values[None, :], None
     if values.ndim != 2:
-        raise FrameError(f"{where}: must be (frames, channels) or (channels,); {_wanted(row_counts, asked)}")
+        raise FrameError(
+            f"{where}: must be (frames, channels) or (channels,); {_wanted(row_counts, asked)}"
+        )
     in_rows = _frames_in_rows(values.shape, row_counts, layout, where, asked)
     return values if in_rows else values.T, in_rows
 
@@ -277,7 +333,9 @@ def _frames_in_rows(
     rows, columns = (side in row_counts for side in shape)
     if layout == "auto":
         if rows and columns:
-            raise UsageError(f"{where}: both sides fit; say --layout frames-in-rows or channels-in-rows")
+            raise UsageError(
+                f"{where}: both sides fit; say --layout frames-in-rows or channels-in-rows"
+            )
         if rows or columns:
             return columns
         raise FrameError(f"{where}: {_wanted(row_counts, asked)}")
@@ -288,7 +346,9 @@ def _frames_in_rows(
 
 
 def _wanted(row_counts: tuple[int, ...], asked: str) -> str:
-    return f"a frame should have {' or '.join(map(str, sorted(set(row_counts))))} channels ({asked})"
+    return (
+        f"a frame should have {' or '.join(map(str, sorted(set(row_counts))))} channels ({asked})"
+    )
 
 
 def _columns(table: TextTable, spec: str | None, option: str) -> tuple[int, ...] | None:

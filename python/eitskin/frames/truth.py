@@ -1,4 +1,5 @@
-"""What a source says about its own scenes: touches and masks, turned into the frames file's units."""
+"""What a source says about its own scenes: touches and masks, turned into the frames file's
+units."""
 
 from __future__ import annotations
 
@@ -17,9 +18,10 @@ from eitskin.frames.arrays import pick
 class TruthOptions:
     """Names of the source's arrays, and their units.
 
-    ``touch_frame`` (t,) frame index from 0 or frame name, ``touch_xy`` (t, 2) and ``touch_radius`` (t,) in units of
-    ``touch_unit_mm``, ``touch_strength`` (t,) relative conductivity change, ``touch_sign`` (t,) true or above 0: more
-    conductive. ``mask`` (n, h, w) +1/-1/0 over ``mask_extent_mm``; ``mask_top_first``: its row 0 is the highest y.
+    ``touch_frame`` (t,) frame index from 0 or frame name, ``touch_xy`` (t, 2) and ``touch_radius``
+    (t,) in units of ``touch_unit_mm``, ``touch_strength`` (t,) relative conductivity change,
+    ``touch_sign`` (t,) true or above 0: more conductive. ``mask`` (n, h, w) +1/-1/0 over
+    ``mask_extent_mm``; ``mask_top_first``: its row 0 is the highest y.
     """
 
     touch_frame: str | None = None
@@ -40,7 +42,8 @@ def truth_fields(
     box_mm: tuple[float, float, float, float] | None,
     where: str,
 ) -> dict[str, Any]:
-    """The truth fields of ``Frames`` that ``options`` ask for; ``names`` of the frames, ``box_mm`` of the skin.
+    """The truth fields of ``Frames`` that ``options`` ask for; ``names`` of the frames, ``box_mm``
+    of the skin.
 
     Raises:
         UsageError: options that need another option.
@@ -52,29 +55,48 @@ def truth_fields(
 def _touches(
     arrays: Mapping[str, NDArray[Any]], options: TruthOptions, names: Sequence[str], where: str
 ) -> dict[str, Any]:
-    needed = {"truth-frame": options.touch_frame, "truth-xy": options.touch_xy, "truth-radius": options.touch_radius}
+    needed = {
+        "truth-frame": options.touch_frame,
+        "truth-xy": options.touch_xy,
+        "truth-radius": options.touch_radius,
+    }
     extra = {"truth-strength": options.touch_strength, "truth-sign": options.touch_sign}
     if not any((needed | extra).values()):
         return {}
     absent = [name for name, key in needed.items() if key is None]
     if absent:
-        raise UsageError(f"touches need --{absent[0]} too (--truth-frame, --truth-xy and --truth-radius)")
-    picked = {name: pick(arrays, key, f"--{name}", where) for name, key in (needed | extra).items() if key is not None}
+        raise UsageError(
+            f"touches need --{absent[0]} too (--truth-frame, --truth-xy and --truth-radius)"
+        )
+    picked = {
+        name: pick(arrays, key, f"--{name}", where)
+        for name, key in (needed | extra).items()
+        if key is not None
+    }
     frame = picked["truth-frame"]
     if frame.dtype.kind in "US":
         absent = [str(name) for name in frame if str(name) not in names]
         if absent:
-            raise FrameError(f"{where}: {options.touch_frame} names frame {absent[0]!r}; frames are {', '.join(names)}")
+            raise FrameError(
+                f"{where}: {options.touch_frame} names frame {absent[0]!r}; frames are"
+                f" {', '.join(names)}"
+            )
         frame = np.array([list(names).index(str(name)) for name in frame], dtype=np.int64)
     elif frame.dtype.kind == "f" and (frame == np.round(frame)).all():
         frame = frame.astype(np.int64)
     fields: dict[str, Any] = {
         "touch_frame": frame,
-        "touch_xy_mm": _scaled(picked["truth-xy"], options.touch_unit_mm, f"{where}: {options.touch_xy}"),
-        "touch_radius_mm": _scaled(picked["truth-radius"], options.touch_unit_mm, f"{where}: {options.touch_radius}"),
+        "touch_xy_mm": _scaled(
+            picked["truth-xy"], options.touch_unit_mm, f"{where}: {options.touch_xy}"
+        ),
+        "touch_radius_mm": _scaled(
+            picked["truth-radius"], options.touch_unit_mm, f"{where}: {options.touch_radius}"
+        ),
     }
     if "truth-strength" in picked:
-        fields["touch_strength"] = _scaled(picked["truth-strength"], 1.0, f"{where}: {options.touch_strength}")
+        fields["touch_strength"] = _scaled(
+            picked["truth-strength"], 1.0, f"{where}: {options.touch_strength}"
+        )
     if "truth-sign" in picked:
         sign = _scaled(picked["truth-sign"], 1.0, f"{where}: {options.touch_sign}")
         fields["touch_sign"] = np.where(sign > 0, 1, -1).astype(np.int8)
@@ -91,7 +113,9 @@ def _mask(
         return {}
     extent = box_mm if options.mask_extent_mm is None else options.mask_extent_mm
     if extent is None:
-        raise UsageError("a truth mask needs --truth-mask-extent XMIN,YMIN,XMAX,YMAX in mm, or --skin")
+        raise UsageError(
+            "a truth mask needs --truth-mask-extent XMIN,YMIN,XMAX,YMAX in mm, or --skin"
+        )
     mask = pick(arrays, options.mask, "--truth-mask", where)
     if mask.ndim == 2:
         mask = mask[None]

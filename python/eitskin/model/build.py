@@ -1,4 +1,5 @@
-"""From a skin's description to a model: mesh, forward model, Jacobian, reduction, storage, golden frame."""
+"""From a skin's description to a model: mesh, forward model, Jacobian, reduction, storage, golden
+frame."""
 
 from __future__ import annotations
 
@@ -32,9 +33,11 @@ FloatArray = npt.NDArray[np.float64]
 LIPSCHITZ_MARGIN = 1e-4
 FIELD_PEAK = 1024.0
 LEAST_RATIO_REFERENCE = 1e-6
-# a disc of contrast c in a sheet of conductivity s answers as a change of 2 (c - 1) / (c + 1) s: for c = 3 to 10, 1.0 to 1.64 s
+# a disc of contrast c in a sheet of conductivity s answers as a change of 2 (c - 1) / (c + 1) s: for
+# c = 3 to 10, 1.0 to 1.64 s
 TOUCH_CHANGE_RATIO = 1.35
-# the logarithm draws strong touches together, so that their data say little of the radius and strength must
+# the logarithm draws strong touches together, so that their data say little of the radius and
+# strength must
 LOG_RADIUS_WEIGHT = 1.0
 
 
@@ -55,8 +58,10 @@ class BuildSettings:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """The skin's linear answer: ``jacobian`` (m, n) V per S/m on ``grid``, ``v0_v`` (m,), and the mesh's element count;
-    ``electrode_fields`` (n, 2, L) V/m per A for what touches do to each other, None to build a model without."""
+    """The skin's linear answer: ``jacobian`` (m, n) V per S/m on ``grid``, ``v0_v`` (m,), and the
+    mesh's element count; ``electrode_fields`` (n, 2, L) V/m per A for what touches do to each
+    other, None to build a model without.
+    """
 
     grid: Grid
     jacobian: FloatArray
@@ -65,7 +70,9 @@ class Linearisation:
     electrode_fields: FloatArray | None = None
 
 
-def linearise(skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elements: int = 3000) -> Linearisation:
+def linearise(
+    skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elements: int = 3000
+) -> Linearisation:
     """Mesh ``skin`` and take the Jacobian of its boundary voltages at its own conductivity.
 
     Raises:
@@ -86,7 +93,9 @@ def linearise(skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elemen
     return Linearisation(grid, jacobian, v0, mesh.n_elements, fields)
 
 
-def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings) -> Model:
+def make_model(
+    skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings
+) -> Model:
     """Reduce and store a linearisation; the golden image comes from the float32 C core.
 
     Raises:
@@ -101,7 +110,9 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
         silent = np.abs(v_ref) < LEAST_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
         jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
     rank = settings.rank or min(64, *jacobian.shape)
-    reduction = reduce_jacobian(jacobian, rank, floor=settings.floor, column_power=settings.column_power)
+    reduction = reduce_jacobian(
+        jacobian, rank, floor=settings.floor, column_power=settings.column_power
+    )
     projection = np.where(silent, 0.0, reduction.projection).astype(np.float32)
     stored = store(reduction.sensitivity, settings.storage)
     decoded = stored.decode(rank)
@@ -119,10 +130,13 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
         column_weight=reduction.column_weight.astype(np.float32),
         lipschitz=float(np.float32(spectral_norm_squared(decoded) * (1 + LIPSCHITZ_MARGIN))),
         noise_gain=float(np.float32(noise_gain(projection, decoded))),
-        defaults=settings.defaults or scaled_defaults(skin, settings.data_kind, settings.touch_change_ratio),
+        defaults=settings.defaults
+        or scaled_defaults(skin, settings.data_kind, settings.touch_change_ratio),
         golden=Golden(reference, _golden_frame(skin, linear), empty),
         meta=_meta(skin, protocol, linear, settings, rank),
-        fields=stored_fields(skin, protocol, linear) if settings.data_kind == "difference" else None,
+        fields=(
+            stored_fields(skin, protocol, linear) if settings.data_kind == "difference" else None
+        ),
     )
     return replace(model, golden=replace(model.golden, image=_golden_image(model)))
 
@@ -130,15 +144,26 @@ def make_model(skin: Skin, protocol: Protocol, linear: Linearisation, settings: 
 def _refuse_settings(settings: BuildSettings, grid: Grid) -> None:
     """Refuse what no .eitm file can hold, before the work."""
     if settings.storage not in STORAGES or settings.data_kind not in DATA_KINDS:
-        raise UsageError(f"model: storage must be one of {', '.join(STORAGES)}; data one of {', '.join(DATA_KINDS)}")
+        raise UsageError(
+            f"model: storage must be one of {', '.join(STORAGES)}; data one of"
+            f" {', '.join(DATA_KINDS)}"
+        )
     if not 0 <= settings.rank <= MAX_RANK:
-        raise UsageError(f"model: rank = {settings.rank} is out of range; use 1 to {MAX_RANK}, or 0 for the usual one")
+        raise UsageError(
+            f"model: rank = {settings.rank} is out of range; use 1 to {MAX_RANK}, or 0 for the"
+            " usual one"
+        )
     if grid.n_pixels > MAX_PIXELS:
-        raise UsageError(f"model: {grid.n_pixels} pixels are more than a model's {MAX_PIXELS}; use fewer across")
+        raise UsageError(
+            f"model: {grid.n_pixels} pixels are more than a model's {MAX_PIXELS}; use fewer across"
+        )
 
 
-def scaled_defaults(skin: Skin, data_kind: str, touch_change_ratio: float = TOUCH_CHANGE_RATIO) -> Defaults:
-    """Defaults for ``skin``: lengths in proportion to its size, the expected change to its conductivity."""
+def scaled_defaults(
+    skin: Skin, data_kind: str, touch_change_ratio: float = TOUCH_CHANGE_RATIO
+) -> Defaults:
+    """Defaults for ``skin``: lengths in proportion to its size, the expected change to its
+    conductivity."""
     paper = Defaults()
     scale = size_to_paper(skin.outline)
     return replace(
@@ -148,7 +173,9 @@ def scaled_defaults(skin: Skin, data_kind: str, touch_change_ratio: float = TOUC
         touch_seed_radius_mm=_round(paper.touch_seed_radius_mm * scale),
         touch_change_s_per_m=_round(touch_change_ratio * skin.conductivity_s_per_m),
         follow_mm=_round(paper.follow_mm * scale),
-        touch_radius_weight=LOG_RADIUS_WEIGHT if data_kind == "log-ratio" else paper.touch_radius_weight,
+        touch_radius_weight=(
+            LOG_RADIUS_WEIGHT if data_kind == "log-ratio" else paper.touch_radius_weight
+        ),
     )
 
 
@@ -157,7 +184,8 @@ def _round(value: float) -> float:
 
 
 def build_model(skin: Skin, protocol: Protocol, settings: BuildSettings | None = None) -> Model:
-    """The whole way from ``skin`` to a model; raises what ``linearise`` and ``make_model`` raise."""
+    """The whole way from ``skin`` to a model; raises what ``linearise`` and ``make_model``
+    raise."""
     chosen = settings or BuildSettings()
     _refuse_settings(chosen, grid_for(skin.outline, chosen.pixels_across))
     linear = linearise(skin, protocol, pixels_across=chosen.pixels_across, elements=chosen.elements)
@@ -165,7 +193,8 @@ def build_model(skin: Skin, protocol: Protocol, settings: BuildSettings | None =
 
 
 def stored_fields(skin: Skin, protocol: Protocol, linear: Linearisation) -> Fields | None:
-    """The fields of ``linear`` as a model stores them, the greatest as 1024; None where there are none."""
+    """The fields of ``linear`` as a model stores them, the greatest as 1024; None where there are
+    none."""
     if linear.electrode_fields is None:
         return None
     fields = linear.electrode_fields.reshape(linear.grid.n_pixels, -1)
@@ -174,16 +203,21 @@ def stored_fields(skin: Skin, protocol: Protocol, linear: Linearisation) -> Fiel
     columns = np.column_stack([fields / unit, a.real, a.imag, b.real, b.imag])
     volts = protocol.current_a * skin.thickness_mm * 1e-3 * 1e-6 * unit**2
     per_sheet = 1 / (2 * np.pi * skin.conductivity_s_per_m)
-    return Fields(columns.astype(np.float16), float(np.float32(volts)), float(np.float32(per_sheet)))
+    return Fields(
+        columns.astype(np.float16), float(np.float32(volts)), float(np.float32(per_sheet))
+    )
 
 
 def _golden_frame(skin: Skin, linear: Linearisation) -> npt.NDArray[np.float32]:
-    """Two discs, as the linear model sees them: reproducible from the model's own Jacobian, with no random number."""
+    """Two discs, as the linear model sees them: reproducible from the model's own Jacobian, with no
+    random number."""
     centres = linear.grid.centres_mm()
     middle, size = centres.mean(axis=0), np.ptp(centres, axis=0).min()
     change = np.zeros(len(centres))
     for offset, radius, contrast in (((0.22, 0.13), 0.06, 3.0), ((-0.25, -0.09), 0.05, 2.0)):
-        inside = np.linalg.norm(centres - middle - size * np.array(offset), axis=1) <= max(radius * size, linear.grid.pixel_mm)
+        inside = np.linalg.norm(centres - middle - size * np.array(offset), axis=1) <= max(
+            radius * size, linear.grid.pixel_mm
+        )
         change[inside] = contrast * skin.conductivity_s_per_m
     return np.asarray(linear.v0_v + linear.jacobian @ change, dtype=np.float32)
 
@@ -194,7 +228,9 @@ def _golden_image(model: Model) -> npt.NDArray[np.float32]:
     return np.asarray(core.reconstruct(model.golden.frame_v, touches=False).image, dtype=np.float32)
 
 
-def _meta(skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings, rank: int) -> dict[str, Any]:
+def _meta(
+    skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings, rank: int
+) -> dict[str, Any]:
     settings_table = {**asdict(settings), "rank": rank}
     settings_table.pop("defaults")
     return {

@@ -1,4 +1,5 @@
-"""The .eitm file, byte by byte as docs/reference/eitm-format.md specifies; this reader is independent of the C one."""
+"""The .eitm file, byte by byte as docs/reference/eitm-format.md specifies; this reader is
+independent of the C one."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from eitskin.core.results import ALL_SEARCH, SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
-from eitskin.model.load import decode_load, encode_load
+from eitskin.model.force_law import decode_load, encode_load
 from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
@@ -71,7 +72,11 @@ def encode_model(model: Model) -> bytes:
         "COLW": model.column_weight.astype("<f4").tobytes(),
         "GRID": model.grid.index.astype("<u2").tobytes(),
         "DEFS": _encode_defaults(model.defaults),
-        "GOLD": np.concatenate([golden.reference_v, golden.frame_v, golden.image]).astype("<f4").tobytes(),
+        "GOLD": (
+            np.concatenate([golden.reference_v, golden.frame_v, golden.image])
+            .astype("<f4")
+            .tobytes()
+        ),
         "META": json.dumps(model.meta, sort_keys=True).encode("utf-8"),
     }
     if model.load is not None:
@@ -79,14 +84,20 @@ def encode_model(model: Model) -> bytes:
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
-        halves = np.zeros((len(model.fields.columns), _fields_stride(model.protocol.n_electrodes)), dtype="<f2")
+        halves = np.zeros(
+            (len(model.fields.columns), _fields_stride(model.protocol.n_electrodes)), dtype="<f2"
+        )
         halves[:, : model.fields.columns.shape[1]] = model.fields.columns
-        sections["FLDS"] = FIELDS_HEAD.pack(model.fields.volts, model.fields.per_sheet) + halves.tobytes()
+        sections["FLDS"] = (
+            FIELDS_HEAD.pack(model.fields.volts, model.fields.per_sheet) + halves.tobytes()
+        )
     return _assemble(sections, model.protocol.hash)
 
 
 def _encode_defaults(defaults: Defaults) -> bytes:
-    return DEFAULTS.pack(*astuple(defaults)[:-2], SOLVERS.index(defaults.solver), defaults.search_left_out)
+    return DEFAULTS.pack(
+        *astuple(defaults)[:-2], SOLVERS.index(defaults.solver), defaults.search_left_out
+    )
 
 
 def _fields_stride(n_electrodes: int) -> int:
@@ -96,19 +107,24 @@ def _fields_stride(n_electrodes: int) -> int:
 def _check_floats(model: Model) -> None:
     """Refuse what float32 cannot hold, and what no reader would take."""
     numbers = {
-        "the Lipschitz constant": model.lipschitz, "the noise gain": model.noise_gain, "the current": model.protocol.current_a,
+        "the Lipschitz constant": model.lipschitz, "the noise gain": model.noise_gain,
+        "the current": model.protocol.current_a,
     }  # fmt: skip
     for name, value in numbers.items():
         if not abs(value) <= MOST_FLOAT32:
             raise ModelError(f"model: {name} of {value:g} does not fit float32; {NEARER}")
     if model.lipschitz < LEAST_LIPSCHITZ:
-        raise ModelError(f"model: the Lipschitz constant of {model.lipschitz:g} is too small for float32; {NEARER}")
+        raise ModelError(
+            f"model: the Lipschitz constant of {model.lipschitz:g} is too small for float32;"
+            f" {NEARER}"
+        )
 
 
 def _encode_dims(model: Model, stride: int) -> bytes:
     grid, protocol = model.grid, model.protocol
     return DIMS.pack(
-        protocol.n_electrodes, protocol.n_rows, len(model.fold.first), model.rank, stride, grid.n_pixels, grid.nx, grid.ny,
+        protocol.n_electrodes, protocol.n_rows, len(model.fold.first), model.rank, stride,
+        grid.n_pixels, grid.nx, grid.ny,
         STORAGES.index(model.stored.storage), DATA_KINDS.index(model.data_kind),
         grid.pixel_mm, *grid.origin_mm, protocol.current_a, model.lipschitz, model.noise_gain,
     )  # fmt: skip
@@ -151,7 +167,9 @@ def _header(blob: bytes, where: str) -> tuple[Any, ...]:
     if blob[:4] != MAGIC:
         raise ModelError(f"{where}: this is not an .eitm model; make one with  eitskin model build")
     if len(blob) < HEADER.size:
-        raise ModelError(f"{where}: the model is truncated ({len(blob)} bytes); copy or build it again")
+        raise ModelError(
+            f"{where}: the model is truncated ({len(blob)} bytes); copy or build it again"
+        )
     header: tuple[Any, ...] = HEADER.unpack_from(blob)
     return header
 
@@ -164,11 +182,19 @@ def _split(blob: bytes, where: str) -> Sections:
             "upgrade eitskin or build the model again"
         )
     if total < HEADER.size or total % 16:
-        raise ModelError(f"{where}: the header states a size of {total} bytes, as no model has; build the model again")
+        raise ModelError(
+            f"{where}: the header states a size of {total} bytes, as no model has; build the model"
+            " again"
+        )
     if len(blob) < total:
-        raise ModelError(f"{where}: the model is truncated ({len(blob)} of {total} bytes); copy or build it again")
+        raise ModelError(
+            f"{where}: the model is truncated ({len(blob)} of {total} bytes); copy or build it"
+            " again"
+        )
     if zlib.crc32(blob[16:total]) != crc:
-        raise ModelError(f"{where}: the model is corrupted (its checksum does not fit); copy or build it again")
+        raise ModelError(
+            f"{where}: the model is corrupted (its checksum does not fit); copy or build it again"
+        )
     table_end = HEADER.size + count * ENTRY.size
     if count > MAX_SECTIONS or table_end > total:
         raise ModelError(f"{where}: the section table is too long; build the model again")
@@ -177,10 +203,15 @@ def _split(blob: bytes, where: str) -> Sections:
         tag, offset, size, flags = ENTRY.unpack_from(blob, HEADER.size + place * ENTRY.size)
         name = tag.decode("ascii", "replace")
         if offset < table_end or offset + size > total or offset % 16 or name in sections:
-            raise ModelError(f"{where}: section {name!r} is misplaced or repeated; build the model again")
+            raise ModelError(
+                f"{where}: section {name!r} is misplaced or repeated; build the model again"
+            )
         if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD"):
             if flags & REQUIRED_FLAG:
-                raise ModelError(f"{where}: needs section {name!r}, which this eitskin does not know; upgrade eitskin")
+                raise ModelError(
+                    f"{where}: needs section {name!r}, which this eitskin does not know; upgrade"
+                    " eitskin"
+                )
             continue
         sections[name] = blob[offset : offset + size]
     absent = [name for name in REQUIRED if name not in sections]
@@ -258,10 +289,16 @@ def _check_sizes(sections: Sections, d: _Dims, where: str) -> None:
     for name, size in wanted.items():
         given = len(sections[name]) if name in sections else None
         if given != size:
-            _refuse(where, f"section {name!r} of {given or 'no'} bytes where its dimensions ask for {size or 'none'}")
+            _refuse(
+                where,
+                f"section {name!r} of {given or 'no'} bytes where its dimensions ask for"
+                f" {size or 'none'}",
+            )
 
 
-def _floats(sections: Sections, name: str, shape: tuple[int, ...], where: str) -> npt.NDArray[np.float32]:
+def _floats(
+    sections: Sections, name: str, shape: tuple[int, ...], where: str
+) -> npt.NDArray[np.float32]:
     values = np.frombuffer(sections[name], dtype="<f4").reshape(shape)
     if not np.isfinite(values).all():
         _refuse(where, f"a number in section {name!r} that is not finite")
@@ -291,15 +328,27 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     values: dict[str, Any] = dict(zip(names, map(_short, DEFAULTS.unpack(content)), strict=False))
     if values["solver"] >= len(SOLVERS):
         _refuse(where, "a solver that this eitskin does not know")
-    d = Defaults(**{**values, "solver": SOLVERS[values["solver"]]})  # files of 1.0 have 0 there: FISTA
+    d = Defaults(
+        **{**values, "solver": SOLVERS[values["solver"]]}
+    )  # files of 1.0 have 0 there: FISTA
     shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_share)
-    sizes = (d.lambda_noise_factor, d.gate_factor, d.touch_change_s_per_m, d.follow_mm, d.touch_radius_weight)
+    sizes = (
+        d.lambda_noise_factor,
+        d.gate_factor,
+        d.touch_change_s_per_m,
+        d.follow_mm,
+        d.touch_radius_weight,
+    )
     in_range = (
         1 <= d.iterations <= MAX_ITERATIONS
         and d.search_left_out <= ALL_SEARCH
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
-        and LEAST_RADIUS_MM <= d.touch_min_radius_mm <= d.touch_seed_radius_mm <= d.touch_max_radius_mm <= HUGE
+        and LEAST_RADIUS_MM
+        <= d.touch_min_radius_mm
+        <= d.touch_seed_radius_mm
+        <= d.touch_max_radius_mm
+        <= HUGE
     )
     if not in_range:
         _refuse(where, "a default out of range")
@@ -309,9 +358,13 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
 def _read_fields(content: bytes, d: _Dims, where: str) -> Fields:
     stride = _fields_stride(d.n_electrodes)
     if len(content) != FIELDS_HEAD.size + 2 * stride * d.n_pixels:
-        _refuse(where, f"section 'FLDS' of {len(content)} bytes where its dimensions ask for others")
+        _refuse(
+            where, f"section 'FLDS' of {len(content)} bytes where its dimensions ask for others"
+        )
     volts, per_sheet = FIELDS_HEAD.unpack_from(content)
-    columns = np.frombuffer(content, dtype="<f2", offset=FIELDS_HEAD.size).reshape(d.n_pixels, stride)
+    columns = np.frombuffer(content, dtype="<f2", offset=FIELDS_HEAD.size).reshape(
+        d.n_pixels, stride
+    )
     if not (0 <= volts <= HUGE and 0 <= per_sheet <= HUGE and np.isfinite(columns).all()):
         _refuse(where, "a number in section 'FLDS' that is out of range")
     return Fields(columns[:, : 2 * d.n_electrodes + MIRROR_ROWS], volts, per_sheet)
@@ -348,7 +401,11 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         rank=d.rank,
         v_ref_v=_floats(sections, "VREF", (d.n_folded,), where),
         projection=_floats(sections, "REDU", (d.n_folded, d.stride), where)[:, : d.rank].T,
-        stored=StoredMatrix(name, columns, _floats(sections, "SCAL", (d.n_pixels,), where) if name in SCALED else None),
+        stored=StoredMatrix(
+            name,
+            columns,
+            _floats(sections, "SCAL", (d.n_pixels,), where) if name in SCALED else None,
+        ),
         column_weight=_floats(sections, "COLW", (d.n_pixels,), where),
         lipschitz=d.lipschitz,
         noise_gain=d.noise_gain,
@@ -361,7 +418,8 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
 
 
 def _short(value: float) -> float:
-    """A float32 as the shortest decimal that gives it again, so that 0.03 is read as 0.03; whole numbers stay."""
+    """A float32 as the shortest decimal that gives it again, so that 0.03 is read as 0.03; whole
+    numbers stay."""
     return value if isinstance(value, int) else float(str(np.float32(value)))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.fem.grid import Grid
-from eitskin.model.load import LoadLaw
+from eitskin.model.force_law import LoadLaw
 from eitskin.model.storage import StoredMatrix
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin, skin_from_table
@@ -20,10 +20,12 @@ DATA_KINDS = ("difference", "normalised", "log-ratio")
 
 @dataclass(frozen=True)
 class Defaults:
-    """What the model's maker chose, in the file's order; csrc/include/eitskin/context.h says what each does.
+    """What the model's maker chose, in the file's order; csrc/include/eitskin/context.h says what
+    each does.
 
-    Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t max(x); ``solver`` is one
-    of ``core.results.SOLVERS``; ``search_left_out``: bits of ``Options.touch_search`` that are not set.
+    Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t
+    max(x); ``solver`` is one of ``core.results.SOLVERS``; ``search_left_out``: bits of
+    ``Options.touch_search`` that are not set.
     """
 
     iterations: int = 60
@@ -46,7 +48,8 @@ class Defaults:
 
 @dataclass(frozen=True, eq=False)
 class Golden:
-    """The self-test: ``reference_v`` and ``frame_v`` (m,), and the float32 core's ``image`` (n,) S/m, all float32."""
+    """The self-test: ``reference_v`` and ``frame_v`` (m,), and the float32 core's ``image`` (n,)
+    S/m, all float32."""
 
     reference_v: npt.NDArray[np.float32]
     frame_v: npt.NDArray[np.float32]
@@ -55,9 +58,10 @@ class Golden:
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """For what touches do to each other (section FLDS). ``columns`` (n, 2 L + 4) float16: of each pixel E_x of each electrode's
-    current, E_y of each, then a_x, a_y, b_x, b_y of the rim's mirror (``fem.fields``); ``volts``: dV = -volts change area E . E
-    in V per (S/m mm2); ``per_sheet``: 1 / (2 pi sigma), m/S; both float32."""
+    """For what touches do to each other (section FLDS). ``columns`` (n, 2 L + 4) float16: of each
+    pixel E_x of each electrode's current, E_y of each, then a_x, a_y, b_x, b_y of the rim's mirror
+    (``fem.fields``); ``volts``: dV = -volts change area E . E in V per (S/m mm2); ``per_sheet``: 1
+    / (2 pi sigma), m/S; both float32."""
 
     columns: npt.NDArray[np.float16]
     volts: float
@@ -66,9 +70,10 @@ class Fields:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P (r, k) float32;
-    ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how it was made; ``fields`` where it has them;
-    ``load`` tells loads from strengths, where the skin was calibrated.
+    """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P
+    (r, k) float32; ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how
+    it was made; ``fields`` where it has them; ``load`` tells loads from strengths, where the skin
+    was calibrated.
     """
 
     protocol: Protocol

@@ -1,6 +1,8 @@
-"""The prebuilt model of the paper's skin that ships with the package, so that reconstruction needs neither scipy nor netgen.
+"""The prebuilt model of the paper's skin that ships with the package, so that reconstruction needs
+neither scipy nor netgen.
 
-Made by ``eitskin model build --paper -o python/eitskin/model/paper.eitm``; a test builds it again and compares.
+Made by ``eitskin model build --paper -o python/eitskin/model/paper.eitm``; a test builds it again
+and compares.
 """
 
 from __future__ import annotations
@@ -23,5 +25,7 @@ def load_prebuilt() -> tuple[Model, bytes]:
     try:
         blob = resources.files("eitskin.model").joinpath(NAME).read_bytes()
     except OSError:
-        raise FileError(f"the prebuilt model {NAME} is missing from this installation; install eitskin again") from None
+        raise FileError(
+            f"the prebuilt model {NAME} is missing from this installation; install eitskin again"
+        ) from None
     return decode_model(blob, f"the prebuilt model {NAME}"), blob

@@ -1,12 +1,15 @@
-"""The reduction: a Jacobian folded by reciprocity, scaled by columns, whitened by rows and cut to a rank.
+"""The reduction: a Jacobian folded by reciprocity, scaled by columns, whitened by rows and cut to a
+rank.
 
 With A = J D, D = diag(|j_k|^-p), and its singular value decomposition A = U diag(s) V':
 
     P = diag((s_i^2 + mu s_1^2)^-1/2) U'      whitens the data: y = P d
-    S = P A = diag(s_i / sqrt(s_i^2 + mu s_1^2)) V'      the stored matrix; its greatest eigenvalue S S' is 1 / (1 + mu)
+    S = P A = diag(s_i / sqrt(s_i^2 + mu s_1^2)) V'      the stored matrix; its greatest eigenvalue
+    S S' is 1 / (1 + mu)
 
-so that |P d - S g|^2 is the misfit of J D g in a metric that lets weak directions speak up to the floor mu, and a
-first-order solver with step 1 needs few iterations. It is Tikhonov-floored whitening, a preconditioner on the data side.
+so that |P d - S g|^2 is the misfit of J D g in a metric that lets weak directions speak up to the
+floor mu, and a first-order solver with step 1 needs few iterations. It is Tikhonov-floored
+whitening, a preconditioner on the data side.
 """
 
 from __future__ import annotations
@@ -30,8 +33,8 @@ MAX_FLOOR = 1e6
 class Reduction:
     """What the reduction of a folded Jacobian (k, n) to rank r gives.
 
-    ``projection`` P (r, k); ``sensitivity`` S (r, n); ``column_weight`` D's diagonal (n,), S/m per coefficient;
-    ``singular_values`` of A, all of them, descending.
+    ``projection`` P (r, k); ``sensitivity`` S (r, n); ``column_weight`` D's diagonal (n,), S/m per
+    coefficient; ``singular_values`` of A, all of them, descending.
     """
 
     projection: FloatArray
@@ -49,20 +52,32 @@ def fold_rows(values: npt.ArrayLike, fold: Reciprocity) -> FloatArray:
 
 
 def reduce_jacobian(
-    jacobian: npt.ArrayLike, rank: int, *, floor: float = DEFAULT_FLOOR, column_power: float = DEFAULT_COLUMN_POWER
+    jacobian: npt.ArrayLike,
+    rank: int,
+    *,
+    floor: float = DEFAULT_FLOOR,
+    column_power: float = DEFAULT_COLUMN_POWER,
 ) -> Reduction:
-    """Reduce a folded Jacobian (k, n) to ``rank`` rows (``floor`` is mu, ``column_power`` is p; both without unit).
+    """Reduce a folded Jacobian (k, n) to ``rank`` rows (``floor`` is mu, ``column_power`` is p;
+    both without unit).
 
     Raises:
-        UsageError: the rank is not within 1 to min(k, n), the Jacobian is zero or not finite, mu or p out of range.
+        UsageError: the rank is not within 1 to min(k, n), the Jacobian is zero or not finite, mu or
+            p out of range.
     """
     j = np.asarray(jacobian, dtype=np.float64)
     if j.ndim != 2 or not np.isfinite(j).all():
-        raise UsageError("reduction: the Jacobian must be a finite matrix; check the skin's conductivity and mesh")
+        raise UsageError(
+            "reduction: the Jacobian must be a finite matrix; check the skin's conductivity and"
+            " mesh"
+        )
     if not 1 <= rank <= min(j.shape):
         raise UsageError(f"reduction: rank = {rank} is out of range; use 1 to {min(j.shape)}")
     if not (0 <= floor <= MAX_FLOOR and 0 <= column_power <= 1):
-        raise UsageError(f"reduction: the floor must be within 0 to {MAX_FLOOR:g} and the column power within 0 to 1")
+        raise UsageError(
+            f"reduction: the floor must be within 0 to {MAX_FLOOR:g} and the column power within 0"
+            " to 1"
+        )
     norm = np.linalg.norm(j, axis=0)
     if not norm.max() > 0:
         raise UsageError("reduction: the Jacobian is zero; no pixel would be seen")
@@ -71,7 +86,10 @@ def reduce_jacobian(
     u, s, vt = np.linalg.svd(j * weight, full_matrices=False)
     denominator = np.sqrt(s[:rank] ** 2 + floor * s[0] ** 2)
     if not denominator.min() > 0:
-        raise UsageError(f"reduction: rank = {rank} exceeds the Jacobian's own with a floor of 0; lower it or raise the floor")
+        raise UsageError(
+            f"reduction: rank = {rank} exceeds the Jacobian's own with a floor of 0; lower it or"
+            " raise the floor"
+        )
     return Reduction(
         projection=u[:, :rank].T / denominator[:, None],
         sensitivity=(s[:rank] / denominator)[:, None] * vt[:rank],
@@ -87,6 +105,7 @@ def spectral_norm_squared(sensitivity: npt.ArrayLike) -> float:
 
 
 def noise_gain(projection: npt.ArrayLike, sensitivity: npt.ArrayLike) -> float:
-    """The greatest deviation over pixels of S' P n for unit white noise n on the folded rows (P (r, k), S (r, n))."""
+    """The greatest deviation over pixels of S' P n for unit white noise n on the folded rows (P (r,
+    k), S (r, n))."""
     through = np.asarray(projection, dtype=np.float64).T @ np.asarray(sensitivity, dtype=np.float64)
     return float(np.linalg.norm(through, axis=0).max())

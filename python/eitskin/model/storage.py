@@ -26,7 +26,8 @@ def stride_for(rank: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class StoredMatrix:
-    """Columns (n, stride) in the storage's own type, padded with zeros; ``scale`` (n,) float32 for integers, else None."""
+    """Columns (n, stride) in the storage's own type, padded with zeros; ``scale`` (n,) float32 for
+    integers, else None."""
 
     storage: str
     columns: npt.NDArray[Any]
@@ -41,7 +42,8 @@ class StoredMatrix:
 
 
 def store(matrix: npt.ArrayLike, storage: str) -> StoredMatrix:
-    """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest of their column's steps.
+    """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest of their column's
+    steps.
 
     Raises:
         UsageError: a number does not fit.
@@ -54,7 +56,9 @@ def store(matrix: npt.ArrayLike, storage: str) -> StoredMatrix:
     most = float(np.finfo(dtype if dtype.kind == "f" else np.float32).max)
     greatest = float(np.abs(padded).max(initial=0.0))
     if not greatest <= most:
-        raise UsageError(f"model: a sensitivity of {greatest:.3g} does not fit {storage}; use another storage")
+        raise UsageError(
+            f"model: a sensitivity of {greatest:.3g} does not fit {storage}; use another storage"
+        )
     if dtype.kind == "f":
         return StoredMatrix(storage, padded.astype(dtype), None)
     top = float(np.iinfo(dtype).max)

@@ -1,8 +1,8 @@
 """A scene becomes a list of steps that is fixed before the first frame: ``compile_scene``.
 
-Only the effects that the scene names are imported and made. What can be known before solving is worked out here: which
-frames share a state of sheet, touches and contacts, and whether touches are solved by factorisation or by update.
-The frame loop (``runner.py``) then asks nothing.
+Only the effects that the scene names are imported and made. What can be known before solving is
+worked out here: which frames share a state of sheet, touches and contacts, and whether touches are
+solved by factorisation or by update. The frame loop (``runner.py``) then asks nothing.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ NO_CHANGE = Change(np.zeros(0, np.int64), np.zeros(0))
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A distinct state of sheet, touches and contacts: one forward solve. ``frame`` is the first that has it."""
+    """A distinct state of sheet, touches and contacts: one forward solve. ``frame`` is the first
+    that has it."""
 
     touches: tuple[Touch, ...]
     change: Change
@@ -93,15 +94,21 @@ class Compiled:
 
     def times_s(self) -> FloatArray:
         """All frames' times (n,), below 0 for quiet ones."""
-        return np.asarray((np.arange(self.scene.n_frames) - self.scene.quiet_frames) / self.scene.rate_hz)
+        return np.asarray(
+            (np.arange(self.scene.n_frames) - self.scene.quiet_frames) / self.scene.rate_hz
+        )
 
 
-def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Bench | None = None) -> Compiled:
+def compile_scene(
+    scene: Scene, *, registry: Registry | None = None, bench: Bench | None = None
+) -> Compiled:
     """Compile ``scene``; ``bench`` lends the meshes and untouched skins of scenes before.
 
     Raises:
-        ConfigError: an effect or a parameter is unknown or impossible, or effects contradict each other.
-        GeometryError, ProtocolError, UsageError, MissingExtraError: from effects, meshing and the forward model.
+        ConfigError: an effect or a parameter is unknown or impossible, or effects contradict each
+            other.
+        GeometryError, ProtocolError, UsageError, MissingExtraError: from effects, meshing and the
+            forward model.
     """
     desk, work = Bench() if bench is None else bench, SessionWork()
     modules = load_effects(scene, Registry() if registry is None else registry)
@@ -118,11 +125,15 @@ def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Benc
     model.patterns = with_bridges(model.patterns, pairs)
     method, reach, counted = _choose_method(scene, model, states, steps)
     known = {}
-    if method == "factorise" and all(step.stage >= Stage.FRONT_END or _is_voltage(step) for step in steps):
+    if method == "factorise" and all(
+        step.stage >= Stage.FRONT_END or _is_voltage(step) for step in steps
+    ):
         if bench is not None:
             desk.v0_v(scene, work)
         electrodes = desk.known(scene)
-        known = {k: electrodes for k, s in enumerate(states) if electrodes is not None and not s.touches}
+        known = {
+            k: electrodes for k, s in enumerate(states) if electrodes is not None and not s.touches
+        }
     functions = _functions(steps, phase)
     gone = any(state.contacts.detached.any() for state in states)
     return Compiled(
@@ -136,7 +147,9 @@ def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Benc
         state_of_frame=state_of_frame,
         known=known,
         functions=functions,
-        needs_whole_reader=bool(pairs) or gone or any(isinstance(step, LoadedStep) for step in steps),
+        needs_whole_reader=bool(pairs)
+        or gone
+        or any(isinstance(step, LoadedStep) for step in steps),
         bridge_pairs=pairs,
         method=method,
         reach=reach,
@@ -149,10 +162,12 @@ def compile_scene(scene: Scene, *, registry: Registry | None = None, bench: Benc
 def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
     """A function from a state to its sheet's conductivity (E,) without touches.
 
-    Steps before the first that varies are applied once, here; the others for each state, at the time of its frame.
+    Steps before the first that varies are applied once, here; the others for each state, at the
+    time of its frame.
 
     Raises:
-        ConfigError: an effect leaves a conductivity that is not finite and above 0 (here, and from the function).
+        ConfigError: an effect leaves a conductivity that is not finite and above 0 (here, and from
+            the function).
     """
     scene, times = compiled.scene, compiled.times_s()
     materials = [step for step in compiled.steps if isinstance(step, MaterialStep)]
@@ -161,10 +176,13 @@ def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
 
     def applied(step: MaterialStep, conductivity: FloatArray, frame: int) -> FloatArray:
         changed = step.apply(conductivity, float(times[frame]), frame)
-        if changed.shape != conductivity.shape or not (changed.min() > 0 and changed.max() < np.inf):
+        if changed.shape != conductivity.shape or not (
+            changed.min() > 0 and changed.max() < np.inf
+        ):
             raise ConfigError(
-                f"{scene.where} [effects.{step.name}]: at {times[frame]:g} s it makes a conductivity of "
-                f"{changed.min():.3g} S/m; every conductivity must be finite and above 0, so use milder parameters"
+                f"{scene.where} [effects.{step.name}]: at {times[frame]:g} s it makes a"
+                f" conductivity of {changed.min():.3g} S/m; every conductivity must be finite and"
+                " above 0, so use milder parameters"
             )
         return changed
 
@@ -183,7 +201,10 @@ def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
 def _only_phase(scene: Scene, steps: Sequence[Step]) -> PhaseStep | None:
     phases = [step for step in steps if isinstance(step, PhaseStep)]
     if len(phases) > 1:
-        raise ConfigError(f"{scene.where} [effects.{phases[1].name}]: [effects.{phases[0].name}] sets the phase too")
+        raise ConfigError(
+            f"{scene.where} [effects.{phases[1].name}]: [effects.{phases[0].name}] sets the"
+            " phase too"
+        )
     return phases[0] if phases else None
 
 
@@ -191,8 +212,11 @@ def _is_voltage(step: Step) -> bool:
     return isinstance(step, VoltageStep | LoadedStep)
 
 
-def _states(scene: Scene, cover: Cover, steps: Sequence[Step]) -> tuple[tuple[State, ...], IntArray]:
-    """The distinct states, in the order that frames first have them, and which one each frame has (n,)."""
+def _states(
+    scene: Scene, cover: Cover, steps: Sequence[Step]
+) -> tuple[tuple[State, ...], IntArray]:
+    """The distinct states, in the order that frames first have them, and which one each frame has
+    (n,)."""
     varies = any(isinstance(step, MaterialStep) and step.varies for step in steps)
     contacts = _contacts(scene, steps)
     samples = scene.samples()
@@ -236,8 +260,9 @@ def _contacts(scene: Scene, steps: Sequence[Step]) -> list[Contacts]:
             _check_contacts(contacts, count, where)
         if own and not live_rows(contacts, rows).any():
             raise ConfigError(
-                f"{detaching or scene.where}: at {time_s:g} s electrodes {np.flatnonzero(contacts.detached).tolist()} "
-                "(from 0) are detached, and no row of the protocol is left that can be measured; detach fewer"
+                f"{detaching or scene.where}: at {time_s:g} s electrodes"
+                f" {np.flatnonzero(contacts.detached).tolist()} (from 0) are detached, and no row"
+                " of the protocol is left that can be measured; detach fewer"
             )
         found.append(contacts)
     return found
@@ -246,25 +271,30 @@ def _contacts(scene: Scene, steps: Sequence[Step]) -> list[Contacts]:
 def _check_contacts(contacts: Contacts, count: int, where: str) -> None:
     impedance = contacts.impedance_ohm_m2
     if impedance.shape != (count,) or not (impedance.min() >= 0 and impedance.max() < np.inf):
-        raise ConfigError(f"{where}: a contact impedance is negative or not finite; use milder parameters")
+        raise ConfigError(
+            f"{where}: a contact impedance is negative or not finite; use milder parameters"
+        )
     for i, j, ohm in contacts.bridges:
         if not (0 <= i < count and 0 <= j < count and i != j and 0 <= ohm < np.inf):
             raise ConfigError(
-                f"{where}: a bridge of {ohm:g} ohm between electrodes {i} and {j} (from 0) cannot be; name two "
-                f"different ones of 0 to {count - 1} and at least 0 ohm"
+                f"{where}: a bridge of {ohm:g} ohm between electrodes {i} and {j} (from 0) cannot"
+                f" be; name two different ones of 0 to {count - 1} and at least 0 ohm"
             )
 
 
 def _choose_method(
     scene: Scene, model: ForwardModel, states: Sequence[State], steps: Sequence[Step]
 ) -> tuple[str, IntArray, Counted | None]:
-    """How to solve, the unknowns that touches reach (for the update), and the count that decided it."""
+    """How to solve, the unknowns that touches reach (for the update), and the count that decided
+    it."""
     nothing = np.zeros(0, np.int64)
-    varying = [step.name for step in steps if isinstance(step, MaterialStep | ContactStep) and step.varies]
+    varying = [
+        step.name for step in steps if isinstance(step, MaterialStep | ContactStep) and step.varies
+    ]
     if varying and scene.solver == "update":
         raise ConfigError(
-            f'{scene.where} [scene]: solver = "update" needs sheet and contacts that stay, but [effects.{varying[0]}] '
-            'changes them; use "auto"'
+            f'{scene.where} [scene]: solver = "update" needs sheet and contacts that stay, but'
+            f' [effects.{varying[0]}] changes them; use "auto"'
         )
     moves = any(track.moves for track in scene.touches)
     if varying or scene.solver == "factorise" or (scene.solver == "auto" and not moves):
@@ -279,9 +309,14 @@ def _choose_method(
 
 
 def _functions(steps: Sequence[Step], phase: PhaseStep | None) -> tuple[VoltageFunction, ...]:
-    """The per-frame line from true voltages to recorded ones; a phase step's readout stands before the digitising."""
-    before = [_function(step) for step in steps if _is_voltage(step) and step.stage < Stage.DIGITISE]
-    after = [_function(step) for step in steps if _is_voltage(step) and step.stage >= Stage.DIGITISE]
+    """The per-frame line from true voltages to recorded ones; a phase step's readout stands before
+    the digitising."""
+    before = [
+        _function(step) for step in steps if _is_voltage(step) and step.stage < Stage.DIGITISE
+    ]
+    after = [
+        _function(step) for step in steps if _is_voltage(step) and step.stage >= Stage.DIGITISE
+    ]
     readout = [] if phase is None else [_readout(phase)]
     return (*before, *readout, *after)
 

@@ -20,7 +20,8 @@ LEAST_FACTOR = 1e-3
 class Cover:
     """Elements under touches on one mesh; what does not depend on the touch is computed once.
 
-    Each element near the disc is split into ``subdivision`` squared equal triangles, whose centres are looked at.
+    Each element near the disc is split into ``subdivision`` squared equal triangles, whose centres
+    are looked at.
     """
 
     def __init__(self, mesh: Mesh, subdivision: int = SUBDIVISION) -> None:
@@ -30,16 +31,20 @@ class Cover:
         self._weights = _sub_triangle_weights(subdivision)
 
     def of(self, touch: Touch) -> tuple[IntArray, FloatArray]:
-        """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,), in (0, 1]."""
+        """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,),
+        in (0, 1]."""
         centre = np.array([touch.x_mm, touch.y_mm])
-        near = np.flatnonzero(np.linalg.norm(self._middles - centre, axis=1) <= touch.radius_mm + self._reach)
+        near = np.flatnonzero(
+            np.linalg.norm(self._middles - centre, axis=1) <= touch.radius_mm + self._reach
+        )
         points = self._weights @ self._corners[near]
         part = (((points - centre) ** 2).sum(axis=2) <= touch.radius_mm**2).mean(axis=1)
         met = part > 0
         return near[met], part[met]
 
     def factor(self, touches: Iterable[Touch]) -> tuple[IntArray, FloatArray]:
-        """Elements (e,) that ``touches`` meet, ascending, and what each one's conductivity is multiplied by (e,).
+        """Elements (e,) that ``touches`` meet, ascending, and what each one's conductivity is
+        multiplied by (e,).
 
         Where touches share an element their changes add (never below a thousandth).
         """
@@ -52,7 +57,8 @@ class Cover:
 
 
 def _sub_triangle_weights(subdivision: int) -> FloatArray:
-    """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a triangle's sides."""
+    """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a
+    triangle's sides."""
     s = subdivision
     upright = [(3 * i + 1, 3 * j + 1) for i in range(s) for j in range(s - i)]
     turned = [(3 * i + 2, 3 * j + 2) for i in range(s - 1) for j in range(s - 1 - i)]

@@ -1,8 +1,10 @@
-"""Many seeded scenes into a folder of chunks: over the cores, or over a Dask cluster; interrupted runs resume.
+"""Many seeded scenes into a folder of chunks: over the cores, or over a Dask cluster; interrupted
+runs resume.
 
-Each chunk is an .npz that is written beside and then renamed, so that what is there is whole. A chunk depends on the
-description, the seed and its number only, and so is the same, byte for byte, however many jobs make it and in which
-order. ``dataset.json`` says what the folder holds; a run with other settings refuses to continue it.
+Each chunk is an .npz that is written beside and then renamed, so that what is there is whole. A
+chunk depends on the description, the seed and its number only, and so is the same, byte for byte,
+however many jobs make it and in which order. ``dataset.json`` says what the folder holds; a run
+with other settings refuses to continue it.
 """
 
 from __future__ import annotations
@@ -65,9 +67,15 @@ class Job:
 
     def manifest(self) -> dict[str, Any]:
         """What ``dataset.json`` holds; two equal ones describe equal datasets."""
-        content = {"skin": skin_to_table(self.scene.skin), "scene": repr(self.scene), "ranges": repr(self.ranges)}
+        content = {
+            "skin": skin_to_table(self.scene.skin),
+            "scene": repr(self.scene),
+            "ranges": repr(self.ranges),
+        }
         rows = hashlib.sha256(self.scene.protocol.drive_measure.tobytes()).hexdigest()
-        digest = hashlib.sha256((json.dumps(content, sort_keys=True) + rows).encode("utf-8")).hexdigest()
+        digest = hashlib.sha256(
+            (json.dumps(content, sort_keys=True) + rows).encode("utf-8")
+        ).hexdigest()
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -80,14 +88,25 @@ class Job:
         }
 
 
-def job_of(scene: Scene, count: int, seed: int, *, chunk: int = DEFAULT_CHUNK, ranges_file: Path | None = None) -> Job:
-    """The dataset of ``count`` scenes drawn from ``scene``; ``ranges_file`` holds a [dataset] that replaces its own.
+def job_of(
+    scene: Scene,
+    count: int,
+    seed: int,
+    *,
+    chunk: int = DEFAULT_CHUNK,
+    ranges_file: Path | None = None,
+) -> Job:
+    """The dataset of ``count`` scenes drawn from ``scene``; ``ranges_file`` holds a [dataset] that
+    replaces its own.
 
     Raises:
         UsageError: count, seed or chunk is out of range.
         FileError, ConfigError: the ranges cannot be read, or do not suit the scene.
     """
-    for name, value, low, high in (("--count", count, 1, MOST_SCENES), ("--chunk", chunk, 1, 100_000)):
+    for name, value, low, high in (
+        ("--count", count, 1, MOST_SCENES),
+        ("--chunk", chunk, 1, 100_000),
+    ):
         if not low <= value <= high:
             raise UsageError(f"dataset: {name} {value} is out of range; use {low} to {high}")
     if seed < 0:
@@ -100,13 +119,16 @@ def job_of(scene: Scene, count: int, seed: int, *, chunk: int = DEFAULT_CHUNK, r
             raise ConfigError(f"{where}: a ranges file holds the table [dataset] and nothing else")
     ranges = ranges_of(own, scene, where)
     if ranges.touches is None and not ranges.numbers and not scene.effects:
-        raise ConfigError(f"{where} [dataset]: nothing is drawn, so that all scenes would be equal; give ranges")
+        raise ConfigError(
+            f"{where} [dataset]: nothing is drawn, so that all scenes would be equal; give ranges"
+        )
     compile_scene(drawn(scene, ranges, seed, 0))
     return Job(scene, ranges, count, seed, chunk)
 
 
 def make_chunk(job: Job, chunk: int, bench: Bench | None = None) -> bytes:
-    """The .npz of one chunk: c scenes of f frames, t touches; every field is listed in docs/guide/scenes.md.
+    """The .npz of one chunk: c scenes of f frames, t touches; every field is listed in
+    docs/guide/scenes.md.
 
     Raises:
         EitskinError: a drawn scene cannot be; the text names its number.
@@ -122,7 +144,12 @@ def make_chunk(job: Job, chunk: int, bench: Bench | None = None) -> bytes:
         seeds.append(scene.seed)
         values.append([one.draw(job.seed, number) for one in job.ranges.numbers])
         truth = truth_of(compiled, 0)
-        rows = [truth.touch_frame, *truth.touch_xy_mm.T, truth.touch_radius_mm, truth.touch_strength]
+        rows = [
+            truth.touch_frame,
+            *truth.touch_xy_mm.T,
+            truth.touch_radius_mm,
+            truth.touch_strength,
+        ]
         touches.append(np.column_stack([np.full(len(rows[0]), len(seeds) - 1), *rows]))
     every = np.concatenate(touches)
     stream = io.BytesIO()
@@ -165,12 +192,19 @@ def chunk_path(folder: Path, chunk: int) -> Path:
 
 
 def write_dataset(
-    job: Job, folder: Path, *, jobs: int = 1, scheduler: str | None = None, progress: Progress | None = None
+    job: Job,
+    folder: Path,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, int]:
-    """Make the chunks that ``folder`` does not have yet; returns how many were made and how many were there.
+    """Make the chunks that ``folder`` does not have yet; returns how many were made and how many
+    were there.
 
-    ``jobs`` processes work on this computer; with ``scheduler`` the Dask cluster at that address does instead.
-    ``progress`` wraps the numbers of scenes as chunks are done, and is told how many scenes are to be made.
+    ``jobs`` processes work on this computer; with ``scheduler`` the Dask cluster at that address
+    does instead. ``progress`` wraps the numbers of scenes as chunks are done, and is told how many
+    scenes are to be made.
 
     Raises:
         UsageError: ``jobs`` is out of range, or the folder holds another dataset.
@@ -196,7 +230,11 @@ def write_dataset(
     scenes = sum(len(job.numbers(chunk)) for chunk in missing)
     for _ in written() if progress is None else progress(written(), scenes):
         pass
-    return {"chunks_made": len(missing), "chunks_kept": job.chunks - len(missing), "scenes_made": scenes}
+    return {
+        "chunks_made": len(missing),
+        "chunks_kept": job.chunks - len(missing),
+        "scenes_made": scenes,
+    }
 
 
 def _open_folder(job: Job, folder: Path) -> None:
@@ -213,15 +251,24 @@ def _open_folder(job: Job, folder: Path) -> None:
     except (OSError, ValueError):
         there = None
     if there != manifest:
-        differs = [key for key in manifest if not isinstance(there, dict) or there.get(key) != manifest[key]]
+        differs = [
+            key
+            for key in manifest
+            if not isinstance(there, dict) or there.get(key) != manifest[key]
+        ]
         raise UsageError(
-            f"{folder}: it holds another dataset ({', '.join(differs)} differ); name another folder, or remove this one"
+            f"{folder}: it holds another dataset ({', '.join(differs)} differ); name another"
+            " folder, or remove this one"
         )
 
 
 def _over_processes(job: Job, chunks: list[int], jobs: int) -> Iterator[tuple[int, bytes]]:
-    """Chunks as they are done; at most two a process are under way, so that an interruption loses little."""
-    with _one_thread_each(), ProcessPoolExecutor(min(jobs, len(chunks)), mp_context=get_context("spawn")) as pool:
+    """Chunks as they are done; at most two a process are under way, so that an interruption loses
+    little."""
+    with (
+        _one_thread_each(),
+        ProcessPoolExecutor(min(jobs, len(chunks)), mp_context=get_context("spawn")) as pool,
+    ):
         waiting, running = list(reversed(chunks)), dict[Future[bytes], int]()
         try:
             while waiting or running:
@@ -236,7 +283,8 @@ def _over_processes(job: Job, chunks: list[int], jobs: int) -> Iterator[tuple[in
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Child processes that start meanwhile use one thread each: their work is in many small solves."""
+    """Child processes that start meanwhile use one thread each: their work is in many small
+    solves."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
@@ -257,7 +305,9 @@ def _over_dask(job: Job, chunks: list[int], scheduler: str) -> Iterator[tuple[in
     try:
         client = Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:
-        raise UsageError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error}); check address") from None
+        raise UsageError(
+            f"--scheduler {scheduler}: no Dask scheduler answers there ({error}); check address"
+        ) from None
     with client:
         futures = {client.submit(make_chunk, job, chunk, pure=False): chunk for chunk in chunks}
         for future, content in as_completed(futures, with_results=True):
@@ -272,21 +322,28 @@ def load_chunk(path: str | Path) -> dict[str, npt.NDArray[Any]]:
     """
     arrays = read_npz(path, "dataset chunk")
     if str(arrays.get("format")) != FORMAT or int(arrays.get("version", np.array(0))) != VERSION:
-        raise FileError(f"{path}: not a chunk of an eitskin dataset of version {VERSION}; make it again")
+        raise FileError(
+            f"{path}: not a chunk of an eitskin dataset of version {VERSION}; make it again"
+        )
     return arrays
 
 
 def frames_of(chunk: dict[str, npt.NDArray[Any]], number: int) -> Frames:
-    """Scene ``number`` (from 0, in the chunk) as frames with truth, to be reconstructed like any others.
+    """Scene ``number`` (from 0, in the chunk) as frames with truth, to be reconstructed like any
+    others.
 
     Raises:
         UsageError: the chunk does not hold that many.
     """
     if not 0 <= number < len(chunk["seed"]):
-        raise UsageError(f"dataset: scene {number} of a chunk of {len(chunk['seed'])}, counted from 0")
+        raise UsageError(
+            f"dataset: scene {number} of a chunk of {len(chunk['seed'])}, counted from 0"
+        )
     own = chunk["touch_scene"] == number
     try:
-        protocol = protocol_of_rows(int(chunk["n_electrodes"]), chunk["drive_measure"], float(chunk["current_a"]))
+        protocol = protocol_of_rows(
+            int(chunk["n_electrodes"]), chunk["drive_measure"], float(chunk["current_a"])
+        )
     except EitskinError as error:
         raise type(error)(f"dataset chunk: {error}") from None
     return Frames(
@@ -294,6 +351,9 @@ def frames_of(chunk: dict[str, npt.NDArray[Any]], number: int) -> Frames:
         voltage_v=chunk["voltage_v"][number],
         reference_voltage_v=chunk["reference_v"][number],
         time_s=chunk["time_s"],
-        **{name: chunk[name][own] for name in ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength")},
+        **{
+            name: chunk[name][own]
+            for name in ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength")
+        },
         meta={"made_by": "eitskin scene dataset", "seed": int(chunk["seed"][number])},
     )

@@ -1,9 +1,10 @@
 """How a dataset varies a scene: the table [dataset], and one drawn scene a number.
 
-``[dataset.touches]`` draws touches anew (in place of [[touch]]); ``[dataset.ranges]`` holds [low, high] at the place of
-the number that is drawn: ``snr_db = [50, 70]`` in ``[dataset.ranges.effects.noise]``, ``radius_mm = [6, 9]`` in
-``[dataset.ranges.touch.0]``.
-Scene k of a dataset depends on (its description, the dataset's seed, k) only. Every range has a stream of its own.
+``[dataset.touches]`` draws touches anew (in place of [[touch]]); ``[dataset.ranges]`` holds [low,
+high] at the place of the number that is drawn: ``snr_db = [50, 70]`` in
+``[dataset.ranges.effects.noise]``, ``radius_mm = [6, 9]`` in ``[dataset.ranges.touch.0]``.
+Scene k of a dataset depends on (its description, the dataset's seed, k) only. Every range has a
+stream of its own.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ TOUCH_NUMBERS = ("x_mm", "y_mm", "radius_mm", "contrast")
 
 @dataclass(frozen=True)
 class Range:
-    """A number drawn evenly from [low, high], whole where both ends are; ``key`` is ("effects", "noise", "snr_db")."""
+    """A number drawn evenly from [low, high], whole where both ends are; ``key`` is ("effects",
+    "noise", "snr_db")."""
 
     key: tuple[str, ...]
     low: float
@@ -57,7 +59,8 @@ def ranges_of(table: Mapping[str, Any], scene: Scene, where: str) -> Ranges:
     """The table [dataset] checked against the ``scene`` that it varies; ``where`` names its file.
 
     Raises:
-        ConfigError: a key is unknown, a range is none, or the number that it varies is not there to be varied.
+        ConfigError: a key is unknown, a range is none, or the number that it varies is not there to
+            be varied.
     """
     check_keys(table, ("touches", "ranges"), f"{where} [dataset]")
     rules = None
@@ -65,7 +68,10 @@ def ranges_of(table: Mapping[str, Any], scene: Scene, where: str) -> Ranges:
         place = f"{where} [dataset.touches]"
         check_keys(table["touches"], [one.name for one in fields(TouchRules)], place)
         if scene.touches:
-            raise ConfigError(f"{place}: the scene has touches of its own; remove [[touch]], or use [dataset.ranges]")
+            raise ConfigError(
+                f"{place}: the scene has touches of its own; remove [[touch]], or use"
+                " [dataset.ranges]"
+            )
         rules = _rules(table["touches"], place)
     numbers = tuple(_walk(table.get("ranges", {}), (), f"{where} [dataset.ranges]"))
     for one in numbers:
@@ -92,7 +98,9 @@ def _rules(table: Mapping[str, Any], where: str) -> TouchRules:
 
 
 def _pair(value: Any, what: str) -> tuple[float, float, bool]:
-    numbers = isinstance(value, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+    numbers = isinstance(value, list) and all(
+        isinstance(v, int | float) and not isinstance(v, bool) for v in value
+    )
     if not numbers or len(value) != 2 or not value[0] <= value[1]:
         raise ConfigError(f"{what} must be a range [low, high], not {value!r}")
     return float(value[0]), float(value[1]), all(isinstance(v, int) for v in value)
@@ -113,17 +121,22 @@ def _check_target(one: Range, scene: Scene, where: str) -> None:
     place, key = f"{where} [dataset.ranges]: {one.name}", one.key
     if key[0] == "effects" and len(key) == 3:
         if key[1] not in scene.effects:
-            raise ConfigError(f"{place}: the scene does not name [effects.{key[1]}]; name it to vary it")
+            raise ConfigError(
+                f"{place}: the scene does not name [effects.{key[1]}]; name it to vary it"
+            )
         return
     if key[0] == "touch" and len(key) == 3 and key[1].isdigit() and key[2] in TOUCH_NUMBERS:
         number = int(key[1])
         if number >= len(scene.touches):
-            raise ConfigError(f"{place}: the scene has {len(scene.touches)} touches, counted from 0")
+            raise ConfigError(
+                f"{place}: the scene has {len(scene.touches)} touches, counted from 0"
+            )
         if key[2] == "contrast" and not isinstance(scene.touches[number].law, ShortCircuit):
             raise ConfigError(f"{place}: touch {number} has no contrast; its law is piezoresistive")
         return
     raise ConfigError(
-        f"{place}: cannot be varied; use effects.NAME.KEY, or touch.NUMBER.KEY with {', '.join(TOUCH_NUMBERS)}"
+        f"{place}: cannot be varied; use effects.NAME.KEY, or touch.NUMBER.KEY with"
+        f" {', '.join(TOUCH_NUMBERS)}"
     )
 
 
@@ -131,21 +144,28 @@ def drawn(scene: Scene, ranges: Ranges, seed: int, number: int) -> Scene:
     """Scene ``number`` of the dataset with ``seed``.
 
     Raises:
-        EitskinError: what was drawn cannot be (touches that overlap, ...); the text names the scene's number.
+        EitskinError: what was drawn cannot be (touches that overlap, ...); the text names the
+            scene's number.
     """
     try:
         effects = {name: dict(table) for name, table in scene.effects.items()}
         touches = list(scene.touches)
         if ranges.touches is not None:
             place = f"dataset {seed} {number}"
-            found = random_touches(scene.skin.outline, _seed(seed, number), 1, place, ranges.touches).scenes[0].touches
+            found = (
+                random_touches(scene.skin.outline, _seed(seed, number), 1, place, ranges.touches)
+                .scenes[0]
+                .touches
+            )
             touches = [always(t.x_mm, t.y_mm, t.radius_mm, ShortCircuit(t.contrast)) for t in found]
         for one in ranges.numbers:
             value = one.draw(seed, number)
             if one.key[0] == "effects":
                 effects[one.key[1]][one.key[2]] = value
             else:
-                touches[int(one.key[1])] = _varied(touches[int(one.key[1])], one.key[2], float(value))
+                touches[int(one.key[1])] = _varied(
+                    touches[int(one.key[1])], one.key[2], float(value)
+                )
         return replace(scene, effects=effects, touches=tuple(touches), seed=_seed(seed, number))
     except EitskinError as error:
         raise type(error)(f"dataset scene {number} (from 0): {error}") from None
@@ -157,11 +177,14 @@ def _seed(seed: int, number: int) -> int:
 
 
 def _varied(track: TouchTrack, key: str, value: float) -> TouchTrack:
-    """``track`` with its law's contrast or its radius replaced, or moved so that its first keyframe has x or y."""
+    """``track`` with its law's contrast or its radius replaced, or moved so that its first keyframe
+    has x or y."""
     if key == "contrast":
         return replace(track, law=ShortCircuit(value))
     if key == "radius_mm":
-        return replace(track, keyframes=tuple(replace(one, radius_mm=value) for one in track.keyframes))
+        return replace(
+            track, keyframes=tuple(replace(one, radius_mm=value) for one in track.keyframes)
+        )
     shift = value - getattr(track.keyframes[0], key)
     moved = tuple(replace(one, **{key: getattr(one, key) + shift}) for one in track.keyframes)
     return replace(track, keyframes=moved)

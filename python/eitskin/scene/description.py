@@ -1,6 +1,8 @@
-"""A scene: what happens on a skin, and which imperfections take part. Read from TOML, checked whole.
+"""A scene: what happens on a skin, and which imperfections take part. Read from TOML, checked
+whole.
 
-Effects' tables are kept as they are; the compiler reads them when it imports their modules. The schema: docs/guide/scenes.md.
+Effects' tables are kept as they are; the compiler reads them when it imports their modules. The
+schema: docs/guide/scenes.md.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ SCENE_KEYS = (
 SOLVERS = ("auto", "factorise", "update")
 MAX_FRAMES = 1_000_000
 MAX_TIME_S = 1e7
-# another mesh than models are built on by default (about 3,000 elements): a simulation must not share its errors with the solver
+# another mesh than models are built on by default (about 3,000 elements): a simulation must not
+# share its errors with the solver
 DEFAULT_ELEMENTS = 5000
 
 
@@ -56,8 +59,8 @@ class Scene:
         frames: recorded frames, the first at 0 s; ``rate_hz`` a second.
         quiet_frames: reference frames before them, at negative times, without touches.
         elements: of the mesh, about.
-        solver: "factorise" anew for each conductivity, "update" the untouched skin's factors, or "auto": whichever
-            counts cheaper where touches move, "factorise" where they do not.
+        solver: "factorise" anew for each conductivity, "update" the untouched skin's factors, or
+            "auto": whichever counts cheaper where touches move, "factorise" where they do not.
         touches: in the order of [[touch]].
         effects: name to its table, as in TOML.
         where: the file, for errors.
@@ -65,7 +68,8 @@ class Scene:
         text: the TOML that it was read from.
 
     Raises:
-        ConfigError: a number is out of range, or a touch lies outside the skin, overlaps another or has no size.
+        ConfigError: a number is out of range, or a touch lies outside the skin, overlaps another or
+            has no size.
     """
 
     name: str
@@ -110,7 +114,8 @@ class Scene:
         return tuple(sample(track, times) for track in self.touches)
 
     def plan(self) -> Plan:
-        """What running this scene will do, step by step, and what it will cost (``compiler.compile_scene``)."""
+        """What running this scene will do, step by step, and what it will cost
+        (``compiler.compile_scene``)."""
         from eitskin.scene.compiler import compile_scene
 
         return compile_scene(self).plan
@@ -131,11 +136,14 @@ def load_scene(path: str | Path) -> Scene:
         ConfigError, GeometryError, ProtocolError: what it describes cannot be.
     """
     table = load_toml(path, "scene")
-    return scene_from_table(table, str(path), Path(path).parent, Path(path).read_text(encoding="utf-8"))
+    return scene_from_table(
+        table, str(path), Path(path).parent, Path(path).read_text(encoding="utf-8")
+    )
 
 
 def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: str = "") -> Scene:
-    """The scene in a parsed TOML ``table``; ``where`` names it in errors, and skins are looked for in ``folder``.
+    """The scene in a parsed TOML ``table``; ``where`` names it in errors, and skins are looked for
+    in ``folder``.
 
     Raises:
         FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
@@ -156,13 +164,17 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
     effects = _table(table, "effects", where)
     for name, one in effects.items():
         if not isinstance(one, Mapping):
-            raise ConfigError(f"{where} [effects]: {name} = {one!r} must be a table: write [effects.{name}]")
+            raise ConfigError(
+                f"{where} [effects]: {name} = {one!r} must be a table: write [effects.{name}]"
+            )
     return Scene(
         name=_word(head, "name", Path(where).stem, place),
         description=_word(head, "description", "", place),
         skin=skin,
         protocol=protocol,
-        touches=tuple(_track(one, f"{where} [[touch]] {k} (from 0)") for k, one in enumerate(touches)),
+        touches=tuple(
+            _track(one, f"{where} [[touch]] {k} (from 0)") for k, one in enumerate(touches)
+        ),
         effects=effects,
         rate_hz=number(head, "rate_hz", 20.0, place, low=0, high=1e6, open_low=True),
         solver=choice(head, "solver", "auto", SOLVERS, place),
@@ -193,7 +205,9 @@ def _skin(head: Mapping[str, Any], where: str, folder: Path) -> tuple[Skin, Prot
         return paper_skin(), adjacent(16)
     path = folder / name
     if "\0" in name or not path.is_file():
-        raise ConfigError(f'{where}: skin = {name!r} is neither "paper" nor a file beside the scene')
+        raise ConfigError(
+            f'{where}: skin = {name!r} is neither "paper" nor a file beside the scene'
+        )
     return load_skin(path)
 
 
@@ -201,7 +215,9 @@ def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
     name = choice(table, "law", "short_circuit", LAWS, where)
     driving = DRIVING_KEY[name]
     own = {key for keys in LAW_KEYS.values() for key in keys} | set(DRIVING_KEY.values())
-    check_keys(table, {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_s"} | own, where)
+    check_keys(
+        table, {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_s"} | own, where
+    )
     law = law_from_table(table, name, where)
     hold = table.get("hold", False)
     if not isinstance(hold, bool):
@@ -211,16 +227,23 @@ def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
         return TouchTrack(*_standing(table, driving, where))
     for key in ("x_mm", "y_mm", "from_s", "to_s"):
         if key in table:
-            raise ConfigError(f"{where}: {key} beside path; give a path, or x_mm and y_mm of a touch that stays")
+            raise ConfigError(
+                f"{where}: {key} beside path; give a path, or x_mm and y_mm of a touch that stays"
+            )
     if not isinstance(path, list) or not path or not all(isinstance(one, Mapping) for one in path):
-        raise ConfigError(f"{where}: path must be a list of keyframes {{ t_s = .., x_mm = .., y_mm = .. }}")
+        raise ConfigError(
+            f"{where}: path must be a list of keyframes {{ t_s = .., x_mm = .., y_mm = .. }}"
+        )
     keys = []
     for k, one in enumerate(path):
         place = f"{where} path {k} (from 0)"
         check_keys(one, ("t_s", "x_mm", "y_mm", "radius_mm", driving), place)
         keys.append(_keyframe({**_defaults(table, driving), **one}, driving, place))
         if k and keys[-1].t_s <= keys[-2].t_s:
-            raise ConfigError(f"{place}: t_s = {keys[-1].t_s:g} is not after {keys[-2].t_s:g}; keyframes must ascend")
+            raise ConfigError(
+                f"{place}: t_s = {keys[-1].t_s:g} is not after {keys[-2].t_s:g}; keyframes must"
+                " ascend"
+            )
     return TouchTrack(tuple(keys), law, hold)
 
 
@@ -228,16 +251,24 @@ def _defaults(table: Mapping[str, Any], driving: str) -> dict[str, Any]:
     return {key: table[key] for key in ("radius_mm", driving) if key in table}
 
 
-def _standing(table: Mapping[str, Any], driving: str, where: str) -> tuple[tuple[Keyframe, ...], Any, bool]:
+def _standing(
+    table: Mapping[str, Any], driving: str, where: str
+) -> tuple[tuple[Keyframe, ...], Any, bool]:
     """A touch without a path: there from from_s to to_s, or always."""
     law = law_from_table(table, choice(table, "law", "short_circuit", LAWS, where), where)
-    start = number(table, "from_s", 0.0, where, low=-MAX_TIME_S, high=MAX_TIME_S) if "from_s" in table else ALWAYS_S[0]
+    start = (
+        number(table, "from_s", 0.0, where, low=-MAX_TIME_S, high=MAX_TIME_S)
+        if "from_s" in table
+        else ALWAYS_S[0]
+    )
     first = _keyframe({**table, "t_s": 0.0}, driving, where)
     keys = [Keyframe(start, first.x_mm, first.y_mm, first.radius_mm, first.drive)]
     if "to_s" in table:
         begin = max(start, -MAX_TIME_S)
         end = number(table, "to_s", None, where, low=begin, high=MAX_TIME_S, open_low=True)
-        keys = [Keyframe(t, first.x_mm, first.y_mm, first.radius_mm, first.drive) for t in (begin, end)]
+        keys = [
+            Keyframe(t, first.x_mm, first.y_mm, first.radius_mm, first.drive) for t in (begin, end)
+        ]
     return tuple(keys), law, "to_s" not in table
 
 
@@ -262,19 +293,25 @@ def _check_touches(scene: Scene) -> None:
         if not all(key.radius_mm > 0 for key in track.keyframes):
             raise ConfigError(f"{where}: radius_mm must be above 0; a touch needs a size")
         if not track.law.contrast_at(np.array([key.drive for key in track.keyframes])).min() > 0:
-            raise ConfigError(f"{where}: contrast must be above 0; a negative conductivity cannot be")
+            raise ConfigError(
+                f"{where}: contrast must be above 0; a negative conductivity cannot be"
+            )
     samples, times = scene.samples(), scene.times_s()
     for k, one in enumerate(samples):
         if len(scene.touches[k].keyframes) and not one.there.any():
             continue
         at = np.flatnonzero(one.there)
-        room = rim_distance_mm(scene.skin.outline, np.column_stack([one.x_mm[at], one.y_mm[at]])) - one.radius_mm[at]
+        room = (
+            rim_distance_mm(scene.skin.outline, np.column_stack([one.x_mm[at], one.y_mm[at]]))
+            - one.radius_mm[at]
+        )
         if room.min() < -1e-9:
             worst = int(at[room.argmin()])
             raise ConfigError(
-                f"{scene.where} [[touch]] {k} (from 0): at {times[worst]:g} s x_mm = {one.x_mm[worst]:g}, y_mm = "
-                f"{one.y_mm[worst]:g} with radius_mm = {one.radius_mm[worst]:g} reaches {-room.min():.3g} mm outside "
-                f"the skin {scene.skin.name!r}; move it inwards or make it smaller"
+                f"{scene.where} [[touch]] {k} (from 0): at {times[worst]:g} s x_mm ="
+                f" {one.x_mm[worst]:g}, y_mm = {one.y_mm[worst]:g} with radius_mm ="
+                f" {one.radius_mm[worst]:g} reaches {-room.min():.3g} mm outside the skin"
+                f" {scene.skin.name!r}; move it inwards or make it smaller"
             )
     _refuse_overlaps(scene, samples, times)
 
@@ -283,11 +320,16 @@ def _refuse_overlaps(scene: Scene, samples: Sequence[TrackSamples], times: Float
     for k, one in enumerate(samples):
         for j in range(k):
             other = samples[j]
-            gap = np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm) - one.radius_mm - other.radius_mm
+            gap = (
+                np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm)
+                - one.radius_mm
+                - other.radius_mm
+            )
             bad = np.flatnonzero(one.there & other.there & (gap < -1e-9))
             if len(bad):
                 worst = int(bad[gap[bad].argmin()])
                 raise ConfigError(
-                    f"{scene.where} [[touch]] {k} (from 0): it overlaps touch {j} by {-gap[worst]:.3g} mm at "
-                    f"{times[worst]:g} s; change x_mm, y_mm or radius_mm so that they lie apart"
+                    f"{scene.where} [[touch]] {k} (from 0): it overlaps touch {j} by"
+                    f" {-gap[worst]:.3g} mm at {times[worst]:g} s; change x_mm, y_mm or radius_mm"
+                    " so that they lie apart"
                 )

@@ -1,24 +1,29 @@
-"""What an effect is: the contract between the compiler of scenes and the modules that each hold one effect.
+"""What an effect is: the contract between the compiler of scenes and the modules that each hold one
+effect.
 
 An effect is a module. It is imported only when a scene names it, and defines
 
 - ``NAME``: the word in ``[effects.NAME]``; ``STAGE``: a :class:`Stage`; ``SUMMARY``: one line.
 - ``ORDER``: a number; within a stage, steps run by (ORDER, NAME). Leave gaps: 10, 20, 30.
-- ``Parameters``: a frozen dataclass, one field a key, units in the names. ``field(default=..., metadata={"low": ...,
-  "high": ..., "open_low": True, "choices": (...), "unit": "V", "doc": "..."})``; types are float, int, bool, str,
-  tuple[int, ...], tuple[float, ...], or one of these ``| None``. Its ``__post_init__`` may raise ConfigError with one
-  line that begins with the key; file and table are put before it.
+- ``Parameters``: a frozen dataclass, one field a key, units in the names. ``field(default=...,
+  metadata={"low": ..., "high": ..., "open_low": True, "choices": (...), "unit": "V", "doc":
+  "..."})``; types are float, int, bool, str, tuple[int, ...], tuple[float, ...], or one of these
+  ``| None``. Its ``__post_init__`` may raise ConfigError with one line that begins with the key;
+  file and table are put before it.
 - ``make(parameters, session) -> Step``: it may raise ConfigError in the same way.
-- optionally ``CONFLICTS``: names of effects that it cannot be named together with, and ``SHARED``: a dict from its
-  keys to what they say of the instrument ({"frequency_hz": "excitation frequency"}), on which named effects must agree.
+- optionally ``CONFLICTS``: names of effects that it cannot be named together with, and ``SHARED``:
+  a dict from its keys to what they say of the instrument ({"frequency_hz": "excitation
+  frequency"}), on which named effects must agree.
 
-Times: ``time_s`` is in seconds from the first recorded frame, on the same axis as the touches' keyframes, so that it is
+Times: ``time_s`` is in seconds from the first recorded frame, on the same axis as the touches'
+    keyframes, so that it is
 NEGATIVE during the quiet frames. ``frame`` counts all frames from 0, quiet ones first.
 
-A step's ``apply`` is a pure function of its arguments: the same frame gives the same result however often and in
-whatever order it is called, and it leaves its arguments as they are. What is random per frame is drawn from
-``session.stream(NAME, frame)``, made anew for that frame; what is random once is drawn in ``make`` from
-``session.stream(NAME)`` (index 0) or ``session.stream(NAME + " part")``. Several parts: several names.
+A step's ``apply`` is a pure function of its arguments: the same frame gives the same result however
+often and in whatever order it is called, and it leaves its arguments as they are. What is random
+per frame is drawn from ``session.stream(NAME, frame)``, made anew for that frame; what is random
+once is drawn in ``make`` from ``session.stream(NAME)`` (index 0) or ``session.stream(NAME + "
+part")``. Several parts: several names.
 """
 
 from __future__ import annotations
@@ -96,7 +101,8 @@ class Session:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh that is solved on, made when first asked for (not to be asked for by geometry effects)."""
+        """The mesh that is solved on, made when first asked for (not to be asked for by geometry
+        effects)."""
         return self.build_mesh()
 
     def times_s(self) -> FloatArray:
@@ -104,9 +110,11 @@ class Session:
         return np.asarray((np.arange(self.n_frames) - self.quiet_frames) / self.rate_hz)
 
     def v0_v(self) -> FloatArray:
-        """The exact frame (m,) of the untouched skin as described, with ideal electrodes and no effect at all.
+        """The exact frame (m,) of the untouched skin as described, with ideal electrodes and no
+        effect at all.
 
-        It does not depend on which effects are named, so that a signal-to-noise ratio means the same volts always.
+        It does not depend on which effects are named, so that a signal-to-noise ratio means the
+        same volts always.
         """
         return self.solve_v0()
 
@@ -123,9 +131,9 @@ class Session:
 class Contacts:
     """The electrodes' contacts at one time.
 
-    ``impedance_ohm_m2`` (L,) is 0 for an ideal shunt. ``detached`` (L,) marks electrodes that touch the sheet nowhere
-    (open circuit; a badly touching one is a large impedance instead). ``bridges`` are resistors (i, j, ohm >= 0)
-    between electrodes.
+    ``impedance_ohm_m2`` (L,) is 0 for an ideal shunt. ``detached`` (L,) marks electrodes that touch
+    the sheet nowhere (open circuit; a badly touching one is a large impedance instead). ``bridges``
+    are resistors (i, j, ohm >= 0) between electrodes.
     """
 
     impedance_ohm_m2: FloatArray
@@ -135,10 +143,11 @@ class Contacts:
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Potentials of the four electrodes of each row while it is read, (m,) V, against the mean of all electrodes.
+    """Potentials of the four electrodes of each row while it is read, (m,) V, against the mean of
+    all electrodes.
 
-    The load of row r is (``source_v[r]`` - ``sink_v[r]``) / ``current_a`` in ohm, contacts included. Complex after a
-    phase step.
+    The load of row r is (``source_v[r]`` - ``sink_v[r]``) / ``current_a`` in ohm, contacts
+    included. Complex after a phase step.
     """
 
     source_v: Voltages
@@ -161,7 +170,8 @@ class GeometryStep:
 
 @dataclass(frozen=True, eq=False)
 class MaterialStep:
-    """``apply(conductivity (E,) S/m, time_s, frame) -> (E,)``, before touches; applied once unless it ``varies``."""
+    """``apply(conductivity (E,) S/m, time_s, frame) -> (E,)``, before touches; applied once unless
+    it ``varies``."""
 
     name: str
     cost: Cost
@@ -187,9 +197,9 @@ class ContactStep:
 class PhaseStep:
     """Makes the forward solve complex, at ``frequency_hz``.
 
-    ``admittivity(conductivity (E,) S/m) -> (E,) complex S/m``, element by element; ``contact(impedance (L,) ohm m2) ->
-    (L,) complex ohm m2``, in which 0 is an ideal shunt; ``readout(v (m,) complex) -> (m,) float``, taken just before
-    the digitising stage.
+    ``admittivity(conductivity (E,) S/m) -> (E,) complex S/m``, element by element;
+    ``contact(impedance (L,) ohm m2) -> (L,) complex ohm m2``, in which 0 is an ideal shunt;
+    ``readout(v (m,) complex) -> (m,) float``, taken just before the digitising stage.
     """
 
     name: str
@@ -204,7 +214,8 @@ class PhaseStep:
 
 @dataclass(frozen=True, eq=False)
 class LoadedStep:
-    """``apply(v (m,), loads, time_s, frame) -> (m,)``: uses electrode potentials (source impedance, common mode)."""
+    """``apply(v (m,), loads, time_s, frame) -> (m,)``: uses electrode potentials (source impedance,
+    common mode)."""
 
     name: str
     stage: Stage
@@ -215,7 +226,8 @@ class LoadedStep:
 
 @dataclass(frozen=True, eq=False)
 class VoltageStep:
-    """``apply(v (m,), time_s, frame) -> (m,)``. Rows are in the order of the scan, evenly over the frame's time."""
+    """``apply(v (m,), time_s, frame) -> (m,)``. Rows are in the order of the scan, evenly over the
+    frame's time."""
 
     name: str
     stage: Stage

@@ -1,13 +1,15 @@
-"""The forward solve of a scene: from conductivity and contacts to the electrodes' potentials, in one of two ways.
+"""The forward solve of a scene: from conductivity and contacts to the electrodes' potentials, in
+one of two ways.
 
-``Factorise`` solves each distinct state by a factorisation of its own, exactly as ``ForwardModel`` does. ``Update``
-factorises the untouched skin once; a touch changes the matrix K on the few unknowns T under it, and with G = (K^-1)_TT
-and D the change on T (Woodbury)
+``Factorise`` solves each distinct state by a factorisation of its own, exactly as ``ForwardModel``
+does. ``Update`` factorises the untouched skin once; a touch changes the matrix K on the few
+unknowns T under it, and with G = (K^-1)_TT and D the change on T (Woodbury)
 
     (K + P D P')^-1 = K^-1 - K^-1 P D (1 + G D)^-1 P' K^-1 .
 
-A column of K^-1 is solved when its unknown is first touched and kept, so a touch that moves pays for the unknowns it
-newly reaches. Which of the two is cheaper is decided by counting multiplications (``count_costs``).
+A column of K^-1 is solved when its unknown is first touched and kept, so a touch that moves pays
+for the unknowns it newly reaches. Which of the two is cheaper is decided by counting
+multiplications (``count_costs``).
 """
 
 from __future__ import annotations
@@ -26,8 +28,9 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 AnyArray = npt.NDArray[Any]
 
-# Ordering and symbolic analysis, in multiplications per stored value of the matrix. Measured with SuperLU at 3,000 and
-# 10,000 elements: a factorisation takes as long as 50 to 80 solves, although it multiplies only as much as 13 to 28.
+# Ordering and symbolic analysis, in multiplications per stored value of the matrix. Measured with
+# SuperLU at 3,000 and 10,000 elements: a factorisation takes as long as 50 to 80 solves, although it
+# multiplies only as much as 13 to 28.
 SYMBOLIC_PER_VALUE = 200
 
 
@@ -52,7 +55,9 @@ class Change:
 class Forward(Protocol):
     """Electrode potentials (L, P) in V per A of each pattern of the model, zero mean."""
 
-    def electrodes(self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray) -> AnyArray:
+    def electrodes(
+        self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
+    ) -> AnyArray:
         """For a sheet ``background`` (E,) S/m with a ``change``, and contacts (L,)."""
         ...
 
@@ -71,7 +76,9 @@ class Factorise:
     model: ForwardModel
     work: Work
 
-    def electrodes(self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray) -> AnyArray:
+    def electrodes(
+        self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
+    ) -> AnyArray:
         """As :class:`Forward`."""
         before = self.model.counters.solves
         solution = self.model.solve(touched(background, change), impedance_ohm_m2)
@@ -82,17 +89,22 @@ class Factorise:
 
 @dataclass(frozen=True, eq=False)
 class FactoriseComplex:
-    """A complex factorisation for each call: admittivity and interface impedance from the scene's phase step."""
+    """A complex factorisation for each call: admittivity and interface impedance from the scene's
+    phase step."""
 
     model: ForwardModel
     phase: PhaseStep
     work: Work
 
-    def electrodes(self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray) -> AnyArray:
+    def electrodes(
+        self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
+    ) -> AnyArray:
         """As :class:`Forward`, complex."""
         impedance = self.phase.contact(impedance_ohm_m2)
         system = self.model.system_for(np.asarray(impedance == 0))
-        factors = factorise(_matrix(system, self.phase.admittivity(touched(background, change)), impedance))
+        factors = factorise(
+            _matrix(system, self.phase.admittivity(touched(background, change)), impedance)
+        )
         loads = _loads(self.model, system).astype(np.complex128)
         self.work.complex_factorisations += 1
         self.work.factorisations += 1
@@ -103,26 +115,37 @@ class FactoriseComplex:
 
 
 class Update:
-    """One factorisation of the untouched skin, then a low-rank update for each call; background and contacts stay.
+    """One factorisation of the untouched skin, then a low-rank update for each call; background and
+    contacts stay.
 
-    ``reach`` (u,) are all unknowns that any state touches (``touched_unknowns``), so that storage is known beforehand.
+    ``reach`` (u,) are all unknowns that any state touches (``touched_unknowns``), so that storage
+    is known beforehand.
     """
 
-    def __init__(self, model: ForwardModel, phase: PhaseStep | None, reach: IntArray, work: Work) -> None:
+    def __init__(
+        self, model: ForwardModel, phase: PhaseStep | None, reach: IntArray, work: Work
+    ) -> None:
         self.model, self.phase, self.work = model, phase, work
         self.reach = reach
         self._ready = False
 
-    def electrodes(self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray) -> AnyArray:
-        """As :class:`Forward`; ``background`` and ``impedance_ohm_m2`` must be those of the first call."""
+    def electrodes(
+        self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
+    ) -> AnyArray:
+        """As :class:`Forward`; ``background`` and ``impedance_ohm_m2`` must be those of the first
+        call."""
         if not self._ready:
             self._factorise_base(background, impedance_ohm_m2)
         if not len(change.elements):
             return _zero_mean(self._base_electrodes)
         conductivity = touched(background, change)
-        values = self._admittivity(conductivity)[change.elements] - self._base_values[change.elements]
+        values = (
+            self._admittivity(conductivity)[change.elements] - self._base_values[change.elements]
+        )
         stiffness = self._stiffness[change.elements]
-        unknowns, dense = _dense_change(self.model, self._system, stiffness, change.elements, values)
+        unknowns, dense = _dense_change(
+            self.model, self._system, stiffness, change.elements, values
+        )
         self._solve_columns(unknowns)
         place = np.searchsorted(self.reach, unknowns)
         g = self._columns[place][:, place].T
@@ -136,7 +159,9 @@ class Update:
 
     def _factorise_base(self, background: FloatArray, impedance_ohm_m2: FloatArray) -> None:
         model = self.model
-        impedance: AnyArray = impedance_ohm_m2 if self.phase is None else self.phase.contact(impedance_ohm_m2)
+        impedance: AnyArray = (
+            impedance_ohm_m2 if self.phase is None else self.phase.contact(impedance_ohm_m2)
+        )
         self._system = system = model.system_for(np.asarray(impedance == 0))
         self._base_values = self._admittivity(background)
         self._factors = factorise(_matrix(system, self._base_values, impedance))
@@ -155,7 +180,8 @@ class Update:
         self._ready = True
 
     def _column(self, load: AnyArray) -> AnyArray:
-        """One solve, kept on the unknowns that matter. One at a time: the same bits whatever is solved beside it."""
+        """One solve, kept on the unknowns that matter. One at a time: the same bits whatever is
+        solved beside it."""
         self.work.solves += 1
         kept = self._factors.solve(np.ascontiguousarray(load, dtype=self._dtype))[self._kept]
         kept[len(self.reach) :][self._grounded] = 0
@@ -198,7 +224,8 @@ def element_stiffness(model: ForwardModel) -> FloatArray:
 def _dense_change(
     model: ForwardModel, system: System, stiffness: FloatArray, elements: IntArray, values: AnyArray
 ) -> tuple[IntArray, AnyArray]:
-    """The unknowns under ``elements`` (k,), ascending, and the change of the matrix on them (k, k)."""
+    """The unknowns under ``elements`` (k,), ascending, and the change of the matrix on them (k,
+    k)."""
     places = system.unknown[model.mesh.triangles[elements]]
     unknowns, local = np.unique(places, return_inverse=True)
     local = local.reshape(places.shape)
@@ -208,8 +235,11 @@ def _dense_change(
     return unknowns[free], dense[np.ix_(free, free)]
 
 
-def touched_unknowns(model: ForwardModel, shunted: npt.NDArray[np.bool_], elements: IntArray) -> IntArray:
-    """The unknowns (k,) at the corners of ``elements`` (e,), ascending, without the grounded one."""
+def touched_unknowns(
+    model: ForwardModel, shunted: npt.NDArray[np.bool_], elements: IntArray
+) -> IntArray:
+    """The unknowns (k,) at the corners of ``elements`` (e,), ascending, without the grounded
+    one."""
     system = model.system_for(shunted)
     unknowns = np.unique(system.unknown[model.mesh.triangles[elements]])
     return np.asarray(unknowns[unknowns < system.size])
@@ -217,7 +247,8 @@ def touched_unknowns(model: ForwardModel, shunted: npt.NDArray[np.bool_], elemen
 
 @dataclass(frozen=True)
 class Counted:
-    """Multiplications that each way would take for a whole session, and the solves of the update."""
+    """Multiplications that each way would take for a whole session, and the solves of the
+    update."""
 
     factorise: float
     update: float
@@ -229,11 +260,15 @@ class Counted:
         return "update" if self.update < self.factorise else "factorise"
 
 
-def count_costs(model: ForwardModel, shunted: npt.NDArray[np.bool_], ranks: IntArray, reach: int) -> Counted:
-    """Count both ways for states that touch ``ranks`` (s,) unknowns each, ``reach`` different ones together.
+def count_costs(
+    model: ForwardModel, shunted: npt.NDArray[np.bool_], ranks: IntArray, reach: int
+) -> Counted:
+    """Count both ways for states that touch ``ranks`` (s,) unknowns each, ``reach`` different ones
+    together.
 
-    Fill is estimated as for nested dissection in the plane: a factor of n unknowns holds about 1.5 n log2(n) values and
-    takes about 10 n^1.5 multiplications (counted: 23,358 and 0.60 M at n = 1,482; 146,328 and 8.4 M at n = 5,452).
+    Fill is estimated as for nested dissection in the plane: a factor of n unknowns holds about 1.5
+    n log2(n) values and takes about 10 n^1.5 multiplications (counted: 23,358 and 0.60 M at n =
+    1,482; 146,328 and 8.4 M at n = 5,452).
     """
     system = model.system_for(shunted)
     n, patterns = system.size, len(model.patterns.solved)

@@ -18,7 +18,10 @@ def library() -> dict[str, Path]:
 
 def descriptions() -> dict[str, str]:
     """Each library scene's name and its line."""
-    return {name: str(load_toml(path, "scene")["scene"]["description"]) for name, path in library().items()}
+    return {
+        name: str(load_toml(path, "scene")["scene"]["description"])
+        for name, path in library().items()
+    }
 
 
 def scene_path(name: str) -> Path:
@@ -32,7 +35,9 @@ def scene_path(name: str) -> Path:
         return path
     known = library()
     if name not in known:
-        raise FileError(f"{name}: no such scene file, nor a scene of the library; {nearest(name, known)}")
+        raise FileError(
+            f"{name}: no such scene file, nor a scene of the library; {nearest(name, known)}"
+        )
     return known[name]
 
 

@@ -16,7 +16,8 @@ def parameter(
     open_low: bool = False,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    """A dataclass field whose metadata holds ``unit``, ``doc`` and the range [low, high], or (low, high]."""
+    """A dataclass field whose metadata holds ``unit``, ``doc`` and the range [low, high], or (low,
+    high]."""
     metadata: dict[str, Any] = {"unit": unit, "doc": doc}
     if low is not None:
         metadata["low"] = low

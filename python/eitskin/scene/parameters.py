@@ -1,4 +1,5 @@
-"""An effect's table in a scene becomes its ``Parameters``: keys, types and ranges are checked against the dataclass."""
+"""An effect's table in a scene becomes its ``Parameters``: keys, types and ranges are checked
+against the dataclass."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ def parse_parameters(module: EffectModule, table: Mapping[str, Any], where: str)
     """``module.Parameters`` filled from ``table``; ``where`` says file and table.
 
     Raises:
-        ConfigError: a key is unknown, missing, of the wrong type or out of range, or keys contradict each other.
+        ConfigError: a key is unknown, missing, of the wrong type or out of range, or keys
+            contradict each other.
     """
     fields = {one.name: one for one in dataclasses.fields(module.Parameters)}
     check_keys(table, fields, where)
@@ -56,10 +58,14 @@ def _value(value: Any, hint: Any, metadata: Mapping[str, Any], what: str) -> Any
         return _word(value, metadata, what)
     if hint in (int, float):
         return _number(value, hint, metadata, what)
-    raise ConfigError(f"{what}: the effect declares a type that scenes do not know ({hint}); mend the effect")
+    raise ConfigError(
+        f"{what}: the effect declares a type that scenes do not know ({hint}); mend the effect"
+    )
 
 
-def _items(value: Any, arguments: tuple[Any, ...], metadata: Mapping[str, Any], what: str) -> tuple[Any, ...]:
+def _items(
+    value: Any, arguments: tuple[Any, ...], metadata: Mapping[str, Any], what: str
+) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
         raise ConfigError(f"{what} must be a list, not {value!r}")
     if len(arguments) == 2 and arguments[1] is Ellipsis:
@@ -69,7 +75,10 @@ def _items(value: Any, arguments: tuple[Any, ...], metadata: Mapping[str, Any], 
     else:
         kinds = arguments
     pairs = zip(value, kinds, strict=True)
-    return tuple(_value(one, kind, metadata, f"{what} entry {k} (from 0)") for k, (one, kind) in enumerate(pairs))
+    return tuple(
+        _value(one, kind, metadata, f"{what} entry {k} (from 0)")
+        for k, (one, kind) in enumerate(pairs)
+    )
 
 
 def _word(value: Any, metadata: Mapping[str, Any], what: str) -> str:
@@ -93,12 +102,16 @@ def _number(value: Any, kind: type, metadata: Mapping[str, Any], what: str) -> f
         bounds = [f"{'above' if open_low else 'at least'} {low:g}"] if low > float("-inf") else []
         bounds += [f"at most {high:g}"] if high < float("inf") else []
         unit = f" {metadata['unit']}" if metadata.get("unit") not in (None, "", "1") else ""
-        raise ConfigError(f"{what} = {value!r} is out of range; it must be {' and '.join(bounds) or 'finite'}{unit}")
+        raise ConfigError(
+            f"{what} = {value!r} is out of range; it must be"
+            f" {' and '.join(bounds) or 'finite'}{unit}"
+        )
     return kind(value)  # type: ignore[no-any-return]
 
 
 def describe_parameters(module: EffectModule) -> list[dict[str, Any]]:
-    """Each parameter's name, type, default, range, unit and meaning, for ``eitskin scene effects NAME``."""
+    """Each parameter's name, type, default, range, unit and meaning, for ``eitskin scene effects
+    NAME``."""
     declared: Any = module.Parameters
     hints = _hints(declared)
     rows = []
@@ -110,9 +123,15 @@ def describe_parameters(module: EffectModule) -> list[dict[str, Any]]:
         rows.append(
             {
                 "name": one.name,
-                "type": hint.__name__ if isinstance(hint, type) else str(hint).replace("typing.", ""),
+                "type": (
+                    hint.__name__ if isinstance(hint, type) else str(hint).replace("typing.", "")
+                ),
                 "default": "required" if default is dataclasses.MISSING else default,
-                **{key: one.metadata[key] for key in ("low", "high", "choices", "unit", "doc") if key in one.metadata},
+                **{
+                    key: one.metadata[key]
+                    for key in ("low", "high", "choices", "unit", "doc")
+                    if key in one.metadata
+                },
             }
         )
     return rows

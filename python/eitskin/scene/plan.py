@@ -1,4 +1,5 @@
-"""What a compiled scene will do, as lines to read: the steps in their order and what each will cost."""
+"""What a compiled scene will do, as lines to read: the steps in their order and what each will
+cost."""
 
 from __future__ import annotations
 
@@ -6,7 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from eitskin.scene.effect import ContactStep, Cost, GeometryStep, MaterialStep, PhaseStep, Stage, Step
+from eitskin.scene.effect import (
+    ContactStep,
+    Cost,
+    GeometryStep,
+    MaterialStep,
+    PhaseStep,
+    Stage,
+    Step,
+)
 
 if TYPE_CHECKING:
     from eitskin.fem.cem import ForwardModel
@@ -29,8 +38,8 @@ class PlanStep:
 class Plan:
     """All steps of a scene in the order they run, and what the whole session will cost.
 
-    ``factorisations`` and ``solves`` are of recorded and quiet frames, and of the reference V0 where an effect asks for
-    it; ``states`` are the distinct states of sheet, touches and contacts.
+    ``factorisations`` and ``solves`` are of recorded and quiet frames, and of the reference V0
+    where an effect asks for it; ``states`` are the distinct states of sheet, touches and contacts.
     """
 
     scene: str
@@ -50,7 +59,8 @@ class Plan:
         return {
             "scene": self.scene,
             "steps": [
-                {**vars(step), "stage": step.stage.name.lower(), "cost": dict(vars(step.cost))} for step in self.steps
+                {**vars(step), "stage": step.stage.name.lower(), "cost": dict(vars(step.cost))}
+                for step in self.steps
             ],
             **{name: value for name, value in vars(self).items() if name not in ("scene", "steps")},
         }
@@ -60,20 +70,27 @@ class Plan:
         costs = [cost_text(step.cost) for step in self.steps]
         wide = max(len(cost) for cost in costs)
         lines = [
-            f"scene {self.scene}: {self.frames} frames after {self.quiet_frames} quiet ones, "
-            f"{self.states} distinct state{'s' if self.states != 1 else ''}",
+            (
+                f"scene {self.scene}: {self.frames} frames after {self.quiet_frames} quiet ones, "
+                f"{self.states} distinct state{'s' if self.states != 1 else ''}"
+            ),
             "",
             f"{'':2} {'step':<18} {'stage':<11} {'cost':<{wide}} what",
         ]
         for k, (step, cost) in enumerate(zip(self.steps, costs, strict=True), 1):
             mark = "*" if step.effect else " "
             stage = step.stage.name.lower()
-            lines.append(f"{k:>2}{mark}{step.name:<18} {stage:<11} {cost:<{wide}} {step.note}".rstrip())
+            lines.append(
+                f"{k:>2}{mark}{step.name:<18} {stage:<11} {cost:<{wide}} {step.note}".rstrip()
+            )
         kind = "complex" if self.is_complex else "real"
         lines += [
             "",
-            f"in all: {self.factorisations} factorisations ({kind}, {self.method}), {self.solves} solves, "
-            f"{self.vector_passes:.0f} vector passes, {self.random_numbers:.0f} random numbers",
+            (
+                f"in all: {self.factorisations} factorisations ({kind}, {self.method}),"
+                f" {self.solves} solves, {self.vector_passes:.0f} vector passes,"
+                f" {self.random_numbers:.0f} random numbers"
+            ),
             "* an effect that the scene names; nothing else is imported or computed",
         ]
         return "\n".join(lines)
@@ -102,16 +119,21 @@ def make_plan(
     reach: int,
     work: SessionWork,
 ) -> Plan:
-    """The plan of a compiled scene: the steps that every scene has, with those of the named effects in their places."""
+    """The plan of a compiled scene: the steps that every scene has, with those of the named effects
+    in their places."""
     own = [PlanStep(step.name, step.stage, step.note, step.cost, True) for step in steps]
     kinds = dict(zip(own, steps, strict=True))
     patterns, total = len(model.patterns.solved), scene.n_frames
     if method == "update":
         factorisations, solves = 1, patterns + reach
-        note = f"the untouched skin once, then low-rank updates on {reach} unknowns that touches reach"
+        note = (
+            f"the untouched skin once, then low-rank updates on {reach} unknowns that touches reach"
+        )
     else:
         factorisations, solves = states - known, (states - known) * patterns
-        note = f"a factorisation for each distinct state, {states}" + (f", of which V0 is {known}" if known else "")
+        note = f"a factorisation for each distinct state, {states}" + (
+            f", of which V0 is {known}" if known else ""
+        )
     solve = Cost(
         factorisations_per_frame=factorisations / total,
         solves_per_frame=solves / total,
@@ -120,7 +142,13 @@ def make_plan(
     mesh = model.mesh
     sheet = f"{scene.skin.conductivity_s_per_m:g} S/m, {scene.skin.thickness_mm:g} mm"
     base = [
-        PlanStep("mesh", Stage.GEOMETRY, f"{mesh.n_elements} elements, {mesh.n_nodes} nodes", Cost(), False),
+        PlanStep(
+            "mesh",
+            Stage.GEOMETRY,
+            f"{mesh.n_elements} elements, {mesh.n_nodes} nodes",
+            Cost(),
+            False,
+        ),
         PlanStep("sheet", Stage.MATERIAL, sheet, Cost(), False),
     ]
     touches = []
@@ -131,13 +159,22 @@ def make_plan(
         touches = [PlanStep("touches", Stage.MATERIAL, note_touches, cost, False)]
     read = Cost(vector_passes_per_frame=1)
     forward = [PlanStep("solve", Stage.BOUNDARY, f"{patterns} patterns; {note}", solve, False)]
-    forward.append(PlanStep("read", Stage.BOUNDARY, f"{scene.protocol.n_rows} voltages", read, False))
+    forward.append(
+        PlanStep("read", Stage.BOUNDARY, f"{scene.protocol.n_rows} voltages", read, False)
+    )
 
     def of(*kind: type) -> list[PlanStep]:
         return [line for line in own if isinstance(kinds[line], kind)]
 
     before = of(GeometryStep, MaterialStep, ContactStep, PhaseStep)
-    lines = [*of(GeometryStep), *base, *of(MaterialStep), *touches, *of(ContactStep, PhaseStep), *forward]
+    lines = [
+        *of(GeometryStep),
+        *base,
+        *of(MaterialStep),
+        *touches,
+        *of(ContactStep, PhaseStep),
+        *forward,
+    ]
     lines += [line for line in own if line not in before]
     every = [line.cost for line in lines]
     return Plan(
@@ -149,7 +186,9 @@ def make_plan(
         factorisations=factorisations + work.v0_factorisations,
         solves=solves + work.v0_solves,
         vector_passes=sum(cost.vector_passes_per_frame for cost in every) * total,
-        random_numbers=sum(cost.random_numbers + cost.random_numbers_per_frame * total for cost in every),
+        random_numbers=sum(
+            cost.random_numbers + cost.random_numbers_per_frame * total for cost in every
+        ),
         is_complex=bool(of(PhaseStep)),
         method=method,
     )

@@ -1,7 +1,8 @@
-"""Random touches: seeded sets of scenes for judging reconstructions, and rings of a given spacing for counting.
+"""Random touches: seeded sets of scenes for judging reconstructions, and rings of a given spacing
+for counting.
 
-A scene depends on (seed, role, its number) only: the first 20 scenes of a set of 180 are the set of 20, and the
-training set of a seed is independent of its test set.
+A scene depends on (seed, role, its number) only: the first 20 scenes of a set of 180 are the set of
+20, and the training set of a seed is independent of its test set.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ class TouchRules:
         count: least and most touches of a scene.
         radius_mm: range of the radius.
         contrast: range of the contrast.
-        gap_mm: least distance between the edges of two touches. 12 mm is two pixels of a 32-pixel image of the
-            194 mm skin: nearer touches are one even in a perfect image.
+        gap_mm: least distance between the edges of two touches. 12 mm is two pixels of a 32-pixel
+            image of the 194 mm skin: nearer touches are one even in a perfect image.
         rim_margin_mm: least distance from a touch's edge to the rim.
     """
 
@@ -76,7 +77,10 @@ class TouchRules:
         for name in ("count", "radius_mm", "contrast"):
             low, high = getattr(self, name)
             if not 0 < low <= high:
-                raise UsageError(f"random touches: {name} = ({low:g}, {high:g}) must be a range above 0, low first")
+                raise UsageError(
+                    f"random touches: {name} = ({low:g}, {high:g}) must be a range above 0, low"
+                    " first"
+                )
         if not (self.gap_mm >= 0 and self.rim_margin_mm >= 0):
             raise UsageError("random touches: gap_mm and rim_margin_mm must be at least 0")
 
@@ -108,7 +112,8 @@ def random_touches(
         raise UsageError(f"a set needs at least 1 scene, not {count}")
     drawn = TouchRules() if rules is None else rules
     scenes = tuple(
-        Scene(f"{role}-s{seed}-{k}", _draw(outline, drawn, stream(seed, f"touches {role}", k))) for k in range(count)
+        Scene(f"{role}-s{seed}-{k}", _draw(outline, drawn, stream(seed, f"touches {role}", k)))
+        for k in range(count)
     )
     return TouchSet(role, seed, scenes)
 
@@ -123,12 +128,15 @@ def spaced_touches(
     contrast: float = 5.0,
     rim_margin_mm: float = 4.0,
 ) -> TouchSet:
-    """``count`` scenes of ``touches`` equal touches whose centres are at least ``spacing_radii`` radii apart.
+    """``count`` scenes of ``touches`` equal touches whose centres are at least ``spacing_radii``
+    radii apart.
 
-    The harder cousin of a ring, for counting: places are random, and the nearest neighbour is at the stated distance.
+    The harder cousin of a ring, for counting: places are random, and the nearest neighbour is at
+    the stated distance.
 
     Raises:
-        UsageError: a count below 1, a seed below 0, or a spacing below 2 radii (touches would overlap).
+        UsageError: a count below 1, a seed below 0, or a spacing below 2 radii (touches would
+            overlap).
         GeometryError: that many do not fit on this skin.
     """
     if spacing_radii < 2:
@@ -157,7 +165,8 @@ def rim_distance_mm(outline: Outline, points_mm: npt.ArrayLike) -> FloatArray:
 
 
 def _draw(outline: Outline, rules: TouchRules, generator: np.random.Generator) -> tuple[Touch, ...]:
-    """One scene: sizes first, then places until all fit; after 200 misses for one touch all places are drawn anew."""
+    """One scene: sizes first, then places until all fit; after 200 misses for one touch all places
+    are drawn anew."""
     number = int(generator.integers(rules.count[0], rules.count[1], endpoint=True))
     radii = generator.uniform(*rules.radius_mm, size=number)
     contrasts = generator.uniform(*rules.contrast, size=number)
@@ -168,7 +177,8 @@ def _draw(outline: Outline, rules: TouchRules, generator: np.random.Generator) -
         x, y = float(generator.uniform(x0, x1)), float(generator.uniform(y0, y1))
         radius = radii[len(places)]
         apart = all(
-            math.hypot(x - u, y - v) >= radius + radii[j] + rules.gap_mm for j, (u, v) in enumerate(places)
+            math.hypot(x - u, y - v) >= radius + radii[j] + rules.gap_mm
+            for j, (u, v) in enumerate(places)
         )
         if apart and rim_distance_mm(outline, (x, y))[0] >= radius + rules.rim_margin_mm:
             places.append((x, y))
@@ -177,11 +187,12 @@ def _draw(outline: Outline, rules: TouchRules, generator: np.random.Generator) -
             misses += 1
         if len(places) == number:
             return tuple(
-                Touch(x, y, float(r), float(c)) for (x, y), r, c in zip(places, radii, contrasts, strict=True)
+                Touch(x, y, float(r), float(c))
+                for (x, y), r, c in zip(places, radii, contrasts, strict=True)
             )
         if misses >= 200:
             places, misses = [], 0
     raise GeometryError(
-        f"random touches: {number} touches of radius up to {radii.max():.3g} mm, {rules.gap_mm:g} mm apart, "
-        "do not fit on this skin; use fewer, smaller or nearer ones"
+        f"random touches: {number} touches of radius up to {radii.max():.3g} mm, {rules.gap_mm:g}"
+        " mm apart, do not fit on this skin; use fewer, smaller or nearer ones"
     )

@@ -1,7 +1,9 @@
-"""From the electrodes' potentials to the protocol's voltages: bridges, detached electrodes, and each row's loads.
+"""From the electrodes' potentials to the protocol's voltages: bridges, detached electrodes, and
+each row's loads.
 
-A skin seen from its electrodes is a linear network, so resistors between electrodes need no new factorisation: with
-the potentials Z D of the bridges' own current patterns D and resistances R, U' = U - Z D (R + D' Z D)^-1 D' U.
+A skin seen from its electrodes is a linear network, so resistors between electrodes need no new
+factorisation: with the potentials Z D of the bridges' own current patterns D and resistances R, U'
+= U - Z D (R + D' Z D)^-1 D' U.
 """
 
 from __future__ import annotations
@@ -20,9 +22,10 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 AnyArray = npt.NDArray[Any]
 
-# A detached electrode's impedance in the solve. It carries no current as a whole, and 1e4 ohm m2 keeps what little runs
-# in and out again along its width below 1e-8 of the other rows; one that a bridge feeds has 2 Gohm on the paper's
-# 48 mm2, where about 1e-5 leaks. More would cost the solve as many digits.
+# A detached electrode's impedance in the solve. It carries no current as a whole, and 1e4 ohm m2
+# keeps what little runs in and out again along its width below 1e-8 of the other rows; one that a
+# bridge feeds has 2 Gohm on the paper's 48 mm2, where about 1e-5 leaks. More would cost the solve as
+# many digits.
 OPEN_OHM_M2 = 1e4
 OPEN_BRIDGED_OHM_M2 = 1e5
 
@@ -37,7 +40,8 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class PlainReader:
-    """Ideal voltmeters on attached electrodes, exactly as ``ForwardModel.voltages_of`` reads them."""
+    """Ideal voltmeters on attached electrodes, exactly as ``ForwardModel.voltages_of`` reads
+    them."""
 
     patterns: Patterns
     current_a: float
@@ -51,8 +55,8 @@ class PlainReader:
 class WholeReader:
     """Also bridges, detached electrodes and loads.
 
-    ``patterns`` hold the protocol's patterns, then one for each of ``pairs`` (b, 2), the electrodes that some state
-    bridges. Rows that use an electrode without any way to the sheet read 0 V.
+    ``patterns`` hold the protocol's patterns, then one for each of ``pairs`` (b, 2), the electrodes
+    that some state bridges. Rows that use an electrode without any way to the sheet read 0 V.
     """
 
     patterns: Patterns
@@ -67,7 +71,9 @@ class WholeReader:
         rows, current_a = self.protocol.drive_measure.astype(np.int64), self.protocol.current_a
         live = live_rows(contacts, rows)
         scale = np.where(live, self.patterns.drive_sign * current_a, 0.0)
-        source, sink, plus, minus = (potentials[rows[:, k], self.patterns.drive] * scale for k in range(4))
+        source, sink, plus, minus = (
+            potentials[rows[:, k], self.patterns.drive] * scale for k in range(4)
+        )
         v = np.where(live, (plus - minus), 0.0)
         return Reading(v, Loads(source, sink, plus, minus, current_a))
 
@@ -75,7 +81,9 @@ class WholeReader:
         first = electrodes.shape[1] - len(self.pairs)
         own = [first + self.pairs.index((i, j)) for i, j, _ in contacts.bridges]
         spread = electrodes[:, own]
-        i, j = (np.array([bridge[k] for bridge in contacts.bridges], dtype=np.int64) for k in (0, 1))
+        i, j = (
+            np.array([bridge[k] for bridge in contacts.bridges], dtype=np.int64) for k in (0, 1)
+        )
         resistance = np.diag([bridge[2] for bridge in contacts.bridges])
         inner = resistance + spread[i] - spread[j]
         current = np.linalg.lstsq(inner, potentials[i] - potentials[j], rcond=None)[0]
@@ -87,11 +95,14 @@ def with_bridges(patterns: Patterns, pairs: tuple[tuple[int, int], ...]) -> Patt
     if not pairs:
         return patterns
     mix = np.hstack([patterns.mix, np.zeros((len(patterns.mix), len(pairs)))])
-    return replace(patterns, solved=np.vstack([patterns.solved, np.array(pairs, dtype=np.int64)]), mix=mix)
+    return replace(
+        patterns, solved=np.vstack([patterns.solved, np.array(pairs, dtype=np.int64)]), mix=mix
+    )
 
 
 def live_rows(contacts: Contacts, rows: IntArray) -> BoolArray:
-    """Which ``rows`` (m, 4) use only electrodes that touch the sheet, or are bridged to one that does: (m,)."""
+    """Which ``rows`` (m, 4) use only electrodes that touch the sheet, or are bridged to one that
+    does: (m,)."""
     attached = ~contacts.detached
     for _ in range(len(contacts.bridges)):
         for i, j, _ohm in contacts.bridges:

@@ -1,8 +1,9 @@
 """Which effects there are, and the import of those that a scene names.
 
-Built-in effects are listed by name and module; a user's package adds its own by an entry point of the group
-``eitskin.effects`` (name = module). A module is imported when a scene names its effect, and not before; listing effects
-reads their source without running it. A built-in name cannot be taken by an entry point.
+Built-in effects are listed by name and module; a user's package adds its own by an entry point of
+the group ``eitskin.effects`` (name = module). A module is imported when a scene names its effect,
+and not before; listing effects reads their source without running it. A built-in name cannot be
+taken by an entry point.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ BUILT_IN: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Registry:
-    """Names to modules: ``modules`` first, then, where ``entry_points``, those of installed packages."""
+    """Names to modules: ``modules`` first, then, where ``entry_points``, those of installed
+    packages."""
 
     modules: Mapping[str, str] = field(default_factory=lambda: dict(BUILT_IN))
     entry_points: bool = True
@@ -58,22 +60,30 @@ class Registry:
         """Every name and its module; nothing is imported."""
         found = {}
         if self.entry_points:
-            found = {one.name: one.value for one in importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)}
+            found = {
+                one.name: one.value
+                for one in importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
+            }
         return {**found, **self.modules}
 
     def load(self, name: str, where: str) -> EffectModule:
         """Import the module of the effect ``name``; ``where`` names the scene in errors.
 
         Raises:
-            ConfigError: no such effect, or its module cannot be imported or breaks the contract of ``effect.py``.
+            ConfigError: no such effect, or its module cannot be imported or breaks the contract of
+                ``effect.py``.
         """
         target = self.modules.get(name) or self.names().get(name)
         if target is None:
-            raise ConfigError(f"{where} [effects.{name}]: unknown effect {name!r}; {nearest(name, self.names())}")
+            raise ConfigError(
+                f"{where} [effects.{name}]: unknown effect {name!r}; {nearest(name, self.names())}"
+            )
         try:
             module = importlib.import_module(target)
         except ImportError as error:
-            raise ConfigError(f"{where} [effects.{name}]: its module {target} cannot be imported ({error})") from None
+            raise ConfigError(
+                f"{where} [effects.{name}]: its module {target} cannot be imported ({error})"
+            ) from None
         _check_contract(module, name, f"{where} [effects.{name}]")
         return module
 
@@ -81,13 +91,19 @@ class Registry:
 def _check_contract(module: object, name: str, where: str) -> None:
     for attribute in ("NAME", "STAGE", "ORDER", "SUMMARY", "Parameters", "make"):
         if not hasattr(module, attribute):
-            raise ConfigError(f"{where}: its module defines no {attribute}; docs/guide/scenes.md says what an effect defines")
+            raise ConfigError(
+                f"{where}: its module defines no {attribute}; docs/guide/scenes.md says what an"
+                " effect defines"
+            )
     if name != module.NAME or not isinstance(module.STAGE, Stage):  # type: ignore[attr-defined]
-        raise ConfigError(f"{where}: its module's NAME must be {name!r} and its STAGE a Stage; mend the module")
+        raise ConfigError(
+            f"{where}: its module's NAME must be {name!r} and its STAGE a Stage; mend the module"
+        )
 
 
 def summary_of(target: str) -> str:
-    """The SUMMARY that the module ``target`` assigns, read from its source without importing it; "" where unknown."""
+    """The SUMMARY that the module ``target`` assigns, read from its source without importing it; ""
+    where unknown."""
     package, _, last = target.rpartition(".")
     try:
         if not package.startswith("eitskin."):
@@ -98,7 +114,9 @@ def summary_of(target: str) -> str:
     except (ImportError, OSError, SyntaxError, IndexError):
         return ""
     for node in tree.body:
-        if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "SUMMARY" for t in node.targets):
+        if isinstance(node, ast.Assign) and any(
+            isinstance(t, ast.Name) and t.id == "SUMMARY" for t in node.targets
+        ):
             try:
                 return str(ast.literal_eval(node.value))
             except ValueError:

@@ -1,4 +1,5 @@
-"""Running a compiled scene: every distinct state is solved once, every frame goes through the named steps."""
+"""Running a compiled scene: every distinct state is solved once, every frame goes through the named
+steps."""
 
 from __future__ import annotations
 
@@ -45,20 +46,31 @@ def forward_of(compiled: Compiled, work: Work) -> Forward:
     return Factorise(compiled.model, work)
 
 
-def simulate_frames(compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None) -> Run:
-    """Solve every state, then take every frame through the steps; ``progress`` wraps the states' numbers.
+def simulate_frames(
+    compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None
+) -> Run:
+    """Solve every state, then take every frame through the steps; ``progress`` wraps the states'
+    numbers.
 
     Raises:
         ConfigError: an effect makes a conductivity that cannot be, or a voltage that is not finite.
     """
     scene, work = compiled.scene, Work()
-    forward, background, read = forward_of(compiled, work), background_of(compiled), _reader(compiled)
+    forward, background, read = (
+        forward_of(compiled, work),
+        background_of(compiled),
+        _reader(compiled),
+    )
     unknown = [k for k in range(len(compiled.states)) if k not in compiled.known]
     readings = {k: read(electrodes, compiled.states[k]) for k, electrodes in compiled.known.items()}
     factorised = np.zeros(scene.n_frames, dtype=np.int64)
-    for k in map(unknown.__getitem__, progress(range(len(unknown))) if progress else range(len(unknown))):
+    for k in map(
+        unknown.__getitem__, progress(range(len(unknown))) if progress else range(len(unknown))
+    ):
         state, before = compiled.states[k], work.factorisations
-        solved = forward.electrodes(background(state), state.change, solved_impedance(state.contacts))
+        solved = forward.electrodes(
+            background(state), state.change, solved_impedance(state.contacts)
+        )
         readings[k] = read(solved, state)
         factorised[state.frame] += work.factorisations - before
 
@@ -73,8 +85,8 @@ def simulate_frames(compiled: Compiled, progress: Callable[[range], Iterable[int
         frame, row = np.argwhere(~np.isfinite(voltage_v))[0]
         named = ", ".join(scene.effects) or "none"
         raise ConfigError(
-            f"{scene.where} [effects]: frame {frame - scene.quiet_frames}, row {row} is {voltage_v[frame, row]}; "
-            f"an effect's parameters (of {named}) are too extreme"
+            f"{scene.where} [effects]: frame {frame - scene.quiet_frames}, row {row} is"
+            f" {voltage_v[frame, row]}; an effect's parameters (of {named}) are too extreme"
         )
     true_v = np.array([readings[k].v for k in range(len(compiled.states))])
     recorded = int(factorised[scene.quiet_frames :].sum())
@@ -91,11 +103,16 @@ def _reader(compiled: Compiled) -> Callable[[npt.NDArray[Any], State], Reading]:
 
 
 def run(
-    compiled: Compiled, *, truth_pixels: int = 64, progress: Callable[[range], Iterable[int]] | None = None
+    compiled: Compiled,
+    *,
+    truth_pixels: int = 64,
+    progress: Callable[[range], Iterable[int]] | None = None,
 ) -> Frames:
-    """The scene's frames with their truth, rastered with ``truth_pixels`` along the skin's longer side (0: no rasters).
+    """The scene's frames with their truth, rastered with ``truth_pixels`` along the skin's longer
+    side (0: no rasters).
 
-    ``meta`` says how they were made: the scene's text, its plan, its effects' parameters, and the work counted.
+    ``meta`` says how they were made: the scene's text, its plan, its effects' parameters, and the
+    work counted.
 
     Raises:
         ConfigError: as ``simulate_frames``.
@@ -128,7 +145,9 @@ def meta_of(compiled: Compiled, done: Run) -> dict[str, Any]:
         "skin": skin_to_table(scene.skin),
         "seed": scene.seed,
         "rate_hz": scene.rate_hz,
-        "effects": {name: plain(dataclasses.asdict(one)) for name, one in compiled.parameters.items()},
+        "effects": {
+            name: plain(dataclasses.asdict(one)) for name, one in compiled.parameters.items()
+        },
         "mesh_elements": compiled.model.mesh.n_elements,
         "plan": compiled.plan.as_dict(),
         "counters": {

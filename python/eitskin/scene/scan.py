@@ -1,4 +1,5 @@
-"""The scan as the front end lives it: when a row is read, on which channel, and what the multiplexers do before."""
+"""The scan as the front end lives it: when a row is read, on which channel, and what the
+multiplexers do before."""
 
 from __future__ import annotations
 
@@ -15,14 +16,18 @@ IntArray = npt.NDArray[np.int64]
 
 
 def row_delays_s(session: Session) -> FloatArray:
-    """When each row (m,) is read, in s after its frame's time: rows follow each other evenly over the frame."""
+    """When each row (m,) is read, in s after its frame's time: rows follow each other evenly over
+    the frame."""
     rows = session.protocol.n_rows
     return np.asarray(np.arange(rows) / (rows * session.rate_hz))
 
 
 def channels(protocol: Protocol) -> tuple[IntArray, IntArray]:
-    """The different measuring pairs (C, 2) [V+, V-], sorted, and the number of each row's pair among them (m,)."""
-    pairs, number = np.unique(protocol.drive_measure[:, 2:].astype(np.int64), axis=0, return_inverse=True)
+    """The different measuring pairs (C, 2) [V+, V-], sorted, and the number of each row's pair
+    among them (m,)."""
+    pairs, number = np.unique(
+        protocol.drive_measure[:, 2:].astype(np.int64), axis=0, return_inverse=True
+    )
     return pairs, np.asarray(number).reshape(-1)
 
 
@@ -38,9 +43,10 @@ def switched(protocol: Protocol) -> npt.NDArray[np.bool_]:
 def settled_from_the_row_before(target: npt.NDArray[Any], left: float) -> npt.NDArray[Any]:
     """What a first-order settling leaves in each row (m,) of a periodic scan.
 
-    Row k starts from what row k - 1 reached, and ``left`` (0 to below 1) of the distance to ``target[k]`` remains:
-    y_k = target_k + left (y_{k-1} - target_k), row 0 coming after the last one. The sum (1 - left) sum_j left^j
-    target_{k-j} is doubled in length until what remains is below 1e-17.
+    Row k starts from what row k - 1 reached, and ``left`` (0 to below 1) of the distance to
+    ``target[k]`` remains: y_k = target_k + left (y_{k-1} - target_k), row 0 coming after the last
+    one. The sum (1 - left) sum_j left^j target_{k-j} is doubled in length until what remains is
+    below 1e-17.
     """
     reached, factor, shift = (1.0 - left) * target, left, 1
     while factor > 1e-17:

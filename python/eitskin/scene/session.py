@@ -1,4 +1,5 @@
-"""A scene's session: its named effects imported and made, and the meshes and models that scenes share."""
+"""A scene's session: its named effects imported and made, and the meshes and models that scenes
+share."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Bench:
-    """Meshes, models and untouched skins, kept between scenes of the same skin and protocol object (dataset mode)."""
+    """Meshes, models and untouched skins, kept between scenes of the same skin and protocol object
+    (dataset mode)."""
 
     def __init__(self) -> None:
         self._meshes: dict[tuple[Skin, int], Mesh] = {}
@@ -39,8 +41,11 @@ class Bench:
             self._meshes[key] = mesh_for_elements(skin, elements)
         return self._meshes[key]
 
-    def model(self, skin: Skin, protocol: Protocol, elements: int, contacts: FloatArray) -> ForwardModel:
-        """A copy of a forward model of ``skin`` whose matrix has the pattern for ``contacts`` (L,), by which are 0."""
+    def model(
+        self, skin: Skin, protocol: Protocol, elements: int, contacts: FloatArray
+    ) -> ForwardModel:
+        """A copy of a forward model of ``skin`` whose matrix has the pattern for ``contacts`` (L,),
+        by which are 0."""
         key = (skin, elements, protocol, (contacts == 0).tobytes())
         if key not in self._models:
             self._models[key] = ForwardModel(self.mesh(skin, elements), skin, protocol, contacts)
@@ -54,12 +59,16 @@ class Bench:
         return self._covers[key]
 
     def known(self, scene: Scene) -> FloatArray | None:
-        """The electrodes' potentials (L, P) of ``scene``'s untouched skin, where they were asked for before."""
+        """The electrodes' potentials (L, P) of ``scene``'s untouched skin, where they were asked
+        for before."""
         return self._untouched.get((scene.skin, scene.elements, scene.protocol))
 
     def v0_v(self, scene: Scene, work: SessionWork) -> FloatArray:
-        """The reference frame (m,) of ``scene``'s skin without any effect; a factorisation when first asked for."""
-        model = self.model(scene.skin, scene.protocol, scene.elements, np.zeros(scene.skin.electrodes.count))
+        """The reference frame (m,) of ``scene``'s skin without any effect; a factorisation when
+        first asked for."""
+        model = self.model(
+            scene.skin, scene.protocol, scene.elements, np.zeros(scene.skin.electrodes.count)
+        )
         electrodes = self.known(scene)
         if electrodes is None:
             electrodes = model.solve(scene.skin.conductivity_s_per_m, 0.0).electrodes
@@ -71,7 +80,8 @@ class Bench:
 
 @dataclass
 class SessionWork:
-    """What making a session costs beside its forward solves: the reference V0, and random generators."""
+    """What making a session costs beside its forward solves: the reference V0, and random
+    generators."""
 
     v0_factorisations: int = 0
     v0_solves: int = 0
@@ -84,12 +94,18 @@ def load_effects(scene: Scene, registry: Registry) -> dict[str, EffectModule]:
     for name, module in modules.items():
         for other in getattr(module, "CONFLICTS", ()):
             if other in modules:
-                raise ConfigError(f"{scene.where} [effects.{name}]: it contradicts [effects.{other}]; keep one of them")
+                raise ConfigError(
+                    f"{scene.where} [effects.{name}]: it contradicts [effects.{other}]; keep one of"
+                    " them"
+                )
     return dict(sorted(modules.items(), key=lambda item: (item[1].STAGE, item[1].ORDER, item[0])))
 
 
-def check_shared(scene: Scene, modules: dict[str, EffectModule], parameters: dict[str, Any]) -> None:
-    """Refuse effects that say different things of what they share, such as the excitation's frequency."""
+def check_shared(
+    scene: Scene, modules: dict[str, EffectModule], parameters: dict[str, Any]
+) -> None:
+    """Refuse effects that say different things of what they share, such as the excitation's
+    frequency."""
     said: dict[str, tuple[str, Any]] = {}
     for name, module in modules.items():
         for key, meaning in getattr(module, "SHARED", {}).items():
@@ -97,20 +113,27 @@ def check_shared(scene: Scene, modules: dict[str, EffectModule], parameters: dic
             other, before = said.setdefault(meaning, (f"[effects.{name}] {key}", value))
             if before != value:
                 raise ConfigError(
-                    f"{scene.where} [effects.{name}]: {key} = {value!r} contradicts {other} = {before!r}; both are the "
-                    f"{meaning}, so make them equal"
+                    f"{scene.where} [effects.{name}]: {key} = {value!r} contradicts {other} ="
+                    f" {before!r}; both are the {meaning}, so make them equal"
                 )
 
 
 def make_steps(
-    scene: Scene, modules: dict[str, EffectModule], parameters: dict[str, Any], desk: Bench, work: SessionWork
+    scene: Scene,
+    modules: dict[str, EffectModule],
+    parameters: dict[str, Any],
+    desk: Bench,
+    work: SessionWork,
 ) -> tuple[tuple[Step, ...], Skin]:
     """Every named effect's step, geometry first, and the skin as it truly is."""
     skin, in_geometry = scene.skin, True
 
     def build_mesh() -> Mesh:
         if in_geometry:
-            raise ConfigError("an effect of the geometry comes before the mesh and cannot ask for it; mend the effect")
+            raise ConfigError(
+                "an effect of the geometry comes before the mesh and cannot ask for it; mend the"
+                " effect"
+            )
         return desk.mesh(skin, scene.elements)
 
     def make_stream(name: str, index: int) -> np.random.Generator:
@@ -138,6 +161,9 @@ def make_steps(
         except EitskinError as error:
             raise type(error)(f"{scene.where} [effects.{name}]: {error}") from None
         if step.stage is not module.STAGE or step.name != name:
-            raise ConfigError(f"{scene.where} [effects.{name}]: its step has another name or stage; mend the effect")
+            raise ConfigError(
+                f"{scene.where} [effects.{name}]: its step has another name or stage; mend the"
+                " effect"
+            )
         steps.append(step)
     return tuple(steps), skin

@@ -1,8 +1,10 @@
-"""Frames that touches would give: every scene solved nonlinearly on a fine mesh, then measured imperfectly.
+"""Frames that touches would give: every scene solved nonlinearly on a fine mesh, then measured
+imperfectly.
 
-The mesh is not the one that is reconstructed on, or the comparison would be rigged (an "inverse crime"). What is
-imperfect is named in :class:`Measurement`, and each source of it has its own random stream (``eitskin.scene.streams``):
-turning one off leaves the samples of the others as they were.
+The mesh is not the one that is reconstructed on, or the comparison would be rigged (an "inverse
+crime"). What is imperfect is named in :class:`Measurement`, and each source of it has its own
+random stream (``eitskin.scene.streams``): turning one off leaves the samples of the others as they
+were.
 """
 
 from __future__ import annotations
@@ -33,13 +35,14 @@ class Measurement:
     """What stands between the voltages and the numbers; None or 0 turns a part off.
 
     Attributes:
-        snr_db: 20 log10(rms(V0) / sigma) of white noise, sigma the same on every channel and V0 the noise-free frame of
-            the untouched skin, rms over its m channels.
+        snr_db: 20 log10(rms(V0) / sigma) of white noise, sigma the same on every channel and V0 the
+            noise-free frame of the untouched skin, rms over its m channels.
         adc_bits: resolution of the converter.
         adc_headroom: the converter spans +- adc_headroom max|V0|; beyond that it clips.
-        contact_spread: each electrode's contact impedance is the skin's times 1 + uniform(-s, s), drawn once for
-            quiet and touched frames.
-        quiet_frames: frames of the untouched skin; their mean is the reference, their scatter shows the noise.
+        contact_spread: each electrode's contact impedance is the skin's times 1 + uniform(-s, s),
+            drawn once for quiet and touched frames.
+        quiet_frames: frames of the untouched skin; their mean is the reference, their scatter shows
+            the noise.
     """
 
     snr_db: float | None = 60.0
@@ -51,10 +54,13 @@ class Measurement:
     def __post_init__(self) -> None:
         if not (self.adc_headroom > 0 and 0 <= self.contact_spread < 1 and self.quiet_frames >= 1):
             raise UsageError(
-                "measurement: adc_headroom must be above 0, contact_spread within 0 to below 1, quiet_frames at least 1"
+                "measurement: adc_headroom must be above 0, contact_spread within 0 to below 1,"
+                " quiet_frames at least 1"
             )
         if self.adc_bits is not None and not 1 <= self.adc_bits <= 32:
-            raise UsageError(f"measurement: adc_bits = {self.adc_bits} is out of range; use 1 to 32, or none")
+            raise UsageError(
+                f"measurement: adc_bits = {self.adc_bits} is out of range; use 1 to 32, or none"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +68,8 @@ class Simulated:
     """A session: one skin with its contacts, quiet frames, then one frame a scene; all in V.
 
     Attributes:
-        skin, protocol, touches, measurement, seed: what was simulated; ``seed`` is that of contacts and noise.
+        skin, protocol, touches, measurement, seed: what was simulated; ``seed`` is that of contacts
+            and noise.
         frames_v: (k, m) measured, one a scene.
         quiet_v: (q, m) measured without touches.
         exact_v: (k, m) the same scenes without noise and converter.
@@ -101,7 +108,9 @@ class Simulated:
 
     def as_frames(self) -> Frames:
         """The session as frames with truth, to be saved or reconstructed like measured ones."""
-        flat = [(k, touch) for k, scene in enumerate(self.touches.scenes) for touch in scene.touches]
+        flat = [
+            (k, touch) for k, scene in enumerate(self.touches.scenes) for touch in scene.touches
+        ]
         contrast = np.array([touch.contrast for _, touch in flat])
         return Frames(
             protocol=self.protocol,
@@ -126,15 +135,19 @@ class Simulated:
         )
 
 
-def element_cover(mesh: Mesh, touch: Touch, subdivision: int = SUBDIVISION) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Which elements a touch meets (e,), and what part of each it covers (e,), in (0, 1]; see ``cover.Cover``."""
+def element_cover(
+    mesh: Mesh, touch: Touch, subdivision: int = SUBDIVISION
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Which elements a touch meets (e,), and what part of each it covers (e,), in (0, 1]; see
+    ``cover.Cover``."""
     return Cover(mesh, subdivision).of(touch)
 
 
 def conductivity_with(mesh: Mesh, touches: Iterable[Touch], sheet_s_per_m: float) -> FloatArray:
     """Conductivity (E,) in S/m of a sheet with touches: each element's mean over its area.
 
-    Touches are taken to lie apart; where they overlap, their changes add (never below a thousandth of the sheet's).
+    Touches are taken to lie apart; where they overlap, their changes add (never below a thousandth
+    of the sheet's).
     """
     change = np.zeros(mesh.n_elements)
     for touch in touches:
@@ -159,31 +172,41 @@ def simulate(
         skin, protocol: what is touched and scanned.
         touches: one frame each.
         measurement: imperfections; None takes the defaults.
-        seed: of contacts and noise; None takes that of ``touches``. Streams are named after its role too, so that
-            training and test sessions of a seed share nothing.
+        seed: of contacts and noise; None takes that of ``touches``. Streams are named after its
+            role too, so that training and test sessions of a seed share nothing.
         mesh: to solve on; None makes one of about 11,000 elements.
         progress: wraps the scenes, to show how far it is.
 
     Raises:
-        UsageError, GeometryError, ProtocolError, MissingExtraError: from meshing and the forward model.
+        UsageError, GeometryError, ProtocolError, MissingExtraError: from meshing and the forward
+            model.
     """
     how = Measurement() if measurement is None else measurement
     solved_on = mesh_for_elements(skin, ELEMENTS) if mesh is None else mesh
     own_seed = touches.seed if seed is None else seed
     role = touches.role
-    spread = stream(own_seed, f"contact {role}").uniform(-1.0, 1.0, skin.electrodes.count) * how.contact_spread
+    spread = (
+        stream(own_seed, f"contact {role}").uniform(-1.0, 1.0, skin.electrodes.count)
+        * how.contact_spread
+    )
     contact = skin.electrodes.contact_impedance_ohm_m2 * (1.0 + spread)
     forward = ForwardModel(solved_on, skin, protocol, contact)
     sheet = skin.conductivity_s_per_m
     quiet = forward.voltages(np.full(solved_on.n_elements, sheet))
     scenes: Iterable[Scene] = touches.scenes if progress is None else progress(touches.scenes)
-    exact = np.array([forward.voltages(conductivity_with(solved_on, scene.touches, sheet)) for scene in scenes])
+    exact = np.array(
+        [forward.voltages(conductivity_with(solved_on, scene.touches, sheet)) for scene in scenes]
+    )
 
-    noise_v = 0.0 if how.snr_db is None else float(np.sqrt((quiet**2).mean()) / 10 ** (how.snr_db / 20))
+    noise_v = (
+        0.0 if how.snr_db is None else float(np.sqrt((quiet**2).mean()) / 10 ** (how.snr_db / 20))
+    )
     span_v = how.adc_headroom * float(np.abs(quiet).max())
     lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
     converter = (noise_v, lsb_v, span_v, own_seed)
-    quiet_v, quiet_clipped = measure(np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}")
+    quiet_v, quiet_clipped = measure(
+        np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}"
+    )
     frames_v, clipped = measure(exact, *converter, f"frame {role}")
     return Simulated(
         skin=skin,
@@ -207,14 +230,19 @@ def simulate(
 def measure(
     exact_v: FloatArray, noise_v: float, lsb_v: float, span_v: float, seed: int, name: str
 ) -> tuple[FloatArray, int]:
-    """Noise, then the converter: measured frames and how many values clipped. Each frame has its own stream.
+    """Noise, then the converter: measured frames and how many values clipped. Each frame has its
+    own stream.
 
     Args:
         exact_v: (k, m) V.
-        noise_v, lsb_v, span_v: sigma of the noise, a step of the converter (0: none), half its range; V.
+        noise_v, lsb_v, span_v: sigma of the noise, a step of the converter (0: none), half its
+            range; V.
         seed, name: of the streams.
     """
-    rows = [stream(seed, f"noise {name}", k).standard_normal(exact_v.shape[1]) for k in range(len(exact_v))]
+    rows = [
+        stream(seed, f"noise {name}", k).standard_normal(exact_v.shape[1])
+        for k in range(len(exact_v))
+    ]
     noisy = exact_v + noise_v * np.array(rows)
     if not lsb_v:
         return noisy, 0

@@ -1,4 +1,5 @@
-"""Random streams keyed by (seed, name): each source of randomness has its own, so that adding one changes no other."""
+"""Random streams keyed by (seed, name): each source of randomness has its own, so that adding one
+changes no other."""
 
 from __future__ import annotations
 
@@ -10,9 +11,11 @@ from eitskin.errors import UsageError
 
 
 def stream(seed: int, name: str, index: int = 0) -> np.random.Generator:
-    """The generator of the source ``name`` under ``seed``; ``index`` counts its independent draws (scenes, frames).
+    """The generator of the source ``name`` under ``seed``; ``index`` counts its independent draws
+    (scenes, frames).
 
-    The name enters by its SHA-256, so that streams do not depend on the order or number of other names.
+    The name enters by its SHA-256, so that streams do not depend on the order or number of other
+    names.
 
     Raises:
         UsageError: the seed or the index is below 0.

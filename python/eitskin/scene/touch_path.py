@@ -19,7 +19,8 @@ ALWAYS_S = (float("-inf"), float("inf"))
 
 @dataclass(frozen=True)
 class Keyframe:
-    """A touch at ``t_s`` after the first recorded frame; ``drive`` is press (0 to 1) or grams, as its law wants."""
+    """A touch at ``t_s`` after the first recorded frame; ``drive`` is press (0 to 1) or grams, as
+    its law wants."""
 
     t_s: float
     x_mm: float
@@ -32,8 +33,9 @@ class Keyframe:
 class TouchTrack:
     """A touch that comes, moves, presses and lifts.
 
-    It is there from its first keyframe to its last, both included; with ``hold`` it stays after the last. A track of
-    one keyframe at t_s = -inf is there always. Between keyframes everything changes in proportion to time.
+    It is there from its first keyframe to its last, both included; with ``hold`` it stays after the
+    last. A track of one keyframe at t_s = -inf is there always. Between keyframes everything
+    changes in proportion to time.
     """
 
     keyframes: tuple[Keyframe, ...]
@@ -48,7 +50,8 @@ class TouchTrack:
 
 @dataclass(frozen=True, eq=False)
 class TrackSamples:
-    """One track at given times, all (n,). Where it is not ``there``, the other numbers mean nothing.
+    """One track at given times, all (n,). Where it is not ``there``, the other numbers mean
+    nothing.
 
     ``there`` is False also where it presses so little that it changes nothing.
     """
@@ -60,7 +63,9 @@ class TrackSamples:
     contrast: FloatArray
 
 
-def always(x_mm: float, y_mm: float, radius_mm: float, law: Law | None = None, drive: float = 1.0) -> TouchTrack:
+def always(
+    x_mm: float, y_mm: float, radius_mm: float, law: Law | None = None, drive: float = 1.0
+) -> TouchTrack:
     """A touch that stays where it is through all recorded frames."""
     frame = Keyframe(ALWAYS_S[0], x_mm, y_mm, radius_mm, drive)
     return TouchTrack((frame,), ShortCircuit() if law is None else law, hold=True)
@@ -78,13 +83,20 @@ def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
         return np.asarray(np.interp(times_s, at, [getattr(k, name) for k in keys]))
 
     contrast = track.law.contrast_at(line("drive"))
-    return TrackSamples(there & (contrast != 1.0), line("x_mm"), line("y_mm"), line("radius_mm"), contrast)
+    return TrackSamples(
+        there & (contrast != 1.0), line("x_mm"), line("y_mm"), line("radius_mm"), contrast
+    )
 
 
 def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[Touch, ...]:
     """The touches that are there in ``frame``, in the tracks' order."""
     return tuple(
-        Touch(float(s.x_mm[frame]), float(s.y_mm[frame]), float(s.radius_mm[frame]), float(s.contrast[frame]))
+        Touch(
+            float(s.x_mm[frame]),
+            float(s.y_mm[frame]),
+            float(s.radius_mm[frame]),
+            float(s.contrast[frame]),
+        )
         for s in samples
         if s.there[frame]
     )

@@ -1,4 +1,5 @@
-"""What was truly there: each frame's touches, the mask of them, and the conductivity that was solved."""
+"""What was truly there: each frame's touches, the mask of them, and the conductivity that was
+solved."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ MOST_CELLS = 500_000_000
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The truth fields of ``Frames``, with its shapes; rasters are None where none were asked for."""
+    """The truth fields of ``Frames``, with its shapes; rasters are None where none were asked
+    for."""
 
     touch_frame: npt.NDArray[np.int64]
     touch_xy_mm: FloatArray
@@ -35,10 +37,12 @@ class Truth:
 
 
 def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
-    """The truth of the recorded frames, rastered with ``pixels`` along the longer side, or 0 for no rasters.
+    """The truth of the recorded frames, rastered with ``pixels`` along the longer side, or 0 for no
+    rasters.
 
     Raises:
-        UsageError: ``pixels`` is neither 0 nor 4 to 512, or the rasters would hold over 500 million cells.
+        UsageError: ``pixels`` is neither 0 nor 4 to 512, or the rasters would hold over 500 million
+            cells.
     """
     scene = compiled.scene
     numbers = compiled.state_of_frame[scene.quiet_frames :]
@@ -74,12 +78,13 @@ def _rasters(
     grid, mesh = grid_for(compiled.skin.outline, pixels), compiled.model.mesh
     if len(numbers) * grid.nx * grid.ny > MOST_CELLS:
         raise UsageError(
-            f"truth of {len(numbers)} frames with {grid.nx} x {grid.ny} cells each is over {MOST_CELLS} cells; "
-            "use fewer --truth-pixels, or 0 for none"
+            f"truth of {len(numbers)} frames with {grid.nx} x {grid.ny} cells each is over"
+            f" {MOST_CELLS} cells; use fewer --truth-pixels, or 0 for none"
         )
     x0, y0 = grid.origin_mm
     x_mm, y_mm = np.meshgrid(
-        x0 + (np.arange(grid.nx) + 0.5) * grid.pixel_mm, y0 + (np.arange(grid.ny) + 0.5) * grid.pixel_mm
+        x0 + (np.arange(grid.nx) + 0.5) * grid.pixel_mm,
+        y0 + (np.arange(grid.ny) + 0.5) * grid.pixel_mm,
     )
     share: Any = element_to_pixel(mesh, grid).multiply(mesh.areas_mm2[:, None]).T
     total = np.asarray(share.sum(axis=1)).ravel()
@@ -89,7 +94,9 @@ def _rasters(
     for k in used:
         state = compiled.states[k]
         masks[k] = mask_of(state.touches, x_mm, y_mm)
-        values = share @ touched(background(state), state.change) / np.where(total > 0, total, np.nan)
+        values = (
+            share @ touched(background(state), state.change) / np.where(total > 0, total, np.nan)
+        )
         images[k] = grid.image(values)
     extent = (x0, y0, x0 + grid.nx * grid.pixel_mm, y0 + grid.ny * grid.pixel_mm)
     return masks[numbers], images[numbers], extent

@@ -1,1 +1,2 @@
-"""What a skin is: its outline, its electrodes, and the order in which they are driven and measured."""
+"""What a skin is: its outline, its electrodes, and the order in which they are driven and
+measured."""

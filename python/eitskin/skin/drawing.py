@@ -1,4 +1,5 @@
-"""Outlines and electrodes out of a drawing, SVG or DXF: shapes in mm with y up, of which one is the skin's rim.
+"""Outlines and electrodes out of a drawing, SVG or DXF: shapes in mm with y up, of which one is the
+skin's rim.
 
 A skin keeps the polygon and the places only: nothing depends on the drawing once it is read.
 """
@@ -29,9 +30,11 @@ JOIN_MM = 0.01  # ends nearer than that are one point
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """One line of a drawing: ``points_mm`` (k, 2), y up, curves flattened; a closed one's last point is not its first.
+    """One line of a drawing: ``points_mm`` (k, 2), y up, curves flattened; a closed one's last
+    point is not its first.
 
-    ``name`` is its own id, empty for none; ``names`` also has its classes, its layer, and what the groups around it are called.
+    ``name`` is its own id, empty for none; ``names`` also has its classes, its layer, and what the
+    groups around it are called.
     """
 
     name: str
@@ -47,8 +50,8 @@ class Shape:
 
 @dataclass(frozen=True)
 class Reading:
-    """How a drawing is read: mm a unit of the drawing (None: the file's own units), and how far a flattened curve may be from
-    the true one."""
+    """How a drawing is read: mm a unit of the drawing (None: the file's own units), and how far a
+    flattened curve may be from the true one."""
 
     scale_mm: float | None = None
     tolerance_mm: float = TOLERANCE_MM
@@ -62,13 +65,16 @@ class Drawing:
     shapes: tuple[Shape, ...]
 
     def marked(self, mark: str) -> tuple[Shape, ...]:
-        """The shapes that ``mark`` names by id, class, layer or group, or whose id is ``mark`` and a number, in any order.
+        """The shapes that ``mark`` names by id, class, layer or group, or whose id is ``mark`` and
+        a number, in any order.
 
         Raises:
             ConfigError: there is none.
         """
         numbered = re.compile(re.escape(mark) + r"[ _.-]?\d+")
-        found = tuple(one for one in self.shapes if mark in one.names or numbered.fullmatch(one.name))
+        found = tuple(
+            one for one in self.shapes if mark in one.names or numbered.fullmatch(one.name)
+        )
         if not found:
             raise ConfigError(f"{self.where}: nothing is marked {mark!r}; {self._known()}")
         return found
@@ -86,11 +92,18 @@ class Drawing:
             shapes = [one for one in shapes if element in one.names]
             if not shapes:
                 raise ConfigError(f"{self.where}: nothing is named {element!r}; {self._known()}")
-        closed = [one for one in shapes if one.closed] + joined([one for one in shapes if not one.closed])
+        closed = [one for one in shapes if one.closed] + joined(
+            [one for one in shapes if not one.closed]
+        )
         if not closed:
-            raise GeometryError(f"{self.where}: no closed outline among {len(shapes)} shapes; close the rim's line")
+            raise GeometryError(
+                f"{self.where}: no closed outline among {len(shapes)} shapes; close the rim's line"
+            )
         if len(closed) > 1:
-            raise GeometryError(f"{self.where}: {len(closed)} closed outlines; name one with element = ...; {_names_of(closed)}")
+            raise GeometryError(
+                f"{self.where}: {len(closed)} closed outlines; name one with element = ...;"
+                f" {_names_of(closed)}"
+            )
         try:
             return polygon(_without_repeats(closed[0].points_mm))
         except GeometryError as error:
@@ -113,7 +126,9 @@ def read_drawing(path: Path, reading: Reading) -> Drawing:
         raise ConfigError(f"{path}: a drawing must be .svg or .dxf")
     content = read_bytes(path, "drawing")
     if len(content) > MAX_BYTES:
-        raise ConfigError(f"{path}: {len(content)} bytes are more than {MAX_BYTES}; export the outline alone")
+        raise ConfigError(
+            f"{path}: {len(content)} bytes are more than {MAX_BYTES}; export the outline alone"
+        )
     if kind == ".svg":
         from eitskin.skin.drawing_svg import read_svg as read
     else:
@@ -124,38 +139,53 @@ def read_drawing(path: Path, reading: Reading) -> Drawing:
     return Drawing(str(path), tuple(shapes))
 
 
-def flattened(point_at: Callable[[float], tuple[float, float]], pieces: float) -> list[tuple[float, float]]:
-    """A curve's points after its first, for its parameter from 0 to 1 in about so many ``pieces``."""
+def flattened(
+    point_at: Callable[[float], tuple[float, float]], pieces: float
+) -> list[tuple[float, float]]:
+    """A curve's points after its first, for its parameter from 0 to 1 in about so many
+    ``pieces``."""
     count = min(max(1, math.ceil(pieces)), MAX_PIECES) if math.isfinite(pieces) else 1
     return [point_at((k + 1) / count) for k in range(count)]
 
 
 def bezier_pieces(controls: npt.ArrayLike, tolerance: float) -> float:
-    """How many straight pieces keep a Bezier curve of degree d with ``controls`` (d + 1, 2) within ``tolerance``: the bound by
-    second differences, sqrt(d (d - 1) max|P_i - 2 P_i+1 + P_i+2| / (8 tolerance))."""
+    """How many straight pieces keep a Bezier curve of degree d with ``controls`` (d + 1, 2) within
+    ``tolerance``: the bound by second differences, sqrt(d (d - 1) max|P_i - 2 P_i+1 + P_i+2| / (8
+    tolerance))."""
     bent = np.diff(np.asarray(controls, dtype=np.float64), n=2, axis=0)
     degree = len(bent) + 1
-    return math.sqrt(degree * (degree - 1) * float(np.hypot(bent[:, 0], bent[:, 1]).max()) / (8 * tolerance))
+    return math.sqrt(
+        degree * (degree - 1) * float(np.hypot(bent[:, 0], bent[:, 1]).max()) / (8 * tolerance)
+    )
 
 
 def arc_pieces(radius: float, sweep_rad: float, tolerance: float) -> float:
-    """The same for an arc: a chord over an angle a lies radius (1 - cos(a / 2)) from it; at least 6 a turn."""
+    """The same for an arc: a chord over an angle a lies radius (1 - cos(a / 2)) from it; at least 6
+    a turn."""
     share = min(max(tolerance / radius, 1e-9), 0.5) if radius > 0 else 0.5
     return abs(sweep_rad) / (2 * math.acos(1 - share))
 
 
 def joined(open_shapes: Sequence[Shape]) -> list[Shape]:
-    """Closed shapes made of open ones whose ends meet, two at each joint; what does not close is left out."""
+    """Closed shapes made of open ones whose ends meet, two at each joint; what does not close is
+    left out."""
     left, closed = [one for one in open_shapes if len(one.points_mm) > 1], []
     while left:
         chain, names = left.pop().points_mm, []
         while not _meet(chain[0], chain[-1]):
-            found = [(k, end) for k, one in enumerate(left) for end in (0, -1) if _meet(one.points_mm[end], chain[-1])]
+            found = [
+                (k, end)
+                for k, one in enumerate(left)
+                for end in (0, -1)
+                if _meet(one.points_mm[end], chain[-1])
+            ]
             if len(found) != 1:
                 break
             k, end = found[0]
             piece = left.pop(k)
-            chain = np.concatenate([chain, (piece.points_mm if end == 0 else piece.points_mm[::-1])[1:]])
+            chain = np.concatenate(
+                [chain, (piece.points_mm if end == 0 else piece.points_mm[::-1])[1:]]
+            )
             names.append(piece.names)
         else:
             if len(chain) > 3:
@@ -168,7 +198,8 @@ def _meet(a: FloatArray, b: FloatArray) -> bool:
 
 
 def _without_repeats(points_mm: FloatArray) -> FloatArray:
-    """``points_mm`` without those that lie next to nothing beside the one before: joints of a drawing's pieces."""
+    """``points_mm`` without those that lie next to nothing beside the one before: joints of a
+    drawing's pieces."""
     size = float(np.ptp(points_mm, axis=0).max())
     if not (np.isfinite(points_mm).all() and size > 0):
         return points_mm

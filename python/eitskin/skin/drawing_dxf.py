@@ -1,4 +1,5 @@
-"""DXF by ezdxf: lines, polylines, arcs, circles, ellipses, splines and points of the model space, in mm."""
+"""DXF by ezdxf: lines, polylines, arcs, circles, ellipses, splines and points of the model space,
+in mm."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ try:
 except ModuleNotFoundError as error:
     raise missing_extra("drawing", "ezdxf") from error
 
-# the header's $INSUNITS: inches, feet, millimetres, centimetres, metres, mils, micrometres, decimetres
+# the header's $INSUNITS: inches, feet, millimetres, centimetres, metres, mils, micrometres,
+# decimetres
 UNITS_MM = {1: 25.4, 2: 304.8, 4: 1.0, 5: 10.0, 6: 1000.0, 9: 0.0254, 13: 1e-3, 14: 100.0}
 DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"}
 
@@ -38,14 +40,22 @@ def read_dxf(content: bytes, where: str, reading: Reading) -> list[Shape]:
     try:
         document, _ = ezdxf.recover.read(io.BytesIO(content))
         scale = reading.scale_mm or _scale_of(document, where)
-        entities = list(islice(ezdxf.disassemble.recursive_decompose(document.modelspace()), MAX_SHAPES + 1))
+        entities = list(
+            islice(ezdxf.disassemble.recursive_decompose(document.modelspace()), MAX_SHAPES + 1)
+        )
         if len(entities) > MAX_SHAPES:
             raise ConfigError(f"{where}: over {MAX_SHAPES} entities; export the outline alone")
-        return [shape for entity in entities for shape in _shapes(entity, scale, reading.tolerance_mm / scale)]
+        return [
+            shape
+            for entity in entities
+            for shape in _shapes(entity, scale, reading.tolerance_mm / scale)
+        ]
     except EitskinError:
         raise
     except Exception as error:  # the reader meets damage with many kinds of errors
-        raise ConfigError(f"{where}: cannot be read as DXF ({type(error).__name__}: {error}); export it again") from None
+        raise ConfigError(
+            f"{where}: cannot be read as DXF ({type(error).__name__}: {error}); export it again"
+        ) from None
     finally:
         talk.setLevel(before)
 
@@ -53,7 +63,10 @@ def read_dxf(content: bytes, where: str, reading: Reading) -> list[Shape]:
 def _scale_of(document: Any, where: str) -> float:
     unit = document.header.get("$INSUNITS", 0)
     if unit not in UNITS_MM:
-        raise ConfigError(f"{where}: $INSUNITS = {unit} is no unit of length; give scale_mm, mm a unit of the drawing")
+        raise ConfigError(
+            f"{where}: $INSUNITS = {unit} is no unit of length; give scale_mm, mm a unit of the"
+            " drawing"
+        )
     return UNITS_MM[unit]
 
 
@@ -65,8 +78,15 @@ def _shapes(entity: Any, scale: float, tolerance: float) -> Iterator[Shape]:
     if entity.dxftype() not in DRAWN:
         return
     for path in ezdxf.path.make_path(entity).sub_paths():
-        points = np.array([(v.x, v.y) for v in islice(path.flattening(tolerance, 4), 4 * MAX_PIECES)]).reshape(-1, 2) * scale
+        points = (
+            np.array(
+                [(v.x, v.y) for v in islice(path.flattening(tolerance, 4), 4 * MAX_PIECES)]
+            ).reshape(-1, 2)
+            * scale
+        )
         if len(points) < 2:
             continue
-        closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(np.ptp(points, axis=0).max())
+        closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(
+            np.ptp(points, axis=0).max()
+        )
         yield Shape("", names, points[:-1] if closed else points, closed)

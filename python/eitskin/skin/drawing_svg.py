@@ -1,4 +1,5 @@
-"""SVG by svgelements: shapes with their transforms, in mm, y up. (0, 0) is the page's lower left corner."""
+"""SVG by svgelements: shapes with their transforms, in mm, y up. (0, 0) is the page's lower left
+corner."""
 
 from __future__ import annotations
 
@@ -46,7 +47,9 @@ def read_svg(content: bytes, where: str, reading: Reading) -> list[Shape]:
     except (ET.ParseError, ValueError, LookupError) as error:
         raise ConfigError(f"{where}: not valid SVG ({error}); export it again") from None
     if root.tag.rpartition("}")[2] != "svg":
-        raise ConfigError(f"{where}: not an SVG drawing but <{root.tag.rpartition('}')[2]}>; export it again")
+        raise ConfigError(
+            f"{where}: not an SVG drawing but <{root.tag.rpartition('}')[2]}>; export it again"
+        )
     _refuse_copies(root, where)
     page = _page(root, where, reading)
     for key in ("width", "height", "viewBox", "preserveAspectRatio", "x", "y"):
@@ -56,8 +59,12 @@ def read_svg(content: bytes, where: str, reading: Reading) -> list[Shape]:
         return list(_shapes(tree, frozenset(), page, reading.tolerance_mm))
     except EitskinError:
         raise
-    except Exception as error:  # the parser has no error of its own: whatever a damaged file meets in it
-        raise ConfigError(f"{where}: cannot be read as SVG ({type(error).__name__}: {error}); export it again") from None
+    except (
+        Exception
+    ) as error:  # the parser has no error of its own: whatever a damaged file meets in it
+        raise ConfigError(
+            f"{where}: cannot be read as SVG ({type(error).__name__}: {error}); export it again"
+        ) from None
 
 
 def _page(root: ET.Element, where: str, reading: Reading) -> Page:
@@ -65,16 +72,30 @@ def _page(root: ET.Element, where: str, reading: Reading) -> Page:
         box = [float(word) for word in re.split(r"[\s,]+", root.get("viewBox", "").strip()) if word]
     except ValueError:
         box = []
-    if root.get("viewBox") is not None and (len(box) != 4 or not all(map(math.isfinite, box)) or min(box[2:]) <= 0):
-        raise ConfigError(f"{where}: viewBox = {root.get('viewBox')!r} is not four numbers, width and height above 0; mend it")
+    if root.get("viewBox") is not None and (
+        len(box) != 4 or not all(map(math.isfinite, box)) or min(box[2:]) <= 0
+    ):
+        raise ConfigError(
+            f"{where}: viewBox = {root.get('viewBox')!r} is not four numbers, width and height"
+            " above 0; mend it"
+        )
     sizes = [_length_mm(root.get(key)) for key in ("width", "height")]
     scale = reading.scale_mm
     if scale is None:
-        given = [size / side if box else MM_A_PIXEL for size, side in zip(sizes, box[2:] or (1, 1), strict=True) if size]
+        given = [
+            size / side if box else MM_A_PIXEL
+            for size, side in zip(sizes, box[2:] or (1, 1), strict=True)
+            if size
+        ]
         if not given:
-            raise ConfigError(f"{where}: width and height have no unit such as mm; give scale_mm, mm a unit")
+            raise ConfigError(
+                f"{where}: width and height have no unit such as mm; give scale_mm, mm a unit"
+            )
         if max(given) > 1.001 * min(given):
-            raise ConfigError(f"{where}: width and height scale it by {given[0]:g} and {given[-1]:g} mm a unit; give scale_mm")
+            raise ConfigError(
+                f"{where}: width and height scale it by {given[0]:g} and {given[-1]:g} mm a unit;"
+                " give scale_mm"
+            )
         scale = given[0]
     if box:
         return Page(scale, box[0], box[1] + box[3])
@@ -95,10 +116,19 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
 
     def count(one: ET.Element, depth: int) -> int:
         if depth > MAX_DEPTH:
-            raise ConfigError(f"{where}: groups or copies within each other, over {MAX_DEPTH} deep; flatten the drawing")
+            raise ConfigError(
+                f"{where}: groups or copies within each other, over {MAX_DEPTH} deep; flatten the"
+                " drawing"
+            )
         if id(one) not in counts:
-            target = next((value for key, value in one.attrib.items() if key.rpartition("}")[2] == "href"), "")
-            copied = by_id.get(target[1:]) if one.tag.rpartition("}")[2] == "use" and target.startswith("#") else None
+            target = next(
+                (value for key, value in one.attrib.items() if key.rpartition("}")[2] == "href"), ""
+            )
+            copied = (
+                by_id.get(target[1:])
+                if one.tag.rpartition("}")[2] == "use" and target.startswith("#")
+                else None
+            )
             own = [] if copied is None else [copied]
             counts[id(one)] = 1 + sum(count(child, depth + 1) for child in [*one, *own])
         return counts[id(one)]
@@ -109,7 +139,9 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
 
 def _shapes(one: Any, around: frozenset[str], page: Page, tolerance_mm: float) -> Iterator[Shape]:
     attributes = one.values.get("attributes", {}) if isinstance(one.values, dict) else {}
-    if attributes.get("display") == "none" or "display:none" in str(attributes.get("style", "")).replace(" ", ""):
+    if attributes.get("display") == "none" or "display:none" in str(
+        attributes.get("style", "")
+    ).replace(" ", ""):
         return
     own = {attributes.get("id"), attributes.get(LABEL), *str(attributes.get("class", "")).split()}
     names = around | {str(name) for name in own if name}
@@ -119,8 +151,12 @@ def _shapes(one: Any, around: frozenset[str], page: Page, tolerance_mm: float) -
     elif isinstance(one, svgelements.Shape):
         for run in _runs(abs(svgelements.Path(one)), tolerance_mm / page.scale_mm):
             points = (np.array(run) - (page.left, page.bottom)) * (page.scale_mm, -page.scale_mm)
-            closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(np.ptp(points, axis=0).max())
-            yield Shape(str(attributes.get("id") or ""), names, points[:-1] if closed else points, closed)
+            closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(
+                np.ptp(points, axis=0).max()
+            )
+            yield Shape(
+                str(attributes.get("id") or ""), names, points[:-1] if closed else points, closed
+            )
 
 
 def _runs(path: Any, tolerance: float) -> Iterator[list[tuple[float, float]]]:

@@ -1,4 +1,5 @@
-"""The shapes that skins have: a rounded rectangle, a forearm's developed sheet, a hand; and the examples' drawings of them.
+"""The shapes that skins have: a rounded rectangle, a forearm's developed sheet, a hand; and the
+examples' drawings of them.
 
 ``python -m eitskin.skin.example_drawings examples`` writes hand.svg and forearm.dxf there.
 """
@@ -23,7 +24,8 @@ FloatArray = npt.NDArray[np.float64]
 
 PAGE_MM = (170.0, 210.0)
 MILLIMETRES = 4  # $INSUNITS of a DXF file
-# base and tip's centre, and half the width, of each finger as it stretches from the palm; from the thumb to the little finger
+# base and tip's centre, and half the width, of each finger as it stretches from the palm; from the
+# thumb to the little finger
 FINGERS = {
     "thumb": ((47.0, 42.0), (15.0, 88.0), 11.0),
     "index": ((60.0, 100.0), (45.0, 160.0), 10.5),
@@ -44,12 +46,21 @@ def forearm_corners() -> list[Corner]:
 
 
 def hand_corners() -> list[Corner]:
-    """A right hand seen on its back, 178 mm from the wrist to the middle finger's tip; fingers are rounded at the tip by nearly
-    half their width, webs by 3.5 mm."""
+    """A right hand seen on its back, 178 mm from the wrist to the middle finger's tip; fingers are
+    rounded at the tip by nearly half their width, webs by 3.5 mm."""
     tips = {name: _tip_corners(name) for name in FINGERS}
     webs = [Corner(122, 90, 3.5), Corner(97, 92, 3.5), Corner(73, 91, 3.5), Corner(50, 70, 8.0)]
     corners = [Corner(54, 10, 8.0), Corner(114, 10, 8.0), Corner(130, 50, 30.0)]
-    corners += [*tips["little"], webs[0], *tips["ring"], webs[1], *tips["middle"], webs[2], *tips["index"], webs[3]]
+    corners += [
+        *tips["little"],
+        webs[0],
+        *tips["ring"],
+        webs[1],
+        *tips["middle"],
+        webs[2],
+        *tips["index"],
+        webs[3],
+    ]
     return [*corners, *tips["thumb"], Corner(43, 36, 15.0)]
 
 
@@ -62,30 +73,47 @@ def _tip_corners(name: str) -> list[Corner]:
 
 
 def hand_places_mm() -> FloatArray:
-    """Where somebody would put 16 electrodes on the hand: three at the wrist, two on the palm's outer edge, fingertips, webs
-    between fingers, two on the thumb's side; counterclockwise from the wrist's middle, (16, 2) on the rim."""
+    """Where somebody would put 16 electrodes on the hand: three at the wrist, two on the palm's
+    outer edge, fingertips, webs between fingers, two on the thumb's side; counterclockwise from the
+    wrist's middle, (16, 2) on the rim.
+    """
     tips = {
         name: np.asarray(tip) + half * np.subtract(tip, base) / math.dist(tip, base)
         for name, (base, tip, half) in FINGERS.items()
     }
     wanted = [
-        (84, 10), (108, 10), (122, 32), (133, 75), tips["little"], (126, 108), tips["ring"], (98, 121), tips["middle"],
+        (84, 10), (108, 10), (122, 32), (133, 75), tips["little"], (126, 108), tips["ring"],
+        (98, 121), tips["middle"],
         (70, 120), tips["index"], (44, 82), tips["thumb"], (24, 60), (46, 33), (60, 10),
     ]  # fmt: skip
     outline = as_outline(hand_corners())
-    arc_mm, _ = nearest_on_rim(outline, np.array([np.asarray(place, dtype=np.float64) for place in wanted]))
+    arc_mm, _ = nearest_on_rim(
+        outline, np.array([np.asarray(place, dtype=np.float64) for place in wanted])
+    )
     return outline.points_at(arc_mm)
 
 
 def hand_pairs_mm() -> FloatArray:
-    """16 electrodes of which each finger has two, one on either side of its tip; the others at the wrist, the palm's edges and
-    beside the thumb; counterclockwise from the wrist's middle, (16, 2) near the rim."""
+    """16 electrodes of which each finger has two, one on either side of its tip; the others at the
+    wrist, the palm's edges and beside the thumb; counterclockwise from the wrist's middle, (16, 2)
+    near the rim."""
     sides = {}
     for name, (base, tip, half) in FINGERS.items():
         along = np.subtract(tip, base) / math.dist(tip, base)
-        sides[name] = [np.asarray(tip) + side * half * np.array([along[1], -along[0]]) for side in (1, -1)]
+        sides[name] = [
+            np.asarray(tip) + side * half * np.array([along[1], -along[0]]) for side in (1, -1)
+        ]
     fingers = [place for name in ("little", "ring", "middle", "index") for place in sides[name]]
-    places = [(96, 10), (120, 28), (133, 70), *fingers, (41, 88), *sides["thumb"], (46, 33), (68, 10)]
+    places = [
+        (96, 10),
+        (120, 28),
+        (133, 70),
+        *fingers,
+        (41, 88),
+        *sides["thumb"],
+        (46, 33),
+        (68, 10),
+    ]
     return np.array([np.asarray(place, dtype=np.float64) for place in places])
 
 
@@ -108,7 +136,8 @@ def hand_svg() -> str:
     """The hand with its marked electrodes, as an SVG file in mm."""
     width, height = PAGE_MM
     marks = "\n".join(
-        f'    <circle class="electrode" id="electrode-{k}" cx="{x:.3f}" cy="{height - y:.3f}" r="2"/>'
+        f'    <circle class="electrode" id="electrode-{k}" cx="{x:.3f}" cy="{height - y:.3f}"'
+        ' r="2"/>'
         for k, (x, y) in enumerate(hand_places_mm())
     )
     page = f'width="{width:g}mm" height="{height:g}mm" viewBox="0 0 {width:g} {height:g}"'
@@ -133,11 +162,15 @@ def write_forearm_dxf(path: Path) -> None:
     except ModuleNotFoundError:
         raise missing_extra("drawing", "ezdxf") from None
     before = ezdxf.options.write_fixed_meta_data_for_testing
-    ezdxf.options.write_fixed_meta_data_for_testing = True  # no dates: two runs write the same bytes
+    ezdxf.options.write_fixed_meta_data_for_testing = (
+        True  # no dates: two runs write the same bytes
+    )
     try:
         document = ezdxf.new("R2000", units=MILLIMETRES)
         space = document.modelspace()
-        space.add_lwpolyline(as_polyline(forearm_corners()), "xyb", close=True, dxfattribs={"layer": "skin"})
+        space.add_lwpolyline(
+            as_polyline(forearm_corners()), "xyb", close=True, dxfattribs={"layer": "skin"}
+        )
         space.add_line((-110, 0), (110, 0), dxfattribs={"layer": "notes"})
         with write_beside(path) as temporary:
             document.saveas(temporary)

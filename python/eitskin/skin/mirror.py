@@ -11,17 +11,21 @@ ComplexArray = npt.NDArray[np.complex128]
 
 
 def rim_mirror(outline: Outline, points_mm: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-    """For a dipole at each of ``points_mm`` (k, 2), a and b (k,) of its mirror: with x + iy for vectors, the rim adds
-    -conj(p) / (a - b z)^2 to the conjugate field at z where the dipole p itself gives p / (z - z_p)^2.
+    """For a dipole at each of ``points_mm`` (k, 2), a and b (k,) of its mirror: with x + iy for
+    vectors, the rim adds -conj(p) / (a - b z)^2 to the conjugate field at z where the dipole p
+    itself gives p / (z - z_p)^2.
 
-    Exact for a disk, where a = R, b = conj(z_p) / R. Of other outlines the nearest piece of the rim is taken as straight:
-    b = conj(n) of its outward normal n, a = b (z_p + 2 d n) with d the distance to it.
+    Exact for a disk, where a = R, b = conj(z_p) / R. Of other outlines the nearest piece of the rim
+    is taken as straight: b = conj(n) of its outward normal n, a = b (z_p + 2 d n) with d the
+    distance to it.
     """
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     place = points[:, 0] + 1j * points[:, 1]
     if outline.diameter_mm is not None:
         radius = outline.diameter_mm / 2
-        return np.full(len(place), complex(radius)), np.asarray(np.conj(place) / radius, dtype=np.complex128)
+        return np.full(len(place), complex(radius)), np.asarray(
+            np.conj(place) / radius, dtype=np.complex128
+        )
     corners = np.asarray(outline.vertices_mm, dtype=np.float64)
     start = corners[:, 0] + 1j * corners[:, 1]
     along = np.roll(start, -1) - start

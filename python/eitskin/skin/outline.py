@@ -1,4 +1,5 @@
-"""A skin's outline: a simple polygon, or a disk whose arcs stay exact. Arc lengths run counterclockwise along the rim.
+"""A skin's outline: a simple polygon, or a disk whose arcs stay exact. Arc lengths run
+counterclockwise along the rim.
 
 A disk's arc length starts at angle 0 (the point furthest right), a polygon's at its first vertex.
 """
@@ -26,10 +27,11 @@ DISK_VERTICES = 256
 
 @dataclass(frozen=True)
 class Outline:
-    """A simple polygon, counterclockwise and open (its last vertex is not its first), from ``disk`` or ``polygon``.
+    """A simple polygon, counterclockwise and open (its last vertex is not its first), from ``disk``
+    or ``polygon``.
 
-    For a disk ``diameter_mm`` is set, the centre is (0, 0), the vertices only approximate the circle, and every method
-    answers for the exact circle.
+    For a disk ``diameter_mm`` is set, the centre is (0, 0), the vertices only approximate the
+    circle, and every method answers for the exact circle.
     """
 
     vertices_mm: tuple[tuple[float, float], ...]
@@ -53,7 +55,11 @@ class Outline:
     @property
     def area_mm2(self) -> float:
         """The enclosed area."""
-        return pi * self.diameter_mm**2 / 4 if self.diameter_mm is not None else _signed_area(self._corners)
+        return (
+            pi * self.diameter_mm**2 / 4
+            if self.diameter_mm is not None
+            else _signed_area(self._corners)
+        )
 
     @property
     def bounding_box_mm(self) -> tuple[float, float, float, float]:
@@ -66,9 +72,11 @@ class Outline:
 
     @cached_property
     def centre_mm(self) -> tuple[float, float]:
-        """The point from which angles are taken, inside the outline: the centre of area where that is inside.
+        """The point from which angles are taken, inside the outline: the centre of area where that
+        is inside.
 
-        Else, for a concave outline, the middle of the longest stretch inside at the height of the centre of area.
+        Else, for a concave outline, the middle of the longest stretch inside at the height of the
+        centre of area.
         """
         if self.diameter_mm is not None:
             return (0.0, 0.0)
@@ -86,13 +94,16 @@ class Outline:
         return (float(x), float(y))
 
     def contains(self, points: npt.ArrayLike) -> BoolArray:
-        """Whether each of ``points`` (k, 2), in mm, lies inside, (k,). On the rim itself either answer may come."""
+        """Whether each of ``points`` (k, 2), in mm, lies inside, (k,). On the rim itself either
+        answer may come."""
         p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         if self.diameter_mm is not None:
             return np.asarray(p[:, 0] ** 2 + p[:, 1] ** 2 <= self.diameter_mm**2 / 4)
         inside = np.zeros(len(p), dtype=np.bool_)
         x, y = p[:, 0], p[:, 1]
-        for (x0, y0), (x1, y1) in zip(self.vertices_mm, self.vertices_mm[1:] + self.vertices_mm[:1], strict=True):
+        for (x0, y0), (x1, y1) in zip(
+            self.vertices_mm, self.vertices_mm[1:] + self.vertices_mm[:1], strict=True
+        ):
             if y0 != y1:
                 inside ^= ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * ((x1 - x0) / (y1 - y0)))
         return inside
@@ -105,7 +116,9 @@ class Outline:
             return np.column_stack([radius * np.cos(s / radius), radius * np.sin(s / radius)])
         edge = np.clip(np.searchsorted(self._arc, s, side="right") - 1, 0, len(self._corners) - 1)
         share = ((s - self._arc[edge]) / (self._arc[edge + 1] - self._arc[edge]))[:, None]
-        return np.asarray((1 - share) * self._corners[edge] + share * np.roll(self._corners, -1, axis=0)[edge])
+        return np.asarray(
+            (1 - share) * self._corners[edge] + share * np.roll(self._corners, -1, axis=0)[edge]
+        )
 
     def point_at(self, arc_length_mm: float) -> tuple[float, float]:
         """The rim's point (x, y) in mm at an arc length, taken modulo the perimeter."""
@@ -113,11 +126,13 @@ class Outline:
         return (float(x), float(y))
 
     def corner_arc_lengths_mm(self) -> FloatArray:
-        """Arc length of each of a polygon's vertices, (k,); empty for a disk, which has no corners."""
+        """Arc length of each of a polygon's vertices, (k,); empty for a disk, which has no
+        corners."""
         return np.zeros(0) if self.diameter_mm is not None else self._arc[:-1].copy()
 
     def arc_length_at_angle(self, angle_deg: float) -> float:
-        """Where the ray from the centre at ``angle_deg`` last crosses the rim, as an arc length in [0, perimeter)."""
+        """Where the ray from the centre at ``angle_deg`` last crosses the rim, as an arc length in
+        [0, perimeter)."""
         angle = radians(angle_deg % 360.0)
         if self.diameter_mm is not None:
             return angle * self.diameter_mm / 2
@@ -147,29 +162,37 @@ def disk(diameter_mm: float) -> Outline:
     """
     if not (isfinite(diameter_mm) and MIN_SIZE_MM <= diameter_mm <= MAX_SIZE_MM):
         raise GeometryError(
-            f"outline: diameter_mm = {diameter_mm:g} is out of range; it must be {MIN_SIZE_MM:g} to {MAX_SIZE_MM:g} mm"
+            f"outline: diameter_mm = {diameter_mm:g} is out of range; it must be {MIN_SIZE_MM:g} to"
+            f" {MAX_SIZE_MM:g} mm"
         )
     radius = diameter_mm / 2
     turns = [2 * pi * k / DISK_VERTICES for k in range(DISK_VERTICES)]
-    return Outline(tuple((radius * cos(turn), radius * sin(turn)) for turn in turns), float(diameter_mm))
+    return Outline(
+        tuple((radius * cos(turn), radius * sin(turn)) for turn in turns), float(diameter_mm)
+    )
 
 
 def polygon(vertices: Iterable[Sequence[float]]) -> Outline:
-    """A polygon through ``vertices`` (x, y) in mm, given either way round; a repeated closing point is dropped.
+    """A polygon through ``vertices`` (x, y) in mm, given either way round; a repeated closing point
+    is dropped.
 
     Raises:
-        GeometryError: fewer than 3 or more than 2000 points, a point that is not finite or repeats its neighbour, an
-            outline that crosses or touches itself, or one smaller than 1 mm.
+        GeometryError: fewer than 3 or more than 2000 points, a point that is not finite or repeats
+            its neighbour, an outline that crosses or touches itself, or one smaller than 1 mm.
     """
     points = [(float(x), float(y)) for x, y in vertices]
     if len(points) > 1 and points[0] == points[-1]:
         points.pop()
     if not 3 <= len(points) <= MAX_VERTICES:
-        raise GeometryError(f"outline: {len(points)} different points; a polygon needs 3 to {MAX_VERTICES}")
+        raise GeometryError(
+            f"outline: {len(points)} different points; a polygon needs 3 to {MAX_VERTICES}"
+        )
     corners = np.array(points)
     if not np.isfinite(corners).all():
         bad = int(np.flatnonzero(~np.isfinite(corners).all(axis=1))[0])
-        raise GeometryError(f"outline: point {bad} (from 0) is {points[bad]}, not finite; mend its coordinates")
+        raise GeometryError(
+            f"outline: point {bad} (from 0) is {points[bad]}, not finite; mend its coordinates"
+        )
     size = np.ptp(corners, axis=0)
     if size.min() < MIN_SIZE_MM or size.max() > MAX_SIZE_MM:
         raise GeometryError(
@@ -180,7 +203,10 @@ def polygon(vertices: Iterable[Sequence[float]]) -> Outline:
     _refuse_crossings(corners)
     area = _signed_area(corners)
     if abs(area) < 1e-3 * float(size.max()) ** 2:
-        raise GeometryError(f"outline: its area of {abs(area):g} mm2 is next to nothing for its size; check its points")
+        raise GeometryError(
+            f"outline: its area of {abs(area):g} mm2 is next to nothing for its size; check its"
+            " points"
+        )
     if area < 0:
         points = points[:1] + points[:0:-1]
     return Outline(tuple(points))
@@ -201,14 +227,17 @@ def _refuse_repeats(corners: FloatArray, size_mm: float) -> None:
 
 
 def _refuse_crossings(corners: FloatArray) -> None:
-    """Every pair of edges: those apart must not meet, neighbours must not fold back onto each other."""
+    """Every pair of edges: those apart must not meet, neighbours must not fold back onto each
+    other."""
     count = len(corners)
     ends = np.roll(corners, -1, axis=0)
     for k in range(count):
         after = (k + 1) % count
         u, v = ends[k] - corners[k], ends[after] - corners[after]
         if abs(u[0] * v[1] - u[1] * v[0]) <= 1e-9 * np.hypot(*u) * np.hypot(*v) and u @ v < 0:
-            raise GeometryError(f"outline: it folds back on itself at point {after} (from 0); remove that point")
+            raise GeometryError(
+                f"outline: it folds back on itself at point {after} (from 0); remove that point"
+            )
         others = np.arange(k + 2, count - (1 if k == 0 else 0))
         if not len(others):
             continue
@@ -220,13 +249,16 @@ def _refuse_crossings(corners: FloatArray) -> None:
         meets = np.flatnonzero((side <= 0) & (back <= 0) & near)
         if len(meets):
             raise GeometryError(
-                f"outline: it crosses or touches itself, edge {k} with edge {int(others[meets[0]])} (from 0); "
-                "list the points in order along the rim"
+                f"outline: it crosses or touches itself, edge {k} with edge {int(others[meets[0]])}"
+                " (from 0); list the points in order along the rim"
             )
 
 
 def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     """Sign of the turn a, b, c (last axis x, y), broadcast."""
     return np.asarray(
-        np.sign((b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0]))
+        np.sign(
+            (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1])
+            - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
+        )
     )

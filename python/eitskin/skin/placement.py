@@ -1,4 +1,5 @@
-"""Electrodes where the user says: by fractions of the rim, by points near it, by marks in a drawing."""
+"""Electrodes where the user says: by fractions of the rim, by points near it, by marks in a
+drawing."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ SNAP_MM = 5.0
 
 @dataclass(frozen=True)
 class Placed:
-    """Places along the rim as ``Electrodes`` takes them: ascending from the start point in the numbering direction."""
+    """Places along the rim as ``Electrodes`` takes them: ascending from the start point in the
+    numbering direction."""
 
     positions_mm: tuple[float, ...]
     clockwise: bool
@@ -34,17 +36,25 @@ def by_fractions(outline: Outline, fractions: Sequence[float], clockwise: bool) 
     """
     for k, value in enumerate(fractions):
         if not 0 <= value < 1:
-            raise GeometryError(f"electrodes: fraction {k} (from 0) is {value:g}; use 0 to below 1 of the rim")
+            raise GeometryError(
+                f"electrodes: fraction {k} (from 0) is {value:g}; use 0 to below 1 of the rim"
+            )
     return Placed(tuple(value * outline.perimeter_mm for value in fractions), clockwise)
 
 
 def by_points(
-    outline: Outline, points_mm: npt.ArrayLike, start_angle_deg: float, clockwise: bool | None, snap_mm: float = SNAP_MM
+    outline: Outline,
+    points_mm: npt.ArrayLike,
+    start_angle_deg: float,
+    clockwise: bool | None,
+    snap_mm: float = SNAP_MM,
 ) -> Placed:
-    """The rim's points nearest to ``points_mm`` (k, 2), electrode 0 first; with ``clockwise`` None, whichever way they go round.
+    """The rim's points nearest to ``points_mm`` (k, 2), electrode 0 first; with ``clockwise`` None,
+    whichever way they go round.
 
     Raises:
-        GeometryError: a point is further than ``snap_mm`` from the rim, or they are not in order along it.
+        GeometryError: a point is further than ``snap_mm`` from the rim, or they are not in order
+            along it.
     """
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     arc_mm, away_mm = nearest_on_rim(outline, points)
@@ -52,24 +62,36 @@ def by_points(
     if not away_mm[worst] <= snap_mm:
         x, y = points[worst]
         raise GeometryError(
-            f"electrodes: electrode {worst} (from 0) at ({x:g}, {y:g}) mm is {away_mm[worst]:.3g} mm from the rim; move it "
-            f"within snap_mm = {snap_mm:g} mm of it"
+            f"electrodes: electrode {worst} (from 0) at ({x:g}, {y:g}) mm is {away_mm[worst]:.3g}"
+            f" mm from the rim; move it within snap_mm = {snap_mm:g} mm of it"
         )
     start, perimeter = outline.arc_length_at_angle(start_angle_deg), outline.perimeter_mm
     for way in (False, True) if clockwise is None else (clockwise,):
         along = np.mod(start - arc_mm if way else arc_mm - start, perimeter)
         steps = np.mod(np.diff(along), perimeter)
         if steps.sum() < perimeter:
-            return Placed(tuple(float(value) for value in along[0] + np.concatenate([[0.0], np.cumsum(steps)])), way)
+            return Placed(
+                tuple(
+                    float(value) for value in along[0] + np.concatenate([[0.0], np.cumsum(steps)])
+                ),
+                way,
+            )
     way_text = {None: "", True: " clockwise", False: " counterclockwise"}[clockwise]
-    raise GeometryError(f"electrodes: {len(points)} places are not in order along the rim{way_text}; give them one after another")
+    raise GeometryError(
+        f"electrodes: {len(points)} places are not in order along the rim{way_text}; give them one"
+        " after another"
+    )
 
 
 def by_marks(
-    outline: Outline, marks: Sequence[Shape], start_angle_deg: float, clockwise: bool | None, snap_mm: float = SNAP_MM
+    outline: Outline,
+    marks: Sequence[Shape],
+    start_angle_deg: float,
+    clockwise: bool | None,
+    snap_mm: float = SNAP_MM,
 ) -> Placed:
-    """The middles of ``marks``, in the order of the numbers that their ids end with; where not all have one, along the rim from
-    the start point.
+    """The middles of ``marks``, in the order of the numbers that their ids end with; where not all
+    have one, along the rim from the start point.
 
     Raises:
         GeometryError: as ``by_points``, or two have the same number.
@@ -80,16 +102,21 @@ def by_marks(
         values = [int(found[1]) for found in numbers if found is not None]
         if len(set(values)) < len(values):
             twice = next(value for value in values if values.count(value) > 1)
-            raise GeometryError(f"electrodes: two marks are numbered {twice}; give each its own number")
+            raise GeometryError(
+                f"electrodes: two marks are numbered {twice}; give each its own number"
+            )
         return by_points(outline, middles[np.argsort(values)], start_angle_deg, clockwise, snap_mm)
     arc_mm, _ = nearest_on_rim(outline, middles)
     start, way = outline.arc_length_at_angle(start_angle_deg), bool(clockwise)
     along = np.mod(start - arc_mm if way else arc_mm - start, outline.perimeter_mm)
-    return by_points(outline, middles[np.argsort(along, kind="stable")], start_angle_deg, way, snap_mm)
+    return by_points(
+        outline, middles[np.argsort(along, kind="stable")], start_angle_deg, way, snap_mm
+    )
 
 
 def nearest_on_rim(outline: Outline, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Arc length of the rim's point nearest to each of ``points_mm`` (k, 2), and the distance to it, (k,) each in mm."""
+    """Arc length of the rim's point nearest to each of ``points_mm`` (k, 2), and the distance to
+    it, (k,) each in mm."""
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     if outline.diameter_mm is not None:
         radius = outline.diameter_mm / 2

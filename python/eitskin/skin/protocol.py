@@ -1,7 +1,8 @@
 """The scan's protocol: which pair drives the current and which pair is measured, row by row.
 
-Electrodes are numbered from 0. A row is [I+, I-, V+, V-]: the current enters at I+ and leaves at I-, and the boundary
-voltage is phi(V+) - phi(V-). By reciprocity row [V+, V-, I+, I-] has the same voltage; swapping a pair flips its sign.
+Electrodes are numbered from 0. A row is [I+, I-, V+, V-]: the current enters at I+ and leaves at
+I-, and the boundary voltage is phi(V+) - phi(V-). By reciprocity row [V+, V-, I+, I-] has the same
+voltage; swapping a pair flips its sign.
 """
 
 from __future__ import annotations
@@ -29,9 +30,11 @@ MAX_ROWS = 0xFFFF
 
 @dataclass(frozen=True, eq=False)
 class Reciprocity:
-    """Rows that reciprocity makes one: folded row k is row ``first[k]`` and ``sign[k]`` times ``second[k]`` unless -1.
+    """Rows that reciprocity makes one: folded row k is row ``first[k]`` and ``sign[k]`` times
+    ``second[k]`` unless -1.
 
-    All three are (k,) int64; ``first`` ascends, and every row of the table is in exactly one folded row.
+    All three are (k,) int64; ``first`` ascends, and every row of the table is in exactly one folded
+    row.
     """
 
     first: IntArray
@@ -44,7 +47,8 @@ class Protocol:
     """A scan of m rows (m, 4) [I+, I-, V+, V-] with one drive current.
 
     Raises:
-        ProtocolError: no rows, too many, an electrode that does not exist, a pair of one electrode, or a bad current.
+        ProtocolError: no rows, too many, an electrode that does not exist, a pair of one electrode,
+            or a bad current.
     """
 
     n_electrodes: int
@@ -54,11 +58,14 @@ class Protocol:
     def __post_init__(self) -> None:
         if not MIN_COUNT <= self.n_electrodes <= MAX_COUNT:
             raise ProtocolError(
-                f"protocol: {self.n_electrodes} electrodes is out of range; use {MIN_COUNT} to {MAX_COUNT}"
+                f"protocol: {self.n_electrodes} electrodes is out of range; use {MIN_COUNT} to"
+                f" {MAX_COUNT}"
             )
         if not (isfinite(self.current_a) and self.current_a > 0):
             raise ProtocolError(f"protocol: current_a = {self.current_a:g} must be above 0")
-        object.__setattr__(self, "drive_measure", _checked_rows(self.drive_measure, self.n_electrodes))
+        object.__setattr__(
+            self, "drive_measure", _checked_rows(self.drive_measure, self.n_electrodes)
+        )
 
     @property
     def n_rows(self) -> int:
@@ -67,14 +74,18 @@ class Protocol:
 
     @property
     def hash(self) -> int:
-        """FNV-1a, 64 bits, over u16le n_electrodes, u16le m, then the rows' bytes. The current does not enter."""
+        """FNV-1a, 64 bits, over u16le n_electrodes, u16le m, then the rows' bytes. The current does
+        not enter."""
         value = 0xCBF29CE484222325
-        for byte in struct.pack("<HH", self.n_electrodes, self.n_rows) + self.drive_measure.tobytes():
+        for byte in (
+            struct.pack("<HH", self.n_electrodes, self.n_rows) + self.drive_measure.tobytes()
+        ):
             value = ((value ^ byte) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF
         return value
 
     def reciprocal_pairs(self) -> Reciprocity:
-        """Which rows hold the same voltage, found from the table alone: pairs swapped, flipped, or repeated.
+        """Which rows hold the same voltage, found from the table alone: pairs swapped, flipped, or
+        repeated.
 
         Raises:
             ProtocolError: more than two rows hold the same voltage.
@@ -89,18 +100,22 @@ class Protocol:
             if len(rows) > 2:
                 listed = ", ".join(map(str, rows))
                 raise ProtocolError(
-                    f"protocol: rows {listed} (from 0) all hold the same voltage by reciprocity; keep at most two"
+                    f"protocol: rows {listed} (from 0) all hold the same voltage by reciprocity;"
+                    " keep at most two"
                 )
         members = list(groups.values())
         return Reciprocity(
             first=np.array([rows[0] for rows in members], dtype=np.int64),
-            second=np.array([rows[1] if len(rows) == 2 else -1 for rows in members], dtype=np.int64),
+            second=np.array(
+                [rows[1] if len(rows) == 2 else -1 for rows in members], dtype=np.int64
+            ),
             sign=np.array([signs[rows[0]] * signs[rows[-1]] for rows in members], dtype=np.int64),
         )
 
 
 def adjacent(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """Drive (d, d+1), measure every (k, k+1) that shares no electrode with it, k ascending from 0: n (n - 3) rows.
+    """Drive (d, d+1), measure every (k, k+1) that shares no electrode with it, k ascending from 0:
+    n (n - 3) rows.
 
     Raises:
         ProtocolError: ``n`` is out of range.
@@ -109,26 +124,36 @@ def adjacent(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
 
 
 def opposite(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """Drive (d, d + n/2), measure every (k, k+1) that shares no electrode with it, k ascending from 0: n (n - 4) rows.
+    """Drive (d, d + n/2), measure every (k, k+1) that shares no electrode with it, k ascending from
+    0: n (n - 4) rows.
 
     Raises:
         ProtocolError: ``n`` is odd, below 6 or out of range.
     """
     if n % 2 or n < 6:
-        raise ProtocolError(f"protocol: opposite drive needs an even number of at least 6 electrodes, not {n}")
+        raise ProtocolError(
+            f"protocol: opposite drive needs an even number of at least 6 electrodes, not {n}"
+        )
     return Protocol(n, _drive_and_measure(n, n // 2, 1), current_a)
 
 
 def skip(n: int, skip: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """Drive and measure pairs (d, d + 1 + skip), those that share no electrode; skip = 0 is adjacent.
+    """Drive and measure pairs (d, d + 1 + skip), those that share no electrode; skip = 0 is
+    adjacent.
 
     Raises:
-        ProtocolError: ``n`` is out of range, or the pair does not span less than half the electrodes.
+        ProtocolError: ``n`` is out of range, or the pair does not span less than half the
+            electrodes.
     """
     if not MIN_COUNT <= n <= MAX_COUNT:
-        raise ProtocolError(f"protocol: {n} electrodes is out of range; use {MIN_COUNT} to {MAX_COUNT}")
+        raise ProtocolError(
+            f"protocol: {n} electrodes is out of range; use {MIN_COUNT} to {MAX_COUNT}"
+        )
     if not 0 <= 2 * (1 + skip) - 1 < n - 1:
-        raise ProtocolError(f"protocol: skip = {skip} is out of range for {n} electrodes; use 0 to {(n - 1) // 2 - 1}")
+        raise ProtocolError(
+            f"protocol: skip = {skip} is out of range for {n} electrodes; use 0 to"
+            f" {(n - 1) // 2 - 1}"
+        )
     return Protocol(n, _drive_and_measure(n, 1 + skip, 1 + skip), current_a)
 
 
@@ -141,14 +166,17 @@ def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> 
     try:
         given = np.asarray(rows)
     except ValueError:
-        raise ProtocolError("protocol: the table's rows differ in length; each must be [I+, I-, V+, V-]") from None
+        raise ProtocolError(
+            "protocol: the table's rows differ in length; each must be [I+, I-, V+, V-]"
+        ) from None
     protocol = Protocol(n, given, current_a)
     protocol.reciprocal_pairs()
     return protocol
 
 
 def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where: str) -> Protocol:
-    """The protocol in a parsed TOML table; ``where`` names its source in errors. An empty table is adjacent.
+    """The protocol in a parsed TOML table; ``where`` names its source in errors. An empty table is
+    adjacent.
 
     Raises:
         ConfigError: an unknown key, a wrong type, or a key that does not go with the kind.
@@ -159,25 +187,36 @@ def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where:
     for key in ("skip", "table"):
         if key in toml_table and kind != key:
             raise ConfigError(f'{where}: {key} goes with kind = "{key}", but kind is "{kind}"')
-    current_a = number(toml_table, "current_a", DEFAULT_CURRENT_A, where, low=0, high=1, open_low=True)
+    current_a = number(
+        toml_table, "current_a", DEFAULT_CURRENT_A, where, low=0, high=1, open_low=True
+    )
     try:
         if kind == "adjacent":
             return adjacent(n_electrodes, current_a)
         if kind == "opposite":
             return opposite(n_electrodes, current_a)
         if kind == "skip":
-            return skip(n_electrodes, integer(toml_table, "skip", None, where, low=0, high=MAX_COUNT), current_a)
+            return skip(
+                n_electrodes,
+                integer(toml_table, "skip", None, where, low=0, high=MAX_COUNT),
+                current_a,
+            )
         return table(n_electrodes, _rows_of_table(toml_table, where), current_a)
     except ProtocolError as error:
         raise ProtocolError(f"{where}: {error}") from None
 
 
 def protocol_to_table(protocol: Protocol) -> dict[str, Any]:
-    """The table from which ``protocol_from_table`` makes one with the same rows, by a kind's name if it can."""
+    """The table from which ``protocol_from_table`` makes one with the same rows, by a kind's name
+    if it can."""
     for name, made in _named(protocol.n_electrodes):
         if np.array_equal(made.drive_measure, protocol.drive_measure):
             return {**name, "current_a": protocol.current_a}
-    return {"kind": "table", "table": protocol.drive_measure.tolist(), "current_a": protocol.current_a}
+    return {
+        "kind": "table",
+        "table": protocol.drive_measure.tolist(),
+        "current_a": protocol.current_a,
+    }
 
 
 def _named(n: int) -> Iterable[tuple[dict[str, Any], Protocol]]:
@@ -202,8 +241,14 @@ def _rows_of_table(toml_table: Mapping[str, Any], where: str) -> list[list[int]]
     if not isinstance(rows, list):
         raise ConfigError(f'{where}: kind = "table" needs table = [[I+, I-, V+, V-], ...]')
     for k, row in enumerate(rows):
-        if not isinstance(row, list) or len(row) != 4 or any(type(value) is not int for value in row):
-            raise ConfigError(f"{where}: table row {k} (from 0) must be four whole numbers, not {row!r}")
+        if (
+            not isinstance(row, list)
+            or len(row) != 4
+            or any(type(value) is not int for value in row)
+        ):
+            raise ConfigError(
+                f"{where}: table row {k} (from 0) must be four whole numbers, not {row!r}"
+            )
     return rows
 
 
@@ -211,21 +256,26 @@ def _checked_rows(rows: npt.ArrayLike, n: int) -> TableArray:
     given = np.asarray(rows)
     if given.ndim != 2 or given.shape[1:] != (4,) or not 1 <= len(given) <= MAX_ROWS:
         raise ProtocolError(
-            f"protocol: the table's shape is {given.shape}; it must be (m, 4), m from 1 to {MAX_ROWS}, [I+, I-, V+, V-]"
+            f"protocol: the table's shape is {given.shape}; it must be (m, 4), m from 1 to"
+            f" {MAX_ROWS}, [I+, I-, V+, V-]"
         )
     if given.dtype.kind not in "iu":
-        raise ProtocolError("protocol: the table must hold whole numbers, electrodes counted from 0")
+        raise ProtocolError(
+            "protocol: the table must hold whole numbers, electrodes counted from 0"
+        )
     outside = np.flatnonzero(((given < 0) | (given >= n)).any(axis=1))
     if len(outside):
         row = int(outside[0])
         raise ProtocolError(
-            f"protocol: row {row} (from 0) is {given[row].tolist()}, but the electrodes are 0 to {n - 1}; count from 0"
+            f"protocol: row {row} (from 0) is {given[row].tolist()}, but the electrodes are 0 to"
+            f" {n - 1}; count from 0"
         )
     same = np.flatnonzero((given[:, 0] == given[:, 1]) | (given[:, 2] == given[:, 3]))
     if len(same):
         row = int(same[0])
         raise ProtocolError(
-            f"protocol: row {row} (from 0) is {given[row].tolist()}: a pair needs two different electrodes"
+            f"protocol: row {row} (from 0) is {given[row].tolist()}: a pair needs two different"
+            " electrodes"
         )
     checked = np.ascontiguousarray(given, dtype=np.uint8).copy()
     checked.flags.writeable = False

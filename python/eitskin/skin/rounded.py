@@ -1,4 +1,5 @@
-"""Outlines of straight sides and rounded corners, as a polygon, as an SVG path and as a DXF polyline."""
+"""Outlines of straight sides and rounded corners, as a polygon, as an SVG path and as a DXF
+polyline."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from eitskin.skin.outline import Outline, polygon
 
 @dataclass(frozen=True)
 class Corner:
-    """A corner of an outline that is listed counterclockwise, with the radius that it is rounded by; mm."""
+    """A corner of an outline that is listed counterclockwise, with the radius that it is rounded
+    by; mm."""
 
     x: float
     y: float
@@ -21,7 +23,8 @@ class Corner:
 
 @dataclass(frozen=True)
 class Fillet:
-    """The arc that rounds a corner: from ``begin`` to ``end`` about ``centre``, turning by ``turn_rad``, to the left above 0."""
+    """The arc that rounds a corner: from ``begin`` to ``end`` about ``centre``, turning by
+    ``turn_rad``, to the left above 0."""
 
     begin: tuple[float, float]
     end: tuple[float, float]
@@ -44,12 +47,23 @@ def fillets(corners: Sequence[Corner]) -> list[Fillet]:
         begin = (corner.x - reach * into[0], corner.y - reach * into[1])
         end = (corner.x + reach * out[0], corner.y + reach * out[1])
         side = math.copysign(corner.radius, turn)
-        found.append(Fillet(begin, end, (begin[0] - side * into[1], begin[1] + side * into[0]), corner.radius, turn))
+        found.append(
+            Fillet(
+                begin,
+                end,
+                (begin[0] - side * into[1], begin[1] + side * into[0]),
+                corner.radius,
+                turn,
+            )
+        )
         taken.append(reach)
     for k, corner in enumerate(corners):
         after = corners[(k + 1) % count]
         if taken[k] + taken[(k + 1) % count] > math.hypot(after.x - corner.x, after.y - corner.y):
-            raise GeometryError(f"outline: the side after corner {k} (from 0) is too short for its corners; use smaller radii")
+            raise GeometryError(
+                f"outline: the side after corner {k} (from 0) is too short for its corners; use"
+                " smaller radii"
+            )
     return found
 
 
@@ -66,7 +80,12 @@ def as_outline(corners: Sequence[Corner], tolerance_mm: float = 0.1) -> Outline:
         start = math.atan2(arc.begin[1] - arc.centre[1], arc.begin[0] - arc.centre[0])
         for k in range(count + 1):
             angle = start + arc.turn_rad * k / count
-            points.append((arc.centre[0] + arc.radius * math.cos(angle), arc.centre[1] + arc.radius * math.sin(angle)))
+            points.append(
+                (
+                    arc.centre[0] + arc.radius * math.cos(angle),
+                    arc.centre[1] + arc.radius * math.sin(angle),
+                )
+            )
     return polygon(points)
 
 
@@ -76,7 +95,10 @@ def as_svg_path(corners: Sequence[Corner], height_mm: float) -> str:
     for arc in fillets(corners):
         sweep = 0 if arc.turn_rad > 0 else 1  # y down turns it round
         words.append(f"{'L' if words else 'M'}{arc.begin[0]:.3f},{height_mm - arc.begin[1]:.3f}")
-        words.append(f"A{arc.radius:g},{arc.radius:g} 0 0 {sweep} {arc.end[0]:.3f},{height_mm - arc.end[1]:.3f}")
+        words.append(
+            f"A{arc.radius:g},{arc.radius:g} 0 0 {sweep}"
+            f" {arc.end[0]:.3f},{height_mm - arc.end[1]:.3f}"
+        )
     return " ".join([*words, "Z"])
 
 

@@ -25,7 +25,15 @@ OUTLINES = ("diameter_mm", "polygon_mm", "outline")
 DRAWING_KEYS = ("element", "scale_mm", "tolerance_mm")
 SKIN_KEYS = ("name", *OUTLINES, *DRAWING_KEYS, "thickness_mm", "conductivity_s_per_m")
 PLACES = ("positions_mm", "fractions", "points_mm", "marked")
-ELECTRODE_KEYS = ("count", "width_mm", "start_angle_deg", "direction", *PLACES, "snap_mm", "contact_impedance_ohm_m2")
+ELECTRODE_KEYS = (
+    "count",
+    "width_mm",
+    "start_angle_deg",
+    "direction",
+    *PLACES,
+    "snap_mm",
+    "contact_impedance_ohm_m2",
+)
 MIN_GAP_PER_WIDTH = 0.05
 PAPER_DIAMETER_MM = 194.0
 
@@ -35,8 +43,8 @@ class Skin:
     """A conductive sheet of one thickness with electrodes at its rim.
 
     Raises:
-        GeometryError: electrodes overlap, nearly touch (a gap below 5 % of their width) or are wider than the rim, or
-            the sheet's conductivity or thickness is not above 0.
+        GeometryError: electrodes overlap, nearly touch (a gap below 5 % of their width) or are
+            wider than the rim, or the sheet's conductivity or thickness is not above 0.
     """
 
     name: str
@@ -55,7 +63,8 @@ class Skin:
     def electrode_spans_mm(self) -> FloatArray:
         """Arc length (counterclockwise) where each electrode starts and ends, (count, 2).
 
-        Starts lie in [0, perimeter); an end may lie beyond the perimeter, where the electrode straddles arc length 0.
+        Starts lie in [0, perimeter); an end may lie beyond the perimeter, where the electrode
+        straddles arc length 0.
         """
         perimeter, half = self.outline.perimeter_mm, self.electrodes.width_mm / 2
         starts = np.mod(self._centre_arc_lengths_mm() - half, perimeter)
@@ -72,16 +81,22 @@ class Skin:
         else:
             along = np.array(electrodes.positions_mm, dtype=np.float64)
         start = self.outline.arc_length_at_angle(electrodes.start_angle_deg)
-        return np.asarray(np.mod(start - along if electrodes.clockwise else start + along, perimeter))
+        return np.asarray(
+            np.mod(start - along if electrodes.clockwise else start + along, perimeter)
+        )
 
 
 def _refuse_overlap(skin: Skin) -> None:
-    count, width, perimeter = skin.electrodes.count, skin.electrodes.width_mm, skin.outline.perimeter_mm
+    count, width, perimeter = (
+        skin.electrodes.count,
+        skin.electrodes.width_mm,
+        skin.outline.perimeter_mm,
+    )
     least = MIN_GAP_PER_WIDTH * width
     if count * (width + least) > perimeter:
         raise GeometryError(
-            f"skin {skin.name!r}: {count} electrodes of {width:g} mm do not fit on a rim of {perimeter:g} mm; "
-            "use fewer or narrower ones"
+            f"skin {skin.name!r}: {count} electrodes of {width:g} mm do not fit on a rim of"
+            f" {perimeter:g} mm; use fewer or narrower ones"
         )
     starts = skin.electrode_spans_mm()[:, 0]
     order = np.argsort(starts, kind="stable")
@@ -90,24 +105,28 @@ def _refuse_overlap(skin: Skin) -> None:
     if gaps[worst] < least * (1 - 1e-9):
         first, second = sorted((int(order[worst]), int(order[(worst + 1) % count])))
         raise GeometryError(
-            f"skin {skin.name!r}: electrodes {first} and {second} (from 0) overlap or nearly touch "
-            f"(gap {gaps[worst]:.3g} mm, at least {least:.3g} mm is needed); move them apart or make them narrower"
+            f"skin {skin.name!r}: electrodes {first} and {second} (from 0) overlap or nearly touch"
+            f" (gap {gaps[worst]:.3g} mm, at least {least:.3g} mm is needed); move them apart or"
+            " make them narrower"
         )
 
 
 def size_to_paper(outline: Outline) -> float:
-    """The outline's size over the paper's: the diameter of the disk of equal area over 194 mm. Lengths are scaled by it."""
+    """The outline's size over the paper's: the diameter of the disk of equal area over 194 mm.
+    Lengths are scaled by it."""
     return 2 * float(np.sqrt(outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
 
 
 def paper_skin() -> Skin:
-    """The hydrogel skin of the paper: a disk of 194 mm, 12 mm thick, 16 electrodes of 4 mm, 0.01 S/m."""
+    """The hydrogel skin of the paper: a disk of 194 mm, 12 mm thick, 16 electrodes of 4 mm, 0.01
+    S/m."""
     return Skin("paper", disk(PAPER_DIAMETER_MM), Electrodes())
 
 
 def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = None) -> Skin:
-    """The skin in a parsed TOML ``table`` with [skin] and [electrodes]; ``where`` names its source in errors. A drawing that it
-    names lies in ``folder``; without one (a stored model's table) none is read.
+    """The skin in a parsed TOML ``table`` with [skin] and [electrodes]; ``where`` names its source
+    in errors. A drawing that it names lies in ``folder``; without one (a stored model's table) none
+    is read.
 
     Raises:
         ConfigError: an unknown key, a wrong type or a value out of range.
@@ -128,7 +147,9 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
             name=name,
             outline=outline,
             electrodes=_electrodes_from_table(contacts, f"{where} [electrodes]", outline, drawing),
-            conductivity_s_per_m=number(sheet, "conductivity_s_per_m", 0.01, place, low=0, high=1e8, open_low=True),
+            conductivity_s_per_m=number(
+                sheet, "conductivity_s_per_m", 0.01, place, low=0, high=1e8, open_low=True
+            ),
             thickness_mm=number(sheet, "thickness_mm", 12.0, place, low=0, high=1e4, open_low=True),
         )
     except GeometryError as error:
@@ -136,7 +157,8 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
 
 
 def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
-    """The skin and the protocol in the TOML file ``path``; without [protocol], adjacent drive and measurement.
+    """The skin and the protocol in the TOML file ``path``; without [protocol], adjacent drive and
+    measurement.
 
     Raises:
         FileError: the file, or a drawing that it names, cannot be read.
@@ -145,7 +167,9 @@ def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
     """
     table, where = load_toml(path, "skin description"), str(path)
     skin = skin_from_table(table, where, Path(path).parent)
-    return skin, protocol_from_table(_subtable(table, "protocol", where), skin.electrodes.count, f"{where} [protocol]")
+    return skin, protocol_from_table(
+        _subtable(table, "protocol", where), skin.electrodes.count, f"{where} [protocol]"
+    )
 
 
 def skin_to_table(skin: Skin) -> dict[str, Any]:
@@ -169,19 +193,26 @@ def skin_to_table(skin: Skin) -> dict[str, Any]:
     return {"skin": sheet, "electrodes": contacts}
 
 
-def _subtable(table: Mapping[str, Any], key: str, where: str, *, required: bool = False) -> Mapping[str, Any]:
+def _subtable(
+    table: Mapping[str, Any], key: str, where: str, *, required: bool = False
+) -> Mapping[str, Any]:
     value = table.get(key)
     if value is None and not required:
         return {}
     if not isinstance(value, Mapping):
-        raise ConfigError(f"{where}: a table [{key}] is needed" + ("" if value is None else f", not {key} = {value!r}"))
+        raise ConfigError(
+            f"{where}: a table [{key}] is needed"
+            + ("" if value is None else f", not {key} = {value!r}")
+        )
     return value
 
 
 def _drawing_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> Drawing | None:
     """The drawing that [skin] names, if any."""
     if sum(key in sheet for key in OUTLINES) != 1:
-        raise ConfigError(f"{where}: give either diameter_mm or polygon_mm, or outline = a drawing's file")
+        raise ConfigError(
+            f"{where}: give either diameter_mm or polygon_mm, or outline = a drawing's file"
+        )
     if "outline" not in sheet:
         for key in DRAWING_KEYS:
             if key in sheet:
@@ -189,17 +220,30 @@ def _drawing_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> Dr
         return None
     name = sheet["outline"]
     if not isinstance(name, str) or not name or "\0" in name:
-        raise ConfigError(f"{where}: outline must be the name of a drawing's file in quotes, not {name!r}")
+        raise ConfigError(
+            f"{where}: outline must be the name of a drawing's file in quotes, not {name!r}"
+        )
     if folder is None:
-        raise ConfigError(f"{where}: outline = {name!r} cannot be read from here; only a skin description's file names a drawing")
-    scale = number(sheet, "scale_mm", None, where, low=0, high=1e6, open_low=True) if "scale_mm" in sheet else None
+        raise ConfigError(
+            f"{where}: outline = {name!r} cannot be read from here; only a skin description's file"
+            " names a drawing"
+        )
+    scale = (
+        number(sheet, "scale_mm", None, where, low=0, high=1e6, open_low=True)
+        if "scale_mm" in sheet
+        else None
+    )
     tolerance = number(sheet, "tolerance_mm", TOLERANCE_MM, where, low=1e-3, high=10)
     return read_drawing(folder / name, Reading(scale, tolerance))
 
 
-def _outline_from_table(sheet: Mapping[str, Any], where: str, drawing: Drawing | None, marked: object) -> Outline:
+def _outline_from_table(
+    sheet: Mapping[str, Any], where: str, drawing: Drawing | None, marked: object
+) -> Outline:
     if drawing is not None:
-        return drawing.outline(_word(sheet, "element", where), marked if isinstance(marked, str) else None)
+        return drawing.outline(
+            _word(sheet, "element", where), marked if isinstance(marked, str) else None
+        )
     if "diameter_mm" in sheet:
         return disk(number(sheet, "diameter_mm", None, where, low=MIN_SIZE_MM, high=MAX_SIZE_MM))
     return polygon(_points(sheet, "polygon_mm", where))
@@ -214,25 +258,40 @@ def _electrodes_from_table(
     way = choice(table, "direction", "counterclockwise", ("clockwise", "counterclockwise"), where)
     placed = _places(table, where, outline, drawing, start, way == "clockwise")
     given = len(placed.positions_mm) if placed is not None else None
-    count = given if given is not None and given <= MAX_COUNT and "positions_mm" not in table else default.count
+    count = (
+        given
+        if given is not None and given <= MAX_COUNT and "positions_mm" not in table
+        else default.count
+    )
     impedance = default.contact_impedance_ohm_m2
     return Electrodes(
         count=integer(table, "count", count, where, low=MIN_COUNT, high=MAX_COUNT),
-        width_mm=number(table, "width_mm", default.width_mm, where, low=0, high=MAX_SIZE_MM, open_low=True),
+        width_mm=number(
+            table, "width_mm", default.width_mm, where, low=0, high=MAX_SIZE_MM, open_low=True
+        ),
         start_angle_deg=start,
         clockwise=way == "clockwise" if placed is None else placed.clockwise,
         positions_mm=None if placed is None else placed.positions_mm,
-        contact_impedance_ohm_m2=number(table, "contact_impedance_ohm_m2", impedance, where, low=0, high=1e6),
+        contact_impedance_ohm_m2=number(
+            table, "contact_impedance_ohm_m2", impedance, where, low=0, high=1e6
+        ),
     )
 
 
 def _places(
-    table: Mapping[str, Any], where: str, outline: Outline, drawing: Drawing | None, start_deg: float, clockwise: bool
+    table: Mapping[str, Any],
+    where: str,
+    outline: Outline,
+    drawing: Drawing | None,
+    start_deg: float,
+    clockwise: bool,
 ) -> Placed | None:
     """Where the electrodes are said to be; None for evenly."""
     said = [key for key in PLACES if key in table]
     if len(said) > 1:
-        raise ConfigError(f"{where}: {said[0]} and {said[1]} both say where electrodes are; keep one")
+        raise ConfigError(
+            f"{where}: {said[0]} and {said[1]} both say where electrodes are; keep one"
+        )
     if "snap_mm" in table and said not in (["points_mm"], ["marked"]):
         raise ConfigError(f"{where}: snap_mm goes with points_mm or marked; remove it")
     if not said:
@@ -242,7 +301,10 @@ def _places(
     if said == ["marked"]:
         mark = _word(table, "marked", where)
         if drawing is None or mark is None:
-            raise ConfigError(f"{where}: marked names marks of a drawing, but [skin] has no outline = a drawing's file")
+            raise ConfigError(
+                f"{where}: marked names marks of a drawing, but [skin] has no outline = a drawing's"
+                " file"
+            )
         return by_marks(outline, drawing.marked(mark), start_deg, way, snap)
     if said == ["points_mm"]:
         points = _points(table, "points_mm", where)
@@ -269,13 +331,17 @@ def _points(table: Mapping[str, Any], key: str, where: str) -> list[list[float]]
     if not isinstance(points, list):
         raise ConfigError(f"{where}: {key} must be a list of [x, y] points")
     for k, point in enumerate(points):
-        if not isinstance(point, list) or len(point) != 2 or not all(_is_number(value) for value in point):
+        if (
+            not isinstance(point, list)
+            or len(point) != 2
+            or not all(_is_number(value) for value in point)
+        ):
             raise ConfigError(f"{where}: {key} entry {k} (from 0) must be [x, y], not {point!r}")
     return points
 
 
 def _is_number(value: object) -> bool:
     """Whether it is a number that a float can hold, and no truth value."""
-    return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63)
-
-
+    return isinstance(value, float) or (
+        isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
+    )

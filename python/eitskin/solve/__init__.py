@@ -1,9 +1,11 @@
-"""From frames to images and touches: the C core, the numpy reference, and baselines to compare with."""
+"""From frames to images and touches: the C core, the numpy reference, and baselines to compare
+with."""
 
 from eitskin.core.results import Baseline, Info, Options, Reconstruction, Touch
 from eitskin.solve.batch import Batch, reconstruct_many
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 
 __all__ = [
-    "ENGINES", "Baseline", "Batch", "Info", "Options", "Reconstruction", "Reconstructor", "Touch", "reconstruct_many",
+    "ENGINES", "Baseline", "Batch", "Info", "Options", "Reconstruction", "Reconstructor", "Touch",
+    "reconstruct_many",
 ]  # fmt: skip

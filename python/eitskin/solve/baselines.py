@@ -1,16 +1,18 @@
 """The reconstructions that others use, done properly: what this project's solver is compared with.
 
-All take the sensitivity J (m, n), V per (S/m), and turn difference frames dv (k, m) in V into images (k, n) of the
-change of conductivity. None is a straw man: each has its regularisation chosen on training scenes (compare.py),
-and FISTA has the exact Lipschitz constant. Strengths are relative, so that they do not depend on units. ``macs`` is what
-a frame costs in multiply-accumulates of matrix products, all of J's rows taken; what is made once for a skin is not counted.
+All take the sensitivity J (m, n), V per (S/m), and turn difference frames dv (k, m) in V into
+images (k, n) of the change of conductivity. None is a straw man: each has its regularisation chosen
+on training scenes (compare.py), and FISTA has the exact Lipschitz constant. Strengths are relative,
+so that they do not depend on units. ``macs`` is what a frame costs in multiply-accumulates of
+matrix products, all of J's rows taken; what is made once for a skin is not counted.
 
     linear back projection   x = J' dv, each pixel over the norm of its sensitivities
     Gauss-Newton, one step   x = (J'J + a s_1^2 I)^-1 J' dv                        (Tikhonov)
     NOSER                    x = (J'J + a s_1^2 R / mean(R))^-1 J' dv,  R = diag(J'J)^p, p = 1/2
-    GREIT-like               one matrix, trained to show small targets as blurred discs: see greit.py
-    conjugate gradient       CGLS, stopped after a few steps: the stop is the regularisation
-    plain FISTA              min 1/2 |J x - dv|^2 + lambda |x|_1, signed or x >= 0, after K iterations
+    GREIT-like               one matrix, trained to show small targets as blurred discs: see
+    greit.py conjugate gradient       CGLS, stopped after a few steps: the stop is the
+    regularisation plain FISTA              min 1/2 |J x - dv|^2 + lambda |x|_1, signed or x >= 0,
+    after K iterations
 """
 
 from __future__ import annotations
@@ -33,10 +35,16 @@ def difference_frames(dv: npt.ArrayLike, rows: int) -> FloatArray:
     """
     frames = np.atleast_2d(np.asarray(dv, dtype=np.float64))
     if frames.ndim != 2 or frames.shape[1] != rows:
-        raise FrameError(f"frames of shape {np.shape(dv)} do not fit: the model has {rows} rows; check the protocol")
+        raise FrameError(
+            f"frames of shape {np.shape(dv)} do not fit: the model has {rows} rows; check the"
+            " protocol"
+        )
     finite = np.isfinite(frames).all(axis=1)
     if not finite.all():
-        raise FrameError(f"frame {int(np.argmin(finite))} (from 0) has values that are not finite; drop or repair it")
+        raise FrameError(
+            f"frame {int(np.argmin(finite))} (from 0) has values that are not finite; drop or"
+            " repair it"
+        )
     return frames
 
 
@@ -67,36 +75,46 @@ class LinearMethod:
 
 
 def back_projection(jacobian: FloatArray, norm: float = 1.0) -> LinearMethod:
-    """Linear back projection with normalised sensitivity: x_j = sum_i J_ij dv_i / |J_.j|; its scale is arbitrary.
+    """Linear back projection with normalised sensitivity: x_j = sum_i J_ij dv_i / |J_.j|; its scale
+    is arbitrary.
 
-    With ``norm`` 1 (C. G. Xie et al., IEE Proc. G 139 (1992) 89-98) a pixel is divided by the sum of its sensitivities,
-    with 2 by their Euclidean length, which makes it a matched filter. A pixel without sensitivity stays 0.
+    With ``norm`` 1 (C. G. Xie et al., IEE Proc. G 139 (1992) 89-98) a pixel is divided by the sum
+    of its sensitivities, with 2 by their Euclidean length, which makes it a matched filter. A pixel
+    without sensitivity stays 0.
     """
     length = np.linalg.norm(jacobian, ord=norm, axis=0)
     return LinearMethod("linear back projection", (jacobian / np.where(length > 0, length, 1.0)).T)
 
 
 def gauss_newton(jacobian: FloatArray, strength: float) -> LinearMethod:
-    """One Gauss-Newton step with a Tikhonov prior, ``strength`` relative to the largest eigenvalue s_1^2 of J'J.
+    """One Gauss-Newton step with a Tikhonov prior, ``strength`` relative to the largest eigenvalue
+    s_1^2 of J'J.
 
     Raises:
         UsageError: the strength is not above 0.
     """
-    return LinearMethod("Gauss-Newton (Tikhonov)", _regularised(jacobian, np.ones(jacobian.shape[1]), strength))
+    return LinearMethod(
+        "Gauss-Newton (Tikhonov)", _regularised(jacobian, np.ones(jacobian.shape[1]), strength)
+    )
 
 
 def noser(jacobian: FloatArray, strength: float, exponent: float = 0.5) -> LinearMethod:
-    """NOSER: one step with the prior R = diag(J'J)^exponent, scaled to mean 1, ``strength`` as in :func:`gauss_newton`.
+    """NOSER: one step with the prior R = diag(J'J)^exponent, scaled to mean 1, ``strength`` as in
+    :func:`gauss_newton`.
 
-    M. Cheney et al., "NOSER: an algorithm for solving the inverse conductivity problem", Int. J. Imaging Syst. Technol.
-    2 (1990) 66-75, doi 10.1002/ima.1850020203; there the exponent is 1, and 1/2 is in common use.
+    M. Cheney et al., "NOSER: an algorithm for solving the inverse conductivity problem", Int. J.
+    Imaging Syst. Technol. 2 (1990) 66-75, doi 10.1002/ima.1850020203; there the exponent is 1, and
+    1/2 is in common use.
 
     Raises:
         UsageError: the strength is not above 0, or a pixel has no sensitivity.
     """
     power = (jacobian**2).sum(axis=0)
     if exponent and not power.min() > 0:
-        raise UsageError(f"NOSER: pixel {int(np.argmin(power))} (from 0) has no sensitivity; leave it out of the grid")
+        raise UsageError(
+            f"NOSER: pixel {int(np.argmin(power))} (from 0) has no sensitivity; leave it out of the"
+            " grid"
+        )
     prior = power**exponent
     return LinearMethod("NOSER", _regularised(jacobian, prior / prior.mean(), strength))
 
@@ -107,12 +125,15 @@ def _regularised(jacobian: FloatArray, prior: FloatArray, strength: float) -> Fl
         raise UsageError(f"regularisation strength {strength!r} must be above 0")
     weighted = jacobian / prior
     a = strength * float(np.linalg.norm(jacobian, 2)) ** 2
-    return np.asarray(np.linalg.solve(weighted @ jacobian.T + a * np.eye(len(jacobian)), weighted).T)
+    return np.asarray(
+        np.linalg.solve(weighted @ jacobian.T + a * np.eye(len(jacobian)), weighted).T
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class ConjugateGradient:
-    """CGLS (Hestenes and Stiefel 1952; Hansen, Discrete Inverse Problems, SIAM 2010, section 6.3) from 0.
+    """CGLS (Hestenes and Stiefel 1952; Hansen, Discrete Inverse Problems, SIAM 2010, section 6.3)
+    from 0.
 
     Attributes:
         jacobian: J (m, n).
@@ -156,10 +177,11 @@ def _ratio(a: FloatArray, b: FloatArray, where: npt.NDArray[np.bool_]) -> FloatA
 
 @dataclass(frozen=True, eq=False)
 class PlainFista:
-    """FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183-202, doi 10.1137/080716542) on J as it is.
+    """FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183-202, doi 10.1137/080716542) on J
+    as it is.
 
-    Each frame has lambda = ``ratio`` lambda_max, lambda_max being the smallest lambda whose solution is 0:
-    max |J'dv|, or max J'dv where x >= 0.
+    Each frame has lambda = ``ratio`` lambda_max, lambda_max being the smallest lambda whose
+    solution is 0: max |J'dv|, or max J'dv where x >= 0.
 
     Attributes:
         jacobian: J (m, n).
@@ -175,7 +197,9 @@ class PlainFista:
 
     def __post_init__(self) -> None:
         if not (0 < self.ratio < 1 and self.iterations >= 1):
-            raise UsageError(f"FISTA needs a ratio within (0, 1), not {self.ratio!r}, and at least 1 iteration")
+            raise UsageError(
+                f"FISTA needs a ratio within (0, 1), not {self.ratio!r}, and at least 1 iteration"
+            )
 
     @property
     def name(self) -> str:
@@ -184,13 +208,16 @@ class PlainFista:
 
     @property
     def macs(self) -> int:
-        """Multiply-accumulates a frame in products with J and J': one for lambda, two an iteration."""
+        """Multiply-accumulates a frame in products with J and J': one for lambda, two an
+        iteration."""
         return (1 + 2 * self.iterations) * self.jacobian.size
 
     def lambdas(self, dv: npt.ArrayLike) -> FloatArray:
         """The lambda of each frame: (k,), at least 0."""
         slope = difference_frames(dv, len(self.jacobian)) @ self.jacobian
-        return np.asarray(self.ratio * np.maximum((np.abs(slope) if self.signed else slope).max(axis=1), 0.0))
+        return np.asarray(
+            self.ratio * np.maximum((np.abs(slope) if self.signed else slope).max(axis=1), 0.0)
+        )
 
     def reconstruct(self, dv: npt.ArrayLike) -> FloatArray:
         """Images (k, n) of difference frames (k, m); all frames advance together.

@@ -1,4 +1,5 @@
-"""Many frames that have nothing to do with each other, over threads: one context each, and C runs without Python's lock."""
+"""Many frames that have nothing to do with each other, over threads: one context each, and C runs
+without Python's lock."""
 
 from __future__ import annotations
 
@@ -31,7 +32,14 @@ def check_threads(threads: int | None) -> int:
         UsageError: out of range.
     """
     if threads is None:
-        return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, MOST_THREADS)
+        return min(
+            (
+                len(os.sched_getaffinity(0))
+                if hasattr(os, "sched_getaffinity")
+                else os.cpu_count() or 1
+            ),
+            MOST_THREADS,
+        )
     if not 1 <= threads <= MOST_THREADS:
         raise UsageError(f"{threads} threads cannot be; use 1 to {MOST_THREADS}")
     return threads
@@ -40,11 +48,13 @@ def check_threads(threads: int | None) -> int:
 class Batch:
     """Contexts of the C core, one a thread, with the same model, options and reference.
 
-    Each frame is reconstructed anew, as :meth:`Reconstructor.forget` before each would do it: the same bits, counts and, in the
-    order of the frames, ids, however many threads there are. ``engine`` is "c" or "c64"; ``threads`` None: all processors.
+    Each frame is reconstructed anew, as :meth:`Reconstructor.forget` before each would do it: the
+    same bits, counts and, in the order of the frames, ids, however many threads there are.
+    ``engine`` is "c" or "c64"; ``threads`` None: all processors.
 
     Raises:
-        UsageError: an unknown engine, an option out of range, too many threads, or the core is not built.
+        UsageError: an unknown engine, an option out of range, too many threads, or the core is not
+            built.
         ModelError: the core refuses the model.
     """
 
@@ -66,46 +76,63 @@ class Batch:
         width = "float32" if engine == "c" else "float64"
         self._engines = [CoreEngine(content, width) for _ in range(self.threads)]
         self._on_each(lambda one: one.set_options(chosen))
-        self._last = np.zeros((0, self._engines[0].n_rows))  # the last frame that could be used, if any
+        self._last = np.zeros(
+            (0, self._engines[0].n_rows)
+        )  # the last frame that could be used, if any
 
     def _on_each(self, call: Callable[[CoreEngine], T]) -> T:
         first, *_ = [call(engine) for engine in self._engines]
         return first
 
     def tare(self, quiet_v: npt.ArrayLike) -> Baseline:
-        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the noise.
+        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
+        noise.
 
         Raises:
             FrameError: a frame cannot be used.
         """
         frames = np.atleast_2d(np.asarray(quiet_v, dtype=np.float64))
         if frames.ndim != 2 or frames.shape[1] != self._engines[0].n_rows or not len(frames):
-            raise FrameError(f"reference: has shape {frames.shape}, but the model's protocol has {self._engines[0].n_rows} rows")
+            raise FrameError(
+                f"reference: has shape {frames.shape}, but the model's protocol has"
+                f" {self._engines[0].n_rows} rows"
+            )
         self._last = self._last[:0]
         return self._on_each(lambda one: one.set_baseline(frames))
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
-        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before ``tare``."""
+        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
+        ``tare``."""
         self._on_each(lambda one: one.mask_rows(rows))
 
-    def each(self, frames_v: npt.ArrayLike, *, touches: bool = True) -> Iterator[Reconstruction | FrameError]:
-        """The results of frames (k, m) in V, in their order; for a frame that cannot be used, its error. Ids count up from 1.
+    def each(
+        self, frames_v: npt.ArrayLike, *, touches: bool = True
+    ) -> Iterator[Reconstruction | FrameError]:
+        """The results of frames (k, m) in V, in their order; for a frame that cannot be used, its
+        error. Ids count up from 1.
 
         Raises:
             FrameError: the frames are not (k, m) numbers.
         """
         frames = np.asarray(frames_v, dtype=np.float64)
         if frames.ndim != 2 or frames.shape[1] != self._engines[0].n_rows:
-            raise FrameError(f"frames: have shape {frames.shape}, but the model's protocol has {self._engines[0].n_rows} rows")
+            raise FrameError(
+                f"frames: have shape {frames.shape}, but the model's protocol has"
+                f" {self._engines[0].n_rows} rows"
+            )
         size = max(1, min(MOST_IN_BLOCK, len(frames) // (4 * self.threads)))
         free: SimpleQueue[CoreEngine] = SimpleQueue()
         for engine in self._engines[1:]:
             free.put(engine)
 
         def run(start: int) -> list[Reconstruction | FrameError]:
-            engine = free.get() if start > 0 else self._engines[0]  # a fresh one for the first frame of all
+            engine = (
+                free.get() if start > 0 else self._engines[0]
+            )  # a fresh one for the first frame of all
             try:
-                engine.follow(np.vstack([self._last, frames[max(0, start - MOST_IN_BLOCK) : start]]))
+                engine.follow(
+                    np.vstack([self._last, frames[max(0, start - MOST_IN_BLOCK) : start]])
+                )
                 return engine.reconstruct_block(frames[start : start + size], touches=touches)
             finally:
                 free.put(engine)
@@ -119,7 +146,9 @@ class Batch:
                         yield result
                         continue
                     last = frames[number - 1 : number].copy()
-                    numbered = tuple(_numbered(touch, next_id + k) for k, touch in enumerate(result.touches))
+                    numbered = tuple(
+                        _numbered(touch, next_id + k) for k, touch in enumerate(result.touches)
+                    )
                     next_id += len(numbered)
                     yield Reconstruction(result.image, result.coefficients, numbered, result.info)
         self._last = last
@@ -139,7 +168,8 @@ def reconstruct_many(
     options: Options | None = None,
     touches: bool = True,
 ) -> list[Reconstruction]:
-    """Images and touches of frames (k, m) in V after taring on ``quiet_v`` (q, m) or (m,); see :class:`Batch`.
+    """Images and touches of frames (k, m) in V after taring on ``quiet_v`` (q, m) or (m,); see
+    :class:`Batch`.
 
     Raises:
         FrameError: a frame cannot be used; the text has its number.

@@ -36,7 +36,14 @@ def default_options(model: Model) -> Options:
 
 
 def tracking(options: Options) -> Options:
-    """``options``, of :func:`default_options`, for frames that follow one another: as eits_options_track in the C core sets them,
-    to the bit in float32. docs/guide/tracking.md says what that is worth."""
+    """``options``, of :func:`default_options`, for frames that follow one another: as
+    eits_options_track in the C core sets them, to the bit in float32. docs/guide/tracking.md says
+    what that is worth."""
     gate = float(np.float32(options.gate_factor) * np.float32(0.75))
-    return replace(options, gate_factor=gate, track_confirm=2, track_hold=2, track_smooth=float(np.float32(0.66)))
+    return replace(
+        options,
+        gate_factor=gate,
+        track_confirm=2,
+        track_hold=2,
+        track_smooth=float(np.float32(0.66)),
+    )

@@ -1,4 +1,5 @@
-"""Frames to images and touches with one signature, whichever engine does it: the C core or the numpy reference."""
+"""Frames to images and touches with one signature, whichever engine does it: the C core or the
+numpy reference."""
 
 from __future__ import annotations
 
@@ -16,9 +17,9 @@ from eitskin.core.results import Baseline, Options, Reconstruction, check_option
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
+from eitskin.reference.engine import ReferenceEngine
 from eitskin.skin.protocol import Protocol
 from eitskin.solve.options import default_options
-from eitskin.solve.reference import ReferenceEngine
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -29,16 +30,24 @@ MIN_CORRELATION = 0.9
 class Reconstructor:
     """One skin's reconstruction: tare on quiet frames, then turn frames into images and touches.
 
-    ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or "numpy" (the reference). What is
-    wrong with a frame is found, left out where that helps, and named in ``info.found`` (docs/reference/diagnostics.md); the option
-    ``findings`` chooses what is looked for.
+    ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or
+    "numpy" (the reference). What is wrong with a frame is found, left out where that helps, and
+    named in ``info.found`` (docs/reference/diagnostics.md); the option ``findings`` chooses what is
+    looked for.
 
     Raises:
         ModelError: the C core refuses the model.
         UsageError: an unknown engine, an option out of range, or the core is not built.
     """
 
-    def __init__(self, model: Model, *, engine: str = "c", options: Options | None = None, blob: bytes | None = None) -> None:
+    def __init__(
+        self,
+        model: Model,
+        *,
+        engine: str = "c",
+        options: Options | None = None,
+        blob: bytes | None = None,
+    ) -> None:
         if engine not in ENGINES:
             raise UsageError(f"engine {engine!r} is not known; use one of {', '.join(ENGINES)}")
         self.model, self.engine = model, engine
@@ -46,12 +55,16 @@ class Reconstructor:
         if engine == "numpy":
             self._engine = ReferenceEngine(model)
         else:
-            self._engine = CoreEngine(blob or encode_model(model), "float32" if engine == "c" else "float64")
+            self._engine = CoreEngine(
+                blob or encode_model(model), "float32" if engine == "c" else "float64"
+            )
         self._options = default_options(model)
         self.set_options(options or self._options)
 
     @classmethod
-    def from_file(cls, path: str | Path, *, engine: str = "c", options: Options | None = None) -> Reconstructor:
+    def from_file(
+        cls, path: str | Path, *, engine: str = "c", options: Options | None = None
+    ) -> Reconstructor:
         """With the model in the file ``path``; raises what ``load_model`` raises besides."""
         model, blob = load_model(path)
         return cls(model, engine=engine, options=options, blob=blob)
@@ -92,32 +105,39 @@ class Reconstructor:
         if protocol.hash != self.model.protocol.hash:
             own = self.model.protocol
             raise ProtocolError(
-                f"frames scanned with protocol {protocol.hash:016x} ({protocol.n_electrodes} electrodes, {protocol.n_rows} rows) "
-                f"do not match the model's {own.hash:016x} ({own.n_electrodes} electrodes, {own.n_rows} rows); "
-                "import the frames in the model's order, or build a model with their protocol"
+                f"frames scanned with protocol {protocol.hash:016x} ({protocol.n_electrodes}"
+                f" electrodes, {protocol.n_rows} rows) do not match the model's {own.hash:016x}"
+                f" ({own.n_electrodes} electrodes, {own.n_rows} rows); import the frames in the"
+                " model's order, or build a model with their protocol"
             )
 
     def tare(self, quiet_v: npt.ArrayLike) -> Baseline:
-        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the noise, and single readings
-        that the others do not bear out are left out (``glitches``).
+        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
+        noise, and single readings that the others do not bear out are left out (``glitches``).
 
         Raises:
             FrameError: a frame has the wrong length or cannot be used.
         """
         frames, rows = np.atleast_2d(_numbers(quiet_v, "reference")), self.model.protocol.n_rows
         if frames.ndim != 2 or frames.shape[1] != rows or not len(frames):
-            raise FrameError(f"reference: has shape {frames.shape}, but the model's protocol has {rows} rows")
+            raise FrameError(
+                f"reference: has shape {frames.shape}, but the model's protocol has {rows} rows"
+            )
         return self._engine.set_baseline(frames)
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
-        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before ``tare``.
+        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
+        ``tare``.
 
         Raises:
             UsageError: not one truth value a row.
         """
         given, count = np.asarray(rows), self.model.protocol.n_rows
         if given.shape != (count,) or given.dtype != np.bool_:
-            raise UsageError(f"mask: is {given.dtype} {given.shape}, but must be one truth value for each of {count} rows")
+            raise UsageError(
+                f"mask: is {given.dtype} {given.shape}, but must be one truth value for each of"
+                f" {count} rows"
+            )
         self._engine.mask_rows(given)
 
     def reconstruct(self, frame_v: npt.ArrayLike, *, touches: bool = True) -> Reconstruction:
@@ -134,7 +154,8 @@ class Reconstructor:
             yield self.reconstruct(frame)
 
     def forget(self) -> None:
-        """Forget the warm start and the touches that were followed: the next frame has nothing to do with the last."""
+        """Forget the warm start and the touches that were followed: the next frame has nothing to
+        do with the last."""
         self._engine.forget()
 
 
@@ -142,4 +163,6 @@ def _numbers(values: npt.ArrayLike, what: str) -> FloatArray:
     try:
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise FrameError(f"{what}: is not an array of voltages; give numbers in V, rows of one length") from None
+        raise FrameError(
+            f"{what}: is not an array of voltages; give numbers in V, rows of one length"
+        ) from None

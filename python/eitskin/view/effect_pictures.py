@@ -1,8 +1,9 @@
 """One picture an effect: its law on the left, on the right what it adds to a frame.
 
-The frame is that of a press on the paper's skin; on the right stands the frame with the effect minus the frame without
-it. Parameters are chosen to be seen, and stand above the picture. docs/reference/effects/README.md shows all.
-``eitskin scene effect-picture NAME -o PNG`` makes one picture.
+The frame is that of a press on the paper's skin; on the right stands the frame with the effect
+minus the frame without it. Parameters are chosen to be seen, and stand above the picture.
+docs/reference/effects/README.md shows all. ``eitskin scene effect-picture NAME -o PNG`` makes one
+picture.
 """
 
 from __future__ import annotations
@@ -83,14 +84,22 @@ def draw_effect(path: str | Path, name: str) -> None:
         SKETCHES[name](left, skin_session, parameters[name])
         _draw_difference(right, frames[-1] - without[-1], without[-1])
         table = ", ".join(f"{key} = {value}" for key, value in SHOWN[name].items())
-        figure.suptitle(f"[effects.{name}]  {table}", fontsize=10, fontweight="bold", family="monospace")
+        figure.suptitle(
+            f"[effects.{name}]  {table}", fontsize=10, fontweight="bold", family="monospace"
+        )
         _save_small_png(figure, path)
 
 
 def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], Session]:
     """All frames (n, m) of the press, the effects' parameters, and a session to make effects in."""
     table = {
-        "scene": {"name": "press", "frames": FRAMES, "quiet_frames": 2, "rate_hz": RATE_HZ, "elements": ELEMENTS},
+        "scene": {
+            "name": "press",
+            "frames": FRAMES,
+            "quiet_frames": 2,
+            "rate_hz": RATE_HZ,
+            "elements": ELEMENTS,
+        },
         "touch": [{"x_mm": 30.0, "y_mm": 20.0, "radius_mm": 12.0, "contrast": 9.0}],
         "effects": effects,
     }
@@ -99,7 +108,9 @@ def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], S
 
     def exact() -> FloatArray:
         mesh = mesh_for_elements(scene.skin, ELEMENTS)
-        return ForwardModel(mesh, scene.skin, scene.protocol, 0.0).voltages(scene.skin.conductivity_s_per_m)
+        return ForwardModel(mesh, scene.skin, scene.protocol, 0.0).voltages(
+            scene.skin.conductivity_s_per_m
+        )
 
     session = Session(
         skin=scene.skin,

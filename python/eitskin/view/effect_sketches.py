@@ -1,7 +1,8 @@
-"""The left half of an effect's picture: its law, drawn from the very functions that the effect computes with.
+"""The left half of an effect's picture: its law, drawn from the very functions that the effect
+computes with.
 
-A sketch takes (axes, session, parameters), the parameters being those of the picture. matplotlib is imported by whoever
-made the axes.
+A sketch takes (axes, session, parameters), the parameters being those of the picture. matplotlib is
+imported by whoever made the axes.
 """
 
 from __future__ import annotations
@@ -30,7 +31,12 @@ def gel_drying(axes: Axes, session: Session, parameters: Any) -> None:
     hours = np.linspace(0, 4 * parameters.time_constant_h, 200)
     axes.plot(hours, [drying_factor(3600 * h, parameters) for h in hours], color=STRONG)
     axes.axhline(drying_factor(1e12, parameters), color=LIGHT, linestyle="--")
-    axes.set(xlabel="time (h)", ylabel="conductivity / described", ylim=(0, 1.05), title="a sheet that dries")
+    axes.set(
+        xlabel="time (h)",
+        ylabel="conductivity / described",
+        ylim=(0, 1.05),
+        title="a sheet that dries",
+    )
     axes.locator_params(axis="x", nbins=5)
 
 
@@ -52,7 +58,12 @@ def background(axes: Axes, session: Session, parameters: Any) -> None:
     mesh = session.mesh
     factors = pattern(mesh.centroids_mm(), mesh.areas_mm2, parameters, session.stream(NAME))
     size = float(np.abs(factors - 1).max())
-    colour: dict[str, Any] = {"triangles": mesh.triangles, "cmap": "RdBu_r", "vmin": 1 - size, "vmax": 1 + size}
+    colour: dict[str, Any] = {
+        "triangles": mesh.triangles,
+        "cmap": "RdBu_r",
+        "vmin": 1 - size,
+        "vmax": 1 + size,
+    }
     shown = axes.tripcolor(mesh.nodes_mm[:, 0], mesh.nodes_mm[:, 1], facecolors=factors, **colour)
     bar = axes.figure.colorbar(shown, ax=axes, shrink=0.8)
     bar.set_label("conductivity / its mean")
@@ -85,7 +96,11 @@ def contact_impedance(axes: Axes, session: Session, parameters: Any) -> None:
     z = impedances(parameters, session.skin.electrodes.count, session)
     axes.bar(np.arange(len(z)), z * 1e3, color=ELECTRODE)
     axes.axhline(parameters.mean_ohm_m2 * 1e3, color=INK, linestyle="--", linewidth=0.8)
-    axes.set(xlabel="electrode (from 0)", ylabel="contact impedance (mohm m2)", title="drawn once a session")
+    axes.set(
+        xlabel="electrode (from 0)",
+        ylabel="contact impedance (mohm m2)",
+        title="drawn once a session",
+    )
 
 
 def detached(axes: Axes, session: Session, parameters: Any) -> None:
@@ -112,7 +127,9 @@ def bridged(axes: Axes, session: Session, parameters: Any) -> None:
     axes.plot(*centres[list(parameters.electrodes)].T, color=STRONG, linewidth=2.5)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set(xlim=(-120, 120), ylim=(-120, 120), title=f"joined by {parameters.resistance_ohm:g} ohm")
+    axes.set(
+        xlim=(-120, 120), ylim=(-120, 120), title=f"joined by {parameters.resistance_ohm:g} ohm"
+    )
 
 
 def phase(axes: Axes, session: Session, parameters: Any) -> None:
@@ -127,9 +144,15 @@ def phase(axes: Axes, session: Session, parameters: Any) -> None:
         at = interface(z, f, parameters.capacitance_f_per_m2)[0] * 1e3
         axes.plot(at.real, -at.imag, "o", color=FOUND, markersize=4)
         aside = (5, 4) if at.real < 9 else (-32, 0)
-        axes.annotate(f"{f:g} Hz", (at.real, -at.imag), xytext=aside, textcoords="offset points", fontsize=8)
+        axes.annotate(
+            f"{f:g} Hz", (at.real, -at.imag), xytext=aside, textcoords="offset points", fontsize=8
+        )
     axes.set_aspect("equal")
-    axes.set(xlabel="real part (mohm m2)", ylabel="- imaginary part (mohm m2)", title="interface of 10 mohm m2")
+    axes.set(
+        xlabel="real part (mohm m2)",
+        ylabel="- imaginary part (mohm m2)",
+        title="interface of 10 mohm m2",
+    )
     axes.margins(0.12)
 
 
@@ -140,7 +163,9 @@ def source_impedance(axes: Axes, session: Session, parameters: Any) -> None:
     load = np.logspace(1, 6, 300)
     axes.semilogx(load, share(load, parameters), color=STRONG)
     axes.axhline(0, color=LIGHT, linewidth=0.8)
-    axes.set(xlabel="load (ohm)", ylabel="current in phase / the source's", title="the current divides")
+    axes.set(
+        xlabel="load (ohm)", ylabel="current in phase / the source's", title="the current divides"
+    )
 
 
 def amplitude_drift(axes: Axes, session: Session, parameters: Any) -> None:
@@ -172,10 +197,20 @@ def mux(axes: Axes, session: Session, parameters: Any) -> None:
     t = np.linspace(0, 2 * parameters.dwell_us, 300)
     axes.plot(t, 1 - np.exp(-t / parameters.settling_us), color=STRONG)
     left = exp(-parameters.dwell_us / parameters.settling_us)
-    axes.plot([parameters.dwell_us] * 2, [1 - left, 1], color=FOUND, linewidth=2.5, label=f"{100 * left:.1f} % is left")
+    axes.plot(
+        [parameters.dwell_us] * 2,
+        [1 - left, 1],
+        color=FOUND,
+        linewidth=2.5,
+        label=f"{100 * left:.1f} % is left",
+    )
     axes.axhline(1, color=LIGHT, linestyle="--")
     axes.legend(frameon=False, loc="center right")
-    axes.set(xlabel="time since switching (us)", ylabel="from the row before (0) to this (1)", title="settling")
+    axes.set(
+        xlabel="time since switching (us)",
+        ylabel="from the row before (0) to this (1)",
+        title="settling",
+    )
 
 
 def charge_injection(axes: Axes, session: Session, parameters: Any) -> None:
@@ -186,7 +221,11 @@ def charge_injection(axes: Axes, session: Session, parameters: Any) -> None:
     axes.plot(t, step_mv * np.exp(-t / parameters.settling_us), color=STRONG)
     axes.axvspan(start, end, color=LIGHT, alpha=0.5, linewidth=0, label="demodulator's window")
     axes.legend(frameon=False)
-    axes.set(xlabel="time since switching (us)", ylabel="on one line (mV)", title="a switch's charge leaks away")
+    axes.set(
+        xlabel="time since switching (us)",
+        ylabel="on one line (mV)",
+        title="a switch's charge leaks away",
+    )
 
 
 def crosstalk(axes: Axes, session: Session, parameters: Any) -> None:
@@ -212,10 +251,16 @@ def mains(axes: Axes, session: Session, parameters: Any) -> None:
     fine = np.linspace(0, float(times_s[-1]), 1500)
     wave = np.sin(2 * pi * parameters.frequency_hz * (fine + row_delays_s(session)[0]))
     axes.plot(fine, 1e3 * parameters.amplitude_v * wave, color=LIGHT, linewidth=0.7)
-    row = [1e3 * float(step.apply(np.zeros(session.protocol.n_rows), float(t), 0)[0]) for t in times_s]
+    row = [
+        1e3 * float(step.apply(np.zeros(session.protocol.n_rows), float(t), 0)[0]) for t in times_s
+    ]
     axes.plot(times_s, row, "o-", color=STRONG, markersize=4)
     seen = alias_hz(parameters.frequency_hz, session.rate_hz)
-    axes.set(xlabel="time (s)", ylabel="added (mV)", title=f"row 0 at {session.rate_hz:g} Hz sees {seen:g} Hz")
+    axes.set(
+        xlabel="time (s)",
+        ylabel="added (mV)",
+        title=f"row 0 at {session.rate_hz:g} Hz sees {seen:g} Hz",
+    )
 
 
 def common_mode(axes: Axes, session: Session, parameters: Any) -> None:
@@ -279,8 +324,10 @@ def jitter(axes: Axes, session: Session, parameters: Any) -> None:
 SKETCHES: dict[str, Callable[[Any, Session, Any], None]] = {
     sketch.__name__: sketch
     for sketch in (
-        misplacement, background, temperature, gel_drying, contact_impedance, detached, bridged, phase,
-        source_impedance, amplitude_drift, crosstalk, mux, charge_injection, mains, common_mode, channel_gain, jitter,
+        misplacement, background, temperature, gel_drying, contact_impedance, detached, bridged,
+        phase,
+        source_impedance, amplitude_drift, crosstalk, mux, charge_injection, mains, common_mode,
+        channel_gain, jitter,
         noise, saturation, adc,
     )
 }  # fmt: skip

@@ -8,7 +8,7 @@ from pathlib import Path
 from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
-from eitskin.study.judge.score import FrameScore
+from eitskin.scoring.score import FrameScore
 from eitskin.view.pictures import Mark, Panel, draw_panels
 
 MOST_PANELS = 36
@@ -44,7 +44,8 @@ def draw_results(
     *,
     title: str = "",
 ) -> None:
-    """A panel a frame, the first 36: image, true touches as circles, found ones as crosses and dashed circles.
+    """A panel a frame, the first 36: image, true touches as circles, found ones as crosses and
+    dashed circles.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -54,9 +55,13 @@ def draw_results(
     for number, result in list(results.items())[:MOST_PANELS]:
         heading = frames.frame_name[number]
         if number in scores:
-            heading += f"\nMIoU {scores[number].miou_image:.2f}, touches {scores[number].miou_touches:.2f}"
+            heading += (
+                f"\nMIoU {scores[number].miou_image:.2f}, touches {scores[number].miou_touches:.2f}"
+            )
         panels.append(Panel(heading, result.image, true_marks(frames, number), found_marks(result)))
     note = "circles: true touches; crosses and dashed circles: found"
     if len(results) > MOST_PANELS:
         note += f"; the first {MOST_PANELS} of {len(results)} frames"
-    draw_panels(path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note)
+    draw_panels(
+        path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note
+    )

@@ -1,7 +1,8 @@
-"""Pictures of frames: the skin with its electrodes, the image, the touches that were there and those that were found.
+"""Pictures of frames: the skin with its electrodes, the image, the touches that were there and
+those that were found.
 
-x to the right, y up, seen from above, mm. Red is more conductive than the untouched skin, blue less, white no change.
-matplotlib is imported when a picture is drawn, and needs no display.
+x to the right, y up, seen from above, mm. Red is more conductive than the untouched skin, blue
+less, white no change. matplotlib is imported when a picture is drawn, and needs no display.
 """
 
 from __future__ import annotations
@@ -46,7 +47,8 @@ STYLE = {
 
 @dataclass(frozen=True)
 class Mark:
-    """A touch in a picture: its centre, its radius where known, its change of conductivity where known."""
+    """A touch in a picture: its centre, its radius where known, its change of conductivity where
+    known."""
 
     x_mm: float
     y_mm: float
@@ -100,7 +102,8 @@ def draw_frame(
     title: str = "",
     unit: str = "S/m",
 ) -> None:
-    """One frame as a PNG: truth (where given) | image | touches, with axes in mm and a colour bar in ``unit``.
+    """One frame as a PNG: truth (where given) | image | touches, with axes in mm and a colour bar
+    in ``unit``.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -112,15 +115,23 @@ def draw_frame(
         panels.insert(0, Panel("truth", None, tuple(truth), fill_truth=True))
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(3.9 * len(panels) + 0.4, 5.2), layout="compressed")
+        figure = matplotlib.figure.Figure(
+            figsize=(3.9 * len(panels) + 0.4, 5.2), layout="compressed"
+        )
         figure.get_layout_engine().set(h_pad=0.08)
         for k, panel in enumerate(panels):
             axes = figure.add_subplot(1, len(panels), k + 1)
-            limit = _limit(image) if panel.values is not None else _limit([m.change or 0.0 for m in panel.truth])
+            limit = (
+                _limit(image)
+                if panel.values is not None
+                else _limit([m.change or 0.0 for m in panel.truth])
+            )
             coloured = draw_panel(axes, skin, grid, panel, limit=limit)
             if k == 0:
                 axes.set_ylabel("y (mm)")
-            bar = figure.colorbar(coloured, ax=axes, location="bottom", shrink=0.85, aspect=32, pad=0.02)
+            bar = figure.colorbar(
+                coloured, ax=axes, location="bottom", shrink=0.85, aspect=32, pad=0.02
+            )
             if panel.values is not None or panel.fill_truth:
                 bar.set_label(f"change of conductivity ({unit})")
                 bar.locator = matplotlib.ticker.MaxNLocator(5)
@@ -134,9 +145,17 @@ def draw_frame(
 
 
 def draw_panels(
-    path: str | Path, skin: Skin, grid: Grid, panels: Sequence[Panel], columns: int, *, title: str = "", note: str = ""
+    path: str | Path,
+    skin: Skin,
+    grid: Grid,
+    panels: Sequence[Panel],
+    columns: int,
+    *,
+    title: str = "",
+    note: str = "",
 ) -> None:
-    """Many small frames as a PNG, row by row, each coloured by its own largest change; ``note`` stands below.
+    """Many small frames as a PNG, row by row, each coloured by its own largest change; ``note``
+    stands below.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -145,14 +164,18 @@ def draw_panels(
     matplotlib = load_matplotlib()
     rows = math.ceil(len(panels) / columns)
     with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(1.75 * columns + 0.7, 1.95 * rows + 0.9), layout="compressed")
+        figure = matplotlib.figure.Figure(
+            figsize=(1.75 * columns + 0.7, 1.95 * rows + 0.9), layout="compressed"
+        )
         axes_of_bar, coloured = [], None
         for k, panel in enumerate(panels):
             axes = figure.add_subplot(rows, columns, k + 1)
             coloured = draw_panel(axes, skin, grid, panel, small=True)
             axes_of_bar.append(axes)
         if coloured is not None:
-            bar = figure.colorbar(coloured, ax=axes_of_bar, location="right", shrink=0.5, aspect=30, pad=0.02)
+            bar = figure.colorbar(
+                coloured, ax=axes_of_bar, location="right", shrink=0.5, aspect=30, pad=0.02
+            )
             bar.set_label("change of conductivity / its largest size in the panel")
         if title:
             figure.suptitle(title, fontsize=11, fontweight="bold", color=INK)
@@ -162,7 +185,13 @@ def draw_panels(
 
 
 def draw_panel(
-    axes: Axes, skin: Skin, grid: Grid, panel: Panel, *, limit: float | None = None, small: bool = False
+    axes: Axes,
+    skin: Skin,
+    grid: Grid,
+    panel: Panel,
+    *,
+    limit: float | None = None,
+    small: bool = False,
 ) -> Any:
     """Draw one panel on ``axes`` and return what a colour bar needs.
 
@@ -188,7 +217,12 @@ def draw_panel(
         x0, y0 = grid.origin_mm
         extent = (x0, x0 + grid.nx * grid.pixel_mm, y0, y0 + grid.ny * grid.pixel_mm)
         shown = grid.image(values / _limit(values) if limit is None else values)
-        colour: dict[str, Any] = {"cmap": COLOURS, "vmin": -scale, "vmax": scale, "interpolation": "nearest"}
+        colour: dict[str, Any] = {
+            "cmap": COLOURS,
+            "vmin": -scale,
+            "vmax": scale,
+            "interpolation": "nearest",
+        }
         picture = axes.imshow(shown, origin="lower", extent=extent, zorder=1, **colour)
         picture.set_clip_path(sheet)
     largest = _limit([m.change or 0.0 for m in panel.truth])
@@ -197,7 +231,15 @@ def draw_panel(
         if panel.fill_truth and mark.change is not None:
             part = mark.change / largest if limit is None else mark.change / limit
             face = colour_map(0.5 + 0.5 * part)
-        _circle(axes, mark, mark.radius_mm or 2.0, facecolor=face, edgecolor=TRUE, linewidth=0.9, zorder=3)
+        _circle(
+            axes,
+            mark,
+            mark.radius_mm or 2.0,
+            facecolor=face,
+            edgecolor=TRUE,
+            linewidth=0.9,
+            zorder=3,
+        )
     size, width = (3.5, 0.9) if small else (8.0, 1.6)
     halo = [withStroke(linewidth=width + 1.6, foreground="white")]
     for mark in panel.found:
@@ -205,9 +247,13 @@ def draw_panel(
         axes.plot(mark.x_mm, mark.y_mm, "x", color=FOUND, zorder=4, **style)
         if mark.radius_mm is not None:
             dashes = {"linestyle": (0, (3, 2)), "linewidth": width, "path_effects": halo}
-            _circle(axes, mark, mark.radius_mm, facecolor="none", edgecolor=FOUND, zorder=4, **dashes)
+            _circle(
+                axes, mark, mark.radius_mm, facecolor="none", edgecolor=FOUND, zorder=4, **dashes
+            )
     width = 0.7 if small else 1.2
-    axes.add_patch(Polygon(rim, closed=True, facecolor="none", edgecolor=RIM, linewidth=width, zorder=2))
+    axes.add_patch(
+        Polygon(rim, closed=True, facecolor="none", edgecolor=RIM, linewidth=width, zorder=2)
+    )
     _draw_electrodes(axes, skin, small)
     axes.set_title(panel.title, fontsize=8 if small else 10)
     return colours
@@ -220,14 +266,17 @@ def _circle(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
 
 
 def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:
-    """Electrodes as bars on the rim, numbered from 0 outside it where there is room; axes to match."""
+    """Electrodes as bars on the rim, numbered from 0 outside it where there is room; axes to
+    match."""
     outline = skin.outline
     x0, y0, x1, y1 = outline.bounding_box_mm
     size = max(x1 - x0, y1 - y0)
     margin = 0.03 if small else 0.10
     for k, (start, end) in enumerate(skin.electrode_spans_mm()):
         along = outline.points_at(np.linspace(start, end, 9))
-        axes.plot(along[:, 0], along[:, 1], color=ELECTRODE, linewidth=1.6 if small else 4.0, zorder=5)
+        axes.plot(
+            along[:, 0], along[:, 1], color=ELECTRODE, linewidth=1.6 if small else 4.0, zorder=5
+        )
         if not small:
             outward = np.array([along[5, 1] - along[3, 1], along[3, 0] - along[5, 0]])
             x, y = along[4] + 0.055 * size * outward / max(float(np.hypot(*outward)), 1e-9)
@@ -249,7 +298,11 @@ def _legend(axes: Axes, panel: Panel) -> None:
 
     handles = []
     if panel.truth:
-        circle: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": TRUE, "markersize": 10}
+        circle: dict[str, Any] = {
+            "markerfacecolor": "none",
+            "markeredgecolor": TRUE,
+            "markersize": 10,
+        }
         handles.append(Line2D([], [], marker="o", color="none", label="true touch", **circle))
     if panel.found:
         cross: dict[str, Any] = {"markeredgecolor": FOUND, "markersize": 8, "markeredgewidth": 1.6}
@@ -265,6 +318,7 @@ def _limit(values: npt.ArrayLike) -> float:
 
 
 def save_png(figure: Figure, path: str | Path) -> None:
-    """Write a PNG whole or not at all, without the date and versions that would make two runs differ."""
+    """Write a PNG whole or not at all, without the date and versions that would make two runs
+    differ."""
     with write_beside(path) as temporary:
         figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})

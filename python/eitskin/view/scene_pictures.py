@@ -1,4 +1,5 @@
-"""A scene at a glance: the touches' paths on the skin, and what the electrodes see of them over time."""
+"""A scene at a glance: the touches' paths on the skin, and what the electrodes see of them over
+time."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ MOST_OUTLINES = 12
 
 
 def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
-    """The picture of ``scene`` and its ``frames`` as a PNG: touches by time | voltage changes by row and time.
+    """The picture of ``scene`` and its ``frames`` as a PNG: touches by time | voltage changes by
+    row and time.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -30,18 +32,27 @@ def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(9.6, 4.9), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-        draw_panel(left, scene.skin, grid_for(scene.skin.outline), Panel("touches, coloured by time"))
+        draw_panel(
+            left, scene.skin, grid_for(scene.skin.outline), Panel("touches, coloured by time")
+        )
         _draw_touches(left, scene)
         left.set_ylabel("y (mm)")
         _draw_voltages(figure, right, scene, frames)
         named = ", ".join(scene.effects) or "none; ideal electrodes, no noise"
-        figure.suptitle(f"{scene.name}: {scene.description}", fontsize=10.5, fontweight="bold", color=INK, wrap=True)
+        figure.suptitle(
+            f"{scene.name}: {scene.description}",
+            fontsize=10.5,
+            fontweight="bold",
+            color=INK,
+            wrap=True,
+        )
         figure.supxlabel(f"effects: {named}", fontsize=8, color=INK)
         save_png(figure, path)
 
 
 def _draw_touches(axes: Axes, scene: Scene) -> None:
-    """Each touch's path, and its outline at up to twelve times, stronger where it presses harder."""
+    """Each touch's path, and its outline at up to twelve times, stronger where it presses
+    harder."""
     from matplotlib import colormaps
     from matplotlib.patches import Circle
 
@@ -52,10 +63,17 @@ def _draw_touches(axes: Axes, scene: Scene) -> None:
             continue
         axes.plot(one.x_mm[there], one.y_mm[there], color=INK, linewidth=0.8, alpha=0.6, zorder=3)
         most = float(np.abs(one.contrast[there] - 1).max())
-        for k in there[np.unique(np.linspace(0, len(there) - 1, MOST_OUTLINES).round().astype(int))]:
+        for k in there[
+            np.unique(np.linspace(0, len(there) - 1, MOST_OUTLINES).round().astype(int))
+        ]:
             colour = colours(k / max(scene.frames - 1, 1))
             press = 0.15 + 0.85 * abs(float(one.contrast[k]) - 1) / most
-            style: dict[str, Any] = {"facecolor": "none", "edgecolor": colour, "linewidth": 1.6, "alpha": press}
+            style: dict[str, Any] = {
+                "facecolor": "none",
+                "edgecolor": colour,
+                "linewidth": 1.6,
+                "alpha": press,
+            }
             axes.add_patch(Circle((one.x_mm[k], one.y_mm[k]), one.radius_mm[k], zorder=4, **style))
 
 

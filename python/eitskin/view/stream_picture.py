@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.model.model import Model
-from eitskin.study.watch import Seen, spread
+from eitskin.scoring.stream_check import Seen, spread
 from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels
 
 MOST_PANELS = 36
@@ -16,7 +16,8 @@ MOST_KEPT = 20 * MOST_PANELS
 
 
 class Album:
-    """Keeps frames for a picture: all of them, or of a long stream evenly spaced ones and the last."""
+    """Keeps frames for a picture: all of them, or of a long stream evenly spaced ones and the
+    last."""
 
     def __init__(self) -> None:
         self._kept: list[Seen] = []
@@ -35,7 +36,11 @@ class Album:
     @property
     def frames(self) -> list[Seen]:
         """At most 36, the first and the last among them."""
-        kept = self._kept if self._last is None or self._kept[-1] is self._last else [*self._kept, self._last]
+        kept = (
+            self._kept
+            if self._last is None or self._kept[-1] is self._last
+            else [*self._kept, self._last]
+        )
         return spread(kept, MOST_PANELS)
 
     @property
@@ -45,7 +50,8 @@ class Album:
 
 
 def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> None:
-    """The album as a PNG: circles are true touches, crosses what was found, dashed circles the found touches' sizes.
+    """The album as a PNG: circles are true touches, crosses what was found, dashed circles the
+    found touches' sizes.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -55,8 +61,18 @@ def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> 
     frames = album.frames
     if len(frames) == 1:
         seen = frames[0]
-        values = np.zeros(model.grid.n_pixels) if seen.frame.image is None else seen.frame.image.image
-        draw_frame(path, model.skin, model.grid, values, truth=_true_marks(model, seen), found=_found_marks(seen), title=title)
+        values = (
+            np.zeros(model.grid.n_pixels) if seen.frame.image is None else seen.frame.image.image
+        )
+        draw_frame(
+            path,
+            model.skin,
+            model.grid,
+            values,
+            truth=_true_marks(model, seen),
+            found=_found_marks(seen),
+            title=title,
+        )
         return
     panels = [
         Panel(
@@ -67,15 +83,21 @@ def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> 
         )
         for seen in frames
     ]
-    note = "crosses: found" + ("; circles: true touches" if any(seen.true for seen in frames) else "")
+    note = "crosses: found" + (
+        "; circles: true touches" if any(seen.true for seen in frames) else ""
+    )
     if album.count > len(frames):
         note += f"; {len(frames)} of {album.count} frames"
-    draw_panels(path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note)
+    draw_panels(
+        path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note
+    )
 
 
 def _true_marks(model: Model, seen: Seen) -> tuple[Mark, ...]:
     conductivity = model.skin.conductivity_s_per_m
-    return tuple(Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * conductivity) for t in seen.true or ())
+    return tuple(
+        Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * conductivity) for t in seen.true or ()
+    )
 
 
 def _found_marks(seen: Seen) -> tuple[Mark, ...]:

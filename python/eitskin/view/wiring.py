@@ -1,7 +1,8 @@
-"""Which pin of the NUCLEO-F767ZI goes where: the table of docs/guide/hardware.md and the drawing are made from it.
+"""Which pin of the NUCLEO-F767ZI goes where: the table of docs/guide/hardware.md and the drawing
+are made from it.
 
-Connectors and pins after ST's UM1974, tables 18 and 25: the Zio connectors CN7 to CN10 take plugs, the morpho ones CN11 and
-CN12 are holes in the board, with every pin of the processor.
+Connectors and pins after ST's UM1974, tables 18 and 25: the Zio connectors CN7 to CN10 take plugs,
+the morpho ones CN11 and CN12 are holes in the board, with every pin of the processor.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ MULTIPLEXERS = ("I+", "I-", "V+", "V-")
 
 @dataclass(frozen=True)
 class Wire:
-    """One wire: a pin of the processor, where the board has it, what the firmware does with it, and its other end.
+    """One wire: a pin of the processor, where the board has it, what the firmware does with it, and
+    its other end.
 
-    ``zio`` is empty where only the morpho connector has the pin; both are empty where the board itself uses it.
+    ``zio`` is empty where only the morpho connector has the pin; both are empty where the board
+    itself uses it.
     """
 
     pin: str
@@ -31,7 +34,12 @@ _PORT_E = (
     ("CN10-18", "CN12-40"), ("CN10-4", "CN12-52"), ("CN10-24", "CN12-47"), ("CN10-6", "CN12-56"),
     ("CN10-26", "CN12-49"), ("CN10-10", "CN12-55"), ("CN10-28", "CN12-51"), ("CN10-30", "CN12-53"),
 )  # fmt: skip
-_PORT_F = (("CN7-20", "CN12-59"), ("CN10-2", "CN12-57"), ("CN10-8", "CN12-50"), ("CN10-12", "CN12-60"))
+_PORT_F = (
+    ("CN7-20", "CN12-59"),
+    ("CN10-2", "CN12-57"),
+    ("CN10-8", "CN12-50"),
+    ("CN10-12", "CN12-60"),
+)
 
 
 def _wires() -> tuple[Wire, ...]:
@@ -65,5 +73,7 @@ WIRES = _wires()
 def wire_table() -> str:
     """The table of docs/guide/hardware.md, as Markdown."""
     lines = ["| pin | Zio | morpho | firmware | wire to |", "|---|---|---|---|---|"]
-    lines += [f"| {one.pin} | {one.zio} | {one.morpho} | {one.function} | {one.to} |" for one in WIRES]
+    lines += [
+        f"| {one.pin} | {one.zio} | {one.morpho} | {one.function} | {one.to} |" for one in WIRES
+    ]
     return "\n".join(lines) + "\n"

@@ -1,7 +1,9 @@
-"""What the prebuilt model must do on random touches that it has never seen: one to three, 6 to 12 mm, contrast 3 to 10, 60 dB.
+"""What the prebuilt model must do on random touches that it has never seen: one to three, 6 to 12
+mm, contrast 3 to 10, 60 dB.
 
-Frames are simulated nonlinearly on a mesh four times finer than the model's, with contact impedances spread by 20 %, white
-noise and a 12-bit converter. The threshold of the image's mask is the model's own; nothing here is fitted to these scenes.
+Frames are simulated nonlinearly on a mesh four times finer than the model's, with contact
+impedances spread by 20 %, white noise and a 12-bit converter. The threshold of the image's mask is
+the model's own; nothing here is fitted to these scenes.
 """
 
 from __future__ import annotations
@@ -9,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from eitskin.scoring.score import FrameScore, scorer_for
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.judge.score import FrameScore, scorer_for
 from small_models import prebuilt, session
 
 SCENES = 200
@@ -40,7 +42,9 @@ def test_the_scenes_are_what_they_should_be() -> None:
     counts = [len(scene.touches) for scene in simulated.touches.scenes]
     assert set(counts) == {1, 2, 3} and min(counts.count(k) for k in (1, 2, 3)) > 45
     assert simulated.mesh_elements > 3 * prebuilt()[0].meta["mesh_elements"]
-    assert 20 * np.log10(np.sqrt(np.mean(simulated.exact_quiet_v**2)) / simulated.noise_v) == pytest.approx(60)
+    assert 20 * np.log10(
+        np.sqrt(np.mean(simulated.exact_quiet_v**2)) / simulated.noise_v
+    ) == pytest.approx(60)
 
 
 def test_image(scores: list[FrameScore]) -> None:

@@ -1,8 +1,10 @@
-"""An electrode that comes off, and rows that are lost, on random scenes that nothing was fitted to: what that costs.
+"""An electrode that comes off, and rows that are lost, on random scenes that nothing was fitted to:
+what that costs.
 
-Scenes are made as those of test_random_scenes.py, one to three touches, with 60 dB noise and spread contacts; in each an
-electrode detaches in the last frame (the effect `detached`), and its rows are given as NaN. Whole and damaged frames share a
-reference. The printed means are the table "Rows left out" of docs/reference/eitm-format.md.
+Scenes are made as those of test_random_scenes.py, one to three touches, with 60 dB noise and spread
+contacts; in each an electrode detaches in the last frame (the effect `detached`), and its rows are
+given as NaN. Whole and damaged frames share a reference. The printed means are the table "Rows left
+out" of docs/reference/eitm-format.md.
 """
 
 from __future__ import annotations
@@ -20,14 +22,16 @@ from eitskin.scene.description import scene_from_table
 from eitskin.scene.random_touches import Scene, random_touches
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import Bench
+from eitskin.scoring import metrics
+from eitskin.scoring.score import Scorer, scorer_for
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.judge import metrics
-from eitskin.study.judge.score import Scorer, scorer_for
 from small_models import prebuilt
 
 SCENES = 160
-SEED = 78  # what an electrode costs differs from set to set: .024 here, .028 on the training set, .031 on a third
+# what an electrode costs differs from set to set: .024 here, .028 on the training set, .031 on a
+# third
+SEED = 78
 QUIET = 16
 ELECTRODES = 16
 MOST_LOSS = 0.03
@@ -38,7 +42,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A scene and its frames: quiet (q, m), whole (m,) and with electrode ``electrode`` off (m,), volts."""
+    """A scene and its frames: quiet (q, m), whole (m,) and with electrode ``electrode`` off (m,),
+    volts."""
 
     scene: Scene
     electrode: int
@@ -54,10 +59,22 @@ def cases() -> tuple[Case, ...]:
     for k, scene in enumerate(random_touches(skin.outline, SEED, SCENES, "faults").scenes):
         electrode = k % ELECTRODES
         touches = [
-            {"x_mm": float(t.x_mm), "y_mm": float(t.y_mm), "radius_mm": float(t.radius_mm), "contrast": float(t.contrast)}
+            {
+                "x_mm": float(t.x_mm),
+                "y_mm": float(t.y_mm),
+                "radius_mm": float(t.radius_mm),
+                "contrast": float(t.contrast),
+            }
             for t in scene.touches
         ]
-        session = {"name": "one", "skin": "paper", "seed": 1000 * SEED + k, "frames": 2, "rate_hz": 20.0, "quiet_frames": QUIET}
+        session = {
+            "name": "one",
+            "skin": "paper",
+            "seed": 1000 * SEED + k,
+            "frames": 2,
+            "rate_hz": 20.0,
+            "quiet_frames": QUIET,
+        }
         table = {
             "scene": session,
             "touch": touches,
@@ -67,8 +84,12 @@ def cases() -> tuple[Case, ...]:
                 "contact_impedance": {"spread": 0.2},
             },
         }
-        voltage_v = simulate_frames(compile_scene(scene_from_table(table, "one", Path()), bench=bench)).voltage_v
-        made.append(Case(scene, electrode, voltage_v[:QUIET], voltage_v[QUIET], voltage_v[QUIET + 1]))
+        voltage_v = simulate_frames(
+            compile_scene(scene_from_table(table, "one", Path()), bench=bench)
+        ).voltage_v
+        made.append(
+            Case(scene, electrode, voltage_v[:QUIET], voltage_v[QUIET], voltage_v[QUIET + 1])
+        )
     return tuple(made)
 
 
@@ -90,21 +111,31 @@ class Judge:
 
     def mask(self, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike) -> BoolArray:
         """Raster points within discs."""
-        return metrics.disc_mask(self.points_mm, np.reshape(centres_mm, (-1, 2)), np.asarray(radii_mm, dtype=np.float64))
+        return metrics.disc_mask(
+            self.points_mm, np.reshape(centres_mm, (-1, 2)), np.asarray(radii_mm, dtype=np.float64)
+        )
 
     def score(self, case: Case, frame_v: FloatArray, out: BoolArray) -> tuple[float, float]:
-        """MIoU of the image's mask and of the touches' discs, with the rows ``out`` (m,) lost; twice the same frame, since the
-        first makes the map."""
+        """MIoU of the image's mask and of the touches' discs, with the rows ``out`` (m,) lost;
+        twice the same frame, since the first makes the map."""
         self.reconstructor.tare(case.quiet_v)
         frame_v = np.where(out, np.nan, frame_v)
         self.reconstructor.reconstruct(frame_v)
         self.reconstructor.forget()
         result = self.reconstructor.reconstruct(frame_v)
-        assert np.isfinite(result.image).all() and result.info.masked == out.sum() and result.info.gap >= 0
+        assert (
+            np.isfinite(result.image).all()
+            and result.info.masked == out.sum()
+            and result.info.gap >= 0
+        )
         assert result.info.step_halvings == 0
         truth = self.mask(case.scene.centres_mm(), [t.radius_mm for t in case.scene.touches])
-        seen = metrics.touch_mask(self.scorer.judge.lookup.show(result.image.astype(np.float64)), self.threshold)
-        discs = self.mask([(t.x_mm, t.y_mm) for t in result.touches], [t.radius_mm for t in result.touches])
+        seen = metrics.touch_mask(
+            self.scorer.judge.lookup.show(result.image.astype(np.float64)), self.threshold
+        )
+        discs = self.mask(
+            [(t.x_mm, t.y_mm) for t in result.touches], [t.radius_mm for t in result.touches]
+        )
         return metrics.miou(seen, truth), metrics.miou(discs, truth)
 
 
@@ -121,7 +152,11 @@ def scores(judge: Judge, electrodes: int) -> FloatArray:
     """Mean scores of image and discs with so many electrodes out, the first of them truly off."""
     found = []
     for case in cases():
-        out = rows_of(*((case.electrode + 5 * k) % ELECTRODES for k in range(electrodes))) if electrodes else NONE_OUT
+        out = (
+            rows_of(*((case.electrode + 5 * k) % ELECTRODES for k in range(electrodes)))
+            if electrodes
+            else NONE_OUT
+        )
         found.append(judge.score(case, case.detached_v if electrodes else case.whole_v, out))
     return np.asarray(np.mean(found, axis=0))
 
@@ -161,13 +196,16 @@ def test_a_few_lost_rows_cost_next_to_nothing(judge: Judge) -> None:
 
 
 def test_no_touch_is_seen_where_there_is_none(judge: Judge) -> None:
-    """Quiet frames after the reference, an electrode's rows lost: as few pass the gate as with all rows."""
+    """Quiet frames after the reference, an electrode's rows lost: as few pass the gate as with all
+    rows."""
     seen = {0: 0, 1: 0}
     for case in cases()[:64]:
         judge.reconstructor.tare(case.quiet_v[: QUIET - 4])
         for electrodes in seen:
             out = rows_of(case.electrode) if electrodes else NONE_OUT
             for frame_v in case.quiet_v[QUIET - 4 :]:
-                seen[electrodes] += bool(judge.reconstructor.reconstruct(np.where(out, np.nan, frame_v)).touches)
+                seen[electrodes] += bool(
+                    judge.reconstructor.reconstruct(np.where(out, np.nan, frame_v)).touches
+                )
     print(seen)
     assert seen[1] <= seen[0] + 3

@@ -1,4 +1,5 @@
-"""Measured frames that nobody here made, from raw arrays to touches by the commands that docs/guide/tank.md gives.
+"""Measured frames that nobody here made, from raw arrays to touches by the commands that
+docs/guide/tank.md gives.
 
 The data are not part of the project; without them these tests are skipped.
 """
@@ -15,15 +16,17 @@ import pytest
 from eitskin.cli.main import main
 from eitskin.frames.frames import load_frames
 from eitskin.model.eitm import load_model
+from eitskin.scoring.score import scorer_for
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.judge.score import scorer_for
 
 SKIN = Path(__file__).resolve().parents[3] / "examples" / "tank_kit4.toml"
 DIAMETER_MM = 280.0
 TOUCH_LIKE = {"1_3": 1, "2_3": 2, "2_6": 2, "3_4": 3}
 IMPORT = [
-    "--voltage", "voltage", "--reference", "reference_voltage", "--scale", "1", "--protocol-table", "drive_measure",
-    "--names", "frame_name", "--truth-frame", "object_frame", "--truth-xy", "object_xy", "--truth-radius", "object_radius",
+    "--voltage", "voltage", "--reference", "reference_voltage", "--scale", "1", "--protocol-table",
+    "drive_measure",
+    "--names", "frame_name", "--truth-frame", "object_frame", "--truth-xy", "object_xy",
+    "--truth-radius", "object_radius",
     "--truth-sign", "object_is_conductive", "--truth-unit-mm", "140", "--truth-mask", "truth_mask",
 ]  # fmt: skip
 
@@ -33,13 +36,27 @@ def folder(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Imported frames and the tank's model."""
     place = tmp_path_factory.mktemp("tank")
     source = str(shared_data / "kit4_dev.npz")
-    assert main(["import", source, "-o", str(place / "kit4.npz"), "--skin", str(SKIN), *IMPORT]) == 0
-    build = ["model", "build", str(SKIN), "-o", str(place / "kit4.eitm"), "--data", "log-ratio", "--touch-change", "2"]
+    assert (
+        main(["import", source, "-o", str(place / "kit4.npz"), "--skin", str(SKIN), *IMPORT]) == 0
+    )
+    build = [
+        "model",
+        "build",
+        str(SKIN),
+        "-o",
+        str(place / "kit4.eitm"),
+        "--data",
+        "log-ratio",
+        "--touch-change",
+        "2",
+    ]
     assert main(build) == 0
     return place
 
 
-def reconstructed(folder: Path, frames: str, capsys: pytest.CaptureFixture[str], *options: str) -> dict[str, Any]:
+def reconstructed(
+    folder: Path, frames: str, capsys: pytest.CaptureFixture[str], *options: str
+) -> dict[str, Any]:
     """What ``eitskin reconstruct --json`` says."""
     capsys.readouterr()
     model = str(folder / "kit4.eitm")
@@ -49,7 +66,9 @@ def reconstructed(folder: Path, frames: str, capsys: pytest.CaptureFixture[str],
 
 
 @pytest.mark.parametrize("engine", ["c", "numpy"])
-def test_every_metal_object_is_found_and_nothing_else(folder: Path, engine: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_metal_object_is_found_and_nothing_else(
+    folder: Path, engine: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     only = ["--only", ",".join(TOUCH_LIKE), "--engine", engine]
     facts = reconstructed(folder, "kit4.npz", capsys, *only)
     assert {frame["name"]: len(frame["touches"]) for frame in facts["frames"]} == TOUCH_LIKE
@@ -73,7 +92,8 @@ def test_the_reference_is_the_models_own(folder: Path) -> None:
 
 
 def test_gains_of_single_channels_do_not_matter_to_ratios(folder: Path) -> None:
-    """log(v / v0) is the same whatever each channel's amplifier does, as long as it does so in both."""
+    """log(v / v0) is the same whatever each channel's amplifier does, as long as it does so in
+    both."""
     model, blob = load_model(folder / "kit4.eitm")
     frames = load_frames(folder / "kit4.npz")
     gain = 1 + 0.02 * np.random.default_rng(1).normal(size=208)
@@ -91,9 +111,19 @@ def test_gains_of_single_channels_do_not_matter_to_ratios(folder: Path) -> None:
 def test_a_raw_export_in_another_order_and_polarity(
     folder: Path, shared_data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The rod before electrode 0 (12 o'clock) at 0.58 of the radius is the strongest touch, and it conducts."""
+    """The rod before electrode 0 (12 o'clock) at 0.58 of the radius is the strongest touch, and it
+    conducts."""
     source, output = str(shared_data / "tank_metal_e1.csv"), str(folder / "e1.npz")
-    mend = ["--columns", "2", "--reference-columns", "0", "--order", "rotating", "--sign", "reversed"]
+    mend = [
+        "--columns",
+        "2",
+        "--reference-columns",
+        "0",
+        "--order",
+        "rotating",
+        "--sign",
+        "reversed",
+    ]
     assert main(["import", source, "-o", output, "--skin", str(SKIN), *mend]) == 0
     touches = reconstructed(folder, "e1.npz", capsys, "--sign", "both")["frames"][0]["touches"]
     rod = touches[0]

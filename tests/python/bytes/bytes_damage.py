@@ -1,4 +1,5 @@
-"""Files damaged as disks, lines and text editors damage them, for hypothesis; and what a reader may do with them."""
+"""Files damaged as disks, lines and text editors damage them, for hypothesis; and what a reader may
+do with them."""
 
 from __future__ import annotations
 
@@ -15,11 +16,29 @@ from eitskin.errors import EitskinError
 Content = TypeVar("Content")
 
 LONGEST_LINE = 4000
-NAN, INFINITE, BYTE_ORDER_MARK, LINE_SEPARATOR = b"\0\0\xc0\x7f", b"\0\0\x80\x7f", b"\xef\xbb\xbf", b"\xe2\x80\xa8"
-ODD_BYTES = (b"\0", b"\xff", b"\n", b"\r\n", b"\0" * 16, b"\xff" * 4, NAN, INFINITE, BYTE_ORDER_MARK, LINE_SEPARATOR)
+NAN, INFINITE, BYTE_ORDER_MARK, LINE_SEPARATOR = (
+    b"\0\0\xc0\x7f",
+    b"\0\0\x80\x7f",
+    b"\xef\xbb\xbf",
+    b"\xe2\x80\xa8",
+)
+ODD_BYTES = (
+    b"\0",
+    b"\xff",
+    b"\n",
+    b"\r\n",
+    b"\0" * 16,
+    b"\xff" * 4,
+    NAN,
+    INFINITE,
+    BYTE_ORDER_MARK,
+    LINE_SEPARATOR,
+)
 ODD_WORDS = (
-    b"nan", b"inf", b"-inf", b"-1", b"0", b"1e999", b"1e-999", b"9" * 20, b"9" * 5000, b"0x7fffffffffffffff", b"1_0", b"true",
-    b'""', b'"\\u0000"', b"'a'", b"[]", b"{}", b"[[", b"]]", b"{", b"}", b"=", b",", b";", b".", b"#", b"\\", b"1979-05-27",
+    b"nan", b"inf", b"-inf", b"-1", b"0", b"1e999", b"1e-999", b"9" * 20, b"9" * 5000,
+    b"0x7fffffffffffffff", b"1_0", b"true",
+    b'""', b'"\\u0000"', b"'a'", b"[]", b"{}", b"[[", b"]]", b"{", b"}", b"=", b",", b";", b".",
+    b"#", b"\\", b"1979-05-27",
     b"[" * 3000,
 )  # fmt: skip
 
@@ -27,12 +46,19 @@ ODD_WORDS = (
 def bounded(examples: int) -> Callable[[Any], Any]:
     """Settings of a test that tries ``examples`` inputs, the same ones in every run."""
     health = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture, HealthCheck.data_too_large]
-    return settings(max_examples=examples, derandomize=True, deadline=None, database=None, suppress_health_check=health)
+    return settings(
+        max_examples=examples,
+        derandomize=True,
+        deadline=None,
+        database=None,
+        suppress_health_check=health,
+    )
 
 
 @st.composite
 def damaged(draw: st.DrawFn, wholes: list[bytes], words: tuple[bytes, ...] = ODD_BYTES) -> bytes:
-    """One of ``wholes`` with up to four places cut, flipped, overwritten, doubled, or filled from another one."""
+    """One of ``wholes`` with up to four places cut, flipped, overwritten, doubled, or filled from
+    another one."""
     content = bytearray(draw(st.sampled_from(wholes)))
     for _ in range(draw(st.integers(1, 4))):
         at = draw(st.integers(0, len(content)))
@@ -58,14 +84,17 @@ def damaged(draw: st.DrawFn, wholes: list[bytes], words: tuple[bytes, ...] = ODD
     return bytes(content)
 
 
-def any_bytes(wholes: list[bytes], words: tuple[bytes, ...] = ODD_BYTES) -> st.SearchStrategy[bytes]:
+def any_bytes(
+    wholes: list[bytes], words: tuple[bytes, ...] = ODD_BYTES
+) -> st.SearchStrategy[bytes]:
     """Mostly damaged files, sometimes bytes of no kind at all."""
     mangled = damaged(wholes, words)
     return st.one_of(mangled, mangled, mangled, mangled, st.binary(max_size=300))
 
 
 def read_or_refuse(read: Callable[[], Content]) -> Content | None:
-    """What ``read`` gives, or None where it refuses; fails where it raises anything but an EitskinError of one line, or warns."""
+    """What ``read`` gives, or None where it refuses; fails where it raises anything but an
+    EitskinError of one line, or warns."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:

@@ -27,7 +27,10 @@ contact_impedance_ohm_m2 = 1e-3
 [protocol]
 kind = "adjacent"
 """
-DISK = b'[skin]\ndiameter_mm = 194\n[electrodes]\ncount = 16\nstart_angle_deg = 12.5\n[protocol]\nkind = "skip"\nskip = 2\n'
+DISK = (
+    b"[skin]\ndiameter_mm = 194\n[electrodes]\ncount = 16\nstart_angle_deg = 12.5\n[protocol]\nkind"
+    b' = "skip"\nskip = 2\n'
+)
 SCENE = b"""[scene]
 name = "two"
 skin = "skin.toml"

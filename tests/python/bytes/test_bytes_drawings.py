@@ -16,13 +16,28 @@ HAND, FOREARM = ((EXAMPLES / name).read_bytes() for name in ("hand.svg", "forear
 CURVES = b"""<svg width="9cm" height="9cm" viewBox="0 0 90 90"><g transform="rotate(9) translate(2,3)">
 <path id="a" d="m10,10 c20-5 30 5 40 0 q9,9 0 20 t-5 9 a9 5 30 1 0 -20 4 z"/></g><use href="#a" x="3"/>
 <rect x="1" y="2" width="30" height="20" rx="4"/><polygon points="1,2 30,4 5,60"/></svg>"""
-WORDS = (*ODD_BYTES, b"nan", b"1e999", b"-1", b'"', b"<", b"/>", b"&#0;", b"A", b"z", b"matrix(0 0 0 0 0 0)", b"9" * 400)
+WORDS = (
+    *ODD_BYTES,
+    b"nan",
+    b"1e999",
+    b"-1",
+    b'"',
+    b"<",
+    b"/>",
+    b"&#0;",
+    b"A",
+    b"z",
+    b"matrix(0 0 0 0 0 0)",
+    b"9" * 400,
+)
 
 
 @pytest.mark.parametrize("scale_mm", [None, 1.0])
 @given(content=any_bytes([HAND, CURVES], WORDS))
 @bounded(150)
-def test_any_svg_is_read_or_refused_in_a_line(tmp_path: Path, scale_mm: float | None, content: bytes) -> None:
+def test_any_svg_is_read_or_refused_in_a_line(
+    tmp_path: Path, scale_mm: float | None, content: bytes
+) -> None:
     _read(written(tmp_path, "a.svg", content), scale_mm)
 
 

@@ -1,4 +1,5 @@
-"""Any bytes as a file of frames, own or somebody else's: frames, or a refusal of one line; nothing half written."""
+"""Any bytes as a file of frames, own or somebody else's: frames, or a refusal of one line; nothing
+half written."""
 
 from __future__ import annotations
 
@@ -54,13 +55,22 @@ FIELDS: dict[str, Any] = {
     "frame_name": np.array(["a", "b", "c"]),
     "meta": np.array(json.dumps({"unit": "V"})),
 }
-FOREIGN = {"v": VOLTS, "ref": VOLTS[0], "names": np.array(["x", "y", "z"]), "table": np.asarray(PROTOCOL.drive_measure)}
+FOREIGN = {
+    "v": VOLTS,
+    "ref": VOLTS[0],
+    "names": np.array(["x", "y", "z"]),
+    "table": np.asarray(PROTOCOL.drive_measure),
+}
 ARCHIVES = [stored(**FIELDS), stored(**FOREIGN)]
 ODD_ARRAYS: tuple[Any, ...] = (
-    np.array(np.nan), np.array([]), np.array("text\nof two lines"), np.array([b"\xff\n"]), np.array(2**63, dtype=np.uint64),
-    np.array(1 + 2j), np.array(True), np.array("2020-01-01", dtype="datetime64[D]"), np.zeros((2, 2, 2)), np.zeros((0, 3)),
-    np.array("[" * 3000), np.array("9" * 5000), np.array("{}"), np.array("[]"), np.array(-1), np.array(1e300), np.array("\0"),
-    np.array([(1, 2.0)], dtype=[("a", "i4"), ("b", "f8")]), np.full((3, ROWS), 1e308), np.zeros((3, ROWS), dtype="f2"),
+    np.array(np.nan), np.array([]), np.array("text\nof two lines"), np.array([b"\xff\n"]),
+    np.array(2**63, dtype=np.uint64),
+    np.array(1 + 2j), np.array(True), np.array("2020-01-01", dtype="datetime64[D]"),
+    np.zeros((2, 2, 2)), np.zeros((0, 3)),
+    np.array("[" * 3000), np.array("9" * 5000), np.array("{}"), np.array("[]"), np.array(-1),
+    np.array(1e300), np.array("\0"),
+    np.array([(1, 2.0)], dtype=[("a", "i4"), ("b", "f8")]), np.full((3, ROWS), 1e308),
+    np.zeros((3, ROWS), dtype="f2"),
     np.full((ROWS, 4), -5), np.full((3, ROWS), np.inf),
 )  # fmt: skip
 
@@ -78,7 +88,9 @@ def test_any_archive_is_frames_or_refused(tmp_path: Path, content: bytes) -> Non
 
 @given(data=st.data())
 @bounded(60)
-def test_a_damaged_frames_file_is_refused(own: list[bytes], tmp_path: Path, data: st.DataObject) -> None:
+def test_a_damaged_frames_file_is_refused(
+    own: list[bytes], tmp_path: Path, data: st.DataObject
+) -> None:
     path = written(tmp_path, "x.npz", data.draw(any_bytes(own)))
     read_or_refuse(lambda: load_frames(path))
 
@@ -92,20 +104,39 @@ def test_each_field_may_hold_anything(tmp_path: Path, name: str) -> None:
 
 
 def test_each_array_of_a_foreign_file_may_hold_anything(tmp_path: Path) -> None:
-    keys = {"voltage": "v", "reference": "ref", "names": "names", "time": "t", "protocol_table": "table"}
+    keys = {
+        "voltage": "v",
+        "reference": "ref",
+        "names": "names",
+        "time": "t",
+        "protocol_table": "table",
+    }
     good = {**FOREIGN, "t": np.arange(3.0)}
     for key, value in ((key, value) for key in keys.values() for value in ODD_ARRAYS):
         path = written(tmp_path, "x.npz", stored(**{**good, key: value, "odd\nname": np.array(1)}))
         for part in (None, "in-phase"):
             options = ImportOptions(SourceOptions(**keys, complex_part=part))
-            read_or_refuse(lambda path=path, options=options: import_frames(path, options, None, None, 8))
-            read_or_refuse(lambda path=path, options=options: import_frames(path, options, None, None, 8, lenient=True))
+            read_or_refuse(
+                lambda path=path, options=options: import_frames(path, options, None, None, 8)
+            )
+            read_or_refuse(
+                lambda path=path, options=options: import_frames(
+                    path, options, None, None, 8, lenient=True
+                )
+            )
         absent = ImportOptions(SourceOptions(voltage="not there"))
-        assert read_or_refuse(lambda path=path, absent=absent: import_frames(path, absent, PROTOCOL, None)) is None
+        assert (
+            read_or_refuse(
+                lambda path=path, absent=absent: import_frames(path, absent, PROTOCOL, None)
+            )
+            is None
+        )
 
 
 TABLE = "\n".join(",".join(f"{value:.5f}" for value in row) for row in VOLTS).encode()
-COLUMNS = "quiet;one;two\n" + "\n".join(";".join(f"{value:.4f}".replace(".", ",") for value in row) for row in VOLTS.T)
+COLUMNS = "quiet;one;two\n" + "\n".join(
+    ";".join(f"{value:.4f}".replace(".", ",") for value in row) for row in VOLTS.T
+)
 TABLES = [TABLE, COLUMNS.encode(), b"# comment\n" + TABLE.replace(b",", b"\t") + b"\n"]
 
 
@@ -113,12 +144,20 @@ TABLES = [TABLE, COLUMNS.encode(), b"# comment\n" + TABLE.replace(b",", b"\t") +
 @bounded(200)
 def test_any_text_table_is_frames_or_refused(tmp_path: Path, content: bytes) -> None:
     path = written(tmp_path, "x.csv", content)
-    for quiet in ({"reference_frames": "0"}, {"reference_columns": "0"}, {"reference_columns": "quiet"}):
+    for quiet in (
+        {"reference_frames": "0"},
+        {"reference_columns": "0"},
+        {"reference_columns": "quiet"},
+    ):
         options = ImportOptions(SourceOptions(**quiet))
-        frames = read_or_refuse(lambda options=options: import_frames(path, options, PROTOCOL, None))
+        frames = read_or_refuse(
+            lambda options=options: import_frames(path, options, PROTOCOL, None)
+        )
         assert frames is None or np.isfinite(frames.voltage_v).all()
     as_table = ImportOptions(SourceOptions(reference_frames="0"), table_file=str(path))
-    read_or_refuse(lambda: import_frames(written(tmp_path, "v.csv", TABLE), as_table, None, None, 8))
+    read_or_refuse(
+        lambda: import_frames(written(tmp_path, "v.csv", TABLE), as_table, None, None, 8)
+    )
 
 
 ELECTRODES = b"\n".join(b"%d,%d,%d,%d" % tuple(row) for row in PROTOCOL.drive_measure.tolist())
@@ -127,7 +166,9 @@ ELECTRODES = b"\n".join(b"%d,%d,%d,%d" % tuple(row) for row in PROTOCOL.drive_me
 @given(content=any_bytes([ELECTRODES], ODD_BYTES + ODD_WORDS))
 @bounded(100)
 def test_any_protocol_table_is_one_or_refused(tmp_path: Path, content: bytes) -> None:
-    options = ImportOptions(SourceOptions(reference_frames="0"), table_file=str(written(tmp_path, "t.csv", content)))
+    options = ImportOptions(
+        SourceOptions(reference_frames="0"), table_file=str(written(tmp_path, "t.csv", content))
+    )
     volts = written(tmp_path, "v.csv", TABLE)
     read_or_refuse(lambda: import_frames(volts, options, None, None, 8))
 
@@ -139,9 +180,16 @@ def mat_files() -> list[bytes]:
     for compressed in (False, True):
         stream = io.BytesIO()
         cells = np.array([1, "a", [2.0]], dtype=object)
-        arrays = {"v": VOLTS, "ref": VOLTS[:1], "s": {"names": ["a", "b"], "deep": {"x": 1.5}}, "c": cells}
+        arrays = {
+            "v": VOLTS,
+            "ref": VOLTS[:1],
+            "s": {"names": ["a", "b"], "deep": {"x": 1.5}},
+            "c": cells,
+        }
         io_of.savemat(stream, arrays, do_compression=compressed)
-        made.append(b"MATLAB 5.0".ljust(116) + stream.getvalue()[116:])  # the head's text names the day
+        made.append(
+            b"MATLAB 5.0".ljust(116) + stream.getvalue()[116:]
+        )  # the head's text names the day
     return made
 
 
@@ -159,7 +207,18 @@ def test_a_refused_import_leaves_what_was_there(tmp_path: Path) -> None:
 
     target = written(tmp_path, "out.npz", b"as it was")
     source = written(tmp_path, "x.csv", TABLE[: len(TABLE) // 2] + b"x")
-    words = ["import", str(source), "--protocol", "adjacent", "--electrodes", "8", "--reference-frames", "0", "-o", str(target)]
+    words = [
+        "import",
+        str(source),
+        "--protocol",
+        "adjacent",
+        "--electrodes",
+        "8",
+        "--reference-frames",
+        "0",
+        "-o",
+        str(target),
+    ]
     assert main(words) != 0
     assert target.read_bytes() == b"as it was"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.npz", "x.csv"]

@@ -1,4 +1,5 @@
-"""Any bytes as an .eitm model: read by Python and C alike or refused in a line; what is read can be used."""
+"""Any bytes as an .eitm model: read by Python and C alike or refused in a line; what is read can be
+used."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ def test_a_damaged_model_is_refused_in_a_line(tmp_path: Path, content: bytes) ->
 
 @given(content=any_bytes(WHOLE).map(resealed))
 @bounded(250)
-def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(tmp_path: Path, content: bytes) -> None:
+def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(
+    tmp_path: Path, content: bytes
+) -> None:
     path = written(tmp_path, "x.eitm", content)
     loaded = read_or_refuse(lambda: load_model(path))
     if loaded is None:
@@ -56,11 +59,15 @@ def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(tmp_path: Path
         assert "\n" not in str(error)
         return
     assert np.isfinite(result.image).all()
-    assert all(np.isfinite([t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2]).all() for t in result.touches)
+    assert all(
+        np.isfinite([t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2]).all()
+        for t in result.touches
+    )
 
 
 def test_iterations_without_end_are_refused() -> None:
-    """A model whose own defaults would keep a board busy for a day is not one that ``eitskin model build`` made."""
+    """A model whose own defaults would keep a board busy for a day is not one that ``eitskin model
+    build`` made."""
     blob = bytearray(tiny_blob())
     place = sections_of(blob)["DEFS"].offset
     blob[place : place + 4] = (100_001).to_bytes(4, "little")

@@ -1,4 +1,5 @@
-"""Any bytes on a line or as a recording: packets or counted, never an exception; pieces do not matter."""
+"""Any bytes on a line or as a recording: packets or counted, never an exception; pieces do not
+matter."""
 
 from __future__ import annotations
 
@@ -14,7 +15,16 @@ from eitskin.device.recordings.run_file import recorded_options
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.commands import COMMANDS, parse_command
 from eitskin.device.wire.explain import fault_text, quality_text, reply_text
-from eitskin.device.wire.packets import BoardInfo, Fault, PacketType, RawFrame, Reply, Solved, SolvedImage, SolvedTouches
+from eitskin.device.wire.packets import (
+    BoardInfo,
+    Fault,
+    PacketType,
+    RawFrame,
+    Reply,
+    Solved,
+    SolvedImage,
+    SolvedTouches,
+)
 from eitskin.device.wire.payloads import (
     MalformedPacket,
     build_fault,
@@ -34,17 +44,27 @@ PROTOCOL = adjacent(8)
 def board() -> BoardInfo:
     text = {"board": "fake", "serial": "1"}
     values = dict.fromkeys(BoardInfo.__dataclass_fields__, 1) | text | {"firmware": (0, 1, 0)}
-    hashed = {"n_electrodes": 8, "n_rows": ROWS, "protocol_hash": PROTOCOL.hash, "electrodes": 16, "model_bytes": 0}
+    hashed = {
+        "n_electrodes": 8,
+        "n_rows": ROWS,
+        "protocol_hash": PROTOCOL.hash,
+        "electrodes": 16,
+        "model_bytes": 0,
+    }
     return BoardInfo(**{**values, **hashed})
 
 
 def raw(frame: int, flags: int) -> bytes:
     volts = (1 + 0.01 * np.sin(np.arange(ROWS) * (frame + 1))).astype("<f4")
-    return build_raw(RawFrame(frame, 1000 * frame, 900, flags, volts, np.zeros(ROWS, dtype=np.uint8)))
+    return build_raw(
+        RawFrame(frame, 1000 * frame, 900, flags, volts, np.zeros(ROWS, dtype=np.uint8))
+    )
 
 
 def solved(count: int) -> Solved:
-    return Solved(1, 2, 3, 4, 5, count, 0, "iterations", 0, 6, 7, 8, 9, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3)
+    return Solved(
+        1, 2, 3, 4, 5, count, 0, "iterations", 0, 6, 7, 8, 9, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3
+    )
 
 
 PAYLOADS = [
@@ -83,7 +103,9 @@ def test_any_line_gives_packets_whatever_the_pieces(content: bytes, size: int) -
     assert cut.counters == whole.counters
     for packet in packets:
         again = Decoder(numbered=False).feed(encode(packet.type, packet.sequence, packet.payload))
-        assert [(one.type, one.sequence, one.payload) for one in again] == [(packet.type, packet.sequence, packet.payload)]
+        assert [(one.type, one.sequence, one.payload) for one in again] == [
+            (packet.type, packet.sequence, packet.payload)
+        ]
 
 
 KINDS = [kind for kind, _ in PAYLOADS] + [PacketType.STATS, 0x55]
@@ -130,7 +152,11 @@ NOTES = [
 ]
 
 
-@given(content=st.one_of(any_bytes([recording()]), st.lists(any_bytes(NOTES), max_size=2).map(resealed)))
+@given(
+    content=st.one_of(
+        any_bytes([recording()]), st.lists(any_bytes(NOTES), max_size=2).map(resealed)
+    )
+)
 @bounded(200)
 def test_any_recording_is_read_or_refused_in_a_line(tmp_path: Path, content: bytes) -> None:
     path = written(tmp_path, "x.eits", content)

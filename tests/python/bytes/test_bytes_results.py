@@ -1,4 +1,5 @@
-"""Any bytes as results of the trade-off, as a run to go on from, as a firmware image: read, passed over, or refused."""
+"""Any bytes as results of the trade-off, as a run to go on from, as a firmware image: read, passed
+over, or refused."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from hypothesis import given
 
 from eitskin.device.flash import check_image
 from eitskin.firmware.prebuilt import load_image
-from eitskin.study.store import Store
-from eitskin.study.tradeoff.front import load_front
+from eitskin.tuning.front import load_front
+from eitskin_studies.harness.store import Store
 
 WORDS = ODD_BYTES + ODD_WORDS
 

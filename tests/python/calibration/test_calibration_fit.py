@@ -1,4 +1,5 @@
-"""The fit finds laws and gains that are known, says how sure it is, and refuses what cannot tell."""
+"""The fit finds laws and gains that are known, says how sure it is, and refuses what cannot
+tell."""
 
 from __future__ import annotations
 
@@ -15,12 +16,21 @@ from eitskin.errors import FrameError
 
 def test_a_known_law_and_gain_are_found() -> None:
     found = calibrate(presses(), RADIUS_MM)
-    assert (found.fitted.form, found.fitted.order, found.groups, found.by_place) == ("saturating", 2, 24, True)
-    for value, true, (low, high) in zip(found.fitted.numbers, (4.0, 1.5), found.interval, strict=True):
+    assert (found.fitted.form, found.fitted.order, found.groups, found.by_place) == (
+        "saturating",
+        2,
+        24,
+        True,
+    )
+    for value, true, (low, high) in zip(
+        found.fitted.numbers, (4.0, 1.5), found.interval, strict=True
+    ):
         assert value == pytest.approx(true, rel=0.05)
         assert low < true < high and high - low < 0.3 * true
     assert found.scatter[0] > 0.1 and found.scatter[1] < 0.025
-    assert found.law.uncertainty == pytest.approx(np.quantile(np.abs(found.left_out), 0.95), rel=1e-6)
+    assert found.law.uncertainty == pytest.approx(
+        np.quantile(np.abs(found.left_out), 0.95), rel=1e-6
+    )
     assert found.notes == ()
     new = np.array([(10.0, -70.0), (-60.0, 20.0), (0.0, 0.0), (33.0, 44.0)])
     load = np.array([0.6, 1.2, 1.7, 1.9])
@@ -50,9 +60,15 @@ def replace_strength(known: Presses, strength: np.ndarray) -> Presses:
 def test_the_table_is_the_law() -> None:
     law = calibrate(presses(noise=0.0), RADIUS_MM, resamples=0).law
     load = np.linspace(0.02, 2.0, 50)
-    assert law.loads_at(np.zeros((50, 2)), saturating(load)) == pytest.approx(load, rel=2e-3, abs=2e-4)
-    beyond = law.loads_at(np.zeros((3, 2)), np.array([saturating(np.array(2.0)) * 1.02, 100.0, np.inf]))
-    assert beyond[0] > 2.0 and beyond[1] == beyond[2] == 4.0  # the last slope, to twice the greatest load
+    assert law.loads_at(np.zeros((50, 2)), saturating(load)) == pytest.approx(
+        load, rel=2e-3, abs=2e-4
+    )
+    beyond = law.loads_at(
+        np.zeros((3, 2)), np.array([saturating(np.array(2.0)) * 1.02, 100.0, np.inf])
+    )
+    assert (
+        beyond[0] > 2.0 and beyond[1] == beyond[2] == 4.0
+    )  # the last slope, to twice the greatest load
 
 
 def test_beyond_the_outermost_place_the_gain_stays() -> None:
@@ -67,7 +83,9 @@ def test_one_place_is_told_to_be_one() -> None:
     one = one.take(np.arange(5))
     found = calibrate(one, RADIUS_MM, resamples=20)
     assert (found.groups, found.by_place, found.fitted.order) == (1, False, 0)
-    assert found.notes[0].startswith("1 place: the gain is taken to be the same everywhere; press at 5 or more")
+    assert found.notes[0].startswith(
+        "1 place: the gain is taken to be the same everywhere; press at 5 or more"
+    )
 
 
 def test_unlike_intervals_for_unlike_noise() -> None:
@@ -79,7 +97,9 @@ def test_unlike_intervals_for_unlike_noise() -> None:
 
 
 def test_the_same_seed_gives_the_same() -> None:
-    one, other = (calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2))
+    one, other = (
+        calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2)
+    )
     assert one == other
 
 
@@ -88,7 +108,10 @@ def test_the_same_seed_gives_the_same() -> None:
     [
         (slice(0, 3), "3 presses are too few; record at least 4"),
         (np.arange(0, 120, 5), "1 different weights are too few; use at least 3"),
-        (np.flatnonzero(np.isin(np.tile(LOADS_N, 24), [1.0, 1.5])), "2 different weights are too few"),
+        (
+            np.flatnonzero(np.isin(np.tile(LOADS_N, 24), [1.0, 1.5])),
+            "2 different weights are too few",
+        ),
     ],
 )
 def test_too_little_is_refused(rows: object, text: str) -> None:
@@ -99,7 +122,10 @@ def test_too_little_is_refused(rows: object, text: str) -> None:
 def test_weights_too_alike_are_refused() -> None:
     known = presses()
     alike = Presses(1 + 0.1 * known.load_n, known.strength, known.place_mm)
-    with pytest.raises(FrameError, match=r"1\.14 times the least, which cannot show a law; use a range of 1\.5 times or more"):
+    with pytest.raises(
+        FrameError,
+        match=r"1\.14 times the least, which cannot show a law; use a range of 1\.5 times or more",
+    ):
         calibrate(alike, RADIUS_MM)
 
 
@@ -110,7 +136,9 @@ def test_strength_that_falls_is_refused() -> None:
 
 
 def test_places_and_weights_are_told_apart() -> None:
-    chain = np.array([(0.0, 0.0), (0.9 * PLACE_MM, 0.0), (1.8 * PLACE_MM, 0.0), (4 * PLACE_MM, 0.0)])
+    chain = np.array(
+        [(0.0, 0.0), (0.9 * PLACE_MM, 0.0), (1.8 * PLACE_MM, 0.0), (4 * PLACE_MM, 0.0)]
+    )
     assert places_of(chain).tolist() == [0, 0, 0, 1]
     assert weights_of(np.array([2.0, 1.0, 1.001, 2.0])).tolist() == [1.0, 2.0]
     both = joined([presses(3), presses(4)])

@@ -21,7 +21,10 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
     first = "[[press]]\nfirst = 0\nlast = 3\nload_n = 0.980665\nx_mm = 1.5\ny_mm = -2\n"
     tables = written(tmp_path, first + "[[press]]\nfirst = 4\nload_g = 200\n", "w.toml")
     one, other = load_weights(table), load_weights(tables)
-    assert one == [Weight(0, 3, pytest.approx(0.980665), (1.5, -2.0)), Weight(4, 4, pytest.approx(1.96133), None)]
+    assert one == [
+        Weight(0, 3, pytest.approx(0.980665), (1.5, -2.0)),
+        Weight(4, 4, pytest.approx(1.96133), None),
+    ]
     assert one == other
 
 
@@ -35,7 +38,10 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("first,load_g\n0,many\n", "row 1 below the header: load_g must be a number, not 'many'"),
         ("first,load_g\n0,nan\n", "load_g = nan is out of range"),
         ("first,load_g\n0,0\n", "load_g = 0.0 is out of range; it must be above 0"),
-        ("first,load_g\n0,\n", "give the load as load_g (grams) or as load_n (newtons), one of them"),
+        (
+            "first,load_g\n0,\n",
+            "give the load as load_g (grams) or as load_n (newtons), one of them",
+        ),
         ("first,load_g,load_n\n0,1,1\n", "one of them"),
         ("first,load_g,x_mm\n0,1,1\n", "a place needs x_mm and y_mm; give both or none"),
         ("first,load_g\n-1,5\n", "first = -1.0 is out of range"),
@@ -47,7 +53,11 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
 def test_what_is_wrong_is_told_in_a_line(tmp_path: Path, text: str, line: str) -> None:
     with pytest.raises(ConfigError) as caught:
         load_weights(written(tmp_path, text))
-    assert line in str(caught.value) and str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
+    assert (
+        line in str(caught.value)
+        and str(caught.value).startswith(str(tmp_path))
+        and "\n" not in str(caught.value)
+    )
 
 
 def test_toml_of_another_form(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
-"""Boards for tests of the command line: a small scene, and a simulated board behind a pseudo-terminal as behind a port."""
+"""Boards for tests of the command line: a small scene, and a simulated board behind a
+pseudo-terminal as behind a port."""
 
 from __future__ import annotations
 
@@ -41,10 +42,13 @@ def write_scene(path: Path, frames: int = 6) -> Path:
 
 
 def board_of(scene: Path, model: bytes | None = None, *, begun: bool = False) -> SimBoard:
-    """A simulated board before ``scene`` with ``model`` (b"": none); ``begun``: its skin is touched from the start."""
+    """A simulated board before ``scene`` with ``model`` (b"": none); ``begun``: its skin is touched
+    from the start."""
     blob = load_prebuilt()[1] if model is None else model
     empty = bytes([ERASED]) * BANK_BYTES
-    board = SimBoard(SceneSkin(find_device_scene(str(scene))), [bank_bytes(blob, 1) if blob else empty, empty])
+    board = SimBoard(
+        SceneSkin(find_device_scene(str(scene))), [bank_bytes(blob, 1) if blob else empty, empty]
+    )
     if begun:
         board.skin.begin(0)
     return board

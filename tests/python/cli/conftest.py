@@ -26,13 +26,20 @@ def frames_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def changed_frames(frames_file: Path, tmp_path: Path) -> Callable[..., Path]:
-    """Write the frames file with fields replaced (None: left out), past the checks of ``save_frames``."""
+    """Write the frames file with fields replaced (None: left out), past the checks of
+    ``save_frames``."""
 
     def write(name: str = "changed.npz", first: int | None = None, **changes: Any) -> Path:
         fields = dict(np.load(frames_file)) | changes
         if first is not None:
             kept = fields["touch_frame"] < first
-            for key in ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"):
+            for key in (
+                "touch_frame",
+                "touch_xy_mm",
+                "touch_radius_mm",
+                "touch_strength",
+                "touch_sign",
+            ):
                 fields[key] = fields[key][kept]
             for key in ("voltage_v", "frame_name"):
                 fields[key] = fields[key][:first]
@@ -45,7 +52,8 @@ def changed_frames(frames_file: Path, tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
-    """Run the command; it must give ``code``, one line on stderr, nothing on stdout, and no new file. Returns the line."""
+    """Run the command; it must give ``code``, one line on stderr, nothing on stdout, and no new
+    file. Returns the line."""
 
     def run(code: int, *arguments: object) -> str:
         before = sorted(tmp_path.rglob("*"))

@@ -1,4 +1,5 @@
-"""``eitskin calibrate`` from a simulated bench to loads of presses that it never saw, on the host and on a simulated board."""
+"""``eitskin calibrate`` from a simulated bench to loads of presses that it never saw, on the host
+and on a simulated board."""
 
 from __future__ import annotations
 
@@ -37,7 +38,13 @@ Done = Callable[..., str]
 
 def bench(name: str, presses: list[tuple[tuple[float, float], int]]) -> tuple[str, str]:
     """A scene of one frame a press by a flat end of 8 mm, and the list of its weights."""
-    scene = ["[scene]", f'name = "{name}"', f"frames = {len(presses)}", "[effects.noise]", "snr_db = 72.0"]
+    scene = [
+        "[scene]",
+        f'name = "{name}"',
+        f"frames = {len(presses)}",
+        "[effects.noise]",
+        "snr_db = 72.0",
+    ]
     weights = ["first,load_g"]
     for k, ((x, y), grams) in enumerate(presses):
         scene += ["[[touch]]", f"x_mm = {x:.3f}", f"y_mm = {y:.3f}", "radius_mm = 8.0"]
@@ -49,22 +56,30 @@ def bench(name: str, presses: list[tuple[tuple[float, float], int]]) -> tuple[st
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Frames and weights of the bench and of presses that it does not have, and the model calibrated on the first."""
+    """Frames and weights of the bench and of presses that it does not have, and the model
+    calibrated on the first."""
     from eitskin.cli.main import main
 
     path = tmp_path_factory.mktemp("bench")
-    for name, presses in (("weights", [(place, grams) for place in PLACES for grams in GRAMS]), ("new", NEW)):
+    for name, presses in (
+        ("weights", [(place, grams) for place in PLACES for grams in GRAMS]),
+        ("new", NEW),
+    ):
         scene, weights = bench(name, presses)
         (path / f"{name}.toml").write_text(scene)
         (path / f"{name}.csv").write_text(weights)
-        assert main(["scene", "run", str(path / f"{name}.toml"), "-o", str(path / f"{name}.npz")]) == 0
+        assert (
+            main(["scene", "run", str(path / f"{name}.toml"), "-o", str(path / f"{name}.npz")]) == 0
+        )
     frames, listed, out = (str(path / name) for name in ("weights.npz", "weights.csv", "skin.eitm"))
     assert main(["calibrate", frames, "--weights", listed, "-o", out]) == 0
     return path
 
 
 def test_presses_that_it_never_saw_read_their_load(folder: Path, done: Done) -> None:
-    told = json.loads(done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm", "--json"))
+    told = json.loads(
+        done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm", "--json")
+    )
     for frame, (place, grams) in zip(told["frames"], NEW, strict=True):
         (touch,) = frame["touches"]
         assert np.hypot(touch["x_mm"] - place[0], touch["y_mm"] - place[1]) < 1
@@ -92,18 +107,30 @@ def test_it_says_what_it_found(folder: Path, done: Done) -> None:
 
 def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
     """The new presses on a simulated board with this model, recorded to ``path``."""
-    board = SimBoard(SceneSkin(load_scene(folder / "new.toml")), [bank_bytes(blob, 1), bytes([ERASED]) * BANK_BYTES])
+    board = SimBoard(
+        SceneSkin(load_scene(folder / "new.toml")),
+        [bank_bytes(blob, 1), bytes([ERASED]) * BANK_BYTES],
+    )
     options = board_options(decode_model(blob, "made"))
     with Device(SimTransport("test", board)) as device, RunRecorder(path, device, options):
         device.solver(options)
         take_reference(device, 16, streamed=True)
         device.start_scene()
-        return [item for item in follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES) if isinstance(item, LiveFrame)]
+        return [
+            item
+            for item in follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)
+            if isinstance(item, LiveFrame)
+        ]
 
 
 def test_a_board_with_that_model_sends_the_same_load_bits(folder: Path, tmp_path: Path) -> None:
     live = recorded(folder, (folder / "skin.eitm").read_bytes(), tmp_path / "run.eits")
-    told = [t.load_n / NEWTONS_PER_GRAM for frame in live if frame.touches is not None for t in frame.touches.touches]
+    told = [
+        t.load_n / NEWTONS_PER_GRAM
+        for frame in live
+        if frame.touches is not None
+        for t in frame.touches.touches
+    ]
     assert told == pytest.approx([grams for _, grams in NEW], rel=SOME)
     check, _ = check_recording(tmp_path / "run.eits", folder / "skin.eitm")
     assert (check.touches, check.different) == (len(NEW), [])
@@ -120,28 +147,56 @@ def test_a_recorded_run_calibrates_too(folder: Path, tmp_path: Path, done: Done)
     facts = json.loads(done("calibrate", path, "--weights", listed, "--json"))
     assert (facts["presses"], facts["places"], facts["gain_order"]) == (4, 4, 0)
     assert "4 places: the gain is taken to be the same everywhere" in facts["notes"][0]
-    both = ("calibrate", path, folder / "weights.npz", "--weights", listed, "--weights", folder / "weights.csv", "--json")
+    both = (
+        "calibrate",
+        path,
+        folder / "weights.npz",
+        "--weights",
+        listed,
+        "--weights",
+        folder / "weights.csv",
+        "--json",
+    )
     assert json.loads(done(*both))["presses"] == 54
 
 
-def test_weights_that_do_not_show_are_named(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_weights_that_do_not_show_are_named(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     from eitskin.cli.main import main
 
     rows = (folder / "weights.csv").read_text().splitlines()
-    elsewhere = ["first,load_g,x_mm,y_mm", *(f"{row},," for row in rows[1:-1]), f"{rows[-1]},0,0"]  # that one stands near the rim
+    elsewhere = [
+        "first,load_g,x_mm,y_mm",
+        *(f"{row},," for row in rows[1:-1]),
+        f"{rows[-1]},0,0",
+    ]  # that one stands near the rim
     (tmp_path / "w.csv").write_text("\n".join(elsewhere))
-    assert main(["calibrate", str(folder / "weights.npz"), "--weights", str(tmp_path / "w.csv")]) == 0
-    assert "weights.npz: frames 49 to 49: 0 of 1 show the weight; left out" in capsys.readouterr().err
+    assert (
+        main(["calibrate", str(folder / "weights.npz"), "--weights", str(tmp_path / "w.csv")]) == 0
+    )
+    assert (
+        "weights.npz: frames 49 to 49: 0 of 1 show the weight; left out" in capsys.readouterr().err
+    )
 
 
 def test_refusals(folder: Path, refused: Refused, tmp_path: Path) -> None:
     frames, listed = folder / "weights.npz", folder / "weights.csv"
-    assert "1 recordings and 2 lists of weights" in refused(2, "calibrate", frames, "--weights", listed, "--weights", listed)
+    assert "1 recordings and 2 lists of weights" in refused(
+        2, "calibrate", frames, "--weights", listed, "--weights", listed
+    )
     (tmp_path / "w.csv").write_text("first,load_g\n50,10\n")
     assert "frames 50 to 50 of the list of weights are not there; it has frames 0 to 49" in refused(
         8, "calibrate", frames, "--weights", tmp_path / "w.csv"
     )
     (tmp_path / "w.csv").write_text("first,load_g\n0,10\n1,20\n")
-    assert "2 presses are too few" in refused(8, "calibrate", frames, "--weights", tmp_path / "w.csv")
-    assert "no such frames file" in refused(3, "calibrate", tmp_path / "none.npz", "--weights", listed).lower()
-    assert "--seed -1 must be 0 or above" in refused(2, "calibrate", frames, "--weights", listed, "--seed", "-1")
+    assert "2 presses are too few" in refused(
+        8, "calibrate", frames, "--weights", tmp_path / "w.csv"
+    )
+    assert (
+        "no such frames file"
+        in refused(3, "calibrate", tmp_path / "none.npz", "--weights", listed).lower()
+    )
+    assert "--seed -1 must be 0 or above" in refused(
+        2, "calibrate", frames, "--weights", listed, "--seed", "-1"
+    )

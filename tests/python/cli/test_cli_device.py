@@ -53,7 +53,9 @@ def json_lines(text: str) -> list[dict[str, Any]]:
 # ---- stream ----
 
 
-def test_two_touches_within_two_millimetres_of_the_scene(done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_touches_within_two_millimetres_of_the_scene(
+    done: Done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The issue's own words, before the simulated board; the emulated one has the same test."""
     monkeypatch.chdir(tmp_path)
     out = done("stream", "--device", "sim:two_touch.toml", "--mode", "touches", "--frames", "20")
@@ -62,26 +64,44 @@ def test_two_touches_within_two_millimetres_of_the_scene(done: Done, tmp_path: P
     for line in lines[:20]:
         errors = [float(error) for error in OFF_BY.findall(line)]
         assert len(errors) == 2 and max(errors) < 2.0, line
-    assert lines[20].startswith("20 frames, 20.0 a second of the board's time; 0 gaps (0 packets missing)")
+    assert lines[20].startswith(
+        "20 frames, 20.0 a second of the board's time; 0 gaps (0 packets missing)"
+    )
     assert "40 of 40 touches found, 0 false" in lines[21]
 
 
 def test_image_places_and_picture(done: Done, tmp_path: Path) -> None:
     picture = tmp_path / "images.png"
-    out = done("stream", "--device", "sim:two_touch", "--mode", "image", "--frames", "20", "--picture", picture)
+    out = done(
+        "stream",
+        "--device",
+        "sim:two_touch",
+        "--mode",
+        "image",
+        "--frames",
+        "20",
+        "--picture",
+        picture,
+    )
     errors = [float(error) for error in OFF_BY.findall(out)]
     assert len(errors) == 40 and max(errors) < 2.0
     assert picture.read_bytes()[:8] == PNG and f"picture: {picture}" in out
 
 
 def test_stream_for_programs(done: Done, scene: Path) -> None:
-    *frames, last = json_lines(done("stream", "--device", f"sim:{scene}", "--mode", "raw,image,touches", "--json"))
+    *frames, last = json_lines(
+        done("stream", "--device", f"sim:{scene}", "--mode", "raw,image,touches", "--json")
+    )
     assert len(frames) == FRAMES
     numbers = [frame["frame"] for frame in frames]
     assert numbers == list(range(numbers[0], numbers[0] + FRAMES))
     assert [frame["time_s"] for frame in frames] == pytest.approx(0.05 * np.arange(FRAMES))
     for frame in frames:
-        assert len(frame["voltage_v"]) == 208 and len(frame["quality"]) == 208 and len(frame["image_s_per_m"]) == 812
+        assert (
+            len(frame["voltage_v"]) == 208
+            and len(frame["quality"]) == 208
+            and len(frame["image_s_per_m"]) == 812
+        )
         assert frame["touches"][0]["error_mm"] < 3.0 and frame["touches"][0]["id"] == 1
         assert frame["true"] == [{"x_mm": -40.0, "y_mm": 10.0, "radius_mm": 9.0, "contrast": 9.0}]
         assert frame["info"]["status"] == 0 and frame["info"]["iterations"] >= 1
@@ -94,7 +114,19 @@ def test_stream_for_programs(done: Done, scene: Path) -> None:
 def test_raw_lines_tell_of_the_scan(done: Done, scene: Path) -> None:
     full = done("stream", "--device", f"sim:{scene}", "--mode", "raw", "--frames", "2").splitlines()
     assert all("raw: 208 rows in 20.78 ms" in line and "copied" not in line for line in full[:2])
-    halved = done("stream", "--device", f"sim:{scene}", "--mode", "raw", "--frames", "2", "--reciprocal", "0", "--tare", "4")
+    halved = done(
+        "stream",
+        "--device",
+        f"sim:{scene}",
+        "--mode",
+        "raw",
+        "--frames",
+        "2",
+        "--reciprocal",
+        "0",
+        "--tare",
+        "4",
+    )
     assert halved.count("raw: 208 rows in 10.38 ms") == halved.count("104 copied") == 2
 
 
@@ -129,14 +161,19 @@ def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     assert {info["iterations"] for info in infos("--iterations", "7")} == {7}
     assert {info["stop"] for info in infos("--gap", "0.05", "--iterations", "1000")} == {"gap"}
     warm, cold = infos("--iterations", "10", "--warm"), infos("--iterations", "10", "--cold")
-    assert warm[0]["gap_rel"] == cold[0]["gap_rel"] and warm[-1]["gap_rel"] < 0.5 * cold[-1]["gap_rel"]
+    assert (
+        warm[0]["gap_rel"] == cold[0]["gap_rel"] and warm[-1]["gap_rel"] < 0.5 * cold[-1]["gap_rel"]
+    )
     other = infos("--sign", "decrease", "--iterations", "3", "--ignore", "all")
     assert other[0]["nonzeros"] != infos("--iterations", "3")[0]["nonzeros"]
     assert all(info["findings"] == [] for info in other)
 
 
-def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Touches that conduct, where what insulates is looked for, are what a stale reference gives."""
+def test_findings_are_said_once_they_rise_and_stand_in_each_frame(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Touches that conduct, where what insulates is looked for, are what a stale reference
+    gives."""
     arguments = ["stream", "--device", f"sim:{scene}", "--sign", "decrease"]
     assert main([*arguments, "--json"]) == 0
     out, err = capsys.readouterr()
@@ -145,8 +182,8 @@ def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene: Path, c
     lines = [line for line in err.splitlines() if "stale reference" in line]
     assert len(shown) > 3
     assert lines == [
-        f"eitskin: stale reference, frame {shown[2]}: the skin has changed since it was taken; leave it untouched and run  "
-        "eitskin tare"
+        f"eitskin: stale reference, frame {shown[2]}: the skin has changed since it was taken;"
+        " leave it untouched and run  eitskin tare"
     ]
     assert main([*arguments, "--ignore", "stale-reference,crowded"]) == 0
     out, err = capsys.readouterr()
@@ -163,7 +200,14 @@ def test_every_other_frame(done: Done, scene: Path) -> None:
 def test_another_model_than_the_prebuilt_one(done: Done, scene: Path, tmp_path: Path) -> None:
     model = tmp_path / "small.eitm"
     model.write_bytes(small_blob())
-    given = ("--device", f"sim:{scene}", "--model", model, "--ignore", "misfit")  # the coarse model does not fit the scene well
+    given = (
+        "--device",
+        f"sim:{scene}",
+        "--model",
+        model,
+        "--ignore",
+        "misfit",
+    )  # the coarse model does not fit the scene well
     frames = json_lines(done("stream", *given, "--mode", "image", "--json"))
     assert len(frames) == FRAMES + 1 and len(frames[0]["image_s_per_m"]) < 812
 
@@ -177,9 +221,17 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
         device = f"serial:{port}"
         assert main(["stream", "--device", device, "--frames", "3"]) == 0
         out, err = capsys.readouterr()
-        assert "leave the skin untouched: taking the reference from 16 frames" in err and "touch it" in err
-        assert all(line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (gate)") for line in out.splitlines()[:3])
-        assert main(["stream", "--device", device, "--frames", "3"]) == 0  # it has its reference already
+        assert (
+            "leave the skin untouched: taking the reference from 16 frames" in err
+            and "touch it" in err
+        )
+        assert all(
+            line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (gate)")
+            for line in out.splitlines()[:3]
+        )
+        assert (
+            main(["stream", "--device", device, "--frames", "3"]) == 0
+        )  # it has its reference already
         out, err = capsys.readouterr()
         assert err == "" and out.startswith("     ")
         assert main(["tare", "--device", device, "--frames", "4", "--json"]) == 0
@@ -192,7 +244,21 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 def test_a_slow_line_is_not_overrun(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with behind_a_port(board_of(scene)) as port:
-        assert main(["stream", "--device", f"serial:{port}?baud=115200", "--mode", "image", "--frames", "4", "--json"]) == 0
+        assert (
+            main(
+                [
+                    "stream",
+                    "--device",
+                    f"serial:{port}?baud=115200",
+                    "--mode",
+                    "image",
+                    "--frames",
+                    "4",
+                    "--json",
+                ]
+            )
+            == 0
+        )
         out, err = capsys.readouterr()
         assert "the line carries one frame in 7 of image; name another number with  --every" in err
         assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
@@ -236,11 +302,21 @@ def test_info_of_a_simulated_board(done: Done) -> None:
     assert "reference   none; leave the skin untouched and run  eitskin tare" in text
     facts = strict(done("info", "--device", "sim:two_touch", "--json"))
     assert facts["board"]["protocol_hash"] == f"{prebuilt()[0].protocol.hash:016x}"
-    assert set(facts["statistics"]["stages"]) == {"scan", "demodulate", "solve", "touches", "send", "frame"}
+    assert set(facts["statistics"]["stages"]) == {
+        "scan",
+        "demodulate",
+        "solve",
+        "touches",
+        "send",
+        "frame",
+    }
 
 
 def test_tare(done: Done, scene: Path) -> None:
-    assert done("tare", "--device", f"sim:{scene}", "--frames", "4") == f"sim:{scene}: reference taken from 4 frames\n"
+    assert (
+        done("tare", "--device", f"sim:{scene}", "--frames", "4")
+        == f"sim:{scene}: reference taken from 4 frames\n"
+    )
 
 
 # ---- model upload ----
@@ -256,9 +332,26 @@ def test_model_upload(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture
         assert main(["info", "--device", f"serial:{port}", "--json"]) == 0
         assert strict(capsys.readouterr().out)["board"]["model_crc"] == facts["model_crc"]
         # what needs its pixels now needs the file
-        assert main(["stream", "--device", f"serial:{port}", "--mode", "image", "--frames", "1"]) == 12
+        assert (
+            main(["stream", "--device", f"serial:{port}", "--mode", "image", "--frames", "1"]) == 12
+        )
         assert "needs the board's model" in capsys.readouterr().err
-        assert main(["stream", "--device", f"serial:{port}", "--mode", "image", "--frames", "1", "--model", str(model)]) == 0
+        assert (
+            main(
+                [
+                    "stream",
+                    "--device",
+                    f"serial:{port}",
+                    "--mode",
+                    "image",
+                    "--frames",
+                    "1",
+                    "--model",
+                    str(model),
+                ]
+            )
+            == 0
+        )
         # touches are millimetres already
         assert main(["stream", "--device", f"serial:{port}", "--frames", "1"]) == 0
 
@@ -290,7 +383,12 @@ def test_flash_prints_what_it_runs_and_runs_it(
     flash = ["flash", "--image", str(image), "--tool", "st-flash"]
     assert main([*flash, "--dry-run"]) == 0
     planned = capsys.readouterr().out.splitlines()
-    assert not log.exists() and str(image) in planned[0] and "0x08000000" in planned[0] and "0x08040000" in planned[1]
+    assert (
+        not log.exists()
+        and str(image) in planned[0]
+        and "0x08000000" in planned[0]
+        and "0x08040000" in planned[1]
+    )
     assert main(flash) == 0
     out, err = capsys.readouterr()
     assert err.splitlines() == planned and "eitskin info" in out
@@ -309,7 +407,9 @@ def test_doctor_on_a_healthy_board(done: Done, scene: Path) -> None:
     facts = strict(done("doctor", "--device", f"sim:{scene}", "--frames", "8", "--json"))
     assert facts["healthy"] and facts["source"] == f"sim:{scene}"
     assert facts["measured"]["quiet_frames"] == 8 and facts["measured"]["board_frames_scanned"] == 8
-    touched = strict(done("doctor", "--device", f"sim:{scene}", "--frames", "6", "--touch=-40,10,9", "--json"))
+    touched = strict(
+        done("doctor", "--device", f"sim:{scene}", "--frames", "6", "--touch=-40,10,9", "--json")
+    )
     assert touched["healthy"] and "numbering_by_touch" in touched["measured"]
 
 
@@ -318,10 +418,16 @@ def test_doctor_on_a_board_that_reports_a_fault(
 ) -> None:
     as_it_is = BoardInfo.fault_codes.fget  # type: ignore[attr-defined]
     assert as_it_is is not None
-    monkeypatch.setattr(BoardInfo, "fault_codes", property(lambda info: as_it_is(type(info)(**{**vars(info), "faults": 1 << 2}))))
+    monkeypatch.setattr(
+        BoardInfo,
+        "fault_codes",
+        property(lambda info: as_it_is(type(info)(**{**vars(info), "faults": 1 << 2}))),
+    )
     assert main(["doctor", "--device", f"sim:{scene}", "--frames", "4", "--json"]) == 11
     findings = strict(capsys.readouterr().out)["findings"]
-    assert [finding["name"] for finding in findings] == ["board-electrode-open"] and findings[0]["mend"] == ""
+    assert [finding["name"] for finding in findings] == ["board-electrode-open"] and findings[0][
+        "mend"
+    ] == ""
 
 
 # ---- start-up ----
@@ -329,20 +435,27 @@ def test_doctor_on_a_board_that_reports_a_fault(
 
 def test_the_parser_imports_nothing_heavy() -> None:
     code = (
-        "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\n"
-        "print([name for name in ('numpy', 'scipy', 'serial', 'cffi', 'matplotlib', 'unicorn') if name in sys.modules])"
+        "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\nprint([name for"
+        " name in ('numpy', 'scipy', 'serial', 'cffi', 'matplotlib', 'unicorn') if name in"
+        " sys.modules])"
     )
     assert run_python(code).stdout.strip() == "[]"
 
 
-def test_frames_of_a_recording_give_the_boards_touches(done: Done, scene: Path, tmp_path: Path) -> None:
+def test_frames_of_a_recording_give_the_boards_touches(
+    done: Done, scene: Path, tmp_path: Path
+) -> None:
     run, exported = tmp_path / "run.eits", tmp_path / "run.npz"
     done("record", "--device", f"sim:{scene}", "-o", run)
     assert done("replay", run, "--frames", exported) == f"{exported}: {FRAMES} frames, 16 quiet\n"
     frames = load_frames(exported)
     assert frames.n_frames == FRAMES and len(frames.reference_voltage_v) == 16
     model: Model = prebuilt()[0]
-    assert frames.protocol.hash == model.protocol.hash and frames.meta["board"]["board"] == "simulated"
+    assert (
+        frames.protocol.hash == model.protocol.hash and frames.meta["board"]["board"] == "simulated"
+    )
     board = json_lines(done("replay", run, "--json"))[:-1]
     host = strict(done("reconstruct", exported, "--track", "--json"))["frames"]
-    assert [[t["x_mm"] for t in f["touches"]] for f in host] == [[t["x_mm"] for t in f["touches"]] for f in board]
+    assert [[t["x_mm"] for t in f["touches"]] for f in host] == [
+        [t["x_mm"] for t in f["touches"]] for f in board
+    ]

@@ -1,4 +1,5 @@
-"""What the commands for boards refuse: the documented exit code, one line that says what to do, no traceback, no file left."""
+"""What the commands for boards refuse: the documented exit code, one line that says what to do, no
+traceback, no file left."""
 
 from __future__ import annotations
 
@@ -67,13 +68,19 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["record"], "required: -o/--output"),
         (["replay"], "required: RUN.eits"),
         (["replay", "x.eits", "--first", "0"], "--first 0 is out of range"),
-        (["replay", "x.eits", "--check", "--mode", "raw"], "leave them out with --check and --frames"),
+        (
+            ["replay", "x.eits", "--check", "--mode", "raw"],
+            "leave them out with --check and --frames",
+        ),
         (["flash", "--tool", "dfu"], "invalid choice: 'dfu'"),
         (["flash", "--model", "x.eitm", "--no-model"], "contradict each other"),
         (["flash", "--json"], "--json goes with --dry-run"),
         (["doctor"], "name frames to examine, or a board"),
         (["doctor", "x.npz", "--device", "auto"], "name frames to examine, or a board"),
-        (["doctor", "--device", "sim:two_touch", "--frames", "2"], "--frames 2 is out of range; use 4 to 1024"),
+        (
+            ["doctor", "--device", "sim:two_touch", "--frames", "2"],
+            "--frames 2 is out of range; use 4 to 1024",
+        ),
         (["model", "upload"], "required: MODEL.eitm"),
     ],
 )
@@ -91,9 +98,21 @@ def test_arguments(refused: Refused, arguments: list[str], text: str) -> None:
         (FILE, ["stream", "--device", "sim:two_tuch"], "did you mean 'two_touch'"),
         (FILE, ["stream", "--device", "emu:two_tuch"], "did you mean 'two_touch'"),
         (FILE, ["stream", "--device", "file:none.eits"], "no such recording"),
-        (FILE, ["stream", "--device", "sim:two_touch", "--picture", "no/such/folder/x.png"], "make it first"),
-        (FILE, ["stream", "--device", "sim:two_touch", "--record", "no/such/folder/x.eits"], "make it first"),
-        (FILE, ["record", "--device", "sim:two_touch", "-o", "no/such/folder/x.eits"], "make it first"),
+        (
+            FILE,
+            ["stream", "--device", "sim:two_touch", "--picture", "no/such/folder/x.png"],
+            "make it first",
+        ),
+        (
+            FILE,
+            ["stream", "--device", "sim:two_touch", "--record", "no/such/folder/x.eits"],
+            "make it first",
+        ),
+        (
+            FILE,
+            ["record", "--device", "sim:two_touch", "-o", "no/such/folder/x.eits"],
+            "make it first",
+        ),
         (FILE, ["stream", "--device", "sim:two_touch", "--model", "none.eitm"], "no such model"),
         (FILE, ["model", "upload", "none.eitm", "--device", "sim:two_touch"], "no such model"),
         (FILE, ["replay", "none.eits"], "no such recording"),
@@ -102,21 +121,40 @@ def test_arguments(refused: Refused, arguments: list[str], text: str) -> None:
     ],
 )
 def test_files(
-    refused: Refused, code: int, arguments: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    refused: Refused,
+    code: int,
+    arguments: list[str],
+    text: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert text in refused(code, *arguments)
 
 
-@pytest.mark.parametrize("command", [("replay",), ("replay", "--check"), ("replay", "--frames", "x.npz"), ("stream", "--device")])
-@pytest.mark.parametrize("content", [b"", b"\x93NUMPY", bytes(3000), encode(0x70, 0, b"not JSON"), encode(0x70, 0, b"[1]")])
+@pytest.mark.parametrize(
+    "command",
+    [("replay",), ("replay", "--check"), ("replay", "--frames", "x.npz"), ("stream", "--device")],
+)
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"\x93NUMPY", bytes(3000), encode(0x70, 0, b"not JSON"), encode(0x70, 0, b"[1]")],
+)
 def test_what_is_no_recording(
-    command: tuple[str, ...], content: bytes, refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: tuple[str, ...],
+    content: bytes,
+    refused: Refused,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "run.eits"
     path.write_bytes(content)
-    given = [*command, f"file:{path}"] if command[0] == "stream" else [command[0], str(path), *command[1:]]
+    given = (
+        [*command, f"file:{path}"]
+        if command[0] == "stream"
+        else [command[0], str(path), *command[1:]]
+    )
     line = refused(FILE, *given)
     assert str(path) in line and "no eitskin recording" in line
 
@@ -134,7 +172,9 @@ def test_a_recording_takes_no_settings(refused: Refused, scene: Path, tmp_path: 
     assert main(["record", "--device", f"sim:{scene}", "-o", str(path), "--frames", "1"]) == 0
     for options in (["--samples", "40"], ["--iterations", "3"], ["--tare", "4"], ["--cold"]):
         assert "is a recording" in refused(USAGE, "stream", "--device", f"file:{path}", *options)
-    assert "is a recording already" in refused(USAGE, "record", "--device", f"file:{path}", "-o", tmp_path / "again.eits")
+    assert "is a recording already" in refused(
+        USAGE, "record", "--device", f"file:{path}", "-o", tmp_path / "again.eits"
+    )
     for command in (["tare"], ["model", "upload", write_model(tmp_path)]):
         assert "is a recording" in refused(DEVICE, *command, "--device", f"file:{path}")
 
@@ -152,34 +192,48 @@ def test_a_recording_without_raw_frames(refused: Refused, scene: Path, tmp_path:
     assert "no raw frames" in refused(FRAME, "replay", path, "--frames", tmp_path / "x.npz")
 
 
-def test_images_that_are_none(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_images_that_are_none(
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     tool = tmp_path / "pyocd"
     tool.write_text("#!/bin/sh\n", encoding="utf-8")
     tool.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    images = ((b"\x7fELF" + bytes(600), "give the .bin"), (bytes(1024), "no firmware image"), (bytes(2**19), "room for"))
+    images = (
+        (b"\x7fELF" + bytes(600), "give the .bin"),
+        (bytes(1024), "no firmware image"),
+        (bytes(2**19), "room for"),
+    )
     for content, text in images:
         path = tmp_path / "image.bin"
         path.write_bytes(content)
         assert text in refused(DEVICE, "flash", "--image", path, "--dry-run")
 
 
-def test_no_tool_to_flash_with(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_tool_to_flash_with(
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from test_cli_device import image_file
 
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert "apt install openocd" in refused(DEVICE, "flash", "--image", image_file(tmp_path / "firmware.bin"))
+    assert "apt install openocd" in refused(
+        DEVICE, "flash", "--image", image_file(tmp_path / "firmware.bin")
+    )
 
 
 # ---- ports ----
 
 
-def test_auto_without_a_board_and_with_two(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_without_a_board_and_with_two(
+    refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("eitskin.device.ports.ports", lambda: [Port("/dev/ttyS0")])
     assert "no ST-LINK port is there" in refused(DEVICE, "info")
     two = [Port(f"/dev/ttyACM{k}", "STLink", 0x0483, 0x374B) for k in range(2)]
     monkeypatch.setattr("eitskin.device.ports.ports", lambda: two)
-    assert "several boards are there (/dev/ttyACM0 (STLink), /dev/ttyACM1 (STLink))" in refused(DEVICE, "stream")
+    assert "several boards are there (/dev/ttyACM0 (STLink), /dev/ttyACM1 (STLink))" in refused(
+        DEVICE, "stream"
+    )
 
 
 def test_ports_that_cannot_be_used(refused: Refused, tmp_path: Path) -> None:
@@ -202,7 +256,13 @@ def test_a_board_without_a_model(scene: Path, capsys: pytest.CaptureFixture[str]
         device = f"serial:{port}"
         assert main(["info", "--device", device]) == 0
         assert "none; upload one with  eitskin model upload" in capsys.readouterr().out
-        for command in (["stream"], ["stream", "--mode", "image"], ["tare"], ["doctor"], ["record", "-o", os.devnull]):
+        for command in (
+            ["stream"],
+            ["stream", "--mode", "image"],
+            ["tare"],
+            ["doctor"],
+            ["record", "-o", os.devnull],
+        ):
             if command[0] == "record":
                 continue
             assert main([*command, "--device", device]) == DEVICE, command
@@ -210,10 +270,15 @@ def test_a_board_without_a_model(scene: Path, capsys: pytest.CaptureFixture[str]
             assert line.startswith(f"eitskin: {port}: ") and "eitskin model upload" in line, line
 
 
-def test_a_model_that_is_not_the_boards(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_model_that_is_not_the_boards(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     model = write_model(tmp_path)
     with behind_a_port(board_of(scene)) as port:
-        assert main(["stream", "--device", f"serial:{port}", "--model", str(model), "--mode", "image"]) == DEVICE
+        assert (
+            main(["stream", "--device", f"serial:{port}", "--model", str(model), "--mode", "image"])
+            == DEVICE
+        )
         line = capsys.readouterr().err
         assert "checksum" in line and "eitskin model upload" in line and line.count("\n") == 1
     with behind_a_port(board_of(scene, small_blob())) as port:
@@ -226,7 +291,9 @@ def test_a_model_that_is_not_the_boards(scene: Path, tmp_path: Path, capsys: pyt
 def test_what_the_board_refuses(refused: Refused, scene: Path) -> None:
     device = ["--device", f"sim:{scene}"]
     assert "the nearest that are: 80" in refused(DEVICE, "stream", *device, "--samples", "79")
-    assert "frame period of at least 20800 us" in refused(DEVICE, "stream", *device, "--frame-period-us", "10000")
+    assert "frame period of at least 20800 us" in refused(
+        DEVICE, "stream", *device, "--frame-period-us", "10000"
+    )
 
 
 # ---- extras ----
@@ -234,10 +301,26 @@ def test_what_the_board_refuses(refused: Refused, scene: Path) -> None:
 
 def test_without_the_emulator(scene: Path) -> None:
     done = run_python(without("unicorn") + MAIN, "stream", "--device", f"emu:{scene}")
-    assert done.returncode == EXTRA and "pip install 'eitskin[emulator]'" in done.stderr and done.stderr.count("\n") == 1
+    assert (
+        done.returncode == EXTRA
+        and "pip install 'eitskin[emulator]'" in done.stderr
+        and done.stderr.count("\n") == 1
+    )
 
 
 def test_pictures_without_matplotlib(scene: Path, tmp_path: Path) -> None:
-    arguments = ["stream", "--device", f"sim:{scene}", "--mode", "image", "--picture", tmp_path / "x.png"]
+    arguments = [
+        "stream",
+        "--device",
+        f"sim:{scene}",
+        "--mode",
+        "image",
+        "--picture",
+        tmp_path / "x.png",
+    ]
     done = run_python(without("matplotlib") + MAIN, *arguments)
-    assert done.returncode == EXTRA and "eitskin[plot]" in done.stderr and not (tmp_path / "x.png").exists()
+    assert (
+        done.returncode == EXTRA
+        and "eitskin[plot]" in done.stderr
+        and not (tmp_path / "x.png").exists()
+    )

@@ -44,13 +44,16 @@ OUTLINES = {
     "clockwise L": "polygon_mm = [[0, 100], [40, 100], [40, 40], [100, 40], [100, 0], [0, 0]]",
 }
 FACTS = (
-    "model", "bytes", "made_by", "skin", "electrodes", "protocol_rows", "protocol_hash", "folded_rows", "rank", "pixels",
+    "model", "bytes", "made_by", "skin", "electrodes", "protocol_rows", "protocol_hash",
+    "folded_rows", "rank", "pixels",
     "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "calibration", "defaults",
 )  # fmt: skip
 QUICK = ("--elements", "900", "--pixels", "14")
 
 
-def write_skin(folder: Path, outline: str = "disk", count: int = 16, kind: str = "adjacent") -> Path:
+def write_skin(
+    folder: Path, outline: str = "disk", count: int = 16, kind: str = "adjacent"
+) -> Path:
     path = folder / "skin.toml"
     path.write_text(SKIN.format(outline=OUTLINES[outline], count=count, kind=kind))
     return path
@@ -59,21 +62,55 @@ def write_skin(folder: Path, outline: str = "disk", count: int = 16, kind: str =
 @pytest.mark.parametrize(
     ("outline", "count", "kind", "options", "expected"),
     [
-        ("disk", 16, "adjacent", [], {"protocol_rows": 208, "folded_rows": 104, "rank": 64, "storage": "f32"}),
-        ("disk", 32, "adjacent", ["--storage", "i8"], {"protocol_rows": 928, "folded_rows": 464, "rank": 64, "storage": "i8"}),
-        ("L", 16, "opposite", ["--rank", "20", "--storage", "f16"], {"protocol_rows": 192, "rank": 20, "storage": "f16"}),
-        ("clockwise L", 8, "adjacent", ["--data", "log-ratio"], {"protocol_rows": 40, "rank": 20, "data": "log-ratio"}),
+        (
+            "disk",
+            16,
+            "adjacent",
+            [],
+            {"protocol_rows": 208, "folded_rows": 104, "rank": 64, "storage": "f32"},
+        ),
+        (
+            "disk",
+            32,
+            "adjacent",
+            ["--storage", "i8"],
+            {"protocol_rows": 928, "folded_rows": 464, "rank": 64, "storage": "i8"},
+        ),
+        (
+            "L",
+            16,
+            "opposite",
+            ["--rank", "20", "--storage", "f16"],
+            {"protocol_rows": 192, "rank": 20, "storage": "f16"},
+        ),
+        (
+            "clockwise L",
+            8,
+            "adjacent",
+            ["--data", "log-ratio"],
+            {"protocol_rows": 40, "rank": 20, "data": "log-ratio"},
+        ),
     ],
 )
 def test_build_info_verify(
-    outline: str, count: int, kind: str, options: list[str], expected: dict[str, object], done: Done, tmp_path: Path
+    outline: str,
+    count: int,
+    kind: str,
+    options: list[str],
+    expected: dict[str, object],
+    done: Done,
+    tmp_path: Path,
 ) -> None:
     skin, model = write_skin(tmp_path, outline, count, kind), tmp_path / "palm.eitm"
     built = json.loads(done("model", "build", skin, "-o", model, "--json", *QUICK, *options))
     assert tuple(built) == FACTS
     assert json.loads(done("model", "info", model, "--json")) == built
     assert built == built | expected
-    assert built["bytes"] == model.stat().st_size and built["skin"] == "palm" and built["electrodes"] == count
+    assert (
+        built["bytes"] == model.stat().st_size
+        and built["skin"] == "palm"
+        and built["electrodes"] == count
+    )
     assert built["protocol_hash"] == f"{load_skin(skin)[1].hash:016x}"
     assert set(built["defaults"]) == set(asdict(Defaults()))
     assert load_model(model)[0].skin == load_skin(skin)[0]
@@ -86,7 +123,8 @@ def test_build_info_verify(
 
 
 def test_a_clockwise_outline_is_the_same_skin(done: Done, tmp_path: Path) -> None:
-    """Orientation is normalised: the same area, pixels and electrodes, wherever the list of points begins."""
+    """Orientation is normalised: the same area, pixels and electrodes, wherever the list of points
+    begins."""
     models = {}
     for outline in ("L", "clockwise L"):
         skin, path = write_skin(tmp_path, outline), tmp_path / f"{outline}.eitm"
@@ -101,7 +139,21 @@ def test_a_clockwise_outline_is_the_same_skin(done: Done, tmp_path: Path) -> Non
 
 def test_touch_change_and_floor_reach_the_model(done: Done, tmp_path: Path) -> None:
     skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
-    facts = json.loads(done("model", "build", skin, "-o", path, "--json", "--touch-change", "2", "--floor", "0.1", *QUICK))
+    facts = json.loads(
+        done(
+            "model",
+            "build",
+            skin,
+            "-o",
+            path,
+            "--json",
+            "--touch-change",
+            "2",
+            "--floor",
+            "0.1",
+            *QUICK,
+        )
+    )
     assert facts["defaults"]["touch_change_s_per_m"] == 0.04
     assert facts["lipschitz"] == pytest.approx(1 / 1.1, rel=2e-4)
 
@@ -135,16 +187,25 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     """The module as users run it: exit codes, streams, and output in pipes."""
     command = [sys.executable, "-m", "eitskin.cli.main"]
     skin = write_skin(tmp_path)
-    built = run_command([*command, "model", "build", "skin.toml", "-o", "palm.eitm", "--json", *QUICK], cwd=tmp_path)
+    built = run_command(
+        [*command, "model", "build", "skin.toml", "-o", "palm.eitm", "--json", *QUICK], cwd=tmp_path
+    )
     assert (built.returncode, built.stderr) == (0, "")
     assert json.loads(built.stdout)["model"] == "palm.eitm"
     skin.write_text(skin.read_text().replace("thickness_mm", "thicknes_mm"))
-    refused = run_command([*command, "model", "build", "skin.toml", "-o", "other.eitm"], cwd=tmp_path)
+    refused = run_command(
+        [*command, "model", "build", "skin.toml", "-o", "other.eitm"], cwd=tmp_path
+    )
     assert (refused.returncode, refused.stdout) == (4, "")
-    assert refused.stderr == "eitskin: skin.toml [skin]: unknown key 'thicknes_mm'; did you mean 'thickness_mm'?\n"
+    assert (
+        refused.stderr
+        == "eitskin: skin.toml [skin]: unknown key 'thicknes_mm'; did you mean 'thickness_mm'?\n"
+    )
     (tmp_path / "palm.eitm").write_bytes((tmp_path / "palm.eitm").read_bytes()[:-16])
     broken = run_command([*command, "model", "verify", "palm.eitm"], cwd=tmp_path)
-    assert broken.returncode == 6 and broken.stderr.startswith("eitskin: palm.eitm: the model is truncated")
+    assert broken.returncode == 6 and broken.stderr.startswith(
+        "eitskin: palm.eitm: the model is truncated"
+    )
     wrong = run_command([*command, "model", "verfy"], cwd=tmp_path)
     assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1
     traced = run_command([*command, "--traceback", "model", "info", "none.eitm"], cwd=tmp_path)
@@ -165,8 +226,8 @@ def test_a_pipe_that_closes_early_leaves_no_traceback() -> None:
 def test_start_up_imports_little() -> None:
     """Help needs no numpy; info needs neither scipy nor matplotlib."""
     code = (
-        "import sys\nfrom eitskin.cli.main import main\nmain(sys.argv[1:])\n"
-        "print([name for name in ('scipy', 'matplotlib', 'netgen', 'sklearn') if name in sys.modules], file=sys.stderr)"
+        "import sys\nfrom eitskin.cli.main import main\nmain(sys.argv[1:])\nprint([name for name in"
+        " ('scipy', 'matplotlib', 'netgen', 'sklearn') if name in sys.modules], file=sys.stderr)"
     )
     done = run_python(code, "model", "info")
     assert (done.returncode, done.stderr) == (0, "[]\n")

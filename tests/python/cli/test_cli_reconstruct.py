@@ -27,20 +27,26 @@ Done = Callable[..., str]
 PNG = b"\x89PNG\r\n\x1a\n"
 TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence", "load_n"}
 INFO = {
-    "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs", "lambda", "lambda_max",
+    "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs",
+    "lambda", "lambda_max",
     "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",
     "findings", "found", "saturated", "glitches", "misfit", "unexplained", "floor",
     "open_electrodes", "bridged_electrodes", "noisy_electrodes",
 }  # fmt: skip
 SUMMARY = {
-    "frames", "found", "true", "false", "position_median_mm", "position_worst_mm", "miou_image", "miou_touches",
+    "frames", "found", "true", "false", "position_median_mm", "position_worst_mm", "miou_image",
+    "miou_touches",
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("engine", ["c", "c64", "numpy"])
 def test_json(engine: str, done: Done, frames_file: Path) -> None:
     facts = json.loads(done("reconstruct", frames_file, "--engine", engine, "--json"))
-    assert (facts["model"], facts["engine"], len(facts["frames"])) == ("prebuilt paper skin", engine, 20)
+    assert (facts["model"], facts["engine"], len(facts["frames"])) == (
+        "prebuilt paper skin",
+        engine,
+        20,
+    )
     for number, frame in enumerate(facts["frames"]):
         assert frame["frame"] == number and frame["name"] == f"test-s3-{number}"
         assert set(frame["info"]) == INFO and frame["info"]["iterations"] == 60
@@ -57,8 +63,11 @@ def test_json(engine: str, done: Done, frames_file: Path) -> None:
     assert summary["miou_image"] > 0.8 and summary["miou_touches"] > 0.88
 
 
-def test_what_is_found_is_said(done: Done, frames_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A detached electrode in frame 1, a glitch in frame 2: by name in table and JSON; too many rows: refused, by name."""
+def test_what_is_found_is_said(
+    done: Done, frames_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A detached electrode in frame 1, a glitch in frame 2: by name in table and JSON; too many
+    rows: refused, by name."""
     frames = load_frames(frames_file)
     spoilt = frames.voltage_v.copy()
     spoilt[1, (frames.protocol.drive_measure == 5).any(axis=1)] = 0.0
@@ -68,7 +77,11 @@ def test_what_is_found_is_said(done: Done, frames_file: Path, tmp_path: Path, ca
     code = main(["reconstruct", str(tmp_path / "spoilt.npz"), "--json"])
     said = capsys.readouterr()
     listed = json.loads(said.out)["frames"]
-    assert code == 8 and "electrodes 2, 6 and 10 open" in listed[3]["refused"] and "electrodes 2, 6 and 10 open" in said.err
+    assert (
+        code == 8
+        and "electrodes 2, 6 and 10 open" in listed[3]["refused"]
+        and "electrodes 2, 6 and 10 open" in said.err
+    )
     assert listed[1]["info"]["found"][0] == "electrode 5 open" and listed[1]["info"]["masked"] == 52
     assert listed[2]["info"]["findings"][0] == "glitch" and listed[2]["info"]["glitches"] in (1, 2)
     assert listed[0]["info"]["masked"] == 0 and set(listed[0]["info"]["findings"]) <= {"crowded"}
@@ -77,7 +90,9 @@ def test_what_is_found_is_said(done: Done, frames_file: Path, tmp_path: Path, ca
 
 
 def test_what_it_says_is_what_the_reconstructor_does(done: Done, frames_file: Path) -> None:
-    facts = json.loads(done("reconstruct", frames_file, "--json", "--iterations", "25", "--sign", "both"))
+    facts = json.loads(
+        done("reconstruct", frames_file, "--json", "--iterations", "25", "--sign", "both")
+    )
     reconstructor = Reconstructor(*prebuilt()[:1], blob=prebuilt()[1])
     reconstructor.with_options(iterations=25, sign="both")
     reconstructor.tare(session().quiet_v)
@@ -88,8 +103,13 @@ def test_what_it_says_is_what_the_reconstructor_does(done: Done, frames_file: Pa
         assert [(t["x_mm"], t["y_mm"]) for t in listed] == [(t.x_mm, t.y_mm) for t in touches]
 
 
-def test_threads_change_nothing(done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    one, three = (json.loads(done("reconstruct", frames_file, "--json", *threads)) for threads in ((), ("--threads", "3")))
+def test_threads_change_nothing(
+    done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one, three = (
+        json.loads(done("reconstruct", frames_file, "--json", *threads))
+        for threads in ((), ("--threads", "3"))
+    )
     for frame in (*one["frames"], *three["frames"]):
         del frame["info"]["solve_us"], frame["info"]["touch_us"]
     assert one == three
@@ -103,54 +123,93 @@ def test_threads_change_nothing(done: Done, frames_file: Path, capsys: pytest.Ca
         assert text in capsys.readouterr().err
 
 
-def test_options_reach_the_solver(done: Done, frames_file: Path, changed_frames: Callable[..., Path]) -> None:
-    facts = json.loads(done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000"))
+def test_options_reach_the_solver(
+    done: Done, frames_file: Path, changed_frames: Callable[..., Path]
+) -> None:
+    facts = json.loads(
+        done("reconstruct", frames_file, "--json", "--gap", "0.001", "--iterations", "5000")
+    )
     assert {frame["info"]["stop"] for frame in facts["frames"]} == {"gap"}
     assert all(frame["info"]["gap_rel"] <= 0.001 for frame in facts["frames"])
     infos = {}
     for solver in SOLVERS:
-        facts = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--solver", solver))
+        facts = json.loads(
+            done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--solver", solver)
+        )
         infos[solver] = facts["frames"][0]["info"]
     assert infos["working-set"]["macs"] < 0.25 * infos["fista"]["macs"]
     assert infos["active-set"]["stop"] == "optimum" and infos["active-set"]["gap_rel"] < 1e-5
-    facts = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--mac-limit", "200000"))
-    assert facts["frames"][0]["info"]["stop"] == "macs" and facts["frames"][0]["info"]["macs"] <= 200000
+    facts = json.loads(
+        done("reconstruct", frames_file, "--json", "--only", "test-s3-0", "--mac-limit", "200000")
+    )
+    assert (
+        facts["frames"][0]["info"]["stop"] == "macs"
+        and facts["frames"][0]["info"]["macs"] <= 200000
+    )
     resting = changed_frames(voltage_v=np.repeat(session().frames_v[:1], 20, axis=0))
     cold = json.loads(done("reconstruct", resting, "--json", "--iterations", "10"))["frames"]
-    warm = json.loads(done("reconstruct", resting, "--json", "--iterations", "10", "--warm"))["frames"]
-    assert cold[0]["info"]["gap"] == warm[0]["info"]["gap"] == cold[5]["info"]["gap"] > 2 * warm[5]["info"]["gap"]
-    assert len({frame["touches"][0]["id"] for frame in warm}) == 1 and cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
+    warm = json.loads(done("reconstruct", resting, "--json", "--iterations", "10", "--warm"))[
+        "frames"
+    ]
+    assert (
+        cold[0]["info"]["gap"]
+        == warm[0]["info"]["gap"]
+        == cold[5]["info"]["gap"]
+        > 2 * warm[5]["info"]["gap"]
+    )
+    assert (
+        len({frame["touches"][0]["id"] for frame in warm}) == 1
+        and cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
+    )
     limit = str(0.999 * np.abs(session().frames_v).max())
     masked = json.loads(done("reconstruct", frames_file, "--json", "--saturation-v", limit))
     assert max(frame["info"]["masked"] for frame in masked["frames"]) >= 1
     some = json.loads(done("reconstruct", frames_file, "--json", "--only", "test-s3-4,test-s3-11"))
-    assert [frame["frame"] for frame in some["frames"]] == [4, 11] and some["summary"]["frames"] == 2
+    assert [frame["frame"] for frame in some["frames"]] == [4, 11] and some["summary"][
+        "frames"
+    ] == 2
 
 
 def test_for_people(done: Done, frames_file: Path) -> None:
     text = done("reconstruct", frames_file)
     lines = text.splitlines()
-    assert " ".join(lines[0].split()) == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
+    assert (
+        " ".join(lines[0].split())
+        == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
+    )
     assert text.count("60 iterations (iterations), gap ") == 20
-    assert "20 frames, 0 refused; median " in text and " of " in lines[-1] and lines[-1].startswith("against the truth of 20")
+    assert (
+        "20 frames, 0 refused; median " in text
+        and " of " in lines[-1]
+        and lines[-1].startswith("against the truth of 20")
+    )
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 
 
 def test_quiet_frames_show_nothing(done: Done, changed_frames: Callable[..., Path]) -> None:
     quiet = session().quiet_v
-    empty = dict.fromkeys(["touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"])
+    empty = dict.fromkeys(
+        ["touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign"]
+    )
     names = np.array([f"q{k}" for k in range(8)])
-    path = changed_frames(voltage_v=quiet[:8], reference_voltage_v=quiet[8:], frame_name=names, **empty)
+    path = changed_frames(
+        voltage_v=quiet[:8], reference_voltage_v=quiet[8:], frame_name=names, **empty
+    )
     text = done("reconstruct", path)
     assert text.count("none (no change above the noise)") >= 7
     assert "against the truth" not in text
     facts = json.loads(done("reconstruct", path, "--json"))
-    assert "summary" not in facts and {frame["info"]["stop"] for frame in facts["frames"]} <= {"gate", "iterations"}
+    assert "summary" not in facts and {frame["info"]["stop"] for frame in facts["frames"]} <= {
+        "gate",
+        "iterations",
+    }
 
 
 def test_output_and_picture(done: Done, frames_file: Path, tmp_path: Path) -> None:
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
-    facts = json.loads(done("reconstruct", frames_file, "-o", output, "--picture", picture, "--json"))
+    facts = json.loads(
+        done("reconstruct", frames_file, "-o", output, "--picture", picture, "--json")
+    )
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out.npz", "out.png"]
     assert picture.read_bytes()[:8] == PNG and picture.stat().st_size > 20_000
     with np.load(output, allow_pickle=False) as saved:
@@ -171,7 +230,10 @@ def test_a_bad_frame_among_good_ones(
     out, err = capsys.readouterr()
     facts = json.loads(out)
     assert ["refused" in frame for frame in facts["frames"]].count(True) == 2
-    assert "too many channels" in facts["frames"][3]["refused"] and "zero" in facts["frames"][5]["refused"]
+    assert (
+        "too many channels" in facts["frames"][3]["refused"]
+        and "zero" in facts["frames"][5]["refused"]
+    )
     lines = err.splitlines()
     assert len(lines) == 2 and all(line.startswith(f"eitskin: {path}: frame ") for line in lines)
     with np.load(output) as saved:
@@ -182,19 +244,27 @@ def test_a_reference_of_another_skin_is_warned_of(
     changed_frames: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     order = np.random.default_rng(1).permutation(208)
-    path = changed_frames(voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order])
+    path = changed_frames(
+        voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order]
+    )
     assert main(["reconstruct", str(path)]) == 0
     err = capsys.readouterr().err
-    assert err.startswith("eitskin: warning: the reference correlates with the model by 0.") and err.count("\n") == 1
+    assert (
+        err.startswith("eitskin: warning: the reference correlates with the model by 0.")
+        and err.count("\n") == 1
+    )
     assert f"eitskin doctor {path}" in err
 
 
 def test_the_whole_way(done: Done, tmp_path: Path) -> None:
-    """A description to a model to simulated frames to touches, with one's own skin: an L with 24 electrodes."""
+    """A description to a model to simulated frames to touches, with one's own skin: an L with 24
+    electrodes."""
     skin_file = tmp_path / "hand.toml"
     skin_file.write_text(
-        "[skin]\nname = 'hand'\npolygon_mm = [[0,0],[160,0],[160,80],[80,80],[80,160],[0,160]]\nthickness_mm = 6.0\n"
-        "conductivity_s_per_m = 0.02\n[electrodes]\ncount = 24\nwidth_mm = 5.0\n[protocol]\nkind = 'skip'\nskip = 2\n"
+        "[skin]\nname = 'hand'\npolygon_mm ="
+        " [[0,0],[160,0],[160,80],[80,80],[80,160],[0,160]]\nthickness_mm ="
+        " 6.0\nconductivity_s_per_m = 0.02\n[electrodes]\ncount = 24\nwidth_mm ="
+        " 5.0\n[protocol]\nkind = 'skip'\nskip = 2\n"
     )
     model_file, frames_path = tmp_path / "hand.eitm", tmp_path / "frames.npz"
     done("model", "build", skin_file, "-o", model_file)
@@ -202,15 +272,32 @@ def test_the_whole_way(done: Done, tmp_path: Path) -> None:
     done("model", "verify", model_file)
     skin, protocol = load_skin(skin_file)
     rules = TouchRules(count=(1, 2), radius_mm=(7, 10), gap_mm=20, rim_margin_mm=8)
-    save_frames(frames_path, simulate(skin, protocol, random_touches(skin.outline, 5, 12, rules=rules)).as_frames())
+    save_frames(
+        frames_path,
+        simulate(skin, protocol, random_touches(skin.outline, 5, 12, rules=rules)).as_frames(),
+    )
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
     facts = json.loads(
-        done("reconstruct", frames_path, "--model", model_file, "-o", output, "--picture", picture, "--json")
+        done(
+            "reconstruct",
+            frames_path,
+            "--model",
+            model_file,
+            "-o",
+            output,
+            "--picture",
+            picture,
+            "--json",
+        )
     )
     assert facts["model"] == str(model_file)
     summary = facts["summary"]
     assert summary["found"] >= 0.85 * summary["true"] and summary["false"] <= 2
-    assert summary["position_median_mm"] < 2 and summary["miou_image"] > 0.75 and summary["miou_touches"] > 0.8
+    assert (
+        summary["position_median_mm"] < 2
+        and summary["miou_image"] > 0.75
+        and summary["miou_touches"] > 0.8
+    )
     assert picture.read_bytes()[:8] == PNG
     with np.load(output) as saved:
         grid = load_model(model_file)[0].grid
@@ -234,7 +321,8 @@ def test_tracked_frames_keep_ids_and_confirm_births(done: Done, tmp_path: Path) 
     made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()
     save_frames(tmp_path / "moving.npz", made)
     alone, tracked = (
-        json.loads(done("reconstruct", tmp_path / "moving.npz", "--json", *more))["frames"] for more in ((), ("--track",))
+        json.loads(done("reconstruct", tmp_path / "moving.npz", "--json", *more))["frames"]
+        for more in ((), ("--track",))
     )
     ids = [[touch["id"] for touch in frame["touches"]] for frame in tracked]
     assert ids == [[1]] * 8

@@ -1,4 +1,5 @@
-"""Recording and replaying: what was seen live, exported, and held against this host's core bit by bit."""
+"""Recording and replaying: what was seen live, exported, and held against this host's core bit by
+bit."""
 
 from __future__ import annotations
 
@@ -54,9 +55,12 @@ def packets(path: Path) -> list[Packet]:
 
 
 def changed(path: Path, target: Path, change: Change) -> Path:
-    """The recording with the payload of each packet as ``change`` gives it, without those where it gives None."""
+    """The recording with the payload of each packet as ``change`` gives it, without those where it
+    gives None."""
     kept = ((p, change(p)) for p in packets(path))
-    target.write_bytes(b"".join(encode(p.type, p.sequence, payload) for p, payload in kept if payload is not None))
+    target.write_bytes(
+        b"".join(encode(p.type, p.sequence, payload) for p, payload in kept if payload is not None)
+    )
     return target
 
 
@@ -86,19 +90,39 @@ def test_replay_shows_what_was_seen_live(done: Done, scene: Path, tmp_path: Path
 
 
 def test_a_recording_is_a_device_too(done: Done, run: Path) -> None:
-    shown, replayed = (done(*command).splitlines()[0] for command in (("stream", "--device", f"file:{run}"), ("replay", run)))
+    shown, replayed = (
+        done(*command).splitlines()[0]
+        for command in (("stream", "--device", f"file:{run}"), ("replay", run))
+    )
     assert shown == re.sub(r", off by [0-9.]+ mm", "", replayed)
     assert json.loads(done("info", "--device", f"file:{run}", "--json"))["statistics"] is None
-    assert json.loads(done("doctor", "--device", f"file:{run}", "--json"))["measured"]["quiet_frames"] == 16
+    assert (
+        json.loads(done("doctor", "--device", f"file:{run}", "--json"))["measured"]["quiet_frames"]
+        == 16
+    )
 
 
 def test_record_says_how_much(done: Done, scene: Path, tmp_path: Path) -> None:
     path = tmp_path / "run.eits"
-    facts = json.loads(done("record", "--device", f"sim:{scene}", "-o", path, "--frames", "3", "--json"))
+    facts = json.loads(
+        done("record", "--device", f"sim:{scene}", "-o", path, "--frames", "3", "--json")
+    )
     assert facts["frames"] == 3 and facts["bytes"] >= path.stat().st_size > 10_000
     assert facts["packets"] == sum(p.type not in (PacketType.RECORDING,) for p in packets(path)) - 1
     assert len([p for p in packets(path) if p.type == PacketType.RAW]) == 16 + 3
-    again = json.loads(done("record", "--device", f"sim:{scene}", "-o", path, "--seconds", "0.1", "--overwrite", "--json"))
+    again = json.loads(
+        done(
+            "record",
+            "--device",
+            f"sim:{scene}",
+            "-o",
+            path,
+            "--seconds",
+            "0.1",
+            "--overwrite",
+            "--json",
+        )
+    )
     assert again["frames"] == 3
 
 
@@ -106,15 +130,32 @@ def test_record_says_how_much(done: Done, scene: Path, tmp_path: Path) -> None:
 
 
 def test_the_hosts_images_are_the_boards(done: Done, run: Path) -> None:
-    assert done("replay", run, "--check") == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
+    assert (
+        done("replay", run, "--check")
+        == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
+    )
     facts = json.loads(done("replay", run, "--check", "--json"))
-    assert facts["same_bits"] and facts["solver_noted"] and (facts["same"], facts["untold"]) == (FRAMES, 0)
+    assert (
+        facts["same_bits"]
+        and facts["solver_noted"]
+        and (facts["same"], facts["untold"]) == (FRAMES, 0)
+    )
 
 
 @pytest.mark.parametrize(
-    "options", [["--cold"], ["--no-track"], ["--iterations", "9"], ["--sign", "both"], ["--tare", "1"], ["--reciprocal", "0"]]
+    "options",
+    [
+        ["--cold"],
+        ["--no-track"],
+        ["--iterations", "9"],
+        ["--sign", "both"],
+        ["--tare", "1"],
+        ["--reciprocal", "0"],
+    ],
 )
-def test_whatever_the_solver_was_told(options: list[str], done: Done, scene: Path, tmp_path: Path) -> None:
+def test_whatever_the_solver_was_told(
+    options: list[str], done: Done, scene: Path, tmp_path: Path
+) -> None:
     path = tmp_path / "run.eits"
     done("record", "--device", f"sim:{scene}", "-o", path, *QUIETLY, *options)
     assert json.loads(done("replay", path, "--check", "--json"))["same"] == FRAMES
@@ -138,44 +179,71 @@ def test_one_bit_that_differs_is_found(
     facts = json.loads(out)
     different = facts["different"]
     # what the host makes of a changed raw frame it begins the next one from
-    assert not facts["same_bits"] and different[0] == 18 and (len(different) == 1 or kind == PacketType.RAW)
+    assert (
+        not facts["same_bits"]
+        and different[0] == 18
+        and (len(different) == 1 or kind == PacketType.RAW)
+    )
     assert err == f"eitskin: {other}: this host's images are not the board's\n"
 
 
 def test_a_changed_bit_in_the_reference_shows_everywhere(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 3, flipped(RAW_HEAD + 4 * 60 + 2)))
+    other = changed(
+        run, tmp_path / "other.eits", nth(PacketType.RAW, 3, flipped(RAW_HEAD + 4 * 60 + 2))
+    )
     assert main(["replay", str(other), "--check", "--json"]) == 10
     assert len(json.loads(capsys.readouterr().out)["different"]) == FRAMES
 
 
-def test_frames_after_a_loss_are_not_called_different(done: Done, scene: Path, tmp_path: Path) -> None:
-    """A warm solve begins from the last one: without it, the host's has other bits and nobody's fault it is."""
+def test_frames_after_a_loss_are_not_called_different(
+    done: Done, scene: Path, tmp_path: Path
+) -> None:
+    """A warm solve begins from the last one: without it, the host's has other bits and nobody's
+    fault it is."""
     run = tmp_path / "warm.eits"
     done("record", "--device", f"sim:{scene}", "-o", run, "--warm")
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
     facts = json.loads(done("replay", other, "--check", "--json"))
-    assert facts["different"] == [] and facts["same"] == 1 and facts["untold"] == FRAMES - 2 and facts["alone"] == 1
+    assert (
+        facts["different"] == []
+        and facts["same"] == 1
+        and facts["untold"] == FRAMES - 2
+        and facts["alone"] == 1
+    )
 
 
-def test_touches_after_a_loss_are_not_called_different(done: Done, run: Path, scene: Path, tmp_path: Path) -> None:
-    """Touches that are followed in time began from the frame that is lost; without tracking, every frame can be judged."""
+def test_touches_after_a_loss_are_not_called_different(
+    done: Done, run: Path, scene: Path, tmp_path: Path
+) -> None:
+    """Touches that are followed in time began from the frame that is lost; without tracking, every
+    frame can be judged."""
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
     facts = json.loads(done("replay", other, "--check", "--json"))
     assert facts["different"] == [] and facts["alone"] == 1 and facts["untold"] > 0
     assert facts["same"] + facts["untold"] == FRAMES - 1
     alone = tmp_path / "alone.eits"
     done("record", "--device", f"sim:{scene}", "-o", alone, "--no-track")
-    other = changed(alone, tmp_path / "others.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
+    other = changed(
+        alone, tmp_path / "others.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None)
+    )
     facts = json.loads(done("replay", other, "--check", "--json"))
-    assert facts["different"] == [] and (facts["same"], facts["untold"], facts["alone"]) == (FRAMES - 1, 0, 1)
+    assert facts["different"] == [] and (facts["same"], facts["untold"], facts["alone"]) == (
+        FRAMES - 1,
+        0,
+        1,
+    )
 
 
-def test_an_image_after_a_loss_is_judged_all_the_same(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_image_after_a_loss_is_judged_all_the_same(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Tracking changes touches only: an image that differs is told, whatever was lost before."""
     lost = changed(run, tmp_path / "lost.eits", nth(PacketType.RAW, 16 + 1, lambda payload: None))
-    other = changed(lost, tmp_path / "other.eits", nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400)))
+    other = changed(
+        lost, tmp_path / "other.eits", nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400))
+    )
     assert main(["replay", str(other), "--check", "--json"]) == 10
     assert len(json.loads(capsys.readouterr().out)["different"]) == 1
 
@@ -191,12 +259,16 @@ def test_a_loss_in_the_tare_leaves_nothing_to_compare(
 def test_without_its_note_the_models_own_options_are_taken(
     done: Done, scene: Path, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    without = changed(run, tmp_path / "plain.eits", nth(PacketType.RECORDING, 1, lambda payload: None))
+    without = changed(
+        run, tmp_path / "plain.eits", nth(PacketType.RECORDING, 1, lambda payload: None)
+    )
     facts = json.loads(done("replay", without, "--check", "--json"))
     assert facts["same"] == FRAMES and not facts["solver_noted"]
     odd = tmp_path / "odd.eits"
     done("record", "--device", f"sim:{scene}", "-o", odd, *QUIETLY, "--iterations", "5")
-    without = changed(odd, tmp_path / "plain2.eits", nth(PacketType.RECORDING, 1, lambda payload: None))
+    without = changed(
+        odd, tmp_path / "plain2.eits", nth(PacketType.RECORDING, 1, lambda payload: None)
+    )
     assert main(["replay", str(without), "--check"]) == 10
     assert "the recording does not note the solver's options" in capsys.readouterr().err
 
@@ -204,7 +276,9 @@ def test_without_its_note_the_models_own_options_are_taken(
 # ---- export ----
 
 
-def test_rows_that_could_not_be_measured_are_not_exported(done: Done, run: Path, tmp_path: Path) -> None:
+def test_rows_that_could_not_be_measured_are_not_exported(
+    done: Done, run: Path, tmp_path: Path
+) -> None:
     def with_nan(payload: bytes) -> bytes:
         return payload[:RAW_HEAD] + np.float32(np.nan).tobytes() + payload[RAW_HEAD + 4 :]
 
@@ -223,8 +297,21 @@ def test_rows_that_could_not_be_measured_are_not_exported(done: Done, run: Path,
 def recording_process(device: str, path: Path) -> subprocess.Popen[bytes]:
     source = os.pathsep.join([str(Path(eitskin.__file__).parents[1])])
     environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-c", MAIN, "record", "--device", device, "-o", str(path), "--tare", "4"]
-    return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    command = [
+        sys.executable,
+        "-c",
+        MAIN,
+        "record",
+        "--device",
+        device,
+        "-o",
+        str(path),
+        "--tare",
+        "4",
+    ]
+    return subprocess.Popen(
+        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
 
 
 def seconds(most: float) -> Iterator[None]:
@@ -235,7 +322,9 @@ def seconds(most: float) -> Iterator[None]:
     raise AssertionError("it took too long")
 
 
-def test_what_a_killed_recorder_has_written_can_be_read(done: Done, scene: Path, tmp_path: Path) -> None:
+def test_what_a_killed_recorder_has_written_can_be_read(
+    done: Done, scene: Path, tmp_path: Path
+) -> None:
     path = tmp_path / "run.eits"
     with behind_a_port(board_of(scene)) as port:
         process = recording_process(f"serial:{port}", path)
@@ -279,9 +368,20 @@ def test_ctrl_c_stops_the_board_and_sums_up(scene: Path) -> None:
         source = str(Path(eitskin.__file__).parents[1])
         # a shell's background job has the signal off, and what it starts too
         listening = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        command = [sys.executable, "-c", listening + MAIN, "stream", "--device", f"serial:{port}", "--tare", "4"]
+        command = [
+            sys.executable,
+            "-c",
+            listening + MAIN,
+            "stream",
+            "--device",
+            f"serial:{port}",
+            "--tare",
+            "4",
+        ]
         environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
-        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        with subprocess.Popen(
+            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as process:
             assert process.stdout is not None and process.stderr is not None
             for _ in range(5):
                 assert "no touch" in process.stdout.readline()

@@ -1,4 +1,5 @@
-"""What the command line refuses: the documented exit code, one line that says what to do, no traceback, no file left."""
+"""What the command line refuses: the documented exit code, one line that says what to do, no
+traceback, no file left."""
 
 from __future__ import annotations
 
@@ -85,7 +86,10 @@ MODELS = {
 }
 
 
-@pytest.mark.parametrize("command", [("model", "info"), ("model", "info", "--json"), ("model", "verify"), ("reconstruct",)])
+@pytest.mark.parametrize(
+    "command",
+    [("model", "info"), ("model", "info", "--json"), ("model", "verify"), ("reconstruct",)],
+)
 @pytest.mark.parametrize("kind", MODELS)
 def test_models_that_cannot_be_read(
     kind: str, command: tuple[str, ...], refused: Refused, tmp_path: Path, frames_file: Path
@@ -97,11 +101,23 @@ def test_models_that_cannot_be_read(
         line = refused(MODEL, *command, path)
     else:
         output = tmp_path / "out.npz"
-        line = refused(MODEL, *command, frames_file, "--model", path, "-o", output, "--picture", tmp_path / "out.png")
+        line = refused(
+            MODEL,
+            *command,
+            frames_file,
+            "--model",
+            path,
+            "-o",
+            output,
+            "--picture",
+            tmp_path / "out.png",
+        )
     assert str(path) in line and text in line and ";" in line
 
 
-def test_a_golden_image_of_other_bits_fails_verification(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_golden_image_of_other_bits_fails_verification(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """One bit of the stored image: read without complaint, but not what this core gives."""
     blob = bytearray(small_blob())
     place = sections_of(blob)["GOLD"]
@@ -138,7 +154,8 @@ def with_nan(count: int) -> np.ndarray:
 )
 @pytest.mark.parametrize("engine", ["c", "numpy"])
 def test_frames_that_cannot_be_used(
-    voltage: np.ndarray, text: str, engine: str, tmp_path: Path, changed_frames: Callable[..., Path],
+    voltage: np.ndarray, text: str, engine: str, tmp_path: Path,
+    changed_frames: Callable[..., Path],
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     """The frame is named on its one line; nothing is written where nothing could be done."""
@@ -146,12 +163,16 @@ def test_frames_that_cannot_be_used(
     outputs = ["-o", str(tmp_path / "out.npz"), "--picture", str(tmp_path / "out.png")]
     assert main(["reconstruct", str(path), "--engine", engine, *outputs]) == FRAME
     err = capsys.readouterr().err
-    assert err.startswith(f"eitskin: {path}: frame 0 (test-s3-0) refused: ") and err.count("\n") == 1
+    assert (
+        err.startswith(f"eitskin: {path}: frame 0 (test-s3-0) refused: ") and err.count("\n") == 1
+    )
     assert text in err
     assert [entry.name for entry in tmp_path.iterdir()] == ["changed.npz"]
 
 
-def test_saturated_frames(changed_frames: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_saturated_frames(
+    changed_frames: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     """Every channel at the rail, told by --saturation-v."""
     path = changed_frames(first=1, voltage_v=np.where(FIRST < 0, -3.3, 3.3))
     assert main(["reconstruct", str(path), "--saturation-v", "3.3"]) == FRAME
@@ -161,7 +182,11 @@ def test_saturated_frames(changed_frames: Callable[..., Path], capsys: pytest.Ca
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(np.nan, "row 20 (from 0) is not finite"), (np.inf, "reference frame 7 (from 0)"), (0.0, "all voltages are zero")],
+    [
+        (np.nan, "row 20 (from 0) is not finite"),
+        (np.inf, "reference frame 7 (from 0)"),
+        (0.0, "all voltages are zero"),
+    ],
 )
 def test_references_that_cannot_be_used(
     value: float, text: str, refused: Refused, changed_frames: Callable[..., Path], tmp_path: Path
@@ -182,7 +207,11 @@ def test_references_that_cannot_be_used(
         ({"voltage_v": np.ones((1, 207))}, FRAME, "voltage_v"),
         ({"voltage_v": np.ones(208)}, FRAME, "voltage_v"),
         ({"voltage_v": np.array([["a"] * 208])}, FRAME, "voltage_v"),
-        ({"voltage_v": np.ones((0, 208)), "frame_name": np.zeros(0, "U1")}, FRAME, "nothing to reconstruct"),
+        (
+            {"voltage_v": np.ones((0, 208)), "frame_name": np.zeros(0, "U1")},
+            FRAME,
+            "nothing to reconstruct",
+        ),
         ({"reference_voltage_v": np.ones((2, 200))}, FRAME, "reference_voltage_v"),
         ({"voltage_v": None}, FRAME, "'voltage_v' is missing"),
         ({"version": np.array(2)}, FRAME, "format version 2"),
@@ -192,12 +221,21 @@ def test_references_that_cannot_be_used(
     ],
 )
 def test_frames_files_that_cannot_be_read(
-    changes: dict[str, np.ndarray], code: int, text: str, refused: Refused, changed_frames: Callable[..., Path],
+    changes: dict[str, np.ndarray], code: int, text: str, refused: Refused,
+    changed_frames: Callable[..., Path],
     tmp_path: Path,
 ) -> None:  # fmt: skip
-    empty = {"touch_frame": None, "touch_xy_mm": None, "touch_radius_mm": None, "touch_strength": None, "touch_sign": None}
+    empty = {
+        "touch_frame": None,
+        "touch_xy_mm": None,
+        "touch_radius_mm": None,
+        "touch_strength": None,
+        "touch_sign": None,
+    }
     path = changed_frames(**({"voltage_v": FIRST, "frame_name": np.array(["a"])} | empty | changes))
-    line = refused(code, "reconstruct", path, "-o", tmp_path / "out.npz", "--picture", tmp_path / "out.png")
+    line = refused(
+        code, "reconstruct", path, "-o", tmp_path / "out.npz", "--picture", tmp_path / "out.png"
+    )
     assert str(path) in line and text in line
 
 
@@ -215,7 +253,10 @@ def test_another_protocol_names_both_hashes_and_files(
     path = changed_frames(drive_measure=rows)
     line = refused(PROTOCOL, "reconstruct", path, "-o", tmp_path / "out.npz")
     assert str(path) in line and "prebuilt paper skin" in line
-    assert f"{prebuilt()[0].protocol.hash:016x}" in line and line.count("(16 electrodes, 208 rows)") == 2
+    assert (
+        f"{prebuilt()[0].protocol.hash:016x}" in line
+        and line.count("(16 electrodes, 208 rows)") == 2
+    )
 
 
 # ---- skins ----
@@ -228,27 +269,34 @@ def points(*corners: tuple[float, float]) -> str:
 
 
 SKINS = {
-    "self-intersecting": (points((0, 0), (100, 100), (100, 0), (0, 100)), GEOMETRY, "crosses or touches itself"),
+    "self-intersecting": (points((0, 0), (100, 100), (100, 0), (0, 100)), GEOMETRY,
+    "crosses or touches itself"),
     "tiny": (points((0, 0), (0.4, 0), (0, 0.4)), GEOMETRY, "are the units mm?"),
     "two points": (points((0, 0), (50, 0)), GEOMETRY, "a polygon needs 3"),
     "not finite": ("[skin]\npolygon_mm = [[0,0],[nan,1],[5,5]]\n", GEOMETRY, "not finite"),
     "tiny disk": ("[skin]\ndiameter_mm = 0.5\n", CONFIG, "diameter_mm = 0.5 is out of range"),
-    "overlapping electrodes": (DISK + "[electrodes]\nwidth_mm = 30.0\n", GEOMETRY, "do not fit on a rim of 314"),
+    "overlapping electrodes": (DISK + "[electrodes]\nwidth_mm = 30.0\n", GEOMETRY,
+    "do not fit on a rim of 314"),
     "two electrodes at one place": (
         DISK + "[electrodes]\ncount = 4\nwidth_mm = 5.0\npositions_mm = [0.0, 3.0, 100.0, 200.0]\n",
         GEOMETRY,
         "electrodes 0 and 1 (from 0) overlap",
     ),
-    "unknown key": (DISK + "thicknes_mm = 3.0\n", CONFIG, "unknown key 'thicknes_mm'; did you mean 'thickness_mm'?"),
-    "unknown table": (DISK + "[electrode]\ncount = 8\n", CONFIG, "unknown key 'electrode'; did you mean 'electrodes'?"),
+    "unknown key": (DISK + "thicknes_mm = 3.0\n", CONFIG,
+    "unknown key 'thicknes_mm'; did you mean 'thickness_mm'?"),
+    "unknown table": (DISK + "[electrode]\ncount = 8\n", CONFIG,
+    "unknown key 'electrode'; did you mean 'electrodes'?"),
     "unknown kind": (DISK + '[protocol]\nkind = "adjacnt"\n', CONFIG, "did you mean 'adjacent'?"),
     "wrong type": (DISK + 'thickness_mm = "thick"\n', CONFIG, "thickness_mm must be a number"),
-    "out of range": (DISK + "conductivity_s_per_m = -0.1\n", CONFIG, "conductivity_s_per_m = -0.1 is out of range"),
+    "out of range": (DISK + "conductivity_s_per_m = -0.1\n", CONFIG,
+    "conductivity_s_per_m = -0.1 is out of range"),
     "no outline": ("[skin]\nname = 'x'\n", CONFIG, "give either diameter_mm or polygon_mm"),
     "nothing": ("", CONFIG, "[skin] is needed"),
-    "odd opposite": (DISK + '[electrodes]\ncount = 15\n[protocol]\nkind = "opposite"\n', PROTOCOL, "even number"),
+    "odd opposite": (DISK + '[electrodes]\ncount = 15\n[protocol]\nkind = "opposite"\n', PROTOCOL,
+    "even number"),
     "electrode that is not there": (
-        DISK + '[protocol]\nkind = "table"\ntable = [[0, 1, 2, 16]]\n', PROTOCOL, "electrodes are 0 to 15"
+        DISK + '[protocol]\nkind = "table"\ntable = [[0, 1, 2, 16]]\n', PROTOCOL,
+        "electrodes are 0 to 15"
     ),
     "invalid TOML": ("[skin\ndiameter_mm = 100", CONFIG, "not valid TOML"),
     "repeated key": (DISK + "diameter_mm = 90.0\n", CONFIG, "not valid TOML"),
@@ -277,11 +325,15 @@ def test_a_description_that_is_no_text(refused: Refused, tmp_path: Path) -> None
 
 def test_missing_files(refused: Refused, tmp_path: Path, frames_file: Path) -> None:
     none, output = tmp_path / "none", tmp_path / "out"
-    assert "no such skin description; check the path" in refused(FILE, "model", "build", none, "-o", output)
+    assert "no such skin description; check the path" in refused(
+        FILE, "model", "build", none, "-o", output
+    )
     assert "no such model; check the path" in refused(FILE, "model", "info", none)
     assert "no such model" in refused(FILE, "model", "verify", none)
     assert "no such frames file; check the path" in refused(FILE, "reconstruct", none)
-    assert "no such model" in refused(FILE, "reconstruct", frames_file, "--model", none, "-o", output)
+    assert "no such model" in refused(
+        FILE, "reconstruct", frames_file, "--model", none, "-o", output
+    )
     assert "no such skin description" in refused(FILE, "compare", "--skin", none)
 
 
@@ -296,8 +348,11 @@ def test_folders_instead_of_files(refused: Refused, tmp_path: Path, frames_file:
 
 
 @pytest.mark.parametrize("place", ["none/out", "."])
-def test_outputs_are_checked_before_the_work(place: str, refused: Refused, tmp_path: Path, frames_file: Path) -> None:
-    """A folder that does not exist, and a folder where a file is wanted; nothing was read or computed before."""
+def test_outputs_are_checked_before_the_work(
+    place: str, refused: Refused, tmp_path: Path, frames_file: Path
+) -> None:
+    """A folder that does not exist, and a folder where a file is wanted; nothing was read or
+    computed before."""
     output = tmp_path / place
     text = "does not exist; make it first" if place != "." else "this is a folder"
     for arguments in (
@@ -323,7 +378,9 @@ def test_a_disk_that_is_full(
     assert line == f"{output}: cannot write it (No space left on device)"
 
 
-def test_a_folder_that_cannot_be_written(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_cannot_be_written(
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As a plain user sees it; simulated, since tests may run as root."""
 
     def forbidden(*arguments: object, **keywords: object) -> tuple[int, str]:
@@ -332,7 +389,9 @@ def test_a_folder_that_cannot_be_written(refused: Refused, tmp_path: Path, monke
     monkeypatch.setattr("eitskin.fileio.tempfile.mkstemp", forbidden)
     skin = tmp_path / "skin.toml"
     skin.write_text(DISK)
-    line = refused(FILE, "model", "build", skin, "-o", tmp_path / "out.eitm", "--elements", 800, "--pixels", 8)
+    line = refused(
+        FILE, "model", "build", skin, "-o", tmp_path / "out.eitm", "--elements", 800, "--pixels", 8
+    )
     assert "cannot write there (Permission denied)" in line
 
 
@@ -354,7 +413,9 @@ def test_a_folder_that_cannot_be_written(refused: Refused, tmp_path: Path, monke
         (["--only", "test-s3-99"], "no frame is named 'test-s3-99'; did you mean 'test-s3-"),
     ],
 )
-def test_options_of_reconstruct(arguments: list[str], text: str, refused: Refused, frames_file: Path) -> None:
+def test_options_of_reconstruct(
+    arguments: list[str], text: str, refused: Refused, frames_file: Path
+) -> None:
     assert text in refused(USAGE, "reconstruct", frames_file, *arguments)
 
 
@@ -373,12 +434,18 @@ def test_options_of_reconstruct(arguments: list[str], text: str, refused: Refuse
         (["skin.toml"], "name a SKIN.toml, or give --paper, not both"),
     ],
 )
-def test_options_of_model_build(arguments: list[str], text: str, refused: Refused, tmp_path: Path) -> None:
-    assert text in refused(USAGE, "model", "build", "--paper", "-o", tmp_path / "out.eitm", *arguments)
+def test_options_of_model_build(
+    arguments: list[str], text: str, refused: Refused, tmp_path: Path
+) -> None:
+    assert text in refused(
+        USAGE, "model", "build", "--paper", "-o", tmp_path / "out.eitm", *arguments
+    )
 
 
 def test_neither_a_skin_nor_the_paper(refused: Refused, tmp_path: Path) -> None:
-    assert "name a SKIN.toml, or give --paper" in refused(USAGE, "model", "build", "-o", tmp_path / "out.eitm")
+    assert "name a SKIN.toml, or give --paper" in refused(
+        USAGE, "model", "build", "-o", tmp_path / "out.eitm"
+    )
 
 
 @pytest.mark.parametrize("arguments", [["--snr-db", "-30"], ["--snr-db", "nan"], ["--seed", "-1"]])
@@ -415,12 +482,19 @@ def test_missing_extras_are_named_with_the_command_to_install_them(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_scipy_frames_are_reconstructed_but_not_scored(frames_file: Path, tmp_path: Path) -> None:
+def test_without_scipy_frames_are_reconstructed_but_not_scored(
+    frames_file: Path, tmp_path: Path
+) -> None:
     output = tmp_path / "out.npz"
-    done = run_python(without("scipy", "netgen", "matplotlib") + MAIN, "reconstruct", frames_file, "-o", output)
+    done = run_python(
+        without("scipy", "netgen", "matplotlib") + MAIN, "reconstruct", frames_file, "-o", output
+    )
     assert done.returncode == 0
     assert "20 frames, 0 refused" in done.stdout and "against the truth" not in done.stdout
-    assert done.stderr.startswith("eitskin: warning: not held against the truth") and done.stderr.count("\n") == 1
+    assert (
+        done.stderr.startswith("eitskin: warning: not held against the truth")
+        and done.stderr.count("\n") == 1
+    )
     assert output.exists()
 
 

@@ -16,20 +16,35 @@ from eitskin.cli.main import main
 from eitskin.model.eitm import load_model
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.tradeoff.engines import ModelShop
-from eitskin.study.tradeoff.front import Where, load_front
+from eitskin.tuning.front import Where, load_front
+from eitskin_studies.tradeoff.engines import ModelShop
 from small_models import prebuilt
 
 Done = Callable[..., str]
 Refused = Callable[..., str]
 
-TINY_RUN = ["--scenes", "3", "--train", "2", "--set-scenes", "2", "--sets", "pairs", "--snr-db", "60", "--elements", "1200"]
+TINY_RUN = [
+    "--scenes",
+    "3",
+    "--train",
+    "2",
+    "--set-scenes",
+    "2",
+    "--sets",
+    "pairs",
+    "--snr-db",
+    "60",
+    "--elements",
+    "1200",
+]
 TINY_RUN += ["--counted", "0", "--rounds", "1", "--only", "tiny,mini,standard rank 32"]
 
 
 def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    out = done("tradeoff", "run", "-o", tmp_path / "out", *TINY_RUN, "--front", tmp_path / "small.json")
+    out = done(
+        "tradeoff", "run", "-o", tmp_path / "out", *TINY_RUN, "--front", tmp_path / "small.json"
+    )
     assert "standard rank 32" in out and "* " in out
     found = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
     pictures = {"front.png", "knobs.png", "noise.png", "samples.png", "scenes.png", "objective.png"}
@@ -37,7 +52,9 @@ def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
     assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     assert len(load_front(tmp_path / "out" / "front.json").points) == 3
     front = tmp_path / "small.json"
-    assert "MIoU" in done("tradeoff", "recommend", "--front", front, "--budget", "1s", "--board", "host")
+    assert "MIoU" in done(
+        "tradeoff", "recommend", "--front", front, "--budget", "1s", "--board", "host"
+    )
 
 
 def test_the_recommended_model_is_the_measured_one(done: Done, tmp_path: Path) -> None:
@@ -48,19 +65,32 @@ def test_the_recommended_model_is_the_measured_one(done: Done, tmp_path: Path) -
     model, _ = load_model(path)
     one = next(p for p in load_front().points if p.name == facts["name"])
     settings = one.configuration
-    assert (model.rank, model.stored.storage, model.grid.n_pixels) == (settings.rank, settings.storage, one.costs["pixels_kept"])
-    assert (model.defaults.iterations, model.defaults.solver) == (settings.iterations, settings.solver)
+    assert (model.rank, model.stored.storage, model.grid.n_pixels) == (
+        settings.rank,
+        settings.storage,
+        one.costs["pixels_kept"],
+    )
+    assert (model.defaults.iterations, model.defaults.solver) == (
+        settings.iterations,
+        settings.solver,
+    )
     assert model.defaults.mask_threshold == pytest.approx(one.threshold)
     measured = ModelShop(paper_skin(), adjacent(16)).build(settings).model
-    assert (measured.stored.columns == model.stored.columns).all() and (measured.projection == model.projection).all()
+    assert (measured.stored.columns == model.stored.columns).all() and (
+        measured.projection == model.projection
+    ).all()
 
 
 def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:
     slow = done("tradeoff", "recommend", "--accuracy", "0.88", "--board", "f767")
     assert "an estimate" in slow and "frames a second" in slow
     assert "measuring bounds the rate" in done("tradeoff", "recommend", "--budget", "2ms")
-    assert "host: solve and touches median" in done("tradeoff", "recommend", "--budget", "1ms", "--board", "host")
-    facts = json.loads(done("tradeoff", "recommend", "--budget", "10ms", "--period", "11ms", "--json"))
+    assert "host: solve and touches median" in done(
+        "tradeoff", "recommend", "--budget", "1ms", "--board", "host"
+    )
+    facts = json.loads(
+        done("tradeoff", "recommend", "--budget", "10ms", "--period", "11ms", "--json")
+    )
     assert facts["acquisition_us"] <= 11_000 and facts["configuration"]["scan"] == "reciprocal"
     discs = json.loads(done("tradeoff", "recommend", "--budget", "10ms", "--by", "discs", "--json"))
     assert discs["judged"].startswith("discs") and discs["accuracy"] > 0.9
@@ -91,7 +121,9 @@ def test_refusals(refused: Refused, code: int, arguments: list[str], said: str) 
     assert said in refused(code, "tradeoff", *arguments)
 
 
-def test_reconstruct_within_a_budget(done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reconstruct_within_a_budget(
+    done: Done, frames_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     usual = json.loads(done("reconstruct", frames_file, "--json"))
     assert main(["reconstruct", str(frames_file), "--accuracy", "0.87", "--json"]) == 0
     out, err = capsys.readouterr()
@@ -99,12 +131,19 @@ def test_reconstruct_within_a_budget(done: Done, frames_file: Path, capsys: pyte
     assert "settings of" in err and fine["settings"]["rank"] == prebuilt()[0].rank
     point = next(one for one in load_front().points if one.name == fine["settings"]["name"])
     assert (point.accuracy(Where()) or 0) >= 0.87
-    assert max(f["info"]["iterations"] for f in fine["frames"]) == fine["settings"]["iterations"] != 60
+    assert (
+        max(f["info"]["iterations"] for f in fine["frames"]) == fine["settings"]["iterations"] != 60
+    )
     assert fine["summary"]["miou_image"] > usual["summary"]["miou_image"]
-    assert all(f["info"]["solve_us"] > 0 and f["info"]["touch_us"] >= 0 for f in fine["frames"] + usual["frames"])
+    assert all(
+        f["info"]["solve_us"] > 0 and f["info"]["touch_us"] >= 0
+        for f in fine["frames"] + usual["frames"]
+    )
     assert main(["reconstruct", str(frames_file), "--budget", "450kMACs", "--json"]) == 0
     quick = json.loads(capsys.readouterr().out)
-    assert sum(f["info"]["macs"] for f in quick["frames"]) < sum(f["info"]["macs"] for f in usual["frames"])
+    assert sum(f["info"]["macs"] for f in quick["frames"]) < sum(
+        f["info"]["macs"] for f in usual["frames"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -118,14 +157,20 @@ def test_reconstruct_within_a_budget(done: Done, frames_file: Path, capsys: pyte
         (["--budget", "1Minstructions"], "instructions"),
     ],
 )
-def test_reconstruct_refuses(refused: Refused, frames_file: Path, arguments: list[str], said: str) -> None:
+def test_reconstruct_refuses(
+    refused: Refused, frames_file: Path, arguments: list[str], said: str
+) -> None:
     assert said in refused(2, "reconstruct", frames_file, *arguments)
 
 
-def test_a_model_that_nothing_was_measured_with(refused: Refused, done: Done, frames_file: Path, tmp_path: Path) -> None:
+def test_a_model_that_nothing_was_measured_with(
+    refused: Refused, done: Done, frames_file: Path, tmp_path: Path
+) -> None:
     path = tmp_path / "odd.eitm"
     done("model", "build", "--paper", "--rank", "33", "--pixels", "12", "-o", path)
-    assert "tradeoff recommend" in refused(2, "reconstruct", frames_file, "--model", path, "--accuracy", "0.7")
+    assert "tradeoff recommend" in refused(
+        2, "reconstruct", frames_file, "--model", path, "--accuracy", "0.7"
+    )
 
 
 def test_boards_are_told_the_settings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -135,7 +180,9 @@ def test_boards_are_told_the_settings(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "on the F767 (an estimate)" in err
     frames = [json.loads(line) for line in out.splitlines()][:2]
     assert "at most 1200000 MACs" in err
-    assert all(frame["info"]["stop"] == "macs" and frame["info"]["macs"] <= 1_200_000 for frame in frames)
+    assert all(
+        frame["info"]["stop"] == "macs" and frame["info"]["macs"] <= 1_200_000 for frame in frames
+    )
     assert all(frame["info"]["gap_rel"] > 0 for frame in frames)
     assert main(["stream", "--device", f"sim:{scene}", "--budget", "7ms"]) == 0
     line = capsys.readouterr().out.splitlines()[0]
@@ -144,7 +191,9 @@ def test_boards_are_told_the_settings(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_boards_refuse(refused: Refused, tmp_path: Path) -> None:
     scene = write_scene(tmp_path / "one.toml", frames=1)
-    assert "--iterations" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "5ms", "--iterations", "9")
+    assert "--iterations" in refused(
+        2, "stream", "--device", f"sim:{scene}", "--budget", "5ms", "--iterations", "9"
+    )
     assert "takes" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "1ms")
     assert "--budget x" in refused(2, "stream", "--device", f"sim:{scene}", "--budget", "x")
 

@@ -22,7 +22,9 @@ def tool(*names: str) -> str:
         found = shutil.which(name) or (str(beside) if beside.exists() else None)
         if found:
             return found
-    raise AssertionError(f"none of {', '.join(names)} is installed; the C core cannot be built and judged without it")
+    raise AssertionError(
+        f"none of {', '.join(names)} is installed; the C core cannot be built and judged without it"
+    )
 
 
 def run(*command: str | Path) -> str:
@@ -31,15 +33,20 @@ def run(*command: str | Path) -> str:
     Raises:
         AssertionError: it fails; with what it said.
     """
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [str(word) for word in command], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, f"{' '.join(map(str, command))}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 
 
 def build_core(folder: Path) -> dict[str, Path]:
-    """The static libraries of both widths, configured and built in ``folder``: {"f32": path, "f64": path}."""
+    """The static libraries of both widths, configured and built in ``folder``: {"f32": path, "f64":
+    path}."""
     compiler, cmake = tool("cc", "gcc", "clang"), tool("cmake")
-    generator = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}"] if not shutil.which("make") else []
+    generator = (
+        ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}"] if not shutil.which("make") else []
+    )
     settings = [f"-DCMAKE_C_COMPILER={compiler}", "-DEITSKIN_TESTS=OFF", "-DEITSKIN_PYTHON=OFF"]
     run(cmake, "-S", ROOT, "-B", folder, *generator, *settings)
     run(cmake, "--build", folder, "--target", "eitskin_f32", "eitskin_f64")

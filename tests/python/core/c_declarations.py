@@ -1,7 +1,9 @@
-"""Declarations of C headers and of a cffi cdef, read as text into plain values that can be compared.
+"""Declarations of C headers and of a cffi cdef, read as text into plain values that can be
+compared.
 
-Reads what this project writes: enums, structs, prototypes and object-like macros at file level. Not a parser of C at large: what
-it does not understand it reports, so that nothing is passed over in silence.
+Reads what this project writes: enums, structs, prototypes and object-like macros at file level. Not
+a parser of C at large: what it does not understand it reports, so that nothing is passed over in
+silence.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ class Struct:
 
 @dataclass
 class Declarations:
-    """All of a text. Enums: members as (name, stated value or None). Functions: (result, (type, name) of each parameter)."""
+    """All of a text. Enums: members as (name, stated value or None). Functions: (result, (type,
+    name) of each parameter)."""
 
     enums: dict[str, tuple[tuple[str, int | None], ...]] = field(default_factory=dict)
     structs: dict[str, Struct] = field(default_factory=dict)
@@ -32,7 +35,8 @@ class Declarations:
 
 
 def parse(text: str) -> Declarations:
-    """The declarations in ``text``, of both branches of conditionals, but for what is there for C++ alone."""
+    """The declarations in ``text``, of both branches of conditionals, but for what is there for C++
+    alone."""
     text = re.sub(r"/\*.*?\*/", " ", text, flags=re.S)
     text = re.sub(r"\\\n", " ", text)
     text = re.sub(r"#ifdef __cplusplus\n.*?#endif", "", text, flags=re.S)
@@ -71,8 +75,13 @@ def _read(statement: str, found: Declarations) -> None:
     elif struct:
         found.structs[struct.group(2)] = _fields(struct.group(1), found)
     elif function:
-        parameters = [] if function.group(3).strip() in ("", "void") else function.group(3).split(",")
-        found.functions[function.group(2)] = (_type(function.group(1)), tuple(_declarator(p) for p in parameters))
+        parameters = (
+            [] if function.group(3).strip() in ("", "void") else function.group(3).split(",")
+        )
+        found.functions[function.group(2)] = (
+            _type(function.group(1)),
+            tuple(_declarator(p) for p in parameters),
+        )
     elif not re.fullmatch(r"struct \w+|typedef (?:float|double) eits_real", statement):
         found.not_understood.append(statement)
 
@@ -138,6 +147,9 @@ def differences(cdef: Declarations, header: Declarations) -> list[str]:
     for name, prototype in cdef.functions.items():
         if header.functions.get(name) != prototype:
             wrong.append(f"function {name}: result or parameters")
-    wrong += [f"function {name}: not in the cdef" for name in header.functions.keys() - cdef.functions.keys()]
+    wrong += [
+        f"function {name}: not in the cdef"
+        for name in header.functions.keys() - cdef.functions.keys()
+    ]
     wrong += [f"macro {name}: not in the headers" for name in cdef.macros - header.macros]
     return wrong

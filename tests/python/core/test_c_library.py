@@ -1,4 +1,5 @@
-"""The C core as a library: what it asks of the world, what it keeps, what it shows; and its sources."""
+"""The C core as a library: what it asks of the world, what it keeps, what it shows; and its
+sources."""
 
 from __future__ import annotations
 
@@ -17,7 +18,12 @@ MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
 ARITHMETIC = {"f32": {"fmaf", "sqrtf"}, "f64": {"fma", "sqrt"}}
 # what a compiler refers to by itself: the processor's features, position-independent code, hardening
 PROCESSOR = {"__cpu_model", "__cpu_features2", "__cpu_indicator_init"}
-OF_THE_COMPILER = PROCESSOR | {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail", "__memcpy_chk", "__memset_chk"}
+OF_THE_COMPILER = PROCESSOR | {
+    "_GLOBAL_OFFSET_TABLE_",
+    "__stack_chk_fail",
+    "__memcpy_chk",
+    "__memset_chk",
+}
 WIDTHS = ("f32", "f64")
 
 
@@ -50,19 +56,27 @@ def symbols(library: Path) -> list[Symbol]:
 def asked_of_others(library: Path) -> set[str]:
     """Names that the library uses and does not define."""
     all_symbols = symbols(library)
-    return {s.name for s in all_symbols if s.kind == "U"} - {s.name for s in all_symbols if s.kind != "U"}
+    return {s.name for s in all_symbols if s.kind == "U"} - {
+        s.name for s in all_symbols if s.kind != "U"
+    }
 
 
 def writable(library: Path) -> set[str]:
-    """Variables that can be written after start, and sections that hold such bytes. Tables of constant pointers are none: those
-    are relocated once (.data.rel.ro)."""
+    """Variables that can be written after start, and sections that hold such bytes. Tables of
+    constant pointers are none: those are relocated once (.data.rel.ro)."""
     of_section = {
         f"section {name}"
-        for name, size in re.findall(r"^\s*\d+\s+(\S+)\s+([0-9a-f]{8,16})\s", run(tool("objdump"), "-h", library), re.M)
-        if re.match(r"\.t?(data|bss)", name) and not name.startswith(".data.rel.ro") and int(size, 16) > 0
+        for name, size in re.findall(
+            r"^\s*\d+\s+(\S+)\s+([0-9a-f]{8,16})\s", run(tool("objdump"), "-h", library), re.M
+        )
+        if re.match(r"\.t?(data|bss)", name)
+        and not name.startswith(".data.rel.ro")
+        and int(size, 16) > 0
     }
     return of_section | {
-        s.name for s in symbols(library) if s.kind in "DdBbCcGgSs" and not s.section.startswith(".data.rel.ro")
+        s.name
+        for s in symbols(library)
+        if s.kind in "DdBbCcGgSs" and not s.section.startswith(".data.rel.ro")
     }
 
 
@@ -75,7 +89,18 @@ def shown(library: Path) -> set[str]:
 def test_asks_only_for_memory_moves_and_arithmetic(libraries: dict[str, Path], width: str) -> None:
     """No malloc, no printf, no file, no clock: nothing but what is listed here."""
     asked = asked_of_others(libraries[width])
-    for forbidden in ("malloc", "calloc", "realloc", "free", "printf", "puts", "fopen", "abort", "exit", "__errno_location"):
+    for forbidden in (
+        "malloc",
+        "calloc",
+        "realloc",
+        "free",
+        "printf",
+        "puts",
+        "fopen",
+        "abort",
+        "exit",
+        "__errno_location",
+    ):
         assert forbidden not in asked
     assert asked - OF_THE_COMPILER <= MEMORY | ARITHMETIC[width]
     assert "memcpy" in asked or "memset" in asked  # the list was read at all
@@ -104,23 +129,32 @@ def test_an_offender_is_noticed(tmp_path: Path) -> None:
     source.write_text(
         "#include <stdio.h>\n#include <stdlib.h>\n"
         "static int calls;\nint table[3] = {1, 2, 3};\n_Thread_local int own = 4;\n"
-        "const char *const names[] = {\"a\", \"b\"};\n"
-        'void *helper(void) { printf("%d %d", ++calls, ++own); return malloc((size_t)table[0]); }\n',
+        'const char *const names[] = {"a", "b"};\n'
+        'void *helper(void) { printf("%d %d", ++calls, ++own); return'
+        " malloc((size_t)table[0]); }\n",
         encoding="ascii",
     )
     run(tool("cc", "gcc", "clang"), "-O0", "-fPIC", "-c", source, "-o", member)
     run(tool("ar"), "rcs", library, member)
     assert {"printf", "malloc"} <= asked_of_others(library)
-    assert {"calls", "table", "section .data", "section .bss", "section .tdata"} <= writable(library)
+    assert {"calls", "table", "section .data", "section .bss", "section .tdata"} <= writable(
+        library
+    )
     assert "names" not in writable(library)
     assert {"helper", "table", "names"} <= shown(library)
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_every_source_is_built(libraries: dict[str, Path], width: str) -> None:
-    members = {name.removesuffix(".o").removesuffix(".obj") for name in run(tool("ar"), "t", libraries[width]).split()}
+    members = {
+        name.removesuffix(".o").removesuffix(".obj")
+        for name in run(tool("ar"), "t", libraries[width]).split()
+    }
     sources = {path.name for path in SOURCES if path.suffix == ".c"}
-    assert sources - members <= {"kernels_avx2.c", "kernels_m7.c"}  # for one family of processors only
+    assert sources - members <= {
+        "kernels_avx2.c",
+        "kernels_m7.c",
+    }  # for one family of processors only
     assert members <= sources
 
 
@@ -134,14 +168,19 @@ def test_files_are_short(path: Path) -> None:
 
 @pytest.mark.parametrize("path", [*SOURCES, *HEADERS], ids=lambda path: path.name)
 def test_includes_are_the_allowed_ones(path: Path) -> None:
-    """The standard library's integers, sizes, memory moves and arithmetic; and files of the core."""
-    allowed = {"stdint.h", "stddef.h", "string.h", "math.h"} | ({"immintrin.h"} if path.name == "kernels_avx2.c" else set())
+    """The standard library's integers, sizes, memory moves and arithmetic; and files of the
+    core."""
+    allowed = {"stdint.h", "stddef.h", "string.h", "math.h"} | (
+        {"immintrin.h"} if path.name == "kernels_avx2.c" else set()
+    )
     if path in HEADERS:
         allowed -= {"math.h", "string.h"}  # a user of the core gets no more than types
     text = path.read_text(encoding="ascii")
-    assert set(re.findall(r'^\s*#\s*include\s*<([^>]+)>', text, re.M)) <= allowed
+    assert set(re.findall(r"^\s*#\s*include\s*<([^>]+)>", text, re.M)) <= allowed
     for name in re.findall(r'^\s*#\s*include\s*"([^"]+)"', text, re.M):
-        assert (CSRC / "include" / name).is_file() or ((CSRC / "src" / name).is_file() and path in SOURCES), name
+        assert (CSRC / "include" / name).is_file() or (
+            (CSRC / "src" / name).is_file() and path in SOURCES
+        ), name
     for rest in re.findall(r"^\s*#\s*include\b(.*)", text, re.M):
         assert re.match(r'\s*(<[^>]+>|"[^"]+")', rest)  # spelled out, not by a macro
 
@@ -149,10 +188,21 @@ def test_includes_are_the_allowed_ones(path: Path) -> None:
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("path", HEADERS, ids=lambda path: path.name)
 def test_each_header_stands_alone(path: Path, width: str, tmp_path: Path) -> None:
-    """Included first and alone, as C11 without extensions and, where there is a C++ compiler, as C++."""
+    """Included first and alone, as C11 without extensions and, where there is a C++ compiler, as
+    C++."""
     program = tmp_path / "alone.c"
-    program.write_text(f'#include "eitskin/{path.name}"\nint main(void) {{ return 0; }}\n', encoding="ascii")
-    strict: list[str | Path] = ["-fsyntax-only", "-pedantic", "-Wall", "-Wextra", "-Werror", "-I", CSRC / "include"]
+    program.write_text(
+        f'#include "eitskin/{path.name}"\nint main(void) {{ return 0; }}\n', encoding="ascii"
+    )
+    strict: list[str | Path] = [
+        "-fsyntax-only",
+        "-pedantic",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-I",
+        CSRC / "include",
+    ]
     strict += ["-DEITS_DOUBLE"] if width == "f64" else []
     run(tool("cc", "gcc", "clang"), "-std=c11", *strict, program)
     plus = shutil.which("c++") or shutil.which("g++")

@@ -25,7 +25,14 @@ FRAMES = 10
 def scene() -> Scene:
     """One touch at (-40, 10) on the paper's skin, with noise at 60 dB; ten frames."""
     touch = TouchTrack((Keyframe(-1e9, -40.0, 10.0, 9.0, 9.0),), hold=True)
-    return Scene("one", touches=(touch,), frames=FRAMES, quiet_frames=QUIET, elements=2500, effects={"noise": {"snr_db": 60.0}})
+    return Scene(
+        "one",
+        touches=(touch,),
+        frames=FRAMES,
+        quiet_frames=QUIET,
+        elements=2500,
+        effects={"noise": {"snr_db": 60.0}},
+    )
 
 
 @cache
@@ -60,9 +67,12 @@ def sim_device(board: SimBoard | None = None) -> Iterator[Device]:
 
 
 class Damaging:
-    """A transport that puts every piece of bytes through ``there`` (to the board) or ``back`` (from it)."""
+    """A transport that puts every piece of bytes through ``there`` (to the board) or ``back`` (from
+    it)."""
 
-    def __init__(self, inner: SimTransport, there: Callable[[bytes], bytes], back: Callable[[bytes], bytes]) -> None:
+    def __init__(
+        self, inner: SimTransport, there: Callable[[bytes], bytes], back: Callable[[bytes], bytes]
+    ) -> None:
         self._inner, self._there, self._back = inner, there, back
         self.url = self.name = inner.name
         self.synchronous, self.replays = True, False
@@ -97,7 +107,9 @@ def dropping(generator: random.Random, share: float) -> Callable[[bytes], bytes]
         if chance < share / 2:
             return b""
         place = generator.randrange(len(data))
-        return data[:place] + bytes([data[place] ^ (1 + generator.randrange(255))]) + data[place + 1 :]
+        return (
+            data[:place] + bytes([data[place] ^ (1 + generator.randrange(255))]) + data[place + 1 :]
+        )
 
     return damage
 
@@ -109,11 +121,16 @@ def same(data: bytes) -> bytes:
 def board_info(**changes: object) -> BoardInfo:
     """What a board might say."""
     values: dict[str, object] = {
-        "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi", "serial": "0123456789ABCDEF01234567",
-        "f_cpu_hz": 216_000_000, "electrodes": 16, "bank_bytes": 524256, "data_bytes": 4096, "model_bytes": 1000,
-        "model_crc": 0xDEADBEEF, "protocol_hash": 2**63 + 5, "n_electrodes": 16, "n_rows": 208, "n_folded": 104, "rank": 64,
-        "n_pixels": 812, "nx": 32, "ny": 32, "storage": 0, "bank": 1, "excitation_millihz": 50_000_012,
-        "sample_rate_hz": 1_000_000, "samples": 80, "settle_us": 16, "slot_us": 100, "check_every": 1, "streaming": 0, "every": 1,
+        "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi",
+        "serial": "0123456789ABCDEF01234567",
+        "f_cpu_hz": 216_000_000, "electrodes": 16, "bank_bytes": 524256, "data_bytes": 4096,
+        "model_bytes": 1000,
+        "model_crc": 0xDEADBEEF, "protocol_hash": 2**63 + 5, "n_electrodes": 16, "n_rows": 208,
+        "n_folded": 104, "rank": 64,
+        "n_pixels": 812, "nx": 32, "ny": 32, "storage": 0, "bank": 1,
+        "excitation_millihz": 50_000_012,
+        "sample_rate_hz": 1_000_000, "samples": 80, "settle_us": 16, "slot_us": 100,
+        "check_every": 1, "streaming": 0, "every": 1,
         "tared": 0, "frame_period_us": 0, "faults": 0, "volts_per_code_nv": 805664,
     }  # fmt: skip
     return BoardInfo(**(values | changes))  # type: ignore[arg-type]

@@ -1,4 +1,5 @@
-"""A model bank's bytes, against the layout written out by hand, and which bank a board starts from."""
+"""A model bank's bytes, against the layout written out by hand, and which bank a board starts
+from."""
 
 from __future__ import annotations
 
@@ -7,7 +8,14 @@ import zlib
 
 import pytest
 
-from eitskin.device.bank import BANK_BYTES, BankRecord, bank_bytes, newest_bank, read_record, record_offset
+from eitskin.device.bank import (
+    BANK_BYTES,
+    BankRecord,
+    bank_bytes,
+    newest_bank,
+    read_record,
+    record_offset,
+)
 from eitskin.errors import DeviceError
 
 MODEL = bytes(range(256)) * 40
@@ -45,10 +53,22 @@ def test_any_damage_to_the_record_makes_it_none() -> None:
 
 @pytest.mark.parametrize(
     ("generations", "newest"),
-    [((1, 2), 1), ((2, 1), 0), ((2**32 - 1, 0), 1), ((0, 2**32 - 1), 0), ((None, 5), 1), ((5, None), 0), ((None, None), None)],
+    [
+        ((1, 2), 1),
+        ((2, 1), 0),
+        ((2**32 - 1, 0), 1),
+        ((0, 2**32 - 1), 0),
+        ((None, 5), 1),
+        ((5, None), 0),
+        ((None, None), None),
+    ],
 )
-def test_the_latest_valid_bank_wins(generations: tuple[int | None, int | None], newest: int | None) -> None:
-    banks = [bytes([0xFF]) * 16384 if g is None else bank_bytes(MODEL, g, 16384) for g in generations]
+def test_the_latest_valid_bank_wins(
+    generations: tuple[int | None, int | None], newest: int | None
+) -> None:
+    banks = [
+        bytes([0xFF]) * 16384 if g is None else bank_bytes(MODEL, g, 16384) for g in generations
+    ]
     assert newest_bank(banks) == newest
 
 

@@ -25,12 +25,17 @@ def clean_run() -> dict[int, bytes]:
     with Device(SimTransport("clean", sim_board())) as device:
         device.tare(QUIET)
         device.start_scene()
-        return {item.frame: item.voltage_v.tobytes() for item in device.stream(Stream.RAW) if isinstance(item, RawFrame)}
+        return {
+            item.frame: item.voltage_v.tobytes()
+            for item in device.stream(Stream.RAW)
+            if isinstance(item, RawFrame)
+        }
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_lossy_line_loses_frames_but_nothing_else(seed: int) -> None:
-    """Commands get through, no frame is wrong, every loss between two packets that came is counted."""
+    """Commands get through, no frame is wrong, every loss between two packets that came is
+    counted."""
     generator = random.Random(seed)
     transport = SimTransport("lossy", sim_board())
     lossy = Damaging(transport, dropping(generator, 0.2), dropping(generator, 0.2))
@@ -46,12 +51,17 @@ def test_a_lossy_line_loses_frames_but_nothing_else(seed: int) -> None:
             missing = counters.missing
     except DeviceError as error:
         # three times lost in a row: said, not hung
-        assert any(words in str(error) for words in ("is not answered within", "no packet decodes", "no answer within"))
+        assert any(
+            words in str(error)
+            for words in ("is not answered within", "no packet decodes", "no answer within")
+        )
         return
     raws = [item for item in items if isinstance(item, RawFrame)]
     assert all(truth[raw.frame] == raw.voltage_v.tobytes() for raw in raws)
     assert [raw.frame for raw in raws] == sorted({raw.frame for raw in raws})
-    events = sum(item.missing for item in items if isinstance(item, LinkEvent) and item.kind == "gap")
+    events = sum(
+        item.missing for item in items if isinstance(item, LinkEvent) and item.kind == "gap"
+    )
     assert events <= missing
     assert counters.duplicates == counters.stale == 0
     assert counters.packets + missing <= sent
@@ -114,7 +124,9 @@ def test_a_restart_loses_the_reference_and_says_so() -> None:
     with Device(SimTransport("restarts", board)) as device:
         device.tare(QUIET)
         device.start_scene()
-        with pytest.raises(DeviceError, match="restarted and has no reference frame; leave the skin untouched"):
+        with pytest.raises(
+            DeviceError, match="restarted and has no reference frame; leave the skin untouched"
+        ):
             for item in device.stream(Stream.TOUCHES):
                 if isinstance(item, SolvedTouches):
                     board._restart()
@@ -150,19 +162,28 @@ class Scripted:
 
 def test_silence_is_said_and_the_port_let_go() -> None:
     port = Scripted()
-    with pytest.raises(DeviceError, match=r"no answer within 3 s; is this the board's port, and its firmware running\? flash"):
+    with pytest.raises(
+        DeviceError,
+        match=r"no answer within 3 s; is this the board's port, and its firmware running\? flash",
+    ):
         Device(port)
     assert port.closed
 
 
 def test_bytes_that_are_no_packets_are_another_baud_rate() -> None:
-    with pytest.raises(DeviceError, match=r"400 bytes arrive but no packet decodes at 115200 baud: .*serial:PORT\?baud=N"):
+    with pytest.raises(
+        DeviceError,
+        match=r"400 bytes arrive but no packet decodes at 115200 baud: .*serial:PORT\?baud=N",
+    ):
         Device(Scripted(bytes(random.Random(1).randrange(256) for _ in range(400))))
 
 
 def test_packets_without_an_answer_are_told_apart() -> None:
     chatter = [encode(PacketType.FAULT, k, bytes(36)) for k in range(5)]
-    with pytest.raises(DeviceError, match=r"packets arrive, but GET_INFO is not answered within 3 s; reset the board"):
+    with pytest.raises(
+        DeviceError,
+        match=r"packets arrive, but GET_INFO is not answered within 3 s; reset the board",
+    ):
         Device(Scripted(*chatter))
 
 
@@ -174,7 +195,9 @@ def test_a_board_that_talks_for_ever_without_answering_is_given_up() -> None:
         Device(port)
 
 
-@pytest.mark.parametrize(("version", "advice"), [(4, "upgrade eitskin, or flash"), (1, "flash this version's firmware")])
+@pytest.mark.parametrize(
+    ("version", "advice"), [(4, "upgrade eitskin, or flash"), (1, "flash this version's firmware")]
+)
 def test_another_link_version_is_refused_with_what_to_do(version: int, advice: str) -> None:
     import zlib
 
@@ -187,20 +210,31 @@ def test_another_link_version_is_refused_with_what_to_do(version: int, advice: s
         else:
             wire += bytes([len(block) + 1]) + block
             block.clear()
-    with pytest.raises(DeviceError, match=f"speaks version {version} of the link protocol and this eitskin 3; {advice}"):
+    with pytest.raises(
+        DeviceError,
+        match=f"speaks version {version} of the link protocol and this eitskin 3; {advice}",
+    ):
         Device(Scripted(bytes(wire) + b"\0"))
 
 
 @pytest.mark.parametrize("major", [host_major() + 1, host_major() + 7])
 def test_another_firmware_version_is_refused_with_what_to_do(major: int) -> None:
     newer = encode(PacketType.INFO, 0, build_info(board_info(firmware=(major, 0, 3))))
-    with pytest.raises(DeviceError, match=rf"firmware is {major}\.0\.3 and this eitskin is .*; install eitskin {major}\.x, or f"):
+    with pytest.raises(
+        DeviceError,
+        match=(
+            rf"firmware is {major}\.0\.3 and this eitskin is .*; install eitskin {major}\.x, or f"
+        ),
+    ):
         Device(Scripted(newer))
 
 
 def test_an_older_firmware_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("eitskin.device.check.__version__", "3.2.1")
-    with pytest.raises(DeviceError, match=r"firmware is 0\.1\.0 and this eitskin is 3\.2\.1; flash this version's firmware"):
+    with pytest.raises(
+        DeviceError,
+        match=r"firmware is 0\.1\.0 and this eitskin is 3\.2\.1; flash this version's firmware",
+    ):
         check_board(board_info(), "COM1")
 
 
@@ -210,10 +244,15 @@ def test_another_model_is_refused_with_what_to_do() -> None:
 
     info = board_info(protocol_hash=model.protocol.hash, model_crc=zlib.crc32(blob))
     check_model(info, model, blob, "x")
-    with pytest.raises(DeviceError, match="model upload FILE  or name the board's with  --model FILE"):
+    with pytest.raises(
+        DeviceError, match="model upload FILE  or name the board's with  --model FILE"
+    ):
         check_model(replace(info, model_crc=1), model, blob, "x")
     tiny = decode_model(tiny_blob(), "tiny")
-    with pytest.raises(DeviceError, match=r"scans protocol [0-9a-f]{16} \(16 electrodes, 208 rows\) and the model here"):
+    with pytest.raises(
+        DeviceError,
+        match=r"scans protocol [0-9a-f]{16} \(16 electrodes, 208 rows\) and the model here",
+    ):
         check_model(info, tiny, tiny_blob(), "x")
     with pytest.raises(DeviceError, match="the board has no model"):
         check_model(replace(info, model_bytes=0), model, blob, "x")
@@ -237,10 +276,17 @@ def test_an_excitation_that_the_generator_rounds_stays_what_was_asked() -> None:
 
     assert _asked_millihz(board_info()) == 50_000_000
     assert _asked_millihz(board_info(excitation_millihz=9_999_990, samples=100)) == 10_000_000
-    assert _asked_millihz(board_info(excitation_millihz=1003, sample_rate_hz=1000, samples=1000)) == 1000
+    assert (
+        _asked_millihz(board_info(excitation_millihz=1003, sample_rate_hz=1000, samples=1000))
+        == 1000
+    )
 
 
 def test_frames_of_a_stream_are_finite() -> None:
     with Device(SimTransport("finite", sim_board())) as device:
         device.start_scene()
-        assert all(np.isfinite(item.voltage_v).all() for item in device.stream(Stream.RAW) if isinstance(item, RawFrame))
+        assert all(
+            np.isfinite(item.voltage_v).all()
+            for item in device.stream(Stream.RAW)
+            if isinstance(item, RawFrame)
+        )

@@ -1,4 +1,5 @@
-"""The codec through cffi: what is sent arrives, what is damaged does not, and every byte is accounted for."""
+"""The codec through cffi: what is sent arrives, what is damaged does not, and every byte is
+accounted for."""
 
 from __future__ import annotations
 
@@ -17,7 +18,11 @@ def packets_of(wire: bytes, decoder: Decoder | None = None) -> list[Packet]:
     return (decoder or Decoder()).feed(wire)
 
 
-@given(st.integers(0, 255).filter(lambda t: t != PacketType.RECORDING), st.integers(0, 2**32 - 1), st.binary(max_size=1000))
+@given(
+    st.integers(0, 255).filter(lambda t: t != PacketType.RECORDING),
+    st.integers(0, 2**32 - 1),
+    st.binary(max_size=1000),
+)
 def test_round_trip(packet_type: int, sequence: int, payload: bytes) -> None:
     wire = encode(packet_type, sequence, payload)
     assert wire[0] == wire[-1] == 0
@@ -32,11 +37,22 @@ def test_the_bytes_are_the_documented_ones() -> None:
     checksum = zlib.crc32(head + payload).to_bytes(4, "little")
     assert 0 not in checksum
     plain = head + payload + checksum
-    stuffed = bytes([4]) + plain[:3] + bytes([2]) + plain[4:5] + bytes([1, 1, 3]) + plain[8:10] + bytes([6]) + plain[11:]
+    stuffed = (
+        bytes([4])
+        + plain[:3]
+        + bytes([2])
+        + plain[4:5]
+        + bytes([1, 1, 3])
+        + plain[8:10]
+        + bytes([6])
+        + plain[11:]
+    )
     assert encode(0x80, 7, payload) == b"\0" + stuffed + b"\0"
 
 
-@pytest.mark.parametrize("size", [0, 1, 241, 242, 243, 253, 254, 255, 508, 1000, MAX_PAYLOAD - 1, MAX_PAYLOAD])
+@pytest.mark.parametrize(
+    "size", [0, 1, 241, 242, 243, 253, 254, 255, 508, 1000, MAX_PAYLOAD - 1, MAX_PAYLOAD]
+)
 @pytest.mark.parametrize("fill", [0, 1, 255])
 def test_sizes_at_the_edges(size: int, fill: int) -> None:
     payload = bytes([fill]) * size
@@ -48,7 +64,9 @@ def test_too_long_a_payload_is_refused() -> None:
         encode(1, 1, bytes(MAX_PAYLOAD + 1))
 
 
-ORIGINALS = [(k % 200 + 1, k, bytes((k * 37 + i * i) % 256 for i in range(k % 90))) for k in range(40)]
+ORIGINALS = [
+    (k % 200 + 1, k, bytes((k * 37 + i * i) % 256 for i in range(k % 90))) for k in range(40)
+]
 WIRE = b"".join(encode(*one) for one in ORIGINALS)
 
 
@@ -78,7 +96,9 @@ def damaged_wires(draw: st.DrawFn) -> bytes:
 
 @settings(max_examples=300, deadline=None)
 @given(damaged_wires(), st.lists(st.integers(1, 700), min_size=1, max_size=8))
-def test_a_link_under_fire_takes_only_what_was_sent_and_in_order(wire: bytes, cuts: list[int]) -> None:
+def test_a_link_under_fire_takes_only_what_was_sent_and_in_order(
+    wire: bytes, cuts: list[int]
+) -> None:
     decoder, found, place = Decoder(), [], 0
     k = 0
     while place < len(wire):
@@ -92,7 +112,11 @@ def test_a_link_under_fire_takes_only_what_was_sent_and_in_order(wire: bytes, cu
         numbers = [p.sequence for p in found]
         assert numbers == sorted(set(numbers))
         if numbers:  # every gap is counted
-            assert sum(p.lost for p in found) == counters.missing == numbers[-1] - numbers[0] + 1 - len(numbers)
+            assert (
+                sum(p.lost for p in found)
+                == counters.missing
+                == numbers[-1] - numbers[0] + 1 - len(numbers)
+            )
     assert counters.packets == len(found)
     assert counters.bytes == len(wire)
     decoder.feed(b"\0")
@@ -113,7 +137,11 @@ def test_a_port_opened_in_the_middle_of_a_packet() -> None:
     decoder = Decoder()
     assert [p.payload for p in decoder.feed(first[5:] + second)] == [b"whole"]
     assert decoder.counters.skipped_bytes == len(first) - 6
-    assert (decoder.counters.crc_errors, decoder.counters.framing_errors, decoder.counters.gaps) == (0, 0, 0)
+    assert (
+        decoder.counters.crc_errors,
+        decoder.counters.framing_errors,
+        decoder.counters.gaps,
+    ) == (0, 0, 0)
 
 
 def test_another_version_is_told_apart_from_damage() -> None:

@@ -1,4 +1,5 @@
-"""Flashing: the exact command lines of each tool, what goes where, and what is refused. No board is touched."""
+"""Flashing: the exact command lines of each tool, what goes where, and what is refused. No board is
+touched."""
 
 from __future__ import annotations
 
@@ -23,7 +24,9 @@ def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "bin"
     folder.mkdir()
     for name in TOOLS:
-        (folder / name).write_text(f'#!/bin/sh\nprintf "%s\\n" "{name} $*" >> {tmp_path}/called\nexit ${{FAIL:-0}}\n')
+        (folder / name).write_text(
+            f'#!/bin/sh\nprintf "%s\\n" "{name} $*" >> {tmp_path}/called\nexit ${{FAIL:-0}}\n'
+        )
         (folder / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}:/usr/bin:/bin")
     return folder
@@ -40,7 +43,8 @@ def test_openocd(image: Path, tools: Path) -> None:
     plan = plan_flash(image, tool="openocd")
     assert plan.commands == (
         (
-            "openocd", "-f", "board/st_nucleo_f7.cfg", "-c", f"program {{{image}}} verify 0x08000000",
+            "openocd", "-f", "board/st_nucleo_f7.cfg", "-c",
+            f"program {{{image}}} verify 0x08000000",
             "-c", "reset run", "-c", "shutdown",
         ),
     )  # fmt: skip
@@ -49,19 +53,33 @@ def test_openocd(image: Path, tools: Path) -> None:
 
 def test_st_flash(image: Path, tools: Path) -> None:
     plan = plan_flash(image, tool="st-flash", serial="0667FF")
-    assert plan.commands == (("st-flash", "--serial", "0667FF", "--reset", "write", str(image), "0x08000000"),)
+    assert plan.commands == (
+        ("st-flash", "--serial", "0667FF", "--reset", "write", str(image), "0x08000000"),
+    )
     assert plan.lines() == [f"st-flash --serial 0667FF --reset write '{image}' 0x08000000"]
 
 
 def test_pyocd(image: Path, tools: Path) -> None:
     plan = plan_flash(image, tool="pyocd")
     assert plan.commands == (
-        ("pyocd", "load", "--target", "stm32f767zi", "--format", "bin", "--base-address", "0x08000000", str(image)),
+        (
+            "pyocd",
+            "load",
+            "--target",
+            "stm32f767zi",
+            "--format",
+            "bin",
+            "--base-address",
+            "0x08000000",
+            str(image),
+        ),
     )
 
 
 @pytest.mark.parametrize("tool", TOOLS)
-def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(tool: str, image: Path, tools: Path) -> None:
+def test_a_model_goes_into_the_first_bank_and_the_other_loses_its_record(
+    tool: str, image: Path, tools: Path
+) -> None:
     plan = plan_flash(image, tiny_blob(), tool=tool)
     assert plan.bank_file is not None
     assert plan.bank_file.read_bytes() == bank_bytes(tiny_blob(), 1)
@@ -78,10 +96,14 @@ def test_the_first_tool_that_is_there_is_taken(tools: Path) -> None:
     assert find_tool() == "st-flash"
     (tools / "st-flash").unlink()
     assert find_tool() == "pyocd"
-    with pytest.raises(DeviceError, match="openocd is not installed; install one:  apt install openocd"):
+    with pytest.raises(
+        DeviceError, match="openocd is not installed; install one:  apt install openocd"
+    ):
         find_tool("openocd")
     (tools / "pyocd").unlink()
-    with pytest.raises(DeviceError, match="none of openocd, st-flash, pyocd is installed; install one"):
+    with pytest.raises(
+        DeviceError, match="none of openocd, st-flash, pyocd is installed; install one"
+    ):
         find_tool()
     with pytest.raises(UsageError, match="--tool dfu: use one of openocd, st-flash, pyocd"):
         find_tool("dfu")
@@ -96,12 +118,18 @@ def test_the_plan_is_what_is_run(tool: str, image: Path, tools: Path, tmp_path: 
     assert not (tmp_path / "called").exists()  # planning runs nothing
     run_flash(plan, said.append)
     assert said == plan.lines()
-    assert (tmp_path / "called").read_text().splitlines() == [" ".join(command) for command in plan.commands]
+    assert (tmp_path / "called").read_text().splitlines() == [
+        " ".join(command) for command in plan.commands
+    ]
 
 
-def test_a_tool_that_fails_is_said(image: Path, tools: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tool_that_fails_is_said(
+    image: Path, tools: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("FAIL", "3")
-    with pytest.raises(DeviceError, match=r"flashing failed: st-flash .* ended with 3; is the board plugged in") as caught:
+    with pytest.raises(
+        DeviceError, match=r"flashing failed: st-flash .* ended with 3; is the board plugged in"
+    ) as caught:
         run_flash(plan_flash(image, tool="st-flash"))
     assert "\n" not in str(caught.value)
     with pytest.raises(DeviceError, match="cannot be run"):
@@ -114,13 +142,18 @@ def test_a_tool_that_fails_is_said(image: Path, tools: Path, monkeypatch: pytest
         (b"\x7fELF" + bytes(600), r"this is an \.elf; give the \.bin"),
         (b"", "no firmware image of this board"),
         (bytes(4000), "no firmware image of this board"),
-        (struct.pack("<II", 0x2000_4000, 0x0800_0200) + bytes(2000), "no firmware image"),  # not Thumb
+        (
+            struct.pack("<II", 0x2000_4000, 0x0800_0200) + bytes(2000),
+            "no firmware image",
+        ),  # not Thumb
         (struct.pack("<II", 0x2000_4000, 0x0900_0001) + bytes(2000), "no firmware image"),
         (struct.pack("<II", 0x1000_0000, 0x0800_0201) + bytes(2000), "no firmware image"),
         (IMAGE + bytes(256 * 1024), "but firmware has room for 262144"),
     ],
 )
-def test_what_is_no_firmware_is_refused(content: bytes, message: str, tmp_path: Path, tools: Path) -> None:
+def test_what_is_no_firmware_is_refused(
+    content: bytes, message: str, tmp_path: Path, tools: Path
+) -> None:
     (tmp_path / "bad.bin").write_bytes(content)
     with pytest.raises(DeviceError, match=message):
         plan_flash(tmp_path / "bad.bin")
@@ -137,6 +170,10 @@ def test_a_model_too_large_is_refused(image: Path, tools: Path) -> None:
 
 
 def test_the_map_is_the_firmwares() -> None:
-    assert (flash.FIRMWARE_ADDRESS, flash.BANK_ADDRESS, flash.SECOND_BANK_ADDRESS) == (0x08000000, 0x08040000, 0x080C0000)
+    assert (flash.FIRMWARE_ADDRESS, flash.BANK_ADDRESS, flash.SECOND_BANK_ADDRESS) == (
+        0x08000000,
+        0x08040000,
+        0x080C0000,
+    )
     assert flash.FIRMWARE_ADDRESS + flash.FIRMWARE_ROOM == flash.BANK_ADDRESS
     assert os.sep not in "".join(TOOLS)

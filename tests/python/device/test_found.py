@@ -1,4 +1,5 @@
-"""What is found wrong with frames is named in their heads, as faults, and once in lines; on a simulated board, recorded too."""
+"""What is found wrong with frames is named in their heads, as faults, and once in lines; on a
+simulated board, recorded too."""
 
 from __future__ import annotations
 
@@ -24,7 +25,15 @@ from eitskin.device.simulated.board import SimBoard
 from eitskin.device.simulated.faults import SimFaults
 from eitskin.device.simulated.skin import SceneSkin
 from eitskin.device.wire.explain import fault_text
-from eitskin.device.wire.packets import CLEAN_FRAMES, SHOWN_FRAMES, Fault, FaultCode, Solved, SolvedTouches, Stream
+from eitskin.device.wire.packets import (
+    CLEAN_FRAMES,
+    SHOWN_FRAMES,
+    Fault,
+    FaultCode,
+    Solved,
+    SolvedTouches,
+    Stream,
+)
 from eitskin.device.wire.payloads import parse_fault
 from eitskin.errors import DeviceError
 from small_models import prebuilt
@@ -36,7 +45,11 @@ ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 @cache
 def wobbling() -> SceneSkin:
     """One touch, and electrode 5 off from the scene's frame 3 until frame 6."""
-    off = {"electrodes": [OFF], "from_s": (FROM_FRAME - 0.5) / 20, "until_s": (UNTIL_FRAME - 0.5) / 20}
+    off = {
+        "electrodes": [OFF],
+        "from_s": (FROM_FRAME - 0.5) / 20,
+        "until_s": (UNTIL_FRAME - 0.5) / 20,
+    }
     skin = SceneSkin(replace(scene(), frames=FRAMES, effects={**scene().effects, "detached": off}))
     skin.frame(prebuilt()[0].protocol, 0)
     return skin
@@ -53,25 +66,37 @@ def heads(items: Iterable[object]) -> list[Solved]:
 
 
 def faults(items: Iterable[object]) -> list[tuple[int, bool, int, int]]:
-    return [(item.code, item.raised, item.index, item.frame) for item in items if isinstance(item, Fault)]
+    return [
+        (item.code, item.raised, item.index, item.frame)
+        for item in items
+        if isinstance(item, Fault)
+    ]
 
 
 @pytest.mark.parametrize("every", [1, 4])
-def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_it_is_back(every: int) -> None:
+def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_it_is_back(
+    every: int,
+) -> None:
     with sim_device(board()) as device:
         device.tare(QUIET)
         device.start_scene()
         items = list(device.stream(Stream.TOUCHES, every=every))
         first = heads(items)[0].frame
         assert [head.open_electrodes for head in heads(items)] == [
-            (OFF,) if FROM_FRAME <= head.frame - first < UNTIL_FRAME else () for head in heads(items)
+            (OFF,) if FROM_FRAME <= head.frame - first < UNTIL_FRAME else ()
+            for head in heads(items)
         ]
         told = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
         gone = first + UNTIL_FRAME + CLEAN_FRAMES - 1
-        assert told == [(FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME), (FaultCode.ELECTRODE_OPEN, False, OFF, gone)]
+        assert told == [
+            (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME),
+            (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
+        ]
         if every == 1:
             at = next(k for k, item in enumerate(items) if isinstance(item, Fault))
-            assert heads(items[at:])[0].frame == first + FROM_FRAME  # the fault comes before the frame that it is of
+            assert (
+                heads(items[at:])[0].frame == first + FROM_FRAME
+            )  # the fault comes before the frame that it is of
             row = prebuilt()[0].protocol.drive_measure
             assert heads(items)[FROM_FRAME].masked == int((row == OFF).any(axis=1).sum())
         assert device.info().faults == 0
@@ -82,7 +107,10 @@ def test_it_is_told_though_nobody_wants_images() -> None:
         device.tare(QUIET)
         device.start_scene()
         told = faults(device.stream(Stream.RAW))
-    assert [fault[:3] for fault in told] == [(FaultCode.ELECTRODE_OPEN, True, OFF), (FaultCode.ELECTRODE_OPEN, False, OFF)]
+    assert [fault[:3] for fault in told] == [
+        (FaultCode.ELECTRODE_OPEN, True, OFF),
+        (FaultCode.ELECTRODE_OPEN, False, OFF),
+    ]
 
 
 def test_what_is_not_looked_for_is_not_found() -> None:
@@ -106,9 +134,17 @@ def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_p
             device.start_scene()
             live = list(follow(device, ALL))
     with open_device(f"file:{path}") as device:
-        again = [item for item in follow(device, ALL) if isinstance(item, LiveFrame) and item.solved is not None]
-    assert [frame.solved for frame in again] == [f.solved for f in live if isinstance(f, LiveFrame) and f.solved is not None]
-    assert any(frame.solved is not None and frame.solved.open_electrodes == (OFF,) for frame in again)
+        again = [
+            item
+            for item in follow(device, ALL)
+            if isinstance(item, LiveFrame) and item.solved is not None
+        ]
+    assert [frame.solved for frame in again] == [
+        f.solved for f in live if isinstance(f, LiveFrame) and f.solved is not None
+    ]
+    assert any(
+        frame.solved is not None and frame.solved.open_electrodes == (OFF,) for frame in again
+    )
     check, noted = check_recording(path, None)
     assert noted
     assert (check.same, check.different) == (FRAMES, [])
@@ -119,7 +155,9 @@ def test_the_check_tells_findings_apart(tmp_path: Path, monkeypatch: pytest.Monk
     from eitskin.device.wire import payloads
 
     build = payloads._build_solved
-    monkeypatch.setattr(payloads, "_build_solved", lambda solved: build(replace(solved, open_electrodes=())))
+    monkeypatch.setattr(
+        payloads, "_build_solved", lambda solved: build(replace(solved, open_electrodes=()))
+    )
     path = tmp_path / "run.eits"
     with sim_device(board()) as device, RunRecorder(path, device, board_options(prebuilt()[0])):
         device.solver(board_options(prebuilt()[0]))
@@ -137,7 +175,8 @@ def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path: Path) -> N
     path = tmp_path / "old.eits"
     path.write_bytes(b"\0" + stuffed + b"\0")
     with pytest.raises(
-        DeviceError, match=r"old\.eits: packets of link version 1, and this eitskin reads version 3; read"
+        DeviceError,
+        match=r"old\.eits: packets of link version 1, and this eitskin reads version 3; read",
     ):
         open_device(f"file:{path}")
 
@@ -146,7 +185,9 @@ def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path: Path) -> N
 
 
 def solved(frame: int, **found: object) -> LiveFrame:
-    head = Solved(frame, 0, 0, 0, 0, 0, 0, "gap", 0, 1, 1, 1, 1, 0.1, 0.2, 0.0, 0.0, 0.0, 1.0, **found)  # type: ignore[arg-type]
+    head = Solved(
+        frame, 0, 0, 0, 0, 0, 0, "gap", 0, 1, 1, 1, 1, 0.1, 0.2, 0.0, 0.0, 0.0, 1.0, **found
+    )  # type: ignore[arg-type]
     return LiveFrame(frame, 0, 0, touches=SolvedTouches(head, ()))
 
 
@@ -169,21 +210,29 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
 def test_what_fault_and_head_tell_is_said_once() -> None:
     news, off = News(), {"findings": bits("electrode open"), "open_electrodes": (5,)}
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
-    assert news.lines(rise) == ["electrode 5 open, frame 41: it makes no contact; wet or press it, then tare"]
+    assert news.lines(rise) == [
+        "electrode 5 open, frame 41: it makes no contact; wet or press it, then tare"
+    ]
     assert news.lines(solved(41, **off)) == []
     also = {"findings": bits("electrode open"), "open_electrodes": (5, 9)}
     assert news.lines(solved(42, **also)) == ["electrode 9 open, frame 42"]  # its fault was lost
     assert news.lines(replace(rise, frame=42, index=9)) == []
-    assert news.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == ["electrode 5 open: over, frame 53"]
+    assert news.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == [
+        "electrode 5 open: over, frame 53"
+    ]
     assert news.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == []
 
 
 def test_a_bridged_pair_is_said_once() -> None:
     news = News()
-    text = "electrodes 6 and 7 bridged, frame 3: water, paste or a wire joins them; dry or part them"
+    text = (
+        "electrodes 6 and 7 bridged, frame 3: water, paste or a wire joins them; dry or part them"
+    )
     assert news.lines(Fault(FaultCode.BRIDGED, True, 3, 6, 7, (0xC0, 0, 0, 0, 0))) == [text]
     assert news.lines(Fault(FaultCode.BRIDGED, True, 3, 7, 6, (0xC0, 0, 0, 0, 0))) == []
-    assert news.lines(solved(3, findings=bits("electrodes bridged"), bridged_electrodes=(6, 7))) == []
+    assert (
+        news.lines(solved(3, findings=bits("electrodes bridged"), bridged_electrodes=(6, 7))) == []
+    )
     over = [line for e in (6, 7) for line in news.lines(Fault(FaultCode.BRIDGED, False, 11, e, 0))]
     assert over == ["electrode 6 bridged: over, frame 11", "electrode 7 bridged: over, frame 11"]
 
@@ -194,13 +243,20 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
         assert ", frame 17: " in text
         assert fault_text(Fault(code, False, 18, 3, 0)).endswith(": over, frame 18")
     assert fault_text(Fault(99, True, 17, 3, 2)) == "fault 99, frame 17: value 2"
-    assert fault_text(Fault(FaultCode.MISFIT, True, 1, 0, 123)).startswith("misfit 12.3 %, frame 1: ")
-    assert fault_text(Fault(FaultCode.BRIDGED, True, 1, 4, -1)).startswith("electrode 4 bridged, frame 1: ")
+    assert fault_text(Fault(FaultCode.MISFIT, True, 1, 0, 123)).startswith(
+        "misfit 12.3 %, frame 1: "
+    )
+    assert fault_text(Fault(FaultCode.BRIDGED, True, 1, 4, -1)).startswith(
+        "electrode 4 bridged, frame 1: "
+    )
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:
     news, misfit = News(), {"findings": bits("misfit"), "misfit": 0.125}
-    told = [news.lines(solved(frame, **(misfit if frame in (2, 3, 7, 8, 9, 10) else {}))) for frame in range(1, 12)]
+    told = [
+        news.lines(solved(frame, **(misfit if frame in (2, 3, 7, 8, 9, 10) else {})))
+        for frame in range(1, 12)
+    ]
     assert told == [[]] * 8 + [["misfit 12.5 %, frame 9"], [], []]
 
 
@@ -209,16 +265,22 @@ def test_simulated_faults_of_all_kinds_rise_and_go_after_clean_frames() -> None:
     board_faults = SimFaults(lambda kind, payload: sent.append(parse_fault(payload)))
     plain = Info(0, "gap", 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     all_found = replace(
-        plain, findings=bits("misfit", "stale reference"), misfit=0.25, open_electrodes=(1,), bridged_electrodes=(2, 40),
+        plain, findings=bits("misfit", "stale reference"), misfit=0.25, open_electrodes=(1,),
+        bridged_electrodes=(2, 40),
         noisy_electrodes=(3,),
     )  # fmt: skip
     board_faults.found(0, all_found, solved=True)
-    assert [f.code for f in sent] == [FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.BRIDGED]
+    assert [f.code for f in sent] == [
+        FaultCode.ELECTRODE_OPEN,
+        FaultCode.BRIDGED,
+        FaultCode.BRIDGED,
+    ]
     for _ in range(SHOWN_FRAMES - 1):
         board_faults.found(1, all_found, solved=True)
     assert [(f.code, f.index, f.value) for f in sent] == [
         (FaultCode.ELECTRODE_OPEN, 1, 0), (FaultCode.BRIDGED, 2, 40), (FaultCode.BRIDGED, 40, 2),
-        (FaultCode.ELECTRODE_NOISY, 3, 0), (FaultCode.MISFIT, 0, 250), (FaultCode.STALE_REFERENCE, 0, 0),
+        (FaultCode.ELECTRODE_NOISY, 3, 0), (FaultCode.MISFIT, 0, 250),
+        (FaultCode.STALE_REFERENCE, 0, 0),
     ]  # fmt: skip
     assert sent[1].words[:2] == (4, 256)
     rose = len(sent)

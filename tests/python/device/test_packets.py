@@ -1,4 +1,5 @@
-"""Payloads: their layouts are the C structs', their enums the header's, and what is built is read back."""
+"""Payloads: their layouts are the C structs', their enums the header's, and what is built is read
+back."""
 
 from __future__ import annotations
 
@@ -58,14 +59,19 @@ def places(layout: struct.Struct) -> list[tuple[int, int]]:
 
 
 def c_places(name: str) -> list[tuple[int, int]]:
-    """The same of a C struct, arrays of numbers element by element, strings and firmware whole, structs field by field."""
+    """The same of a C struct, arrays of numbers element by element, strings and firmware whole,
+    structs field by field."""
     found = []
     for field, info in core.ffi.typeof(name).fields:
         kind = info.type
         if kind.kind == "array" and kind.item.kind == "struct":
             inner = c_places(kind.item.cname)
             size = core.ffi.sizeof(kind.item)
-            found += [(info.offset + k * size + at, width) for k in range(kind.length) for at, width in inner]
+            found += [
+                (info.offset + k * size + at, width)
+                for k in range(kind.length)
+                for at, width in inner
+            ]
         elif kind.kind == "array" and core.ffi.sizeof(kind.item) > 1:
             size = core.ffi.sizeof(kind.item)
             found += [(info.offset + k * size, size) for k in range(kind.length)]
@@ -121,7 +127,10 @@ def test_fields_are_named_in_the_structs_order(name: str, own: list[str]) -> Non
     ],
 )
 def test_enums_are_the_headers(enum: type[IntEnum] | type[IntFlag], name: str, prefix: str) -> None:
-    in_c = {member.removeprefix(prefix): value for member, value in core.ffi.typeof(name).relements.items()}
+    in_c = {
+        member.removeprefix(prefix): value
+        for member, value in core.ffi.typeof(name).relements.items()
+    }
     assert {member.name: int(member) for member in enum} == in_c
 
 
@@ -135,19 +144,27 @@ def test_flags_stages_and_limits_are_the_headers() -> None:
     )  # fmt: skip
     assert (pk.LINK_VERSION, pk.MAX_PAYLOAD) == (lib.EITS_LINK_VERSION, lib.EITS_LINK_MAX_PAYLOAD)
     stages = core.ffi.typeof("eits_stage").relements
-    assert [name.removeprefix("EITS_STAGE_").lower() for name in sorted(stages, key=stages.__getitem__)] == list(pk.STAGES)
+    assert [
+        name.removeprefix("EITS_STAGE_").lower() for name in sorted(stages, key=stages.__getitem__)
+    ] == list(pk.STAGES)
     assert len(pk.STAGES) == lib.EITS_STAGES
 
 
 def test_a_command_is_known_by_its_type() -> None:
-    assert {kind.TYPE for kind in cmd.COMMANDS.values()} == {kind for kind in pk.PacketType if kind >= 0x80}
+    assert {kind.TYPE for kind in cmd.COMMANDS.values()} == {
+        kind for kind in pk.PacketType if kind >= 0x80
+    }
 
 
 def test_info_is_read_as_it_was_built() -> None:
     info = board_info(firmware=(1, 2, 255), faults=0b10100, board="x" * 15, serial="A" * 24)
     payload = pl.build_info(info)
     c = core.ffi.from_buffer("eits_packet_info *", bytearray(payload))
-    assert (c.protocol_hash, c.volts_per_code_nv, list(c.firmware)) == (2**63 + 5, 805664, [1, 2, 255, 0])
+    assert (c.protocol_hash, c.volts_per_code_nv, list(c.firmware)) == (
+        2**63 + 5,
+        805664,
+        [1, 2, 255, 0],
+    )
     assert pl.parse(pk.PacketType.INFO, payload) == info
     assert info.fault_codes == (pk.FaultCode.ELECTRODE_OPEN, pk.FaultCode.DEADLINE)
     assert info.firmware_text == "1.2.255"
@@ -163,16 +180,28 @@ singles = st.floats(width=32, allow_nan=False)
 
 
 @given(words, halves, halves, signed, signed)
-def test_replies_are_read_as_built(request: int, command: int, status: int, first: int, second: int) -> None:
+def test_replies_are_read_as_built(
+    request: int, command: int, status: int, first: int, second: int
+) -> None:
     reply = pk.Reply(request, command, status, (first, second))
     assert pl.parse(pk.PacketType.REPLY, pl.build_reply(reply)) == reply
 
 
-@given(st.lists(st.tuples(st.floats(width=32), st.integers(0, 255)), max_size=300), words, words, words, halves)
-def test_raw_frames_are_read_bit_for_bit(rows: list[tuple[float, int]], frame: int, time: int, scan: int, flags: int) -> None:
+@given(
+    st.lists(st.tuples(st.floats(width=32), st.integers(0, 255)), max_size=300),
+    words,
+    words,
+    words,
+    halves,
+)
+def test_raw_frames_are_read_bit_for_bit(
+    rows: list[tuple[float, int]], frame: int, time: int, scan: int, flags: int
+) -> None:
     volts = np.array([v for v, _ in rows], dtype=np.float32)
     quality = np.array([q for _, q in rows], dtype=np.uint8)
-    again = pl.parse(pk.PacketType.RAW, pl.build_raw(pk.RawFrame(frame, time, scan, flags, volts, quality)))
+    again = pl.parse(
+        pk.PacketType.RAW, pl.build_raw(pk.RawFrame(frame, time, scan, flags, volts, quality))
+    )
     assert isinstance(again, pk.RawFrame)
     assert (again.frame, again.time_us, again.scan_us, again.flags) == (frame, time, scan, flags)
     assert again.voltage_v.tobytes() == volts.tobytes()
@@ -180,7 +209,8 @@ def test_raw_frames_are_read_bit_for_bit(rows: list[tuple[float, int]], frame: i
 
 
 def solved(count: int, status: int = 0) -> pk.Solved:
-    return pk.Solved(7, 8, 9, 10, 11, count, status, "gap", 3, 20, 40, 1234, 56, 0.5, 1.5, 0.25, 0.125, 2.0, 4.0,
+    return pk.Solved(7, 8, 9, 10, 11, count, status, "gap", 3, 20, 40, 1234, 56, 0.5, 1.5, 0.25,
+        0.125, 2.0, 4.0,
                      0b10111111, 3, 2, 0.375, (5, 63), (0, 1), (7,))  # fmt: skip
 
 
@@ -193,7 +223,9 @@ def test_images_and_touches_are_read_as_built() -> None:
     touches = (Touch(1, 2.5, -3.5, 4.0, 5.0, 0.5), Touch(2**32 - 1, 0.0, 0.0, 1.0, 1.0, 1.0))
     found = pk.SolvedTouches(solved(2), touches)
     assert pl.parse(pk.PacketType.TOUCHES, pl.build_touches(found)) == found
-    assert pl.parse(pk.PacketType.TOUCHES, pl.build_touches(pk.SolvedTouches(solved(0), ()))) == pk.SolvedTouches(solved(0), ())
+    assert pl.parse(
+        pk.PacketType.TOUCHES, pl.build_touches(pk.SolvedTouches(solved(0), ()))
+    ) == pk.SolvedTouches(solved(0), ())
 
 
 def test_stats_and_faults_are_read_as_built() -> None:
@@ -201,7 +233,13 @@ def test_stats_and_faults_are_read_as_built() -> None:
     stats = pk.BoardStats(*range(17), stages)  # type: ignore[call-arg]
     payload = pl.build_stats(stats)
     c = core.ffi.from_buffer("eits_packet_stats *", bytearray(payload))
-    assert (c.slots_repeated, c.glitches, c.workspace_used, c.stage[5].worst_us, c.stage[0].count) == (7, 8, 16, 24, 1)
+    assert (
+        c.slots_repeated,
+        c.glitches,
+        c.workspace_used,
+        c.stage[5].worst_us,
+        c.stage[0].count,
+    ) == (7, 8, 16, 24, 1)
     assert pl.parse(pk.PacketType.STATS, payload) == stats
     fault = pk.Fault(8, True, 99, -1, -15, (1, 2, 3, 4, 2**32 - 1))
     assert pl.parse(pk.PacketType.FAULT, pl.build_fault(fault)) == fault
@@ -225,9 +263,13 @@ def test_a_payload_of_another_length_is_refused(extra: int) -> None:
     whole = {
         pk.PacketType.INFO: pl.build_info(board_info()),
         pk.PacketType.REPLY: pl.build_reply(pk.Reply(1, 2, 3)),
-        pk.PacketType.RAW: pl.build_raw(pk.RawFrame(1, 2, 3, 0, np.zeros(4, np.float32), np.zeros(4, np.uint8))),
+        pk.PacketType.RAW: pl.build_raw(
+            pk.RawFrame(1, 2, 3, 0, np.zeros(4, np.float32), np.zeros(4, np.uint8))
+        ),
         pk.PacketType.IMAGE: pl.build_image(pk.SolvedImage(solved(3), np.zeros(3, np.float32))),
-        pk.PacketType.TOUCHES: pl.build_touches(pk.SolvedTouches(solved(1), (Touch(1, 1, 1, 1, 1, 1),))),
+        pk.PacketType.TOUCHES: pl.build_touches(
+            pk.SolvedTouches(solved(1), (Touch(1, 1, 1, 1, 1, 1),))
+        ),
         pk.PacketType.FAULT: pl.build_fault(pk.Fault(1, True, 1, 1, 1)),
     }
     for kind, payload in whole.items():
@@ -240,7 +282,9 @@ def test_an_unknown_type_is_passed_over() -> None:
 
 
 @given(words, halves, halves, words)
-def test_commands_are_read_as_a_board_reads_them(request: int, what: int, every: int, frames: int) -> None:
+def test_commands_are_read_as_a_board_reads_them(
+    request: int, what: int, every: int, frames: int
+) -> None:
     command = cmd.StreamCommand(what, every, frames)
     assert cmd.parse_command(cmd.StreamCommand, command.payload(request)) == (request, command)
     assert cmd.parse_command(cmd.StreamCommand, command.payload(request) + b"\0") is None

@@ -1,4 +1,5 @@
-"""Recordings: what was received is read back, after a kill too; damage is counted; frames come out for the other tools."""
+"""Recordings: what was received is read back, after a kill too; damage is counted; frames come out
+for the other tools."""
 
 from __future__ import annotations
 
@@ -51,7 +52,14 @@ def record(path: Path, *, tare_first: bool = False) -> tuple[list[object], list[
 
 def contents(item: object) -> tuple[object, ...]:
     if isinstance(item, RawFrame):
-        return ("raw", item.frame, item.time_us, item.flags, item.voltage_v.tobytes(), item.quality.tobytes())
+        return (
+            "raw",
+            item.frame,
+            item.time_us,
+            item.flags,
+            item.voltage_v.tobytes(),
+            item.quality.tobytes(),
+        )
     if isinstance(item, SolvedImage):
         return ("image", item.solved, item.image.tobytes())
     assert isinstance(item, SolvedTouches)
@@ -63,7 +71,12 @@ def test_replay_equals_the_live_run(tmp_path: Path) -> None:
     with open_device(f"file:{tmp_path / 'run.eits'}") as device:
         assert device.board.tared == 1
         replayed = list(device.stream(ALL))
-        assert device.counters.gaps == device.counters.crc_errors == device.counters.framing_errors == 0
+        assert (
+            device.counters.gaps
+            == device.counters.crc_errors
+            == device.counters.framing_errors
+            == 0
+        )
     assert [contents(item) for item in replayed] == [contents(item) for item in live]
     assert len(live) == 3 * FRAMES
     read = Decoder().feed((tmp_path / "run.eits").read_bytes())
@@ -113,7 +126,9 @@ def test_a_killed_recorder_loses_at_most_the_last_packet(seed: int, tmp_path: Pa
     path = tmp_path / "killed.eits"
     here = Path(__file__).resolve().parent
     script = textwrap.dedent(KILLED).format(paths=[str(here), str(here.parent)])
-    child = subprocess.Popen([sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE, text=True)
+    child = subprocess.Popen(
+        [sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE, text=True
+    )
     assert child.stdout is not None
     told = [child.stdout.readline().strip() for _ in range(30 + 20 * seed)]
     time.sleep(0.001 * random.Random(seed).random())
@@ -150,7 +165,9 @@ def test_cut_at_any_byte_the_rest_is_read_and_the_cut_is_counted(tmp_path: Path)
         (tmp_path / "cut.eits").write_bytes(whole[:cut])
         with open_device(f"file:{tmp_path / 'cut.eits'}") as device:
             list(device.stream(ALL))
-            complete = sum(end <= cut or end == cut + 1 for end in ends)  # but for its last zero it is whole
+            complete = sum(
+                end <= cut or end == cut + 1 for end in ends
+            )  # but for its last zero it is whole
             assert device.counters.packets == complete
             inside = cut not in ends and cut + 1 not in ends and cut - 1 not in ends
             assert device.counters.framing_errors + device.counters.crc_errors == inside
@@ -219,7 +236,12 @@ def test_frames_of_a_recording_without_raw_or_quiet_frames(tmp_path: Path) -> No
 def test_a_recording_takes_no_commands(tmp_path: Path) -> None:
     record(tmp_path / "run.eits")
     with open_device(f"file:{tmp_path / 'run.eits'}") as device:
-        for act in (lambda: device.tare(4), device.stats, device.reset, lambda: device.upload_model(tiny_blob())):
+        for act in (
+            lambda: device.tare(4),
+            device.stats,
+            device.reset,
+            lambda: device.upload_model(tiny_blob()),
+        ):
             with pytest.raises(DeviceError, match=r"is a recording: .* needs a board"):
                 act()
 
@@ -233,7 +255,9 @@ def test_another_model_than_the_recorded_boards_is_refused(tmp_path: Path) -> No
 
 
 def head_packet(**changes: object) -> bytes:
-    return encode(PacketType.RECORDING, 0, json.dumps({"format": "eits", "version": 1} | changes).encode())
+    return encode(
+        PacketType.RECORDING, 0, json.dumps({"format": "eits", "version": 1} | changes).encode()
+    )
 
 
 @pytest.mark.parametrize(
@@ -247,12 +271,18 @@ def head_packet(**changes: object) -> bytes:
         (encode(PacketType.RECORDING, 0, b"[1]"), FileError, "first packet says something else"),
         (head_packet(format="edf"), FileError, "first packet says something else"),
         (head_packet(version="1"), FileError, "first packet says something else"),
-        (head_packet(version=2), DeviceError, "recording version 2, this eitskin reads up to 1; upgrade eitskin"),
+        (
+            head_packet(version=2),
+            DeviceError,
+            "recording version 2, this eitskin reads up to 1; upgrade eitskin",
+        ),
         (head_packet(), DeviceError, "holds no INFO of its board"),
         (head_packet()[:-3], FileError, "cut in its first bytes"),
     ],
 )
-def test_what_is_no_recording(content: bytes, kind: type[EitskinError], message: str, tmp_path: Path) -> None:
+def test_what_is_no_recording(
+    content: bytes, kind: type[EitskinError], message: str, tmp_path: Path
+) -> None:
     (tmp_path / "bad.eits").write_bytes(content)
     with pytest.raises(kind) as caught:
         open_device(f"file:{tmp_path / 'bad.eits'}")
@@ -282,8 +312,13 @@ def test_a_full_disk_ends_the_recording_with_an_error() -> None:
 
 def test_a_recording_of_a_recording_is_its_equal(tmp_path: Path) -> None:
     record(tmp_path / "one.eits")
-    with open_device(f"file:{tmp_path / 'one.eits'}") as device, Recorder(tmp_path / "two.eits", device):
+    with (
+        open_device(f"file:{tmp_path / 'one.eits'}") as device,
+        Recorder(tmp_path / "two.eits", device),
+    ):
         list(device.stream(ALL))
-    one, two = (Decoder().feed((tmp_path / name).read_bytes())[2:] for name in ("one.eits", "two.eits"))
+    one, two = (
+        Decoder().feed((tmp_path / name).read_bytes())[2:] for name in ("one.eits", "two.eits")
+    )
     assert one == two
     assert fresh_skin()

@@ -1,4 +1,5 @@
-"""Sequence numbers: gaps are counted, what is no news is refused, a board that begins anew is recognised."""
+"""Sequence numbers: gaps are counted, what is no news is refused, a board that begins anew is
+recognised."""
 
 from __future__ import annotations
 
@@ -14,8 +15,11 @@ from eitskin.device.wire.sequence import LATE_IN_A_ROW, REMEMBERED, SequenceChec
 TOP = 2**32
 
 
-def judged(numbers: list[int], *, prints: list[int] | None = None) -> tuple[list[int | None], LinkCounters]:
-    """Verdicts on packets of these numbers; the same number has the same content unless ``prints`` says otherwise."""
+def judged(
+    numbers: list[int], *, prints: list[int] | None = None
+) -> tuple[list[int | None], LinkCounters]:
+    """Verdicts on packets of these numbers; the same number has the same content unless ``prints``
+    says otherwise."""
     counters = LinkCounters()
     check = SequenceCheck(counters)
     return [check.judge(n % TOP, (prints or numbers)[k]) for k, n in enumerate(numbers)], counters
@@ -67,7 +71,8 @@ def test_a_loss_right_after_a_restart_is_a_gap() -> None:
 
 
 def test_the_first_info_may_be_repeated() -> None:
-    """A board says once that it began; the line gives it twice, and more after it. Nothing is taken twice."""
+    """A board says once that it began; the line gives it twice, and more after it. Nothing is taken
+    twice."""
     counters = LinkCounters()
     check = SequenceCheck(counters)
     assert check.judge(0, 7, restart=True) == 0
@@ -120,7 +125,8 @@ def test_a_cut_line_counts_one_gap() -> None:
 
 
 def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late() -> None:
-    """Faults of the start may come before the INFO that tells of it, or that INFO be lost: they are all there in the end."""
+    """Faults of the start may come before the INFO that tells of it, or that INFO be lost: they are
+    all there in the end."""
     for said in (True, False):
         decoder = Decoder()
         old = b"".join(packet(n) for n in range(500, 520))
@@ -143,7 +149,8 @@ def packet(number: int, *, restart: bool = False) -> bytes:
 
 
 def test_whole_packets_shuffled_dropped_and_doubled() -> None:
-    """Against a plain account of the same packets: in order, each once, and what is missing is what is not there."""
+    """Against a plain account of the same packets: in order, each once, and what is missing is what
+    is not there."""
     for seed in range(60):
         generator = random.Random(seed)
         numbers, n = [], generator.randrange(TOP)

@@ -1,4 +1,5 @@
-"""Serial ports on pseudo-terminals: a board behind one, ports that are not there, busy, forbidden, slow to be read, unplugged."""
+"""Serial ports on pseudo-terminals: a board behind one, ports that are not there, busy, forbidden,
+slow to be read, unplugged."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ SOON = Reconnect(tries=40, every_s=0.05)
 
 
 class Wire:
-    """A simulated board at the far end of a pseudo-terminal, kept going by a thread. ``path`` is the near end."""
+    """A simulated board at the far end of a pseudo-terminal, kept going by a thread. ``path`` is
+    the near end."""
 
     def __init__(self, board: SimBoard | None, *, frame_s: float = 0.0) -> None:
         self.master, slave = pty.openpty()
@@ -89,7 +91,11 @@ def test_a_board_on_a_port(wire: Wire) -> None:
     with quick(f"serial:{wire.path}") as device:
         assert device.board.board == "simulated"
         device.tare(8)
-        frames = [item.frame for item in device.stream(Stream.RAW, frames=20) if isinstance(item, RawFrame)]
+        frames = [
+            item.frame
+            for item in device.stream(Stream.RAW, frames=20)
+            if isinstance(item, RawFrame)
+        ]
         assert len(frames) == 20
         assert frames == list(range(frames[0], frames[0] + 20))
         assert device.counters.gaps == device.counters.crc_errors == 0
@@ -109,12 +115,16 @@ def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire: Wi
         counters = device.counters
         stream.close()
         assert stats.frames_scanned > 200
-        told = sum(item.missing for item in items if isinstance(item, LinkEvent) and item.kind == "dropped")
+        told = sum(
+            item.missing for item in items if isinstance(item, LinkEvent) and item.kind == "dropped"
+        )
         frames = [item.frame for item in items if isinstance(item, RawFrame)]
         assert frames == sorted(set(frames))
         assert told >= 50
         assert frames[-1] - frames[0] + 1 - len(frames) == told  # exactly those that are missing
-        assert counters.gaps == counters.crc_errors == counters.framing_errors == 0  # the port itself never waited
+        assert (
+            counters.gaps == counters.crc_errors == counters.framing_errors == 0
+        )  # the port itself never waited
 
 
 def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,14 +164,21 @@ def test_another_board_in_its_place_is_refused(monkeypatch: pytest.MonkeyPatch) 
     from device_helpers import fresh_skin
 
     first, there = Wire(sim_board(), frame_s=0.005), []
-    monkeypatch.setattr(ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there])
+    monkeypatch.setattr(
+        ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there]
+    )
     there.append(first.path)
     other = sim_board()
     skin = fresh_skin()
-    monkeypatch.setattr(type(skin), "serial", property(lambda self: "OTHER" if self is other.skin else "FIRST"))
+    monkeypatch.setattr(
+        type(skin), "serial", property(lambda self: "OTHER" if self is other.skin else "FIRST")
+    )
     second = Wire(other)
     try:
-        with quick(f"serial:{first.path}") as device, pytest.raises(DeviceError, match="another board came back"):
+        with (
+            quick(f"serial:{first.path}") as device,
+            pytest.raises(DeviceError, match="another board came back"),
+        ):
             for k, _ in enumerate(device.stream(Stream.RAW)):
                 if k == 5:
                     there[:] = [second.path]
@@ -175,7 +192,10 @@ def test_unplugged_for_good_is_an_error_and_no_hang() -> None:
     wire = Wire(sim_board())
     with open_device(f"serial:{wire.path}", reconnect=Reconnect(tries=3, every_s=0.02)) as device:
         began = time.monotonic()
-        with pytest.raises(DeviceError, match=r"the port is gone .*; it did not come back within 0\.06 s: plug it in"):
+        with pytest.raises(
+            DeviceError,
+            match=r"the port is gone .*; it did not come back within 0\.06 s: plug it in",
+        ):
             for k, _ in enumerate(device.stream(Stream.RAW)):
                 if k == 3:
                     wire.unplug()
@@ -207,7 +227,10 @@ def test_a_wrong_baud_rate_is_recognised() -> None:
     noise = threading.Thread(target=babble, daemon=True)
     noise.start()
     try:
-        with pytest.raises(DeviceError, match=r"bytes arrive but no packet decodes at 115200 baud: .*serial:PORT\?baud=N"):
+        with pytest.raises(
+            DeviceError,
+            match=r"bytes arrive but no packet decodes at 115200 baud: .*serial:PORT\?baud=N",
+        ):
             open_device(f"serial:{wire.path}?baud=115200")
     finally:
         over.set()
@@ -217,7 +240,9 @@ def test_a_wrong_baud_rate_is_recognised() -> None:
 
 def test_a_port_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ports_module, "ports", lambda: [Port("/dev/ttyS9", "old thing")])
-    with pytest.raises(DeviceError, match=r"/dev/ttyNONE: no such port; there are: /dev/ttyS9 \(old thing\)"):
+    with pytest.raises(
+        DeviceError, match=r"/dev/ttyNONE: no such port; there are: /dev/ttyS9 \(old thing\)"
+    ):
         open_device("serial:/dev/ttyNONE")
 
 
@@ -269,24 +294,35 @@ OTHER = Port("/dev/ttyUSB0", "adapter", 0x0403, 0x6001, "B")
     [
         ([], r"no ST-LINK port is there \(serial ports: none\)"),
         ([OTHER], r"no ST-LINK port is there \(serial ports: /dev/ttyUSB0 \(adapter\)\)"),
-        ([BOARD, Port("/dev/ttyACM1", "STM32 STLink", 0x0483, 0x374E, "C"), OTHER], r"several boards .*ttyACM0.*ttyACM1"),
+        (
+            [BOARD, Port("/dev/ttyACM1", "STM32 STLink", 0x0483, 0x374E, "C"), OTHER],
+            r"several boards .*ttyACM0.*ttyACM1",
+        ),
     ],
 )
-def test_auto_needs_exactly_one_board(found: list[Port], message: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_needs_exactly_one_board(
+    found: list[Port], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(ports_module, "ports", lambda: found)
     with pytest.raises(DeviceError, match=message):
         open_device("auto")
 
 
 def test_auto_takes_the_one_board(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ports_module, "ports", lambda: [OTHER, Port(wire.path, "STLink", 0x0483, 0x374B, "A")])
+    monkeypatch.setattr(
+        ports_module, "ports", lambda: [OTHER, Port(wire.path, "STLink", 0x0483, 0x374B, "A")]
+    )
     with open_device("auto") as device:
         assert device.transport.name == wire.path
 
 
 def test_devices_are_listed_boards_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("eitskin.device.open.ports", lambda: [Port("/dev/ttyACM9"), BOARD, OTHER])
-    assert [port.path for port in list_devices()] == ["/dev/ttyACM0", "/dev/ttyACM9", "/dev/ttyUSB0"]
+    assert [port.path for port in list_devices()] == [
+        "/dev/ttyACM0",
+        "/dev/ttyACM9",
+        "/dev/ttyUSB0",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""A simulated board: the scene's frames through the host core, with the firmware's commands, checks and replies."""
+"""A simulated board: the scene's frames through the host core, with the firmware's commands, checks
+and replies."""
 
 from __future__ import annotations
 
@@ -47,11 +48,16 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit() -> None:
         device.tare(QUIET)
         device.start_scene()
         items = list(device.stream(ALL))
-    raws, images, touches = (by_kind(items, kind) for kind in (RawFrame, SolvedImage, SolvedTouches))
+    raws, images, touches = (
+        by_kind(items, kind) for kind in (RawFrame, SolvedImage, SolvedTouches)
+    )
     assert len(raws) == len(images) == len(touches) == FRAMES
     assert [type(item) for item in items[:3]] == [RawFrame, SolvedImage, SolvedTouches]
     true = simulate_frames(compile_scene(scene())).voltage_v.astype(np.float32)
-    assert all(raw.voltage_v.tobytes() == frame.tobytes() for raw, frame in zip(raws, true[QUIET:], strict=True))
+    assert all(
+        raw.voltage_v.tobytes() == frame.tobytes()
+        for raw, frame in zip(raws, true[QUIET:], strict=True)
+    )
     skin = Reconstructor(model, blob=blob, options=board_options(model))
     skin.tare(true[:QUIET])
     for raw, image, found in zip(raws, images, touches, strict=True):
@@ -83,12 +89,21 @@ def test_two_runs_are_the_same_bytes() -> None:
 
 def test_the_skin_is_untouched_until_the_scene_begins() -> None:
     with sim_device() as device:
-        quiet = [item for item in device.stream(Stream.RAW, frames=2 * QUIET) if isinstance(item, RawFrame)]
-        assert [q.voltage_v.tobytes() for q in quiet[:QUIET]] == [q.voltage_v.tobytes() for q in quiet[QUIET:]]
+        quiet = [
+            item
+            for item in device.stream(Stream.RAW, frames=2 * QUIET)
+            if isinstance(item, RawFrame)
+        ]
+        assert [q.voltage_v.tobytes() for q in quiet[:QUIET]] == [
+            q.voltage_v.tobytes() for q in quiet[QUIET:]
+        ]
         device.tare(QUIET)
         device.start_scene()
         touched = next(item for item in device.stream(Stream.RAW) if isinstance(item, RawFrame))
-    rms, change = float(np.sqrt(np.mean(quiet[0].voltage_v ** 2))), np.abs(touched.voltage_v - quiet[0].voltage_v)
+    rms, change = (
+        float(np.sqrt(np.mean(quiet[0].voltage_v ** 2))),
+        np.abs(touched.voltage_v - quiet[0].voltage_v),
+    )
     assert change.max() > 0.02 * rms > np.abs(quiet[1].voltage_v - quiet[0].voltage_v).max()
 
 
@@ -130,8 +145,18 @@ def test_reciprocal_scans_copy_what_they_do_not_measure() -> None:
         device.scan(check_every=3)
         device.start_scene()
         raws = by_kind(list(device.stream(Stream.RAW, frames=4)), RawFrame)
-    assert [raw.flags for raw in raws] == [RawFlags.CHECK, RawFlags.RECIPROCAL, RawFlags.RECIPROCAL, RawFlags.CHECK]
-    assert [raw.scan_us for raw in raws] == [207 * 100 + 80, 103 * 100 + 80, 103 * 100 + 80, 207 * 100 + 80]
+    assert [raw.flags for raw in raws] == [
+        RawFlags.CHECK,
+        RawFlags.RECIPROCAL,
+        RawFlags.RECIPROCAL,
+        RawFlags.CHECK,
+    ]
+    assert [raw.scan_us for raw in raws] == [
+        207 * 100 + 80,
+        103 * 100 + 80,
+        103 * 100 + 80,
+        207 * 100 + 80,
+    ]
     for raw in raws:
         first, second = raw.voltage_v[model.fold.first], raw.voltage_v[model.fold.second]
         assert np.array_equal(second, model.fold.sign.astype(np.float32) * first)
@@ -174,8 +199,16 @@ def test_a_board_without_a_model() -> None:
         fault = device.next_item(0.0)
         assert isinstance(fault, Fault)
         assert (fault.code, fault.raised, fault.value) == (FaultCode.NO_MODEL, True, -4)
-        for act in (lambda: device.tare(4), lambda: next(device.stream()), device.self_test, lambda: device.mask_row(1)):
-            with pytest.raises(DeviceError, match=r"the board has no model; upload one with  eitskin model upload MODEL\.eitm"):
+        for act in (
+            lambda: device.tare(4),
+            lambda: next(device.stream()),
+            device.self_test,
+            lambda: device.mask_row(1),
+        ):
+            with pytest.raises(
+                DeviceError,
+                match=r"the board has no model; upload one with  eitskin model upload MODEL\.eitm",
+            ):
                 act()
 
 
@@ -275,7 +308,12 @@ def test_unknown_commands_and_wrong_lengths_are_refused() -> None:
         board.receive(encode(packet_type, 1, payload))
         (packet,) = Decoder().feed(board.take_output())
         reply = parse_reply(packet.payload)
-        assert (reply.request, reply.command, reply.status, reply.detail) == (7, packet_type, status, detail)
+        assert (reply.request, reply.command, reply.status, reply.detail) == (
+            7,
+            packet_type,
+            status,
+            detail,
+        )
     board.receive(encode(PacketType.RAW, 1, bytes(40)))  # an echo of its own
     assert board.take_output() == b""
 
@@ -322,7 +360,9 @@ def test_options_of_the_solver_are_taken() -> None:
         assert image.solved.iterations == 7
         with pytest.raises(UsageError):
             device.solver(replace(options, iterations=0))
-        with pytest.raises(DeviceError, match="SOLVER: iterations is out of range, its limit is 1000"):
+        with pytest.raises(
+            DeviceError, match="SOLVER: iterations is out of range, its limit is 1000"
+        ):
             device.solver(replace(options, iterations=2000))
 
 
@@ -331,7 +371,9 @@ def test_a_scan_forgets_the_reference() -> None:
         device.tare(QUIET)
         assert device.scan(samples=100).tared == 0
         assert device.board.samples == 100
-        with pytest.raises(DeviceError, match="no reference frame; leave the skin untouched and run  eitskin tare"):
+        with pytest.raises(
+            DeviceError, match="no reference frame; leave the skin untouched and run  eitskin tare"
+        ):
             next(device.stream(Stream.TOUCHES))
 
 

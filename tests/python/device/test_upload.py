@@ -1,4 +1,5 @@
-"""Models over the wire: whole, cut anywhere, resumed, damaged, refused. The old model stays until the new one is proven."""
+"""Models over the wire: whole, cut anywhere, resumed, damaged, refused. The old model stays until
+the new one is proven."""
 
 from __future__ import annotations
 
@@ -7,7 +8,16 @@ import zlib
 from pathlib import Path
 
 import pytest
-from device_helpers import QUIET, Damaging, dropping, empty_bank, fresh_skin, same, sim_board, sim_device
+from device_helpers import (
+    QUIET,
+    Damaging,
+    dropping,
+    empty_bank,
+    fresh_skin,
+    same,
+    sim_board,
+    sim_device,
+)
 
 from eitskin.device.bank import bank_bytes, newest_bank, read_record
 from eitskin.device.client import Device
@@ -30,7 +40,9 @@ def works(board: SimBoard, crc: int) -> bool:
     """Whether the board, opened anew, has the model and scans."""
     with Device(SimTransport("again", board)) as device:
         device.tare(4)
-        frames = [item for item in device.stream(Stream.RAW, frames=1) if isinstance(item, RawFrame)]
+        frames = [
+            item for item in device.stream(Stream.RAW, frames=1) if isinstance(item, RawFrame)
+        ]
         return device.board.model_crc == crc and len(frames) == 1
 
 
@@ -41,7 +53,12 @@ def test_a_model_is_taken_up() -> None:
     with sim_device(board) as device:
         device.tare(QUIET)
         info = device.upload_model(tiny, lambda done, total: seen.append((done, total)))
-        assert (info.model_crc, info.model_bytes, info.bank, info.tared) == (zlib.crc32(tiny), len(tiny), 1, 0)
+        assert (info.model_crc, info.model_bytes, info.bank, info.tared) == (
+            zlib.crc32(tiny),
+            len(tiny),
+            1,
+            0,
+        )
         assert seen[-1] == (len(tiny), len(tiny))
         assert len(seen) > 3
         assert [done for done, _ in seen] == [*range(4096, len(tiny), 4096), len(tiny)]
@@ -82,7 +99,9 @@ def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed: i
         assert newest_bank([bytes(bank) for bank in board.banks.banks]) == 0
         rebooted = SimBoard(fresh_skin(), [bytes(bank) for bank in board.banks.banks])
         assert works(rebooted, OLD)
-    with Device(SimTransport("again", board)) as device:  # without a reboot: goes on where it was cut, or begins anew
+    with Device(
+        SimTransport("again", board)
+    ) as device:  # without a reboot: goes on where it was cut, or begins anew
         assert device.board.model_crc in (OLD, new)
         if device.board.model_crc == OLD:
             assert device.upload_model(tiny).model_crc == new
@@ -124,8 +143,14 @@ def test_the_scan_waits_while_a_model_comes() -> None:
     tiny = tiny_blob()
     with sim_device() as device:
         device.send_command(cmd.ModelBegin(len(tiny), zlib.crc32(tiny)), 1.0)
-        for act in (lambda: device.tare(4), lambda: next(device.stream(Stream.RAW)), device.self_test):
-            with pytest.raises(DeviceError, match="the board is busy with MODEL_BEGIN; wait for it"):
+        for act in (
+            lambda: device.tare(4),
+            lambda: next(device.stream(Stream.RAW)),
+            device.self_test,
+        ):
+            with pytest.raises(
+                DeviceError, match="the board is busy with MODEL_BEGIN; wait for it"
+            ):
                 act()
 
 
@@ -149,12 +174,18 @@ def test_data_out_of_order_or_too_long_are_refused() -> None:
 
 def sent(device: Device, blob: bytes, crc: int | None = None) -> tuple[ReplyStatus, int]:
     """Send ``blob`` past the host's own checks; how the board took it."""
-    reply = device.send_command(cmd.ModelBegin(len(blob), zlib.crc32(blob) if crc is None else crc), 1.0)
+    reply = device.send_command(
+        cmd.ModelBegin(len(blob), zlib.crc32(blob) if crc is None else crc), 1.0
+    )
     done = reply.detail[0]
     while reply.ok and done < len(blob):
         reply = device.send_command(cmd.ModelData(done, blob[done : done + 4096]), 1.0)
         done += 4096
-    return status(device, cmd.ModelCommit()) if reply.ok else (ReplyStatus(reply.status), reply.detail[0])
+    return (
+        status(device, cmd.ModelCommit())
+        if reply.ok
+        else (ReplyStatus(reply.status), reply.detail[0])
+    )
 
 
 def reseal(blob: bytearray) -> bytes:
@@ -184,12 +215,16 @@ def test_a_model_whose_golden_frame_gives_other_bits_is_refused() -> None:
     image = model.golden.image.copy()
     image[image.argmax()] *= 1.5
     with sim_device() as device:
-        kind, parts = sent(device, encode_model(replace(model, golden=replace(model.golden, image=image))))
+        kind, parts = sent(
+            device, encode_model(replace(model, golden=replace(model.golden, image=image)))
+        )
         assert kind == ReplyStatus.SELF_TEST
         assert parts > 10**8
         assert device.info().model_crc == OLD
         with pytest.raises(DeviceError, match="golden frame's image differs from the model's by"):
-            device.upload_model(encode_model(replace(model, golden=replace(model.golden, image=image))))
+            device.upload_model(
+                encode_model(replace(model, golden=replace(model.golden, image=image)))
+            )
 
 
 def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path: Path) -> None:
@@ -212,7 +247,9 @@ def test_a_model_too_large_for_the_bank_is_refused_by_the_host_and_by_the_board(
     room = len(tiny_blob()) + 32 - 16
     board = SimBoard(fresh_skin(), [bytes([0xFF]) * room, bytes([0xFF]) * room])
     with sim_device(board) as device:
-        with pytest.raises(DeviceError, match=f"has {len(tiny_blob())} bytes and the board takes {room - 32}"):
+        with pytest.raises(
+            DeviceError, match=f"has {len(tiny_blob())} bytes and the board takes {room - 32}"
+        ):
             device.upload_model(tiny_blob())
         assert status(device, cmd.ModelBegin(room - 31, 0)) == (ReplyStatus.MODEL_SIZE, room - 32)
 

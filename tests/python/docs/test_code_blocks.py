@@ -1,4 +1,5 @@
-"""Every shell and Python block of the README and of pages that promise it runs, in order, in one folder a page."""
+"""Every shell and Python block of the README and of pages that promise it runs, in order, in one
+folder a page."""
 
 from __future__ import annotations
 
@@ -28,14 +29,27 @@ def blocks(page: str) -> list[tuple[str, str]]:
 @pytest.mark.parametrize("page", PAGES)
 def test_blocks_run(page: str, tmp_path: Path) -> None:
     ran = 0
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+    }
     for language, text in blocks(page):
         if set(text.split("\n")) & SET_UP:
             for command in SET_UP & set(text.split("\n")):
-                assert os.access(ROOT / command, os.X_OK), f"{page} names {command}, which cannot be run"
+                assert os.access(ROOT / command, os.X_OK), (
+                    f"{page} names {command}, which cannot be run"
+                )
             continue
         command = ["sh", "-e", "-c", text] if language == "sh" else [sys.executable, "-c", text]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False)
+        done = subprocess.run(
+            command,
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=False,
+        )
         assert done.returncode == 0, f"{page}:\n{text}\n{done.stdout}\n{done.stderr}"
         ran += 1
     assert ran >= 1
@@ -45,4 +59,6 @@ def test_pages_link_to_files_that_exist() -> None:
     for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]:
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             if "://" not in target:
-                assert (page.parent / target).exists(), f"{page.relative_to(ROOT)} links to {target}, which is not there"
+                assert (page.parent / target).exists(), (
+                    f"{page.relative_to(ROOT)} links to {target}, which is not there"
+                )

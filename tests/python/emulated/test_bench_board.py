@@ -9,8 +9,8 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.errors import UsageError
-from eitskin.study import emulated
-from eitskin.study.bench import board as bench_board
+from eitskin_studies.benchmarks import board as bench_board
+from eitskin_studies.harness import emulated
 
 
 @pytest.fixture(scope="module")
@@ -39,21 +39,36 @@ def test_every_storage_by_plain_c_cold_and_warm(result: bench_board.BoardCost) -
 def test_images(result: bench_board.BoardCost) -> None:
     nucleo, mps2 = result.images
     assert (nucleo.board, mps2.board) == ("nucleo_f767zi", "mps2_an500")
-    assert 40_000 < nucleo.code_bytes < 256 * 1024 and nucleo.stack_bytes >= 8192 and nucleo.static_bytes < 128 * 1024
+    assert (
+        40_000 < nucleo.code_bytes < 256 * 1024
+        and nucleo.stack_bytes >= 8192
+        and nucleo.static_bytes < 128 * 1024
+    )
 
 
 def test_the_rate_of_the_emulated_board(cortex_m7: Path) -> None:
     _, blob = bench_board.load_prebuilt()
     image = cortex_m7 / "firmware" / f"{bench_board.IMAGE}.bin"
     rate = bench_board.measure_rate(blob, "f32", image, 0, 3)
-    assert (rate.rows, rate.samples, rate.acquire_us, rate.bound) == (104, 80, 10_400, "acquisition")
+    assert (rate.rows, rate.samples, rate.acquire_us, rate.bound) == (
+        104,
+        80,
+        10_400,
+        "acquisition",
+    )
     assert rate.rate_hz == pytest.approx(1e6 / 10_400, rel=0.01)
-    assert 4000 < rate.solve_us_p50 <= rate.solve_us_worst < 10_400 and 1000 < rate.stack_used < 16384
+    assert (
+        4000 < rate.solve_us_p50 <= rate.solve_us_worst < 10_400 and 1000 < rate.stack_used < 16384
+    )
 
 
 def test_the_page_and_json(result: bench_board.BoardCost) -> None:
     page = bench_board.as_markdown(result, "the command")
-    assert "Written by `the command`" in page and page.count("| M7 | cold |") == 4 and "## Frame rate" not in page
+    assert (
+        "Written by `the command`" in page
+        and page.count("| M7 | cold |") == 4
+        and "## Frame rate" not in page
+    )
     text = bench_board.as_text(result)
     for cost in result.costs:
         assert f"{cost.mean / 1e6:.2f}" in page and f"{cost.mean / 1e6:.2f}" in text
@@ -61,7 +76,9 @@ def test_the_page_and_json(result: bench_board.BoardCost) -> None:
     assert facts["costs"][1]["mean"] == result.costs[1].mean and facts["scenes"] == 3
 
 
-def test_it_says_what_it_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_says_what_it_needs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["bench", "board", "--scenes", "0"]) == 2
     assert main(["bench", "board", "--frames", "1"]) == 2
     assert main(["bench", "board", "--markdown", str(tmp_path / "no" / "page.md")]) == 3

@@ -1,6 +1,8 @@
-"""The Cortex-M7, under QEMU, gives the bits that the host gives: images and touches, all storages, with faults and warm starts.
+"""The Cortex-M7, under QEMU, gives the bits that the host gives: images and touches, all storages,
+with faults and warm starts.
 
-The same program prints exact instruction counts (-icount), and they are held to their bound; pytest -s shows them.
+The same program prints exact instruction counts (-icount), and they are held to their bound; pytest
+-s shows them.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import ALL_SEARCH, SOLVERS, Options, Reconstruction
 from eitskin.model.eitm import encode_model
-from eitskin.model.load import LoadLaw
+from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.model.storage import STORAGES, store
@@ -25,7 +27,7 @@ from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.options import default_options
-from eitskin.study.emulated import PROGRAM, EmulatedFrame, run_frames
+from eitskin_studies.harness.emulated import PROGRAM, EmulatedFrame, run_frames
 from small_models import session as simulated_session
 from small_models import small, small_blob, small_model
 
@@ -36,7 +38,12 @@ def program(cortex_m7: Path) -> Path:
 
 
 def run(
-    program: Path, folder: Path, blob: bytes, quiet: np.ndarray, frames: np.ndarray, options: Options
+    program: Path,
+    folder: Path,
+    blob: bytes,
+    quiet: np.ndarray,
+    frames: np.ndarray,
+    options: Options,
 ) -> tuple[EmulatedFrame, ...]:
     """The results of the processor's own kernels."""
     done = run_frames(program, folder, blob, quiet, frames, options)
@@ -51,32 +58,44 @@ def bits(value: float) -> str:
 def as_printed(result: Reconstruction) -> str:
     """Touches in the emulated program's words."""
     words = [
-        f" {t.id}:" + ":".join(map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n)))
+        f" {t.id}:"
+        + ":".join(
+            map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n))
+        )
         for t in result.touches
     ]
     return f"{len(words)}{''.join(words)}"
 
 
-def session(model: Model, seed: int, count: int, noise: float = 1e-3) -> tuple[np.ndarray, np.ndarray]:
-    """16 quiet frames and ``count`` frames of one to three touches by the model's own linear answer, with noise at 60 dB."""
+def session(
+    model: Model, seed: int, count: int, noise: float = 1e-3
+) -> tuple[np.ndarray, np.ndarray]:
+    """16 quiet frames and ``count`` frames of one to three touches by the model's own linear
+    answer, with noise at 60 dB."""
     rng = np.random.default_rng(seed)
     reference = model.golden.reference_v.astype(np.float64)
     noise *= np.sqrt(np.mean(reference**2))
     change = model.golden.frame_v.astype(np.float64) - reference
     quiet = reference + noise * rng.standard_normal((16, len(reference)))
     strength = rng.uniform(0.3, 1.5, (count, 1))
-    return quiet, reference + strength * change + noise * rng.standard_normal((count, len(reference)))
+    return quiet, reference + strength * change + noise * rng.standard_normal(
+        (count, len(reference))
+    )
 
 
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("warm", [False, True])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_same_bits_as_the_host(program: Path, tmp_path: Path, solver: str, storage: str, warm: bool) -> None:
+def test_the_same_bits_as_the_host(
+    program: Path, tmp_path: Path, solver: str, storage: str, warm: bool
+) -> None:
     """Warm ones after a noisy tare, which raises the floor."""
     model, _ = load_prebuilt()
     blob = in_storage(model, storage)
     quiet, frames = session(model, 5, 4, noise=1e-2 if warm else 1e-3)
-    frames[2, (model.protocol.drive_measure == 6).any(axis=1)] = np.nan  # an electrode lost for one frame
+    frames[2, (model.protocol.drive_measure == 6).any(axis=1)] = (
+        np.nan
+    )  # an electrode lost for one frame
     frames[3] = quiet.mean(axis=0)  # no touch
     host = CoreEngine(blob)
     options = replace(default_options(model), warm_start=warm, solver=solver)
@@ -88,7 +107,10 @@ def test_the_same_bits_as_the_host(program: Path, tmp_path: Path, solver: str, s
         assert emulated.status == 0
         assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
         assert emulated.touches == as_printed(expected)
-        assert (emulated.stop, emulated.iterations) == (expected.info.stop, expected.info.iterations)
+        assert (emulated.stop, emulated.iterations) == (
+            expected.info.stop,
+            expected.info.iterations,
+        )
         assert (expected.info.floor > 0.03) == warm
         assert emulated.macs == expected.info.macs + expected.info.touch_macs
     assert board[0].touches[0] != "0" and board[3].touches == "0"
@@ -99,13 +121,17 @@ def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
     model, _ = load_prebuilt()
     table = np.linspace(0, 6, 9, dtype=np.float32)
     gain = np.array([1.0, 0.07, -0.11, 0.23, 0.05, 0.19, -0.3, 0.2, 0.11, 0.4], dtype=np.float32)
-    blob = encode_model(replace(model, load=LoadLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02)))
+    blob = encode_model(
+        replace(model, load=LoadLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02))
+    )
     random, host = simulated_session(), CoreEngine(blob)
     quiet, frames, options = random.quiet_v, random.frames_v[:6], default_options(model)
     host.set_options(options)
     host.set_baseline(quiet.astype(np.float32).astype(np.float64))
     results = [host.reconstruct(frame.astype(np.float32)) for frame in frames]
-    assert [one.touches for one in run(program, tmp_path, blob, quiet, frames, options)] == [as_printed(one) for one in results]
+    assert [one.touches for one in run(program, tmp_path, blob, quiet, frames, options)] == [
+        as_printed(one) for one in results
+    ]
     assert sum(touch.load_n > 0 for one in results for touch in one.touches) >= len(frames)
 
 
@@ -118,16 +144,23 @@ def test_instructions_are_counted_exactly(program: Path, tmp_path: Path) -> None
         assert first == run(program, tmp_path, blob, quiet, frames, options)
         for result in first:
             per_mac = (result.solve_instructions + result.touch_instructions) / result.macs
-            print(f"{solver}: {result.solve_instructions} + {result.touch_instructions} instructions, {per_mac:.2f} a MAC")
+            print(
+                f"{solver}: {result.solve_instructions} + {result.touch_instructions} instructions,"
+                f" {per_mac:.2f} a MAC"
+            )
             assert per_mac < (3 if "fista" in solver or "working" in solver else 4)
 
 
 def moving_touches() -> tuple[np.ndarray, np.ndarray]:
-    """Quiet frames and 12 frames of two fingers, simulated nonlinearly, that come down at once, move by 2 mm a frame (100 mm/s
-    at 48 frames a second) and are joined by a third at frame 6."""
+    """Quiet frames and 12 frames of two fingers, simulated nonlinearly, that come down at once,
+    move by 2 mm a frame (100 mm/s at 48 frames a second) and are joined by a third at frame 6."""
     fingers = [(-50.0, 20.0, 9.0, 6.0), (30.0, -35.0, 11.0, 8.0), (45.0, 45.0, 8.0, 4.0)]
     scenes = tuple(
-        Scene(str(k), tuple(Touch(x + 2.0 * k, y, r, c) for x, y, r, c in fingers[: 2 if k < 6 else 3])) for k in range(12)
+        Scene(
+            str(k),
+            tuple(Touch(x + 2.0 * k, y, r, c) for x, y, r, c in fingers[: 2 if k < 6 else 3]),
+        )
+        for k in range(12)
     )
     simulated = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, scenes))
     return simulated.quiet_v, simulated.frames_v
@@ -139,15 +172,19 @@ MOST_INSTRUCTIONS = {0: 2_500_000, ALL_SEARCH: 4_000_000}
 @pytest.mark.parametrize("warm", [False, True])
 @pytest.mark.parametrize("search", MOST_INSTRUCTIONS)
 def test_what_a_frame_costs_at_most(program: Path, tmp_path: Path, warm: bool, search: int) -> None:
-    """Solve and touches, with peaks alone and with the whole search; each frame, also the first and those where a touch comes:
-    moving touches, and 20 random scenes that follow each other without any rest."""
+    """Solve and touches, with peaks alone and with the whole search; each frame, also the first and
+    those where a touch comes: moving touches, and 20 random scenes that follow each other without
+    any rest."""
     model, blob = load_prebuilt()
     random = simulated_session()
     for quiet, frames in (moving_touches(), (random.quiet_v, random.frames_v)):
         options = replace(default_options(model), warm_start=warm, touch_search=search)
         board = run(program, tmp_path, blob, quiet, frames, options)
         costs = [result.solve_instructions + result.touch_instructions for result in board]
-        print(f"{'warm' if warm else 'cold'}: mean {np.mean(costs):.0f}, most {max(costs)} instructions")
+        print(
+            f"{'warm' if warm else 'cold'}: mean {np.mean(costs):.0f}, most {max(costs)}"
+            " instructions"
+        )
         assert all(result.touches[0] in "123" for result in board)
         assert max(costs) <= MOST_INSTRUCTIONS[search]
 
@@ -160,21 +197,33 @@ MOST_TIMES_F32 = {"f32": 1.0, "f16": 1.2, "i16": 1.4, "i8": 1.45}
 
 
 def test_every_storage_costs_little_more_than_f32(program: Path, tmp_path: Path) -> None:
-    """The mean over 20 random scenes, cold: columns in use are unpacked once, so that only the three looks at all of them a frame
-    convert."""
+    """The mean over 20 random scenes, cold: columns in use are unpacked once, so that only the
+    three looks at all of them a frame convert."""
     model, _ = load_prebuilt()
     random = simulated_session()
     mean = {}
     for storage in STORAGES:
-        board = run(program, tmp_path, in_storage(model, storage), random.quiet_v, random.frames_v, default_options(model))
+        board = run(
+            program,
+            tmp_path,
+            in_storage(model, storage),
+            random.quiet_v,
+            random.frames_v,
+            default_options(model),
+        )
         mean[storage] = np.mean([result.instructions for result in board])
-        print(f"{storage}: {mean[storage]:.0f} instructions, {mean[storage] / mean['f32']:.2f} times those of f32")
+        print(
+            f"{storage}: {mean[storage]:.0f} instructions, {mean[storage] / mean['f32']:.2f} times"
+            " those of f32"
+        )
         assert mean[storage] <= MOST_INSTRUCTIONS[ALL_SEARCH]
         assert mean[storage] <= MOST_TIMES_F32[storage] * mean["f32"]
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-def test_plain_c_gives_the_same_for_more_instructions(program: Path, tmp_path: Path, storage: str) -> None:
+def test_plain_c_gives_the_same_for_more_instructions(
+    program: Path, tmp_path: Path, storage: str
+) -> None:
     model, _ = load_prebuilt()
     quiet, frames = session(model, 8, 1)
     blob, options = in_storage(model, storage), default_options(model)
@@ -183,7 +232,11 @@ def test_plain_c_gives_the_same_for_more_instructions(program: Path, tmp_path: P
     assert (own.kernels, plain.kernels) == ("cortex-m7", "portable")
     assert own.workspace_bytes == plain.workspace_bytes
     for one, other in zip(own.frames, plain.frames, strict=True):
-        assert (one.image_crc, one.touches, one.macs) == (other.image_crc, other.touches, other.macs)
+        assert (one.image_crc, one.touches, one.macs) == (
+            other.image_crc,
+            other.touches,
+            other.macs,
+        )
         assert one.instructions < other.instructions
 
 
@@ -196,7 +249,9 @@ def test_the_other_signs_too(program: Path, tmp_path: Path, sign: str) -> None:
     options = replace(default_options(model), sign=sign)
     host.set_options(options)
     host.set_baseline(quiet.astype(np.float32).astype(np.float64))
-    for frame, emulated in zip(frames, run(program, tmp_path, blob, quiet, frames, options), strict=True):
+    for frame, emulated in zip(
+        frames, run(program, tmp_path, blob, quiet, frames, options), strict=True
+    ):
         expected = host.reconstruct(frame.astype(np.float32))
         assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
         assert emulated.touches == as_printed(expected)
@@ -205,7 +260,9 @@ def test_the_other_signs_too(program: Path, tmp_path: Path, sign: str) -> None:
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("rank", [5, 16, 37, 48])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_ranks_that_no_block_fits(program: Path, tmp_path: Path, solver: str, rank: int, storage: str) -> None:
+def test_ranks_that_no_block_fits(
+    program: Path, tmp_path: Path, solver: str, rank: int, storage: str
+) -> None:
     """Rows and columns that the blocks of the processor's own products leave over."""
     model, blob = small_model(storage, rank=rank), small_blob(storage, rank=rank)
     quiet, frames = small().quiet(31, 8), small().frames(30, 3)
@@ -215,7 +272,9 @@ def test_ranks_that_no_block_fits(program: Path, tmp_path: Path, solver: str, ra
     host = CoreEngine(blob)
     host.set_options(options)
     host.set_baseline(quiet.astype(np.float32).astype(np.float64))
-    for frame, emulated in zip(frames, run(program, tmp_path, blob, quiet, frames, options), strict=True):
+    for frame, emulated in zip(
+        frames, run(program, tmp_path, blob, quiet, frames, options), strict=True
+    ):
         expected = host.reconstruct(frame.astype(np.float32))
         assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
         assert emulated.touches == as_printed(expected)

@@ -1,4 +1,5 @@
-"""Instructions of a configuration, counted: what is not in a model's defaults reaches the emulated core too."""
+"""Instructions of a configuration, counted: what is not in a model's defaults reaches the emulated
+core too."""
 
 from __future__ import annotations
 
@@ -9,11 +10,11 @@ from typing import Any
 
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.tradeoff.accuracy import solve_session
-from eitskin.study.tradeoff.configuration import Configuration
-from eitskin.study.tradeoff.emulation import Emulator, chosen_scenes, count_instructions
-from eitskin.study.tradeoff.engines import ModelShop
-from eitskin.study.tradeoff.scene_sets import Workshop
+from eitskin.tuning.configuration import Configuration
+from eitskin_studies.tradeoff.accuracy import solve_session
+from eitskin_studies.tradeoff.emulation import Emulator, chosen_scenes, count_instructions
+from eitskin_studies.tradeoff.engines import ModelShop
+from eitskin_studies.tradeoff.scene_sets import Workshop
 
 
 def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
@@ -39,7 +40,9 @@ def test_counts_are_exact_and_follow_every_setting(cortex_m7: Path) -> None:
         counted[one.name] = count_instructions(emulator, one, built, measured, solved, 3, 2)
     assert counted["base"] == counted["again"]
     parts = counted["base"]["solve_mean"] + counted["base"]["touch_mean"]
-    assert abs(counted["base"]["mean"] - parts) <= 1 and parts <= counted["base"]["most"]  # each mean is rounded by itself
+    assert (
+        abs(counted["base"]["mean"] - parts) <= 1 and parts <= counted["base"]["most"]
+    )  # each mean is rounded by itself
     assert counted["sweeps"]["touch_mean"] < counted["base"]["touch_mean"]
     assert counted["sweeps"]["solve_mean"] == counted["base"]["solve_mean"]
     assert counted["gap"]["solve_mean"] != counted["base"]["solve_mean"]

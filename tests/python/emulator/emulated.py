@@ -9,15 +9,15 @@ from typing import Any
 from eitskin.core.results import Reconstruction
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_S
-from eitskin.device.emulator.scene_skin import skin_of
-from eitskin.device.emulator.transport import EmulatedTransport
 from eitskin.device.known_model import KnownModel, board_options
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.transport import Transport
 from eitskin.device.wire.packets import RawFrame, Stream
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_S
+from eitskin.emulator.scene_skin import skin_of
+from eitskin.emulator.transport import EmulatedTransport
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.library_scenes import find_scene
@@ -26,7 +26,9 @@ IMAGE = "firmware/eitskin_nucleo_f767zi.bin"
 EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
-def power_up(image: bytes, *, scene: str = "two_touch", noisy: bool = True, model: bytes | None = None) -> EmulatedBoard:
+def power_up(
+    image: bytes, *, scene: str = "two_touch", noisy: bool = True, model: bytes | None = None
+) -> EmulatedBoard:
     """A board that has just got power, with ``model`` (or the prebuilt one) in bank 0."""
     decoded, blob = load_prebuilt() if model is None else (decode_model(model, "the model"), model)
     described = find_scene(scene)
@@ -38,7 +40,9 @@ def power_up(image: bytes, *, scene: str = "two_touch", noisy: bool = True, mode
 def connect(board: EmulatedBoard) -> Device:
     """The host on the board's line, once it speaks."""
     transport: Transport = EmulatedTransport("test", board)
-    board.run_until(board.clock.now + TICKS_PER_S, lambda: board.line.up_next_end() <= board.clock.now)
+    board.run_until(
+        board.clock.now + TICKS_PER_S, lambda: board.line.up_next_end() <= board.clock.now
+    )
     return Device(transport)
 
 
@@ -50,14 +54,17 @@ def board_of(device: Device) -> EmulatedBoard:
 
 def raw_frames(device: Device, count: int) -> list[RawFrame]:
     """Raw frames of scans that begin from now on: two were under way."""
-    frames = [item for item in device.stream(Stream.RAW, frames=count + 2) if isinstance(item, RawFrame)]
+    frames = [
+        item for item in device.stream(Stream.RAW, frames=count + 2) if isinstance(item, RawFrame)
+    ]
     return frames[2:]
 
 
 def twin_check(
     device: Device, blob: bytes, frames: int, quiet: int = 4
 ) -> tuple[HostCheck, list[LiveFrame], list[Reconstruction | None]]:
-    """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core and its results."""
+    """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core
+    and its results."""
     from eitskin.device.wire import commands
 
     taken: list[Any] = []
@@ -72,7 +79,11 @@ def twin_check(
     for item in taken:
         if isinstance(item, RawFrame) and item.quiet:
             twin.take(LiveFrame(item.frame, 0, item.time_us, raw=item))
-    seen = [item for item in put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING) if isinstance(item, LiveFrame)]
+    seen = [
+        item
+        for item in put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING)
+        if isinstance(item, LiveFrame)
+    ]
     return twin.check, seen, [twin.take(frame) for frame in seen]
 
 

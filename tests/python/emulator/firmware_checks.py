@@ -1,6 +1,8 @@
-"""What must be true of a firmware image on the emulated board, one check a property: each returns what is wrong, or None.
+"""What must be true of a firmware image on the emulated board, one check a property: each returns
+what is wrong, or None.
 
-The session is short, and bounded in the board's own time: a broken image must fail soon and not hang the test.
+The session is short, and bounded in the board's own time: a broken image must fail soon and not
+hang the test.
 """
 
 from __future__ import annotations
@@ -11,14 +13,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from eitskin.device.emulator.analog.converter import STEP_V
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.device.emulator.transport import EmulatedTransport
 from eitskin.device.link import PumpedLink
 from eitskin.device.wire import commands
 from eitskin.device.wire.packets import BoardInfo, RawFrame, Reply, Stream
 from eitskin.device.wire.payloads import parse
+from eitskin.emulator.analog.converter import STEP_V
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.emulator.transport import EmulatedTransport
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
@@ -43,8 +45,11 @@ class Session:
     stuck: str = ""
     asked: int = 1000
 
-    def ask(self, command: commands.Command, timeout_s: float = ANSWER_S) -> Reply | BoardInfo | None:
-        """The answer to ``command``, if one comes in time; raw frames that come before it are kept."""
+    def ask(
+        self, command: commands.Command, timeout_s: float = ANSWER_S
+    ) -> Reply | BoardInfo | None:
+        """The answer to ``command``, if one comes in time; raw frames that come before it are
+        kept."""
         assert self.link is not None
         self.asked += 1
         self.link.send(command.TYPE, command.payload(self.asked))
@@ -95,7 +100,9 @@ def run_session(image: bytes) -> Session:
     board.adc.sample = watched  # type: ignore[assignment]
     session.link = PumpedLink(Impatient("mutant", board))
     try:
-        board.run_until(round(BOOT_S * TICKS_PER_S), lambda: board.record.interrupts.total() > MOST_INTERRUPTS)
+        board.run_until(
+            round(BOOT_S * TICKS_PER_S), lambda: board.record.interrupts.total() > MOST_INTERRUPTS
+        )
         session.ask(commands.GetInfo())
         session.ask(commands.StreamCommand(int(Stream.RAW)))
         session.listen(SCAN_S)
@@ -115,7 +122,11 @@ def speaks(session: Session) -> str | None:
 def generator(session: Session) -> str | None:
     """The AD9833, as decoded from the wires, gives the frequency."""
     hz = session.board.generator.frequency_hz
-    return None if abs(hz - EXCITATION_HZ) < 0.02 else f"{hz} Hz, words {[hex(word) for word in session.board.generator.words]}"
+    return (
+        None
+        if abs(hz - EXCITATION_HZ) < 0.02
+        else f"{hz} Hz, words {[hex(word) for word in session.board.generator.words]}"
+    )
 
 
 def order(session: Session) -> str | None:
@@ -146,7 +157,9 @@ def amplitudes(session: Session) -> str | None:
     if len(session.frames) < 2:
         return f"{len(session.frames)} raw frames"
     exact = session.board.skin.frames_v[0]
-    errors = np.array([np.abs(frame.voltage_v - exact).max() for frame in session.frames[1:]]) / STEP_V
+    errors = (
+        np.array([np.abs(frame.voltage_v - exact).max() for frame in session.frames[1:]]) / STEP_V
+    )
     return None if np.all(errors < 0.5) else f"{errors.max():.2f} LSB"
 
 
@@ -165,7 +178,11 @@ def interrupts(session: Session) -> str | None:
     """One interrupt a burst: none is lost, none comes twice."""
     board = session.board
     taken, bursts = board.record.interrupts[16 + 56], board.adc.conversions / 80
-    return None if bursts > 100 and abs(taken - bursts) <= 1 else f"{taken} interrupts for {bursts:.1f} bursts"
+    return (
+        None
+        if bursts > 100 and abs(taken - bursts) <= 1
+        else f"{taken} interrupts for {bursts:.1f} bursts"
+    )
 
 
 def orderly(session: Session) -> str | None:
@@ -176,7 +193,10 @@ def orderly(session: Session) -> str | None:
     try:
         clean(session.board)
     except AssertionError:
-        return f"{record.unmodelled} {record.clock_off} {record.hazards} {record.faults} {session.board.generator.ignored_bits}"
+        return (
+            f"{record.unmodelled} {record.clock_off} {record.hazards} {record.faults}"
+            f" {session.board.generator.ignored_bits}"
+        )
     return None
 
 
@@ -187,13 +207,18 @@ CHECKS: tuple[Callable[[Session], str | None], ...] = (
 
 
 def table_after_upload(image: bytes, model: bytes) -> str | None:
-    """A model with another protocol is uploaded: its table is the one that is scanned from then on."""
+    """A model with another protocol is uploaded: its table is the one that is scanned from then
+    on."""
     board = power_up(image, noisy=False)
     session = Session(board, decode_model(model, "the model").protocol)
     session.link = PumpedLink(EmulatedTransport("mutant", board))
     board.run_until(round(BOOT_S * TICKS_PER_S))
-    steps: list[tuple[commands.Command, float]] = [(commands.ModelBegin(len(model), zlib.crc32(model)), 5.0)]
-    steps += [(commands.ModelData(at, model[at : at + 4096]), 1.0) for at in range(0, len(model), 4096)]
+    steps: list[tuple[commands.Command, float]] = [
+        (commands.ModelBegin(len(model), zlib.crc32(model)), 5.0)
+    ]
+    steps += [
+        (commands.ModelData(at, model[at : at + 4096]), 1.0) for at in range(0, len(model), 4096)
+    ]
     steps += [(commands.ModelCommit(), 5.0), (commands.GetInfo(), ANSWER_S)]
     for step, timeout_s in steps:
         answer = session.ask(step, timeout_s)

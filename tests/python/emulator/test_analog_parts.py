@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from thumb import flat_skin
 
-from eitskin.device.emulator.analog.ad9833 import FULL_TURN, Ad9833
-from eitskin.device.emulator.analog.adg1206 import OFF_TICKS, Multiplexers
-from eitskin.device.emulator.analog.converter import STEP_V, codes
-from eitskin.device.emulator.analog.front_end import TAU_TICKS, FrontEnd
-from eitskin.device.emulator.analog.skin import Skin
-from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.device.emulator.peripherals.spi import SpiFrame
+from eitskin.emulator.analog.ad9833 import FULL_TURN, Ad9833
+from eitskin.emulator.analog.adg1206 import OFF_TICKS, Multiplexers
+from eitskin.emulator.analog.converter import STEP_V, codes
+from eitskin.emulator.analog.front_end import TAU_TICKS, FrontEnd
+from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.emulator.peripherals.spi import SpiFrame
 from eitskin.skin.protocol import adjacent, opposite, table
 
 MCLK_HZ, MCLK_TICKS = 8_000_000, 54
@@ -54,7 +54,9 @@ def test_phase_register_waveforms_and_reset() -> None:
     at = np.array([10])
     assert started(*starting(STEP)).output(at)[0] == pytest.approx(0, abs=2e-3)
     assert started(*starting(0, phase=1024)).output(at)[0] == pytest.approx(1, abs=2e-3)
-    assert started(*starting(0, phase=1024, control=0x2002)).output(at)[0] == pytest.approx(0, abs=4e-3)  # triangle
+    assert started(*starting(0, phase=1024, control=0x2002)).output(at)[0] == pytest.approx(
+        0, abs=4e-3
+    )  # triangle
     assert started(*starting(STEP, control=0x2100)).output(at + 999)[0] == 0
     assert started(*starting(STEP, control=0x2100)).frequency_hz == 0
     held = started(*starting(STEP, control=0x2080))  # the clock stopped: a constant
@@ -64,7 +66,9 @@ def test_phase_register_waveforms_and_reset() -> None:
 
 
 def test_halves_of_a_frequency_need_b28_or_hlb() -> None:
-    assert started(0x2100, 0x4001, 0x4001, 0x2000).frequency_hz == pytest.approx((1 << 14 | 1) / FULL_TURN * MCLK_HZ)
+    assert started(0x2100, 0x4001, 0x4001, 0x2000).frequency_hz == pytest.approx(
+        (1 << 14 | 1) / FULL_TURN * MCLK_HZ
+    )
     lower = started(0x2100, 0x4000, 0x4000, 0x0000, 0x4123)
     assert lower.frequency_hz == pytest.approx(0x123 / FULL_TURN * MCLK_HZ)
     upper = started(0x2100, 0x4000, 0x4000, 0x1000, 0x4001)
@@ -184,5 +188,12 @@ def test_settling_is_first_order() -> None:
 
 
 def test_codes() -> None:
-    assert codes(np.array([0.0, STEP_V, -STEP_V, 0.49 * STEP_V, 1.2, -1.2])).tolist() == [2048, 2049, 2047, 2048, 4095, 0]
+    assert codes(np.array([0.0, STEP_V, -STEP_V, 0.49 * STEP_V, 1.2, -1.2])).tolist() == [
+        2048,
+        2049,
+        2047,
+        2048,
+        4095,
+        0,
+    ]
     assert pytest.approx(3.3 / 4096 / 1.5) == STEP_V

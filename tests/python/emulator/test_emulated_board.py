@@ -1,4 +1,5 @@
-"""The unmodified firmware image of the NUCLEO-F767ZI on the emulated board: what it drives, measures, computes and sends."""
+"""The unmodified firmware image of the NUCLEO-F767ZI on the emulated board: what it drives,
+measures, computes and sends."""
 
 from __future__ import annotations
 
@@ -8,11 +9,19 @@ import numpy as np
 import pytest
 
 from eitskin.device.client import Device
-from eitskin.device.emulator.analog.converter import STEP_V
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.device.emulator.scene_skin import skin_of
-from eitskin.device.wire.packets import Fault, FaultCode, Quality, RawFlags, RawFrame, SolvedTouches, Stream
+from eitskin.device.wire.packets import (
+    Fault,
+    FaultCode,
+    Quality,
+    RawFlags,
+    RawFrame,
+    SolvedTouches,
+    Stream,
+)
+from eitskin.emulator.analog.converter import STEP_V
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.emulator.scene_skin import skin_of
 from eitskin.errors import DeviceError, ProtocolError
 from eitskin.model.build import BuildSettings, linearise, make_model
 from eitskin.model.eitm import encode_model
@@ -72,7 +81,9 @@ def amplitude_errors_lsb(device: Device) -> np.ndarray:
 
 def test_amplitudes_are_within_half_a_step(quiet: Device) -> None:
     errors = amplitude_errors_lsb(quiet)
-    print(f"adjacent: worst {np.abs(errors).max():.3f} LSB, rms {np.sqrt(np.mean(errors**2)):.3f} LSB")
+    print(
+        f"adjacent: worst {np.abs(errors).max():.3f} LSB, rms {np.sqrt(np.mean(errors**2)):.3f} LSB"
+    )
     assert np.abs(errors).max() < 0.5
 
 
@@ -121,7 +132,10 @@ def test_touches_and_images_are_the_host_s_to_the_bit(image: bytes) -> None:
     for frame, result in zip(seen, host, strict=True):
         assert frame.solved is not None
         assert result is not None
-        assert (frame.solved.macs, frame.solved.iterations) == (result.info.macs, result.info.iterations)
+        assert (frame.solved.macs, frame.solved.iterations) == (
+            result.info.macs,
+            result.info.iterations,
+        )
     truth = np.array([[-40.0, 10.0], [30.0, -25.0]])
     for frame in seen[2:]:
         assert frame.touches is not None
@@ -134,8 +148,16 @@ def test_touches_and_images_are_the_host_s_to_the_bit(image: bytes) -> None:
 
 def test_an_opposite_protocol(image: bytes) -> None:
     """Another protocol: the model's table is scanned, and each row has its voltage."""
-    skin, protocol = paper_skin(), opposite(16, 0.5e-3)  # at 1 mA its voltages would saturate this front end
-    model = make_model(skin, protocol, linearise(skin, protocol, pixels_across=14, elements=900), BuildSettings(rank=40))
+    skin, protocol = (
+        paper_skin(),
+        opposite(16, 0.5e-3),
+    )  # at 1 mA its voltages would saturate this front end
+    model = make_model(
+        skin,
+        protocol,
+        linearise(skin, protocol, pixels_across=14, elements=900),
+        BuildSettings(rank=40),
+    )
     board = power_up(image, noisy=False, model=encode_model(model))
     device = connect(board)
     assert device.board.protocol_hash == protocol.hash
@@ -151,14 +173,23 @@ def test_an_opposite_protocol(image: bytes) -> None:
 
 def periods_us(device: Device, frames: int) -> tuple[float, float]:
     """From frame to frame, by the board's clock: of scans alone, and with solves."""
-    raw = [item.time_us for item in device.stream(Stream.RAW, frames=frames) if isinstance(item, RawFrame)]
-    solved = [item.solved.time_us for item in device.stream(Stream.TOUCHES, frames=frames) if isinstance(item, SolvedTouches)]
+    raw = [
+        item.time_us
+        for item in device.stream(Stream.RAW, frames=frames)
+        if isinstance(item, RawFrame)
+    ]
+    solved = [
+        item.solved.time_us
+        for item in device.stream(Stream.TOUCHES, frames=frames)
+        if isinstance(item, SolvedTouches)
+    ]
     return float(np.diff(raw)[2:].mean()), float(np.diff(solved)[2:].mean())
 
 
 @pytest.mark.parametrize(("check_every", "rows"), [(1, 208), (0, 104)])
 def test_frame_rates(image: bytes, check_every: int, rows: int) -> None:
-    """208 and 104 measurements of 80 samples, the solve overlapped: the slower of scan and solve is what bounds the rate."""
+    """208 and 104 measurements of 80 samples, the solve overlapped: the slower of scan and solve is
+    what bounds the rate."""
     board = power_up(image)
     device = connect(board)
     device.scan(check_every=check_every)
@@ -173,7 +204,9 @@ def test_frame_rates(image: bytes, check_every: int, rows: int) -> None:
     rate = f"scan {scan_us / 1000:.2f} ms, frame {frame_us / 1000:.2f} ms ({1e6 / frame_us:.1f} Hz)"
     print(f"{rows} rows: {rate}; {told}: {bound} bounds it")
     assert abs(scan_us - rows * device.board.slot_us) <= 2 * device.board.slot_us
-    assert scan_us - 1 <= frame_us <= max(scan_us, sum(own_us.values())) * 1.1  # they overlap: it is not their sum
+    assert (
+        scan_us - 1 <= frame_us <= max(scan_us, sum(own_us.values())) * 1.1
+    )  # they overlap: it is not their sum
     clean(board)
 
 
@@ -213,9 +246,9 @@ def test_a_saturated_row_is_told(image: bytes) -> None:
     assert raw[-1].quality[7] & Quality.SATURATED
     assert np.isnan(raw[-1].voltage_v[7])
     faults = [item for item in items if isinstance(item, Fault)]
-    assert any(fault.code == FaultCode.SATURATED and fault.raised and fault.index == 7 for fault in faults) or (
-        FaultCode.SATURATED in device.info().fault_codes
-    )
+    assert any(
+        fault.code == FaultCode.SATURATED and fault.raised and fault.index == 7 for fault in faults
+    ) or (FaultCode.SATURATED in device.info().fault_codes)
 
 
 def test_no_model_no_scan_but_answers(image: bytes) -> None:
@@ -240,5 +273,7 @@ def test_without_the_8_mhz_the_red_light_blinks(image: bytes) -> None:
 
 
 def test_a_scene_for_other_electrodes_is_refused() -> None:
-    with pytest.raises(ProtocolError, match=r"its skin has 16 electrodes, the model is for 8; build a model"):
+    with pytest.raises(
+        ProtocolError, match=r"its skin has 16 electrodes, the model is for 8; build a model"
+    ):
         skin_of(find_scene("two_touch"), small("disk", "adjacent", 8).protocol)

@@ -1,4 +1,5 @@
-"""What the firmware does when things go wrong: uploads cut at any byte, a program that crashes or hangs, noise on the line."""
+"""What the firmware does when things go wrong: uploads cut at any byte, a program that crashes or
+hangs, noise on the line."""
 
 from __future__ import annotations
 
@@ -9,11 +10,11 @@ import pytest
 
 from eitskin.device.bank import newest_bank
 from eitskin.device.client import Device
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.device.emulator.memory import RAM
 from eitskin.device.wire import commands
 from eitskin.device.wire.packets import Fault, FaultCode, SolvedTouches, Stream
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.emulator.memory import RAM
 from eitskin.model.prebuilt import load_prebuilt
 from emulated import board_of, clean, connect, power_up
 from small_models import small_blob
@@ -27,7 +28,8 @@ def restarted(device: Device) -> Device:
 
 
 def test_a_model_over_the_wire(image: bytes) -> None:
-    """It is programmed, verified and swapped in; a restart finds it, and the bank before it is as it was."""
+    """It is programmed, verified and swapped in; a restart finds it, and the bank before it is as
+    it was."""
     board = power_up(image)
     device = connect(board)
     before, model = board.bank(0), small_blob()
@@ -72,7 +74,8 @@ def upload_until(device: Device, model: bytes, words: int) -> None:
 
 
 def test_an_upload_cut_at_any_word_leaves_the_old_model(image: bytes) -> None:
-    """Power goes during the erase, in the middle, at the last word of the model and in each word of the record but its last."""
+    """Power goes during the erase, in the middle, at the last word of the model and in each word of
+    the record but its last."""
     model, (_, old) = small_blob(), load_prebuilt()
     total = -(-len(model) // 4) + 8
     chosen = np.random.default_rng(4).integers(2, total - 8, 3).tolist()
@@ -213,6 +216,8 @@ def test_a_restart_on_request(image: bytes) -> None:
     assert board.record.resets == ["power", "software"]
     assert (info.tared, info.faults) == (0, 0)
     device.tare(4)
-    touches = [item for item in device.stream(Stream.TOUCHES, frames=2) if isinstance(item, SolvedTouches)]
+    touches = [
+        item for item in device.stream(Stream.TOUCHES, frames=2) if isinstance(item, SolvedTouches)
+    ]
     assert len(touches) == 2
     clean(board)

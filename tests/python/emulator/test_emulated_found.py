@@ -1,4 +1,5 @@
-"""The firmware on the emulated board names what is wrong with a frame within that frame, by fault and head, as the host would."""
+"""The firmware on the emulated board names what is wrong with a frame within that frame, by fault
+and head, as the host would."""
 
 from __future__ import annotations
 
@@ -10,11 +11,11 @@ import numpy as np
 from eitskin.core.findings import names
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.emulator.analog.skin import Skin
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.scene_skin import skin_of
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.wire.packets import CLEAN_FRAMES, Fault, FaultCode
+from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.scene_skin import skin_of
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
@@ -31,12 +32,15 @@ def device_before(image: bytes, skin: Skin) -> Device:
 
 def taken(device: Device, frames: int) -> tuple[list[LiveFrame], list[Fault]]:
     items = list(put_together(device.stream(EVERYTHING, frames=frames), EVERYTHING))
-    return [item for item in items if isinstance(item, LiveFrame)], [item for item in items if isinstance(item, Fault)]
+    return [item for item in items if isinstance(item, LiveFrame)], [
+        item for item in items if isinstance(item, Fault)
+    ]
 
 
 def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
-    """Named by a fault and by the head in the same frame, at the latest the first that is wholly without it; gone after eight
-    frames with it; every bit, and all that was found, as the host finds it."""
+    """Named by a fault and by the head in the same frame, at the latest the first that is wholly
+    without it; gone after eight frames with it; every bit, and all that was found, as the host
+    finds it."""
     model, blob = load_prebuilt()
     wobble = {"detached": {"electrodes": [5], "from_s": 0.05, "until_s": 0.12}}
     device = device_before(image, skin_of(scene(wobble), model.protocol))
@@ -46,7 +50,9 @@ def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
     assert (check.same + check.alone, check.different) == (16, [])  # the line does not carry all
     assert check.same > 10
     uses = (model.protocol.drive_measure == 5).any(axis=1)
-    whole = [f.number for f in seen if f.raw is not None and np.abs(f.raw.voltage_v[uses]).max() < 1e-3]
+    whole = [
+        f.number for f in seen if f.raw is not None and np.abs(f.raw.voltage_v[uses]).max() < 1e-3
+    ]
     named = [f.number for f in seen if f.solved is not None and f.solved.open_electrodes == (5,)]
     assert named[0] <= whole[0]
     assert set(whole) <= set(named)
@@ -73,13 +79,19 @@ def _faults(packet: Any) -> list[Fault]:
 
 def test_bridged_electrodes_are_named_with_each_other(image: bytes) -> None:
     protocol = load_prebuilt()[0].protocol
-    whole, bridged = skin_of(scene({}), protocol), skin_of(scene({"bridged": {"electrodes": [6, 7]}}), protocol)
+    whole, bridged = (
+        skin_of(scene({}), protocol),
+        skin_of(scene({"bridged": {"electrodes": [6, 7]}}), protocol),
+    )
     device = device_before(image, Skin(protocol, whole.quiet_v, bridged.frames_v, 20.0))
     device.tare(4)
     device.start_scene()
     frames, faults = taken(device, 4)
     told = [fault for fault in faults if fault.code == FaultCode.BRIDGED]
-    assert [(fault.raised, fault.index, fault.value) for fault in told] == [(True, 6, 7), (True, 7, 6)]
+    assert [(fault.raised, fault.index, fault.value) for fault in told] == [
+        (True, 6, 7),
+        (True, 7, 6),
+    ]
     assert {fault.words[:2] for fault in told} == {(0xC0, 0)}
     first = next(f for f in frames if f.solved is not None and f.solved.bridged_electrodes)
     assert first.solved is not None
@@ -110,6 +122,8 @@ def test_a_reading_that_is_off_is_left_out_and_counted(image: bytes) -> None:
     rows = [frame.solved.glitches for frame in frames if frame.solved is not None]
     assert sorted(rows)[:-1] == [0, 0, 0, 0]
     assert 1 <= max(rows) <= 2
-    assert [names(frame.solved.findings) for frame in frames if frame.solved and frame.solved.glitches] == [("glitch",)]
+    assert [
+        names(frame.solved.findings) for frame in frames if frame.solved and frame.solved.glitches
+    ] == [("glitch",)]
     assert device.stats().glitches == max(rows)
     assert not faults

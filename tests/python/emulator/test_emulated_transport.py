@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from eitskin.device.emulator import transport as transport_module
-from eitskin.device.emulator.clocktime import TICKS_PER_S
-from eitskin.device.emulator.transport import EmulatedTransport, open_emulated
 from eitskin.device.open import open_device
 from eitskin.device.transport import Transport
 from eitskin.device.wire.packets import SolvedTouches, Stream
+from eitskin.emulator import transport as transport_module
+from eitskin.emulator.clocktime import TICKS_PER_S
+from eitskin.emulator.transport import EmulatedTransport, open_emulated
 from eitskin.errors import DeviceError, FileError, MissingExtraError, ProtocolError
 from emulated import IMAGE
 from small_models import small_blob
@@ -31,7 +31,11 @@ def test_a_device_by_its_url(built: Path, scene: str) -> None:
         assert isinstance(device.transport, Transport)
         device.tare(4)
         device.start_scene()
-        touches = [item for item in device.stream(Stream.TOUCHES, frames=3) if isinstance(item, SolvedTouches)]
+        touches = [
+            item
+            for item in device.stream(Stream.TOUCHES, frames=3)
+            if isinstance(item, SolvedTouches)
+        ]
         assert len(touches[-1].touches) == 2
         assert not device.transport.ended
 
@@ -60,7 +64,9 @@ def test_a_closed_one_is_refused(built: Path) -> None:
             use()
 
 
-def test_an_image_that_hangs_does_not_hang_its_user(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_image_that_hangs_does_not_hang_its_user(
+    built: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     transport = open_emulated("two_touch", image=built)
     while transport.read(0.001):
         pass
@@ -92,5 +98,9 @@ def test_the_image_that_ships_runs() -> None:
     assert transport.read(0.5)
     report = transport.board.report()
     assert report.clean
-    assert (report.resets, report.mclk_hz, report.interrupts[15] > 5) == (("power",), 8_000_000, True)
+    assert (report.resets, report.mclk_hz, report.interrupts[15] > 5) == (
+        ("power",),
+        8_000_000,
+        True,
+    )
     assert json.dumps(report.as_dict())

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
-from eitskin.device.emulator.memory import BANK_BYTES
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.emulator.memory import BANK_BYTES
 from eitskin.errors import DeviceError
 
 OPEN = "FLASH_KEYR = 0x45670123u; FLASH_KEYR = 0xCDEF89ABu;"
@@ -29,16 +29,25 @@ def test_erase_and_program() -> None:
     board = flashed(OPEN + ERASE + "OUT[2] = DWT_CYCCNT;" + WRITE + CLOSE, bank=b"\0" * BANK_BYTES)
     word, status, cycles, done = out(board, 4)
     assert (word, status, done) == (0x12345678, 0, 1)
-    assert 16_000_000 <= cycles <= 16_000_200  # one second at 16 MHz, in which the processor stood still
+    assert (
+        16_000_000 <= cycles <= 16_000_200
+    )  # one second at 16 MHz, in which the processor stood still
     assert board.bank(0)[:0x10] == b"\xff" * 16
     assert board.bank(0)[0x10:0x14] == bytes.fromhex("78563412")
     assert board.bank(0)[0x40000:] == b"\0" * 0x40000  # the next sector
-    assert (board.flash.sectors_erased, board.flash.words_programmed, board.flash.not_erased) == (1, 1, 0)
+    assert (board.flash.sectors_erased, board.flash.words_programmed, board.flash.not_erased) == (
+        1,
+        1,
+        0,
+    )
     assert not board.record.hazards
 
 
 def test_a_word_takes_16_us() -> None:
-    many = "FLASH_CR = 2u << 8 | 1u; for (uint32_t k = 0; k < 100; ++k) { REG32(0x08040010u + 4 * k) = k; " + WAIT + "}"
+    many = (
+        "FLASH_CR = 2u << 8 | 1u; for (uint32_t k = 0; k < 100; ++k) { REG32(0x08040010u + 4 * k)"
+        " = k; " + WAIT + "}"
+    )
     cycles = out(flashed(OPEN + many + "OUT[2] = DWT_CYCCNT;" + CLOSE), 3)[2]
     assert 100 * 256 <= cycles <= 100 * 280
 
@@ -55,10 +64,16 @@ def test_what_flash_refuses() -> None:
     assert "FLASH: CR written while it is locked" in locked.record.hazards
     barred = flashed("FLASH_KEYR = 1u;" + OPEN + ERASE, bank=b"\0" * 64)
     assert out(barred, 1) == [0]
-    narrow = flashed(OPEN + WRITE.replace("REG32(0x08040010u) = 0x12345678u", "REG16(0x08040010u) = 0x5678u") + CLOSE)
+    narrow = flashed(
+        OPEN
+        + WRITE.replace("REG32(0x08040010u) = 0x12345678u", "REG16(0x08040010u) = 0x5678u")
+        + CLOSE
+    )
     assert out(narrow, 2) == [0xFFFFFFFF, 1 << 6]
     with pytest.raises(DeviceError, match="locked up"):
-        flashed("REG32(0x08040010u) = 1;" * 2 + "}\nvoid hard_fault(void) { REG32(0x08040010u) = 1;")
+        flashed(
+            "REG32(0x08040010u) = 1;" * 2 + "}\nvoid hard_fault(void) { REG32(0x08040010u) = 1;"
+        )
 
 
 def test_time_goes_on_while_the_processor_stands_still() -> None:
@@ -68,7 +83,13 @@ def test_time_goes_on_while_the_processor_stands_still() -> None:
     """
     body = "OUT[2] = 0; RCC_APB1ENR |= 1u << 3; STK_LOAD = 99999; STK_VAL = 0; STK_CTRL = 7; "
     body += "TIM_ARR(TIM5_BASE) = ~0u; T_CR1(TIM5_BASE) = 1;"
-    program = "void program(void) { cycle_counter(); " + body + OPEN + ERASE + "OUT[4] = TIM_CNT(TIM5_BASE); }"
+    program = (
+        "void program(void) { cycle_counter(); "
+        + body
+        + OPEN
+        + ERASE
+        + "OUT[4] = TIM_CNT(TIM5_BASE); }"
+    )
     board = EmulatedBoard(compile_program(CLOCK + source + program), flat_skin())
     board.run_until(2 * TICKS_PER_S, lambda: board._asleep)
     _, _, ticks, _, counted, at = out(board, 6)
@@ -105,7 +126,11 @@ def test_a_watchdog_that_is_not_fed_resets_the_board() -> None:
 
 
 def test_feeding_keeps_it_away() -> None:
-    board = run_program(WATCHDOG % "for (;;) { for (volatile uint32_t k = 0; k < 100000; ++k) ; IWDG_KR = 0xAAAA; }", 300_000)
+    board = run_program(
+        WATCHDOG
+        % "for (;;) { for (volatile uint32_t k = 0; k < 100000; ++k) ; IWDG_KR = 0xAAAA; }",
+        300_000,
+    )
     assert board.record.resets == ["power"]
     assert board.iwdg.feeds > 3
 

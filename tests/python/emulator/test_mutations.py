@@ -1,4 +1,5 @@
-"""Firmware with one bug each, built and run: the check that is meant for it fails. The sources as they are pass them all."""
+"""Firmware with one bug each, built and run: the check that is meant for it fails. The sources as
+they are pass them all."""
 
 from __future__ import annotations
 
@@ -14,13 +15,22 @@ from cross_build import ROOT, build_cortex_m7
 from emulated import IMAGE
 from small_models import small_blob
 
-COPIED = ("csrc", "firmware", "cmake", "tests/emulated", "tests/soak", "CMakeLists.txt", "CMakePresets.json")
+COPIED = (
+    "csrc",
+    "firmware",
+    "cmake",
+    "tests/emulated",
+    "tests/soak",
+    "CMakeLists.txt",
+    "CMakePresets.json",
+)
 TARGET = "eitskin_nucleo_f767zi"
 
 
 @dataclass(frozen=True)
 class Mutation:
-    """Texts to be replaced in a file, each of which must be there exactly once, and the check that must notice."""
+    """Texts to be replaced in a file, each of which must be there exactly once, and the check that
+    must notice."""
 
     file: str
     replaced: tuple[tuple[str, str], ...]
@@ -30,10 +40,16 @@ class Mutation:
 BOARD, DRIVERS, APP = "firmware/boards/nucleo_f767zi", "firmware/drivers", "firmware/app"
 MUTATIONS = {
     "SPI mode wrong": Mutation(
-        f"{BOARD}/generator.c", (("mode = SPI_CR1_CPOL;", "mode = SPI_CR1_CPOL | 1u;"),), "generator"
+        f"{BOARD}/generator.c",
+        (("mode = SPI_CR1_CPOL;", "mode = SPI_CR1_CPOL | 1u;"),),
+        "generator",
     ),
-    "SPI clock missing": Mutation(f"{BOARD}/clock.c", (("RCC_APB1ENR |= RCC_APB1ENR_SPI3EN;", ""),), "generator"),
-    "ADC clock missing": Mutation(f"{BOARD}/clock.c", (("RCC_APB2ENR |= RCC_APB2ENR_ADC1EN;", ""),), "amplitudes"),
+    "SPI clock missing": Mutation(
+        f"{BOARD}/clock.c", (("RCC_APB1ENR |= RCC_APB1ENR_SPI3EN;", ""),), "generator"
+    ),
+    "ADC clock missing": Mutation(
+        f"{BOARD}/clock.c", (("RCC_APB2ENR |= RCC_APB2ENR_ADC1EN;", ""),), "amplitudes"
+    ),
     "AD9833 word order": Mutation(
         f"{DRIVERS}/ad9833.c",
         (
@@ -41,7 +57,10 @@ MUTATIONS = {
                 "words[1] = (uint16_t)(ADDRESS_FREQ0 | (tuning & 0x3FFFu));",
                 "words[2] = (uint16_t)(ADDRESS_FREQ0 | (tuning & 0x3FFFu));",
             ),
-            ("words[2] = (uint16_t)(ADDRESS_FREQ0 | (tuning >> 14", "words[1] = (uint16_t)(ADDRESS_FREQ0 | (tuning >> 14"),
+            (
+                "words[2] = (uint16_t)(ADDRESS_FREQ0 | (tuning >> 14",
+                "words[1] = (uint16_t)(ADDRESS_FREQ0 | (tuning >> 14",
+            ),
         ),
         "generator",
     ),
@@ -89,14 +108,25 @@ MUTATIONS = {
         "interrupts",
     ),
     "wrong interrupt": Mutation(
-        f"{BOARD}/stm32f767.h", (("#define IRQ_DMA2_STREAM0 56u", "#define IRQ_DMA2_STREAM0 57u"),), "interrupts"
+        f"{BOARD}/stm32f767.h",
+        (("#define IRQ_DMA2_STREAM0 56u", "#define IRQ_DMA2_STREAM0 57u"),),
+        "interrupts",
     ),
     "settling skipped": Mutation(
         f"{APP}/scan.c",
         (
             ("fw_burst_us(s) + s->settle_us + FW_SWITCH_US;", "fw_burst_us(s) + FW_SWITCH_US;"),
-            ("if ((uint64_t)us * s->excitation_millihz % 1000000000u == 0)", "if ((uint64_t)us * s->excitation_millihz > 0)"),
-            ("(int32_t)(burst->start_us - scan->switched_us) > (int32_t)scan->settings.settle_us;", "true;"),
+            (
+                "if ((uint64_t)us * s->excitation_millihz % 1000000000u == 0)",
+                "if ((uint64_t)us * s->excitation_millihz > 0)",
+            ),
+            (
+                (
+                    "(int32_t)(burst->start_us - scan->switched_us) >"
+                    " (int32_t)scan->settings.settle_us;"
+                ),
+                "true;",
+            ),
         ),
         "amplitudes",
     ),
@@ -106,8 +136,10 @@ STALE_TABLE = Mutation(
     (
         (
             "    return (fw_scan_table){engine->model.protocol,",
-            "    static const uint8_t *first;\n    if (first == NULL)\n        first = engine->model.protocol;\n"
-            "    return (fw_scan_table){first,",
+            (
+                "    static const uint8_t *first;\n    if (first == NULL)\n        first ="
+                " engine->model.protocol;\n    return (fw_scan_table){first,"
+            ),
         ),
     ),
     "table_after_upload",
@@ -132,13 +164,17 @@ class Workshop:
         original = text = path.read_text()
         for old, new in mutation.replaced:
             assert text.count(old) == 1, (
-                f"{mutation.file}: {old!r} is there {text.count(old)} times: bring the mutation up to date"
+                f"{mutation.file}: {old!r} is there {text.count(old)} times: bring the mutation up"
+                " to date"
             )
             text = text.replace(old, new)
         try:
             path.write_text(text)
             done = subprocess.run(
-                ["cmake", "--build", self.build, "--target", TARGET], capture_output=True, text=True, check=False
+                ["cmake", "--build", self.build, "--target", TARGET],
+                capture_output=True,
+                text=True,
+                check=False,
             )
             assert done.returncode == 0, done.stdout
             image = (self.build / IMAGE).read_bytes()
@@ -155,7 +191,9 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
 
 def test_the_sources_as_they_are_pass(workshop: Workshop) -> None:
     session = run_session(workshop.unmutated)
-    assert {check.__name__: check(session) for check in CHECKS} == {check.__name__: None for check in CHECKS}
+    assert {check.__name__: check(session) for check in CHECKS} == {
+        check.__name__: None for check in CHECKS
+    }
 
 
 @pytest.mark.parametrize("name", MUTATIONS)

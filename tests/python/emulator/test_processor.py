@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from thumb import CLOCK, OUT, STACK_TOP, compile_program, flat_skin, out, run_program, unexpected
 
-from eitskin.device.emulator import board as board_module
-from eitskin.device.emulator import counter
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_US
-from eitskin.device.emulator.memory import RAM
+from eitskin.emulator import board as board_module
+from eitskin.emulator import counter
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_US
+from eitskin.emulator.memory import RAM
 from eitskin.errors import DeviceError
 
 # arithmetic with IT blocks, floating point, division and memory: whatever slicing could spoil
@@ -29,7 +29,9 @@ void program(void) {
 """
 
 
-def test_where_slices_end_changes_neither_results_nor_time_nor_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_slices_end_changes_neither_results_nor_time_nor_counts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     image = compile_program(MIXED)
     found = set()
     for longest in (5_000_000, 1000, 97, 13, 5, 3):
@@ -42,12 +44,15 @@ def test_where_slices_end_changes_neither_results_nor_time_nor_counts(monkeypatc
 
 
 def test_an_instruction_takes_a_cycle() -> None:
-    """CYCCNT read twice around 100 NOPs: 100, and what the read itself takes, which is found without them."""
+    """CYCCNT read twice around 100 NOPs: 100, and what the read itself takes, which is found
+    without them."""
     nops = '__asm volatile(".rept %d\\n nop\\n .endr");'
     timed = "uint32_t a = DWT_CYCCNT; %s uint32_t b = DWT_CYCCNT; OUT[0] = b - a;"
     source = CLOCK + "void program(void) { %s cycle_counter(); " + timed + " }"
     for clock in ("", "clock_216();"):
-        with_them, without = (out(run_program(source % (clock, nops % n), 1000), 1)[0] for n in (100, 0))
+        with_them, without = (
+            out(run_program(source % (clock, nops % n), 1000), 1)[0] for n in (100, 0)
+        )
         assert with_them - without == 100
         assert 1 <= without <= 3
 
@@ -83,9 +88,15 @@ void program(void) {
 
 @pytest.mark.parametrize(
     ("urgency_2", "urgency_3", "order"),
-    [("0x20", "0x10", [2, 3, 30, 20]), ("0x10", "0x10", [2, 20, 3, 30]), ("0x10", "0x20", [2, 20, 3, 30])],
+    [
+        ("0x20", "0x10", [2, 3, 30, 20]),
+        ("0x10", "0x10", [2, 20, 3, 30]),
+        ("0x10", "0x20", [2, 20, 3, 30]),
+    ],
 )
-def test_the_more_urgent_interrupt_preempts(urgency_2: str, urgency_3: str, order: list[int]) -> None:
+def test_the_more_urgent_interrupt_preempts(
+    urgency_2: str, urgency_3: str, order: list[int]
+) -> None:
     board = run_program(TWO_TIMERS % (urgency_2, urgency_3), 200, (28, 29))
     assert out(board, 4) == order
     assert board.record.interrupts == {44: 1, 45: 1}
@@ -119,7 +130,8 @@ def test_a_frame_has_8_words_or_26_after_floating_point() -> None:
     assert bits == 0x40A00000
 
 
-# A handler that spoils all that it may, and a program that needs all of it: flags (GE and the FPU's too), registers, 64-bit sums
+# A handler that spoils all that it may, and a program that needs all of it: flags (GE and the FPU's
+# too), registers, 64-bit sums
 SPOILING = """
 __attribute__((naked)) void systick(void) {
     __asm volatile("vmov.f32 s0, #1.0\\n .irp n, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15\\n vmov.f32 s\\\\n, s0\\n .endr\\n"
@@ -181,7 +193,11 @@ void program(void) {
     ("on", "off", "held"),
     [
         ('__asm volatile("cpsid i");', '__asm volatile("cpsie i");', True),
-        ('__asm volatile("msr basepri, %0" :: "r"(0x80));', '__asm volatile("msr basepri, %0" :: "r"(0));', True),
+        (
+            '__asm volatile("msr basepri, %0" :: "r"(0x80));',
+            '__asm volatile("msr basepri, %0" :: "r"(0));',
+            True,
+        ),
         ('__asm volatile("msr basepri, %0" :: "r"(0x90));', "", False),
         ('__asm volatile("cpsid f");', '__asm volatile("cpsie f");', True),
     ],
@@ -269,10 +285,16 @@ def test_faults_reach_their_handlers(body: str, taken: int, cfsr: int, hfsr: int
 
 
 def test_a_fault_in_the_hard_fault_handler_locks_up() -> None:
-    source = FAULT.replace("TELL(hard_fault, 3)", "uint32_t load(uint32_t at); void hard_fault(void) { load(0x60000000); }")
+    source = FAULT.replace(
+        "TELL(hard_fault, 3)",
+        "uint32_t load(uint32_t at); void hard_fault(void) { load(0x60000000); }",
+    )
     with pytest.raises(DeviceError, match="locked up"):
         run_program(source % "load(0x60000000);", 200)
-    fed = "RCC_CSR = 1; IWDG_KR = 0xCCCC; IWDG_KR = 0x5555; IWDG_PR = 0; IWDG_RLR = 63; load(0x60000000);"
+    fed = (
+        "RCC_CSR = 1; IWDG_KR = 0xCCCC; IWDG_KR = 0x5555; IWDG_PR = 0; IWDG_RLR = 63;"
+        " load(0x60000000);"
+    )
     board = run_program(source % fed, 20_000)
     assert board.record.resets.count("watchdog") >= 1
 
@@ -306,7 +328,7 @@ def test_a_bug_in_a_peripheral_is_not_swallowed(monkeypatch: pytest.MonkeyPatch)
     def broken(self: object, offset: int, size: int) -> int:
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr("eitskin.device.emulator.peripherals.rcc.Rcc.read", broken)
+    monkeypatch.setattr("eitskin.emulator.peripherals.rcc.Rcc.read", broken)
     with pytest.raises(ZeroDivisionError, match="a bug"):
         run_program("void program(void) { OUT[0] = RCC_CR; }", 100)
 

@@ -1,14 +1,15 @@
-"""USART3 with DMA on the line to the host, SPI3 to the generator: bytes, words, their times, and what goes wrong."""
+"""USART3 with DMA on the line to the host, SPI3 to the generator: bytes, words, their times, and
+what goes wrong."""
 
 from __future__ import annotations
 
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_US
-from eitskin.device.emulator.memory import RAM
-from eitskin.device.emulator.serial_line import resampled
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_US
+from eitskin.emulator.memory import RAM
+from eitskin.emulator.serial_line import resampled
 
 SERIAL = """
     clock_216();
@@ -52,7 +53,13 @@ def test_bytes_reach_the_host_at_a_megabaud() -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [("1u << 18", "0"), ("2u << 16 |", ""), ("7u |", "0 |"), ("= 3u << 6", "= 1u << 6"), ("| 1u << 21", "")],
+    [
+        ("1u << 18", "0"),
+        ("2u << 16 |", ""),
+        ("7u |", "0 |"),
+        ("= 3u << 6", "= 1u << 6"),
+        ("| 1u << 21", ""),
+    ],
     ids=["clock off", "pin mode", "pin function", "no DMAT", "DMA off"],
 )
 def test_nothing_is_sent_when_something_is_missing(change: tuple[str, str]) -> None:
@@ -68,7 +75,9 @@ def test_a_wrong_baud_rate_is_garbage() -> None:
         assert received
         assert received != SENT
     for divisor in (53, 55):
-        assert (lambda board: board.receive())(sending(SERIAL.replace("= 54", f"= {divisor}"))) == SENT
+        assert (lambda board: board.receive())(
+            sending(SERIAL.replace("= 54", f"= {divisor}"))
+        ) == SENT
 
 
 def test_sampling_at_another_rate() -> None:
@@ -132,13 +141,19 @@ def test_a_receiver_at_another_rate_hears_garbage_and_framing_errors() -> None:
 
 
 def test_single_bytes_overrun() -> None:
-    source = """
+    source = (
+        """
     void irq_39(void) { OUT[0] |= U_ISR(USART3_BASE) & 1u << 3; OUT[1] = U_RDR(USART3_BASE); USART_ICR(USART3_BASE) = 1u << 3;
         for (uint32_t k = 0; k < %d; ++k) __asm volatile("nop"); ++OUT[2]; }
-    void program(void) { OUT[0] = OUT[2] = 0; """ + SERIAL + """
+    void program(void) { OUT[0] = OUT[2] = 0; """
+        + SERIAL
+        + """
         NVIC_ISER(1) = 1u << 7; USART_CR1(USART3_BASE) = 13 | 1u << 5; }"""
+    )
     for wait, overrun in ((10, 0), (3000, 1 << 3)):
-        board = EmulatedBoard(compile_program(CLOCK + source.replace("3u << 6;", "0;") % wait, (39,)), flat_skin())
+        board = EmulatedBoard(
+            compile_program(CLOCK + source.replace("3u << 6;", "0;") % wait, (39,)), flat_skin()
+        )
         board.run_until(500 * TICKS_PER_US)
         board.send(bytes(range(10)))
         board.run_until(board.clock.now + 3000 * TICKS_PER_US)
@@ -209,22 +224,36 @@ def test_mode_1_clocks_too_early() -> None:
         (SPI.replace("15u << 8", "7u << 8"), SHIFT, 5),
         (SPI.replace("@ |", "@ | 1u << 7 |"), SHIFT, 5),
     ],
-    ids=["clock off", "pin mode", "pin function", "no FSYNC", "FSYNC too soon", "FSYNC no output", "8 bits", "LSB first"],
+    ids=[
+        "clock off",
+        "pin mode",
+        "pin function",
+        "no FSYNC",
+        "FSYNC too soon",
+        "FSYNC no output",
+        "8 bits",
+        "LSB first",
+    ],
 )
 def test_what_does_not_reach_the_generator(setup: str, shift: str, words: int) -> None:
     assert (setup, shift) != (SPI, SHIFT)
     board = shifted(setup, shift=shift)
     assert len(board.generator.words) == words
     if words and "7u << 8" in setup:
-        assert board.generator.words == [word << 8 & 0xFF00 | word >> 8 for word in WORDS]  # two frames a word, low byte first
+        assert board.generator.words == [
+            word << 8 & 0xFF00 | word >> 8 for word in WORDS
+        ]  # two frames a word, low byte first
     elif words:
         assert board.generator.words == [int(f"{word:016b}"[::-1], 2) for word in WORDS]
 
 
 def test_a_word_takes_its_time() -> None:
     """16 bits at 54 MHz / 16: 4.74 us from the write to BSY's end."""
-    source = SHIFT.replace("SPI_DR(SPI3_BASE) = value;", "uint32_t t = DWT_CYCCNT; SPI_DR(SPI3_BASE) = value;").replace(
-        "GPIO_BSRR(GPIOD_BASE) = 1u << 2;\n}", "OUT[1] = DWT_CYCCNT - t;\n    GPIO_BSRR(GPIOD_BASE) = 1u << 2;\n}"
+    source = SHIFT.replace(
+        "SPI_DR(SPI3_BASE) = value;", "uint32_t t = DWT_CYCCNT; SPI_DR(SPI3_BASE) = value;"
+    ).replace(
+        "GPIO_BSRR(GPIOD_BASE) = 1u << 2;\n}",
+        "OUT[1] = DWT_CYCCNT - t;\n    GPIO_BSRR(GPIOD_BASE) = 1u << 2;\n}",
     )
     cycles = out(shifted(SPI + "cycle_counter();", shift=source), 2)[1]
     assert 1024 <= cycles <= 1040
@@ -233,5 +262,8 @@ def test_a_word_takes_its_time() -> None:
 def test_mclk_is_what_the_pin_gives() -> None:
     assert shifted().generator.mclk_hz == 8_000_000
     assert shifted(SPI.replace("0xA8020000u", "0xA8000000u")).generator.mclk_hz == 0
-    assert shifted(SPI + "RCC_CFGR = (RCC_CFGR & ~(7u << 24)) | 4u << 24;").generator.mclk_hz == 4_000_000
+    assert (
+        shifted(SPI + "RCC_CFGR = (RCC_CFGR & ~(7u << 24)) | 4u << 24;").generator.mclk_hz
+        == 4_000_000
+    )
     assert RAM == 0x20000000

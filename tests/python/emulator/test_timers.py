@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from thumb import CLOCK, compile_program, flat_skin, out, run_program
 
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_US
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_US
 
 TIMERS_ON = "RCC_APB1ENR |= 0xB; (void)RCC_APB1ENR;"
 
@@ -17,7 +17,13 @@ TIMERS_ON = "RCC_APB1ENR |= 0xB; (void)RCC_APB1ENR;"
 def test_clocks_and_their_hazards() -> None:
     board = run_program(CLOCK + "void program(void) { clock_216(); OUT[0] = RCC_CFGR; }", 1000)
     rcc = board.rcc
-    assert (rcc.sysclk_hz, rcc.hclk_hz, rcc.apb_hz(1), rcc.apb_hz(2), rcc.timer_hz(1)) == (216e6, 216e6, 54e6, 108e6, 108e6)
+    assert (rcc.sysclk_hz, rcc.hclk_hz, rcc.apb_hz(1), rcc.apb_hz(2), rcc.timer_hz(1)) == (
+        216e6,
+        216e6,
+        54e6,
+        108e6,
+        108e6,
+    )
     assert rcc.mco1_hz == 8_000_000
     assert board.clock.cycle_ticks == 2
     assert not board.record.hazards
@@ -27,7 +33,9 @@ def test_clocks_and_their_hazards() -> None:
         "APB1 above 54": "",
     }.items():
         source = CLOCK.replace(left_out, "") if left_out else CLOCK.replace("5u << 10", "4u << 10")
-        source = source.replace("!(PWR_CSR1 & PWR_CSR1_ODSWRDY) || ", "") if "over" in text else source
+        source = (
+            source.replace("!(PWR_CSR1 & PWR_CSR1_ODSWRDY) || ", "") if "over" in text else source
+        )
         board = run_program(source + "void program(void) { clock_216(); }", 1000)
         assert any(text in hazard for hazard in board.record.hazards), board.record.hazards
 
@@ -96,15 +104,21 @@ void program(void) { %s }
 """
 
 
-def watched(source: str, us: float, irqs: tuple[int, ...] = (56,)) -> tuple[EmulatedBoard, list[np.ndarray]]:
-    """A board after ``source``, and the instants (ticks) at which the converter sampled, call by call."""
+def watched(
+    source: str, us: float, irqs: tuple[int, ...] = (56,)
+) -> tuple[EmulatedBoard, list[np.ndarray]]:
+    """A board after ``source``, and the instants (ticks) at which the converter sampled, call by
+    call."""
     board = EmulatedBoard(compile_program(CLOCK + source, irqs), flat_skin())
     times: list[np.ndarray] = []
 
     def sample(at: Any, channel: int) -> Any:
         assert channel == 3
         times.append(at)
-        return np.arange(board.adc.conversions, board.adc.conversions + len(at), dtype=np.uint16) % 4096
+        return (
+            np.arange(board.adc.conversions, board.adc.conversions + len(at), dtype=np.uint16)
+            % 4096
+        )
 
     board.adc.sample = sample
     board.run_until(round(us * TICKS_PER_US))
@@ -112,7 +126,8 @@ def watched(source: str, us: float, irqs: tuple[int, ...] = (56,)) -> tuple[Emul
 
 
 def test_bursts_are_timed_by_hardware_alone() -> None:
-    """The firmware's chain: a compare of TIM5 starts TIM3, TIM3's OC1REF gates TIM2, TIM2's updates start conversions."""
+    """The firmware's chain: a compare of TIM5 starts TIM3, TIM3's OC1REF gates TIM2, TIM2's updates
+    start conversions."""
     board, times = watched(BURSTS % CHAIN, 1500)
     start_us, count, *told = out(board, 14)
     assert count == 6
@@ -133,13 +148,16 @@ def test_bursts_are_timed_by_hardware_alone() -> None:
 
 
 def test_sample_instants_follow_the_microsecond_clock() -> None:
-    """Sample k of a slot is taken k + 1/2 us after TIM5 reached the slot's start, and the sampling time later."""
+    """Sample k of a slot is taken k + 1/2 us after TIM5 reached the slot's start, and the sampling
+    time later."""
     source = BURSTS % (CHAIN + "while (TIM_CNT(TIM5_BASE) < at) ; OUT[20] = DWT_CYCCNT;")
     board, times = watched(source, 1500)
     began = out(board, 21)[20] * 2  # ticks, from the counter's start
     first = int(times[0][0]) - 3 * 16
     counter_zero = board.dwt._began
-    assert abs(first - (counter_zero + began) - TICKS_PER_US // 2) < 40  # the program's loop sees it up to 10 instructions late
+    assert (
+        abs(first - (counter_zero + began) - TICKS_PER_US // 2) < 40
+    )  # the program's loop sees it up to 10 instructions late
 
 
 @pytest.mark.parametrize(
@@ -153,7 +171,9 @@ def test_sample_instants_follow_the_microsecond_clock() -> None:
     ],
     ids=["clock off", "another trigger", "no TRGO", "interrupt off", "another master"],
 )
-def test_a_missing_link_of_the_chain(change: tuple[str, str], conversions: int | None, interrupts: int) -> None:
+def test_a_missing_link_of_the_chain(
+    change: tuple[str, str], conversions: int | None, interrupts: int
+) -> None:
     assert change[0] in CHAIN
     board, _ = watched(BURSTS % CHAIN.replace(*change), 800)
     if conversions is not None:
@@ -162,17 +182,28 @@ def test_a_missing_link_of_the_chain(change: tuple[str, str], conversions: int |
 
 
 def test_a_dma_flag_stays_until_it_is_cleared() -> None:
-    source = BURSTS.replace("DMA_LIFCR(DMA2_BASE) = 0x3D;", "if (n == 9) { DMA_LIFCR(DMA2_BASE) = 0x3D; T_CR1(TIM3_BASE) = 0; }")
-    board, _ = watched(source.replace("if (n == 5) { T_CR1(TIM3_BASE) = 0; T_CR1(TIM2_BASE) = 0; }", "") % CHAIN, 800)
+    source = BURSTS.replace(
+        "DMA_LIFCR(DMA2_BASE) = 0x3D;",
+        "if (n == 9) { DMA_LIFCR(DMA2_BASE) = 0x3D; T_CR1(TIM3_BASE) = 0; }",
+    )
+    board, _ = watched(
+        source.replace("if (n == 5) { T_CR1(TIM3_BASE) = 0; T_CR1(TIM2_BASE) = 0; }", "") % CHAIN,
+        800,
+    )
     _, count, *told = out(board, 22)
     assert count == 10
     assert told[2 * 9] - told[0] < 20  # all at once, not one a slot
 
 
 def test_an_overrun_stops_the_requests() -> None:
-    handler = "void irq_18(void) { ++OUT[30]; OUT[31] = ADC_SR(ADC1_BASE); ADC_SR(ADC1_BASE) = 0; ADC_CR2(ADC1_BASE) = 1; }"
+    handler = (
+        "void irq_18(void) { ++OUT[30]; OUT[31] = ADC_SR(ADC1_BASE); ADC_SR(ADC1_BASE) = 0;"
+        " ADC_CR2(ADC1_BASE) = 1; }"
+    )
     enabled = "ADC_CR2(ADC1_BASE) = 1; REG32(0x40012004) = 1u << 26; NVIC_ISER(0) = 1u << 18;"
-    chain = CHAIN.replace("DMA_CR(DMA2_BASE, 0) |= 1;", "").replace("ADC_CR2(ADC1_BASE) = 1;", enabled)
+    chain = CHAIN.replace("DMA_CR(DMA2_BASE, 0) |= 1;", "").replace(
+        "ADC_CR2(ADC1_BASE) = 1;", enabled
+    )
     source = handler + BURSTS % ("OUT[30] = 0;" + chain)
     board, times = watched(source, 800, (56, 18))
     overruns, status = out(board, 32)[30:]
@@ -181,15 +212,23 @@ def test_an_overrun_stops_the_requests() -> None:
 
 
 def test_a_converter_that_is_triggered_too_fast_skips() -> None:
-    board, times = watched(BURSTS % CHAIN.replace("107; TIM_CNT(TIM2_BASE) = 54", "26; TIM_CNT(TIM2_BASE) = 13"), 400)
+    board, times = watched(
+        BURSTS % CHAIN.replace("107; TIM_CNT(TIM2_BASE) = 54", "26; TIM_CNT(TIM2_BASE) = 13"), 400
+    )
     at = np.concatenate(times)
-    assert (np.diff(at)[:20] == 3 * 27 * 4).all()  # every third trigger: 15 cycles of 27 MHz are 2.2 periods
+    assert (
+        np.diff(at)[:20] == 3 * 27 * 4
+    ).all()  # every third trigger: 15 cycles of 27 MHz are 2.2 periods
     assert board.adc.ignored_triggers > 50
 
 
 def test_dma_into_no_memory_is_an_error() -> None:
-    source = BURSTS % CHAIN.replace("0x20011000u", "0x60001000u").replace("| DMA_CR_TCIE", "| DMA_CR_TEIE")
-    source = source.replace("OUT[3 + 2 * n] = DMA_CR(DMA2_BASE, 0) >> 19 & 1", "OUT[3 + 2 * n] = DMA_LISR(DMA2_BASE)")
+    source = BURSTS % CHAIN.replace("0x20011000u", "0x60001000u").replace(
+        "| DMA_CR_TCIE", "| DMA_CR_TEIE"
+    )
+    source = source.replace(
+        "OUT[3 + 2 * n] = DMA_CR(DMA2_BASE, 0) >> 19 & 1", "OUT[3 + 2 * n] = DMA_LISR(DMA2_BASE)"
+    )
     board, _ = watched(source, 800)
     assert out(board, 4)[3] & 1 << 3
     assert board.record.interrupts[72] == 1

@@ -1,4 +1,5 @@
-"""Small programs for the emulated processor, compiled in the test against the board's own register header."""
+"""Small programs for the emulated processor, compiled in the test against the board's own register
+header."""
 
 from __future__ import annotations
 
@@ -11,17 +12,24 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from eitskin.device.emulator.analog.skin import Skin
-from eitskin.device.emulator.board import EmulatedBoard
-from eitskin.device.emulator.clocktime import TICKS_PER_US
-from eitskin.device.emulator.memory import RAM
+from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.board import EmulatedBoard
+from eitskin.emulator.clocktime import TICKS_PER_US
+from eitskin.emulator.memory import RAM
 from eitskin.skin.protocol import adjacent
 
 ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
 OUT = 0x20010000  # where programs leave what they found
 STACK_TOP = 0x20008000
-FLAGS = ["-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard", "-O1", "-ffreestanding"]
+FLAGS = [
+    "-mcpu=cortex-m7",
+    "-mthumb",
+    "-mfpu=fpv5-sp-d16",
+    "-mfloat-abi=hard",
+    "-O1",
+    "-ffreestanding",
+]
 LINK = """
 SECTIONS {
     . = 0x08000000;
@@ -31,7 +39,8 @@ SECTIONS {
     .bss (NOLOAD) : { *(.bss*) *(.data*) *(COMMON) }
 }
 """
-# Every exception that has no handler of its own stops in `unexpected`, which leaves its number at OUT - 4.
+# Every exception that has no handler of its own stops in `unexpected`, which leaves its number at
+# OUT - 4.
 HEAD = """
 #include "stm32f767.h"
 #define OUT ((volatile uint32_t *)0x20010000)
@@ -63,7 +72,8 @@ __attribute__((section(".vectors"), used)) static void (*const vectors[16 + 110]
 
 @lru_cache(maxsize=64)
 def compile_program(source: str, irqs: tuple[int, ...] = ()) -> bytes:
-    """The image of C ``source``, which defines ``void program(void)`` and, for each of ``irqs``, ``void irq_N(void)``."""
+    """The image of C ``source``, which defines ``void program(void)`` and, for each of ``irqs``,
+    ``void irq_N(void)``."""
     assert shutil.which("arm-none-eabi-gcc"), "missing arm-none-eabi-gcc: scripts/test installs it"
     declared = " ".join(f"void irq_{n}(void);" for n in irqs)
     entries = ", ".join(f"[{16 + n}] = irq_{n}" for n in irqs)
@@ -73,10 +83,22 @@ def compile_program(source: str, irqs: tuple[int, ...] = ()) -> bytes:
         (folder / "program.c").write_text(HEAD + source)
         (folder / "link.ld").write_text(LINK)
         flags = [*FLAGS, "-nostdlib", "-fno-builtin", f"-I{BOARD}"]
-        command = ["arm-none-eabi-gcc", *flags, "-T", "link.ld", "start.c", "program.c", "-o", "a.elf", "-lgcc"]
+        command = [
+            "arm-none-eabi-gcc",
+            *flags,
+            "-T",
+            "link.ld",
+            "start.c",
+            "program.c",
+            "-o",
+            "a.elf",
+            "-lgcc",
+        ]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-        subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", "a.elf", "a.bin"], cwd=folder, check=True)
+        subprocess.run(
+            ["arm-none-eabi-objcopy", "-O", "binary", "a.elf", "a.bin"], cwd=folder, check=True
+        )
         return (folder / "a.bin").read_bytes()
 
 
@@ -100,7 +122,8 @@ def out(board: EmulatedBoard, count: int) -> list[int]:
 
 
 def unexpected(board: EmulatedBoard) -> int:
-    """The number of an exception that the program did not expect; the pattern of fresh RAM if none came."""
+    """The number of an exception that the program did not expect; the pattern of fresh RAM if none
+    came."""
     return int(struct.unpack("<I", board.memories.ram[OUT - RAM - 4 : OUT - RAM])[0])
 
 

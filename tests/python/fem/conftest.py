@@ -32,7 +32,8 @@ def l_mesh(l_skin: Skin) -> Mesh:
 
 @pytest.fixture(scope="session")
 def rounded_skin() -> Skin:
-    """A rectangle of 120 x 60 mm with corners of 15 mm radius, its outline given clockwise, with 16 electrodes."""
+    """A rectangle of 120 x 60 mm with corners of 15 mm radius, its outline given clockwise, with 16
+    electrodes."""
     corners = [(45, 15, 0), (-45, 15, 90), (-45, -15, 180), (45, -15, 270)]
     points = [
         (x + 15 * cos(pi * (turn + 10 * k) / 180), y + 15 * sin(pi * (turn + 10 * k) / 180))

@@ -1,7 +1,9 @@
-"""Exact voltages of a disk with a concentric inclusion, and polar meshes that resolve it, to hold FEM results against.
+"""Exact voltages of a disk with a concentric inclusion, and polar meshes that resolve it, to hold
+FEM results against.
 
-With a contact impedance that dwarfs the sheet's own resistance, the complete electrode model's current density is
-uniform under each electrode, and the boundary value problem has a closed Fourier series.
+With a contact impedance that dwarfs the sheet's own resistance, the complete electrode model's
+current density is uniform under each electrode, and the boundary value problem has a closed Fourier
+series.
 """
 
 from __future__ import annotations
@@ -20,13 +22,16 @@ FloatArray = npt.NDArray[np.float64]
 DWARFING_IMPEDANCE_OHM_M2 = 1e6
 
 
-def transfer_ohm(skin: Skin, inclusion_mm: float, inclusion_s_per_m: float, terms: int = 20000) -> FloatArray:
-    """Mean potential under electrode m per ampere into l (and out evenly over the rim), (L, L), contacts left out.
+def transfer_ohm(
+    skin: Skin, inclusion_mm: float, inclusion_s_per_m: float, terms: int = 20000
+) -> FloatArray:
+    """Mean potential under electrode m per ampere into l (and out evenly over the rim), (L, L),
+    contacts left out.
 
-    On the rim r = R, the current density cos(k theta) makes the potential R / (k sigma) T_k cos(k theta), where
-    T_k = (1 - mu rho^2k) / (1 + mu rho^2k), with the inclusion's relative radius rho and
-    mu = (sigma_in - sigma) / (sigma_in + sigma). An electrode of half-angle alpha has the coefficients
-    sin(k alpha) / (k alpha), once for the current and once for the mean.
+    On the rim r = R, the current density cos(k theta) makes the potential R / (k sigma) T_k cos(k
+    theta), where T_k = (1 - mu rho^2k) / (1 + mu rho^2k), with the inclusion's relative radius rho
+    and mu = (sigma_in - sigma) / (sigma_in + sigma). An electrode of half-angle alpha has the
+    coefficients sin(k alpha) / (k alpha), once for the current and once for the mean.
     """
     assert skin.outline.diameter_mm is not None
     radius_mm = skin.outline.diameter_mm / 2
@@ -43,7 +48,9 @@ def transfer_ohm(skin: Skin, inclusion_mm: float, inclusion_s_per_m: float, term
     return np.asarray(total / (pi * sigma * skin.thickness_mm * 1e-3))
 
 
-def exact_voltages(skin: Skin, protocol: Protocol, inclusion_mm: float, inclusion_s_per_m: float) -> FloatArray:
+def exact_voltages(
+    skin: Skin, protocol: Protocol, inclusion_mm: float, inclusion_s_per_m: float
+) -> FloatArray:
     """Boundary voltages (m,) of rows that measure on electrodes without current."""
     z = transfer_ohm(skin, inclusion_mm, inclusion_s_per_m)
     a, b, c, d = protocol.drive_measure.T.astype(int)
@@ -51,7 +58,8 @@ def exact_voltages(skin: Skin, protocol: Protocol, inclusion_mm: float, inclusio
 
 
 def polar_mesh(skin: Skin, rings_mm: FloatArray, around: int) -> Mesh:
-    """Rings of ``around`` nodes at radii ``rings_mm``, the last on the rim; electrodes must begin and end on nodes."""
+    """Rings of ``around`` nodes at radii ``rings_mm``, the last on the rim; electrodes must begin
+    and end on nodes."""
     angles = 2 * pi * np.arange(around) / around
     unit = np.column_stack([np.cos(angles), np.sin(angles)])
     nodes = np.concatenate([np.zeros((1, 2)), *(r * unit for r in rings_mm)])

@@ -1,4 +1,5 @@
-"""The Jacobian benchmark: that both sides compute the same thing, and what it says where pyEIT is absent."""
+"""The Jacobian benchmark: that both sides compute the same thing, and what it says where pyEIT is
+absent."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ import json
 import pytest
 
 from eitskin.errors import MissingExtraError, UsageError
-from eitskin.study.bench import jacobian as bench_jacobian
+from eitskin_studies.benchmarks import jacobian as bench_jacobian
 
 
 def test_both_compute_the_same_jacobian() -> None:
@@ -30,7 +31,9 @@ def test_both_compute_the_same_jacobian() -> None:
 
 def test_without_pyeit(monkeypatch: pytest.MonkeyPatch) -> None:
     found = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pyeit" else found(name))
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "pyeit" else found(name)
+    )
     with pytest.raises(MissingExtraError, match=r"pyeit.*eitskin\[peers\]"):
         bench_jacobian.run()
 

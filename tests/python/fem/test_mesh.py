@@ -33,7 +33,9 @@ def _check(mesh: Mesh, skin: Skin) -> None:
     assert sorted(np.unique(mesh.triangles)) == list(range(mesh.n_nodes))
     assert mesh.least_angle_deg() > 12
     rim = _rim_edges(mesh)
-    assert mesh.n_nodes - (3 * mesh.n_elements + len(rim)) // 2 + mesh.n_elements == 1  # Euler: one piece, no holes
+    assert (
+        mesh.n_nodes - (3 * mesh.n_elements + len(rim)) // 2 + mesh.n_elements == 1
+    )  # Euler: one piece, no holes
     assert len(mesh.electrode_edges) == skin.electrodes.count
     seen: set[int] = set()
     for edges, span in zip(mesh.electrode_edges, skin.electrode_spans_mm(), strict=True):
@@ -80,7 +82,9 @@ def test_electrode_around_a_corner_and_ending_on_one() -> None:
     corner = int(np.argmin(np.hypot(*(mesh.nodes_mm - (60, 60)).T)))
     assert corner in mesh.electrode_edges[0][1:, 0]
     # Electrode 0's middle at (60, 55): it ends 2e-4 mm from the corner, onto which it is put.
-    ending = Skin("ending", square, Electrodes(4, 10.0004, 0, positions_mm=(25.0, 85.0, 145.0, 205.0)))
+    ending = Skin(
+        "ending", square, Electrodes(4, 10.0004, 0, positions_mm=(25.0, 85.0, 145.0, 205.0))
+    )
     mesh = build_mesh(ending, max_size_mm=6.0)
     _check(mesh, ending)
     assert mesh.nodes_mm[mesh.electrode_edges[0][-1, 1]].tolist() == [60, 60]
@@ -90,7 +94,13 @@ def test_electrode_around_a_corner_and_ending_on_one() -> None:
 def test_electrodes_on_a_quarter_of_a_disk() -> None:
     """The bare arc is longer than half of the rim: its nodes lie on the circle all the same."""
     places = tuple(2.5 + 5.0 * k for k in range(16))
-    skin = Skin("bunched", disk(100.0), Electrodes(16, 3.0, positions_mm=places), conductivity_s_per_m=0.02, thickness_mm=5.0)
+    skin = Skin(
+        "bunched",
+        disk(100.0),
+        Electrodes(16, 3.0, positions_mm=places),
+        conductivity_s_per_m=0.02,
+        thickness_mm=5.0,
+    )
     mesh = build_mesh(skin, max_size_mm=6.0)
     rim = np.hypot(*mesh.nodes_mm.T)
     assert rim.max() < 50 + 1e-6 and mesh.areas_mm2.sum() > 0.99 * skin.outline.area_mm2
@@ -121,9 +131,13 @@ def test_sizes_are_obeyed_and_repeatable() -> None:
     ids=lambda skin: skin.name,
 )
 @pytest.mark.parametrize("elements", [1000, 3000, 10500])
-def test_element_counts_in_one_go(skin: Skin, elements: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_element_counts_in_one_go(
+    skin: Skin, elements: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     calls = []
-    monkeypatch.setattr(mesh_module, "build_mesh", lambda *a, **k: (calls.append(k), build_mesh(*a, **k))[1])
+    monkeypatch.setattr(
+        mesh_module, "build_mesh", lambda *a, **k: (calls.append(k), build_mesh(*a, **k))[1]
+    )
     mesh = mesh_for_elements(skin, elements)
     assert abs(mesh.n_elements - elements) <= 0.15 * elements
     assert len(calls) == 1
@@ -143,7 +157,8 @@ def test_refused_counts(elements: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "at_electrodes"), [(0.0, 1.0), (-1.0, 1.0), (5.0, 0.0), (1e-3, 1e-3), (float("nan"), 1.0)]
+    ("size", "at_electrodes"),
+    [(0.0, 1.0), (-1.0, 1.0), (5.0, 0.0), (1e-3, 1e-3), (float("nan"), 1.0)],
 )
 def test_refused_sizes(size: float, at_electrodes: float) -> None:
     with pytest.raises(UsageError, match="mesh: sizes of"):
@@ -161,11 +176,14 @@ class _Recorded(subprocess.Popen[bytes]):
 
 
 def test_a_mesher_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Netgen never returns on a clockwise outline; ``polygon`` turns those, so the request is made by hand."""
+    """Netgen never returns on a clockwise outline; ``polygon`` turns those, so the request is made
+    by hand."""
     monkeypatch.setattr(_Recorded, "started", [], raising=False)
     monkeypatch.setattr(subprocess, "Popen", _Recorded)
     clockwise = [[0, 0, None, 1.0], [0, 10, None, 1.0], [10, 10, None, 1.0], [10, 0, None, 1.0]]
-    with pytest.raises(GeometryError, match=r"skin 'bad': meshing took longer than 1\.5 s and was stopped") as caught:
+    with pytest.raises(
+        GeometryError, match=r"skin 'bad': meshing took longer than 1\.5 s and was stopped"
+    ) as caught:
         run_mesher({"max_size": 1.0, "pieces": clockwise}, 1.5, "bad")
     assert "\n" not in str(caught.value)
     (child,) = _Recorded.started
@@ -193,14 +211,16 @@ def test_without_netgen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_worker_starts_light() -> None:
     code = (
-        "import sys, eitskin.fem.mesh_worker, netgen.geom2d\n"
-        "print([m for m in ('scipy', 'matplotlib', 'eitskin.fem.mesh', 'eitskin.skin') if m in sys.modules])"
+        "import sys, eitskin.fem.mesh_worker, netgen.geom2d\nprint([m for m in ('scipy',"
+        " 'matplotlib', 'eitskin.fem.mesh', 'eitskin.skin') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
 
-def test_files_in_the_working_directory_do_not_disturb(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_in_the_working_directory_do_not_disturb(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "numpy.py").write_text("raise SystemExit('the wrong numpy')")
     (tmp_path / "netgen.py").write_text("raise SystemExit('the wrong netgen')")
     monkeypatch.chdir(tmp_path)

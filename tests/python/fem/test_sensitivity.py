@@ -1,4 +1,5 @@
-"""The Jacobian against finite differences, exact laws, and its element-to-pixel areas against clipping by hand."""
+"""The Jacobian against finite differences, exact laws, and its element-to-pixel areas against
+clipping by hand."""
 
 from __future__ import annotations
 
@@ -66,7 +67,8 @@ def test_custom_outline_against_finite_differences(l_skin: Skin, l_mesh: Mesh) -
 
 
 def test_predicts_a_touch(paper_mesh: Mesh) -> None:
-    """A conductive spot of one pixel lowers the voltages near it as V + J ds says, to second order in ds."""
+    """A conductive spot of one pixel lowers the voltages near it as V + J ds says, to second order
+    in ds."""
     grid = grid_for(paper_skin().outline)
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16))
     jacobian, base = sensitivity(forward, 0.01, grid)
@@ -81,7 +83,8 @@ def test_predicts_a_touch(paper_mesh: Mesh) -> None:
 
 
 def test_euler_identity_with_shunts(paper_mesh: Mesh) -> None:
-    """Without contact impedance V is homogeneous of degree -1 in the conductivity, so the whole skin's J sigma = -V."""
+    """Without contact impedance V is homogeneous of degree -1 in the conductivity, so the whole
+    skin's J sigma = -V."""
     grid = _whole(grid_for(paper_skin().outline, 24))
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16), 0.0)
     jacobian, voltages = sensitivity(forward, 0.01, grid)
@@ -94,7 +97,10 @@ def test_reciprocal_rows_and_chosen_rows(paper_mesh: Mesh) -> None:
     forward = ForwardModel(paper_mesh, paper_skin(), protocol)
     whole, voltages = sensitivity(forward, 0.01, grid)
     pairs = protocol.reciprocal_pairs()
-    assert np.abs(whole[pairs.first] - pairs.sign[:, None] * whole[pairs.second]).max() < 1e-13 * np.abs(whole).max()
+    assert (
+        np.abs(whole[pairs.first] - pairs.sign[:, None] * whole[pairs.second]).max()
+        < 1e-13 * np.abs(whole).max()
+    )
     weights = element_to_pixel(paper_mesh, grid)
     kept = weights.copy()
     folded, some = sensitivity(forward, 0.01, grid, rows=pairs.first, weights=weights)
@@ -106,14 +112,21 @@ def test_reciprocal_rows_and_chosen_rows(paper_mesh: Mesh) -> None:
 def test_one_factorisation_and_each_pair_once(paper_mesh: Mesh) -> None:
     forward = ForwardModel(paper_mesh, paper_skin(), adjacent(16))
     sensitivity(forward, 0.01, grid_for(paper_skin().outline))
-    assert (forward.counters.patterns, forward.counters.factorisations, forward.counters.solves) == (1, 1, 16)
-    forward = ForwardModel(paper_mesh, paper_skin(), table(16, [[0, 1, 2, 3], [3, 2, 5, 6], [6, 5, 1, 0]]))
+    assert (
+        forward.counters.patterns,
+        forward.counters.factorisations,
+        forward.counters.solves,
+    ) == (1, 1, 16)
+    forward = ForwardModel(
+        paper_mesh, paper_skin(), table(16, [[0, 1, 2, 3], [3, 2, 5, 6], [6, 5, 1, 0]])
+    )
     sensitivity(forward, 0.01, grid_for(paper_skin().outline))
     assert forward.counters.solves == 3
 
 
 def test_a_symmetric_skin_has_a_symmetric_jacobian() -> None:
-    """A quarter turn of a skin with 16 electrodes turns pixels and rows alike, to the mesh's own asymmetry."""
+    """A quarter turn of a skin with 16 electrodes turns pixels and rows alike, to the mesh's own
+    asymmetry."""
     skin, protocol = paper_skin(), adjacent(16)
     mesh = build_mesh(skin, max_size_mm=4.0, electrode_size_mm=0.5)
     grid = grid_for(skin.outline)
@@ -139,7 +152,10 @@ def _clipped_area(triangle: FloatArray, low: FloatArray, side: float) -> float:
                 share = a / (a - b)
                 clipped.append((p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])))
         points = clipped
-    return sum(p[0] * q[1] - p[1] * q[0] for p, q in zip(points, points[1:] + points[:1], strict=True)) / 2
+    return (
+        sum(p[0] * q[1] - p[1] * q[0] for p, q in zip(points, points[1:] + points[:1], strict=True))
+        / 2
+    )
 
 
 def test_areas_against_clipping(l_mesh: Mesh, l_skin: Skin) -> None:
@@ -175,7 +191,9 @@ def test_triangles_with_edges_along_the_grid() -> None:
     mesh = Mesh(nodes, np.array([[0, 1, 2], [1, 3, 2]]), ())
     grid = Grid(2, 2, 1.0, (0.0, 0.0), np.array([[0, 0], [1, 0], [0, 1], [1, 1]]))
     weights = element_to_pixel(mesh, grid).toarray()
-    np.testing.assert_allclose(weights, [[0.5, 0.25, 0.25, 0.0], [0.0, 0.25, 0.25, 0.5]], atol=1e-15)
+    np.testing.assert_allclose(
+        weights, [[0.5, 0.25, 0.25, 0.0], [0.0, 0.25, 0.25, 0.5]], atol=1e-15
+    )
 
 
 def test_refused_conductivity(paper_mesh: Mesh) -> None:

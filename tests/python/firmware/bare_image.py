@@ -1,7 +1,9 @@
-"""Single functions of the built NUCLEO-F767ZI image, called in Unicorn on registers that are plain memory.
+"""Single functions of the built NUCLEO-F767ZI image, called in Unicorn on registers that are plain
+memory.
 
-What a test wants of the hardware it writes into the registers itself; a DMA controller's flag registers are the exception: a
-write to LIFCR clears LISR, as on the processor. Whole runs on emulated peripherals are tests/python/emulator's matter.
+What a test wants of the hardware it writes into the registers itself; a DMA controller's flag
+registers are the exception: a write to LIFCR clears LISR, as on the processor. Whole runs on
+emulated peripherals are tests/python/emulator's matter.
 """
 
 from __future__ import annotations
@@ -25,7 +27,12 @@ from unicorn.arm_const import (
     UC_CPU_ARM_CORTEX_M7,
 )
 
-MEMORY = ((0x08000000, 0x200000), (0x20000000, 0x80000), (0x40000000, 0x30000), (0xE0000000, 0x100000))
+MEMORY = (
+    (0x08000000, 0x200000),
+    (0x20000000, 0x80000),
+    (0x40000000, 0x30000),
+    (0xE0000000, 0x100000),
+)
 RETURN, CALLBACK, SCRATCH = 0x20070000, 0x20070100, 0x20071000
 BX_LR = b"\x70\x47"
 DMA1, DMA2 = 0x40026000, 0x40026400
@@ -34,11 +41,17 @@ MOST_INSTRUCTIONS = 2_000_000
 
 
 class BareImage:
-    """The image with cleared statics; ``on_callback`` is called with r0, r1 when the program calls the address ``CALLBACK``."""
+    """The image with cleared statics; ``on_callback`` is called with r0, r1 when the program calls
+    the address ``CALLBACK``."""
 
     def __init__(self, elf: Path) -> None:
-        listed = subprocess.run(["arm-none-eabi-nm", elf], capture_output=True, text=True, check=True).stdout
-        self.symbols = {name: int(value, 16) for value, name in re.findall(r"^([0-9a-f]{8}) \w (\S+)$", listed, re.M)}
+        listed = subprocess.run(
+            ["arm-none-eabi-nm", elf], capture_output=True, text=True, check=True
+        ).stdout
+        self.symbols = {
+            name: int(value, 16)
+            for value, name in re.findall(r"^([0-9a-f]{8}) \w (\S+)$", listed, re.M)
+        }
         self.on_callback: Callable[[int, int], None] = lambda r0, r1: None
         self._uc = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         self._uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M7)
@@ -53,7 +66,9 @@ class BareImage:
     def _called(self, uc: Any, *_: Any) -> None:
         self.on_callback(uc.reg_read(UC_ARM_REG_R0), uc.reg_read(UC_ARM_REG_R1))
 
-    def _clear_flags(self, uc: Any, _access: int, address: int, _size: int, value: int, *_: Any) -> None:
+    def _clear_flags(
+        self, uc: Any, _access: int, address: int, _size: int, value: int, *_: Any
+    ) -> None:
         self.write(address - 8, self.read(address - 8) & ~value)
 
     def read(self, address: int) -> int:

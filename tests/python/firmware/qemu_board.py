@@ -33,7 +33,8 @@ class Script:
 
 
 def skin_bytes(rows: np.ndarray, volts: np.ndarray, frame_us: int) -> bytes:
-    """``rows`` (m, 4) electrodes, ``volts`` (k, m); frames change every ``frame_us`` from the start of the scan."""
+    """``rows`` (m, 4) electrodes, ``volts`` (k, m); frames change every ``frame_us`` from the start
+    of the scan."""
     head = struct.pack("<III", len(rows), len(volts), frame_us)
     return head + rows.astype(np.uint8).tobytes() + volts.astype("<f4").tobytes()
 
@@ -52,9 +53,25 @@ def run_board(image: Path, folder: Path, files: dict[str, bytes]) -> Run:
     folder.mkdir(exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    command = ["qemu-system-arm", "-M", "mps2-an500", "-nographic", "-monitor", "none", "-semihosting-config"]
+    command = [
+        "qemu-system-arm",
+        "-M",
+        "mps2-an500",
+        "-nographic",
+        "-monitor",
+        "none",
+        "-semihosting-config",
+    ]
     command += ["enable=on,target=native", "-icount", "shift=6", "-kernel", str(image)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL)
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     output = (folder / "link_out.bin").read_bytes()
     decoder = Decoder()

@@ -1,4 +1,5 @@
-"""Registers and fields from CMSIS-SVD files, as far as the tests of the register header need them."""
+"""Registers and fields from CMSIS-SVD files, as far as the tests of the register header need
+them."""
 
 from __future__ import annotations
 
@@ -36,7 +37,10 @@ def _number(element: ElementTree.Element, name: str) -> int:
 
 
 def _register(element: ElementTree.Element) -> Register:
-    fields = {str(one.findtext("name")): (_number(one, "bitOffset"), _number(one, "bitWidth")) for one in element.iter("field")}
+    fields = {
+        str(one.findtext("name")): (_number(one, "bitOffset"), _number(one, "bitWidth"))
+        for one in element.iter("field")
+    }
     return Register(_number(element, "addressOffset"), fields)
 
 
@@ -48,7 +52,12 @@ def load_svd(name: str) -> Device:
     elements = {str(one.findtext("name")): one for one in root.iter("peripheral")}
     peripherals = {}
     for key, element in elements.items():
-        source = elements[element.attrib["derivedFrom"]] if "derivedFrom" in element.attrib else element
+        source = (
+            elements[element.attrib["derivedFrom"]] if "derivedFrom" in element.attrib else element
+        )
         registers = {str(one.findtext("name")): _register(one) for one in source.iter("register")}
         peripherals[key] = Peripheral(_number(element, "baseAddress"), registers)
-    return Device(peripherals, {str(one.findtext("name")): _number(one, "value") for one in root.iter("interrupt")})
+    return Device(
+        peripherals,
+        {str(one.findtext("name")): _number(one, "value") for one in root.iter("interrupt")},
+    )

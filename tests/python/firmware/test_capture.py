@@ -1,4 +1,5 @@
-"""The board's capture where the emulated board seldom takes it: late interrupts, failed transfers, overruns, refused settings."""
+"""The board's capture where the emulated board seldom takes it: late interrupts, failed transfers,
+overruns, refused settings."""
 
 from __future__ import annotations
 
@@ -9,7 +10,14 @@ import pytest
 from bare_image import CALLBACK, DMA2, SCRATCH, BareImage
 
 TIM3, TIM5, ADC1 = 0x40000400, 0x40000C00, 0x40012000
-NOW, TIM5_CCR1, TIM3_CR1, TIM3_SMCR, ADC_SR, ADC_CR2 = TIM5 + 0x24, TIM5 + 0x34, TIM3, TIM3 + 8, ADC1, ADC1 + 8
+NOW, TIM5_CCR1, TIM3_CR1, TIM3_SMCR, ADC_SR, ADC_CR2 = (
+    TIM5 + 0x24,
+    TIM5 + 0x34,
+    TIM3,
+    TIM3 + 8,
+    ADC1,
+    ADC1 + 8,
+)
 LISR, CR, NDTR, M0AR, M1AR = DMA2, DMA2 + 0x10, DMA2 + 0x14, DMA2 + 0x1C, DMA2 + 0x20
 TEIF, TCIF, CT, EN, OVR = 1 << 3, 1 << 5, 1 << 19, 1, 1 << 5
 RANGE = -5
@@ -20,7 +28,9 @@ Burst = tuple[int, int, int, bool]
 class Capture:
     """The capture of a fresh image, started at the time ``now``."""
 
-    def __init__(self, elf: Path, now: int = 1000, rate: int = 1_000_000, slot_us: int = SLOT_US) -> None:
+    def __init__(
+        self, elf: Path, now: int = 1000, rate: int = 1_000_000, slot_us: int = SLOT_US
+    ) -> None:
         self.image = BareImage(elf)
         self.bursts: list[Burst] = []
         self.image.on_callback = self._told
@@ -32,7 +42,9 @@ class Capture:
 
     def configure(self, rate: int, samples: int, slot_us: int) -> int:
         self.image.write_bytes(SCRATCH, struct.pack("<III", rate, samples, slot_us))
-        return self.image.call(self.image.operation("nucleo_capture_ops", 0), 0, SCRATCH, CALLBACK | 1, 77)
+        return self.image.call(
+            self.image.operation("nucleo_capture_ops", 0), 0, SCRATCH, CALLBACK | 1, 77
+        )
 
     def stop(self) -> None:
         self.image.call(self.image.operation("nucleo_capture_ops", 2), 0)
@@ -44,7 +56,8 @@ class Capture:
         self.bursts.append((start, next_start, (samples - buffers) // 2048, bool(lost)))
 
     def interrupt(self, slots_done: int, now: int, flags: int = TCIF) -> list[Burst]:
-        """The DMA interrupt at ``now``, after ``slots_done`` bursts since the start; what it told."""
+        """The DMA interrupt at ``now``, after ``slots_done`` bursts since the start; what it
+        told."""
         image, self.bursts = self.image, []
         image.write(NOW, now)
         image.write(CR, (image.read(CR) & ~CT) | (CT if slots_done % 2 else 0))
@@ -64,7 +77,10 @@ def test_start_arms_everything(elf: Path) -> None:
     image = capture.image
     assert capture.first - 5000 >= 20
     assert image.read(NDTR) == SAMPLES and image.read(CR) & EN
-    assert image.read(M0AR) == image.symbols["buffers"] and image.read(M1AR) == image.symbols["buffers"] + 2048
+    assert (
+        image.read(M0AR) == image.symbols["buffers"]
+        and image.read(M1AR) == image.symbols["buffers"] + 2048
+    )
     assert image.read(TIM3_SMCR) == 0x26  # trigger mode, ITR2
     assert image.read(TIM3 + 0x2C) == SLOT_US - 1 and image.read(TIM3 + 0x34) == BURST_US
 
@@ -80,7 +96,9 @@ def test_bursts_in_time_alternate_between_the_buffers(elf: Path) -> None:
 @pytest.mark.parametrize("now", [1000, 2**32 - 250])
 @pytest.mark.parametrize("missed", range(6))
 @pytest.mark.parametrize("late_us", [-1, 0, 4, 40, 97])
-def test_a_late_interrupt_tells_each_slot_once_and_only_the_last_is_whole(elf: Path, now: int, missed: int, late_us: int) -> None:
+def test_a_late_interrupt_tells_each_slot_once_and_only_the_last_is_whole(
+    elf: Path, now: int, missed: int, late_us: int
+) -> None:
     capture = Capture(elf, now=now)
     slot = 0
     for skipped in (0, missed, 0, missed):
@@ -88,17 +106,24 @@ def test_a_late_interrupt_tells_each_slot_once_and_only_the_last_is_whole(elf: P
         told = capture.interrupt(last + 1, capture.first + SLOT_US * last + BURST_US + late_us)
         starts = [(capture.first + SLOT_US * k) % 2**32 for k in range(slot, last + 1)]
         assert [start for start, *_ in told] == starts
-        assert [next_start for _, next_start, *_ in told] == [(start + SLOT_US) % 2**32 for start in starts]
+        assert [next_start for _, next_start, *_ in told] == [
+            (start + SLOT_US) % 2**32 for start in starts
+        ]
         assert [lost for *_, lost in told] == [True] * skipped + [False]
         assert told[-1][2] == last % 2
         slot = last + 1
 
 
 @pytest.mark.parametrize("late_us", [-49, 0, 60])
-def test_at_a_slow_rate_too_where_a_burst_ends_before_its_last_period(elf: Path, late_us: int) -> None:
+def test_at_a_slow_rate_too_where_a_burst_ends_before_its_last_period(
+    elf: Path, late_us: int
+) -> None:
     capture = Capture(elf, rate=10_000, slot_us=8100)
     told = capture.interrupt(2, capture.first + 8100 + 8000 + late_us)
-    assert [(start - capture.first, lost) for start, _, _, lost in told] == [(0, True), (8100, False)]
+    assert [(start - capture.first, lost) for start, _, _, lost in told] == [
+        (0, True),
+        (8100, False),
+    ]
 
 
 def test_where_clock_and_buffer_disagree_the_buffer_is_believed(elf: Path) -> None:
@@ -123,7 +148,9 @@ def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf: Path, caus
     ((start, next_start, _, lost),) = capture.bursts
     assert start == capture.first + SLOT_US and lost
     assert next_start >= now + 20 and (next_start - capture.first) % SLOT_US == 0
-    assert image.read(TIM5_CCR1) == next_start - 1 and image.read(CR) & EN and image.read(ADC_CR2) & 1
+    assert (
+        image.read(TIM5_CCR1) == next_start - 1 and image.read(CR) & EN and image.read(ADC_CR2) & 1
+    )
     told = capture.interrupt(1, next_start + BURST_US)
     assert told == [(next_start, next_start + SLOT_US, 0, False)]
 
@@ -147,7 +174,11 @@ def test_after_stop_nothing_is_told(elf: Path) -> None:
     capture = Capture(elf)
     capture.stop()
     assert capture.interrupt(1, capture.first + BURST_US) == []
-    assert not capture.image.read(CR) & EN and not capture.image.read(TIM3_CR1) and not capture.image.read(TIM3_SMCR) & 7
+    assert (
+        not capture.image.read(CR) & EN
+        and not capture.image.read(TIM3_CR1)
+        and not capture.image.read(TIM3_SMCR) & 7
+    )
 
 
 @pytest.mark.parametrize(

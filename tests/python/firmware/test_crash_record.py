@@ -1,4 +1,5 @@
-"""What a processor fault leaves in memory that survives the reset, and what the next start makes of it."""
+"""What a processor fault leaves in memory that survives the reset, and what the next start makes of
+it."""
 
 from __future__ import annotations
 
@@ -10,10 +11,14 @@ import pytest
 from bare_image import SCRATCH, BareImage
 
 SCB = 0xE000ED00
-ICSR, AIRCR, CFSR, HFSR, MMFAR, BFAR = (SCB + offset for offset in (0x04, 0x0C, 0x28, 0x2C, 0x34, 0x38))
+ICSR, AIRCR, CFSR, HFSR, MMFAR, BFAR = (
+    SCB + offset for offset in (0x04, 0x0C, 0x28, 0x2C, 0x34, 0x38)
+)
 RCC_CSR = 0x40023874
 MMARVALID, BFARVALID, STKERR = 1 << 7, 1 << 15, 1 << 12
-FRAME = struct.pack("<8I", 1, 2, 3, 4, 12, 0x08001235, 0x08004568, 0x01000000)  # r0-r3, r12, lr, pc, xpsr
+FRAME = struct.pack(
+    "<8I", 1, 2, 3, 4, 12, 0x08001235, 0x08004568, 0x01000000
+)  # r0-r3, r12, lr, pc, xpsr
 
 
 @pytest.fixture
@@ -57,7 +62,11 @@ def test_an_unexpected_interrupt_is_told_by_its_number(image: BareImage) -> None
 def test_no_frame_is_read_where_none_is(image: BareImage, frame: str) -> None:
     """A stack that overflowed: reading there would be a second fault."""
     bottom, top = image.symbols["stack_bottom"], image.symbols["stack_top"]
-    at = {"below the guard": bottom + 128, "above the stack": top - 16, "stacking failed": top - 64}[frame]
+    at = {
+        "below the guard": bottom + 128,
+        "above the stack": top - 16,
+        "stacking failed": top - 64,
+    }[frame]
     cfsr = STKERR if frame == "stacking failed" else 0x82
     image.write_bytes(at, FRAME)
     crash(image, at, cfsr)

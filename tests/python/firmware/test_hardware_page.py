@@ -12,13 +12,21 @@ from eitskin.view.wiring import MULTIPLEXERS, WIRES, wire_table
 ROOT = Path(__file__).resolve().parents[3]
 BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
 PAGE = (ROOT / "docs" / "guide" / "hardware.md").read_text(encoding="utf-8")
-MODES = {"MCO1": ("PIN_ALTERNATE", 0), "SPI3": ("PIN_ALTERNATE", 6), "USART3": ("PIN_ALTERNATE", 7), "ADC1": ("PIN_ANALOG", 0)}
+MODES = {
+    "MCO1": ("PIN_ALTERNATE", 0),
+    "SPI3": ("PIN_ALTERNATE", 6),
+    "USART3": ("PIN_ALTERNATE", 7),
+    "ADC1": ("PIN_ANALOG", 0),
+}
 CONSTANTS = {"FSYNC": 2, "LED_GREEN": 0, "LED_BLUE": 7, "LED_RED": 14}
 
 
 def firmware_pins() -> dict[str, tuple[str, int]]:
     """Mode and alternate function of each pin that the firmware sets up."""
-    program = "".join((BOARD / name).read_text(encoding="utf-8") for name in sorted(path.name for path in BOARD.glob("*.c")))
+    program = "".join(
+        (BOARD / name).read_text(encoding="utf-8")
+        for name in sorted(path.name for path in BOARD.glob("*.c"))
+    )
     call = re.compile(r"nucleo_pin\(GPIO([A-F])_BASE, ([\w +]+), (PIN_\w+), (\d+),")
     pins: dict[str, tuple[str, int]] = {}
     enables = int(re.findall(r"ENABLE_PIN = (\d+)", program)[0])
@@ -39,12 +47,16 @@ def test_the_page_has_the_table() -> None:
 
 
 def test_the_firmware_uses_these_pins_and_no_others() -> None:
-    expected = {wire.pin: MODES.get(wire.function.split(",")[0].split()[0], ("PIN_OUTPUT", 0)) for wire in WIRES}
+    expected = {
+        wire.pin: MODES.get(wire.function.split(",")[0].split()[0], ("PIN_OUTPUT", 0))
+        for wire in WIRES
+    }
     assert firmware_pins() == expected
 
 
 def test_the_lines_are_in_the_order_of_the_hal() -> None:
-    """Lines 0-3 are A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- (firmware/hal/hal.h)."""
+    """Lines 0-3 are A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V-
+    (firmware/hal/hal.h)."""
     to = {wire.pin: wire.to for wire in WIRES}
     for number, name in enumerate(MULTIPLEXERS):
         assert to[f"PF{12 + number}"] == f"ADG1206 {name} EN"
@@ -53,7 +65,11 @@ def test_the_lines_are_in_the_order_of_the_hal() -> None:
 
 
 def test_no_place_is_taken_twice() -> None:
-    for places in ([w.pin for w in WIRES], [w.zio for w in WIRES if w.zio], [w.morpho for w in WIRES if w.morpho]):
+    for places in (
+        [w.pin for w in WIRES],
+        [w.zio for w in WIRES if w.zio],
+        [w.morpho for w in WIRES if w.morpho],
+    ):
         assert len(places) == len(set(places))
 
 
@@ -61,7 +77,11 @@ def test_the_flash_map_is_the_linkers_and_the_stores() -> None:
     script = (BOARD / "nucleo_f767zi.ld").read_text(encoding="utf-8")
     store = (BOARD / "store.c").read_text(encoding="utf-8")
     assert "ORIGIN = 0x08000000, LENGTH = 256K" in script and "| 0x08000000 | 256 KB" in PAGE
-    assert "#define BANKS_START 0x08040000u" in store and "| 0x08040000 | 512 KB" in PAGE and "| 0x080C0000 | 512 KB" in PAGE
+    assert (
+        "#define BANKS_START 0x08040000u" in store
+        and "| 0x08040000 | 512 KB" in PAGE
+        and "| 0x080C0000 | 512 KB" in PAGE
+    )
 
 
 def test_the_drawing_repeats_byte_for_byte(tmp_path: Path) -> None:

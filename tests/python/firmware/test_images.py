@@ -1,4 +1,5 @@
-"""What the built images hold: vectors, places in memory, sizes, and nothing of a heap, of stdio or of double arithmetic."""
+"""What the built images hold: vectors, places in memory, sizes, and nothing of a heap, of stdio or
+of double arithmetic."""
 
 from __future__ import annotations
 
@@ -40,7 +41,10 @@ def elf(cortex_m7: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def symbols(elf: Path) -> dict[str, int]:
-    return {name: int(value, 16) for value, name in re.findall(r"^([0-9a-f]{8}) \w (\S+)$", arm("nm", elf), re.M)}
+    return {
+        name: int(value, 16)
+        for value, name in re.findall(r"^([0-9a-f]{8}) \w (\S+)$", arm("nm", elf), re.M)
+    }
 
 
 @pytest.fixture(scope="session")
@@ -52,43 +56,66 @@ def sections(elf: Path) -> dict[str, tuple[int, int]]:
 
 def test_vectors(elf: Path, symbols: dict[str, int]) -> None:
     image = elf.with_suffix(".bin").read_bytes()
-    vectors = struct.unpack("<126I", image[: 4 * 126])  # 16 of the core, 110 of the F767 (RM0410 table 46)
+    vectors = struct.unpack(
+        "<126I", image[: 4 * 126]
+    )  # 16 of the core, 110 of the F767 (RM0410 table 46)
     assert vectors[0] == symbols["stack_top"] and vectors[0] % 8 == 0
     assert vectors[1] == symbols["nucleo_reset"] | 1
     for number, vector in enumerate(vectors[2:], 2):
         if number in RESERVED:
             assert vector == 0
         else:
-            assert vector == symbols[HANDLERS.get(number, "nucleo_fault_irq")] | 1, f"vector {number}"
-    assert symbols["vectors"] == FLASH and symbols["vectors"] % 512 == 0  # VTOR: aligned to the table's size, a power of two
+            assert vector == symbols[HANDLERS.get(number, "nucleo_fault_irq")] | 1, (
+                f"vector {number}"
+            )
+    assert (
+        symbols["vectors"] == FLASH and symbols["vectors"] % 512 == 0
+    )  # VTOR: aligned to the table's size, a power of two
 
 
 def test_places_in_memory(sections: dict[str, tuple[int, int]], symbols: dict[str, int]) -> None:
     for name, (size, address) in sections.items():
         ends = [start + room for start, room in MEMORIES if start <= address < start + room]
         assert ends and address + size <= ends[0], name
-    # The stack is at the bottom of DTCM, so that what overflows it meets the MPU's guard, aligned to its 256 bytes.
-    assert symbols["stack_bottom"] == DTCM and symbols["stack_top"] - symbols["stack_bottom"] >= 8 * 1024
+    # The stack is at the bottom of DTCM, so that what overflows it meets the MPU's guard, aligned to its
+    # 256 bytes.
+    assert (
+        symbols["stack_bottom"] == DTCM
+        and symbols["stack_top"] - symbols["stack_bottom"] >= 8 * 1024
+    )
     # DMA works on memory that no cache covers.
     for name in ("buffers", "tx_ring", "rx_ring"):
         assert DTCM <= symbols[name] < DTCM + DTCM_BYTES, name
     # What survives a reset is neither cleared nor painted.
-    assert symbols["dtcm_start"] >= symbols["crash"] + 28 and symbols["crash"] >= symbols["stack_top"]
+    assert (
+        symbols["dtcm_start"] >= symbols["crash"] + 28 and symbols["crash"] >= symbols["stack_top"]
+    )
     assert symbols["workspace_start"] % 16 == 0 and symbols["workspace_start"] >= symbols["bss_end"]
 
 
 def test_what_the_image_does_without(symbols: dict[str, int]) -> None:
     for name in symbols:
         assert not re.search(r"alloc|printf|sbrk|^free$|^exit$|fwrite|fopen", name), name
-        assert not re.search(r"__aeabi_d(?!iv0)|df[23]$|df$|f2d", name), f"{name}: double arithmetic"
+        assert not re.search(r"__aeabi_d(?!iv0)|df[23]$|df$|f2d", name), (
+            f"{name}: double arithmetic"
+        )
 
 
 def test_sizes(elf: Path, sections: dict[str, tuple[int, int]], symbols: dict[str, int]) -> None:
     image = elf.with_suffix(".bin").stat().st_size
-    stack, workspace = symbols["stack_top"] - symbols["stack_bottom"], symbols["workspace_end"] - symbols["workspace_start"]
-    print(f"\nflash {image} of {FLASH_BYTES} bytes, stack {stack}, DMA buffers {sections['.dtcm'][0]}")
+    stack, workspace = (
+        symbols["stack_top"] - symbols["stack_bottom"],
+        symbols["workspace_end"] - symbols["workspace_start"],
+    )
+    print(
+        f"\nflash {image} of {FLASH_BYTES} bytes, stack {stack}, DMA buffers {sections['.dtcm'][0]}"
+    )
     print(f"statics {sections['.bss'][0]}, workspace {workspace} of {SRAM_BYTES} bytes")
-    assert image == sum(sections[name][0] for name in (".vectors", ".text", ".ARM.exidx", ".data") if name in sections)
+    assert image == sum(
+        sections[name][0]
+        for name in (".vectors", ".text", ".ARM.exidx", ".data")
+        if name in sections
+    )
     assert image <= FLASH_BYTES // 2, "half of the program's flash is kept for what is to come"
     assert workspace >= 256 * 1024
     assert f"0x{symbols['stack_top']:08x}" in elf.with_suffix(".map").read_text(encoding="utf-8")

@@ -1,4 +1,5 @@
-"""The same application on another board: it scans, tares and streams under QEMU, and its images are the host's to the bit."""
+"""The same application on another board: it scans, tares and streams under QEMU, and its images are
+the host's to the bit."""
 
 from __future__ import annotations
 
@@ -15,7 +16,15 @@ from qemu_board import Run, Script, run_board, skin_bytes
 from eitskin.core.engine import CoreEngine
 from eitskin.device.bank import bank_bytes
 from eitskin.device.known_model import board_options
-from eitskin.device.wire.commands import GetInfo, GetStats, ModelBegin, ModelCommit, ModelData, StreamCommand, Tare
+from eitskin.device.wire.commands import (
+    GetInfo,
+    GetStats,
+    ModelBegin,
+    ModelCommit,
+    ModelData,
+    StreamCommand,
+    Tare,
+)
 from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
@@ -47,7 +56,9 @@ def volts() -> np.ndarray:
     reference = model.golden.reference_v.astype(np.float64)
     change = model.golden.frame_v.astype(np.float64) - reference
     quiet = TARED_BY_US // FRAME_US + 1
-    return np.vstack([[reference] * quiet, [reference + strength * change for strength in (0.5, 1.0, 1.4)]])
+    return np.vstack(
+        [[reference] * quiet, [reference + strength * change for strength in (0.5, 1.0, 1.4)]]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +76,11 @@ def files() -> dict[str, bytes]:
     script.at(TARED_BY_US, StreamCommand(int(ALL)))
     script.at(990_000, GetStats())
     skin = skin_bytes(model.protocol.drive_measure, volts(), FRAME_US)
-    return {"bank0.bin": bank_bytes(blob, 1), "skin.bin": skin, "link_in.bin": script.to_bytes(1_000_000)}
+    return {
+        "bank0.bin": bank_bytes(blob, 1),
+        "skin.bin": skin,
+        "link_in.bin": script.to_bytes(1_000_000),
+    }
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +100,10 @@ def test_the_scan_keeps_its_time(run: Run) -> None:
     assert info.board == "mps2_an500" and info.slot_us == 100
     assert stats.slots_repeated == 0 and stats.packets_dropped == 0
     scans = {raw.scan_us for raw in of(RawFrame, run.packets)}
-    print(f"\nscan {scans} us; stack {stats.stack_used} of {stats.stack_bytes}; {stats.frames_solved} frames solved")
+    print(
+        f"\nscan {scans} us; stack {stats.stack_used} of {stats.stack_bytes}; {stats.frames_solved}"
+        " frames solved"
+    )
     assert max(scans) <= 208 * info.slot_us
     assert stats.stack_used < 12 * 1024  # the F767 has 16 KB
 
@@ -119,7 +137,10 @@ def test_the_same_bits_as_the_host(run: Run) -> None:
             continue
         board = images.pop(raw.frame)
         assert board.image.tobytes() == expected.image.tobytes(), f"frame {raw.frame}"
-        assert (board.solved.stop, board.solved.iterations) == (expected.info.stop, expected.info.iterations)
+        assert (board.solved.stop, board.solved.iterations) == (
+            expected.info.stop,
+            expected.info.iterations,
+        )
         assert [replace(touch, id=0) for touch in touches[raw.frame].touches] == [
             replace(touch, id=0) for touch in expected.touches
         ]
@@ -128,7 +149,9 @@ def test_the_same_bits_as_the_host(run: Run) -> None:
     assert found >= 4
 
 
-def test_runs_are_alike_to_the_bit(image: Path, files: dict[str, bytes], run: Run, tmp_path: Path) -> None:
+def test_runs_are_alike_to_the_bit(
+    image: Path, files: dict[str, bytes], run: Run, tmp_path: Path
+) -> None:
     assert run_board(image, tmp_path, files).output == run.output
 
 
@@ -145,6 +168,8 @@ def test_a_model_is_uploaded_into_an_empty_board(image: Path, tmp_path: Path) ->
     script.at(time_us + 300_000, GetInfo())
     run = run_board(image, tmp_path, {"link_in.bin": script.to_bytes(time_us + 310_000)})
     before, *_, after = of(BoardInfo, run.packets)
-    assert before.model_bytes == 0 and FaultCode.NO_MODEL in [fault.code for fault in of(Fault, run.packets)]
+    assert before.model_bytes == 0 and FaultCode.NO_MODEL in [
+        fault.code for fault in of(Fault, run.packets)
+    ]
     assert [reply.status for reply in of(Reply, run.packets)] == [0] * (commit - 1)
     assert after.model_bytes == len(blob) and after.n_rows == 208

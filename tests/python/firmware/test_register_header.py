@@ -1,7 +1,9 @@
-"""The board's own register header agrees with SVD files that others made: bases, offsets and bits of everything they share.
+"""The board's own register header agrees with SVD files that others made: bases, offsets and bits
+of everything they share.
 
-There is no SVD file of the STM32F7 in a package; the F429's has its older peripherals, the L4's those that came between (USART,
-SPI with a FIFO) and the core's. What neither has is listed here, each with its section of RM0410 or PM0253.
+There is no SVD file of the STM32F7 in a package; the F429's has its older peripherals, the L4's
+those that came between (USART, SPI with a FIFO) and the core's. What neither has is listed here,
+each with its section of RM0410 or PM0253.
 """
 
 from __future__ import annotations
@@ -19,18 +21,25 @@ F4, L4 = "STM32F429x.svd", "STM32L4x2.svd"
 
 # Prefix in the header: file, peripheral there, and other instances whose bases the header names.
 PERIPHERALS = {
-    "RCC": (F4, "RCC"), "PWR": (F4, "PWR"), "FLASH": (F4, "FLASH"), "GPIO": (F4, "GPIOA"), "ADC": (F4, "ADC1"),
-    "DMA": (F4, "DMA2"), "TIM": (F4, "TIM2"), "IWDG": (F4, "IWDG"), "SPI": (L4, "SPI3"), "USART": (L4, "USART3"),
+    "RCC": (F4, "RCC"), "PWR": (F4, "PWR"), "FLASH": (F4, "FLASH"), "GPIO": (F4, "GPIOA"),
+    "ADC": (F4, "ADC1"),
+    "DMA": (F4, "DMA2"), "TIM": (F4, "TIM2"), "IWDG": (F4, "IWDG"), "SPI": (L4, "SPI3"),
+    "USART": (L4, "USART3"),
     "STK": (L4, "STK"), "NVIC": (L4, "NVIC"), "SCB": (L4, "SCB"), "MPU": (L4, "MPU"),
 }  # fmt: skip
-# Registers and fields that have another name there; CTRL and the like of the MPU bear their unit's name.
+# Registers and fields that have another name there; CTRL and the like of the MPU bear their unit's
+# name.
 RENAMED = {
-    "PWR_CR1": "CR", "PWR_CSR1": "CSR", "SCB_CFSR": "CFSR_UFSR_BFSR_MMFSR", "TIM_CCMR1": "CCMR1_Output",
+    "PWR_CR1": "CR", "PWR_CSR1": "CSR", "SCB_CFSR": "CFSR_UFSR_BFSR_MMFSR",
+    "TIM_CCMR1": "CCMR1_Output",
     "MPU_CTRL": "MPU_CTRL", "MPU_RNR": "MPU_RNR", "MPU_RBAR": "MPU_RBAR", "MPU_RASR": "MPU_RASR",
     "NVIC_ISER": "ISER0", "NVIC_ICER": "ICER0", "NVIC_ICPR": "ICPR0", "NVIC_IPR": "IPR0",
-    "DMA_CR": "S0CR", "DMA_NDTR": "S0NDTR", "DMA_PAR": "S0PAR", "DMA_M0AR": "S0M0AR", "DMA_M1AR": "S0M1AR", "DMA_FCR": "S0FCR",
-    "RCC_CFGR_SW": "SW0", "RCC_CFGR_SWS": "SWS0", "RCC_PLLCFGR_PLLM": "PLLM0", "RCC_PLLCFGR_PLLN": "PLLN0",
-    "RCC_PLLCFGR_PLLP": "PLLP0", "RCC_PLLCFGR_PLLQ": "PLLQ0", "RCC_AHB1ENR_DTCMRAMEN": "CCMDATARAMEN",
+    "DMA_CR": "S0CR", "DMA_NDTR": "S0NDTR", "DMA_PAR": "S0PAR", "DMA_M0AR": "S0M0AR",
+    "DMA_M1AR": "S0M1AR", "DMA_FCR": "S0FCR",
+    "RCC_CFGR_SW": "SW0", "RCC_CFGR_SWS": "SWS0", "RCC_PLLCFGR_PLLM": "PLLM0",
+    "RCC_PLLCFGR_PLLN": "PLLN0",
+    "RCC_PLLCFGR_PLLP": "PLLP0", "RCC_PLLCFGR_PLLQ": "PLLQ0",
+    "RCC_AHB1ENR_DTCMRAMEN": "CCMDATARAMEN",
     "FLASH_ACR_ARTEN": "ICEN", "FLASH_SR_ERSERR": "PGSERR",
 }  # fmt: skip
 # In neither file.
@@ -46,18 +55,25 @@ ONLY_F7 = {
     "SCB_DCIMVAC": 0x25C,          # PM0253 4.8
     "SCB_DCISW": 0x260,            # PM0253 4.8
 }  # fmt: skip
-# Not of a peripheral with an SVD: the trace unit and the identifier (Armv7-M C1.8.7, C1.6.5; RM0410 45.1).
+# Not of a peripheral with an SVD: the trace unit and the identifier (Armv7-M C1.8.7, C1.6.5; RM0410
+# 45.1).
 ADDRESSES = {"DWT": 0xE0001000, "UID": 0x1FF0F420, "ADC_COMMON": 0x40012300}
 DWT_OFFSETS = {"DWT_CTRL": 0x00, "DWT_CYCCNT": 0x04, "DWT_LAR": 0xFB0}
 INTERRUPTS = {
-    "DMA1_STREAM1": "DMA1_Stream1", "DMA1_STREAM3": "DMA1_Stream3", "DMA2_STREAM0": "DMA2_Stream0", "ADC": "ADC",
+    "DMA1_STREAM1": "DMA1_Stream1", "DMA1_STREAM3": "DMA1_Stream3", "DMA2_STREAM0": "DMA2_Stream0",
+    "ADC": "ADC",
     "USART3": "USART3",
 }  # fmt: skip
 
 TEXT = HEADER.read_text(encoding="utf-8")
-BASES = {name: int(value, 16) for name, value in re.findall(r"^#define (\w+)_BASE (0x[0-9A-F]+)u", TEXT, re.M)}
+BASES = {
+    name: int(value, 16)
+    for name, value in re.findall(r"^#define (\w+)_BASE (0x[0-9A-F]+)u", TEXT, re.M)
+}
 ACCESS = r"(?:REG32|REG16|\(\*\(volatile uint8_t \*\))"
-REGISTER = re.compile(rf"^#define (\w+?)(?:\([\w, ]+\))? {ACCESS}\(\(?(\w+)\)? \+ 0x([0-9A-F]+)u", re.M)
+REGISTER = re.compile(
+    rf"^#define (\w+?)(?:\([\w, ]+\))? {ACCESS}\(\(?(\w+)\)? \+ 0x([0-9A-F]+)u", re.M
+)
 REGISTERS = {name: (owner, int(offset, 16)) for name, owner, offset in REGISTER.findall(TEXT)}
 BITS = {name: int(bit) for name, bit in re.findall(r"^#define (\w+) \(1u << (\d+)\)", TEXT, re.M)}
 POSITIONS = {name: int(bit) for name, bit in re.findall(r"^#define (\w+)_POS (\d+)u", TEXT, re.M)}
@@ -87,7 +103,12 @@ def register_of(name: str) -> tuple[str, Register] | None:
 
 def test_everything_in_the_header_was_read() -> None:
     defined = set(re.findall(r"^#define (\w+)", TEXT, re.M)) - {"STM32F767_H", "REG32", "REG16"}
-    read = {f"{name}_BASE" for name in BASES} | set(REGISTERS) | set(BITS) | {f"{name}_POS" for name in POSITIONS}
+    read = (
+        {f"{name}_BASE" for name in BASES}
+        | set(REGISTERS)
+        | set(BITS)
+        | {f"{name}_POS" for name in POSITIONS}
+    )
     constants = {"FLASH_KEY1", "FLASH_KEY2", "SCB_AIRCR_SYSRESETREQ", "UID", "DCB_DEMCR"}
     assert {name for name in defined - read - constants if not name.startswith("IRQ_")} == set()
     assert len(REGISTERS) > 80 and len(BITS) > 80 and len(POSITIONS) > 20
@@ -99,7 +120,9 @@ def test_everything_in_the_header_is_used() -> None:
     lines = TEXT.splitlines()
     for name in re.findall(r"^#define (\w+)", TEXT, re.M):
         elsewhere = "\n".join(line for line in lines if not line.startswith(f"#define {name}"))
-        assert re.search(rf"\b{name}\b", program + elsewhere) or name == "STM32F767_H", f"{name} is not used"
+        assert re.search(rf"\b{name}\b", program + elsewhere) or name == "STM32F767_H", (
+            f"{name} is not used"
+        )
 
 
 @pytest.mark.parametrize("name", sorted(BASES))
@@ -123,7 +146,9 @@ def test_register(name: str) -> None:
         assert found is not None, f"{name} is checked against nothing"
         assert offset == found[1].offset
         if owner.endswith("_BASE"):  # of the peripheral whose name it bears
-            assert owner == ("ADC_COMMON_BASE" if name == "ADC_CCR" else f"{name.split('_')[0]}_BASE")
+            assert owner == (
+                "ADC_COMMON_BASE" if name == "ADC_CCR" else f"{name.split('_')[0]}_BASE"
+            )
 
 
 @pytest.mark.parametrize("name", sorted(BITS | POSITIONS))
@@ -133,7 +158,9 @@ def test_field(name: str) -> None:
         assert bit == ONLY_F7[name]
         return
     if name.startswith(("DWT_", "DCB_")):
-        assert bit == {"DWT_CTRL_CYCCNTENA": 0, "DCB_DEMCR_TRCENA": 24}[name]  # Armv7-M C1.8.7, C1.6.5
+        assert (
+            bit == {"DWT_CTRL_CYCCNTENA": 0, "DCB_DEMCR_TRCENA": 24}[name]
+        )  # Armv7-M C1.8.7, C1.6.5
         return
     found = register_of(name)
     assert found is not None, f"{name} is checked against nothing"
@@ -161,6 +188,8 @@ def test_reset_request() -> None:
 
 
 def test_interrupts() -> None:
-    numbers = {name: int(value) for name, value in re.findall(r"^#define IRQ_(\w+) (\d+)u", TEXT, re.M)}
+    numbers = {
+        name: int(value) for name, value in re.findall(r"^#define IRQ_(\w+) (\d+)u", TEXT, re.M)
+    }
     assert numbers.pop("COUNT") == 110  # RM0410 table 46
     assert numbers == {name: device(F4).interrupts[theirs] for name, theirs in INTERRUPTS.items()}

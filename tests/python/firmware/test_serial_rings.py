@@ -1,4 +1,5 @@
-"""The board's serial link: every byte out once and in order, all of a write or nothing, and what a full receiver does."""
+"""The board's serial link: every byte out once and in order, all of a write or nothing, and what a
+full receiver does."""
 
 from __future__ import annotations
 
@@ -25,7 +26,10 @@ class Serial:
 
     def write(self, data: bytes) -> bool:
         self.image.write_bytes(SCRATCH, data)
-        return bool(self.image.call(self.image.operation("nucleo_link_ops", 0), 0, SCRATCH, len(data)) & 0xFF)
+        return bool(
+            self.image.call(self.image.operation("nucleo_link_ops", 0), 0, SCRATCH, len(data))
+            & 0xFF
+        )
 
     def send(self, flag: int = TCIF3) -> bytes:
         """DMA sends what it has been given, and says so."""
@@ -79,7 +83,9 @@ def test_every_byte_is_sent_once_and_in_order(elf: Path, seed: int) -> None:
             accepted += data
         else:
             refused += 1
-            assert len(data) > TX_BYTES - (len(accepted) - len(sent)), "refused though there was room"
+            assert len(data) > TX_BYTES - (len(accepted) - len(sent)), (
+                "refused though there was room"
+            )
         assert len(accepted) - len(sent) <= TX_BYTES
         if rng.random() < 0.5:
             sent += serial.send()

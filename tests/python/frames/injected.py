@@ -71,10 +71,14 @@ def changed(frames: Frames, reference: FloatArray, voltage: FloatArray) -> Frame
     )
 
 
-def permuted(frames: Frames, index: NDArray[np.int64], sign: NDArray[np.int64] | None = None) -> Frames:
+def permuted(
+    frames: Frames, index: NDArray[np.int64], sign: NDArray[np.int64] | None = None
+) -> Frames:
     """Channel r replaced by channel ``index[r]`` times ``sign[r]``, labels left as they are."""
     factor = 1.0 if sign is None else sign
-    return changed(frames, frames.reference_voltage_v[:, index] * factor, frames.voltage_v[:, index] * factor)
+    return changed(
+        frames, frames.reference_voltage_v[:, index] * factor, frames.voltage_v[:, index] * factor
+    )
 
 
 def times(frames: Frames, gains: FloatArray) -> Frames:
@@ -82,7 +86,9 @@ def times(frames: Frames, gains: FloatArray) -> Frames:
     return changed(frames, frames.reference_voltage_v * gains, frames.voltage_v * gains)
 
 
-def as_if_electrodes(frames: Frames, electrodes: NDArray[np.int64], skin: Skin | None = None, seed: int = 0) -> Frames:
+def as_if_electrodes(
+    frames: Frames, electrodes: NDArray[np.int64], skin: Skin | None = None, seed: int = 0
+) -> Frames:
     """What is measured when the wire labelled e goes to electrode ``electrodes[e]`` of the skin."""
     skin = paper_skin() if skin is None else skin
     rows = frames.protocol.drive_measure.astype(np.int64)
@@ -95,4 +101,6 @@ def as_if_electrodes(frames: Frames, electrodes: NDArray[np.int64], skin: Skin |
 
 def quiet_only(frames: Frames) -> Frames:
     """The same voltages without any known touch."""
-    return Frames(frames.protocol, frames.voltage_v, frames.reference_voltage_v, allow_nonfinite=True)
+    return Frames(
+        frames.protocol, frames.voltage_v, frames.reference_voltage_v, allow_nonfinite=True
+    )

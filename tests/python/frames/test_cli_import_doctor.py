@@ -47,7 +47,9 @@ def write(path: Path, frames: Frames) -> Path:
 
 def rotating(frames: Frames) -> Frames:
     protocol = frames.protocol
-    return permuted(frames, match_rows(protocol.drive_measure, source_table("rotating", protocol)).index)
+    return permuted(
+        frames, match_rows(protocol.drive_measure, source_table("rotating", protocol)).index
+    )
 
 
 def one_off(frames: Frames, channels: list[int], gain: float) -> Frames:
@@ -74,8 +76,12 @@ FAULTS: dict[str, Callable[[], Frames]] = {
     "one channel": lambda: one_off(healthy_frames(8), [40], 1.5),
     "both of a pair": lambda: one_off(healthy_frames(9), [0, 26], 1.5),
     "flipped": lambda: one_off(healthy_frames(10), [17, 90], -1.0),
-    "own gains": lambda: times(healthy_frames(11), np.random.default_rng(11).uniform(0.8, 1.2, 208)),
-    "one drive": lambda: times(healthy_frames(12), np.where((ROWS[:, :2] == [3, 4]).all(axis=1), 0.7, 1.0)),
+    "own gains": lambda: times(
+        healthy_frames(11), np.random.default_rng(11).uniform(0.8, 1.2, 208)
+    ),
+    "one drive": lambda: times(
+        healthy_frames(12), np.where((ROWS[:, :2] == [3, 4]).all(axis=1), 0.7, 1.0)
+    ),
 }
 
 
@@ -90,16 +96,38 @@ def test_the_advice_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str], fa
     assert run("doctor", mended, "--json") == 0, capsys.readouterr().out
 
 
-def test_numbering_is_advised_by_known_touches_and_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbering_is_advised_by_known_touches_and_mends(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "skin.toml").write_text(SKIN)
     turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
     path, mended = write(tmp_path / "s.npz", one_off(turned, [40], 1.5)), tmp_path / "mended.npz"
-    touch = ("--skin", tmp_path / "skin.toml", "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in", "0")
+    touch = (
+        "--skin",
+        tmp_path / "skin.toml",
+        "--touch",
+        "30,40,8",
+        "--touch=-50,10,8",
+        "--touch-in",
+        "0",
+    )
     assert run("doctor", path, *NPZ, *touch, "--json") == 11
     report = json.loads(capsys.readouterr().out)
     assert report["mend"] == "--rotate 5 --mirror"
     assert any("renumber by import first" in text for text in report["untold"])
-    assert run("import", path, "-o", mended, *NPZ, "--skin", tmp_path / "skin.toml", *report["mend"].split()) == 0
+    assert (
+        run(
+            "import",
+            path,
+            "-o",
+            mended,
+            *NPZ,
+            "--skin",
+            tmp_path / "skin.toml",
+            *report["mend"].split(),
+        )
+        == 0
+    )
     capsys.readouterr()
     assert run("doctor", mended, *touch, "--json") == 11
     again = json.loads(capsys.readouterr().out)
@@ -110,12 +138,30 @@ def test_numbering_is_advised_by_known_touches_and_mends(tmp_path: Path, capsys:
 
 def test_import_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "s.npz", healthy_frames(14))
-    words = ("import", path, "-o", tmp_path / "o.npz", *NPZ, "--protocol", "adjacent", "--electrodes", 16)
+    words = (
+        "import",
+        path,
+        "-o",
+        tmp_path / "o.npz",
+        *NPZ,
+        "--protocol",
+        "adjacent",
+        "--electrodes",
+        16,
+    )
     assert run(*words, "--current-a", "0.002", "--json") == 0
     said = json.loads(capsys.readouterr().out)
-    assert (said["frames"], said["quiet_frames"], said["channels"], said["unit"]) == (1, 12, 208, "V")
+    assert (said["frames"], said["quiet_frames"], said["channels"], said["unit"]) == (
+        1,
+        12,
+        208,
+        "V",
+    )
     frames = load_frames(tmp_path / "o.npz")
-    assert frames.protocol.current_a == 2e-3 and said["protocol_hash"] == f"{frames.protocol.hash:016x}"
+    assert (
+        frames.protocol.current_a == 2e-3
+        and said["protocol_hash"] == f"{frames.protocol.hash:016x}"
+    )
     assert frames.meta["source"] == "s.npz"
     assert run(*words) == 0
     assert "next: eitskin doctor" in capsys.readouterr().out
@@ -128,7 +174,11 @@ def test_the_doctor_examines_frames_files_and_prints_evidence(
     save_frames(path, rotating(quiet_only(healthy_frames(15))))
     assert run("doctor", path) == 11
     text = capsys.readouterr().out
-    assert "FAULT order" in text and "rotating 0.9" in text and "mend: eitskin import ... --order rotating" in text
+    assert (
+        "FAULT order" in text
+        and "rotating 0.9" in text
+        and "mend: eitskin import ... --order rotating" in text
+    )
     save_frames(path, quiet_only(healthy_frames(15, opposite(16))))
     assert run("doctor", path) == 0
     assert "0 faults, 0 notes: nothing must be mended" in capsys.readouterr().out
@@ -144,7 +194,15 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(
     index = match_rows(frames.protocol.drive_measure, rows[measured]).index
     values[measured] = np.column_stack([frames.reference_v, frames.voltage_v[0]])[index]
     np.savetxt(tmp_path / "all.csv", values, delimiter=",")
-    words = (tmp_path / "all.csv", "--protocol", "adjacent", "--electrodes", "16", "--reference-columns", "0")
+    words = (
+        tmp_path / "all.csv",
+        "--protocol",
+        "adjacent",
+        "--electrodes",
+        "16",
+        "--reference-columns",
+        "0",
+    )
     assert run("doctor", *words, "--json") == 11
     report = json.loads(capsys.readouterr().out)
     assert [finding["name"] for finding in report["findings"]] == ["order"]
@@ -170,14 +228,25 @@ def test_the_picture_is_drawn(tmp_path: Path) -> None:
         (("--skin", "SKIN", "--electrodes", "8"), "--electrodes 8: the skin .* has 16"),
         (("--skin", "SKIN", "--swap", "3"), "--swap 3: name two electrodes"),
         (("--skin", "SKIN", "--drop-channels", "3,x"), "'x' is no whole number or range"),
-        (("--skin", "SKIN", "--truth-mask", "v", "--truth-mask-extent", "1,2"), "XMIN,YMIN,XMAX,YMAX"),
+        (
+            ("--skin", "SKIN", "--truth-mask", "v", "--truth-mask-extent", "1,2"),
+            "XMIN,YMIN,XMAX,YMAX",
+        ),
         (("--skin", "SKIN", "--touch", "1"), "X,Y or X,Y,RADIUS"),
         (("--skin", "SKIN", "--touch", "500,0"), "outside the skin"),
-        (("--skin", "SKIN", "--touch", "5,0", "--touch-in", "zz"), "--touch-in zz: no such frame; frames are 0"),
-        (("--protocol", "adjacent", "--electrodes", "16", "--touch", "5,0"), "--touch needs --skin FILE"),
+        (
+            ("--skin", "SKIN", "--touch", "5,0", "--touch-in", "zz"),
+            "--touch-in zz: no such frame; frames are 0",
+        ),
+        (
+            ("--protocol", "adjacent", "--electrodes", "16", "--touch", "5,0"),
+            "--touch needs --skin FILE",
+        ),
     ],
 )
-def test_bad_words_are_refused_in_one_line(tmp_path: Path, words: tuple[Any, ...], said: str) -> None:
+def test_bad_words_are_refused_in_one_line(
+    tmp_path: Path, words: tuple[Any, ...], said: str
+) -> None:
     (tmp_path / "skin.toml").write_text(SKIN)
     path = write(tmp_path / "s.npz", healthy_frames(18))
     given = [tmp_path / "skin.toml" if word == "SKIN" else word for word in words]

@@ -1,4 +1,5 @@
-"""The doctor on frames from the closed form: healthy ones give no finding, each injected fault is named."""
+"""The doctor on frames from the closed form: healthy ones give no finding, each injected fault is
+named."""
 
 from __future__ import annotations
 
@@ -32,7 +33,12 @@ from eitskin.skin.skin import Skin, paper_skin
 
 ROWS = adjacent(16).drive_measure.astype(np.int64)
 PAPER = paper_skin()
-PROTOCOLS = {"adjacent": adjacent(16), "opposite": opposite(16), "skip2": skip(16, 2), "adjacent8": adjacent(8)}
+PROTOCOLS = {
+    "adjacent": adjacent(16),
+    "opposite": opposite(16),
+    "skip2": skip(16, 2),
+    "adjacent8": adjacent(8),
+}
 by_protocol = pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=PROTOCOLS.keys())
 
 
@@ -79,7 +85,9 @@ def test_noiseless_and_digitised_frames_raise_no_alarm() -> None:
     assert named(report_of(healthy_frames(1, gain=0, snr_db=300))) == []
     frames = healthy_frames(2)
     step = 2 * np.abs(frames.reference_voltage_v).max() / 4096
-    reference, voltage = (np.round(v / step) * step for v in (frames.reference_voltage_v, frames.voltage_v))
+    reference, voltage = (
+        np.round(v / step) * step for v in (frames.reference_voltage_v, frames.voltage_v)
+    )
     assert named(report_of(changed(frames, reference, voltage))) == []
 
 
@@ -91,8 +99,12 @@ def test_finite_element_frames_with_uneven_contacts_raise_no_alarm() -> None:
     mesh = mesh_for_elements(PAPER, 3000)
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        clean = ForwardModel(mesh, PAPER, adjacent(16), 0.01 * rng.uniform(0.8, 1.2, 16)).voltages(0.01)
-        quiet = clean * (1 + 0.02 * rng.normal(size=208)) + 1e-3 * np.std(clean) * rng.normal(size=(8, 208))
+        clean = ForwardModel(mesh, PAPER, adjacent(16), 0.01 * rng.uniform(0.8, 1.2, 16)).voltages(
+            0.01
+        )
+        quiet = clean * (1 + 0.02 * rng.normal(size=208)) + 1e-3 * np.std(clean) * rng.normal(
+            size=(8, 208)
+        )
         assert named(report_of(Frames(adjacent(16), quiet[:1], quiet))) == []
 
 
@@ -110,9 +122,9 @@ def test_rotating_order_is_recognised(protocol: Protocol) -> None:
 def test_reversed_polarity_is_recognised(protocol: Protocol) -> None:
     skin = skin_for(protocol)
     frames = times(healthy_frames(4, protocol, skin), np.float64(-1))
-    one_sign = protocol.drive_measure[:, :2].tolist() != protocol.drive_measure[:, 2:].tolist() and (
-        len(set(np.sign(frames.reference_v))) == 1
-    )
+    one_sign = protocol.drive_measure[:, :2].tolist() != protocol.drive_measure[
+        :, 2:
+    ].tolist() and (len(set(np.sign(frames.reference_v))) == 1)
     finding = only(frames, "reversed-or-magnitude" if one_sign else "reversed", skin=skin)
     assert finding.mend == "--sign reversed"
 
@@ -121,7 +133,10 @@ def test_reversed_polarity_is_certain_once_a_channel_crosses_zero() -> None:
     frames = healthy_frames(4)
     voltage = -frames.voltage_v.copy()
     voltage[0, 6] = -0.2 * rms(frames)
-    assert only(quiet_only(changed(frames, -frames.reference_voltage_v, voltage)), "reversed").mend == "--sign reversed"
+    assert (
+        only(quiet_only(changed(frames, -frames.reference_voltage_v, voltage)), "reversed").mend
+        == "--sign reversed"
+    )
 
 
 @pytest.mark.parametrize("protocol", (opposite(16), skip(16, 2)), ids=("opposite", "skip2"))
@@ -139,7 +154,8 @@ def test_magnitudes_of_adjacent_patterns_cannot_be_told_from_reversed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rotate", "mirror", "option"), [(3, False, "--rotate 3"), (0, True, "--mirror"), (5, True, "--rotate 5 --mirror")]
+    ("rotate", "mirror", "option"),
+    [(3, False, "--rotate 3"), (0, True, "--mirror"), (5, True, "--rotate 5 --mirror")],
 )
 def test_numbering_is_told_by_two_known_touches(rotate: int, mirror: bool, option: str) -> None:
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, rotate, mirror), seed=6)
@@ -152,9 +168,13 @@ def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch() -> N
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, 5, True), seed=6)
     report = report_of(quiet_only(frames))
     assert named(report) == []
-    assert any("which way the numbers run" in text and "--touch X,Y" in text for text in report.untold)
+    assert any(
+        "which way the numbers run" in text and "--touch X,Y" in text for text in report.untold
+    )
     unknown_places = report_of(frames, None)
-    assert any("which way the numbers run" in text and "--skin" in text for text in unknown_places.untold)
+    assert any(
+        "which way the numbers run" in text and "--skin" in text for text in unknown_places.untold
+    )
 
 
 def test_one_touch_leaves_its_mirror_image_and_says_so() -> None:
@@ -168,12 +188,16 @@ def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame() -> None:
     corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
     skin = Skin("odd", polygon(corners), Electrodes(count=8))
     transfer = homogeneous(skin, 8).transfer_ohm
-    healthy = quiet_only(healthy_frames(8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=transfer))
+    healthy = quiet_only(
+        healthy_frames(8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=transfer)
+    )
     assert named(report_of(healthy, skin)) == []
     for rotate, mirror, option in ((3, False, "--rotate 3"), (1, True, "--rotate 1 --mirror")):
         moved = electrode_map(8, rotate, mirror)
         turned = quiet_only(
-            healthy_frames(8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=transfer[np.ix_(moved, moved)])
+            healthy_frames(
+                8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=transfer[np.ix_(moved, moved)]
+            )
         )
         assert only(turned, "numbering", skin=skin).mend == option
 
@@ -189,7 +213,11 @@ def test_two_exchanges_in_rotating_order_and_reversed_are_untangled() -> None:
     swapped = as_if_electrodes(healthy_frames(10), swap_map(16, [(3, 9), (1, 14)]), seed=10)
     index = match_rows(ROWS, source_table("rotating", adjacent(16))).index
     report = report_of(times(permuted(swapped, index), np.float64(-1)))
-    assert named(report) == [("order", "fault"), ("swapped-electrodes", "fault"), ("reversed", "fault")]
+    assert named(report) == [
+        ("order", "fault"),
+        ("swapped-electrodes", "fault"),
+        ("reversed", "fault"),
+    ]
     assert report.mend == "--order rotating --swap 3,9 --swap 1,14 --sign reversed"
 
 
@@ -211,7 +239,9 @@ def test_every_dead_electrode_is_named_with_its_side(driving: bool, measuring: b
         rng = np.random.default_rng(electrode)
         frames = healthy_frames(electrode)
         reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
-        drives, measures = ((ROWS[:, columns] == electrode).any(axis=1) for columns in ([0, 1], [2, 3]))
+        drives, measures = (
+            (ROWS[:, columns] == electrode).any(axis=1) for columns in ([0, 1], [2, 3])
+        )
         floating = rng.uniform(-1, 1, 208) * np.abs(reference).max()
         for values in (reference, voltage):
             noise = 1e-3 * rms(frames) * rng.normal(size=values.shape)
@@ -238,7 +268,9 @@ def test_saturated_channels_are_named(quantile: float) -> None:
     rail = float(np.quantile(np.abs(frames.reference_voltage_v), quantile))
     reference = np.clip(frames.reference_voltage_v, -rail, rail)
     finding = only(changed(frames, reference, np.clip(frames.voltage_v, -rail, rail)), "saturated")
-    clipped = (np.abs(reference) == rail).any(axis=0) | (np.abs(frames.voltage_v) >= rail).any(axis=0)
+    clipped = (np.abs(reference) == rail).any(axis=0) | (np.abs(frames.voltage_v) >= rail).any(
+        axis=0
+    )
     assert finding.evidence["channels"] == np.flatnonzero(clipped).tolist()
     assert finding.evidence["rail_v"] == [pytest.approx(-rail)]
 
@@ -273,7 +305,9 @@ def test_the_snr_is_measured_and_judged(snr_db: float, severity: str) -> None:
 def test_drift_is_measured_and_judged(drift: float, severity: str) -> None:
     frames = healthy_frames(15)
     ramp = 1 + np.linspace(-drift / 2, drift / 2, len(frames.reference_voltage_v))
-    finding = only(with_reference(frames, frames.reference_voltage_v * ramp[:, None]), "drift", severity)
+    finding = only(
+        with_reference(frames, frames.reference_voltage_v * ramp[:, None]), "drift", severity
+    )
     assert finding.evidence["drift"] == pytest.approx(drift, rel=0.05)
 
 
@@ -287,11 +321,16 @@ def test_gain_faults_are_told_apart() -> None:
     for name, columns, gain in (("drive", [0, 1], 0.7), ("measure", [2, 3], 1.3)):
         of_pair = (ROWS[:, columns] == [3, 4]).all(axis=1)
         finding = only(times(frames, np.where(of_pair, gain, 1.0)), f"{name}-pair-gain")
-        assert finding.evidence["pair"] == [3, 4] and finding.evidence["gain"] == pytest.approx(gain, rel=0.03)
+        assert finding.evidence["pair"] == [3, 4] and finding.evidence["gain"] == pytest.approx(
+            gain, rel=0.03
+        )
     report = report_of(times(frames, rng.uniform(0.8, 1.2, 208)))
     assert named(report) == [("gain-spread", "fault"), ("reciprocity", "fault")]
     assert report.mend == "--equalise"
-    assert named(report_of(healthy_frames(16, gain=0.045))) == [("gain-spread", "note"), ("reciprocity", "note")]
+    assert named(report_of(healthy_frames(16, gain=0.045))) == [
+        ("gain-spread", "note"),
+        ("reciprocity", "note"),
+    ]
 
 
 def test_a_pair_that_breaks_reciprocity_is_named() -> None:
@@ -312,7 +351,10 @@ def test_channels_of_the_wrong_sign_are_named() -> None:
     assert only(times(frames, some), "flipped-channels").mend == "--flip-channels 17,90"
     of_pair = (ROWS[:, :2] == [3, 4]).all(axis=1)
     finding = only(times(frames, np.where(of_pair, -1.0, 1.0)), "flipped-channels")
-    assert "drive [3, 4]" in finding.text and finding.evidence["channels"] == np.flatnonzero(of_pair).tolist()
+    assert (
+        "drive [3, 4]" in finding.text
+        and finding.evidence["channels"] == np.flatnonzero(of_pair).tolist()
+    )
 
 
 def test_values_that_are_no_numbers_are_counted_and_named() -> None:
@@ -357,10 +399,15 @@ def test_several_remedies_become_one() -> None:
 
 def test_a_round_skin_needs_no_scipy() -> None:
     program = (
-        "import sys; from injected import healthy_frames; from eitskin.skin.skin import paper_skin\n"
-        "from eitskin.frames.doctor import examine, subject_from_frames\n"
-        "assert not examine(subject_from_frames(healthy_frames(1), paper_skin())).findings\n"
-        "assert 'scipy' not in sys.modules and 'matplotlib' not in sys.modules"
+        "import sys; from injected import healthy_frames; from eitskin.skin.skin import"
+        " paper_skin\nfrom eitskin.frames.doctor import examine, subject_from_frames\nassert not"
+        " examine(subject_from_frames(healthy_frames(1), paper_skin())).findings\nassert 'scipy'"
+        " not in sys.modules and 'matplotlib' not in sys.modules"
     )
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
-    subprocess.run([sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": path}, check=True, timeout=60)
+    subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": path},
+        check=True,
+        timeout=60,
+    )

@@ -39,7 +39,15 @@ def test_saved_frames_come_back_equal(tmp_path: Path) -> None:
     frames = make_frames()
     save_frames(tmp_path / "f.npz", frames)
     back = load_frames(tmp_path / "f.npz")
-    same = ("voltage_v", "reference_voltage_v", "time_s", "touch_frame", "touch_xy_mm", "touch_radius_mm", "truth_mask")
+    same = (
+        "voltage_v",
+        "reference_voltage_v",
+        "time_s",
+        "touch_frame",
+        "touch_xy_mm",
+        "touch_radius_mm",
+        "truth_mask",
+    )
     for name in same:
         assert np.array_equal(getattr(back, name), getattr(frames, name)), name
         assert getattr(back, name).dtype == getattr(frames, name).dtype, name
@@ -84,7 +92,10 @@ def test_one_reference_frame_becomes_a_row_and_names_are_counted() -> None:
     ("change", "said"),
     [
         ({"voltage_v": np.zeros((3, 41))}, r"voltage_v has shape \(3, 41\)"),
-        ({"voltage_v": np.zeros((3, CHANNELS), dtype=complex)}, "must be real numbers, not complex128"),
+        (
+            {"voltage_v": np.zeros((3, CHANNELS), dtype=complex)},
+            "must be real numbers, not complex128",
+        ),
         ({"voltage_v": np.full((3, CHANNELS), np.inf)}, "frame 0, channel 0 is inf"),
         ({"reference_voltage_v": np.zeros((0, CHANNELS))}, "at least one quiet frame"),
         ({"frame_name": ("a",)}, "1 names for 3 frames"),
@@ -125,7 +136,10 @@ def rewritten(path: Path, **changes: Any) -> Path:
         ({"extra": np.zeros(2)}, "unknown field 'extra'"),
         ({"meta": np.array("{")}, "'meta' is not JSON"),
         ({"meta": np.array("[1]")}, "'meta' is not a JSON object"),
-        ({"drive_measure": np.zeros((CHANNELS, 4), dtype=int)}, "pair of one|two different|electrode"),
+        (
+            {"drive_measure": np.zeros((CHANNELS, 4), dtype=int)},
+            "pair of one|two different|electrode",
+        ),
         ({"drive_measure": np.zeros((CHANNELS, 3), dtype=int)}, "table"),
         ({"n_electrodes": np.array(6)}, "electrode"),
         ({"current_a": np.array(0.0)}, "current_a"),
@@ -134,7 +148,9 @@ def rewritten(path: Path, **changes: Any) -> Path:
         ({"touch_frame": np.array([0, 9, 1])}, "there are 0 to 2"),
     ],
 )
-def test_wrong_files_are_refused_in_one_line_naming_the_file(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+def test_wrong_files_are_refused_in_one_line_naming_the_file(
+    tmp_path: Path, change: dict[str, Any], said: str
+) -> None:
     path = rewritten(tmp_path / "f.npz", **change)
     with pytest.raises(EitskinError, match=said) as caught:
         load_frames(path)
@@ -143,7 +159,9 @@ def test_wrong_files_are_refused_in_one_line_naming_the_file(tmp_path: Path, cha
 
 def test_pickled_objects_are_never_loaded(tmp_path: Path) -> None:
     path = tmp_path / "f.npz"
-    np.savez(path, format=np.array(FORMAT), version=np.array(1), meta=np.array([{"a": 1}], dtype=object))
+    np.savez(
+        path, format=np.array(FORMAT), version=np.array(1), meta=np.array([{"a": 1}], dtype=object)
+    )
     with pytest.raises(FrameError, match="is missing"):
         load_frames(path)
 

@@ -1,4 +1,5 @@
-"""The predicted homogeneous frame: its symmetries, the finite-element model, and the touch response."""
+"""The predicted homogeneous frame: its symmetries, the finite-element model, and the touch
+response."""
 
 from __future__ import annotations
 
@@ -36,7 +37,9 @@ def test_symmetric_rows_are_equal_and_reciprocal() -> None:
     frame = homogeneous(None, 16).voltages(ROWS)
     assert (frame < 0).all()
     for rotate, mirror in ((1, False), (5, True)):
-        assert np.allclose(homogeneous(None, 16).voltages(relabel(ROWS, electrode_map(16, rotate, mirror))), frame)
+        assert np.allclose(
+            homogeneous(None, 16).voltages(relabel(ROWS, electrode_map(16, rotate, mirror))), frame
+        )
     assert np.allclose(homogeneous(None, 16).voltages(ROWS[:, [2, 3, 0, 1]]), frame)
     assert np.allclose(homogeneous(None, 16).voltages(ROWS[:, [1, 0, 2, 3]]), -frame)
 
@@ -51,7 +54,11 @@ def test_closed_form_agrees_with_finite_elements() -> None:
         rows = protocol.drive_measure.astype(np.int64)
         closed, solved = homogeneous(skin, 16).voltages(rows), voltages_of(fem.transfer_ohm(), rows)
         assert np.abs(closed - solved).max() < 0.01 * np.abs(solved).max()
-    xy, radius, sign = np.array([[30.0, 40.0], [-50.0, 10.0]]), np.array([8.0, 6.0]), np.array([1, -1], dtype=np.int8)
+    xy, radius, sign = (
+        np.array([[30.0, 40.0], [-50.0, 10.0]]),
+        np.array([8.0, 6.0]),
+        np.array([1, -1], dtype=np.int8),
+    )
     closed = voltages_of(touch_transfer(skin, xy, radius, sign), ROWS)
     solved = voltages_of(fem.touch_transfer(xy, radius, sign), ROWS)
     assert np.corrcoef(closed, solved)[0, 1] > 0.98
@@ -60,7 +67,9 @@ def test_closed_form_agrees_with_finite_elements() -> None:
 def test_a_touch_beside_the_first_electrodes_changes_their_channels_most() -> None:
     skin = paper_skin()
     centre = 0.85 * skin.electrode_centres_mm()[[0]]
-    change = voltages_of(touch_transfer(skin, centre, np.array([5.0]), np.array([1], dtype=np.int8)), ROWS)
+    change = voltages_of(
+        touch_transfer(skin, centre, np.array([5.0]), np.array([1], dtype=np.int8)), ROWS
+    )
     strongest = ROWS[np.argsort(-np.abs(change))[:8]]
     assert (strongest == 0).any(axis=1).all()
     frame = homogeneous(skin, 16).voltages(ROWS)

@@ -1,4 +1,5 @@
-"""Import: every option that says how a source differs gives back the frames that the source was made from."""
+"""Import: every option that says how a source differs gives back the frames that the source was
+made from."""
 
 from __future__ import annotations
 
@@ -23,10 +24,17 @@ TABLE = adjacent(16).drive_measure.astype(np.int64)
 KEYS = SourceOptions(voltage="v", reference="r", scale=1.0)
 
 
-def source(tmp_path: Path, frames: Frames, index: Any = slice(None), sign: Any = 1.0, **more: Any) -> Path:
+def source(
+    tmp_path: Path, frames: Frames, index: Any = slice(None), sign: Any = 1.0, **more: Any
+) -> Path:
     """An NPZ with the frames' channels under ``index`` and ``sign``."""
     path = tmp_path / "source.npz"
-    np.savez(path, v=frames.voltage_v[:, index] * sign, r=frames.reference_voltage_v[:, index] * sign, **more)
+    np.savez(
+        path,
+        v=frames.voltage_v[:, index] * sign,
+        r=frames.reference_voltage_v[:, index] * sign,
+        **more,
+    )
     return path
 
 
@@ -45,7 +53,9 @@ def test_every_order_comes_back_in_ours(tmp_path: Path, protocol: Any, order: st
     index = np.zeros(len(rows), dtype=np.int64)
     index[measured] = match_rows(protocol.drive_measure, rows[measured]).index
     path = source(tmp_path, frames, index, np.where(measured, 1.0, 77.0))
-    assert_same(import_frames(path, ImportOptions(source=KEYS, order=order), protocol, None), frames)
+    assert_same(
+        import_frames(path, ImportOptions(source=KEYS, order=order), protocol, None), frames
+    )
 
 
 def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
@@ -65,7 +75,9 @@ def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
     assert np.array_equal(kept.protocol.drive_measure, rows)
     assert np.allclose(kept.voltage_v, frames.voltage_v[:, index] * sign)
     assert_same(import_frames(path, options, None, None, 16), kept)
-    with pytest.raises(FrameError, match="1 to 16, but they are 0 to 15; if it counts from 1 say --table-base 1"):
+    with pytest.raises(
+        FrameError, match="1 to 16, but they are 0 to 15; if it counts from 1 say --table-base 1"
+    ):
         import_frames(path, ImportOptions(source=replace(inside, table_base=0)), adjacent(16), None)
 
 
@@ -103,7 +115,9 @@ def test_clockwise_mirrors_unless_the_skin_is_clockwise(tmp_path: Path) -> None:
 
 def test_swapped_wires_give_the_table_that_was_really_measured(tmp_path: Path) -> None:
     path = source(tmp_path, healthy_frames(6))
-    frames = import_frames(path, ImportOptions(source=KEYS, swaps=((3, 9), (1, 2))), adjacent(16), None)
+    frames = import_frames(
+        path, ImportOptions(source=KEYS, swaps=((3, 9), (1, 2))), adjacent(16), None
+    )
     assert np.array_equal(frames.protocol.drive_measure, swap_map(16, [(3, 9), (1, 2)])[TABLE])
 
 
@@ -111,7 +125,11 @@ def test_channels_are_flipped_filled_and_left_out(tmp_path: Path) -> None:
     frames = healthy_frames(7)
     path = source(tmp_path, frames)
     options = ImportOptions(
-        source=KEYS, flip_channels=(5,), impute_channels=(0,), drop_channels=(207,), drop_electrodes=(9,)
+        source=KEYS,
+        flip_channels=(5,),
+        impute_channels=(0,),
+        drop_channels=(207,),
+        drop_electrodes=(9,),
     )
     mended = import_frames(path, options, adjacent(16), None)
     kept = [row for row in range(207) if 9 not in TABLE[row]]
@@ -140,13 +158,17 @@ def test_bad_values_pass_only_where_they_are_mended(tmp_path: Path) -> None:
         import_frames(path, ImportOptions(source=KEYS), adjacent(16), None)
     with pytest.raises(FrameError, match="frame 0, channel 0 is nan"):
         import_frames(path, ImportOptions(source=KEYS, impute_channels=(3,)), adjacent(16), None)
-    mended = import_frames(path, ImportOptions(source=KEYS, impute_channels=(0,)), adjacent(16), None)
+    mended = import_frames(
+        path, ImportOptions(source=KEYS, impute_channels=(0,)), adjacent(16), None
+    )
     assert mended.voltage_v[0, 0] == voltage[0, 26]
 
 
 def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
     frames = healthy_frames(9, gain=0.15)
-    mended = import_frames(source(tmp_path, frames), ImportOptions(source=KEYS, equalise=True), adjacent(16), None)
+    mended = import_frames(
+        source(tmp_path, frames), ImportOptions(source=KEYS, equalise=True), adjacent(16), None
+    )
     gains = mended.reference_v / frames.reference_v
     assert np.allclose(mended.voltage_v, frames.voltage_v * gains)
     pairs = mended.protocol.reciprocal_pairs()
@@ -154,8 +176,12 @@ def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
     weak = frames.reference_voltage_v.copy()
     weak[:, 40] *= 0.01
     np.savez(tmp_path / "weak.npz", v=frames.voltage_v, r=weak)
-    with pytest.raises(FrameError, match=r"channel 40 has 0\.0\d+ of its predicted reference \(1 such\)"):
-        import_frames(tmp_path / "weak.npz", ImportOptions(source=KEYS, equalise=True), adjacent(16), None)
+    with pytest.raises(
+        FrameError, match=r"channel 40 has 0\.0\d+ of its predicted reference \(1 such\)"
+    ):
+        import_frames(
+            tmp_path / "weak.npz", ImportOptions(source=KEYS, equalise=True), adjacent(16), None
+        )
 
 
 def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
@@ -167,17 +193,30 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
     options = SourceOptions(columns="one", reference_columns="q0,q1", scale=1.0)
     got = import_frames(rows, ImportOptions(source=options), adjacent(16), None)
     assert got.frame_name == ("one",) and len(got.reference_voltage_v) == 2
-    assert np.array_equal(got.voltage_v, voltage) and np.array_equal(got.reference_voltage_v, quiet[:2])
+    assert np.array_equal(got.voltage_v, voltage) and np.array_equal(
+        got.reference_voltage_v, quiet[:2]
+    )
     wide = tmp_path / "wide.csv"
     times = np.arange(len(quiet) + 1) * 0.25
-    np.savetxt(wide, np.column_stack([times, 1000 * np.vstack([quiet, voltage])]), delimiter=",", fmt="%.17g")
+    np.savetxt(
+        wide,
+        np.column_stack([times, 1000 * np.vstack([quiet, voltage])]),
+        delimiter=",",
+        fmt="%.17g",
+    )
     options = SourceOptions(columns="1:209", time="0", reference_frames="0:12", scale=1e-3)
     got = import_frames(wide, ImportOptions(source=options), adjacent(16), None)
-    assert np.allclose(got.voltage_v, voltage, rtol=1e-12) and np.allclose(got.reference_voltage_v, quiet, rtol=1e-12)
+    assert np.allclose(got.voltage_v, voltage, rtol=1e-12) and np.allclose(
+        got.reference_voltage_v, quiet, rtol=1e-12
+    )
     assert got.time_s is not None and got.time_s.tolist() == [3.0]
     assert got.meta["unit"] == "V" and got.meta["options"]["scale"] == 1e-3
-    with pytest.raises(FrameError, match=r"209 chosen columns: a frame should have 208 channels \(16 electrodes, "):
-        import_frames(wide, ImportOptions(source=SourceOptions(reference_frames="0:12")), adjacent(16), None)
+    with pytest.raises(
+        FrameError, match=r"209 chosen columns: a frame should have 208 channels \(16 electrodes, "
+    ):
+        import_frames(
+            wide, ImportOptions(source=SourceOptions(reference_frames="0:12")), adjacent(16), None
+        )
 
 
 @pytest.mark.parametrize("part", ("real", "imag", "abs", "in-phase"))
@@ -185,7 +224,12 @@ def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> 
     frames = healthy_frames(11)
     phase = np.exp(0.4j)
     voltage, quiet = frames.voltage_v * phase, frames.reference_voltage_v * phase
-    wanted = {"real": np.real, "imag": np.imag, "abs": np.abs, "in-phase": lambda z: np.real(z / phase)}[part]
+    wanted = {
+        "real": np.real,
+        "imag": np.imag,
+        "abs": np.abs,
+        "in-phase": lambda z: np.real(z / phase),
+    }[part]
     np.savez(tmp_path / "z.npz", v=voltage, r=quiet)
     source_of = replace(KEYS, complex_part=part)
     got = import_frames(tmp_path / "z.npz", ImportOptions(source=source_of), adjacent(16), None)
@@ -194,21 +238,34 @@ def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> 
     np.savetxt(tmp_path / "z.csv", pairs, delimiter=",", fmt="%.17g")
     columns = SourceOptions(columns="2,3", reference_columns="0,1", complex_part=part)
     got = import_frames(tmp_path / "z.csv", ImportOptions(source=columns), adjacent(16), None)
-    assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9) and got.meta["unit"] == "unknown, taken as V"
+    assert (
+        np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
+        and got.meta["unit"] == "unknown, taken as V"
+    )
     with pytest.raises(UsageError, match="numbers are complex; say with --complex-part"):
         import_frames(tmp_path / "z.npz", ImportOptions(source=KEYS), adjacent(16), None)
     with pytest.raises(UsageError, match="pairs re,im; 1 are named"):
-        import_frames(tmp_path / "z.csv", ImportOptions(source=replace(columns, columns="2")), adjacent(16), None)
+        import_frames(
+            tmp_path / "z.csv",
+            ImportOptions(source=replace(columns, columns="2")),
+            adjacent(16),
+            None,
+        )
 
 
 def test_mat_files_with_structs(tmp_path: Path) -> None:
     savemat = pytest.importorskip("scipy.io").savemat
     frames = healthy_frames(12)
     path = tmp_path / "m.mat"
-    savemat(path, {"data": {"v": frames.voltage_v.T, "quiet": frames.reference_voltage_v.T}, "note": "x"})
+    savemat(
+        path,
+        {"data": {"v": frames.voltage_v.T, "quiet": frames.reference_voltage_v.T}, "note": "x"},
+    )
     options = SourceOptions(voltage="data.v", reference="data.quiet", scale=1.0)
     assert_same(import_frames(path, ImportOptions(source=options), adjacent(16), None), frames)
-    with pytest.raises(FrameError, match=r"no array 'v' for --voltage; it holds data.quiet \(208, 12\), data.v"):
+    with pytest.raises(
+        FrameError, match=r"no array 'v' for --voltage; it holds data.quiet \(208, 12\), data.v"
+    ):
         import_frames(path, ImportOptions(source=KEYS), adjacent(16), None)
     path.write_bytes(path.read_bytes()[:700])
     with pytest.raises(EitskinError, match=r"not a readable MAT file|cannot read"):
@@ -231,22 +288,36 @@ def test_truth_comes_along_in_millimetres(tmp_path: Path) -> None:
         mask=mask,
     )
     truth = TruthOptions(
-        touch_frame="of", touch_xy="xy", touch_radius="rad", touch_sign="more", touch_unit_mm=97.0, mask="mask"
+        touch_frame="of",
+        touch_xy="xy",
+        touch_radius="rad",
+        touch_sign="more",
+        touch_unit_mm=97.0,
+        mask="mask",
     )
     options = ImportOptions(source=replace(KEYS, names="names"), truth=truth)
     got = import_frames(path, options, adjacent(16), paper_skin())
-    assert got.touch_frame is not None and got.touch_xy_mm is not None and got.touch_sign is not None
+    assert (
+        got.touch_frame is not None and got.touch_xy_mm is not None and got.touch_sign is not None
+    )
     assert got.touch_frame.tolist() == [0, 0] and got.touch_sign.tolist() == [1, -1]
     assert np.allclose(got.touch_xy_mm, [[9.7, 19.4], [29.1, -38.8]])
     assert got.touch_strength is not None and np.isnan(got.touch_strength).all()
-    assert np.array_equal(got.truth_mask, mask) and got.truth_mask_extent_mm == (-97.0, -97.0, 97.0, 97.0)
+    assert np.array_equal(got.truth_mask, mask) and got.truth_mask_extent_mm == (
+        -97.0,
+        -97.0,
+        97.0,
+        97.0,
+    )
     top_first = replace(options, truth=replace(truth, mask_top_first=True))
     flipped = import_frames(path, top_first, adjacent(16), paper_skin())
     assert np.array_equal(flipped.truth_mask, mask[:, ::-1])
     with pytest.raises(UsageError, match="--truth-mask-extent"):
         import_frames(path, options, adjacent(16), None)
     with pytest.raises(UsageError, match="need --truth-xy too"):
-        import_frames(path, replace(options, truth=TruthOptions(touch_frame="of")), adjacent(16), None)
+        import_frames(
+            path, replace(options, truth=TruthOptions(touch_frame="of")), adjacent(16), None
+        )
     with pytest.raises(FrameError, match="names frame 'two'; frames are 0"):
         import_frames(path, replace(options, source=KEYS), adjacent(16), paper_skin())
 
@@ -269,22 +340,48 @@ def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "protocol", "said"),
     [
-        (ImportOptions(source=SourceOptions(voltage="x")), adjacent(16), r"no array 'x' .*r \(12, 208\), v \(1, 208\)"),
+        (
+            ImportOptions(source=SourceOptions(voltage="x")),
+            adjacent(16),
+            r"no array 'x' .*r \(12, 208\), v \(1, 208\)",
+        ),
         (ImportOptions(source=SourceOptions()), adjacent(16), "--voltage KEY"),
-        (ImportOptions(source=SourceOptions(voltage="v")), adjacent(16), "which frames are quiet: --reference KEY"),
-        (ImportOptions(source=replace(KEYS, columns="1")), adjacent(16), "--columns does not go with a NPZ"),
+        (
+            ImportOptions(source=SourceOptions(voltage="v")),
+            adjacent(16),
+            "which frames are quiet: --reference KEY",
+        ),
+        (
+            ImportOptions(source=replace(KEYS, columns="1")),
+            adjacent(16),
+            "--columns does not go with a NPZ",
+        ),
         (ImportOptions(source=KEYS), adjacent(8), r"v \(1, 208\): a frame should have 40 channels"),
         (ImportOptions(source=KEYS, order="fixed-all"), adjacent(16), "should have 256 channels"),
         (ImportOptions(source=KEYS), None, "say which protocol"),
         (ImportOptions(source=KEYS, order="table"), adjacent(16), "--order table needs"),
         (ImportOptions(source=KEYS, sign="maybe"), adjacent(16), "--sign maybe"),
         (ImportOptions(source=replace(KEYS, scale=0.0)), adjacent(16), "--scale 0"),
-        (ImportOptions(source=replace(KEYS, layout="channels-in-rows")), adjacent(16), "--layout channels-in-rows a"),
-        (ImportOptions(source=replace(KEYS, reference_frames="0")), adjacent(16), "another reference"),
-        (ImportOptions(source=replace(KEYS, protocol_table="v")), adjacent(16), "table is .rows, 4"),
+        (
+            ImportOptions(source=replace(KEYS, layout="channels-in-rows")),
+            adjacent(16),
+            "--layout channels-in-rows a",
+        ),
+        (
+            ImportOptions(source=replace(KEYS, reference_frames="0")),
+            adjacent(16),
+            "another reference",
+        ),
+        (
+            ImportOptions(source=replace(KEYS, protocol_table="v")),
+            adjacent(16),
+            "table is .rows, 4",
+        ),
     ],
 )
-def test_bad_options_say_what_to_do(tmp_path: Path, options: ImportOptions, protocol: Any, said: str) -> None:
+def test_bad_options_say_what_to_do(
+    tmp_path: Path, options: ImportOptions, protocol: Any, said: str
+) -> None:
     with pytest.raises(EitskinError, match=said) as caught:
         import_frames(source(tmp_path, healthy_frames(15)), options, protocol, None)
     assert "\n" not in str(caught.value)

@@ -22,7 +22,8 @@ def test_blocks_run(page: str, tmp_path: Path) -> None:
     work.mkdir()
     program = programs / "eitskin"
     program.write_text(
-        f"#!{sys.executable}\nimport sys\nfrom eitskin.cli.main import main\nsys.exit(main())\n", encoding="utf-8"
+        f"#!{sys.executable}\nimport sys\nfrom eitskin.cli.main import main\nsys.exit(main())\n",
+        encoding="utf-8",
     )
     program.chmod(0o755)
     path = os.pathsep.join([str(programs), os.environ["PATH"]])
@@ -33,6 +34,12 @@ def test_blocks_run(page: str, tmp_path: Path) -> None:
     for language, text in blocks:
         command = ["sh", "-e", "-c", text] if language == "sh" else [sys.executable, "-c", text]
         done = subprocess.run(
-            command, cwd=work, env=environment, capture_output=True, text=True, timeout=120, check=False
+            command,
+            cwd=work,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
         )
         assert done.returncode == 0, f"{page}:\n{text}\n{done.stdout}\n{done.stderr}"

@@ -1,4 +1,5 @@
-"""Measured tank frames: their order, sign and numbering are recognised, import mends them, and truth comes along."""
+"""Measured tank frames: their order, sign and numbering are recognised, import mends them, and
+truth comes along."""
 
 from __future__ import annotations
 
@@ -18,9 +19,15 @@ from eitskin.skin.outline import disk
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import Skin
 
-KIT4 = Skin("kit4", disk(280.0), Electrodes(count=16, width_mm=25.0, start_angle_deg=90.0, clockwise=True))
+KIT4 = Skin(
+    "kit4", disk(280.0), Electrodes(count=16, width_mm=25.0, start_angle_deg=90.0, clockwise=True)
+)
 KIT4_SOURCE = SourceOptions(
-    voltage="voltage", reference="reference_voltage", names="frame_name", protocol_table="drive_measure", scale=1.0
+    voltage="voltage",
+    reference="reference_voltage",
+    names="frame_name",
+    protocol_table="drive_measure",
+    scale=1.0,
 )
 KIT4_TRUTH = TruthOptions(
     touch_frame="object_frame",
@@ -32,7 +39,10 @@ KIT4_TRUTH = TruthOptions(
 )
 TANKS = ("tank_metal_e1.csv", "tank_metal_e1_e13_plastic_e5_e9.csv")
 MENDED = ImportOptions(
-    source=SourceOptions(columns="2", reference_columns="0"), order="rotating", sign="reversed", clockwise=True
+    source=SourceOptions(columns="2", reference_columns="0"),
+    order="rotating",
+    sign="reversed",
+    clockwise=True,
 )
 
 
@@ -64,9 +74,14 @@ def test_kit4_is_healthy_with_notes_on_what_is_there(kit4: Frames) -> None:
     found = {finding.name: finding for finding in report.findings}
     assert set(found) == {"measure-pair-gain", "gain-spread", "reciprocity"}
     pairs = {
-        tuple(f.evidence["pair"]): f.evidence["gain"] for f in report.findings if f.name == "measure-pair-gain"
+        tuple(f.evidence["pair"]): f.evidence["gain"]
+        for f in report.findings
+        if f.name == "measure-pair-gain"
     }
-    assert pairs == {(14, 15): pytest.approx(0.908, abs=0.005), (15, 0): pytest.approx(1.113, abs=0.005)}
+    assert pairs == {
+        (14, 15): pytest.approx(0.908, abs=0.005),
+        (15, 0): pytest.approx(1.113, abs=0.005),
+    }
     assert found["gain-spread"].evidence["spread"] == pytest.approx(0.045, abs=0.003)
     assert found["reciprocity"].evidence["rms"] == pytest.approx(0.053, abs=0.003)
     assert report.measured["numbering_by_touch"]["as given"] == pytest.approx(0.975, abs=0.005)
@@ -87,25 +102,37 @@ def test_the_rotating_order_of_the_raw_exports_is_recognised(shared_data: Path, 
     assert report.exit_code == 11
     assert report.mend == "--order rotating --sign reversed"
     order = next(finding for finding in report.findings if finding.name == "order")
-    assert order.evidence["correlation"]["rotating"] > 0.995 and order.evidence["correlation"]["fixed"] < 0.25
-    unlike = next(finding for finding in report.findings if finding.name == "frames-unlike-the-reference")
+    assert (
+        order.evidence["correlation"]["rotating"] > 0.995
+        and order.evidence["correlation"]["fixed"] < 0.25
+    )
+    unlike = next(
+        finding for finding in report.findings if finding.name == "frames-unlike-the-reference"
+    )
     assert unlike.evidence["frames"] == ["1", "3"]
 
 
 @pytest.mark.parametrize("name", TANKS)
 @pytest.mark.parametrize("part", (None, "in-phase"))
 def test_mended_raw_exports_are_clean(shared_data: Path, name: str, part: str | None) -> None:
-    source = MENDED.source if part is None else SourceOptions("2,3", None, "2,3", "0,1", complex_part=part)
+    source = (
+        MENDED.source
+        if part is None
+        else SourceOptions("2,3", None, "2,3", "0,1", complex_part=part)
+    )
     source = replace(source, voltage=None)
     frames = import_frames(shared_data / name, replace(MENDED, source=source), adjacent(16), KIT4)
     report = examine(subject_from_frames(frames, KIT4))
-    assert report.exit_code == 0 and {finding.name for finding in report.findings} <= {"gain-spread"}
+    assert report.exit_code == 0 and {finding.name for finding in report.findings} <= {
+        "gain-spread"
+    }
     assert report.measured["reference_correlation"] > 0.995
     assert report.measured["reciprocity_rms"] < 0.03
 
 
 def test_the_metal_rod_changes_most_beside_its_electrode(shared_data: Path) -> None:
-    """A rod beside electrode 0 (1 in the data's own words), and in the second file beside 0 and 12 (1 and 13)."""
+    """A rod beside electrode 0 (1 in the data's own words), and in the second file beside 0 and 12
+    (1 and 13)."""
     for name, electrodes in zip(TANKS, ((0,), (0, 12)), strict=True):
         frames = import_frames(shared_data / name, MENDED, adjacent(16), KIT4)
         rows = frames.protocol.drive_measure.astype(np.int64)

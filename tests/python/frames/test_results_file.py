@@ -16,8 +16,10 @@ from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt, session
 
 FIELDS = {
-    "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm", "touch_frame", "touch_id",
-    "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_confidence", "touch_load_n", "info",
+    "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm",
+    "touch_frame", "touch_id",
+    "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_confidence",
+    "touch_load_n", "info",
 }  # fmt: skip
 
 
@@ -42,7 +44,9 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
     assert saved["image_s_per_m"].shape == (3, 32, 32)
     for place, number in enumerate((0, 2, 9)):
         image = saved["image_s_per_m"][place]
-        assert (image[model.grid.index[:, 1], model.grid.index[:, 0]] == results[number].image).all()
+        assert (
+            image[model.grid.index[:, 1], model.grid.index[:, 0]] == results[number].image
+        ).all()
         assert np.isnan(image).sum() == 32 * 32 - 812
     assert float(saved["pixel_mm"]) == pytest.approx(194 / 32)
     assert saved["image_origin_mm"] == pytest.approx([-97, -97])
@@ -51,16 +55,25 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
     assert saved["touch_frame"].tolist() == [number for number, _ in touches]
     assert saved["touch_id"].tolist() == [touch.id for _, touch in touches]
     assert saved["touch_xy_mm"].tolist() == [[touch.x_mm, touch.y_mm] for _, touch in touches]
-    for field, name in (("radius_mm",) * 2, ("strength_s_per_m_mm2",) * 2, ("confidence",) * 2, ("load_n",) * 2):
+    for field, name in (
+        ("radius_mm",) * 2,
+        ("strength_s_per_m_mm2",) * 2,
+        ("confidence",) * 2,
+        ("load_n",) * 2,
+    ):
         assert saved[f"touch_{name}"].tolist() == [getattr(touch, field) for _, touch in touches]
     info = json.loads(str(saved["info"]))
     assert [entry["stop"] for entry in info] == ["iterations"] * 3
     assert info[1]["lambda"] == results[2].info.lambda_ and "lambda_" not in info[1]
 
 
-def test_the_documented_fields_are_the_saved_ones(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
+def test_the_documented_fields_are_the_saved_ones(
+    tmp_path: Path, results: dict[int, Reconstruction]
+) -> None:
     """Names and types of the table in docs/reference/frames-format.md, row by row."""
-    page = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "frames-format.md").read_text(encoding="utf-8")
+    page = (
+        Path(__file__).resolve().parents[3] / "docs" / "reference" / "frames-format.md"
+    ).read_text(encoding="utf-8")
     rows = re.findall(r"^\| (`.*?) \| (.*?) \|", page.split("# The results file")[1], re.MULTILINE)
     documented = {name: kind for names, kind in rows for name in re.findall(r"`(\w+)`", names)}
     save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), results)
@@ -69,11 +82,16 @@ def test_the_documented_fields_are_the_saved_ones(tmp_path: Path, results: dict[
         for name, kind in documented.items():
             wanted = re.findall(r"float64|int64|int32|text", kind)
             kinds = {"text": "U", "float64": "f8", "int64": "i8", "int32": "i4"}
-            assert saved[name].dtype.str[1:].startswith(kinds[wanted[-1 if name == "version" else 0]]), name
+            assert (
+                saved[name].dtype.str[1:].startswith(kinds[wanted[-1 if name == "version" else 0]])
+            ), name
 
 
-def test_a_pixel_lies_where_the_grid_says(tmp_path: Path, results: dict[int, Reconstruction]) -> None:
-    """Row 0 is the lowest y: the peak of the picture, by origin and pixel size, is the peak of the pixels."""
+def test_a_pixel_lies_where_the_grid_says(
+    tmp_path: Path, results: dict[int, Reconstruction]
+) -> None:
+    """Row 0 is the lowest y: the peak of the picture, by origin and pixel size, is the peak of the
+    pixels."""
     model = prebuilt()[0]
     save_results(tmp_path / "out.npz", model, session().as_frames(), results)
     with np.load(tmp_path / "out.npz") as saved:

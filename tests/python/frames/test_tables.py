@@ -1,4 +1,5 @@
-"""Text tables: delimiters, headers, decimal commas, column choices, and bad cells named by line and column."""
+"""Text tables: delimiters, headers, decimal commas, column choices, and bad cells named by line and
+column."""
 
 from __future__ import annotations
 
@@ -31,10 +32,24 @@ def write(tmp_path: Path, text: str | bytes) -> Path:
         '"a";"b";"c"\n"1";"2,5";"-0,03"\n4;5;6\n',
         b"\xef\xbb\xbf1,2.5,-3e-2\n4,5,6",
     ],
-    ids=["comma", "semicolon", "decimal-comma", "tab", "spaces", "bar", "ends-in-comma", "header", "quotes", "bom"],
+    ids=[
+        "comma",
+        "semicolon",
+        "decimal-comma",
+        "tab",
+        "spaces",
+        "bar",
+        "ends-in-comma",
+        "header",
+        "quotes",
+        "bom",
+    ],
 )
 def test_the_same_numbers_come_out_of_every_dialect(tmp_path: Path, text: str | bytes) -> None:
-    assert read_table(write(tmp_path, text)).numbers(range(3)).tolist() == [[1, 2.5, -0.03], [4, 5, 6]]
+    assert read_table(write(tmp_path, text)).numbers(range(3)).tolist() == [
+        [1, 2.5, -0.03],
+        [4, 5, 6],
+    ]
 
 
 def test_headers_name_columns_and_bad_cells_are_named(tmp_path: Path) -> None:
@@ -71,7 +86,9 @@ def test_column_choices() -> None:
     for bad in ("4", "2:9", "3:1", "-1"):
         with pytest.raises(UsageError, match="out of range; there are 0 to 3"):
             chosen(bad, 4, names, "--columns")
-    with pytest.raises(UsageError, match="'d' is no number, range a:b or header name; names are time, a, b, c"):
+    with pytest.raises(
+        UsageError, match="'d' is no number, range a:b or header name; names are time, a, b, c"
+    ):
         chosen("d", 4, names, "--columns")
 
 
@@ -95,4 +112,6 @@ def test_a_forced_delimiter(tmp_path: Path) -> None:
     assert read_table(path, "/").numbers(range(2)).tolist() == [[1, 2], [3, 4]]
     with pytest.raises(UsageError, match="one character or one of comma"):
         read_table(path, "slash")
-    assert read_table(write(tmp_path, "5 6\n1 2\n"), header_rows=1).numbers(range(2)).tolist() == [[1, 2]]
+    assert read_table(write(tmp_path, "5 6\n1 2\n"), header_rows=1).numbers(range(2)).tolist() == [
+        [1, 2]
+    ]

@@ -1,4 +1,5 @@
-"""The catalogue's group Bytes: whatever comes from outside as bytes. Fuzzed by libFuzzer (tests/fuzz) and by hypothesis."""
+"""The catalogue's group Bytes: whatever comes from outside as bytes. Fuzzed by libFuzzer
+(tests/fuzz) and by hypothesis."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ CASES = (
         "Any bytes as a model",
         "A model file is cut, flipped, spliced or made up, its checksum right or not.",
         "Lengths, indices and numbers in it reach into memory and arithmetic.",
-        "Refused and nothing touched; or opened, and every number out of it is finite. C and Python agree on which.",
+        "Refused and nothing touched; or opened, and every number out of it is finite. C and Python"
+        " agree on which.",
         (
             f"{FUZZ}/fuzz_model.c",
             "bytes/test_bytes_models.py::test_a_damaged_model_is_refused_in_a_line",
@@ -32,15 +34,20 @@ CASES = (
         "Any bytes on the wire",
         "Noise, and packets cut, damaged and run together, in any pieces.",
         "A decoder keeps state between pieces, and trusts lengths.",
-        "Whatever the pieces, the same packets come out; each stretch is counted once; nothing unchecked is used.",
-        (f"{FUZZ}/fuzz_link.c", "bytes/test_bytes_packets.py::test_any_line_gives_packets_whatever_the_pieces"),
+        "Whatever the pieces, the same packets come out; each stretch is counted once; nothing"
+        " unchecked is used.",
+        (
+            f"{FUZZ}/fuzz_link.c",
+            "bytes/test_bytes_packets.py::test_any_line_gives_packets_whatever_the_pieces",
+        ),
     ),
     Case(
         "bytes/payloads",
         "Any payload, any command",
         "The checksum is right, the content is not.",
         "Counts and enumerations come from the other side.",
-        "A payload is of its type or malformed, and said so on one line; a command is read as a board reads it, or not at all.",
+        "A payload is of its type or malformed, and said so on one line; a command is read as a"
+        " board reads it, or not at all.",
         (
             "bytes/test_bytes_packets.py::test_any_payload_is_of_its_type_or_malformed",
             "bytes/test_bytes_packets.py::test_any_command_is_read_as_a_board_reads_it_or_not_at_all",
@@ -51,7 +58,8 @@ CASES = (
         "Any numbers as a frame",
         "Frames of any float bits, with any options, masks and tares, in any order.",
         "Infinities, denormals and the ends of the range meet in sums.",
-        "Finite results, a residual no worse than at zero, the same bits from portable and AVX2 kernels.",
+        "Finite results, a residual no worse than at zero, the same bits from portable and AVX2"
+        " kernels.",
         (f"{FUZZ}/fuzz_frame.c", "tests/c/test_out_of_range.c", "tests/c/test_extremes.c"),
     ),
     Case(

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from hard_case import Case
 
-ROWS, ELECTRODES, DRIFT = (f"hard_cases/test_{name}.py" for name in ("rows", "electrodes", "reference_drift"))
+ROWS, ELECTRODES, DRIFT = (
+    f"hard_cases/test_{name}.py" for name in ("rows", "electrodes", "reference_drift")
+)
 
 CASES: tuple[Case, ...] = (
     Case(
@@ -12,17 +14,18 @@ CASES: tuple[Case, ...] = (
         "Nothing wrong",
         "Random scenes at 60 dB with contact impedances that differ by a fifth.",
         "Whatever looks for faults must leave healthy frames alone.",
-        "Nothing is found but, in a few scenes, that touches are hard to count; no row is left out; the image has the bits "
-        "that it has without looking.",
+        "Nothing is found but, in a few scenes, that touches are hard to count; no row is left out;"
+        " the image has the bits that it has without looking.",
         (f"{ROWS}::test_clean_frames_are_left_alone",),
     ),
     Case(
         "frames/zero-and-denormal",
         "Zeros and denormal numbers",
         "A frame of zeros, of denormal numbers, or with one row that fell to a denormal number.",
-        "Every electrode looks open; ratios to the reference vanish, and logarithms of them do not exist.",
-        "All zero is refused as a dead front end, not as sixteen open electrodes; the image is zero. All denormal shows no "
-        "touch. One denormal row is a glitch: left out and counted.",
+        "Every electrode looks open; ratios to the reference vanish, and logarithms of them do not"
+        " exist.",
+        "All zero is refused as a dead front end, not as sixteen open electrodes; the image is"
+        " zero. All denormal shows no touch. One denormal row is a glitch: left out and counted.",
         (f"{ROWS}::test_zero_and_denormal", f"{ROWS}::test_one_denormal_row"),
     ),
     Case(
@@ -30,8 +33,8 @@ CASES: tuple[Case, ...] = (
         "NaN and infinities",
         "One, ten or forty rows are no finite numbers, or more than half of all.",
         "One NaN makes every pixel NaN if it comes through.",
-        "Such rows are left out and counted; beyond max_masked the frame is refused, the image is zero, and the next good frame "
-        "gives the bits that it always gave.",
+        "Such rows are left out and counted; beyond max_masked the frame is refused, the image is"
+        " zero, and the next good frame gives the bits that it always gave.",
         (f"{ROWS}::test_not_finite",),
     ),
     Case(
@@ -39,26 +42,30 @@ CASES: tuple[Case, ...] = (
         "A glitch",
         "One row of a frame is off by 5 % of rms(V0) to five times that.",
         "The image has four to five times its peak, somewhere else.",
-        "A full scan tells by the row's reciprocal and, which of the two is wrong, by the other rows: it is left out and "
-        "counted, and at most 0.02 of the MIoU are lost. A half scan has no reciprocals: only what the other rows contradict "
-        "is left out, and the mean loss is at most half of what it would be.",
+        "A full scan tells by the row's reciprocal and, which of the two is wrong, by the other"
+        " rows: it is left out and counted, and at most 0.02 of the MIoU are lost. A half scan has"
+        " no reciprocals: only what the other rows contradict is left out, and the mean loss is at"
+        " most half of what it would be.",
         (f"{ROWS}::test_glitch", f"{ROWS}::test_glitch_in_half_scans"),
     ),
     Case(
         "frames/glitch-while-taring",
         "A glitch while taring",
         "One reading of one of 16 quiet frames is off by half of rms(V0).",
-        "It moves the reference by a thirtieth and raises lambda_noise until light presses are gated.",
-        "The reading is left out and counted; lambda_noise changes by at most 30 %, and at most 0.02 of the MIoU are lost.",
+        "It moves the reference by a thirtieth and raises lambda_noise until light presses are"
+        " gated.",
+        "The reading is left out and counted; lambda_noise changes by at most 30 %, and at most"
+        " 0.02 of the MIoU are lost.",
         (f"{ROWS}::test_glitch_while_taring",),
     ),
     Case(
         "frames/saturation",
         "Saturation",
         "Rows at the converter's limit: in the touched frame, in the quiet ones, in both.",
-        "A clipped voltage is a finite number like any other; the image has up to nine times its peak.",
-        "In a touched frame such rows are left out and counted apart; in a quiet one the reference is refused until the rows are "
-        "masked.",
+        "A clipped voltage is a finite number like any other; the image has up to nine times its"
+        " peak.",
+        "In a touched frame such rows are left out and counted apart; in a quiet one the reference"
+        " is refused until the rows are masked.",
         (f"{ROWS}::test_saturation_in_touch", f"{ROWS}::test_saturation_in_baseline"),
     ),
     Case(
@@ -74,7 +81,8 @@ CASES: tuple[Case, ...] = (
         "Bridged electrodes",
         "A drop of gel joins two electrodes by 10 ohm, neighbours or others.",
         "Between neighbours only the rows across them die; between others none does.",
-        "Neighbours are named in the very frame and left out. A bridge between others is a misfit, by name.",
+        "Neighbours are named in the very frame and left out. A bridge between others is a misfit,"
+        " by name.",
         (f"{ELECTRODES}::test_bridged",),
     ),
     Case(
@@ -98,8 +106,8 @@ CASES: tuple[Case, ...] = (
         "A channel's polarity flips",
         "All 13 rows of one pair of electrodes come with the other sign.",
         "The change is twice the voltage.",
-        "Its two electrodes are named, the 13 rows are left out, their reciprocals stand for them: at most 0.02 of the MIoU are "
-        "lost.",
+        "Its two electrodes are named, the 13 rows are left out, their reciprocals stand for them:"
+        " at most 0.02 of the MIoU are lost.",
         (f"{ELECTRODES}::test_polarity_flip",),
     ),
     Case(
@@ -115,15 +123,16 @@ CASES: tuple[Case, ...] = (
         "Gain drift",
         "The current or the amplifier drifts by 1 to 20 % after the tare.",
         "5 % of every voltage is more than most touches make.",
-        "The peak follows the gain; up to 5 % it loses at most 2 % of itself, up to 20 % at most 5 %; at most 0.02 of the MIoU "
-        "are lost.",
+        "The peak follows the gain; up to 5 % it loses at most 2 % of itself, up to 20 % at most 5"
+        " %; at most 0.02 of the MIoU are lost.",
         (f"{DRIFT}::test_gain_drift",),
     ),
     Case(
         "frames/drying",
         "A gel that dries",
         "The baseline moves for an hour after the tare.",
-        "The sheet's conductivity falls by a sixth; without the drift's direction ignored, that is all there is to see.",
+        "The sheet's conductivity falls by a sixth; without the drift's direction ignored, that is"
+        " all there is to see.",
         "Touches stay: at most one lost or too many, at most 0.03 of the MIoU lost.",
         (f"{DRIFT}::test_drying",),
     ),
@@ -132,8 +141,8 @@ CASES: tuple[Case, ...] = (
         "A common-mode jump",
         "A constant of 1 or 5 % of rms(V0) is added to all rows.",
         "It is no drift of the gain, and nearly such as a sheet could give.",
-        "No row is left out for it. 1 % costs at most 0.1 of the MIoU. 5 % spoils the image; at least half of such "
-        "frames are named.",
+        "No row is left out for it. 1 % costs at most 0.1 of the MIoU. 5 % spoils the image; at"
+        " least half of such frames are named.",
         (f"{DRIFT}::test_common_mode_jump",),
     ),
     Case(
@@ -141,7 +150,8 @@ CASES: tuple[Case, ...] = (
         "A touch during the tare",
         "The skin is tared while it is touched; then the touch goes.",
         "The reference is wrong, and nothing about it is odd.",
-        "Nothing can be known then; once the touch has gone, every frame says that the reference is stale.",
+        "Nothing can be known then; once the touch has gone, every frame says that the reference is"
+        " stale.",
         (f"{DRIFT}::test_touch_during_tare",),
     ),
     Case(

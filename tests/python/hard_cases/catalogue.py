@@ -15,7 +15,13 @@ HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent
 ROOT = TESTS.parents[1]
 
-CASES = (*cases_frames.CASES, *cases_physics.CASES, *cases_problem.CASES, *cases_time.CASES, *cases_bytes.CASES)
+CASES = (
+    *cases_frames.CASES,
+    *cases_physics.CASES,
+    *cases_problem.CASES,
+    *cases_time.CASES,
+    *cases_bytes.CASES,
+)
 
 OF_THE_CATALOGUE = "hard_cases/test_catalogue.py"
 
@@ -24,7 +30,9 @@ def tests_in(path: Path) -> list[str]:
     """The names of the test functions at the top of a module, and in its classes."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     return [
-        node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+        node.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
     ]
 
 
@@ -38,5 +46,9 @@ def exists(test: str) -> bool:
 
 def hard_tests() -> set[str]:
     """Every test of this folder, but those of the catalogue itself."""
-    found = {f"{path.parent.name}/{path.name}::{name}" for path in HERE.glob("test_*.py") for name in tests_in(path)}
+    found = {
+        f"{path.parent.name}/{path.name}::{name}"
+        for path in HERE.glob("test_*.py")
+        for name in tests_in(path)
+    }
     return {name for name in found if not name.startswith(OF_THE_CATALOGUE)}

@@ -1,8 +1,10 @@
-"""Judging a float32 result by float64 arithmetic on the same numbers: objective, duality gap, and what rounding may add to each.
+"""Judging a float32 result by float64 arithmetic on the same numbers: objective, duality gap, and
+what rounding may add to each.
 
-With u = 2^-24, a sum of k products of float32 numbers in any order is off by at most k u times the sum of their magnitudes
-(Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.1, terms in u^2 left out). The residual y - S x of x with
-k non-zeros is so off by at most rho = (k + 2) u (|y| + sum_j |x_j| |s_j|) in norm, and a correlation s_j' r of r rows by
+With u = 2^-24, a sum of k products of float32 numbers in any order is off by at most k u times the
+sum of their magnitudes (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.1,
+terms in u^2 left out). The residual y - S x of x with k non-zeros is so off by at most rho = (k +
+2) u (|y| + sum_j |x_j| |s_j|) in norm, and a correlation s_j' r of r rows by
 |s_j| (rho + r u |r|).
 """
 
@@ -13,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from everywhere import Outcome, as_float32
 
-from eitskin.solve.reference_problem import greatest
+from eitskin.reference.problem import greatest
 from margins import Margins
 
 U = 2.0**-24
@@ -27,7 +29,8 @@ def objective_of(s: np.ndarray, y: np.ndarray, x: np.ndarray, lam: float) -> flo
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A point ``x`` of the problem S (r, n), y (r,), lambda, sign rule; all float64 of float32 numbers."""
+    """A point ``x`` of the problem S (r, n), y (r,), lambda, sign rule; all float64 of float32
+    numbers."""
 
     s: np.ndarray
     y: np.ndarray
@@ -68,14 +71,17 @@ class Judged:
 
     @property
     def objective_rounding(self) -> float:
-        """How far off the objective may be: |r| rho for the residual, and (r + n) u of the sums of squares and magnitudes."""
+        """How far off the objective may be: |r| rho for the residual, and (r + n) u of the sums of
+        squares and magnitudes."""
         r, (rank, n) = float(np.linalg.norm(self.residual)), self.s.shape
         return r * self.rho + 0.5 * self.rho**2 + (rank + n + 4) * U * self.objective
 
     @property
     def gap_rounding(self) -> float:
-        """How far off the gap may be: as the objective, and by the correlations' error dc: sum_j |x_j| dc_j for the slacks, and,
-        as s = lambda / max c is off by at most dc / max c, that share of |r|^2 + sum_j |x_j c_j|."""
+        """How far off the gap may be: as the objective, and by the correlations' error dc: sum_j
+        |x_j| dc_j for the slacks, and, as s = lambda / max c is off by at most dc / max c, that
+        share of |r|^2 + sum_j |x_j c_j|.
+        """
         r = self.residual
         correlation, norm = self.s.T @ r, float(np.linalg.norm(r))
         off = np.linalg.norm(self.s, axis=0) * (self.rho + self.s.shape[0] * U * norm)
@@ -92,8 +98,9 @@ def judged(s: np.ndarray, data: np.ndarray, sign: str, one: Outcome) -> Judged:
 
 
 def check_sound(margins: Margins, case: str, point: Judged, one: Outcome) -> None:
-    """All that holds for every result: finite numbers, signs kept, objective, residual and gap no worse than at the start, and
-    what is reported is what a float64 look at the coefficients finds; each but for rounding."""
+    """All that holds for every result: finite numbers, signs kept, objective, residual and gap no
+    worse than at the start, and what is reported is what a float64 look at the coefficients finds;
+    each but for rounding."""
     assert one.status == 0 and one.finite()
     allowed = {"increase": 1, "decrease": -1}.get(point.sign)
     wrong = 0 if allowed is None else np.count_nonzero(point.x * allowed < 0)
@@ -101,15 +108,36 @@ def check_sound(margins: Margins, case: str, point: Judged, one: Outcome) -> Non
     start, slack = point.at_zero(), point.objective_rounding
     half = max(start.objective, 1e-300)
     rise = max(0.0, point.objective - start.objective)
-    margins.everywhere(case, "objective above the start", rise / half, (slack + start.objective_rounding) / half, "|y|^2/2")
-    size, longer = float(np.linalg.norm(point.y)) or 1.0, float(np.linalg.norm(point.residual) - np.linalg.norm(point.y))
+    margins.everywhere(
+        case,
+        "objective above the start",
+        rise / half,
+        (slack + start.objective_rounding) / half,
+        "|y|^2/2",
+    )
+    size, longer = (
+        float(np.linalg.norm(point.y)) or 1.0,
+        float(np.linalg.norm(point.residual) - np.linalg.norm(point.y)),
+    )
     allowance = point.rho + point.s.shape[0] * U * size
-    margins.everywhere(case, "residual above the start", max(0.0, longer) / size, allowance / size, "|y|")
+    margins.everywhere(
+        case, "residual above the start", max(0.0, longer) / size, allowance / size, "|y|"
+    )
     worse = max(0.0, point.gap - start.gap)
-    margins.everywhere(case, "gap above the start", worse / half, (point.gap_rounding + start.gap_rounding) / half, "|y|^2/2")
+    margins.everywhere(
+        case,
+        "gap above the start",
+        worse / half,
+        (point.gap_rounding + start.gap_rounding) / half,
+        "|y|^2/2",
+    )
     nothing_known = one.info.stop == "macs" and one.info.iterations == 0
     if one.info.stop not in ("zero", "gate", "diverged") and not nothing_known:
         said = abs(one.info.gap - point.gap)
-        margins.everywhere(case, "reported gap off the true one", said / half, point.gap_rounding / half, "|y|^2/2")
+        margins.everywhere(
+            case, "reported gap off the true one", said / half, point.gap_rounding / half, "|y|^2/2"
+        )
         off = abs(one.info.residual - float(np.linalg.norm(point.residual)))
-        margins.everywhere(case, "reported residual off the true one", off / size, allowance / size, "|y|")
+        margins.everywhere(
+            case, "reported residual off the true one", off / size, allowance / size, "|y|"
+        )

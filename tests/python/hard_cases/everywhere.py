@@ -1,4 +1,5 @@
-"""The same steps on the host's own kernels, on plain C, and on the emulated Cortex-M7: every bit must be the same."""
+"""The same steps on the host's own kernels, on plain C, and on the emulated Cortex-M7: every bit
+must be the same."""
 
 from __future__ import annotations
 
@@ -15,16 +16,25 @@ from eitskin.core.results import Info, Options, Touch
 from eitskin.errors import EitskinError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.options import default_options
-from eitskin.study.emulated import EmulatedFrame, EmulatedRun, run_steps
-from eitskin.study.emulated_steps import Choose, Forget, Load, Mask, Play, Solve, Step, Tare
+from eitskin_studies.harness.emulated import EmulatedFrame, EmulatedRun, run_steps
+from eitskin_studies.harness.emulated_steps import (
+    Choose,
+    Forget,
+    Load,
+    Mask,
+    Play,
+    Solve,
+    Step,
+    Tare,
+)
 
 NUMBERS = ("lambda_", "lambda_max", "lambda_noise", "gap", "gap_rel", "residual", "data_norm")
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One frame as a host gave it: status 0 or the core's error, ``image`` (n,) S/m, ``coefficients`` (n,), touches and info; an
-    error leaves an image of zeros."""
+    """One frame as a host gave it: status 0 or the core's error, ``image`` (n,) S/m,
+    ``coefficients`` (n,), touches and info; an error leaves an image of zeros."""
 
     status: int
     image: np.ndarray
@@ -37,7 +47,11 @@ class Outcome:
         numbers = [getattr(self.info, name) for name in NUMBERS]
         for t in self.touches:
             numbers += [t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n]
-        return bool(np.isfinite(self.image).all() and np.isfinite(self.coefficients).all() and np.isfinite(numbers).all())
+        return bool(
+            np.isfinite(self.image).all()
+            and np.isfinite(self.coefficients).all()
+            and np.isfinite(numbers).all()
+        )
 
 
 class Host(CoreEngine):
@@ -70,9 +84,14 @@ class Host(CoreEngine):
             status = int(self._lib.eits_solve(self._context))
         else:
             status = self.solve_frame(numbers)
-        self._lib.eits_find_touches(self._context, self._touches, len(self._touches), self._touch_count)
+        self._lib.eits_find_touches(
+            self._context, self._touches, len(self._touches), self._touch_count
+        )
         each = (self._touches[k] for k in range(self._touch_count[0]))
-        found = tuple(Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n) for t in each)
+        found = tuple(
+            Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n)
+            for t in each
+        )
         return Outcome(status, self._image.copy(), self.coefficients(), found, self.last_info())
 
 
@@ -85,7 +104,8 @@ def as_float32(values: np.ndarray) -> np.ndarray:
 def on_host(
     steps: Sequence[Step], width: str = "float32", *, prepared: bool = True, portable: bool = False
 ) -> tuple[list[int], list[Outcome]]:
-    """The statuses of models, options and tares, and the outcomes of frames; all rounded to float32 first."""
+    """The statuses of models, options and tares, and the outcomes of frames; all rounded to float32
+    first."""
     statuses: list[int] = []
     outcomes: list[Outcome] = []
     host: Host | None = None
@@ -123,15 +143,45 @@ def _electrode_bits(numbers: tuple[int, ...]) -> str:
 def as_printed(outcome: Outcome) -> tuple[object, ...]:
     """In the emulated program's words."""
     i = outcome.info
-    info = ":".join([str(i.nonzeros), str(i.masked), str(i.step_halvings), *(bits(getattr(i, name)) for name in NUMBERS)])
-    info = ":".join([info, str(i.findings), str(i.saturated), str(i.glitches), bits(i.misfit), bits(i.unexplained)])
-    info = ":".join([info, *map(_electrode_bits, (i.open_electrodes, i.bridged_electrodes, i.noisy_electrodes))])
+    info = ":".join(
+        [
+            str(i.nonzeros),
+            str(i.masked),
+            str(i.step_halvings),
+            *(bits(getattr(i, name)) for name in NUMBERS),
+        ]
+    )
+    info = ":".join(
+        [
+            info,
+            str(i.findings),
+            str(i.saturated),
+            str(i.glitches),
+            bits(i.misfit),
+            bits(i.unexplained),
+        ]
+    )
+    info = ":".join(
+        [info, *map(_electrode_bits, (i.open_electrodes, i.bridged_electrodes, i.noisy_electrodes))]
+    )
     words = [
-        f" {t.id}:" + ":".join(map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n)))
+        f" {t.id}:"
+        + ":".join(
+            map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n))
+        )
         for t in outcome.touches
     ]
     image = zlib.crc32(outcome.image.tobytes())
-    return (outcome.status, i.stop, i.iterations, i.macs, i.touch_macs, image, info, f"{len(words)}{''.join(words)}")
+    return (
+        outcome.status,
+        i.stop,
+        i.iterations,
+        i.macs,
+        i.touch_macs,
+        image,
+        info,
+        f"{len(words)}{''.join(words)}",
+    )
 
 
 def _of_board(frame: EmulatedFrame) -> tuple[object, ...]:
@@ -142,7 +192,8 @@ def _of_board(frame: EmulatedFrame) -> tuple[object, ...]:
 
 
 class SameEverywhere:
-    """Runs steps on all three and asserts that they agree; gives the host's outcomes, which are then the Cortex-M7's too."""
+    """Runs steps on all three and asserts that they agree; gives the host's outcomes, which are
+    then the Cortex-M7's too."""
 
     def __init__(self, program: Path, new_folder: Callable[[], Path]) -> None:
         self._program, self._new_folder = program, new_folder
@@ -155,16 +206,19 @@ class SameEverywhere:
         options: Options | None = None,
         masked: np.ndarray | None = None,
     ) -> list[Outcome]:
-        """Of frames (k, m) after a tare on quiet frames (q, m), volts, which must be taken; None: the model's options."""
+        """Of frames (k, m) after a tare on quiet frames (q, m), volts, which must be taken; None:
+        the model's options."""
         chosen = options or default_options(decode_model(blob, "model"))
         masks = [] if masked is None else [Mask(masked)]
-        statuses, outcomes = self.steps([Load(blob), Choose(chosen), *masks, Tare(quiet_v), Play(frames_v)])
+        statuses, outcomes = self.steps(
+            [Load(blob), Choose(chosen), *masks, Tare(quiet_v), Play(frames_v)]
+        )
         assert statuses == [0, 0, 0], statuses
         return outcomes
 
     def steps(self, steps: Sequence[Step]) -> tuple[list[int], list[Outcome]]:
-        """Of any steps: statuses of models, options and tares, and outcomes. Many models a call: each start of QEMU takes a
-        second."""
+        """Of any steps: statuses of models, options and tares, and outcomes. Many models a call:
+        each start of QEMU takes a second."""
         statuses, own = on_host(steps)
         for prepared, portable in ((False, False), (False, True)):
             others, plain = on_host(steps, prepared=prepared, portable=portable)

@@ -1,4 +1,5 @@
-"""Random scenes of one to three touches on the paper's skin, and the same with something wrong; simulated once a session."""
+"""Random scenes of one to three touches on the paper's skin, and the same with something wrong;
+simulated once a session."""
 
 from __future__ import annotations
 
@@ -14,10 +15,10 @@ from eitskin.scene.description import scene_from_table
 from eitskin.scene.random_touches import Scene, random_touches
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import Bench
+from eitskin.scoring import metrics
+from eitskin.scoring.score import Scorer, scorer_for
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
-from eitskin.study.judge import metrics
-from eitskin.study.judge.score import Scorer, scorer_for
 from small_models import prebuilt
 
 SEED, COUNT, QUIET = 9, 6, 16
@@ -40,11 +41,25 @@ def bench() -> Bench:
 
 
 def frames_of(
-    k: int, effects: dict[str, Any], protocol: Protocol | None = None, rate_hz: float = 20.0, frames: int = 1
+    k: int,
+    effects: dict[str, Any],
+    protocol: Protocol | None = None,
+    rate_hz: float = 20.0,
+    frames: int = 1,
 ) -> np.ndarray:
     """One quiet frame of scene k, then ``frames`` touched ones (frames + 1, m) V, without noise."""
-    touches = [{"radius_mm": t.radius_mm, "x_mm": t.x_mm, "y_mm": t.y_mm, "contrast": t.contrast} for t in scenes()[k].touches]
-    head = {"name": "fault", "skin": "paper", "seed": 1000 * SEED + k, "frames": frames, "rate_hz": rate_hz, "quiet_frames": 1}
+    touches = [
+        {"radius_mm": t.radius_mm, "x_mm": t.x_mm, "y_mm": t.y_mm, "contrast": t.contrast}
+        for t in scenes()[k].touches
+    ]
+    head = {
+        "name": "fault",
+        "skin": "paper",
+        "seed": 1000 * SEED + k,
+        "frames": frames,
+        "rate_hz": rate_hz,
+        "quiet_frames": 1,
+    }
     text = {"scene": head, "touch": touches, "effects": CONTACTS | effects}
     scene = scene_from_table(text, "fault", Path())
     if protocol is not None:
@@ -61,7 +76,8 @@ def swapped(i: int, j: int) -> Protocol:
 
 @cache
 def simulated() -> list[dict[str, np.ndarray]]:
-    """By scene: "quiet" and "touched" (m,), and what is wrong, with electrode k or those from k on."""
+    """By scene: "quiet" and "touched" (m,), and what is wrong, with electrode k or those from k
+    on."""
     found = []
     for k in range(COUNT):
         quiet, touched = frames_of(k, {})
@@ -70,11 +86,16 @@ def simulated() -> list[dict[str, np.ndarray]]:
         faults = {
             "detached": frames_of(k, {"detached": {"electrodes": pair[:1]}}),
             "bridged": frames_of(k, {"bridged": {"electrodes": pair, "resistance_ohm": 10.0}}),
-            "bridged apart": frames_of(k, {"bridged": {"electrodes": apart, "resistance_ohm": 10.0}}),
+            "bridged apart": frames_of(
+                k, {"bridged": {"electrodes": apart, "resistance_ohm": 10.0}}
+            ),
             "swapped": frames_of(k, {}, swapped(*pair)),
             "swapped apart": frames_of(k, {}, swapped(*apart)),
         }
-        found.append({"quiet": quiet, "touched": touched} | {name: frames[-1] for name, frames in faults.items()})
+        found.append(
+            {"quiet": quiet, "touched": touched}
+            | {name: frames[-1] for name, frames in faults.items()}
+        )
     return found
 
 
@@ -112,4 +133,6 @@ def miou(image: np.ndarray, k: int) -> float:
     judge, scene = scorer().judge, scenes()[k]
     truth = metrics.disc_mask(judge.raster.points_mm, scene.centres_mm(), scene.radii_mm())
     shown = judge.lookup.show(np.asarray(image, dtype=np.float64))
-    return float(metrics.miou(metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold), truth))
+    return float(
+        metrics.miou(metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold), truth)
+    )

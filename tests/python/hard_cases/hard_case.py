@@ -11,8 +11,9 @@ GROUPS = ("Frames", "Physics", "Problem", "Time", "Bytes")
 class Case:
     """A case that makes an EIT skin's numbers go wrong.
 
-    ``id`` is "group/name" in lower case. ``tests``: "FILE.py::test" below tests/python, or a path from the root for what
-    is no Python test. ``picture``: a file's name in docs/results/pictures, made by the function of that name in ``pictures.py``.
+    ``id`` is "group/name" in lower case. ``tests``: "FILE.py::test" below tests/python, or a path
+    from the root for what is no Python test. ``picture``: a file's name in docs/results/pictures,
+    made by the function of that name in ``pictures.py``.
     """
 
     id: str

@@ -1,4 +1,5 @@
-"""Skins whose electrodes see little, or much of the same; each model is built once, on a coarse mesh."""
+"""Skins whose electrodes see little, or much of the same; each model is built once, on a coarse
+mesh."""
 
 from __future__ import annotations
 
@@ -19,7 +20,13 @@ from eitskin.skin.skin import Skin
 def bunched() -> Skin:
     """16 electrodes on a quarter of a disk's rim: 4 mm wide, 5 mm apart, of 314 mm."""
     places = tuple(2.5 + 5.0 * k for k in range(16))
-    return Skin("bunched", disk(100.0), Electrodes(16, 3.0, positions_mm=places), conductivity_s_per_m=0.02, thickness_mm=5.0)
+    return Skin(
+        "bunched",
+        disk(100.0),
+        Electrodes(16, 3.0, positions_mm=places),
+        conductivity_s_per_m=0.02,
+        thickness_mm=5.0,
+    )
 
 
 def strip() -> Skin:
@@ -30,10 +37,21 @@ def strip() -> Skin:
 
 def many(count: int) -> Skin:
     """A disk with so many electrodes."""
-    return Skin(f"{count} electrodes", disk(100.0), Electrodes(count, 2.0), conductivity_s_per_m=0.02, thickness_mm=5.0)
+    return Skin(
+        f"{count} electrodes",
+        disk(100.0),
+        Electrodes(count, 2.0),
+        conductivity_s_per_m=0.02,
+        thickness_mm=5.0,
+    )
 
 
-SKINS = {"bunched": bunched, "strip": strip, "32 electrodes": lambda: many(32), "64 electrodes": lambda: many(64)}
+SKINS = {
+    "bunched": bunched,
+    "strip": strip,
+    "32 electrodes": lambda: many(32),
+    "64 electrodes": lambda: many(64),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +77,9 @@ class HardSkin:
             change = np.zeros(len(centres))
             for _ in range(2):
                 middle = centres[rng.integers(len(centres))]
-                change[np.linalg.norm(centres - middle, axis=1) <= 0.12 * size] = 2 * self.skin.conductivity_s_per_m
+                change[np.linalg.norm(centres - middle, axis=1) <= 0.12 * size] = (
+                    2 * self.skin.conductivity_s_per_m
+                )
             frames.append(self.linear.v0_v + self.linear.jacobian @ change)
         return self._noisy(np.array(frames), 3, noise)
 

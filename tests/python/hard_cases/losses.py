@@ -1,4 +1,5 @@
-"""How the image changes as frames get worse: with noise, with rows left out, with coarser numbers."""
+"""How the image changes as frames get worse: with noise, with rows left out, with coarser
+numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ import numpy as np
 from everywhere import Outcome
 
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Load, Mask, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Mask, Play, Step, Tare
 from small_models import small, small_blob, small_model
 
 COUNT = 12
@@ -17,7 +18,11 @@ NOISE = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)  # of rms(V0)
 ROWS_OUT = (0, 4, 8, 16, 32, 64)  # of 208
 BITS = (24, 14, 13, 12, 11, 10, 9, 8)
 LEVELS = {"noise": NOISE, "rows left out": ROWS_OUT, "bits": BITS}
-UNITS = {"noise": "noise, share of rms(V0)", "rows left out": "rows left out, of 208", "bits": "bits of the converter"}
+UNITS = {
+    "noise": "noise, share of rms(V0)",
+    "rows left out": "rows left out, of 208",
+    "bits": "bits of the converter",
+}
 
 
 @cache
@@ -45,18 +50,27 @@ def steps_of(kind: str, level: float) -> list[Step]:
         frames, quiet = np.round(frames / step) * step, np.round(quiet / step) * step
     masked = np.zeros(len(v0), dtype=bool)
     masked[order_of_loss()[: int(level) if kind == "rows left out" else 0]] = True
-    options = replace(default_options(small_model()), findings=0)  # linear answers are no sheet's, and rows would be left out
+    options = replace(
+        default_options(small_model()), findings=0
+    )  # linear answers are no sheet's, and rows would be left out
     return [Load(small_blob()), Choose(options), Mask(masked), Tare(quiet), Play(frames)]
 
 
 def all_steps() -> list[Step]:
     """Every kind at every level."""
-    return [step for kind, levels in LEVELS.items() for level in levels for step in steps_of(kind, level)]
+    return [
+        step
+        for kind, levels in LEVELS.items()
+        for level in levels
+        for step in steps_of(kind, level)
+    ]
 
 
 def errors_of(outcomes: list[Outcome]) -> dict[str, list[float]]:
     """By kind and level: |image - image at the first level| / |that|, mean over the frames."""
-    images = np.array([one.image.astype(np.float64) for one in outcomes]).reshape(-1, COUNT, len(outcomes[0].image))
+    images = np.array([one.image.astype(np.float64) for one in outcomes]).reshape(
+        -1, COUNT, len(outcomes[0].image)
+    )
     errors: dict[str, list[float]] = {}
     place = 0
     for kind, levels in LEVELS.items():

@@ -1,4 +1,5 @@
-"""Models whose stored matrix is whatever a case asks for, on a protocol of 8 electrodes: 40 rows, 20 after the fold."""
+"""Models whose stored matrix is whatever a case asks for, on a protocol of 8 electrodes: 40 rows,
+20 after the fold."""
 
 from __future__ import annotations
 
@@ -47,8 +48,9 @@ def made_model(
     v_ref_scale: float = 1.0,
     column_weight: np.ndarray | None = None,
 ) -> Model:
-    """A model that stores ``s`` (r, n), r up to 20, n up to 64. Its P takes the first r folded rows, times ``projection_scale``;
-    the reference is near ``v_ref_scale`` volts. ``lipschitz`` None: that of what is stored."""
+    """A model that stores ``s`` (r, n), r up to 20, n up to 64. Its P takes the first r folded
+    rows, times ``projection_scale``; the reference is near ``v_ref_scale`` volts. ``lipschitz``
+    None: that of what is stored."""
     rank, columns = s.shape
     fold = protocol().reciprocal_pairs()
     stored = store(s, storage)
@@ -66,7 +68,11 @@ def made_model(
         v_ref_v=v_ref.astype(np.float32),
         projection=(projection_scale * np.eye(rank, FOLDED)).astype(np.float32),
         stored=stored,
-        column_weight=np.ones(columns, dtype=np.float32) if column_weight is None else column_weight.astype(np.float32),
+        column_weight=(
+            np.ones(columns, dtype=np.float32)
+            if column_weight is None
+            else column_weight.astype(np.float32)
+        ),
         lipschitz=lipschitz_of(stored.decode(rank)) if lipschitz is None else lipschitz,
         noise_gain=1.0,
         defaults=Defaults(),
@@ -84,7 +90,10 @@ def plain_options(s: np.ndarray, **changes: object) -> Options:
     from dataclasses import replace
 
     base = default_options(made_model(s))
-    return replace(base, **{"gate_factor": 0.0, "lambda_noise_factor": 0.0, "project_baseline": False, **changes})  # type: ignore[arg-type]
+    return replace(
+        base,
+        **{"gate_factor": 0.0, "lambda_noise_factor": 0.0, "project_baseline": False, **changes},
+    )  # type: ignore[arg-type]
 
 
 def frame_of(model: Model, data: np.ndarray) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""docs/results/hard-cases.md: the catalogue, and how near to its bound each case came. ``scripts/hard-cases`` makes it."""
+"""docs/results/hard-cases.md: the catalogue, and how near to its bound each case came.
+``scripts/hard-cases`` makes it."""
 
 from __future__ import annotations
 
@@ -42,7 +43,9 @@ def cell(margin: Margin | None) -> str:
     """One entry of a table."""
     if margin is None:
         return ""
-    return _anchor(f"{margin.measured:.2g} of {margin.bound:.2g}{' ' + margin.unit if margin.unit else ''}")
+    return _anchor(
+        f"{margin.measured:.2g} of {margin.bound:.2g}{' ' + margin.unit if margin.unit else ''}"
+    )
 
 
 def _rows(case: Case, found: Margins) -> Iterator[str]:
@@ -54,7 +57,15 @@ def _rows(case: Case, found: Margins) -> Iterator[str]:
 
 
 def _text(case: Case) -> list[str]:
-    lines = ["", f"### {case.title}", "", f"`{case.id}`. {case.happens} {case.hard}", "", f"**Promise**: {case.promise}", ""]
+    lines = [
+        "",
+        f"### {case.title}",
+        "",
+        f"`{case.id}`. {case.happens} {case.hard}",
+        "",
+        f"**Promise**: {case.promise}",
+        "",
+    ]
     if case.picture is not None:
         lines += [f"![{case.title}](pictures/{case.picture})", ""]
     return [*lines, "Tests: " + ", ".join(f"`{name}`" for name in case.tests), ""]
@@ -70,7 +81,11 @@ def page_text(found: Margins) -> str:
             rows = list(_rows(case, found))
             lines += _text(case)
             if rows:
-                lines += ["| measured of bound | " + " | ".join(TARGETS) + " |", "|---|---|---|---|", *rows]
+                lines += [
+                    "| measured of bound | " + " | ".join(TARGETS) + " |",
+                    "|---|---|---|---|",
+                    *rows,
+                ]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -87,7 +102,11 @@ def missing(found: Margins) -> list[str]:
         for case in CASES
         for test in case.tests
         if test.startswith("hard_cases/") and test not in found.passed
-    ] + [f"{case.id}: no margin was recorded" for case in CASES if case.id not in worst and _measures(case)]
+    ] + [
+        f"{case.id}: no margin was recorded"
+        for case in CASES
+        if case.id not in worst and _measures(case)
+    ]
 
 
 def _measures(case: Case) -> bool:
@@ -96,14 +115,25 @@ def _measures(case: Case) -> bool:
 
 def main() -> int:
     """Run the hard cases, or read what a run left, then write page and pictures."""
-    parser = argparse.ArgumentParser(description="run the hard cases and write docs/results/hard-cases.md and its pictures")
-    parser.add_argument("--margins", type=Path, help="what  pytest --margins FOLDER  left there, in place of a run")
+    parser = argparse.ArgumentParser(
+        description="run the hard cases and write docs/results/hard-cases.md and its pictures"
+    )
+    parser.add_argument(
+        "--margins", type=Path, help="what  pytest --margins FOLDER  left there, in place of a run"
+    )
     parser.add_argument("--only-page", action="store_true", help="leave the pictures as they are")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = given.margins or Path(name)
         if given.margins is None:
-            chosen = sorted({f"{TESTS / test.split('::')[0]}" for case in CASES for test in case.tests if _runs_here(test)})
+            chosen = sorted(
+                {
+                    f"{TESTS / test.split('::')[0]}"
+                    for case in CASES
+                    for test in case.tests
+                    if _runs_here(test)
+                }
+            )
             command = [sys.executable, "-m", "pytest", "-q", "--margins", name, *chosen]
             if subprocess.run(command, cwd=ROOT, check=False).returncode != 0:
                 return 1

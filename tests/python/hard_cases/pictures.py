@@ -13,9 +13,9 @@ from touch_scenes import frames_of, groups
 
 from eitskin.scene.random_touches import Scene
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Load, Play, Tare
-from eitskin.view.comparison_pictures import truth_marks
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Tare
+from eitskin_studies.pictures.comparison_pictures import truth_marks
 from small_models import prebuilt
 
 SHOWN = (  # group, which of it, sign looked for, title
@@ -39,11 +39,15 @@ def panel(group: str, which: int, sign: str, title: str) -> Panel:
     model, blob = prebuilt()
     options = replace(default_options(model), sign=sign)
     frames = frames_of(group)[which : which + 1]
-    _, (one,) = on_host([Load(blob), Choose(options), Tare(touch_scenes.simulated().quiet_v), Play(frames)])
+    _, (one,) = on_host(
+        [Load(blob), Choose(options), Tare(touch_scenes.simulated().quiet_v), Play(frames)]
+    )
     truth = truth_marks(Scene(title, groups()[group][which]), model.skin.conductivity_s_per_m)
     found = tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in one.touches)
     count = len(found)
-    return Panel(f"{title}\n{count} touch{'' if count == 1 else 'es'} found", one.image, truth, found)
+    return Panel(
+        f"{title}\n{count} touch{'' if count == 1 else 'es'} found", one.image, truth, found
+    )
 
 
 def draw_touches(path: Path) -> None:
@@ -51,7 +55,9 @@ def draw_touches(path: Path) -> None:
     model, _ = prebuilt()
     note = "solid circles: touches that are there; crosses and dashed circles: found"
     panels = [panel(*each) for each in SHOWN]
-    draw_panels(path, model.skin, model.grid, panels, 4, title="Touches that are hard to see", note=note)
+    draw_panels(
+        path, model.skin, model.grid, panels, 4, title="Touches that are hard to see", note=note
+    )
 
 
 def draw_losses(path: Path) -> None:
@@ -62,7 +68,9 @@ def draw_losses(path: Path) -> None:
         figure = matplotlib.figure.Figure(figsize=(9.0, 3.0), layout="constrained")
         for k, (kind, values) in enumerate(errors.items()):
             axes = figure.add_subplot(1, 3, k + 1)
-            axes.plot([float(level) for level in LEVELS[kind]][1:], values[1:], "o-", color="#1f6fb4")
+            axes.plot(
+                [float(level) for level in LEVELS[kind]][1:], values[1:], "o-", color="#1f6fb4"
+            )
             axes.set_ylim(0, 0.26)
             axes.set_xlabel(UNITS[kind], color=INK)
             if kind == "noise":
@@ -74,7 +82,10 @@ def draw_losses(path: Path) -> None:
         save_png(figure, path)
 
 
-DRAWN: dict[str, Callable[[Path], None]] = {"hard-touches.png": draw_touches, "hard-losses.png": draw_losses}
+DRAWN: dict[str, Callable[[Path], None]] = {
+    "hard-touches.png": draw_touches,
+    "hard-losses.png": draw_losses,
+}
 
 
 def draw(name: str, path: Path) -> None:

@@ -9,8 +9,8 @@ from certified import Judged, judged
 from everywhere import on_host
 from made_models import made_blob, plain_options
 
-from eitskin.solve.reference_problem import greatest
-from eitskin.study.emulated_steps import Choose, Load, Solve
+from eitskin.reference.problem import greatest
+from eitskin_studies.harness.emulated_steps import Choose, Load, Solve
 
 RANK, COLUMNS = 20, 64
 
@@ -47,13 +47,18 @@ def gaussian(seed: int, rank: int = RANK, columns: int = COLUMNS) -> RandomProbl
     return with_data(s / np.linalg.norm(s, axis=0), seed + 1000)
 
 
-def smooth(seed: int, rank: int = RANK, columns: int = COLUMNS, decay: float = 0.8) -> RandomProblem:
-    """Columns that resemble their neighbours, singular values falling by ``decay``: as a Jacobian's do."""
+def smooth(
+    seed: int, rank: int = RANK, columns: int = COLUMNS, decay: float = 0.8
+) -> RandomProblem:
+    """Columns that resemble their neighbours, singular values falling by ``decay``: as a Jacobian's
+    do."""
     rng = np.random.default_rng(seed)
     left, _ = np.linalg.qr(rng.standard_normal((rank, rank)))
     place = (np.arange(columns) + 0.5) / columns
     right = np.array([np.cos(np.pi * k * place + rng.uniform(0, 1)) for k in range(rank)])
-    return with_data(left @ (decay ** np.arange(rank)[:, None] * right) / np.sqrt(columns / 2), seed + 1000)
+    return with_data(
+        left @ (decay ** np.arange(rank)[:, None] * right) / np.sqrt(columns / 2), seed + 1000
+    )
 
 
 def whitened(seed: int) -> RandomProblem:
@@ -63,7 +68,12 @@ def whitened(seed: int) -> RandomProblem:
 
 
 def optimum_of(problem: RandomProblem, sign: str, share: float = 0.03) -> Judged:
-    """By the active set in float64, to a gap of 1e-12 of the start's objective; ``share`` is lambda / lambda_max."""
-    options = plain_options(problem.s, solver="active-set", sign=sign, iterations=1000, gap_rel=1e-12, lambda_rel=share)
-    _, outcomes = on_host([Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], "float64")
+    """By the active set in float64, to a gap of 1e-12 of the start's objective; ``share`` is lambda
+    / lambda_max."""
+    options = plain_options(
+        problem.s, solver="active-set", sign=sign, iterations=1000, gap_rel=1e-12, lambda_rel=share
+    )
+    _, outcomes = on_host(
+        [Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], "float64"
+    )
     return judged(problem.s, problem.y, sign, outcomes[0])

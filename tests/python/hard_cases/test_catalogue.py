@@ -34,7 +34,9 @@ def test_the_page_is_that_of_the_catalogue() -> None:
     assert page.without_numbers(written) == page.without_numbers(page.page_text(Margins()))
     for case in CASES:
         section = written.split(f"`{case.id}`.")[1].split("\n### ")[0]
-        assert "\n| " in section or not page._measures(case), f"{case.id} has no margin on the page; run scripts/hard-cases"
+        assert "\n| " in section or not page._measures(case), (
+            f"{case.id} has no margin on the page; run scripts/hard-cases"
+        )
 
 
 def test_pictures_exist() -> None:

@@ -1,4 +1,5 @@
-"""Matrices whose columns do not tell coefficients apart: duplicates, opposites, zeros, low ranks; and whitened ones."""
+"""Matrices whose columns do not tell coefficients apart: duplicates, opposites, zeros, low ranks;
+and whitened ones."""
 
 from __future__ import annotations
 
@@ -10,12 +11,13 @@ from made_models import made_blob, plain_options
 from random_problems import RandomProblem, gaussian, rounded, smooth, whitened, with_data
 
 from eitskin.core.results import SIGNS, SOLVERS
-from eitskin.study.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 from margins import Margins
 
 
 def repeated(times: int, turn: float = 1.0, nudge: float = 0.0) -> RandomProblem:
-    """16 directions, each ``times`` in a row, every second turned by ``turn`` and nudged by so much of itself."""
+    """16 directions, each ``times`` in a row, every second turned by ``turn`` and nudged by so much
+    of itself."""
     base, rng = gaussian(2, columns=64 // times).s, np.random.default_rng(3)
     s = np.repeat(base, times, axis=1)
     s[:, 1::2] = turn * s[:, 1::2] + nudge * rng.standard_normal(s[:, 1::2].shape)
@@ -56,7 +58,12 @@ PROBLEMS = {
         "all but opposite": repeated(2, -1.0, 1e-7),
     },
     "problem/zero-columns": {"every third": with_zeros(), "all": all_zero()},
-    "problem/low-rank": {"1": of_rank(1), "2": of_rank(2), "7": of_rank(7), "falling by 0.5": smooth(11, decay=0.5)},
+    "problem/low-rank": {
+        "1": of_rank(1),
+        "2": of_rank(2),
+        "7": of_rank(7),
+        "falling by 0.5": smooth(11, decay=0.5),
+    },
     "problem/whitened": {"orthonormal rows": whitened(12)},
     "problem/steep-columns": {"1e-6 to 1e6": steep()},
 }
@@ -64,8 +71,9 @@ PROBLEMS = {
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """Whatever the columns, the result is sound (certified.check_sound); a zero column stays at zero; where the data have fewer
-    directions than there are columns, the active set's support is no larger than they are."""
+    """Whatever the columns, the result is sound (certified.check_sound); a zero column stays at
+    zero; where the data have fewer directions than there are columns, the active set's support is
+    no larger than they are."""
     steps: list[Step] = []
     asked = []
     for case, problems in PROBLEMS.items():
@@ -73,14 +81,30 @@ def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str)
             lipschitz = 1.0 if not problem.s.any() else None
             for sign in SIGNS:
                 for share in (0.003, 0.3):
-                    options = plain_options(problem.s, solver=solver, sign=sign, iterations=150, lambda_rel=share)
-                    steps += [Load(made_blob(problem.s, lipschitz=lipschitz)), Choose(options), Solve(problem.y[None])]
+                    options = plain_options(
+                        problem.s, solver=solver, sign=sign, iterations=150, lambda_rel=share
+                    )
+                    steps += [
+                        Load(made_blob(problem.s, lipschitz=lipschitz)),
+                        Choose(options),
+                        Solve(problem.y[None]),
+                    ]
                     asked.append((case, name, problem, sign))
     _, outcomes = same_everywhere.steps(steps)
     for (case, name, problem, sign), one in zip(asked, outcomes, strict=True):
         check_sound(margins, case, judged(problem.s, problem.y, sign, one), one)
         silent = ~problem.s.any(axis=0)
         if silent.any():
-            margins.everywhere(case, "zero columns that moved", np.count_nonzero(one.coefficients[silent]), 0, "pixels")
-        if solver == "active-set" and one.info.stop == "optimum" and case != "problem/steep-columns":
+            margins.everywhere(
+                case,
+                "zero columns that moved",
+                np.count_nonzero(one.coefficients[silent]),
+                0,
+                "pixels",
+            )
+        if (
+            solver == "active-set"
+            and one.info.stop == "optimum"
+            and case != "problem/steep-columns"
+        ):
             assert one.info.nonzeros <= np.linalg.matrix_rank(problem.s, tol=1e-4), name

@@ -14,7 +14,8 @@ from margins import Margins
 
 
 def played(spoil: Callable[[int, np.ndarray], np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """By scene: quiet frames; then the touched frame, and that with ``spoil`` applied, both with the same noise."""
+    """By scene: quiet frames; then the touched frame, and that with ``spoil`` applied, both with
+    the same noise."""
     pairs = []
     for k in range(COUNT):
         clean = simulated()[k]["touched"]
@@ -23,7 +24,9 @@ def played(spoil: Callable[[int, np.ndarray], np.ndarray]) -> list[tuple[np.ndar
     return pairs
 
 
-def compare(same_everywhere: SameEverywhere, spoil: Callable[[int, np.ndarray], np.ndarray]) -> list[tuple[Outcome, Outcome]]:
+def compare(
+    same_everywhere: SameEverywhere, spoil: Callable[[int, np.ndarray], np.ndarray]
+) -> list[tuple[Outcome, Outcome]]:
     """Clean and spoilt outcome of each scene."""
     return [(clean, spoilt) for clean, spoilt in run(same_everywhere, played(spoil), options())]
 
@@ -46,17 +49,38 @@ def using(*electrodes: int) -> np.ndarray:
 def test_detached(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Its number is told, and its 52 rows are left out."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["detached"])):
-        assert one.status == 0 and one.info.open_electrodes == (k % ELECTRODES,) and one.info.bridged_electrodes == ()
+        assert (
+            one.status == 0
+            and one.info.open_electrodes == (k % ELECTRODES,)
+            and one.info.bridged_electrodes == ()
+        )
         unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
-        margins.everywhere("frames/detached", "rows left out that should not be, or the other way round", unlike, 0, "rows")
+        margins.everywhere(
+            "frames/detached",
+            "rows left out that should not be, or the other way round",
+            unlike,
+            0,
+            "rows",
+        )
 
 
 def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Neighbours: both are named, and left out. Others: no row is dead, and the frame is named a misfit."""
+    """Neighbours: both are named, and left out. Others: no row is dead, and the frame is named a
+    misfit."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["bridged"])):
-        assert one.status == 0 and one.info.bridged_electrodes == pair(k) and one.info.open_electrodes == ()
+        assert (
+            one.status == 0
+            and one.info.bridged_electrodes == pair(k)
+            and one.info.open_electrodes == ()
+        )
         unlike = abs(one.info.masked - int(using(*pair(k)).sum()))
-        margins.everywhere("frames/bridged", "rows left out that should not be, or the other way round", unlike, 0, "rows")
+        margins.everywhere(
+            "frames/bridged",
+            "rows left out that should not be, or the other way round",
+            unlike,
+            0,
+            "rows",
+        )
     for _, one in compare(same_everywhere, lambda k, _: simulated()[k]["bridged apart"]):
         assert one.status == 0 and "misfit" in one.info.findings_by_name
 
@@ -66,7 +90,9 @@ def test_swapped(same_everywhere: SameEverywhere, margins: Margins, which: str) 
     """A misfit, by name."""
     outcomes = compare(same_everywhere, lambda k, _: simulated()[k][which])
     assert all(one.status == 0 for _, one in outcomes)
-    margins.everywhere("frames/swapped", f"{which}: frames that were not named", unnamed(outcomes), 0, "frames")
+    margins.everywhere(
+        "frames/swapped", f"{which}: frames that were not named", unnamed(outcomes), 0, "frames"
+    )
 
 
 def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
@@ -74,21 +100,37 @@ def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
     def rub(k: int, frame: np.ndarray) -> np.ndarray:
         generator = np.random.default_rng([k, 6])
-        return np.asarray(np.where(using(k % ELECTRODES), frame * (1 + 0.2 * generator.standard_normal(len(frame))), frame))
+        return np.asarray(
+            np.where(
+                using(k % ELECTRODES),
+                frame * (1 + 0.2 * generator.standard_normal(len(frame))),
+                frame,
+            )
+        )
 
     for k, (_, one) in enumerate(compare(same_everywhere, rub)):
         assert one.status == 0 and one.info.noisy_electrodes == (k % ELECTRODES,)
         unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
-        margins.everywhere("frames/noisy", "rows left out that should not be, or the other way round", unlike, 0, "rows")
+        margins.everywhere(
+            "frames/noisy",
+            "rows left out that should not be, or the other way round",
+            unlike,
+            0,
+            "rows",
+        )
 
 
 def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """A channel's 13 rows with the other sign: its two electrodes are named, the rows left out; their reciprocals stand for
-    them."""
+    """A channel's 13 rows with the other sign: its two electrodes are named, the rows left out;
+    their reciprocals stand for them."""
     losses = []
-    outcomes = compare(same_everywhere, lambda k, frame: np.where(ROWS[:, 2] == k % ELECTRODES, -frame, frame))
+    outcomes = compare(
+        same_everywhere, lambda k, frame: np.where(ROWS[:, 2] == k % ELECTRODES, -frame, frame)
+    )
     for k, (clean, one) in enumerate(outcomes):
-        assert {"electrode noisy", "misfit"} <= set(one.info.findings_by_name) and one.info.noisy_electrodes == pair(k)
+        assert {"electrode noisy", "misfit"} <= set(
+            one.info.findings_by_name
+        ) and one.info.noisy_electrodes == pair(k)
         assert one.info.masked == 13
         losses.append(miou(clean.image, k) - miou(one.image, k))
     margins.everywhere("frames/polarity", "MIoU lost", np.mean(losses), 0.02)
@@ -99,4 +141,6 @@ def test_rotated(same_everywhere: SameEverywhere, margins: Margins, by: int) -> 
     """All rows in the place of others: a misfit, by name."""
     outcomes = compare(same_everywhere, lambda _, frame: np.roll(frame, by))
     assert all(one.status == 0 for _, one in outcomes)
-    margins.everywhere("frames/rotated", f"by {by}: frames that were not named", unnamed(outcomes), 0, "frames")
+    margins.everywhere(
+        "frames/rotated", f"by {by}: frames that were not named", unnamed(outcomes), 0, "frames"
+    )

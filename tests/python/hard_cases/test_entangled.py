@@ -1,4 +1,5 @@
-"""The search for touches where they bend each other's field: joined, parted and coupled discs, and refined images."""
+"""The search for touches where they bend each other's field: joined, parted and coupled discs, and
+refined images."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from touch_scenes import entangled, frames_of
 
 from eitskin.core.results import ALL_SEARCH, COUPLED, REGROUP, STRAIGHT, Options
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Forget, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, Tare
 from margins import Margins
 from small_models import prebuilt
 
@@ -21,14 +22,23 @@ MOST = 16
 
 
 def searches() -> list[Options]:
-    """All and each part of the search, images refined, any sign, as many touches as there may be."""
+    """All and each part of the search, images refined, any sign, as many touches as there may
+    be."""
     own = replace(default_options(prebuilt()[0]), max_touches=MOST, refine=True)
-    parts = [replace(own, touch_search=bits) for bits in (ALL_SEARCH, 0, STRAIGHT, REGROUP, COUPLED, REGROUP | COUPLED)]
-    return [*parts, replace(own, sign="both"), replace(own, touch_share=0.0, gate_factor=0.0, touch_threshold=0.05)]
+    parts = [
+        replace(own, touch_search=bits)
+        for bits in (ALL_SEARCH, 0, STRAIGHT, REGROUP, COUPLED, REGROUP | COUPLED)
+    ]
+    return [
+        *parts,
+        replace(own, sign="both"),
+        replace(own, touch_share=0.0, gate_factor=0.0, touch_threshold=0.05),
+    ]
 
 
 def test_touches_in_each_others_field(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Same bits everywhere, finite, on the skin, within max_touches; two that overlap lie within the outline of both."""
+    """Same bits everywhere, finite, on the skin, within max_touches; two that overlap lie within
+    the outline of both."""
     model, blob = prebuilt()
     steps: list[Step] = [Load(blob), Tare(touch_scenes.simulated().quiet_v)]
     frames, chosen = frames_of("entangled"), searches()
@@ -39,12 +49,22 @@ def test_touches_in_each_others_field(same_everywhere: SameEverywhere, margins: 
     for k, one in enumerate(outcomes):
         assert one.status == 0 and one.finite()
         options = chosen[k // len(frames)]
-        margins.everywhere(CASE, "touches beyond max_touches", max(0, len(one.touches) - MOST), 0, "touches")
-        margins.everywhere(CASE, "touches beyond the skin", sum(not on_skin(t) for t in one.touches), 0, "touches")
+        margins.everywhere(
+            CASE, "touches beyond max_touches", max(0, len(one.touches) - MOST), 0, "touches"
+        )
+        margins.everywhere(
+            CASE, "touches beyond the skin", sum(not on_skin(t) for t in one.touches), 0, "touches"
+        )
         assert one.info.iterations <= 2 * options.iterations
-        margins.everywhere(CASE, "multiply-accumulates of the search", one.info.touch_macs / 1e6, 60, "million")
+        margins.everywhere(
+            CASE, "multiply-accumulates of the search", one.info.touch_macs / 1e6, 60, "million"
+        )
     first = outcomes[list(entangled()).index("two that overlap")]
     middle = max(float(np.hypot(t.x_mm, t.y_mm)) for t in first.touches)
     margins.everywhere(CASE, "centre's distance from the middle, overlapping", middle, 15, "mm")
     assert 1 <= len(first.touches) <= 2
-    assert all(0 < t.radius_mm <= model.defaults.touch_max_radius_mm for one in outcomes for t in one.touches)
+    assert all(
+        0 < t.radius_mm <= model.defaults.touch_max_radius_mm
+        for one in outcomes
+        for t in one.touches
+    )

@@ -1,6 +1,8 @@
-"""Touches that are hard to see, simulated on another mesh than the model's, in the model's default settings.
+"""Touches that are hard to see, simulated on another mesh than the model's, in the model's default
+settings.
 
-A place may be off by half of a touch's radius, so that the found centre lies well within the touch, unless a test says otherwise.
+A place may be off by half of a touch's radius, so that the found centre lies well within the touch,
+unless a test says otherwise.
 """
 
 from __future__ import annotations
@@ -11,25 +13,41 @@ import numpy as np
 import pytest
 import touch_scenes
 from everywhere import Outcome, SameEverywhere
-from touch_scenes import CONTRASTS, PRESS_PLACES, PRESSES, QUIET_TRIALS, RIM_MM, crowds, frames_of, groups, quiet_trials
+from touch_scenes import (
+    CONTRASTS,
+    PRESS_PLACES,
+    PRESSES,
+    QUIET_TRIALS,
+    RIM_MM,
+    crowds,
+    frames_of,
+    groups,
+    quiet_trials,
+)
 
 from eitskin.core.results import Touch as Found
 from eitskin.scene.random_touches import Touch
+from eitskin.scoring.matching import match
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Load, Play, Tare
-from eitskin.study.judge.matching import match
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Tare
 from margins import Margins
 from small_models import prebuilt
 
 
-def reconstruct(same_everywhere: SameEverywhere, frames: np.ndarray, sign: str = "increase") -> list[Outcome]:
-    """Frames after a tare on the scenes' quiet frames; every number finite, no more touches than asked for."""
+def reconstruct(
+    same_everywhere: SameEverywhere, frames: np.ndarray, sign: str = "increase"
+) -> list[Outcome]:
+    """Frames after a tare on the scenes' quiet frames; every number finite, no more touches than
+    asked for."""
     model, blob = prebuilt()
     options = replace(default_options(model), sign=sign)
     steps = [Load(blob), Choose(options), Tare(touch_scenes.simulated().quiet_v), Play(frames)]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
-    assert all(one.status == 0 and one.finite() and len(one.touches) <= options.max_touches for one in outcomes)
+    assert all(
+        one.status == 0 and one.finite() and len(one.touches) <= options.max_touches
+        for one in outcomes
+    )
     assert sum(not on_skin(touch) for one in outcomes for touch in one.touches) == 0
     return outcomes
 
@@ -46,37 +64,56 @@ def off_mm(found: Found, truth: Touch) -> float:
     return float(np.hypot(found.x_mm - truth.x_mm, found.y_mm - truth.y_mm))
 
 
-def check_alone(margins: Margins, case: str, what: str, one: Outcome, truth: Touch, share: float = 0.5) -> None:
+def check_alone(
+    margins: Margins, case: str, what: str, one: Outcome, truth: Touch, share: float = 0.5
+) -> None:
     """One touch, its centre within ``share`` of the true radius."""
-    margins.everywhere(case, f"touches beside the one, {what}", abs(len(one.touches) - 1), 0, "touches")
-    margins.everywhere(case, f"place, {what}", off_mm(one.touches[0], truth), share * truth.radius_mm, "mm")
+    margins.everywhere(
+        case, f"touches beside the one, {what}", abs(len(one.touches) - 1), 0, "touches"
+    )
+    margins.everywhere(
+        case, f"place, {what}", off_mm(one.touches[0], truth), share * truth.radius_mm, "mm"
+    )
 
 
 @pytest.mark.parametrize("where", ["on an electrode", "between electrodes"])
 def test_on_an_electrode(same_everywhere: SameEverywhere, margins: Margins, where: str) -> None:
     """At the rim, over an electrode's middle or in a gap: one touch, inside the skin."""
-    for one, (truth,) in zip(reconstruct(same_everywhere, frames_of(where)), groups()[where], strict=True):
+    for one, (truth,) in zip(
+        reconstruct(same_everywhere, frames_of(where)), groups()[where], strict=True
+    ):
         check_alone(margins, "physics/on-an-electrode", where, one, truth)
         beyond = max(0.0, np.hypot(one.touches[0].x_mm, one.touches[0].y_mm) - RIM_MM)
         margins.everywhere("physics/on-an-electrode", "centre beyond the rim", beyond, 0, "mm")
 
 
 def test_merge_and_part(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Two touches of 9 mm: apart by 30 mm (12 mm of sheet between them, two pixels), two; nearer, two as near or one between
-    them; then two again. Ids are never shared, and one that stays keeps its own."""
+    """Two touches of 9 mm: apart by 30 mm (12 mm of sheet between them, two pixels), two; nearer,
+    two as near or one between them; then two again. Ids are never shared, and one that stays keeps
+    its own."""
     case, outcomes = "physics/merge-and-part", reconstruct(same_everywhere, frames_of("merging"))
-    for one, truths, apart in zip(outcomes, groups()["merging"], touch_scenes.APART_MM, strict=True):
+    for one, truths, apart in zip(
+        outcomes, groups()["merging"], touch_scenes.APART_MM, strict=True
+    ):
         if apart >= 30:
-            margins.everywhere(case, "touches missing or too many, apart", abs(len(one.touches) - 2), 0, "touches")
+            margins.everywhere(
+                case, "touches missing or too many, apart", abs(len(one.touches) - 2), 0, "touches"
+            )
             for truth in truths:
-                margins.everywhere(case, "place, apart", min(off_mm(t, truth) for t in one.touches), 4.5, "mm")
+                margins.everywhere(
+                    case, "place, apart", min(off_mm(t, truth) for t in one.touches), 4.5, "mm"
+                )
         else:
             assert 1 <= len(one.touches) <= 2
             if len(one.touches) == 1:
                 middle = np.hypot(one.touches[0].x_mm, one.touches[0].y_mm)
-                margins.everywhere(case, "centre's distance from the middle, merged", middle, apart / 2, "mm")
+                margins.everywhere(
+                    case, "centre's distance from the middle, merged", middle, apart / 2, "mm"
+                )
             for truth in truths if len(one.touches) == 2 else ():
-                margins.everywhere(case, "place, near", min(off_mm(t, truth) for t in one.touches), 4.5, "mm")
+                margins.everywhere(
+                    case, "place, near", min(off_mm(t, truth) for t in one.touches), 4.5, "mm"
+                )
         assert len({t.id for t in one.touches}) == len(one.touches)
     common = set.intersection(*({t.id for t in one.touches} for one in outcomes))
     assert len(common) == 1
@@ -90,35 +127,55 @@ def test_centre(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
 def test_small(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """3 mm, half of a pixel: found as one touch; its place to its diameter."""
-    for one, (truth,) in zip(reconstruct(same_everywhere, frames_of("radius 3 mm")), groups()["radius 3 mm"], strict=True):
+    for one, (truth,) in zip(
+        reconstruct(same_everywhere, frames_of("radius 3 mm")), groups()["radius 3 mm"], strict=True
+    ):
         check_alone(margins, "physics/sizes", "radius 3 mm", one, truth, share=2.0)
 
 
 def test_large(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """40 mm, beyond touch_max_radius_mm of 30: touches, perhaps several, but only within it; and nearly all of the image's weight
-    lies within it and a pixel around."""
+    """40 mm, beyond touch_max_radius_mm of 30: touches, perhaps several, but only within it; and
+    nearly all of the image's weight lies within it and a pixel around."""
     model, _ = prebuilt()
     centres = model.grid.centres_mm()
-    for one, (truth,) in zip(reconstruct(same_everywhere, frames_of("radius 40 mm")), groups()["radius 40 mm"], strict=True):
+    for one, (truth,) in zip(
+        reconstruct(same_everywhere, frames_of("radius 40 mm")),
+        groups()["radius 40 mm"],
+        strict=True,
+    ):
         assert one.touches
         farthest = max(off_mm(t, truth) for t in one.touches)
         margins.everywhere("physics/sizes", "place, radius 40 mm", farthest, truth.radius_mm, "mm")
         away = np.hypot(centres[:, 0] - truth.x_mm, centres[:, 1] - truth.y_mm)
-        outside = float(one.image[away > truth.radius_mm + model.grid.pixel_mm].sum() / one.image.sum())
-        margins.everywhere("physics/sizes", "image outside of it, radius 40 mm", outside, 0.1, "of the image")
+        outside = float(
+            one.image[away > truth.radius_mm + model.grid.pixel_mm].sum() / one.image.sum()
+        )
+        margins.everywhere(
+            "physics/sizes", "image outside of it, radius 40 mm", outside, 0.1, "of the image"
+        )
 
 
 def test_contrasts(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """1.01 lies within the noise: nothing, or one touch there. 1.1 is found, to a diameter; from 1.5 to 1,000 each is found in
-    its place, and a stronger one is never given a lesser strength."""
+    """1.01 lies within the noise: nothing, or one touch there. 1.1 is found, to a diameter; from
+    1.5 to 1,000 each is found in its place, and a stronger one is never given a lesser strength."""
     case, strength = "physics/contrasts", 0.0
     outcomes = reconstruct(same_everywhere, frames_of("contrasts"))
     for one, (truth,), contrast in zip(outcomes, groups()["contrasts"], CONTRASTS, strict=True):
         if contrast <= 1.01:
             assert len(one.touches) <= 1
             continue
-        check_alone(margins, case, f"contrast {contrast:g}", one, truth, share=0.5 if contrast >= 1.5 else 2.0)
-        lost = max(0.0, strength - one.touches[0].strength_s_per_m_mm2) / one.touches[0].strength_s_per_m_mm2
+        check_alone(
+            margins,
+            case,
+            f"contrast {contrast:g}",
+            one,
+            truth,
+            share=0.5 if contrast >= 1.5 else 2.0,
+        )
+        lost = (
+            max(0.0, strength - one.touches[0].strength_s_per_m_mm2)
+            / one.touches[0].strength_s_per_m_mm2
+        )
         margins.everywhere(case, "strength lost where the contrast rises", lost, 0, "of it")
         strength = one.touches[0].strength_s_per_m_mm2
 
@@ -133,26 +190,43 @@ def test_insulating(same_everywhere: SameEverywhere, margins: Margins, sign: str
 
 
 def test_insulating_under_the_other_sign(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Where only increases are looked for, an insulating touch shows as increases around it: no coefficient has the other sign,
-    and where touches are found that are none, it is said."""
+    """Where only increases are looked for, an insulating touch shows as increases around it: no
+    coefficient has the other sign, and where touches are found that are none, it is said."""
     for one in reconstruct(same_everywhere, frames_of("insulating")):
-        margins.everywhere("physics/insulating", "pixels below 0, increases wanted", np.count_nonzero(one.image < 0), 0, "pixels")
+        margins.everywhere(
+            "physics/insulating",
+            "pixels below 0, increases wanted",
+            np.count_nonzero(one.image < 0),
+            0,
+            "pixels",
+        )
         assert len(one.touches) < 3 or says_that_there_are_too_many(one)
 
 
 def test_light_presses(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """At the gate, 1.2 times the greatest correlation of 32 quiet frames: of 200 quiet frames at most 2 % are taken for a touch;
-    as the press grows it is detected no less often, and in all places from twice the gate on."""
+    """At the gate, 1.2 times the greatest correlation of 32 quiet frames: of 200 quiet frames at
+    most 2 % are taken for a touch; as the press grows it is detected no less often, and in all
+    places from twice the gate on."""
     case = "physics/light-presses"
     quiet = reconstruct(same_everywhere, quiet_trials())
-    margins.everywhere(case, "false alarms", sum(bool(one.touches) for one in quiet) / QUIET_TRIALS, 0.02, "of the frames")
+    margins.everywhere(
+        case,
+        "false alarms",
+        sum(bool(one.touches) for one in quiet) / QUIET_TRIALS,
+        0.02,
+        "of the frames",
+    )
     outcomes, before = reconstruct(same_everywhere, frames_of("presses")), 0
     for k, press in enumerate(PRESSES):
         at_it = outcomes[k * PRESS_PLACES : (k + 1) * PRESS_PLACES]
         seen = sum(bool(one.touches) for one in at_it)
-        margins.everywhere(case, "places lost where the press grows", max(0, before - seen), 0, "places")
+        margins.everywhere(
+            case, "places lost where the press grows", max(0, before - seen), 0, "places"
+        )
         clear = [one for one in at_it if one.info.lambda_max >= 2.4 * one.info.lambda_noise]
-        margins.everywhere(case, "missed at twice the gate", sum(not one.touches for one in clear), 0, "places")
+        margins.everywhere(
+            case, "missed at twice the gate", sum(not one.touches for one in clear), 0, "places"
+        )
         assert press < PRESSES[-1] or len(clear) == PRESS_PLACES
         before = seen
 
@@ -165,19 +239,31 @@ def says_that_there_are_too_many(one: Outcome) -> bool:
 def is_one_group(one: Outcome, touches: tuple[Touch, ...]) -> bool:
     """Whether a single touch was found in place of a group that it covers."""
     return len(one.touches) == 1 and all(
-        np.hypot(t.x_mm - one.touches[0].x_mm, t.y_mm - one.touches[0].y_mm) <= one.touches[0].radius_mm + t.radius_mm
+        np.hypot(t.x_mm - one.touches[0].x_mm, t.y_mm - one.touches[0].y_mm)
+        <= one.touches[0].radius_mm + t.radius_mm
         for t in touches
     )
 
 
-def test_more_touches_than_can_be_told_apart(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Finite, on the skin, at most as many as asked for; and that they are too many is said, but where each is found all the
-    same, and for a group within the size of one touch, which is found as one that covers it."""
+def test_more_touches_than_can_be_told_apart(
+    same_everywhere: SameEverywhere, margins: Margins
+) -> None:
+    """Finite, on the skin, at most as many as asked for; and that they are too many is said, but
+    where each is found all the same, and for a group within the size of one touch, which is found
+    as one that covers it."""
     outcomes = reconstruct(same_everywhere, frames_of("crowds"))
     for (name, touches), one in zip(crowds().items(), outcomes, strict=True):
         most = default_options(prebuilt()[0]).max_touches
-        margins.everywhere("physics/crowds", "touches beyond max_touches", max(0, len(one.touches) - most), 0, "touches")
+        margins.everywhere(
+            "physics/crowds",
+            "touches beyond max_touches",
+            max(0, len(one.touches) - most),
+            0,
+            "touches",
+        )
         outside = sum(not on_skin(touch) for touch in one.touches)
         margins.everywhere("physics/crowds", "touches beyond the skin", outside, 0, "touches")
-        told_apart = match([(t.x_mm, t.y_mm) for t in touches], [(t.x_mm, t.y_mm) for t in one.touches]).exact
+        told_apart = match(
+            [(t.x_mm, t.y_mm) for t in touches], [(t.x_mm, t.y_mm) for t in one.touches]
+        ).exact
         assert says_that_there_are_too_many(one) or told_apart or is_one_group(one, touches), name

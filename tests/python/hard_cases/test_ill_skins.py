@@ -12,7 +12,7 @@ from hard_skins import SKINS, HardSkin, hard_skin
 
 from eitskin.core.results import SOLVERS, Options
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, Tare
 from margins import Margins
 
 CASE = "problem/ill-conditioned-skins"
@@ -26,7 +26,10 @@ def steps_for(h: HardSkin, options: Options) -> list[Step]:
 def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
     """y of each frame, (r,), in float64."""
     host = Host(h.blob, width)
-    assert [host.status_of(step) for step in (Choose(options), Tare(as_float32(h.quiet_v(8))))] == [0, 0]
+    assert [host.status_of(step) for step in (Choose(options), Tare(as_float32(h.quiet_v(8))))] == [
+        0,
+        0,
+    ]
     data = []
     for frame in as_float32(h.frames_v(FRAMES)):
         host.solve_frame(frame)
@@ -35,36 +38,52 @@ def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
 
 
 def rounding_of_data(h: HardSkin) -> float:
-    """|P| times what a row's datum may be off: 8 roundings of the mean of 8 quiet frames, 4 of difference, gain and product,
-    and k of a row of P: (12 + k) u |v| over k folded rows."""
+    """|P| times what a row's datum may be off: 8 roundings of the mean of 8 quiet frames, 4 of
+    difference, gain and product, and k of a row of P: (12 + k) u |v| over k folded rows."""
     k = len(h.model.v_ref_v)
     norm = float(np.linalg.norm(h.model.projection.astype(np.float64), 2))
     return (12 + k) * U * norm * float(np.linalg.norm(h.model.v_ref_v.astype(np.float64)))
 
 
 def compare_widths(
-    margins: Margins, name: str, h: HardSkin, narrow: Outcome, wide: Outcome, y: np.ndarray, y64: np.ndarray
+    margins: Margins,
+    name: str,
+    h: HardSkin,
+    narrow: Outcome,
+    wide: Outcome,
+    y: np.ndarray,
+    y64: np.ndarray,
 ) -> None:
-    """The optimum's S x moves by at most as much as y, and as far again by lambda, which follows y; each gap g adds sqrt(2 g)."""
+    """The optimum's S x moves by at most as much as y, and as far again by lambda, which follows y;
+    each gap g adds sqrt(2 g)."""
     size = float(np.linalg.norm(y64))
     moved = float(np.linalg.norm(y - y64))
-    margins.everywhere(CASE, f"y, float32 from float64, {name}", moved / size, rounding_of_data(h) / size, "|y|")
-    one, other = judged(h.model.sensitivity, y, "increase", narrow), judged(h.model.sensitivity, y64, "increase", wide)
+    margins.everywhere(
+        CASE, f"y, float32 from float64, {name}", moved / size, rounding_of_data(h) / size, "|y|"
+    )
+    one, other = (
+        judged(h.model.sensitivity, y, "increase", narrow),
+        judged(h.model.sensitivity, y64, "increase", wide),
+    )
     room = 2 * moved + np.sqrt(2 * one.gap) + np.sqrt(2 * (other.gap + U * size**2))
     apart = float(np.linalg.norm(h.model.sensitivity @ (one.x - other.x)))
     margins.everywhere(CASE, f"S x, float32 from float64, {name}", apart / size, room / size, "|y|")
 
 
 @pytest.mark.parametrize("name", SKINS)
-def test_ill_conditioned_skins(same_everywhere: SameEverywhere, margins: Margins, name: str) -> None:
-    """The default settings give finite images and touches; each solver, without projection so that S is the whole problem, a
-    sound result; and to a small gap, float32 what float64 gives."""
+def test_ill_conditioned_skins(
+    same_everywhere: SameEverywhere, margins: Margins, name: str
+) -> None:
+    """The default settings give finite images and touches; each solver, without projection so that
+    S is the whole problem, a sound result; and to a small gap, float32 what float64 gives."""
     h = hard_skin(name)
     usual = default_options(h.model)
     sound = replace(usual, project_baseline=False, gate_factor=0.0)
     precise = replace(sound, solver="active-set", iterations=300, gap_rel=1e-5)
     chosen = [usual, *(replace(sound, solver=solver) for solver in SOLVERS), precise]
-    _, outcomes = same_everywhere.steps([step for options in chosen for step in steps_for(h, options)])
+    _, outcomes = same_everywhere.steps(
+        [step for options in chosen for step in steps_for(h, options)]
+    )
     by_options = [outcomes[k * FRAMES : (k + 1) * FRAMES] for k in range(len(chosen))]
     for one in by_options[0]:
         assert one.status == 0 and one.finite() and one.info.stop in ("iterations", "gate")

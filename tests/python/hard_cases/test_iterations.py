@@ -12,7 +12,7 @@ from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import RandomProblem, gaussian, optimum_of, smooth, whitened
 
 from eitskin.core.results import SIGNS, SOLVERS
-from eitskin.study.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 from margins import Margins
 
 CASE, WIDTHS_CASE = "problem/iterations", "problem/float32-against-float64"
@@ -28,9 +28,11 @@ def optimum(name: str, sign: str) -> Judged:
 
 
 def allowance(best: Judged, k: int) -> float:
-    """What FISTA's objective may lack of the optimum after k iterations from zero with inexact gradients (Schmidt, Le Roux and
-    Bach, NIPS 2011, proposition 2): 2 L (|x*| + 2 A)^2 / (k + 1)^2, A = sum_i i e_i / L, e_i the gradient's error: that of a
-    residual of at most 3 |y| over columns whose norm is sqrt(L), once for the sum that it is and once for its products."""
+    """What FISTA's objective may lack of the optimum after k iterations from zero with inexact
+    gradients (Schmidt, Le Roux and Bach, NIPS 2011, proposition 2): 2 L (|x*| + 2 A)^2 / (k + 1)^2,
+    A = sum_i i e_i / L, e_i the gradient's error: that of a residual of at most 3 |y| over columns
+    whose norm is sqrt(L), once for the sum that it is and once for its products.
+    """
     rank, n = best.s.shape
     lipschitz, size = lipschitz_of(best.s), float(np.linalg.norm(best.y))
     error = np.sqrt(lipschitz) * (n + 2 * rank + 4) * U * 3 * size
@@ -43,20 +45,25 @@ def check_rate(margins: Margins, name: str, best: Judged, k: int, point: Judged)
     half = 0.5 * float(best.y @ best.y)
     lacks = max(0.0, point.objective - best.objective) / half
     bound = (allowance(best, k) + best.gap + point.objective_rounding) / half
-    margins.everywhere(CASE, f"objective above the optimum after k iterations of {name}", lacks, bound, "|y|^2/2")
+    margins.everywhere(
+        CASE, f"objective above the optimum after k iterations of {name}", lacks, bound, "|y|^2/2"
+    )
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_iterations(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """Coordinate descent and active set never raise the objective but for rounding. FISTA may ripple; it stays within its rate,
-    and so does the working set, whose columns left out are looked after."""
+    """Coordinate descent and active set never raise the objective but for rounding. FISTA may
+    ripple; it stays within its rate, and so does the working set, whose columns left out are looked
+    after."""
     steps: list[Step] = []
     asked: list[tuple[str, str, int]] = []
     for name, problem in PROBLEMS.items():
         steps.append(Load(made_blob(problem.s)))
         for sign in SIGNS:
             for k in COUNTS:
-                options = plain_options(problem.s, solver=solver, sign=sign, iterations=k, lambda_rel=SHARE)
+                options = plain_options(
+                    problem.s, solver=solver, sign=sign, iterations=k, lambda_rel=SHARE
+                )
                 steps += [Choose(options), Solve(problem.y[None])]
                 asked.append((name, sign, k))
     _, outcomes = same_everywhere.steps(steps)
@@ -71,7 +78,13 @@ def test_iterations(same_everywhere: SameEverywhere, margins: Margins, solver: s
             half = point.at_zero().objective
             rise = max(0.0, point.objective - before[2].objective)
             slack = point.objective_rounding + before[2].objective_rounding
-            margins.everywhere(CASE, f"objective risen by an iteration of {solver}", rise / half, slack / half, "|y|^2/2")
+            margins.everywhere(
+                CASE,
+                f"objective risen by an iteration of {solver}",
+                rise / half,
+                slack / half,
+                "|y|^2/2",
+            )
         before = (name, sign, point)
 
 
@@ -81,20 +94,35 @@ def smallest_of(s: np.ndarray, columns: np.ndarray) -> float:
 
 
 def solve_to(problem: RandomProblem, solver: str, sign: str, gap: float, width: str) -> Outcome:
-    options = plain_options(problem.s, solver=solver, sign=sign, iterations=100_000, gap_rel=gap, lambda_rel=SHARE)
-    return on_host([Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], width)[1][0]
+    options = plain_options(
+        problem.s, solver=solver, sign=sign, iterations=100_000, gap_rel=gap, lambda_rel=SHARE
+    )
+    return on_host([Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], width)[1][
+        0
+    ]
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_float32_against_float64(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """Both to a gap of 1e-5 |y|^2/2. The objective is strongly convex in S x: f(x) - f* >= |S (x - x*)|^2 / 2 at the optimum x*,
-    so a gap g leaves S x within sqrt(2 g) of the optimum's, and two results within the sum. On the columns where either is not
-    zero x itself differs by at most that over their least singular value, where they are independent."""
+def test_float32_against_float64(
+    same_everywhere: SameEverywhere, margins: Margins, solver: str
+) -> None:
+    """Both to a gap of 1e-5 |y|^2/2. The objective is strongly convex in S x: f(x) - f* >= |S (x -
+    x*)|^2 / 2 at the optimum x*, so a gap g leaves S x within sqrt(2 g) of the optimum's, and two
+    results within the sum. On the columns where either is not zero x itself differs by at most that
+    over their least singular value, where they are independent.
+    """
     steps: list[Step] = []
     asked: list[tuple[str, str]] = []
     for name, problem in PROBLEMS.items():
         for sign in SIGNS:
-            options = plain_options(problem.s, solver=solver, sign=sign, iterations=100_000, gap_rel=1e-5, lambda_rel=SHARE)
+            options = plain_options(
+                problem.s,
+                solver=solver,
+                sign=sign,
+                iterations=100_000,
+                gap_rel=1e-5,
+                lambda_rel=SHARE,
+            )
             steps += [Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])]
             asked.append((name, sign))
     _, outcomes = same_everywhere.steps(steps)
@@ -102,19 +130,42 @@ def test_float32_against_float64(same_everywhere: SameEverywhere, margins: Margi
     for (name, sign), one in zip(asked, outcomes, strict=True):
         problem = PROBLEMS[name]
         wide_outcome = solve_to(problem, solver, sign, 1e-5, "float64")
-        narrow, wide = judged(problem.s, problem.y, sign, one), judged(problem.s, problem.y, sign, wide_outcome)
+        narrow, wide = (
+            judged(problem.s, problem.y, sign, one),
+            judged(problem.s, problem.y, sign, wide_outcome),
+        )
         check_sound(margins, WIDTHS_CASE, narrow, one)
         half, size = narrow.at_zero().objective, float(np.linalg.norm(problem.y))
-        margins.everywhere(WIDTHS_CASE, "gap reached", narrow.gap / half, 1e-5 + narrow.gap_rounding / half, "|y|^2/2")
-        margins.record(WIDTHS_CASE, "gap reached", "host f64", wide.gap / half, 1e-5 * (1 + 1e-6), "|y|^2/2")
-        room = np.sqrt(2 * narrow.gap) + np.sqrt(2 * wide.gap) + np.sqrt(2 * abs(narrow.lam - wide.lam) * np.abs(wide.x).sum())
+        margins.everywhere(
+            WIDTHS_CASE,
+            "gap reached",
+            narrow.gap / half,
+            1e-5 + narrow.gap_rounding / half,
+            "|y|^2/2",
+        )
+        margins.record(
+            WIDTHS_CASE, "gap reached", "host f64", wide.gap / half, 1e-5 * (1 + 1e-6), "|y|^2/2"
+        )
+        room = (
+            np.sqrt(2 * narrow.gap)
+            + np.sqrt(2 * wide.gap)
+            + np.sqrt(2 * abs(narrow.lam - wide.lam) * np.abs(wide.x).sum())
+        )
         apart = float(np.linalg.norm(problem.s @ (narrow.x - wide.x)))
-        margins.everywhere(WIDTHS_CASE, "S x, float32 from float64", apart / size, room / size, "|y|")
+        margins.everywhere(
+            WIDTHS_CASE, "S x, float32 from float64", apart / size, room / size, "|y|"
+        )
         support = (narrow.x != 0) | (wide.x != 0)
         least = smallest_of(problem.s, support)
         if least > 0 and np.count_nonzero(support) <= problem.s.shape[0]:
             longest = float(np.linalg.norm(wide.x))
             moved = float(np.linalg.norm(narrow.x - wide.x))
-            margins.everywhere(WIDTHS_CASE, "x, float32 from float64", moved / longest, room / least / longest, "|x|")
+            margins.everywhere(
+                WIDTHS_CASE,
+                "x, float32 from float64",
+                moved / longest,
+                room / least / longest,
+                "|x|",
+            )
             compared += 1
     assert compared >= 2

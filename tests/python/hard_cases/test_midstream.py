@@ -1,4 +1,5 @@
-"""Model, options or reference replaced while frames come: what follows is as if it had always been so."""
+"""Model, options or reference replaced while frames come: what follows is as if it had always been
+so."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from everywhere import Outcome, SameEverywhere, as_printed
 
 from eitskin.core.results import SIGNS, SOLVERS, Options
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Forget, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, Tare
 from margins import Margins
 from small_models import small, small_blob, small_model
 
@@ -17,26 +18,46 @@ NO_BASELINE = -13
 
 
 def of_the_frame(one: Outcome) -> tuple[object, ...]:
-    """Every bit but those of what came before: ids, which count on, and the MACs of directions that were ready."""
+    """Every bit but those of what came before: ids, which count on, and the MACs of directions that
+    were ready."""
     status, stop, iterations, _, _, image, info, _ = as_printed(one)
-    return status, stop, iterations, image, info, tuple(replace(touch, id=0) for touch in one.touches)
+    return (
+        status,
+        stop,
+        iterations,
+        image,
+        info,
+        tuple(replace(touch, id=0) for touch in one.touches),
+    )
 
 
 def unlike(some: list[Outcome], others: list[Outcome]) -> int:
     """How many frames differ."""
-    return sum(of_the_frame(one) != of_the_frame(other) for one, other in zip(some, others, strict=True))
+    return sum(
+        of_the_frame(one) != of_the_frame(other) for one, other in zip(some, others, strict=True)
+    )
 
 
 def test_model_swapped(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """A second model takes the first one's memory: until it has a reference of its own no frame is taken; then nothing is left of
-    the first, whatever its storage, data and size."""
+    """A second model takes the first one's memory: until it has a reference of its own no frame is
+    taken; then nothing is left of the first, whatever its storage, data and size."""
     s, other = small(), small("l")
     quiet, frames = s.quiet(101, 8), s.frames(100, 2)
-    swaps = [small_blob("i8"), small_blob("f16", "normalised"), small_blob(rank=16), small_blob("i16", "log-ratio")]
+    swaps = [
+        small_blob("i8"),
+        small_blob("f16", "normalised"),
+        small_blob(rank=16),
+        small_blob("i16", "log-ratio"),
+    ]
     steps: list[Step] = [Load(small_blob()), Tare(quiet), Play(frames)]
     for blob in swaps:
         steps += [Load(blob), Play(frames[:1]), Tare(quiet), Play(frames)]
-    steps += [Load(small_blob(outline="l")), Play(other.frames(102, 1)), Tare(other.quiet(103, 8)), Play(other.frames(102, 2))]
+    steps += [
+        Load(small_blob(outline="l")),
+        Play(other.frames(102, 1)),
+        Tare(other.quiet(103, 8)),
+        Play(other.frames(102, 2)),
+    ]
     _, streamed = same_everywhere.steps(steps)
     fresh: list[Step] = []
     for blob in swaps:
@@ -45,23 +66,48 @@ def test_model_swapped(same_everywhere: SameEverywhere, margins: Margins) -> Non
     _, alone = same_everywhere.steps(fresh)
     after = streamed[2:]
     before_tare, taken = after[::3], [one for k, one in enumerate(after) if k % 3]
-    assert all(one.status == NO_BASELINE and not one.image.any() and one.touches == () for one in before_tare)
+    assert all(
+        one.status == NO_BASELINE and not one.image.any() and one.touches == ()
+        for one in before_tare
+    )
     assert all(one.image.any() for one in taken)
-    margins.everywhere("time/model-swapped", "frames unlike those of the model alone", unlike(taken, alone), 0, "frames")
+    margins.everywhere(
+        "time/model-swapped",
+        "frames unlike those of the model alone",
+        unlike(taken, alone),
+        0,
+        "frames",
+    )
 
 
 def changes() -> list[Options]:
     """One option after another, from the usual ones."""
     usual = default_options(small_model())
-    named = [replace(usual, solver=solver) for solver in SOLVERS] + [replace(usual, sign=sign) for sign in SIGNS]
-    named += [replace(usual, project_baseline=False), replace(usual, lambda_rel=0.3), replace(usual, lambda_abs=1e-3)]
-    named += [replace(usual, iterations=3), replace(usual, gap_rel=1e-3), replace(usual, mac_limit=200_000)]
-    return [*named, replace(usual, touch_sweeps=0), replace(usual, max_touches=1), replace(usual, gate_factor=100.0), usual]
+    named = [replace(usual, solver=solver) for solver in SOLVERS] + [
+        replace(usual, sign=sign) for sign in SIGNS
+    ]
+    named += [
+        replace(usual, project_baseline=False),
+        replace(usual, lambda_rel=0.3),
+        replace(usual, lambda_abs=1e-3),
+    ]
+    named += [
+        replace(usual, iterations=3),
+        replace(usual, gap_rel=1e-3),
+        replace(usual, mac_limit=200_000),
+    ]
+    return [
+        *named,
+        replace(usual, touch_sweeps=0),
+        replace(usual, max_touches=1),
+        replace(usual, gate_factor=100.0),
+        usual,
+    ]
 
 
 def test_options_changed(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Cold starts: each frame is as in a context that never had other options. Warm ones: a sign, once changed, leaves nothing
-    that it forbids."""
+    """Cold starts: each frame is as in a context that never had other options. Warm ones: a sign,
+    once changed, leaves nothing that it forbids."""
     s, blob, case = small(), small_blob(), "time/options-changed"
     quiet, frames = s.quiet(111, 8), s.frames(110, 2)
     stream: list[Step] = [Load(blob), Tare(quiet)]
@@ -71,12 +117,21 @@ def test_options_changed(same_everywhere: SameEverywhere, margins: Margins) -> N
         alone += [Load(blob), Tare(quiet), Choose(options), Play(frames)]
     _, streamed = same_everywhere.steps(stream)
     _, fresh = same_everywhere.steps(alone)
-    margins.everywhere(case, "cold frames unlike those of a fresh context", unlike(streamed, fresh), 0, "frames")
+    margins.everywhere(
+        case, "cold frames unlike those of a fresh context", unlike(streamed, fresh), 0, "frames"
+    )
     warm: list[Step] = [Load(blob), Tare(quiet)]
     signs = [sign for _ in range(2) for sign in SIGNS]
     for sign in signs:
         for solver in SOLVERS:
-            warm += [Choose(replace(default_options(small_model()), sign=sign, solver=solver, warm_start=True)), Play(frames)]
+            warm += [
+                Choose(
+                    replace(
+                        default_options(small_model()), sign=sign, solver=solver, warm_start=True
+                    )
+                ),
+                Play(frames),
+            ]
     _, outcomes = same_everywhere.steps(warm)
     each = 2 * len(SOLVERS)
     for k, one in enumerate(outcomes):
@@ -87,8 +142,10 @@ def test_options_changed(same_everywhere: SameEverywhere, margins: Margins) -> N
 
 
 def test_tare_in_midstream(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """A new reference, at rest or under a held touch: what follows is as in a context that never had another, warm starts
-    included; a tare that is refused leaves no reference, and frames are refused until one is taken."""
+    """A new reference, at rest or under a held touch: what follows is as in a context that never
+    had another, warm starts included; a tare that is refused leaves no reference, and frames are
+    refused until one is taken.
+    """
     s, blob = small(), small_blob()
     options = replace(default_options(small_model()), warm_start=True)
     quiet, drifted, frames = s.quiet(121, 8), 1.1 * s.quiet(122, 8), s.frames(120, 3)
@@ -97,14 +154,31 @@ def test_tare_in_midstream(same_everywhere: SameEverywhere, margins: Margins) ->
     broken[5, 7] = np.nan
     head: list[Step] = [Load(blob), Choose(options)]
     statuses, outcomes = same_everywhere.steps(
-        [*head, Tare(quiet), Play(frames), Tare(drifted), Play(1.1 * frames), Tare(held), Play(frames), Tare(broken),
+        [*head, Tare(quiet), Play(frames), Tare(drifted), Play(1.1 * frames), Tare(held),
+        Play(frames), Tare(broken),
          Play(frames[:1]), Tare(quiet), Forget(), Play(frames)]
     )  # fmt: skip
     _, alone = same_everywhere.steps(
-        [*head, Tare(drifted), Play(1.1 * frames), *head, Tare(held), Play(frames), *head, Tare(quiet), Play(frames)]
+        [
+            *head,
+            Tare(drifted),
+            Play(1.1 * frames),
+            *head,
+            Tare(held),
+            Play(frames),
+            *head,
+            Tare(quiet),
+            Play(frames),
+        ]
     )
     assert [status == 0 for status in statuses] == [True] * 5 + [False, True]
     assert outcomes[9].status == NO_BASELINE and not outcomes[9].image.any()
     after = [*outcomes[3:9], *outcomes[10:13]]
-    margins.everywhere("time/tare-in-midstream", "frames unlike those of a fresh context", unlike(after, alone), 0, "frames")
+    margins.everywhere(
+        "time/tare-in-midstream",
+        "frames unlike those of a fresh context",
+        unlike(after, alone),
+        0,
+        "frames",
+    )
     assert not outcomes[6].image.any()

@@ -1,4 +1,5 @@
-"""Stored matrices at the limits of their types: what is lost follows from the step of the quantiser."""
+"""Stored matrices at the limits of their types: what is lost follows from the step of the
+quantiser."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from random_problems import RandomProblem, gaussian, rounded, smooth, with_data
 from eitskin.core.results import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.model.storage import STORAGES, store
-from eitskin.study.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 from margins import Margins
 
 CASE = "problem/quantised"
@@ -20,7 +21,8 @@ HALF_STEP = {"i8": 0.5 / 127, "i16": 0.5 / 32767}  # of a column's greatest numb
 
 
 def ranged(low: float, high: float) -> RandomProblem:
-    """Rows from 1 down to ``low`` within each column, columns from ``high`` down to 1 / ``high``."""
+    """Rows from 1 down to ``low`` within each column, columns from ``high`` down to 1 /
+    ``high``."""
     s = gaussian(41).s * np.geomspace(1, low, 20)[:, None] * np.geomspace(high, 1 / high, 64)
     return with_data(s, 42)
 
@@ -30,35 +32,51 @@ PROBLEMS = {
     "smooth": smooth(44),
     "wide columns": ranged(1e-4, 1.0),
     "long and short columns": ranged(1.0, 100.0),
-    "at the end of f16": RandomProblem(rounded(s := gaussian(45).s * 65000 / np.abs(gaussian(45).s).max()), rounded(s[:, 3])),
+    "at the end of f16": RandomProblem(
+        rounded(s := gaussian(45).s * 65000 / np.abs(gaussian(45).s).max()), rounded(s[:, 3])
+    ),
     "in the denormals of f16": RandomProblem(rounded(s := gaussian(46).s * 1e-5), rounded(s[:, 3])),
 }
 
 
 def entry_errors(s: np.ndarray, storage: str) -> np.ndarray:
-    """The most that each number of S (r, n) may be off: half a step; for f16 2^-11 of it, or half of 2^-24; and the rounding of
-    the scale to float32."""
+    """The most that each number of S (r, n) may be off: half a step; for f16 2^-11 of it, or half
+    of 2^-24; and the rounding of the scale to float32."""
     if storage in HALF_STEP:
-        return np.broadcast_to(HALF_STEP[storage] * np.abs(s).max(axis=0), s.shape) + 2.0**-24 * np.abs(s)
+        return np.broadcast_to(
+            HALF_STEP[storage] * np.abs(s).max(axis=0), s.shape
+        ) + 2.0**-24 * np.abs(s)
     return np.maximum(2.0**-11 * np.abs(s), 2.0**-25) if storage == "f16" else np.zeros_like(s)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_quantised(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """With S' = S + E stored and e(x) = sum_j |x_j| |E_j|, |y - S x| and |y - S' x| differ by at most e(x). So x', within a gap
-    g of the optimum of S', has f(x') <= f* + g + |r'| e(x') + e(x')^2 / 2 + |r*| e(x*) + e(x*)^2 / 2 in the problem of S, and by
-    strong convexity |S (x' - x*)| <= sqrt(2 (f(x') - f*)). E is bounded by the step, before anything is measured."""
+    """With S' = S + E stored and e(x) = sum_j |x_j| |E_j|, |y - S x| and |y - S' x| differ by at
+    most e(x). So x', within a gap g of the optimum of S', has f(x') <= f* + g + |r'| e(x') +
+    e(x')^2 / 2 + |r*| e(x*) + e(x*)^2 / 2 in the problem of S, and by strong convexity |S (x' -
+    x*)| <= sqrt(2 (f(x') - f*)). E is bounded by the step, before anything is measured.
+    """
     steps: list[Step] = []
     asked = []
     for name, problem in PROBLEMS.items():
         lam = 0.1 * problem.lambda_max("both")
         options = plain_options(
-            problem.s, solver=solver, sign="both", iterations=3000, gap_rel=1e-5, lambda_abs=lam, lambda_rel=0.0
+            problem.s,
+            solver=solver,
+            sign="both",
+            iterations=3000,
+            gap_rel=1e-5,
+            lambda_abs=lam,
+            lambda_rel=0.0,
         )
         wide = [Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])]
         best = judged(problem.s, problem.y, "both", on_host(wide, "float64")[1][0])
         for storage in STORAGES:
-            steps += [Load(made_blob(problem.s, storage=storage)), Choose(options), Solve(problem.y[None])]
+            steps += [
+                Load(made_blob(problem.s, storage=storage)),
+                Choose(options),
+                Solve(problem.y[None]),
+            ]
             asked.append((name, storage, problem, best))
     _, outcomes = same_everywhere.steps(steps)
     for (name, storage, problem, best), one in zip(asked, outcomes, strict=True):
@@ -69,23 +87,36 @@ def test_quantised(same_everywhere: SameEverywhere, margins: Margins, solver: st
         check_sound(margins, CASE, point, one)
         sizes = np.linalg.norm(allowed, axis=0)
         mine, its = float(np.abs(point.x) @ sizes), float(np.abs(best.x) @ sizes)
-        residual, best_residual = (float(np.linalg.norm(r)) for r in (point.residual, best.residual))
+        residual, best_residual = (
+            float(np.linalg.norm(r)) for r in (point.residual, best.residual)
+        )
         room = point.gap + best.gap + point.objective_rounding
         room += residual * mine + 0.5 * mine**2 + best_residual * its + 0.5 * its**2
         lacks = max(0.0, objective_of(problem.s, problem.y, point.x, best.lam) - best.objective)
         half, size = best.at_zero().objective, float(np.linalg.norm(problem.y))
-        margins.everywhere(CASE, f"objective above that of f32, {storage}", lacks / half, room / half, "|y|^2/2")
+        margins.everywhere(
+            CASE, f"objective above that of f32, {storage}", lacks / half, room / half, "|y|^2/2"
+        )
         moved = float(np.linalg.norm(problem.s @ (point.x - best.x)))
-        margins.everywhere(CASE, f"S x from that of f32, {storage}", moved / size, np.sqrt(2 * (room + best.gap)) / size, "|y|")
+        margins.everywhere(
+            CASE,
+            f"S x from that of f32, {storage}",
+            moved / size,
+            np.sqrt(2 * (room + best.gap)) / size,
+            "|y|",
+        )
 
 
 @pytest.mark.parametrize("storage", STORAGES)
 def test_what_does_not_fit_is_refused(storage: str) -> None:
-    """Beyond the type's greatest number; and a column too small for a step is silent, not rubbish."""
+    """Beyond the type's greatest number; and a column too small for a step is silent, not
+    rubbish."""
     for value in (1e39, np.inf, np.nan, *((65520.0,) if storage == "f16" else ())):
         with pytest.raises(UsageError) as error:
             store(np.full((3, 4), value), storage)
         assert "\n" not in str(error.value)
     tiny = store(np.full((3, 4), 1e-44), storage).decode(3)
     assert (np.abs(tiny) <= 2e-44).all()
-    assert np.isfinite(store(np.full((3, 4), 3e38 if storage != "f16" else 6.5e4), storage).decode(3)).all()
+    assert np.isfinite(
+        store(np.full((3, 4), 3e38 if storage != "f16" else 6.5e4), storage).decode(3)
+    ).all()

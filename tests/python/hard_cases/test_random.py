@@ -1,4 +1,5 @@
-"""Property-based: any matrix, data, lambda, sign, solver and storage give a sound result, and the same bits everywhere."""
+"""Property-based: any matrix, data, lambda, sign, solver and storage give a sound result, and the
+same bits everywhere."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from random_problems import rounded
 from eitskin.core.results import SIGNS, SOLVERS
 from eitskin.model.eitm import encode_model
 from eitskin.model.storage import STORAGES
-from eitskin.study.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 from margins import Margins
 
 CASE = "problem/any"
@@ -67,10 +68,18 @@ def problems(draw: st.DrawFn) -> dict[str, Any]:
 
 def steps_of(given_problem: dict[str, Any]) -> tuple[np.ndarray, list[Step]]:
     """S as stored, and the steps: the data twice, which a warm start takes up."""
-    model = made_model(given_problem["s"], storage=given_problem["storage"], lipschitz=None if given_problem["s"].any() else 1.0)
+    model = made_model(
+        given_problem["s"],
+        storage=given_problem["storage"],
+        lipschitz=None if given_problem["s"].any() else 1.0,
+    )
     names = ("sign", "solver", "iterations", "lambda_rel", "gap_rel", "mac_limit", "warm_start")
     options = plain_options(given_problem["s"], **{name: given_problem[name] for name in names})
-    return model.sensitivity, [Load(encode_model(model)), Choose(options), Solve(np.array([given_problem["y"]] * 2))]
+    return model.sensitivity, [
+        Load(encode_model(model)),
+        Choose(options),
+        Solve(np.array([given_problem["y"]] * 2)),
+    ]
 
 
 def test_any_problem(same_everywhere: SameEverywhere, margins: Margins) -> None:
@@ -78,7 +87,11 @@ def test_any_problem(same_everywhere: SameEverywhere, margins: Margins) -> None:
     steps: list[Step] = []
 
     @settings(
-        max_examples=EXAMPLES, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck)
+        max_examples=EXAMPLES,
+        derandomize=True,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(HealthCheck),
     )
     @given(problems())
     def sound(given_problem: dict[str, Any]) -> None:
@@ -86,7 +99,9 @@ def test_any_problem(same_everywhere: SameEverywhere, margins: Margins) -> None:
         statuses, outcomes = on_host(own)
         assert statuses == [0, 0]
         for one in outcomes:
-            check_sound(margins, CASE, judged(s, given_problem["y"], given_problem["sign"], one), one)
+            check_sound(
+                margins, CASE, judged(s, given_problem["y"], given_problem["sign"], one), one
+            )
         steps.extend(own)
 
     sound()

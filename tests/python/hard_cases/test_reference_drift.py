@@ -1,4 +1,5 @@
-"""What moves between the reference and the frame: gain, skin, common mode; and a reference that was none."""
+"""What moves between the reference and the frame: gain, skin, common mode; and a reference that was
+none."""
 
 from __future__ import annotations
 
@@ -15,10 +16,15 @@ HOUR_S = 3600.0
 
 
 def test_gain_drift(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """The whole gain off by 1 to 20 %: the peak follows it and loses no more; at 5 % at most 2 %."""
+    """The whole gain off by 1 to 20 %: the peak follows it and loses no more; at 5 % at most 2
+    %."""
     case = "frames/gain-drift"
     played = [
-        (quiet_frames(k), np.array([noisy(k, g * simulated()[k]["touched"], 1) for g in (1.0, *GAINS)])) for k in range(COUNT)
+        (
+            quiet_frames(k),
+            np.array([noisy(k, g * simulated()[k]["touched"], 1) for g in (1.0, *GAINS)]),
+        )
+        for k in range(COUNT)
     ]
     lost, worse = np.zeros((COUNT, len(GAINS))), np.zeros((COUNT, len(GAINS)))
     for k, (clean, *drifted) in enumerate(run(same_everywhere, played, options())):
@@ -48,9 +54,15 @@ def test_drying(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
 
 def test_common_mode_jump(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """A constant on all rows: nothing is left out for it; 1 % of rms(V0) costs little, and at 5 % most frames are named."""
+    """A constant on all rows: nothing is left out for it; 1 % of rms(V0) costs little, and at 5 %
+    most frames are named."""
     played = [
-        (quiet_frames(k), np.array([noisy(k, simulated()[k]["touched"] + j * rms_v(k), 1) for j in (0.0, *JUMPS)]))
+        (
+            quiet_frames(k),
+            np.array(
+                [noisy(k, simulated()[k]["touched"] + j * rms_v(k), 1) for j in (0.0, *JUMPS)]
+            ),
+        )
         for k in range(COUNT)
     ]
     losses, named = np.zeros((COUNT, len(JUMPS))), 0
@@ -60,17 +72,30 @@ def test_common_mode_jump(same_everywhere: SameEverywhere, margins: Margins) -> 
             losses[k, j] = miou(clean.image, k) - miou(one.image, k)
             named += abs(JUMPS[j]) > 0.01 and one.info.findings != 0
     for jump, loss in zip(JUMPS, losses.mean(axis=0), strict=True):
-        margins.everywhere("frames/common-mode", f"MIoU lost to {jump:g} rms(V0)", loss, 0.1 if abs(jump) <= 0.01 else 0.4)
-    margins.everywhere("frames/common-mode", "frames of 5 % that nothing was found about", 1 - named / (2 * COUNT), 0.5)
+        margins.everywhere(
+            "frames/common-mode",
+            f"MIoU lost to {jump:g} rms(V0)",
+            loss,
+            0.1 if abs(jump) <= 0.01 else 0.4,
+        )
+    margins.everywhere(
+        "frames/common-mode",
+        "frames of 5 % that nothing was found about",
+        1 - named / (2 * COUNT),
+        0.5,
+    )
 
 
 def test_touch_during_tare(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Not to be known then. Once it has gone, the change goes the way touches cannot, and that is said."""
+    """Not to be known then. Once it has gone, the change goes the way touches cannot, and that is
+    said."""
     played = []
     for k in range(COUNT):
         touched = simulated()[k]["touched"]
         quiet = noisy(k, np.tile(touched, (16, 1)), 0)
-        played.append((quiet, np.array([noisy(k, touched, 1), noisy(k, simulated()[k]["quiet"], 1)])))
+        played.append(
+            (quiet, np.array([noisy(k, touched, 1), noisy(k, simulated()[k]["quiet"], 1)]))
+        )
     missed = 0
     for held, lifted in run(same_everywhere, played, options()):
         assert held.info.findings == 0 and held.touches == ()
@@ -79,7 +104,8 @@ def test_touch_during_tare(same_everywhere: SameEverywhere, margins: Margins) ->
 
 
 def test_lift_off(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Held for ten warm-started frames, then lifted: the very next frame is as empty as if nothing had been there."""
+    """Held for ten warm-started frames, then lifted: the very next frame is as empty as if nothing
+    had been there."""
     held, after = 10, 5
     played = []
     for k in range(COUNT):

@@ -12,7 +12,7 @@ from fault_scenes import COUNT, half, miou, noisy, quiet_frames, rms_v, simulate
 
 from eitskin.core.results import Options
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, Tare
 from margins import Margins
 from small_models import prebuilt
 
@@ -25,7 +25,9 @@ def options(**changes: object) -> Options:
     return replace(default_options(prebuilt()[0]), **changes)  # type: ignore[arg-type]
 
 
-def run(same_everywhere: SameEverywhere, played: list[tuple[np.ndarray, np.ndarray]], chosen: Options) -> list[list[Outcome]]:
+def run(
+    same_everywhere: SameEverywhere, played: list[tuple[np.ndarray, np.ndarray]], chosen: Options
+) -> list[list[Outcome]]:
     """Outcomes of frames after a tare on quiet frames, pair by pair; all finite."""
     steps: list[Step] = [Load(prebuilt()[1]), Choose(chosen)]
     for quiet, frames in played:
@@ -39,15 +41,22 @@ def run(same_everywhere: SameEverywhere, played: list[tuple[np.ndarray, np.ndarr
 
 def damaged(k: int, amplitude: float) -> np.ndarray:
     """Scene k with one row off by so much of rms(V0), up or down."""
-    frame, generator = noisy(k, simulated()[k]["touched"], 1), np.random.default_rng([k, round(100 * amplitude)])
+    frame, generator = (
+        noisy(k, simulated()[k]["touched"], 1),
+        np.random.default_rng([k, round(100 * amplitude)]),
+    )
     frame[generator.integers(len(frame))] += amplitude * rms_v(k) * generator.choice([-1, 1])
     return frame
 
 
 def test_glitch(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """One row of a full scan off by 5 % of rms(V0) to five times that: left out, counted, and hardly seen."""
+    """One row of a full scan off by 5 % of rms(V0) to five times that: left out, counted, and
+    hardly seen."""
     played = [
-        (quiet_frames(k), np.array([noisy(k, simulated()[k]["touched"], 1), *(damaged(k, a) for a in GLITCHES)]))
+        (
+            quiet_frames(k),
+            np.array([noisy(k, simulated()[k]["touched"], 1), *(damaged(k, a) for a in GLITCHES)]),
+        )
         for k in range(COUNT)
     ]
     losses = np.zeros((COUNT, len(GLITCHES)))
@@ -55,16 +64,23 @@ def test_glitch(same_everywhere: SameEverywhere, margins: Margins) -> None:
         assert clean.info.glitches == 0 and clean.info.masked == 0
         for a, (amplitude, one) in enumerate(zip(GLITCHES, spoilt, strict=True)):
             losses[k, a] = miou(clean.image, k) - miou(one.image, k)
-            assert one.info.glitches == one.info.masked <= 2 and one.info.glitches >= (amplitude > 0.05)
+            assert one.info.glitches == one.info.masked <= 2 and one.info.glitches >= (
+                amplitude > 0.05
+            )
     for amplitude, loss in zip(GLITCHES, losses.mean(axis=0), strict=True):
         margins.everywhere("frames/glitch", f"MIoU lost to {amplitude:g} rms(V0)", loss, 0.02)
 
 
 def test_glitch_in_half_scans(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Without reciprocals only what the other rows contradict can be told: the mean loss is at most half of what it would be."""
+    """Without reciprocals only what the other rows contradict can be told: the mean loss is at most
+    half of what it would be."""
     found, blind = [], []
     played = [
-        (half(quiet_frames(k)), half(np.array([noisy(k, simulated()[k]["touched"], 1), damaged(k, 1.0)]))) for k in range(COUNT)
+        (
+            half(quiet_frames(k)),
+            half(np.array([noisy(k, simulated()[k]["touched"], 1), damaged(k, 1.0)])),
+        )
+        for k in range(COUNT)
     ]
     for chosen, losses in ((options(), found), (options(findings=0), blind)):
         for k, (clean, spoilt) in enumerate(run(same_everywhere, played, chosen)):
@@ -74,7 +90,8 @@ def test_glitch_in_half_scans(same_everywhere: SameEverywhere, margins: Margins)
 
 
 def test_glitch_while_taring(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """One reading of one of 16 quiet frames off by rms(V0) / 2: left out of the reference and of its noise."""
+    """One reading of one of 16 quiet frames off by rms(V0) / 2: left out of the reference and of
+    its noise."""
     played = []
     for k in range(COUNT):
         quiet = quiet_frames(k)
@@ -91,26 +108,37 @@ def test_glitch_while_taring(same_everywhere: SameEverywhere, margins: Margins) 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_not_finite(same_everywhere: SameEverywhere, margins: Margins, value: float) -> None:
-    """One, 10 or 40 rows: left out. More than half of them: refused, the image cleared, and the next frame as ever."""
+    """One, 10 or 40 rows: left out. More than half of them: refused, the image cleared, and the
+    next frame as ever."""
     good, generator = noisy(0, simulated()[0]["touched"], 1), np.random.default_rng(5)
     frames, counts = [good], (1, 10, 40)
     for count in (*counts, 105):
         frame = good.copy()
         frame[generator.permutation(len(good))[:count]] = value
         frames.append(frame)
-    ((clean, *spoilt, refused, again),) = run(same_everywhere, [(quiet_frames(0), np.array([*frames, good]))], options())
+    ((clean, *spoilt, refused, again),) = run(
+        same_everywhere, [(quiet_frames(0), np.array([*frames, good]))], options()
+    )
     for count, one in zip(counts, spoilt, strict=True):
         assert one.status == 0 and one.info.masked == count
-        margins.everywhere("frames/not-finite", f"MIoU lost to {count} rows", miou(clean.image, 0) - miou(one.image, 0), 0.1)
+        margins.everywhere(
+            "frames/not-finite",
+            f"MIoU lost to {count} rows",
+            miou(clean.image, 0) - miou(one.image, 0),
+            0.1,
+        )
     assert refused.status == CHANNELS and not refused.image.any() and refused.touches == ()
     assert (again.image == clean.image).all()
 
 
 def test_zero_and_denormal(same_everywhere: SameEverywhere) -> None:
-    """All zero: a dead front end, refused as such, though every electrode looks open. Denormal numbers: no touch."""
+    """All zero: a dead front end, refused as such, though every electrode looks open. Denormal
+    numbers: no touch."""
     good = noisy(0, simulated()[0]["touched"], 1)
     frames = np.array([good, np.zeros_like(good), -np.zeros_like(good), 1e-39 * good, good])
-    ((clean, zero, minus, tiny, again),) = run(same_everywhere, [(quiet_frames(0), frames)], options())
+    ((clean, zero, minus, tiny, again),) = run(
+        same_everywhere, [(quiet_frames(0), frames)], options()
+    )
     for one in (zero, minus):
         assert one.status == ZERO and not one.image.any() and one.info.findings_by_name == ()
     assert tiny.status in (0, ZERO, CHANNELS) and tiny.touches == ()
@@ -125,7 +153,12 @@ def test_one_denormal_row(same_everywhere: SameEverywhere, margins: Margins) -> 
     spoilt[row] = 1e-39
     ((clean, one),) = run(same_everywhere, [(quiet_frames(0), np.array([good, spoilt]))], options())
     assert one.info.glitches in (1, 2)
-    margins.everywhere("frames/zero-and-denormal", "MIoU lost to one row", miou(clean.image, 0) - miou(one.image, 0), 0.02)
+    margins.everywhere(
+        "frames/zero-and-denormal",
+        "MIoU lost to one row",
+        miou(clean.image, 0) - miou(one.image, 0),
+        0.02,
+    )
 
 
 def test_saturation_in_touch(same_everywhere: SameEverywhere, margins: Margins) -> None:
@@ -135,13 +168,23 @@ def test_saturation_in_touch(same_everywhere: SameEverywhere, margins: Margins) 
     rows = np.array([3, 50, 171])
     spoilt = good.copy()
     spoilt[rows] = np.array([limit, -limit, limit])
-    ((clean, one),) = run(same_everywhere, [(quiet_frames(0), np.array([good, spoilt]))], options(saturation_v=limit))
-    assert one.info.saturated == one.info.masked == len(rows) and one.info.findings_by_name == ("saturated",)
-    margins.everywhere("frames/saturation", "MIoU lost to three rows", miou(clean.image, 0) - miou(one.image, 0), 0.02)
+    ((clean, one),) = run(
+        same_everywhere, [(quiet_frames(0), np.array([good, spoilt]))], options(saturation_v=limit)
+    )
+    assert one.info.saturated == one.info.masked == len(rows) and one.info.findings_by_name == (
+        "saturated",
+    )
+    margins.everywhere(
+        "frames/saturation",
+        "MIoU lost to three rows",
+        miou(clean.image, 0) - miou(one.image, 0),
+        0.02,
+    )
 
 
 def test_saturation_in_baseline(same_everywhere: SameEverywhere) -> None:
-    """A saturated quiet frame is no reference, whether the touch saturates too or not; the same status everywhere."""
+    """A saturated quiet frame is no reference, whether the touch saturates too or not; the same
+    status everywhere."""
     quiet, limit = quiet_frames(0), float(np.abs(quiet_frames(0)).max())
     steps: list[Step] = [Load(prebuilt()[1]), Choose(options(saturation_v=limit)), Tare(quiet)]
     assert same_everywhere.steps(steps)[0] == [0, 0, CHANNELS]
@@ -150,8 +193,15 @@ def test_saturation_in_baseline(same_everywhere: SameEverywhere) -> None:
 def test_clean_frames_are_left_alone(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Nothing is found, and the bits are those without any finding."""
     played = [(quiet_frames(k), noisy(k, simulated()[k]["touched"], 1)[None]) for k in range(COUNT)]
-    quietly = {"findings": options().findings & ~(1 << 7)}  # whether a scene is crowded is for test_hard_touches.py
-    looked, blind = run(same_everywhere, played, options(**quietly)), run(same_everywhere, played, options(findings=0))
+    quietly = {
+        "findings": options().findings & ~(1 << 7)
+    }  # whether a scene is crowded is for test_hard_touches.py
+    looked, blind = (
+        run(same_everywhere, played, options(**quietly)),
+        run(same_everywhere, played, options(findings=0)),
+    )
     for (one,), (other,) in zip(looked, blind, strict=True):
-        margins.everywhere("frames/clean", "findings and rows left out", one.info.findings + one.info.masked, 0)
+        margins.everywhere(
+            "frames/clean", "findings and rows left out", one.info.findings + one.info.masked, 0
+        )
         assert (one.coefficients == other.coefficients).all() and one.touches == other.touches

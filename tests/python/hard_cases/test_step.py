@@ -1,5 +1,5 @@
-"""A model that states too small a Lipschitz constant makes FISTA's step too long: the guard halves it, or gives zero and says
-so."""
+"""A model that states too small a Lipschitz constant makes FISTA's step too long: the guard halves
+it, or gives zero and says so."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import gaussian, optimum_of, smooth, whitened
 
 from eitskin.core.results import SIGNS, SOLVERS
-from eitskin.study.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 from margins import Margins
 
 CASE = "problem/step-too-long"
@@ -22,10 +22,13 @@ PROBLEMS = {"gaussian": gaussian(31), "smooth": smooth(32), "whitened": whitened
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("iterations", [3, 300])
-def test_step_too_long(same_everywhere: SameEverywhere, margins: Margins, solver: str, iterations: int) -> None:
-    """Up to 2^8 times too long, the halvings leave most of 300 iterations: at least 99 % of what the objective can lose is lost.
-    Where the step cannot be brought down, or there is no time, the image is zero and the stop is "diverged". Coordinate descent
-    and active set take no step from the constant."""
+def test_step_too_long(
+    same_everywhere: SameEverywhere, margins: Margins, solver: str, iterations: int
+) -> None:
+    """Up to 2^8 times too long, the halvings leave most of 300 iterations: at least 99 % of what
+    the objective can lose is lost. Where the step cannot be brought down, or there is no time, the
+    image is zero and the stop is "diverged". Coordinate descent and active set take no step from
+    the constant."""
     steps: list[Step] = []
     asked = []
     for name, problem in PROBLEMS.items():
@@ -49,7 +52,13 @@ def test_step_too_long(same_everywhere: SameEverywhere, margins: Margins, solver
         elif iterations == 300:
             best, start = optimum_of(problem, sign), point.at_zero()
             left = max(0.0, point.objective - best.objective) / (start.objective - best.objective)
-            margins.everywhere(CASE, f"left to do after 300 iterations of {solver}", left, 0.01, "of what there was")
+            margins.everywhere(
+                CASE,
+                f"left to do after 300 iterations of {solver}",
+                left,
+                0.01,
+                "of what there was",
+            )
         if solver not in ("fista", "working-set"):
             assert one.info.step_halvings == 0
         elif iterations == 300:

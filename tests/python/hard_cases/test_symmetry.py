@@ -1,4 +1,5 @@
-"""Metamorphic: what only renames, turns or scales gives the same image renamed, turned or scaled."""
+"""Metamorphic: what only renames, turns or scales gives the same image renamed, turned or
+scaled."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import Skin
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Load, Play, Solve, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, Tare
 from margins import Margins
 from small_models import DATA_KINDS, ELEMENTS, PIXELS, small, small_blob, small_model
 
@@ -30,25 +31,40 @@ RANK = 37  # as small_model has it
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_powers_of_two_and_turned_signs(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """Data and lambda times 2^k: coefficients times 2^k. Data turned, the other sign: coefficients turned. Both bit for bit."""
+def test_powers_of_two_and_turned_signs(
+    same_everywhere: SameEverywhere, margins: Margins, solver: str
+) -> None:
+    """Data and lambda times 2^k: coefficients times 2^k. Data turned, the other sign: coefficients
+    turned. Both bit for bit."""
     problem = gaussian(51)
     steps: list[Step] = [Load(made_blob(problem.s))]
     scales = (1.0, 2.0**-40, 2.0**-7, 2.0**5, 2.0**40)
     for sign in SIGNS:
         lam = 0.05 * problem.lambda_max(sign)
         for scale in scales:
-            options = plain_options(problem.s, solver=solver, sign=sign, iterations=40, lambda_abs=scale * lam, lambda_rel=0.0)
+            options = plain_options(
+                problem.s,
+                solver=solver,
+                sign=sign,
+                iterations=40,
+                lambda_abs=scale * lam,
+                lambda_rel=0.0,
+            )
             steps += [Choose(options), Solve(scale * problem.y[None])]
     for sign, turn in (("increase", "decrease"), ("both", "both")):
         for name, y in ((sign, problem.y), (turn, -problem.y)):
-            steps += [Choose(plain_options(problem.s, solver=solver, sign=name, iterations=40)), Solve(y[None])]
+            steps += [
+                Choose(plain_options(problem.s, solver=solver, sign=name, iterations=40)),
+                Solve(y[None]),
+            ]
     _, outcomes = same_everywhere.steps(steps)
     scaled, turned = outcomes[: len(SIGNS) * len(scales)], outcomes[len(SIGNS) * len(scales) :]
     for k, one in enumerate(scaled):
         base, scale = scaled[k - k % len(scales)], scales[k % len(scales)]
         unlike = np.count_nonzero(one.coefficients != np.float32(scale) * base.coefficients)
-        margins.everywhere(CASE, "coefficients unlike, data times a power of two", unlike, 0, "pixels")
+        margins.everywhere(
+            CASE, "coefficients unlike, data times a power of two", unlike, 0, "pixels"
+        )
     for one, other in (turned[:2], turned[2:]):
         unlike = np.count_nonzero(one.coefficients != -other.coefficients)
         margins.everywhere(CASE, "coefficients unlike, data turned", unlike, 0, "pixels")
@@ -61,7 +77,16 @@ def test_polarity(same_everywhere: SameEverywhere, margins: Margins, data_kind: 
     s, blob = small(), small_blob("f32", data_kind)
     options = default_options(small_model("f32", data_kind))
     quiet, frames = s.quiet(61, 8), s.frames(60, 3)
-    steps = [Load(blob), Choose(options), Tare(quiet), Play(frames), Load(blob), Choose(options), Tare(-quiet), Play(-frames)]
+    steps = [
+        Load(blob),
+        Choose(options),
+        Tare(quiet),
+        Play(frames),
+        Load(blob),
+        Choose(options),
+        Tare(-quiet),
+        Play(-frames),
+    ]
     _, outcomes = same_everywhere.steps(steps)
     for one, other in zip(outcomes[:3], outcomes[3:], strict=True):
         unlike = np.count_nonzero(one.image != other.image)
@@ -69,7 +94,9 @@ def test_polarity(same_everywhere: SameEverywhere, margins: Margins, data_kind: 
         assert one.touches == other.touches and one.image.any()
 
 
-def model_of(skin: Skin, protocol: Protocol, linear: Linearisation, data_kind: str = "difference") -> Model:
+def model_of(
+    skin: Skin, protocol: Protocol, linear: Linearisation, data_kind: str = "difference"
+) -> Model:
     return make_model(skin, protocol, linear, BuildSettings(rank=RANK, data_kind=data_kind))
 
 
@@ -93,15 +120,20 @@ def check_alike(
     frames: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
     pixels: np.ndarray,
 ) -> None:
-    """Coefficients of the second model, taken at ``pixels``, are the first's. Both models are the same but for the rounding of P
-    and S to float32: that moves y by (12 + k) u |P| |v| (test_ill_skins.rounding_of_data) and S x by u |S|_F |x|, each in both
-    models; the optimum follows data and lambda as a projection does; and each gap g adds sqrt(2 g)."""
+    """Coefficients of the second model, taken at ``pixels``, are the first's. Both models are the
+    same but for the rounding of P and S to float32: that moves y by (12 + k) u |P| |v|
+    (test_ill_skins.rounding_of_data) and S x by u |S|_F |x|, each in both models; the optimum
+    follows data and lambda as a projection does; and each gap g adds sqrt(2 g).
+    """
     options = replace(
-        default_options(models[0]), solver="active-set", iterations=500, gap_rel=1e-5, project_baseline=False, gate_factor=0.0,
+        default_options(models[0]), solver="active-set", iterations=500, gap_rel=1e-5,
+        project_baseline=False, gate_factor=0.0,
         lambda_noise_factor=0.0,
     )  # fmt: skip
     both = zip(models, frames, strict=True)
-    steps = [step for model, (quiet, given) in both for step in steps_for(model, options, quiet, given)]
+    steps = [
+        step for model, (quiet, given) in both for step in steps_for(model, options, quiet, given)
+    ]
     _, outcomes = same_everywhere.steps(steps)
     count = len(frames[0][1])
     s = models[0].sensitivity
@@ -123,21 +155,40 @@ def check_alike(
 
 
 @pytest.mark.parametrize("what", ["rotation by one electrode", "numbered the other way round"])
-def test_electrodes_relabelled(same_everywhere: SameEverywhere, margins: Margins, what: str) -> None:
-    """The same electrodes under other numbers, and the protocol's table in those numbers: the same rows, from mesh to image."""
+def test_electrodes_relabelled(
+    same_everywhere: SameEverywhere, margins: Margins, what: str
+) -> None:
+    """The same electrodes under other numbers, and the protocol's table in those numbers: the same
+    rows, from mesh to image."""
     s = small()
-    turn = {"start_angle_deg": 90.0 - 360 / COUNT} if what.startswith("rotation") else {"clockwise": True}
-    numbers = (np.arange(COUNT) + 1) % COUNT if what.startswith("rotation") else -np.arange(COUNT) % COUNT
-    skin = Skin("relabelled", s.skin.outline, Electrodes(COUNT, 3.0, **turn), conductivity_s_per_m=0.02, thickness_mm=5.0)
+    turn = (
+        {"start_angle_deg": 90.0 - 360 / COUNT}
+        if what.startswith("rotation")
+        else {"clockwise": True}
+    )
+    numbers = (
+        (np.arange(COUNT) + 1) % COUNT if what.startswith("rotation") else -np.arange(COUNT) % COUNT
+    )
+    skin = Skin(
+        "relabelled",
+        s.skin.outline,
+        Electrodes(COUNT, 3.0, **turn),
+        conductivity_s_per_m=0.02,
+        thickness_mm=5.0,
+    )
     protocol = table(COUNT, numbers[s.protocol.drive_measure.astype(int)])
     linear = linearise(skin, protocol, pixels_across=PIXELS, elements=ELEMENTS)
     assert np.abs(linear.v0_v - s.linear.v0_v).max() < 1e-9 * np.abs(s.linear.v0_v).max()
     models = model_of(s.skin, s.protocol, s.linear), model_of(skin, protocol, linear)
     given = s.quiet(71, 8), s.frames(70, 2)
-    check_alike(same_everywhere, margins, what, models, (given, given), np.arange(models[0].grid.n_pixels))
+    check_alike(
+        same_everywhere, margins, what, models, (given, given), np.arange(models[0].grid.n_pixels)
+    )
 
 
-def test_channels_permuted_with_the_protocol(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_channels_permuted_with_the_protocol(
+    same_everywhere: SameEverywhere, margins: Margins
+) -> None:
     s = small()
     order = np.random.default_rng(5).permutation(s.protocol.n_rows)
     protocol = table(COUNT, s.protocol.drive_measure[order].astype(int))
@@ -145,7 +196,14 @@ def test_channels_permuted_with_the_protocol(same_everywhere: SameEverywhere, ma
     models = model_of(s.skin, s.protocol, s.linear), model_of(s.skin, protocol, linear)
     quiet, frames = s.quiet(73, 8), s.frames(72, 2)
     given = (quiet, frames), (quiet[:, order], frames[:, order])
-    check_alike(same_everywhere, margins, "channels permuted", models, given, np.arange(models[0].grid.n_pixels))
+    check_alike(
+        same_everywhere,
+        margins,
+        "channels permuted",
+        models,
+        given,
+        np.arange(models[0].grid.n_pixels),
+    )
 
 
 def quarter_turn(grid: Grid) -> np.ndarray:
@@ -164,7 +222,12 @@ def rows_moved(protocol: Protocol, electrode: np.ndarray) -> tuple[np.ndarray, n
     place = {tuple(row): k for k, row in enumerate(protocol.drive_measure.tolist())}
     to, sign = [], []
     for a, b, c, d in electrode[protocol.drive_measure.astype(int)].tolist():
-        for turned, key in ((1, (a, b, c, d)), (-1, (b, a, c, d)), (-1, (a, b, d, c)), (1, (b, a, d, c))):
+        for turned, key in (
+            (1, (a, b, c, d)),
+            (-1, (b, a, c, d)),
+            (-1, (a, b, d, c)),
+            (1, (b, a, d, c)),
+        ):
             if key in place:
                 to.append(place[key])
                 sign.append(turned)
@@ -173,7 +236,8 @@ def rows_moved(protocol: Protocol, electrode: np.ndarray) -> tuple[np.ndarray, n
 
 
 def symmetric(linear: Linearisation, protocol: Protocol) -> Linearisation:
-    """The mean of the Jacobian over quarter turns and mirrors: a mesh's own asymmetry is not what is looked at."""
+    """The mean of the Jacobian over quarter turns and mirrors: a mesh's own asymmetry is not what
+    is looked at."""
     jacobian, v0 = linear.jacobian, linear.v0_v
     turn, mirror = 4, -np.arange(COUNT) % COUNT  # electrode 0 is on top: a mirror keeps it
     for electrode, pixel, order in (
@@ -193,8 +257,11 @@ def symmetric(linear: Linearisation, protocol: Protocol) -> Linearisation:
 
 
 @pytest.mark.parametrize("what", ["a quarter turn of the disk", "the disk in a mirror"])
-def test_the_disk_turned_and_mirrored(same_everywhere: SameEverywhere, margins: Margins, what: str) -> None:
-    """A touch elsewhere by symmetry is the same touch: its frame is the rows' permutation, its image the pixels'."""
+def test_the_disk_turned_and_mirrored(
+    same_everywhere: SameEverywhere, margins: Margins, what: str
+) -> None:
+    """A touch elsewhere by symmetry is the same touch: its frame is the rows' permutation, its
+    image the pixels'."""
     s, protocol = small(), adjacent(COUNT)
     linear = symmetric(s.linear, protocol)
     model = model_of(s.skin, protocol, linear)
@@ -210,4 +277,11 @@ def test_the_disk_turned_and_mirrored(same_everywhere: SameEverywhere, margins: 
     quiet, frames = clean.quiet(75, 8), clean.frames(74, 2)
     moved_quiet, moved_frames = np.empty_like(quiet), np.empty_like(frames)
     moved_quiet[:, to], moved_frames[:, to] = sign * quiet, sign * frames
-    check_alike(same_everywhere, margins, what, (model, model), ((quiet, frames), (moved_quiet, moved_frames)), pixel)
+    check_alike(
+        same_everywhere,
+        margins,
+        what,
+        (model, model),
+        ((quiet, frames), (moved_quiet, moved_frames)),
+        pixel,
+    )

@@ -1,4 +1,5 @@
-"""Touches followed in time where frames are bad: noise that flickers, fingers that lift, frames that are missing."""
+"""Touches followed in time where frames are bad: noise that flickers, fingers that lift, frames
+that are missing."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from everywhere import Outcome, SameEverywhere
 
 from eitskin.core.results import Options
 from eitskin.solve.options import default_options, tracking
-from eitskin.study.emulated_steps import Choose, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, Tare
 from margins import Margins
 from small_models import small, small_blob, small_model
 
@@ -18,12 +19,14 @@ FLICKER, LIFT, MISSING = "time/tracked-flicker", "time/tracked-lift", "time/trac
 
 
 def options(**changes: object) -> Options:
-    """Tracking on; the linear answers of these frames are no sheet's, so that nothing else is looked for."""
+    """Tracking on; the linear answers of these frames are no sheet's, so that nothing else is
+    looked for."""
     return replace(tracking(default_options(small_model())), findings=0, **changes)  # type: ignore[arg-type]
 
 
 def frames_of(places_mm: list[tuple[float, float] | None], share: float, seed: int) -> np.ndarray:
-    """A disc of 9 mm at each place, or none, that changes the sheet by ``share`` of itself; with noise."""
+    """A disc of 9 mm at each place, or none, that changes the sheet by ``share`` of itself; with
+    noise."""
     s = small()
     frames = s.quiet(seed, len(places_mm), NOISE)
     for frame, place in zip(frames, places_mm, strict=True):
@@ -44,40 +47,56 @@ def ids(outcomes: list[Outcome]) -> list[tuple[int, ...]]:
 
 
 def test_noise_that_flickers(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Quiet frames at half of the gate: without tracking many of them have a touch, and each that comes is another; with it a
-    touch has to come twice to one place."""
+    """Quiet frames at half of the gate: without tracking many of them have a touch, and each that
+    comes is another; with it a touch has to come twice to one place."""
     low = options(gate_factor=0.6)
     quiet = frames_of([None] * 40, 0, 132)
-    _, bare = same_everywhere.steps([*head(replace(low, track_confirm=0, track_hold=0, track_smooth=0.0)), Play(quiet)])
+    _, bare = same_everywhere.steps(
+        [*head(replace(low, track_confirm=0, track_hold=0, track_smooth=0.0)), Play(quiet)]
+    )
     _, told = same_everywhere.steps([*head(low), Play(quiet)])
     untracked, tracked = (sum(len(one.touches) for one in some) for some in (bare, told))
     assert untracked >= 10
-    margins.everywhere(FLICKER, "touches told of 40 quiet frames", tracked, untracked / 5, "touches")
+    margins.everywhere(
+        FLICKER, "touches told of 40 quiet frames", tracked, untracked / 5, "touches"
+    )
 
 
 def test_a_finger_that_lifts(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """A clear touch that is lifted is told no more from the next frame on, and one that comes at its place later is another."""
+    """A clear touch that is lifted is told no more from the next frame on, and one that comes at
+    its place later is another."""
     place = (10.0, 15.0)
     _, outcomes = same_everywhere.steps(
-        [*head(options()), Play(frames_of([place] * 8 + [None] * 5 + [place] * 3 + [None] + [place] * 2, 1.0, 133))]
+        [
+            *head(options()),
+            Play(
+                frames_of([place] * 8 + [None] * 5 + [place] * 3 + [None] + [place] * 2, 1.0, 133)
+            ),
+        ]
     )
     seen = ids(outcomes)
     assert seen[0] and seen[:8] == [seen[0]] * 8
     ghosts = sum(touch.id == seen[0][0] for one in outcomes[8:] for touch in one.touches)
     margins.everywhere(LIFT, "frames with a touch that was lifted", ghosts, 0, "frames")
-    assert seen[13] == seen[15] == seen[17] and seen[13] > seen[0]  # a missed frame between does not make another
+    assert (
+        seen[13] == seen[15] == seen[17] and seen[13] > seen[0]
+    )  # a missed frame between does not make another
     assert seen[16] == ()
 
 
 def test_frames_that_are_missing(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """A moving finger; frames that the core refuses in between, or that never came: it keeps its id, and stays a number."""
+    """A moving finger; frames that the core refuses in between, or that never came: it keeps its
+    id, and stays a number."""
     path: list[tuple[float, float] | None] = [(-30.0 + 2.5 * k, 5.0) for k in range(24)]
     frames = frames_of(path, 1.0, 134)
     refused = frames.copy()
     refused[[6, 7, 13]] = np.nan
     dropped = np.delete(frames, [6, 7, 13], axis=0)
     switched, off = 0, 0.0
-    for played, true in ((refused, path), (dropped, [one for k, one in enumerate(path) if k not in (6, 7, 13)])):
+    for played, true in (
+        (refused, path),
+        (dropped, [one for k, one in enumerate(path) if k not in (6, 7, 13)]),
+    ):
         _, outcomes = same_everywhere.steps([*head(options()), Play(played)])
         good = [(one, place) for one, place in zip(outcomes, true, strict=True) if one.status == 0]
         assert len(good) == 21 and all(len(one.touches) == 1 for one, _ in good)
@@ -85,6 +104,8 @@ def test_frames_that_are_missing(same_everywhere: SameEverywhere, margins: Margi
         assert all(one.finite() for one in outcomes)
         for one, place in good[3:]:
             assert place is not None
-            off = max(off, float(np.hypot(one.touches[0].x_mm - place[0], one.touches[0].y_mm - place[1])))
+            off = max(
+                off, float(np.hypot(one.touches[0].x_mm - place[0], one.touches[0].y_mm - place[1]))
+            )
     margins.everywhere(MISSING, "ids a finger changes", switched, 0, "ids")
     margins.everywhere(MISSING, "off its place, at most", off, 6.0, "mm")

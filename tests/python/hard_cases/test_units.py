@@ -1,4 +1,5 @@
-"""Units of model, data and frames from 1e-30 to 1e30: the same image in other units, zero, or a clean refusal; never rubbish."""
+"""Units of model, data and frames from 1e-30 to 1e30: the same image in other units, zero, or a
+clean refusal; never rubbish."""
 
 from __future__ import annotations
 
@@ -17,13 +18,16 @@ from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
-from eitskin.study.emulated_steps import Choose, Load, Play, Solve, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, Tare
 from margins import Margins
 from small_models import DATA_KINDS, small, small_blob, small_model
 
 CASE, FRAMES_CASE = "problem/units", "problem/units-of-frames"
 EXPONENTS = tuple(range(-30, 31, 5))
-LEAST_DATA, MOST_DATA = 2.0**-51, 2.0**63  # |y| whose square float32 holds with 24 bits to spare, and |y|^2 below its end
+LEAST_DATA, MOST_DATA = (
+    2.0**-51,
+    2.0**63,
+)  # |y| whose square float32 holds with 24 bits to spare, and |y|^2 below its end
 NOT_FINITE = -15
 
 
@@ -44,23 +48,41 @@ def expected_end(size: float) -> str:
     return "solved" if size < MOST_DATA else "refused"
 
 
-def check_scaled(margins: Margins, case: str, base: Judged, one: Judged, data_off: float, to_base: float) -> None:
-    """S x of both, in the base's units. At the optimum S x moves by at most as much as y (r = y - S x is y's projection onto the
-    dual set, and a projection does not expand), and as far again by lambda, which follows y; S's own rounding adds u |S|_F |x|;
-    and a gap g leaves S x within sqrt(2 g) of the optimum's."""
+def check_scaled(
+    margins: Margins, case: str, base: Judged, one: Judged, data_off: float, to_base: float
+) -> None:
+    """S x of both, in the base's units. At the optimum S x moves by at most as much as y (r = y - S
+    x is y's projection onto the dual set, and a projection does not expand), and as far again by
+    lambda, which follows y; S's own rounding adds u |S|_F |x|; and a gap g leaves S x within sqrt(2
+    g) of the optimum's."""
     off = float(np.linalg.norm(base.s @ (one.x * to_base - base.x)))
     size = float(np.linalg.norm(base.y))
     stored = 2 * U * float(np.linalg.norm(base.s)) * float(np.linalg.norm(base.x))
-    gaps = sum(np.sqrt(2 * (j.gap + j.gap_rounding)) / float(np.linalg.norm(j.y)) * size for j in (base, one))
-    margins.everywhere(case, "S x in other units", off / size, (2 * data_off + stored + gaps) / size, "|y|")
+    gaps = sum(
+        np.sqrt(2 * (j.gap + j.gap_rounding)) / float(np.linalg.norm(j.y)) * size
+        for j in (base, one)
+    )
+    margins.everywhere(
+        case, "S x in other units", off / size, (2 * data_off + stored + gaps) / size, "|y|"
+    )
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_units_of_model_and_data(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """S times a, y times b, each alone and both together: x times b / a, while squares are numbers."""
+def test_units_of_model_and_data(
+    same_everywhere: SameEverywhere, margins: Margins, solver: str
+) -> None:
+    """S times a, y times b, each alone and both together: x times b / a, while squares are
+    numbers."""
     problem = gaussian(1)
-    options = plain_options(problem.s, solver=solver, sign="both", iterations=20_000, gap_rel=1e-4, lambda_rel=0.2)
-    chosen = [(0, 0)] + [(0, e) for e in EXPONENTS] + [(e, 0) for e in EXPONENTS] + [(e, e) for e in EXPONENTS]
+    options = plain_options(
+        problem.s, solver=solver, sign="both", iterations=20_000, gap_rel=1e-4, lambda_rel=0.2
+    )
+    chosen = (
+        [(0, 0)]
+        + [(0, e) for e in EXPONENTS]
+        + [(e, 0) for e in EXPONENTS]
+        + [(e, e) for e in EXPONENTS]
+    )
     chosen += [(-15, 15), (15, -15), (0, -44), (0, -40), (-18, 0), (18, 0)]
     steps: list[Step] = []
     kept: list[tuple[int, int]] = []
@@ -86,13 +108,17 @@ def test_units_of_model_and_data(same_everywhere: SameEverywhere, margins: Margi
             check_sound(margins, CASE, point, one)
             check_scaled(margins, CASE, base, point, U * size, 10.0 ** (a - b))
             continue
-        margins.everywhere(CASE, "pixels of refused or vanishing data", np.count_nonzero(one.image), 0, "pixels")
+        margins.everywhere(
+            CASE, "pixels of refused or vanishing data", np.count_nonzero(one.image), 0, "pixels"
+        )
         assert one.status == (NOT_FINITE if end == "refused" else 0)
         assert one.info.stop == ("diverged" if end == "refused" else "zero") and one.touches == ()
     assert ends == {"zero", "solved", "refused"}
 
 
-def reduced(model: Model, blob: bytes, options: Options, quiet: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def reduced(
+    model: Model, blob: bytes, options: Options, quiet: np.ndarray, frame: np.ndarray
+) -> np.ndarray:
     """y (r,) as the solver sees it."""
     engine = CoreEngine(blob)
     engine.set_options(options)
@@ -103,9 +129,10 @@ def reduced(model: Model, blob: bytes, options: Options, quiet: np.ndarray, fram
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_units_of_frames(same_everywhere: SameEverywhere, margins: Margins, data_kind: str) -> None:
-    """Frames and quiet frames in other volts: the gain brings them to the model's, from 1e-38 to 1e37. Every voltage is rounded
-    anew, by u of itself, and so is every mean of 8 quiet ones, 8 times; their difference, times the gain, is so off by at most
-    (1 + 8 + 3) u of the model's own voltage a row, and y by |P| times the norm of that; as a ratio by as much of 1. Denormal
+    """Frames and quiet frames in other volts: the gain brings them to the model's, from 1e-38 to
+    1e37. Every voltage is rounded anew, by u of itself, and so is every mean of 8 quiet ones, 8
+    times; their difference, times the gain, is so off by at most (1 + 8 + 3) u of the model's own
+    voltage a row, and y by |P| times the norm of that; as a ratio by as much of 1. Denormal
     voltages of 1e-38 have 2^-149 / 1e-38 = 2^-23 in place of u."""
     s, model, blob = small(), small_model("f32", data_kind), small_blob("f32", data_kind)
     quiet, frames = s.quiet(31, 8), s.frames(30, 2)
@@ -113,22 +140,46 @@ def test_units_of_frames(same_everywhere: SameEverywhere, margins: Margins, data
     exponents = [0, -38, -37, *EXPONENTS, 37]
     steps: list[Step] = []
     for e in exponents:
-        steps += [Load(blob), Choose(options), Tare(as_float32(quiet * 10.0**e)), Play(as_float32(frames * 10.0**e))]
+        steps += [
+            Load(blob),
+            Choose(options),
+            Tare(as_float32(quiet * 10.0**e)),
+            Play(as_float32(frames * 10.0**e)),
+        ]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     per_row = np.ones(len(model.v_ref_v)) if data_kind == "normalised" else np.abs(model.v_ref_v)
-    data_off = 12 * U * float(np.linalg.norm(model.projection.astype(np.float64), 2)) * float(np.linalg.norm(per_row))
+    data_off = (
+        12
+        * U
+        * float(np.linalg.norm(model.projection.astype(np.float64), 2))
+        * float(np.linalg.norm(per_row))
+    )
     points = [
-        [reduced(model, blob, options, quiet * 10.0**e, frame * 10.0**e) for frame in frames] for e in exponents
+        [reduced(model, blob, options, quiet * 10.0**e, frame * 10.0**e) for frame in frames]
+        for e in exponents
     ]
     for k, e in enumerate(exponents):
         for frame, one in enumerate(outcomes[2 * k : 2 * k + 2]):
-            assert one.status == 0 and one.finite() and len(one.touches) == len(outcomes[frame].touches)
+            assert (
+                one.status == 0
+                and one.finite()
+                and len(one.touches) == len(outcomes[frame].touches)
+            )
             worst = (20 if e == -38 else 1) * data_off
             size = float(np.linalg.norm(points[0][frame]))
             off = float(np.linalg.norm(points[k][frame] - points[0][frame]))
-            margins.everywhere(FRAMES_CASE, f"y, frames in other volts, {data_kind}", off / size, 2 * worst / size, "|y|")
-            both = [judged(model.sensitivity, points[j][frame], "increase", outcomes[2 * j + frame]) for j in (0, k)]
+            margins.everywhere(
+                FRAMES_CASE,
+                f"y, frames in other volts, {data_kind}",
+                off / size,
+                2 * worst / size,
+                "|y|",
+            )
+            both = [
+                judged(model.sensitivity, points[j][frame], "increase", outcomes[2 * j + frame])
+                for j in (0, k)
+            ]
             check_scaled(margins, FRAMES_CASE, *both, off, 1.0)
 
 
@@ -143,8 +194,11 @@ def test_the_noise_has_the_units_of_the_frames(margins: Margins, width: str) -> 
         baseline = engine.set_baseline(quiet * 10.0**e)
         off = abs(baseline.noise_v / (truth * 10.0**e) - 1)
         target = "host f32" if width == "float32" else "host f64"
-        # a quiet voltage is rounded by u |v0|, 1e3 u of a deviation of 1e-3 |v0|; 8 frames' errors add up at worst
-        margins.record(FRAMES_CASE, "noise learned, frames in other volts", target, off, 8 * 1e3 * U, "of it")
+        # a quiet voltage is rounded by u |v0|, 1e3 u of a deviation of 1e-3 |v0|; 8 frames' errors add up at
+        # worst
+        margins.record(
+            FRAMES_CASE, "noise learned, frames in other volts", target, off, 8 * 1e3 * U, "of it"
+        )
 
 
 def test_a_model_that_float32_cannot_hold_is_refused_in_one_line() -> None:

@@ -1,4 +1,5 @@
-"""Touches that are hard to see, on the paper's skin, solved on another mesh than the model's; simulated once a session."""
+"""Touches that are hard to see, on the paper's skin, solved on another mesh than the model's;
+simulated once a session."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ def ring(count: int, ring_mm: float, radius_mm: float, turn: float = 0.0) -> tup
     return tuple(Touch(ring_mm * cos(a), ring_mm * sin(a), radius_mm, 5.0) for a in angles)
 
 
-def at(distance_mm: float, angle_deg: float, radius_mm: float = 9.0, contrast: float = 5.0) -> tuple[Touch, ...]:
+def at(
+    distance_mm: float, angle_deg: float, radius_mm: float = 9.0, contrast: float = 5.0
+) -> tuple[Touch, ...]:
     """One touch, by its distance from the centre."""
     a = angle_deg * pi / 180
     return (Touch(distance_mm * cos(a), distance_mm * sin(a), radius_mm, contrast),)
@@ -42,17 +45,22 @@ def crowds() -> dict[str, tuple[Touch, ...]]:
         "14 on two rings": (*ring(9, 78.0, 7.0), *ring(5, 38.0, 7.0, 0.3)),
         "12 and one in the middle": (*ring(12, 72.0, 8.0), *at(0.0, 0.0)),
         "5 within 30 mm": (*ring(4, 20.0, 6.0), *at(0.0, 0.0, 6.0)),
-        "a row of 6, a millimetre apart": tuple(Touch(-42.5 + 17.0 * k, 10.0, 8.0, 5.0) for k in range(6)),
+        "a row of 6, a millimetre apart": tuple(
+            Touch(-42.5 + 17.0 * k, 10.0, 8.0, 5.0) for k in range(6)
+        ),
     }
 
 
 def entangled() -> dict[str, tuple[Touch, ...]]:
-    """Touches that bend each other's field beyond what two dipoles tell, or hide each other's peaks."""
+    """Touches that bend each other's field beyond what two dipoles tell, or hide each other's
+    peaks."""
     return {
         "two that overlap": (*at(6.0, 30.0), *at(6.0, 210.0)),
         "two that touch, of opposite change": (*at(9.0, 80.0), *at(9.0, 260.0, 9.0, 0.1)),
         "three metals in a row": tuple(Touch(x, 0.0, 12.0, 1000.0) for x in (-25.0, 0.0, 25.0)),
-        "12 metals on a ring": tuple(Touch(t.x_mm, t.y_mm, t.radius_mm, 1000.0) for t in ring(12, 70.0, 12.0)),
+        "12 metals on a ring": tuple(
+            Touch(t.x_mm, t.y_mm, t.radius_mm, 1000.0) for t in ring(12, 70.0, 12.0)
+        ),
         "a pair at the rim": (*at(88.0, 5.0), *at(88.0, 17.0)),
         "one of half the skin": at(20.0, 130.0, 60.0),
     }
@@ -78,9 +86,15 @@ def groups() -> dict[str, list[tuple[Touch, ...]]]:
 @cache
 def simulated() -> Simulated:
     """All scenes at 60 dB and 12 bits, 64 quiet frames."""
-    scenes = tuple(Scene(f"{name} {k}", touches) for name, each in groups().items() for k, touches in enumerate(each))
+    scenes = tuple(
+        Scene(f"{name} {k}", touches)
+        for name, each in groups().items()
+        for k, touches in enumerate(each)
+    )
     skin = paper_skin()
-    return simulate(skin, adjacent(16), TouchSet("hard", 1, scenes), mesh=mesh_for_elements(skin, ELEMENTS))
+    return simulate(
+        skin, adjacent(16), TouchSet("hard", 1, scenes), mesh=mesh_for_elements(skin, ELEMENTS)
+    )
 
 
 def frames_of(name: str) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""Models built from skins of every kind: what is inside, and that their golden frames give the same bits."""
+"""Models built from skins of every kind: what is inside, and that their golden frames give the same
+bits."""
 
 from __future__ import annotations
 
@@ -9,7 +10,13 @@ import pytest
 
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import UsageError
-from eitskin.model.build import BuildSettings, Linearisation, build_model, make_model, scaled_defaults
+from eitskin.model.build import (
+    BuildSettings,
+    Linearisation,
+    build_model,
+    make_model,
+    scaled_defaults,
+)
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.model.model import Model
 from eitskin.model.reduction import fold_rows, spectral_norm_squared
@@ -30,7 +37,9 @@ KINDS = (
 
 
 @pytest.mark.parametrize(("outline", "kind", "electrodes", "rows", "folded"), KINDS)
-def test_every_shape_and_protocol(outline: str, kind: str, electrodes: int, rows: int, folded: int) -> None:
+def test_every_shape_and_protocol(
+    outline: str, kind: str, electrodes: int, rows: int, folded: int
+) -> None:
     s = small(outline, kind, electrodes)
     blob = small_blob("f32", "difference", outline, kind, electrodes)
     model = decode_model(blob, "x")
@@ -44,7 +53,11 @@ def test_every_shape_and_protocol(outline: str, kind: str, electrodes: int, rows
     assert greatest <= model.lipschitz <= 1.0002 * greatest
     scaled = fold_rows(s.linear.jacobian, model.fold) * model.column_weight
     assert model.projection.astype(float) @ scaled == pytest.approx(model.sensitivity, abs=2e-5)
-    for width, prepared, portable in (("float32", True, False), ("float32", False, True), ("float32", True, True)):
+    for width, prepared, portable in (
+        ("float32", True, False),
+        ("float32", False, True),
+        ("float32", True, True),
+    ):
         assert CoreEngine(blob, width, prepared=prepared, portable=portable).self_test() == 0
     assert CoreEngine(blob, "float64").self_test() < 1e-4
     assert np.abs(model.golden.image).max() > 0
@@ -55,7 +68,9 @@ def test_every_shape_and_protocol(outline: str, kind: str, electrodes: int, rows
 def test_golden_frame_of_every_storage_and_data_kind(storage: str, data_kind: str) -> None:
     blob = small_blob(storage, data_kind)
     engines = [
-        CoreEngine(blob, prepared=prepared, portable=portable) for prepared in (True, False) for portable in (True, False)
+        CoreEngine(blob, prepared=prepared, portable=portable)
+        for prepared in (True, False)
+        for portable in (True, False)
     ]
     assert [engine.self_test() for engine in engines] == [0.0] * 4
     assert CoreEngine(blob, "float64").self_test() < 1e-4
@@ -73,24 +88,37 @@ def test_the_golden_image_shows_its_two_discs() -> None:
     for share in ((0.22, 0.13), (-0.25, -0.09)):
         near = np.linalg.norm(centres - size * np.array(share), axis=1) < 0.1 * size
         assert image[near].max() > 0.5 * image.max()
-    far = np.linalg.norm(centres[:, None] - size * np.array([(0.22, 0.13), (-0.25, -0.09)]), axis=2).min(axis=1) > 0.2 * size
+    far = (
+        np.linalg.norm(
+            centres[:, None] - size * np.array([(0.22, 0.13), (-0.25, -0.09)]), axis=2
+        ).min(axis=1)
+        > 0.2 * size
+    )
     assert image[far].max() < 0.1 * image.max()
 
 
 @pytest.mark.parametrize("storage", STORAGES[1:])
 def test_storages_show_the_same_image(storage: str) -> None:
-    """Narrow storage costs little: the golden image within 3 % of the peak in int8, far less in the others."""
+    """Narrow storage costs little: the golden image within 3 % of the peak in int8, far less in the
+    others."""
     whole, narrow = small_model("f32"), small_model(storage)
     bound = {"f16": 2e-3, "i16": 5e-4, "i8": 3e-2}[storage]
     assert np.abs(narrow.golden.image - whole.golden.image).max() < bound * whole.golden.image.max()
-    assert narrow.stored.columns.nbytes * {"f16": 2, "i16": 2, "i8": 4}[storage] == whole.stored.columns.nbytes
+    assert (
+        narrow.stored.columns.nbytes * {"f16": 2, "i16": 2, "i8": 4}[storage]
+        == whole.stored.columns.nbytes
+    )
 
 
 def test_normalised_data_divide_the_jacobian_by_the_reference() -> None:
     s, model = small(), small_model("f32", "normalised")
-    jacobian = fold_rows(s.linear.jacobian, model.fold) / fold_rows(s.linear.v0_v, model.fold)[:, None]
+    jacobian = (
+        fold_rows(s.linear.jacobian, model.fold) / fold_rows(s.linear.v0_v, model.fold)[:, None]
+    )
     assert model.column_weight == pytest.approx(np.linalg.norm(jacobian, axis=0) ** -0.5, rel=1e-5)
-    assert model.projection.astype(float) @ (jacobian * model.column_weight) == pytest.approx(model.sensitivity, abs=2e-5)
+    assert model.projection.astype(float) @ (jacobian * model.column_weight) == pytest.approx(
+        model.sensitivity, abs=2e-5
+    )
 
 
 def test_defaults_scale_with_the_skin() -> None:
@@ -116,8 +144,12 @@ def images_of(model: Model) -> np.ndarray:
 
 
 def test_the_prebuilt_model_is_what_the_builder_makes() -> None:
-    """Meshes of other netgen versions differ a little, so images are compared loosely; on one mesh, all numbers closely."""
-    old, new = prebuilt()[0], decode_model(encode_model(build_model(paper_skin(), adjacent(16))), "new")
+    """Meshes of other netgen versions differ a little, so images are compared loosely; on one mesh,
+    all numbers closely."""
+    old, new = (
+        prebuilt()[0],
+        decode_model(encode_model(build_model(paper_skin(), adjacent(16))), "new"),
+    )
     assert new.protocol.hash == old.protocol.hash
     assert new.skin == old.skin
     assert (new.grid.index == old.grid.index).all()
@@ -165,7 +197,9 @@ def test_a_row_whose_reference_vanishes_says_nothing_as_a_ratio() -> None:
     v0[[0, s.protocol.reciprocal_pairs().second[0]]] = 0
     linear = Linearisation(s.linear.grid, s.linear.jacobian, v0, s.linear.elements)
     with np.errstate(all="raise"):
-        blob = encode_model(make_model(s.skin, s.protocol, linear, BuildSettings(rank=37, data_kind="normalised")))
+        blob = encode_model(
+            make_model(s.skin, s.protocol, linear, BuildSettings(rank=37, data_kind="normalised"))
+        )
     model = decode_model(blob, "x")
     assert not model.projection[:, 0].any() and model.projection[:, 1].any()
     assert CoreEngine(blob).self_test() == 0

@@ -1,4 +1,5 @@
-"""The .eitm file: what is written is read again, the bytes lie where docs/reference/eitm-format.md says, and damage is refused."""
+"""The .eitm file: what is written is read again, the bytes lie where docs/reference/eitm-format.md
+says, and damage is refused."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ ITEM = {"f32": "<f4", "f16": "<f2", "i16": "<i2", "i8": "i1"}
 
 
 def refusal(blob: bytes) -> str:
-    """The text with which ``blob`` is refused; a fault of the test where it is not, or not in one line."""
+    """The text with which ``blob`` is refused; a fault of the test where it is not, or not in one
+    line."""
     with pytest.raises(ModelError) as caught:
         decode_model(blob, "x.eitm")
     text = str(caught.value)
@@ -50,7 +52,9 @@ def test_round_trip(storage: str, data_kind: str) -> None:
         assert (getattr(first, name) == getattr(again, name)).all()
     assert (first.sensitivity == again.sensitivity).all()
     for name in ("first", "second", "sign"):
-        assert (getattr(first.fold, name) == getattr(small().protocol.reciprocal_pairs(), name)).all()
+        assert (
+            getattr(first.fold, name) == getattr(small().protocol.reciprocal_pairs(), name)
+        ).all()
     for name in ("reference_v", "frame_v", "image"):
         assert (getattr(first.golden, name) == getattr(again.golden, name)).all()
     assert first.defaults == again.defaults
@@ -81,7 +85,9 @@ def test_sections_as_documented(storage: str) -> None:
     for name, place in sections.items():
         assert place.offset % 16 == 0 and place.offset >= HEADER_SIZE + 16 * len(sections)
         assert place.flags == (1 if name in required else 0)
-    body = {name: blob[place.offset : place.offset + place.size] for name, place in sections.items()}
+    body = {
+        name: blob[place.offset : place.offset + place.size] for name, place in sections.items()
+    }
     m, k, r, stride, n = 208, 104, 37, 40, linear.grid.n_pixels
     dims = struct.unpack("<10I6f", body["DIMS"])
     grid = linear.grid
@@ -93,12 +99,16 @@ def test_sections_as_documented(storage: str) -> None:
     fold = np.frombuffer(body["FOLD"], "<u2").reshape(k, 4)
     assert (fold[:, 0] == model.fold.first).all() and (fold[:, 1] == model.fold.second).all()
     assert (fold[:, 2] == 1).all() and not fold[:, 3].any()
-    assert np.frombuffer(body["VREF"], "<f4") == pytest.approx(linear.v0_v[model.fold.first], rel=1e-6)
+    assert np.frombuffer(body["VREF"], "<f4") == pytest.approx(
+        linear.v0_v[model.fold.first], rel=1e-6
+    )
     projection = np.frombuffer(body["REDU"], "<f4").reshape(k, stride)
     assert (model.projection == projection[:, :r].T).all() and not projection[:, r:].any()
     columns = np.frombuffer(body["SENS"], ITEM[storage]).reshape(n, stride)
     scale = np.frombuffer(body["SCAL"], "<f4")[:, None] if "SCAL" in body else 1.0
-    assert (model.sensitivity == (columns[:, :r].astype(float) * scale).T).all() and not columns[:, r:].any()
+    assert (model.sensitivity == (columns[:, :r].astype(float) * scale).T).all() and not columns[
+        :, r:
+    ].any()
     assert (np.frombuffer(body["COLW"], "<f4") == model.column_weight).all()
     assert (np.frombuffer(body["GRID"], "<u2").reshape(n, 2) == grid.index).all()
     defaults = struct.unpack("<2I12fIf", body["DEFS"])
@@ -106,7 +116,9 @@ def test_sections_as_documented(storage: str) -> None:
     assert model.defaults.solver == "working-set" and defaults[14:] == (1, 0)
     gold = np.frombuffer(body["GOLD"], "<f4")
     assert gold[:m] == pytest.approx(linear.v0_v, rel=1e-6)
-    assert (gold[m : 2 * m] == model.golden.frame_v).all() and (gold[2 * m :] == model.golden.image).all()
+    assert (gold[m : 2 * m] == model.golden.frame_v).all() and (
+        gold[2 * m :] == model.golden.image
+    ).all()
     assert json.loads(body["META"])["skin"]["skin"]["name"] == "disk"
 
 
@@ -127,7 +139,9 @@ def test_reciprocals_of_the_other_sign() -> None:
 
 def test_rows_without_a_reciprocal_are_marked() -> None:
     s = small("l", "opposite")
-    half = Linearisation(s.linear.grid, s.linear.jacobian[:96], s.linear.v0_v[:96], s.linear.elements)
+    half = Linearisation(
+        s.linear.grid, s.linear.jacobian[:96], s.linear.v0_v[:96], s.linear.elements
+    )
     protocol = table(16, s.protocol.drive_measure[:96])
     blob = encode_model(make_model(s.skin, protocol, half, BuildSettings(rank=20)))
     assert (fold_section(blob)[:, 1] == 0xFFFF).all()
@@ -165,7 +179,9 @@ def test_every_damaged_byte_is_refused(flip: int) -> None:
         blob[place] ^= flip
 
 
-@pytest.mark.parametrize("content", [b"", b"E", b"PK\x03\x04" + bytes(200), b"[skin]\nname = 'x'\n" * 20])
+@pytest.mark.parametrize(
+    "content", [b"", b"E", b"PK\x03\x04" + bytes(200), b"[skin]\nname = 'x'\n" * 20]
+)
 def test_a_foreign_file_is_no_model(content: bytes) -> None:
     assert "not an .eitm model" in refusal(content)
 
@@ -183,7 +199,8 @@ def with_extra_section(tag: bytes, flags: int) -> bytes:
     places = sections_of(blob)
     count, shift = len(places) + 1, 16
     table = b"".join(
-        struct.pack("<4sIII", name.encode(), p.offset + shift, p.size, p.flags) for name, p in places.items()
+        struct.pack("<4sIII", name.encode(), p.offset + shift, p.size, p.flags)
+        for name, p in places.items()
     )
     start = HEADER_SIZE + 16 * len(places)
     body = blob[start:]
@@ -198,7 +215,9 @@ def test_an_unknown_optional_section_is_skipped() -> None:
 
 
 def test_an_unknown_required_section_is_refused() -> None:
-    assert "needs section 'NEWS', which this eitskin does not know" in refusal(with_extra_section(b"NEWS", 1))
+    assert "needs section 'NEWS', which this eitskin does not know" in refusal(
+        with_extra_section(b"NEWS", 1)
+    )
 
 
 def test_a_section_that_stands_twice_is_refused() -> None:
@@ -226,7 +245,17 @@ def test_scales_go_with_integers_only(storage: str) -> None:
 
 @pytest.mark.parametrize(
     "content",
-    [b"", b"{", b"[]", b"3", b'"x"', b"\xff\xfe", b'{"skin": 3}', b'{"skin": {"skin": []}}', b"[" * 100_000],
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"3",
+        b'"x"',
+        b"\xff\xfe",
+        b'{"skin": 3}',
+        b'{"skin": {"skin": []}}',
+        b"[" * 100_000,
+    ],
     ids=lambda content: repr(content[:12]),
 )
 def test_meta_must_be_an_object(content: bytes) -> None:
@@ -246,7 +275,9 @@ def test_save_and_load(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["small.eitm"]
 
 
-def test_a_failed_save_leaves_the_old_file_and_nothing_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_save_leaves_the_old_file_and_nothing_beside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "small.eitm"
     path.write_bytes(b"old")
 

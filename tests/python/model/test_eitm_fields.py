@@ -35,7 +35,11 @@ def test_the_section_as_documented() -> None:
     place = sections_of(blob)["FLDS"]
     assert place.size == 16 + 2 * s.linear.grid.n_pixels * 40 and place.flags == 0
     volts, per_sheet = struct.unpack_from("<2f", blob, place.offset)
-    columns = np.frombuffer(blob, "<f2", place.size // 2 - 8, place.offset + 16).reshape(-1, 40).astype(float)
+    columns = (
+        np.frombuffer(blob, "<f2", place.size // 2 - 8, place.offset + 16)
+        .reshape(-1, 40)
+        .astype(float)
+    )
     assert not columns[:, 36:].any() and np.abs(columns[:, :32]).max() == 1024
     assert s.linear.electrode_fields is not None
     fields = s.linear.electrode_fields.reshape(len(columns), 32)
@@ -44,7 +48,9 @@ def test_the_section_as_documented() -> None:
     assert per_sheet == pytest.approx(1 / (2 * np.pi * 0.02))
     assert columns[:, :32] * unit == pytest.approx(fields, rel=1e-3, abs=1e-3 * unit)
     a, b = rim_mirror(s.skin.outline, s.linear.grid.centres_mm())
-    assert columns[:, 32:36] == pytest.approx(np.column_stack([a.real, a.imag, b.real, b.imag]), rel=1e-3, abs=1e-3)
+    assert columns[:, 32:36] == pytest.approx(
+        np.column_stack([a.real, a.imag, b.real, b.imag]), rel=1e-3, abs=1e-3
+    )
     assert model.fields is not None and (model.fields.columns == columns[:, :36]).all()
 
 
@@ -80,11 +86,18 @@ def test_numbers_in_range(at: int, value: float) -> None:
     assert accepted(sealed(blob)) == (0 <= value <= 1e30)
 
 
-@pytest.mark.parametrize(("half", "good"), [(0x7BFF, True), (0x7C00, False), (0xFC00, False), (0x7E01, False)])
+@pytest.mark.parametrize(
+    ("half", "good"), [(0x7BFF, True), (0x7C00, False), (0xFC00, False), (0x7E01, False)]
+)
 def test_every_half_is_finite(half: int, good: bool) -> None:
     blob = tiny_blob()
     place = sections_of(blob)["FLDS"]
-    for at in (16, 16 + 2 * 19, 16 + 2 * 23, place.size - 2):  # the first, the mirror's last, padding, the very last
+    for at in (
+        16,
+        16 + 2 * 19,
+        16 + 2 * 23,
+        place.size - 2,
+    ):  # the first, the mirror's last, padding, the very last
         changed = bytearray(blob)
         struct.pack_into("<H", changed, place.offset + at, half)
         assert accepted(sealed(changed)) == good

@@ -1,4 +1,5 @@
-"""Two readers of one format, Python's and the C core's: what one refuses the other refuses, whatever the bytes."""
+"""Two readers of one format, Python's and the C core's: what one refuses the other refuses,
+whatever the bytes."""
 
 from __future__ import annotations
 
@@ -18,13 +19,45 @@ from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import tiny_blob
 
-WORDS = (0, 1, 3, 4, 255, 256, 1024, 1025, 4096, 4097, 65534, 65535, 65536, 2**31 - 1, 2**31, 2**32 - 1)
-FLOATS = (0.0, -0.0, -1.0, 1.0, 2.0, 1e-45, 1e-7, 1e29, 1.1e30, 3.4e38, float("inf"), float("-inf"), float("nan"))
+WORDS = (
+    0,
+    1,
+    3,
+    4,
+    255,
+    256,
+    1024,
+    1025,
+    4096,
+    4097,
+    65534,
+    65535,
+    65536,
+    2**31 - 1,
+    2**31,
+    2**32 - 1,
+)
+FLOATS = (
+    0.0,
+    -0.0,
+    -1.0,
+    1.0,
+    2.0,
+    1e-45,
+    1e-7,
+    1e29,
+    1.1e30,
+    3.4e38,
+    float("inf"),
+    float("-inf"),
+    float("nan"),
+)
 STORAGE = {0: "f32", 1: "f16", 2: "i16", 3: "i8"}
 
 
 def accepts(blob: bytes) -> tuple[bool, bool]:
-    """Whether Python and C read ``blob``; whatever they raise but ModelError goes through and fails the test."""
+    """Whether Python and C read ``blob``; whatever they raise but ModelError goes through and fails
+    the test."""
     answers = []
     for read in (lambda: decode_model(blob, "x"), lambda: CoreEngine(blob, prepared=False)):
         try:
@@ -65,7 +98,8 @@ def test_both_refuse_every_damaged_byte(flip: int) -> None:
 
 @pytest.mark.parametrize("field", range(10))
 def test_whole_numbers_of_dims(field: int) -> None:
-    """What else fits the sections' sizes: larger images, more electrodes, ranks of the same stride, another data kind."""
+    """What else fits the sections' sizes: larger images, more electrodes, ranks of the same stride,
+    another data kind."""
     blob = tiny_blob()
     place = sections_of(blob)["DIMS"].offset + 4 * field
     own = struct.unpack_from("<I", blob, place)[0]
@@ -122,7 +156,9 @@ def test_numbers_of_defaults(field: int) -> None:
     """The field's range as documented; the tiny model's radii are 1.55, 15.5 and 4.64 mm."""
     blob = tiny_blob()
     start = sections_of(blob)["DEFS"].offset + 8
-    assert struct.unpack_from("<3f", blob, start + 24) == pytest.approx((1.546, 15.46, 4.639), rel=1e-3)
+    assert struct.unpack_from("<3f", blob, start + 24) == pytest.approx(
+        (1.546, 15.46, 4.639), rel=1e-3
+    )
     read = set()
     for value in FLOATS:
         changed = bytearray(blob)
@@ -157,18 +193,22 @@ def test_halves_that_are_not_finite(half: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("row", "good"), [((0, 1, 2, 3), True), ((0, 1, 2, 8), False), ((4, 4, 2, 3), False), ((0, 1, 5, 5), False)]
+    ("row", "good"),
+    [((0, 1, 2, 3), True), ((0, 1, 2, 8), False), ((4, 4, 2, 3), False), ((0, 1, 5, 5), False)],
 )
 def test_a_protocol_of_pairs(row: tuple[int, ...], good: bool) -> None:
     changed = bytearray(tiny_blob())
     struct.pack_into("<4B", changed, sections_of(changed)["PROT"].offset, *row)
     assert agreed(sealed(changed, rehash=True), row) == good
-    assert not agreed(sealed(changed), "another hash") or row == tuple(tiny_blob()[sections_of(changed)["PROT"].offset :][:4])
+    assert not agreed(sealed(changed), "another hash") or row == tuple(
+        tiny_blob()[sections_of(changed)["PROT"].offset :][:4]
+    )
 
 
 @pytest.mark.parametrize(
     ("at", "value", "good"),
-    [(0, 39, True), (0, 40, False), (2, 39, True), (2, 40, False), (2, 0xFFFF, True), (4, 1, True), (4, 0xFFFF, True),
+    [(0, 39, True), (0, 40, False), (2, 39, True), (2, 40, False), (2, 0xFFFF, True), (4, 1, True),
+    (4, 0xFFFF, True),
      (4, 0, False), (4, 2, False), (6, 77, True)],
 )  # fmt: skip
 def test_a_fold_of_rows(at: int, value: int, good: bool) -> None:
@@ -194,7 +234,8 @@ def test_pixels_are_ordered_and_inside() -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 10, 11, 13, 257, 2**20, 2**32 - 1])
 def test_numbers_of_sections(count: int) -> None:
-    """Sections beyond the table are read from other sections' bytes, and one too few lacks nothing that is required."""
+    """Sections beyond the table are read from other sections' bytes, and one too few lacks nothing
+    that is required."""
     assert agreed(sealed(tiny_blob(), count=count), count) == (count in (10, 11))
 
 
@@ -220,7 +261,8 @@ def test_misplaced_sections() -> None:
 @given(st.data())
 @settings(max_examples=400, deadline=None)
 def test_agreement_on_anything(data: st.DataObject) -> None:
-    """Bytes changed anywhere but in META, which boards ignore, and sealed again; what both read also runs."""
+    """Bytes changed anywhere but in META, which boards ignore, and sealed again; what both read
+    also runs."""
     blob = bytearray(tiny_blob(data.draw(st.sampled_from(list(STORAGE.values())))))
     places = {name: place for name, place in sections_of(blob).items() if name != "META"}
     name = data.draw(st.sampled_from(["table", *places]))
@@ -230,14 +272,19 @@ def test_agreement_on_anything(data: st.DataObject) -> None:
         start, size, _ = places[name]
     for _ in range(data.draw(st.integers(1, 4))):
         at = start + data.draw(st.integers(0, size - 1))
-        blob[at] = data.draw(st.sampled_from([0, 1, 0x7F, 0x80, 0xFF, blob[at] ^ 1, blob[at] ^ 0x80, (blob[at] + 1) % 256]))
+        blob[at] = data.draw(
+            st.sampled_from(
+                [0, 1, 0x7F, 0x80, 0xFF, blob[at] ^ 1, blob[at] ^ 0x80, (blob[at] + 1) % 256]
+            )
+        )
     whole = sealed(blob, rehash=name == "PROT")
     if agreed(whole, name) and name not in ("DIMS", "table"):
         runs(whole)
 
 
 def runs(blob: bytes) -> None:
-    """Every engine gives finite images and touches for the golden frame, or says in one line why not."""
+    """Every engine gives finite images and touches for the golden frame, or says in one line why
+    not."""
     model = decode_model(blob, "x")
     for engine in ("c", "c64"):
         try:

@@ -1,4 +1,5 @@
-"""The section LOAD: written, read by both readers, skipped where it is not there, refused where it is out of range."""
+"""The section LOAD: written, read by both readers, skipped where it is not there, refused where it
+is out of range."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
 from eitskin.model.eitm import HEADER, decode_model, encode_model
-from eitskin.model.load import HEAD, LoadLaw, decode_load, encode_load, terms_of
+from eitskin.model.force_law import HEAD, LoadLaw, decode_load, encode_load, terms_of
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from small_models import prebuilt, session
 
@@ -19,7 +20,9 @@ from small_models import prebuilt, session
 def law(order: int = 2) -> LoadLaw:
     strength = np.array([0.0, 1.0, 2.5, 4.0], dtype=np.float32)
     load = np.array([0.0, 0.4, 1.2, 2.6], dtype=np.float32)
-    gain = np.resize(np.array([1.0, 0.05, -0.1, 0.2, 0.03, 0.15], dtype=np.float32), len(terms_of(order)))
+    gain = np.resize(
+        np.array([1.0, 0.05, -0.1, 0.2, 0.03, 0.15], dtype=np.float32), len(terms_of(order))
+    )
     return LoadLaw(strength, load, gain, order, 97.0, 0.9, 0.03)
 
 
@@ -48,9 +51,13 @@ def test_touches_carry_the_load_of_strength_and_place(engine: str) -> None:
         one.tare(session().quiet_v)
     for frame in session().frames_v[:6]:
         touches, without = skin.reconstruct(frame).touches, bare.reconstruct(frame).touches
-        assert touches == tuple(replace(t, load_n=touches[k].load_n) for k, t in enumerate(without))  # nothing else differs
+        assert touches == tuple(
+            replace(t, load_n=touches[k].load_n) for k, t in enumerate(without)
+        )  # nothing else differs
         for touch in touches:
-            expected = law().loads_at(np.array([(touch.x_mm, touch.y_mm)]), np.array([touch.strength_s_per_m_mm2]))[0]
+            expected = law().loads_at(
+                np.array([(touch.x_mm, touch.y_mm)]), np.array([touch.strength_s_per_m_mm2])
+            )[0]
             assert touch.load_n == pytest.approx(expected, rel=1e-5) and touch.load_n > 0
             seen += 1
         assert all(touch.load_n == 0 for touch in without)
@@ -84,8 +91,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize("content", WRONG.values(), ids=WRONG)
-def test_both_readers_refuse_what_is_out_of_range(content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ModelError, match=r"calibration \(section 'LOAD'\) that is out of range; calibrate again"):
+def test_both_readers_refuse_what_is_out_of_range(
+    content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(
+        ModelError, match=r"calibration \(section 'LOAD'\) that is out of range; calibrate again"
+    ):
         decode_load(content, "made")
     monkeypatch.setattr("eitskin.model.eitm.encode_load", lambda _: content)
     blob = encode_model(replace(prebuilt()[0], load=law()))

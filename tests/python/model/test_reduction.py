@@ -1,4 +1,5 @@
-"""The reduction against its own definition: what folds, what whitens, and what the greatest eigenvalue is."""
+"""The reduction against its own definition: what folds, what whitens, and what the greatest
+eigenvalue is."""
 
 from __future__ import annotations
 
@@ -24,17 +25,24 @@ def test_fold_takes_the_mean_with_its_sign_and_leaves_single_rows() -> None:
 def test_reciprocal_rows_turned_round_have_sign_minus_one() -> None:
     protocol = table(8, [[0, 1, 4, 5], [5, 4, 0, 1], [2, 3, 6, 7]])
     fold = protocol.reciprocal_pairs()
-    assert (fold.first.tolist(), fold.second.tolist(), fold.sign.tolist()) == ([0, 2], [1, -1], [-1, 1])
+    assert (fold.first.tolist(), fold.second.tolist(), fold.sign.tolist()) == (
+        [0, 2],
+        [1, -1],
+        [-1, 1],
+    )
 
 
 def test_fold_of_the_forward_model_changes_nothing() -> None:
-    """Voltages of the forward model obey reciprocity, so folding keeps either row; adjacent 16 folds 208 to 104."""
+    """Voltages of the forward model obey reciprocity, so folding keeps either row; adjacent 16
+    folds 208 to 104."""
     s = small()
     fold = adjacent(16).reciprocal_pairs()
     folded = fold_rows(s.linear.v0_v, fold)
     assert folded.shape == (104,)
     assert folded == pytest.approx(s.linear.v0_v[fold.first], rel=1e-9)
-    assert fold_rows(s.linear.jacobian, fold) == pytest.approx(s.linear.jacobian[fold.first], rel=1e-7, abs=1e-12)
+    assert fold_rows(s.linear.jacobian, fold) == pytest.approx(
+        s.linear.jacobian[fold.first], rel=1e-7, abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("rank", [1, 5, 12])
@@ -51,7 +59,9 @@ def test_greatest_eigenvalue_is_known_beforehand(floor: float) -> None:
     r = reduce_jacobian(J, 12, floor=floor)
     assert spectral_norm_squared(r.sensitivity) == pytest.approx(1 / (1 + floor), rel=1e-12)
     s = r.singular_values
-    assert np.diag(r.sensitivity @ r.sensitivity.T) == pytest.approx(s**2 / (s**2 + floor * s[0] ** 2))
+    assert np.diag(r.sensitivity @ r.sensitivity.T) == pytest.approx(
+        s**2 / (s**2 + floor * s[0] ** 2)
+    )
 
 
 def test_truncation_keeps_the_first_directions_of_the_whole() -> None:

@@ -12,7 +12,9 @@ MATRIX = GENERATOR.normal(size=(13, 40)) * np.geomspace(1, 1e-3, 40)
 MATRIX[:, 17] = 0.0
 
 
-@pytest.mark.parametrize(("rank", "stride"), [(1, 8), (7, 8), (8, 8), (9, 16), (64, 64), (104, 104)])
+@pytest.mark.parametrize(
+    ("rank", "stride"), [(1, 8), (7, 8), (8, 8), (9, 16), (64, 64), (104, 104)]
+)
 def test_stride_is_the_rank_rounded_up_to_eight(rank: int, stride: int) -> None:
     assert stride_for(rank) == stride
 

@@ -1,4 +1,5 @@
-"""Reconstruction needs neither scipy nor netgen nor matplotlib: they are made unimportable, or looked for afterwards."""
+"""Reconstruction needs neither scipy nor netgen nor matplotlib: they are made unimportable, or
+looked for afterwards."""
 
 from __future__ import annotations
 
@@ -51,5 +52,8 @@ def test_info_and_verify_of_the_prebuilt_model() -> None:
 
 def test_the_parser_is_light() -> None:
     """Help and refusals need nothing but the standard library: imports come when a command runs."""
-    done = run_python("import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\nprint('numpy' in sys.modules)")
+    done = run_python(
+        "import sys\nfrom eitskin.cli.main import build_parser\nbuild_parser()\nprint('numpy' in"
+        " sys.modules)"
+    )
     assert (done.returncode, done.stdout.strip()) == (0, "False")

@@ -1,4 +1,5 @@
-"""What the tests of scenes share: small scenes, effects made on the spot, and the command line of scenes alone."""
+"""What the tests of scenes share: small scenes, effects made on the spot, and the command line of
+scenes alone."""
 
 from __future__ import annotations
 
@@ -19,7 +20,12 @@ ELEMENTS = 600
 
 def still_scene(frames: int = 3, **changes: Any) -> Scene:
     """A touch that stays; a coarse mesh."""
-    given = {"touches": (always(-30, 20, 10),), "frames": frames, "quiet_frames": 2, "elements": ELEMENTS}
+    given = {
+        "touches": (always(-30, 20, 10),),
+        "frames": frames,
+        "quiet_frames": 2,
+        "elements": ELEMENTS,
+    }
     return Scene("still", **{**given, **changes})
 
 
@@ -27,7 +33,12 @@ def moving_scene(frames: int = 8, **changes: Any) -> Scene:
     """A touch that crosses the skin, passing an electrode's neighbourhood; a coarse mesh."""
     end = (frames - 1) / 20.0
     path = (Keyframe(0.0, -80, 0, 10), Keyframe(end, 60, 30, 10))
-    given = {"touches": (TouchTrack(path),), "frames": frames, "quiet_frames": 2, "elements": ELEMENTS}
+    given = {
+        "touches": (TouchTrack(path),),
+        "frames": frames,
+        "quiet_frames": 2,
+        "elements": ELEMENTS,
+    }
     return Scene("moving", **{**given, **changes})
 
 
@@ -38,15 +49,24 @@ class Offset:
     offset_v: float = 0.001
 
 
-def effect_module(name: str, make: Callable[[Any, Session], Any] | None = None, stage: Stage = Stage.FRONT_END) -> str:
+def effect_module(
+    name: str, make: Callable[[Any, Session], Any] | None = None, stage: Stage = Stage.FRONT_END
+) -> str:
     """Put a module with the effect ``name`` into sys.modules, and return its name there."""
 
     def add_offset(parameters: Offset, session: Session) -> VoltageStep:
-        return VoltageStep(name, stage, Cost(), "adds", lambda v, time_s, frame: v + parameters.offset_v)
+        return VoltageStep(
+            name, stage, Cost(), "adds", lambda v, time_s, frame: v + parameters.offset_v
+        )
 
     module = ModuleType(f"effects_of_tests_{name}")
     vars(module).update(
-        NAME=name, STAGE=stage, ORDER=50, SUMMARY="adds", Parameters=Offset, make=add_offset if make is None else make
+        NAME=name,
+        STAGE=stage,
+        ORDER=50,
+        SUMMARY="adds",
+        Parameters=Offset,
+        make=add_offset if make is None else make,
     )
     sys.modules[module.__name__] = module
     return module.__name__

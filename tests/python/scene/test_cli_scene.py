@@ -37,14 +37,18 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
-def test_run_writes_frames_with_truth(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_writes_frames_with_truth(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--json") == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["effects"] == ["noise"] and facts["counters"]["states"] == 2
     frames = load_frames(tmp_path / "f.npz")
     assert frames.n_frames == 3 and frames.truth_mask is not None and frames.touch_xy_mm is not None
     assert frames.meta["scene"] == TEXT
-    assert scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--truth-pixels", "0") == 0
+    assert (
+        scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--truth-pixels", "0") == 0
+    )
     assert "short: 3 frames after 2 quiet ones" in capsys.readouterr().out
     assert load_frames(tmp_path / "f.npz").truth_mask is None
 
@@ -52,7 +56,9 @@ def test_run_writes_frames_with_truth(scene: Path, tmp_path: Path, capsys: pytes
 def test_plan_lists_the_steps(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene_command("plan", str(scene), "--json")
     plan = json.loads(capsys.readouterr().out)
-    assert [step["name"] for step in plan["steps"] if step["effect"]] == ["noise"] and plan["factorisations"] == 2
+    assert [step["name"] for step in plan["steps"] if step["effect"]] == ["noise"] and plan[
+        "factorisations"
+    ] == 2
     scene_command("plan", str(scene))
     assert "*noise" in capsys.readouterr().out
 
@@ -75,7 +81,10 @@ def test_lists(capsys: pytest.CaptureFixture[str]) -> None:
     scene_command("effects", "noise")
     assert "snr_db" in capsys.readouterr().out
     scene_command("effects", "noise", "--json")
-    assert {row["name"] for row in json.loads(capsys.readouterr().out)["parameters"]} == {"snr_db", "noise_v"}
+    assert {row["name"] for row in json.loads(capsys.readouterr().out)["parameters"]} == {
+        "snr_db",
+        "noise_v",
+    }
 
 
 def test_bad_input_is_refused_before_the_work(scene: Path, tmp_path: Path) -> None:
@@ -86,5 +95,7 @@ def test_bad_input_is_refused_before_the_work(scene: Path, tmp_path: Path) -> No
     with pytest.raises(UsageError, match="pixels across"):
         scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--truth-pixels", "3")
     scene.write_text(TEXT.replace("snr_db", "snr"), encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"short.toml \[effects.noise\]: unknown key 'snr'; did you mean 'snr_db'"):
+    with pytest.raises(
+        ConfigError, match=r"short.toml \[effects.noise\]: unknown key 'snr'; did you mean 'snr_db'"
+    ):
         scene_command("plan", str(scene))

@@ -41,7 +41,9 @@ def test_naming_an_effect_adds_exactly_one_step(name: str, bench: Bench) -> None
     """The steps of the scene without it stay, in their order."""
     scene = moving_scene(4)
     without = compile_scene(scene, bench=bench).plan.steps
-    named = compile_scene(replace(scene, effects={name: NEEDED.get(name, {})}), bench=bench).plan.steps
+    named = compile_scene(
+        replace(scene, effects={name: NEEDED.get(name, {})}), bench=bench
+    ).plan.steps
     assert len(named) == len(without) + 1
     assert [step.name for step in named if step.name != name] == [step.name for step in without]
     assert [step.name for step in named if step.effect] == [name]
@@ -50,7 +52,9 @@ def test_naming_an_effect_adds_exactly_one_step(name: str, bench: Bench) -> None
 def test_frames_without_effects_are_the_forward_models_to_the_bit() -> None:
     for scene in (still_scene(), moving_scene(4, solver="factorise")):
         frames = scene.run()
-        forward = ForwardModel(mesh_for_elements(scene.skin, ELEMENTS), scene.skin, scene.protocol, 0.0)
+        forward = ForwardModel(
+            mesh_for_elements(scene.skin, ELEMENTS), scene.skin, scene.protocol, 0.0
+        )
         sheet = scene.skin.conductivity_s_per_m
         assert np.array_equal(frames.reference_voltage_v, np.tile(forward.voltages(sheet), (2, 1)))
         for k in range(scene.frames):
@@ -69,18 +73,26 @@ def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
     scene = moving_scene(4, effects={"noise": {"snr_db": 60.0}})
     alone = compile_scene(scene)
     among = compile_scene(scene, registry=Registry({**BUILT_IN, **many}, entry_points=False))
-    assert len(many) == 200 and among.plan.steps == alone.plan.steps and among.plan.text() == alone.plan.text()
+    assert (
+        len(many) == 200
+        and among.plan.steps == alone.plan.steps
+        and among.plan.text() == alone.plan.text()
+    )
     assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
 
 
-def test_the_factory_of_an_unnamed_effect_is_never_called(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_factory_of_an_unnamed_effect_is_never_called(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(parameters: Any, session: Any) -> Any:
         raise AssertionError("called")
 
     before = simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v
     for target in BUILT_IN.values():
         monkeypatch.setattr(importlib.import_module(target), "make", refuse)
-    assert np.array_equal(simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v, before)
+    assert np.array_equal(
+        simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v, before
+    )
     with pytest.raises(AssertionError, match="called"):
         compile_scene(still_scene(effects={"noise": {"snr_db": 60.0}}), bench=bench)
 
@@ -89,7 +101,9 @@ def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(bench: Be
     """V0 has patterns of its own; asking for it late does not disturb the scene's."""
 
     def make(parameters: Any, session: Any) -> VoltageStep:
-        return VoltageStep("late", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v / session.v0_rms_v())
+        return VoltageStep(
+            "late", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v / session.v0_rms_v()
+        )
 
     registry = Registry({**BUILT_IN, "late": effect_module("late", make)}, entry_points=False)
     effects: dict[str, Any] = {"bridged": {"electrodes": [2, 3]}, "gel_drying": {}}
@@ -116,7 +130,9 @@ def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
             compiled = compile_scene(replace(around, effects=effects, solver=solver), bench=bench)
             assert compiled.method == solver
             frames[solver] = simulate_frames(compiled)
-            assert frames[solver].work.factorisations == (1 if solver == "update" else 17 - len(compiled.known))
+            assert frames[solver].work.factorisations == (
+                1 if solver == "update" else 17 - len(compiled.known)
+            )
         largest = np.abs(frames["factorise"].voltage_v).max()
         difference = np.abs(frames["update"].voltage_v - frames["factorise"].voltage_v).max()
         assert difference < 1e-9 * largest, effects
@@ -124,7 +140,11 @@ def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
 
 def test_the_way_with_fewer_multiplications_is_chosen(bench: Bench) -> None:
     many = compile_scene(moving_scene(60), bench=bench)
-    assert many.counted is not None and many.counted.update < many.counted.factorise and many.method == "update"
+    assert (
+        many.counted is not None
+        and many.counted.update < many.counted.factorise
+        and many.method == "update"
+    )
     assert many.counted.update_solves == 16 + len(many.reach)
     done = simulate_frames(many)
     assert (done.work.factorisations, done.work.solves) == (1, 16 + len(many.reach))
@@ -140,11 +160,20 @@ def test_count_prefers_factorisations_where_few_states_touch_much() -> None:
 
 
 def test_the_plan_tells_what_the_run_then_does(bench: Bench) -> None:
-    for effects in ({}, {"noise": {"snr_db": 60.0}}, {"gel_drying": {}}, {"contact_impedance": {}}, {"phase": {}}):
+    for effects in (
+        {},
+        {"noise": {"snr_db": 60.0}},
+        {"gel_drying": {}},
+        {"contact_impedance": {}},
+        {"phase": {}},
+    ):
         for scene in (still_scene(5, effects=effects), moving_scene(5, effects=effects)):
             compiled = compile_scene(scene)
             done = simulate_frames(compiled)
-            assert compiled.plan.factorisations == done.work.factorisations + compiled.work.v0_factorisations
+            assert (
+                compiled.plan.factorisations
+                == done.work.factorisations + compiled.work.v0_factorisations
+            )
             assert compiled.plan.solves == done.work.solves + compiled.work.v0_solves
             assert compiled.plan.is_complex == ("phase" in effects)
 
@@ -171,10 +200,14 @@ def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames() ->
 
 
 def test_order_within_a_stage_is_that_of_order_then_name(bench: Bench) -> None:
-    scene = still_scene(effects={"jitter": {}, "adc": {}, "noise": {"snr_db": 60.0}, "saturation": {}})
+    scene = still_scene(
+        effects={"jitter": {}, "adc": {}, "noise": {"snr_db": 60.0}, "saturation": {}}
+    )
     names = [step.name for step in compile_scene(scene, bench=bench).plan.steps if step.effect]
     turned = replace(scene, effects=dict(reversed(scene.effects.items())))
-    assert names == [step.name for step in compile_scene(turned, bench=bench).plan.steps if step.effect]
+    assert names == [
+        step.name for step in compile_scene(turned, bench=bench).plan.steps if step.effect
+    ]
     assert set(names[-1:]) == {"adc"}
 
 
@@ -183,10 +216,14 @@ def test_contradictory_effects_are_refused(bench: Bench) -> None:
     sys.modules[name].CONFLICTS = ("mains",)  # type: ignore[attr-defined]
     registry = Registry({**BUILT_IN, "opposed": name})
     scene = still_scene(effects={"mains": {}, "opposed": {}}, where="f.toml")
-    with pytest.raises(ConfigError, match=r"f.toml \[effects.opposed\]: it contradicts \[effects.mains\]"):
+    with pytest.raises(
+        ConfigError, match=r"f.toml \[effects.opposed\]: it contradicts \[effects.mains\]"
+    ):
         compile_scene(scene, registry=registry, bench=bench)
     varying = still_scene(effects={"gel_drying": {}}, solver="update", where="f.toml")
-    with pytest.raises(ConfigError, match=r'f.toml \[scene\]: solver = "update" .* \[effects.gel_drying\]'):
+    with pytest.raises(
+        ConfigError, match=r'f.toml \[scene\]: solver = "update" .* \[effects.gel_drying\]'
+    ):
         compile_scene(varying, bench=bench)
 
 
@@ -197,19 +234,28 @@ def test_a_protocol_that_detached_electrodes_leave_unsolvable_is_refused(bench: 
 
 
 def test_a_bridge_rescues_a_detached_electrode(bench: Bench) -> None:
-    """Electrode 5 off, but joined to 6 by a wire: rows over both read 0, the others' rows are read through 6."""
-    effects = {"detached": {"electrodes": [5]}, "bridged": {"electrodes": [5, 6], "resistance_ohm": 0.0}}
+    """Electrode 5 off, but joined to 6 by a wire: rows over both read 0, the others' rows are read
+    through 6."""
+    effects = {
+        "detached": {"electrodes": [5]},
+        "bridged": {"electrodes": [5, 6], "resistance_ohm": 0.0},
+    }
     compiled = compile_scene(still_scene(effects=effects), bench=bench)
     v, rows = simulate_frames(compiled).voltage_v[-1], compiled.scene.protocol.drive_measure
     across = [set(row[2:]) == {5, 6} or set(row[:2]) == {5, 6} for row in rows.tolist()]
-    assert np.abs(v[across]).max() < 1e-6 * np.abs(v).max() and (np.abs(v[np.logical_not(across)]) > 0).all()
+    assert (
+        np.abs(v[across]).max() < 1e-6 * np.abs(v).max()
+        and (np.abs(v[np.logical_not(across)]) > 0).all()
+    )
 
 
 def test_a_bridge_of_no_resistance_is_one_electrode_and_of_much_is_none(bench: Bench) -> None:
     plain = simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v
     for ohm, bound in ((1e12, 1e-7), (0.0, None)):
         effects = {"bridged": {"electrodes": [3, 4], "resistance_ohm": ohm}}
-        bridged = simulate_frames(compile_scene(still_scene(effects=effects), bench=bench)).voltage_v
+        bridged = simulate_frames(
+            compile_scene(still_scene(effects=effects), bench=bench)
+        ).voltage_v
         difference = np.abs(bridged - plain).max() / np.abs(plain).max()
         assert difference > 0.1 if bound is None else difference < bound
 
@@ -223,21 +269,34 @@ def test_bad_steps_are_said_to_be_the_effects(bench: Bench) -> None:
         return ContactStep("negative", Cost(), "", lambda contacts, time_s, frame: less)
 
     def endless(parameters: Any, session: Any) -> VoltageStep:
-        return VoltageStep("endless", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v * np.inf)
+        return VoltageStep(
+            "endless", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v * np.inf
+        )
 
-    modules = {"renamed": effect_module("renamed", renamed), "endless": effect_module("endless", endless)}
+    modules = {
+        "renamed": effect_module("renamed", renamed),
+        "endless": effect_module("endless", endless),
+    }
     modules["negative"] = effect_module("negative", negative, Stage.BOUNDARY)
     registry = Registry(modules, entry_points=False)
-    for name, said in (("renamed", "another name or stage"), ("negative", "negative or not finite")):
+    for name, said in (
+        ("renamed", "another name or stage"),
+        ("negative", "negative or not finite"),
+    ):
         with pytest.raises(ConfigError, match=rf"scene \[effects.{name}\]: .*{said}"):
             compile_scene(still_scene(effects={name: {}}), registry=registry, bench=bench)
     with pytest.raises(ConfigError, match=r"frame -2, row 0 is -?inf.*endless"):
-        simulate_frames(compile_scene(still_scene(effects={"endless": {}}), registry=registry, bench=bench))
+        simulate_frames(
+            compile_scene(still_scene(effects={"endless": {}}), registry=registry, bench=bench)
+        )
 
 
 def test_effects_that_disagree_on_the_excitation_frequency_are_refused(bench: Bench) -> None:
     effects = {"phase": {"frequency_hz": 1e4}, "source_impedance": {"frequency_hz": 5e4}}
-    said = r"f.toml \[effects.source_impedance\]: frequency_hz = 50000.0 contradicts \[effects.phase\] frequency_hz"
+    said = (
+        r"f.toml \[effects.source_impedance\]: frequency_hz = 50000.0 contradicts \[effects.phase\]"
+        r" frequency_hz"
+    )
     with pytest.raises(ConfigError, match=said):
         compile_scene(still_scene(effects=effects, where="f.toml"), bench=bench)
     effects["source_impedance"]["frequency_hz"] = 1e4

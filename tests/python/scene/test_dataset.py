@@ -18,7 +18,15 @@ from scene_helpers import ELEMENTS, scene_command, still_scene
 from eitskin.errors import ConfigError, FileError, MissingExtraError, UsageError
 from eitskin.scene import dataset
 from eitskin.scene.compiler import compile_scene
-from eitskin.scene.dataset import Job, chunk_path, frames_of, job_of, load_chunk, make_chunk, write_dataset
+from eitskin.scene.dataset import (
+    Job,
+    chunk_path,
+    frames_of,
+    job_of,
+    load_chunk,
+    make_chunk,
+    write_dataset,
+)
 from eitskin.scene.dataset_ranges import drawn, ranges_of
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.runner import simulate_frames
@@ -26,7 +34,9 @@ from eitskin.scene.session import Bench
 
 
 def small_job(count: int = 7, seed: int = 3, chunk: int = 3) -> Job:
-    return job_of(replace(find_scene("random_touches"), elements=ELEMENTS), count, seed, chunk=chunk)
+    return job_of(
+        replace(find_scene("random_touches"), elements=ELEMENTS), count, seed, chunk=chunk
+    )
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -38,10 +48,15 @@ def test_the_same_bytes_whatever_the_jobs(tmp_path: Path) -> None:
     one = write_dataset(job, tmp_path / "one")
     write_dataset(job, tmp_path / "two", jobs=2)
     assert one == {"chunks_made": 3, "chunks_kept": 0, "scenes_made": 7}
-    assert content(tmp_path / "one") == content(tmp_path / "two") and len(content(tmp_path / "one")) == 4
+    assert (
+        content(tmp_path / "one") == content(tmp_path / "two")
+        and len(content(tmp_path / "one")) == 4
+    )
 
 
-def test_an_interrupted_run_resumes_without_doing_things_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_run_resumes_without_doing_things_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     job, made = small_job(), []
     real = make_chunk
 
@@ -57,7 +72,11 @@ def test_an_interrupted_run_resumes_without_doing_things_twice(tmp_path: Path, m
     assert made == [0, 1] and not chunk_path(tmp_path / "d", 2).exists()
     before = {k: chunk_path(tmp_path / "d", k).stat().st_mtime_ns for k in (0, 1)}
     made.clear()
-    assert write_dataset(job, tmp_path / "d") == {"chunks_made": 1, "chunks_kept": 2, "scenes_made": 1}
+    assert write_dataset(job, tmp_path / "d") == {
+        "chunks_made": 1,
+        "chunks_kept": 2,
+        "scenes_made": 1,
+    }
     assert made == [2]
     assert before == {k: chunk_path(tmp_path / "d", k).stat().st_mtime_ns for k in (0, 1)}
     monkeypatch.undo()
@@ -67,7 +86,11 @@ def test_an_interrupted_run_resumes_without_doing_things_twice(tmp_path: Path, m
 
 def test_a_folder_with_another_dataset_is_not_mixed(tmp_path: Path) -> None:
     write_dataset(small_job(3), tmp_path / "d")
-    others = {"count": small_job(4), "seed": small_job(3, seed=4), "scenes_a_chunk": small_job(3, chunk=2)}
+    others = {
+        "count": small_job(4),
+        "seed": small_job(3, seed=4),
+        "scenes_a_chunk": small_job(3, chunk=2),
+    }
     for said, other in others.items():
         with pytest.raises(UsageError, match=rf"holds another dataset \({said} differ"):
             write_dataset(other, tmp_path / "d")
@@ -85,8 +108,12 @@ def test_a_scene_of_a_dataset_is_the_scene_run_alone(tmp_path: Path) -> None:
     frames = frames_of(chunk, 1)
     assert np.array_equal(frames.voltage_v, simulate_frames(compile_scene(alone)).voltage_v[1:])
     assert frames.touch_xy_mm is not None and frames.touch_strength is not None
-    assert frames.touch_xy_mm.tolist() == [[t.keyframes[0].x_mm, t.keyframes[0].y_mm] for t in alone.touches]
-    assert frames.touch_strength == pytest.approx([t.law.contrast_at(np.ones(1))[0] - 1 for t in alone.touches])
+    assert frames.touch_xy_mm.tolist() == [
+        [t.keyframes[0].x_mm, t.keyframes[0].y_mm] for t in alone.touches
+    ]
+    assert frames.touch_strength == pytest.approx(
+        [t.law.contrast_at(np.ones(1))[0] - 1 for t in alone.touches]
+    )
     assert chunk["range_name"].tolist() == ["effects.noise.snr_db"]
     assert chunk["range_value"][1, 0] == alone.effects["noise"]["snr_db"]
     with pytest.raises(UsageError, match="counted from 0"):
@@ -96,7 +123,9 @@ def test_a_scene_of_a_dataset_is_the_scene_run_alone(tmp_path: Path) -> None:
 def test_ranges_are_kept_and_independent_of_each_other() -> None:
     scene = still_scene(effects={"adc": {"bits": 12}, "mains": {}})
     touch = {"0": {"radius_mm": [6.0, 9.0], "x_mm": [-40, 40]}}
-    ranges = ranges_of({"ranges": {"effects": {"adc": {"bits": [8, 14]}}, "touch": touch}}, scene, "f")
+    ranges = ranges_of(
+        {"ranges": {"effects": {"adc": {"bits": [8, 14]}}, "touch": touch}}, scene, "f"
+    )
     found = [drawn(scene, ranges, 5, k) for k in range(60)]
     bits = {one.effects["adc"]["bits"] for one in found}
     radii = [one.touches[0].keyframes[0].radius_mm for one in found]
@@ -112,11 +141,20 @@ def test_ranges_are_kept_and_independent_of_each_other() -> None:
     [
         ({"range": {}}, r"f \[dataset\]: unknown key 'range'; did you mean 'ranges'"),
         ({"touches": {}}, r"f \[dataset.touches\]: the scene has touches of its own"),
-        ({"ranges": {"effects": {"noise": {"snr_db": [1, 2]}}}}, r"effects.noise.snr_db: the scene does not name"),
-        ({"ranges": {"effects": {"mains": {"amplitude_v": [2, 1]}}}}, r"must be a range \[low, high\]"),
+        (
+            {"ranges": {"effects": {"noise": {"snr_db": [1, 2]}}}},
+            r"effects.noise.snr_db: the scene does not name",
+        ),
+        (
+            {"ranges": {"effects": {"mains": {"amplitude_v": [2, 1]}}}},
+            r"must be a range \[low, high\]",
+        ),
         ({"ranges": {"effects": {"mains": {"amplitude_v": 3}}}}, r"must be a range \[low, high\]"),
         ({"ranges": {"touch": {"1": {"x_mm": [0, 1]}}}}, "the scene has 1 touches"),
-        ({"ranges": {"touch": {"0": {"colour": [0, 1]}}}}, "cannot be varied; use effects.NAME.KEY"),
+        (
+            {"ranges": {"touch": {"0": {"colour": [0, 1]}}}},
+            "cannot be varied; use effects.NAME.KEY",
+        ),
         ({"ranges": {"scene": {"frames": [0, 1]}}}, "cannot be varied"),
     ],
 )
@@ -127,12 +165,18 @@ def test_bad_ranges_name_file_table_and_key(table: dict[str, Any], said: str) ->
 
 def test_bad_datasets_are_refused(tmp_path: Path) -> None:
     scene = replace(find_scene("random_touches"), elements=ELEMENTS)
-    for change, said in (({"count": 0}, "--count 0"), ({"seed": -1}, "--seed -1"), ({"chunk": 0}, "--chunk 0")):
+    for change, said in (
+        ({"count": 0}, "--count 0"),
+        ({"seed": -1}, "--seed -1"),
+        ({"chunk": 0}, "--chunk 0"),
+    ):
         with pytest.raises(UsageError, match=said):
             job_of(scene, **{"count": 1, "seed": 1, **change})
     with pytest.raises(ConfigError, match="nothing is drawn"):
         job_of(still_scene(), 2, 1)
-    bad = still_scene(effects={"mains": {}}, dataset={"ranges": {"effects": {"mains": {"amplitude": [0, 1]}}}})
+    bad = still_scene(
+        effects={"mains": {}}, dataset={"ranges": {"effects": {"mains": {"amplitude": [0, 1]}}}}
+    )
     with pytest.raises(ConfigError, match="unknown key 'amplitude'; did you mean 'amplitude_v'"):
         job_of(bad, 2, 1)
     outside = still_scene(dataset={"ranges": {"touch": {"0": {"x_mm": [200, 300]}}}})
@@ -148,7 +192,9 @@ def test_bad_datasets_are_refused(tmp_path: Path) -> None:
         job_of(scene, 1, 1, ranges_file=tmp_path / "r.toml")
 
 
-def test_without_dask_a_scheduler_asks_for_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_dask_a_scheduler_asks_for_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import sys
 
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
@@ -169,10 +215,14 @@ def test_a_dask_cluster_gives_the_same_bytes(tmp_path: Path) -> None:
         write_dataset(job, tmp_path / "nowhere", scheduler="nonsense")
 
 
-def test_the_command_takes_ranges_from_a_file_and_resumes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_takes_ranges_from_a_file_and_resumes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     scene = tmp_path / "s.toml"
     touch = "[[touch]]\nradius_mm = 9\nx_mm = 10\ny_mm = 20\n"
-    scene.write_text(f'[scene]\nname = "s"\nquiet_frames = 1\nelements = {ELEMENTS}\n{touch}', encoding="utf-8")
+    scene.write_text(
+        f'[scene]\nname = "s"\nquiet_frames = 1\nelements = {ELEMENTS}\n{touch}', encoding="utf-8"
+    )
     ranges = tmp_path / "r.toml"
     ranges.write_text("[dataset.ranges.touch.0]\nx_mm = [-40.0, 40.0]\n", encoding="utf-8")
     command = ["dataset", str(scene), "--ranges", str(ranges), "--count", "5", "--chunk", "2"]
@@ -182,7 +232,9 @@ def test_the_command_takes_ranges_from_a_file_and_resumes(tmp_path: Path, capsys
     chunk_path(tmp_path / "d", 1).unlink()
     assert scene_command(*command, "--jobs", "2") == 0
     assert "2 scenes in 1 chunks, 2 chunks were there already" in capsys.readouterr().out
-    x = np.concatenate([load_chunk(chunk_path(tmp_path / "d", k))["touch_xy_mm"][:, 0] for k in range(3)])
+    x = np.concatenate(
+        [load_chunk(chunk_path(tmp_path / "d", k))["touch_xy_mm"][:, 0] for k in range(3)]
+    )
     assert len(set(x.tolist())) == 5 and np.abs(x).max() <= 40
     with pytest.raises(UsageError, match="give one of them"):
         scene_command(*command, "--jobs", "2", "--scheduler", "tcp://h:1")

@@ -13,7 +13,10 @@ from eitskin.scene.laws import Piezoresistive, ShortCircuit
 from eitskin.scene.touch_path import Keyframe, TouchTrack, always, sample, touches_at
 
 HEAD = '[scene]\nname = "s"\nframes = 40\nrate_hz = 20.0\nquiet_frames = 4\n'
-TOUCH = '[[touch]]\nradius_mm = 8.0\npath = [{t_s = 0.5, x_mm = -30, y_mm = 0}, {t_s = 1.5, x_mm = 30, y_mm = 10}]\n'
+TOUCH = (
+    "[[touch]]\nradius_mm = 8.0\npath = [{t_s = 0.5, x_mm = -30, y_mm = 0}, {t_s = 1.5, x_mm = 30,"
+    " y_mm = 10}]\n"
+)
 
 
 def written(folder: Path, text: str) -> Path:
@@ -34,7 +37,9 @@ def test_a_touch_comes_moves_and_goes(tmp_path: Path) -> None:
 
 
 def test_hold_keeps_a_touch_and_standing_touches_need_no_path(tmp_path: Path) -> None:
-    held = load_scene(written(tmp_path, HEAD + TOUCH.replace("radius_mm", "hold = true\nradius_mm")))
+    held = load_scene(
+        written(tmp_path, HEAD + TOUCH.replace("radius_mm", "hold = true\nradius_mm"))
+    )
     assert held.samples()[0].there[39] and held.samples()[0].x_mm[39] == 30.0
     text = HEAD + "[[touch]]\nradius_mm = 8\nx_mm = 1\ny_mm = 2\n"
     assert load_scene(written(tmp_path, text)).samples()[0].there.all()
@@ -51,7 +56,8 @@ def test_press_scales_the_contact() -> None:
 
 
 def test_load_is_nearly_linear_and_saturates() -> None:
-    """Slope at no load as stated; 10 % below the straight line at small loads at most; never beyond saturation."""
+    """Slope at no load as stated; 10 % below the straight line at small loads at most; never beyond
+    saturation."""
     law = Piezoresistive(0.01, 11.0)
     change = law.contrast_at(np.array([0.0, 1e-3, 100.0, 1e6])) - 1
     assert change[0] == 0 and change[1] == pytest.approx(1e-5, rel=1e-5)
@@ -62,24 +68,48 @@ def test_load_is_nearly_linear_and_saturates() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (HEAD.replace("frames = 40", "frams = 40"), r"\[scene\]: unknown key 'frams'; did you mean 'frames'"),
+        (
+            HEAD.replace("frames = 40", "frams = 40"),
+            r"\[scene\]: unknown key 'frams'; did you mean 'frames'",
+        ),
         (HEAD.replace("frames = 40", "frames = 0"), r"\[scene\]: frames = 0 is out of range"),
         (HEAD + "[touche]\n", "unknown key 'touche'; did you mean 'touch'"),
         (HEAD + "[touch]\nradius_mm = 8\n", r"two brackets"),
         (HEAD + "effects = 3\n", r"\[scene\]: unknown key 'effects'"),
-        (HEAD + "[effects]\nnoise = 3\n", r"\[effects\]: noise = 3 must be a table: write \[effects.noise\]"),
+        (
+            HEAD + "[effects]\nnoise = 3\n",
+            r"\[effects\]: noise = 3 must be a table: write \[effects.noise\]",
+        ),
         (HEAD + 'skin = "nowhere.toml"\n', r"skin = 'nowhere.toml' is neither"),
         (HEAD + 'solver = "magic"\n', r"solver = 'magic' is not known"),
-        (HEAD + TOUCH.replace("8.0", "0"), r"\[\[touch\]\] 0 .* path 0 \(from 0\): radius_mm = 0 is out of range"),
+        (
+            HEAD + TOUCH.replace("8.0", "0"),
+            r"\[\[touch\]\] 0 .* path 0 \(from 0\): radius_mm = 0 is out of range",
+        ),
         (HEAD + TOUCH.replace("8.0", "-2"), "radius_mm = -2 is out of range"),
-        (HEAD + TOUCH.replace("x_mm = 30", "x_mm = 92"), r"\[\[touch\]\] 0 \(from 0\): at 1.5 s x_mm = 92.* outside"),
-        (HEAD + TOUCH + TOUCH, r"\[\[touch\]\] 1 \(from 0\): it overlaps touch 0 by 16 mm at 0.5 s"),
-        (HEAD + TOUCH.replace("t_s = 1.5", "t_s = 0.5"), r"path 1 \(from 0\): t_s = 0.5 is not after 0.5"),
+        (
+            HEAD + TOUCH.replace("x_mm = 30", "x_mm = 92"),
+            r"\[\[touch\]\] 0 \(from 0\): at 1.5 s x_mm = 92.* outside",
+        ),
+        (
+            HEAD + TOUCH + TOUCH,
+            r"\[\[touch\]\] 1 \(from 0\): it overlaps touch 0 by 16 mm at 0.5 s",
+        ),
+        (
+            HEAD + TOUCH.replace("t_s = 1.5", "t_s = 0.5"),
+            r"path 1 \(from 0\): t_s = 0.5 is not after 0.5",
+        ),
         (HEAD + TOUCH + "contrast = -1\n", "contrast = -1 is out of range; it must be above 0"),
         (HEAD + TOUCH + "contrast = 0\n", "contrast = 0 is out of range"),
         (HEAD + TOUCH + "grams = 5\n", 'grams goes with law = "piezoresistive"'),
-        (HEAD + TOUCH + 'law = "piezo"\n', "law = 'piezo' is not known; did you mean 'piezoresistive'"),
-        (HEAD + TOUCH + 'law = "piezoresistive"\n', r"path 0 \(from 0\): the key 'grams' is required"),
+        (
+            HEAD + TOUCH + 'law = "piezo"\n',
+            "law = 'piezo' is not known; did you mean 'piezoresistive'",
+        ),
+        (
+            HEAD + TOUCH + 'law = "piezoresistive"\n',
+            r"path 0 \(from 0\): the key 'grams' is required",
+        ),
         (HEAD + TOUCH + "x_mm = 5\n", "x_mm beside path"),
         (HEAD + TOUCH.replace("y_mm = 10", 'y_mm = "10"'), "y_mm must be a number"),
         (HEAD + TOUCH.replace("radius_mm = 8.0\n", ""), "the key 'radius_mm' is required"),
@@ -88,7 +118,9 @@ def test_load_is_nearly_linear_and_saturates() -> None:
         ("[scene\n", "not valid TOML"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(tmp_path: Path, text: str, said: str) -> None:
+def test_what_cannot_be_is_refused_in_one_line_naming_file_table_and_key(
+    tmp_path: Path, text: str, said: str
+) -> None:
     path = written(tmp_path, text)
     with pytest.raises(EitskinError, match=said) as caught:
         load_scene(path)
@@ -112,6 +144,8 @@ def test_scenes_made_in_python_are_checked_too() -> None:
 
 
 def test_a_skin_file_beside_the_scene_is_found(tmp_path: Path) -> None:
-    (tmp_path / "skin.toml").write_text('[skin]\nname = "mine"\ndiameter_mm = 100\n[electrodes]\ncount = 8\n')
+    (tmp_path / "skin.toml").write_text(
+        '[skin]\nname = "mine"\ndiameter_mm = 100\n[electrodes]\ncount = 8\n'
+    )
     scene = load_scene(written(tmp_path, HEAD + 'skin = "skin.toml"\n'))
     assert scene.skin.name == "mine" and scene.protocol.n_electrodes == 8

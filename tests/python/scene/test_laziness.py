@@ -33,16 +33,24 @@ def fresh(code: str, *arguments: str) -> str:
     """What ``code`` prints in a fresh process."""
     path = os.pathsep.join(filter(None, [str(ROOT / "python"), os.environ.get("PYTHONPATH")]))
     command = [sys.executable, "-c", code, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, check=False)
+    done = subprocess.run(
+        command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, check=False
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-@pytest.mark.parametrize("effects", [{}, {"noise": {"snr_db": 60.0}}, {"mains": {}, "gel_drying": {}}])
+@pytest.mark.parametrize(
+    "effects", [{}, {"noise": {"snr_db": 60.0}}, {"mains": {}, "gel_drying": {}}]
+)
 def test_only_named_effects_are_imported(effects: dict[str, dict[str, float]]) -> None:
     own, every = json.loads(fresh(PROBE, json.dumps(effects)))
     assert own == sorted(effects)
-    assert not [name for name in every if name.split(".")[0] in ("matplotlib", "dask", "distributed", "tqdm")]
+    assert not [
+        name
+        for name in every
+        if name.split(".")[0] in ("matplotlib", "dask", "distributed", "tqdm")
+    ]
 
 
 def test_listing_effects_imports_none() -> None:
@@ -57,5 +65,8 @@ print([m for m in sys.modules if m.startswith("eitskin.scene.effects.")])
 
 
 def test_the_command_line_starts_without_scipy() -> None:
-    code = "import sys, eitskin.cli.cmd_scene; print([m for m in ('scipy', 'numpy', 'matplotlib') if m in sys.modules])"
+    code = (
+        "import sys, eitskin.cli.cmd_scene; print([m for m in ('scipy', 'numpy', 'matplotlib') if m"
+        " in sys.modules])"
+    )
     assert fresh(code).strip() == "[]"

@@ -19,7 +19,18 @@ from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import Bench
 
 EXPECTED = {
-    *("single_press", "light_press", "two_touch", "pinch", "swipe", "ring7", "roll", "rotate", "grip", "drying_gel"),
+    *(
+        "single_press",
+        "light_press",
+        "two_touch",
+        "pinch",
+        "swipe",
+        "ring7",
+        "roll",
+        "rotate",
+        "grip",
+        "drying_gel",
+    ),
     *("loose_electrode", "bridged", "mains_hum", "drift", "real_board", "random_touches", "demo"),
 }
 BENCH = Bench()
@@ -38,7 +49,10 @@ def test_every_library_scene_runs(name: str) -> None:
     compiled = compile_scene(scene, bench=BENCH)
     frames = simulate_frames(compiled).voltage_v
     assert frames.shape == (scene.n_frames, 208)
-    quiet, noise_v = frames[: scene.quiet_frames].mean(axis=0), frames[: scene.quiet_frames].std(axis=0).max()
+    quiet, noise_v = (
+        frames[: scene.quiet_frames].mean(axis=0),
+        frames[: scene.quiet_frames].std(axis=0).max(),
+    )
     change = np.abs(frames[scene.quiet_frames :] - quiet).max()
     assert change > 10 * noise_v or name == "random_touches"
     assert compiled.states[0].touches == ()
@@ -47,11 +61,16 @@ def test_every_library_scene_runs(name: str) -> None:
 def test_seven_on_the_ring_are_seven_on_a_ring() -> None:
     samples = find_scene("ring7").samples()
     assert len(samples) == 7
-    assert [float(np.hypot(s.x_mm[0], s.y_mm[0])) for s in samples] == pytest.approx([60.0] * 7, abs=1e-3)
+    assert [float(np.hypot(s.x_mm[0], s.y_mm[0])) for s in samples] == pytest.approx(
+        [60.0] * 7, abs=1e-3
+    )
 
 
 def test_an_unknown_scene_names_the_nearest() -> None:
-    with pytest.raises(FileError, match="swip: no such scene file, nor a scene of the library; did you mean 'swipe'"):
+    with pytest.raises(
+        FileError,
+        match="swip: no such scene file, nor a scene of the library; did you mean 'swipe'",
+    ):
         find_scene("swip")
     with pytest.raises(FileError, match="no such scene"):
         find_scene("swip.toml")

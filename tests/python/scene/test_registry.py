@@ -41,7 +41,15 @@ MODULE = SimpleNamespace(Parameters=Every)
 
 def test_tables_become_parameters() -> None:
     assert parse_parameters(MODULE, {}, "w") == Every()  # type: ignore[arg-type]
-    table = {"gain": 2, "bits": 8.0, "on": False, "kind": "fast", "which": [1, 2], "pair": [3, 4], "limit_v": 0.5}
+    table = {
+        "gain": 2,
+        "bits": 8.0,
+        "on": False,
+        "kind": "fast",
+        "which": [1, 2],
+        "pair": [3, 4],
+        "limit_v": 0.5,
+    }
     found = parse_parameters(MODULE, table, "w")  # type: ignore[arg-type]
     assert found == Every(2.0, 8, False, "fast", (1, 2), (3.0, 4.0), 0.5)
     assert isinstance(found.gain, float) and isinstance(found.bits, int)
@@ -51,7 +59,10 @@ def test_tables_become_parameters() -> None:
     ("table", "said"),
     [
         ({"gian": 1}, r"f \[effects.x\]: unknown key 'gian'; did you mean 'gain'"),
-        ({"gain": 0}, r"f \[effects.x\]: gain = 0 is out of range; it must be above 0 and at most 2 V"),
+        (
+            {"gain": 0},
+            r"f \[effects.x\]: gain = 0 is out of range; it must be above 0 and at most 2 V",
+        ),
         ({"gain": float("nan")}, "gain = nan is out of range"),
         ({"gain": "loud"}, "gain must be a number"),
         ({"gain": True}, "gain must be a number"),
@@ -73,13 +84,23 @@ def test_impossible_parameters_name_file_table_and_key(table: dict[str, object],
 
 def test_parameters_describe_themselves() -> None:
     rows = {row["name"]: row for row in describe_parameters(MODULE)}  # type: ignore[arg-type]
-    gain = {"name": "gain", "type": "float", "default": 1.0, "low": 0, "high": 2, "unit": "V", "doc": "a number"}
+    gain = {
+        "name": "gain",
+        "type": "float",
+        "default": 1.0,
+        "low": 0,
+        "high": 2,
+        "unit": "V",
+        "doc": "a number",
+    }
     assert rows["gain"] == gain
     assert rows["kind"]["choices"] == ("slow", "fast")
 
 
 def test_an_unknown_effect_names_the_nearest() -> None:
-    with pytest.raises(ConfigError, match=r"f.toml \[effects.nosie\]: unknown effect 'nosie'; did you mean 'noise'"):
+    with pytest.raises(
+        ConfigError, match=r"f.toml \[effects.nosie\]: unknown effect 'nosie'; did you mean 'noise'"
+    ):
         Registry().load("nosie", "f.toml")
 
 

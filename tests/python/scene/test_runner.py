@@ -36,16 +36,29 @@ def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
     frames = run(compile_scene(scene), truth_pixels=32)
     save_frames(tmp_path / "f.npz", frames)
     again = load_frames(tmp_path / "f.npz")
-    assert np.array_equal(again.voltage_v, frames.voltage_v) and again.reference_voltage_v.shape == (2, 208)
+    assert np.array_equal(
+        again.voltage_v, frames.voltage_v
+    ) and again.reference_voltage_v.shape == (2, 208)
     assert again.time_s is not None and again.time_s[5] == 0.25
-    assert again.touch_frame is not None and again.touch_xy_mm is not None and again.touch_strength is not None
-    assert again.touch_frame.tolist() == list(range(6)) and again.touch_strength.tolist() == [8.0] * 6
-    assert again.touch_xy_mm[0].tolist() == [-80.0, 0.0] and again.touch_xy_mm[5] == pytest.approx([60.0, 30.0])
+    assert (
+        again.touch_frame is not None
+        and again.touch_xy_mm is not None
+        and again.touch_strength is not None
+    )
+    assert (
+        again.touch_frame.tolist() == list(range(6)) and again.touch_strength.tolist() == [8.0] * 6
+    )
+    assert again.touch_xy_mm[0].tolist() == [-80.0, 0.0] and again.touch_xy_mm[5] == pytest.approx(
+        [60.0, 30.0]
+    )
     assert again.truth_mask is not None and again.truth_conductivity_s_per_m is not None
     area = (again.truth_mask == 1).sum(axis=(1, 2)) * (194 / 32) ** 2
     assert area == pytest.approx(np.full(6, 314.0), rel=0.45)
     inside = again.truth_conductivity_s_per_m[again.truth_mask == 1]
-    assert inside.max() == pytest.approx(0.09, rel=0.01) and np.nanmin(again.truth_conductivity_s_per_m) > 0.0099
+    assert (
+        inside.max() == pytest.approx(0.09, rel=0.01)
+        and np.nanmin(again.truth_conductivity_s_per_m) > 0.0099
+    )
     assert again.meta["effects"] == {"noise": {"snr_db": 60.0, "noise_v": None}}
     assert again.meta["plan"]["method"] == "update" and again.meta["counters"]["states"] == 7
 
@@ -61,7 +74,8 @@ def test_the_same_scene_gives_the_same_frames_and_another_seed_others(bench: Ben
 def test_adding_an_effect_leaves_the_others_samples_as_they_were(
     added: str, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every number that named effects draw, by stream: equal to the bit with and without one more effect."""
+    """Every number that named effects draw, by stream: equal to the bit with and without one more
+    effect."""
     drawn: dict[tuple[int, str, int], np.random.BitGenerator] = {}
     real = session.stream
 
@@ -71,7 +85,9 @@ def test_adding_an_effect_leaves_the_others_samples_as_they_were(
         return generator
 
     monkeypatch.setattr(session, "stream", watched)
-    effects = {name: {} for name in RANDOM if name not in (added, "noise")} | {"noise": {"snr_db": 60.0}}
+    effects = {name: {} for name in RANDOM if name not in (added, "noise")} | {
+        "noise": {"snr_db": 60.0}
+    }
     steps, states = [], []
     for own in (effects, {added: {}, **effects}):
         drawn.clear()
@@ -90,7 +106,13 @@ def test_without_random_effects_no_generator_is_made(monkeypatch: pytest.MonkeyP
         raise AssertionError("a random generator was made")
 
     monkeypatch.setattr(np.random, "default_rng", refuse)
-    effects: dict[str, Any] = {"gel_drying": {}, "mains": {}, "adc": {}, "detached": {"electrodes": [3]}, "mux": {}}
+    effects: dict[str, Any] = {
+        "gel_drying": {},
+        "mains": {},
+        "adc": {},
+        "detached": {"electrodes": [3]},
+        "mux": {},
+    }
     for own in ({}, effects):
         frames = moving_scene(4, effects=own).run()
         assert frames.meta["counters"]["random_generators"] == 0
@@ -98,7 +120,9 @@ def test_without_random_effects_no_generator_is_made(monkeypatch: pytest.MonkeyP
         moving_scene(4, effects={"noise": {"snr_db": 60.0}}).run()
 
 
-def test_arithmetic_is_complex_only_with_phase(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arithmetic_is_complex_only_with_phase(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from eitskin.fem import cem
     from eitskin.scene import forward_steps
 
@@ -111,7 +135,9 @@ def test_arithmetic_is_complex_only_with_phase(bench: Bench, monkeypatch: pytest
 
     monkeypatch.setattr(cem, "factorise", watched)
     monkeypatch.setattr(forward_steps, "factorise", watched)
-    everything = {name: {} for name in BUILT_IN if name not in ("phase", "noise")} | {"noise": {"snr_db": 60.0}}
+    everything = {name: {} for name in BUILT_IN if name not in ("phase", "noise")} | {
+        "noise": {"snr_db": 60.0}
+    }
     for scene in (moving_scene(3), still_scene(3, effects=everything)):
         done = simulate_frames(compile_scene(scene))
         assert done.work.complex_factorisations == 0 and done.true_v.dtype == np.float64
@@ -124,11 +150,18 @@ def test_arithmetic_is_complex_only_with_phase(bench: Bench, monkeypatch: pytest
 
 def test_a_conductivity_that_cannot_be_names_effect_and_time(bench: Bench) -> None:
     def make(parameters: Any, session: Any) -> MaterialStep:
-        return MaterialStep("sinking", Cost(), "", lambda c, time_s, frame: c - 0.08 * max(time_s + 0.1, 0.0), True)
+        return MaterialStep(
+            "sinking", Cost(), "", lambda c, time_s, frame: c - 0.08 * max(time_s + 0.1, 0.0), True
+        )
 
-    registry = Registry({"sinking": effect_module("sinking", make, Stage.MATERIAL)}, entry_points=False)
+    registry = Registry(
+        {"sinking": effect_module("sinking", make, Stage.MATERIAL)}, entry_points=False
+    )
     scene = still_scene(4, effects={"sinking": {}}, where="f.toml")
-    with pytest.raises(ConfigError, match=r"f.toml \[effects.sinking\]: at 0.05 s it makes a conductivity of -0.002"):
+    with pytest.raises(
+        ConfigError,
+        match=r"f.toml \[effects.sinking\]: at 0.05 s it makes a conductivity of -0.002",
+    ):
         simulate_frames(compile_scene(scene, registry=registry, bench=bench))
 
 

@@ -14,7 +14,13 @@ pytest.importorskip("netgen")
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.scene.random_touches import Scene, Touch, TouchSet, random_touches
-from eitskin.scene.simulate import Measurement, Simulated, conductivity_with, element_cover, simulate
+from eitskin.scene.simulate import (
+    Measurement,
+    Simulated,
+    conductivity_with,
+    element_cover,
+    simulate,
+)
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 
@@ -33,11 +39,15 @@ def session(mesh: Mesh) -> Simulated:
     return simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
 
 
-@pytest.mark.parametrize("touch", [Touch(0, 0, 9, 5), Touch(40.3, -51.7, 6, 3), Touch(2, 80, 12, 8)])
+@pytest.mark.parametrize(
+    "touch", [Touch(0, 0, 9, 5), Touch(40.3, -51.7, 6, 3), Touch(2, 80, 12, 8)]
+)
 def test_a_touch_covers_its_area(mesh: Mesh, touch: Touch) -> None:
     elements, part = element_cover(mesh, touch)
     assert part.min() > 0 and 0.5 < part.max() <= 1.0
-    assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(math.pi * touch.radius_mm**2, rel=0.01)
+    assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(
+        math.pi * touch.radius_mm**2, rel=0.01
+    )
 
 
 def test_a_touch_smaller_than_an_element_is_not_lost(mesh: Mesh) -> None:
@@ -66,10 +76,15 @@ def test_a_touch_without_contrast_changes_nothing(mesh: Mesh) -> None:
 
 
 def test_conductive_touches_lower_the_voltages_that_drive(mesh: Mesh) -> None:
-    """The power that a current source puts in falls when conductivity rises; adjacent rows sum to a drop across."""
-    touches = TouchSet("one", 0, (Scene("one", (Touch(0, 60, 10, 8.0),)), Scene("hole", (Touch(0, 60, 10, 0.1),))))
+    """The power that a current source puts in falls when conductivity rises; adjacent rows sum to a
+    drop across."""
+    touches = TouchSet(
+        "one", 0, (Scene("one", (Touch(0, 60, 10, 8.0),)), Scene("hole", (Touch(0, 60, 10, 0.1),)))
+    )
     clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
-    across = np.array([np.abs(v.reshape(16, 13).sum(axis=1)).sum() for v in (clean.exact_quiet_v, *clean.exact_v)])
+    across = np.array(
+        [np.abs(v.reshape(16, 13).sum(axis=1)).sum() for v in (clean.exact_quiet_v, *clean.exact_v)]
+    )
     assert across[1] < across[0] < across[2]
 
 
@@ -90,14 +105,19 @@ def test_converter_steps_are_whole_and_as_stated(session: Simulated) -> None:
     steps = session.frames_v / session.lsb_v
     assert np.abs(steps - np.round(steps)).max() < 1e-6
     assert session.clipped == 0
-    assert np.abs(session.quiet_v - session.exact_quiet_v).max() < 5 * session.noise_v + session.lsb_v
+    assert (
+        np.abs(session.quiet_v - session.exact_quiet_v).max() < 5 * session.noise_v + session.lsb_v
+    )
 
 
 def test_a_small_converter_clips_and_says_so(mesh: Mesh) -> None:
     how = replace(CLEAN, adc_bits=12, adc_headroom=0.5)
     tight = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
     span = 0.5 * np.abs(tight.exact_quiet_v).max()
-    beyond = [np.count_nonzero(np.abs(v) > span) for v in (*tight.exact_v, tight.exact_quiet_v, tight.exact_quiet_v)]
+    beyond = [
+        np.count_nonzero(np.abs(v) > span)
+        for v in (*tight.exact_v, tight.exact_quiet_v, tight.exact_quiet_v)
+    ]
     assert tight.clipped == sum(beyond) > 0
     assert tight.frames_v.min() >= -span and tight.frames_v.max() < span
 
@@ -108,7 +128,9 @@ def test_contacts_are_spread_within_bounds_and_shared(session: Simulated) -> Non
     assert len(set(ratio)) == 16
 
 
-def test_sessions_repeat_and_are_independent_of_their_length(session: Simulated, mesh: Mesh) -> None:
+def test_sessions_repeat_and_are_independent_of_their_length(
+    session: Simulated, mesh: Mesh
+) -> None:
     again = simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
     assert (again.frames_v == session.frames_v).all() and (again.quiet_v == session.quiet_v).all()
     short = simulate(SKIN, PROTOCOL, random_touches(SKIN.outline, 5, 2), mesh=mesh)
@@ -121,8 +143,12 @@ def test_sources_do_not_disturb_each_other(session: Simulated, mesh: Mesh) -> No
 
     analog = replace(session.measurement, adc_bits=None)
     with_contacts = simulate(SKIN, PROTOCOL, TOUCHES, measurement=analog, mesh=mesh)
-    without = simulate(SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, contact_spread=0.0), mesh=mesh)
-    louder = simulate(SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, snr_db=40.0, quiet_frames=3), mesh=mesh)
+    without = simulate(
+        SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, contact_spread=0.0), mesh=mesh
+    )
+    louder = simulate(
+        SKIN, PROTOCOL, TOUCHES, measurement=replace(analog, snr_db=40.0, quiet_frames=3), mesh=mesh
+    )
     assert noise_of(without) == pytest.approx(noise_of(with_contacts), abs=1e-6)
     assert noise_of(louder) == pytest.approx(noise_of(with_contacts), abs=1e-6)
     assert (louder.contact_impedance_ohm_m2 == session.contact_impedance_ohm_m2).all()
@@ -141,7 +167,9 @@ def test_training_and_test_share_nothing(session: Simulated, mesh: Mesh) -> None
 
 def test_reference_is_the_mean_quiet_frame(session: Simulated) -> None:
     assert session.quiet_v.shape == (64, 208)
-    assert session.differences_v() == pytest.approx(session.frames_v - session.quiet_v.sum(axis=0) / 64)
+    assert session.differences_v() == pytest.approx(
+        session.frames_v - session.quiet_v.sum(axis=0) / 64
+    )
 
 
 def test_as_frames_carries_the_truth(session: Simulated) -> None:
@@ -149,8 +177,14 @@ def test_as_frames_carries_the_truth(session: Simulated) -> None:
     assert (frames.voltage_v == session.frames_v).all()
     assert frames.reference_voltage_v.shape == (64, 208)
     assert frames.frame_name[1] == "test-s5-1"
-    assert frames.touch_frame is not None and frames.touch_strength is not None and frames.touch_xy_mm is not None
-    assert frames.touch_frame.tolist() == [k for k, s in enumerate(TOUCHES.scenes) for _ in s.touches]
+    assert (
+        frames.touch_frame is not None
+        and frames.touch_strength is not None
+        and frames.touch_xy_mm is not None
+    )
+    assert frames.touch_frame.tolist() == [
+        k for k, s in enumerate(TOUCHES.scenes) for _ in s.touches
+    ]
     first = TOUCHES.scenes[0].touches[0]
     assert frames.touch_strength[0] == first.contrast - 1
     assert frames.touch_xy_mm[0].tolist() == [first.x_mm, first.y_mm]

@@ -1,4 +1,5 @@
-"""Outlines and electrodes out of SVG and DXF files: sizes, sides, transforms, and a refusal of one line for the rest."""
+"""Outlines and electrodes out of SVG and DXF files: sizes, sides, transforms, and a refusal of one
+line for the rest."""
 
 from __future__ import annotations
 
@@ -15,7 +16,13 @@ from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, 
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.drawing import Reading, read_drawing
-from eitskin.skin.example_drawings import forearm_corners, hand_corners, hand_places_mm, hand_svg, main
+from eitskin.skin.example_drawings import (
+    forearm_corners,
+    hand_corners,
+    hand_places_mm,
+    hand_svg,
+    main,
+)
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.rounded import Corner, as_outline
@@ -39,18 +46,24 @@ def outline(path: Path, element: str | None = None, **reading: float) -> Outline
     return read_drawing(path, Reading(**reading)).outline(element)
 
 
-def described(folder: Path, body: str, skin: str = "", electrodes: str = "count = 8", head: str = MM) -> Skin:
+def described(
+    folder: Path, body: str, skin: str = "", electrodes: str = "count = 8", head: str = MM
+) -> Skin:
     """The skin of a description that names a drawing with ``body``."""
     svg(folder, body, head)
     path = folder / "skin.toml"
-    path.write_text(f'[skin]\noutline = "a.svg"\n{skin}\n[electrodes]\n{electrodes}\n', encoding="utf-8")
+    path.write_text(
+        f'[skin]\noutline = "a.svg"\n{skin}\n[electrodes]\n{electrodes}\n', encoding="utf-8"
+    )
     return load_skin(path)[0]
 
 
 def test_y_goes_up_from_the_lower_edge_of_the_page(tmp_path: Path) -> None:
     assert outline(svg(tmp_path, BOX)).bounding_box_mm == pytest.approx((10, 30, 70, 70), abs=1e-4)
     shifted = 'width="50mm" height="40mm" viewBox="10 20 100 80"'
-    assert outline(svg(tmp_path, BOX, shifted)).bounding_box_mm == pytest.approx((0, 25, 30, 45), abs=1e-4)
+    assert outline(svg(tmp_path, BOX, shifted)).bounding_box_mm == pytest.approx(
+        (0, 25, 30, 45), abs=1e-4
+    )
 
 
 @pytest.mark.parametrize(
@@ -69,7 +82,10 @@ def test_units(tmp_path: Path, head: str, reading: dict[str, float], width_mm: f
 
 
 def test_transforms_and_groups(tmp_path: Path) -> None:
-    body = '<g id="layer" transform="translate(50 40) rotate(90) scale(2)"><path class="rim" d="M0 0 h20 v10 h-20 z"/></g>'
+    body = (
+        '<g id="layer" transform="translate(50 40) rotate(90) scale(2)"><path class="rim" d="M0 0'
+        ' h20 v10 h-20 z"/></g>'
+    )
     shape = outline(svg(tmp_path, body + '<circle cx="9" cy="9" r="5"/>'), "layer")
     assert shape.bounding_box_mm == pytest.approx((30, 0, 50, 40), abs=1e-4)
     assert outline(svg(tmp_path, body), "rim").area_mm2 == pytest.approx(800, rel=1e-6)
@@ -87,7 +103,10 @@ def test_copies_are_placed(tmp_path: Path) -> None:
         '<circle cx="50" cy="40" r="30"/>',
         '<path d="M20 40 A30 30 0 0 1 80 40 A30 30 0 0 1 20 40 Z"/>',
         # a circle of four cubic curves lies within 0.03 % of the radius
-        '<path d="M80 40 C80 56.5685 66.5685 70 50 70 S20 56.5685 20 40 S33.4315 10 50 10 S80 23.4315 80 40 Z"/>',
+        (
+            '<path d="M80 40 C80 56.5685 66.5685 70 50 70 S20 56.5685 20 40 S33.4315 10 50 10 S80'
+            ' 23.4315 80 40 Z"/>'
+        ),
     ],
 )
 def test_curves_are_flat_to_the_tolerance(tmp_path: Path, body: str, tolerance: float) -> None:
@@ -100,42 +119,69 @@ def test_curves_are_flat_to_the_tolerance(tmp_path: Path, body: str, tolerance: 
 
 
 def test_open_pieces_are_joined(tmp_path: Path) -> None:
-    body = '<path d="M10 10 H70"/><path d="M10 50 V10"/><path d="M70 10 V50"/><path d="M70 50 H10"/>'
+    body = (
+        '<path d="M10 10 H70"/><path d="M10 50 V10"/><path d="M70 10 V50"/><path d="M70 50 H10"/>'
+    )
     assert outline(svg(tmp_path, body)).area_mm2 == pytest.approx(2400, rel=1e-6)
     with pytest.raises(GeometryError, match="no closed outline among 3 shapes"):
         outline(svg(tmp_path, body.replace('<path d="M70 10 V50"/>', "")))
 
 
-MARKS = '<g><circle id="electrode-{}" cx="10" cy="30" r="1"/><circle id="electrode-{}" cx="40" cy="11" r="1"/>' + (
-    '<circle id="electrode-{}" cx="70" cy="30" r="1"/><circle id="electrode-{}" cx="40" cy="49" r="1"/></g>'
+MARKS = (
+    '<g><circle id="electrode-{}" cx="10" cy="30" r="1"/><circle id="electrode-{}" cx="40" cy="11"'
+    ' r="1"/>'
+    + '<circle id="electrode-{}" cx="70" cy="30" r="1"/><circle id="electrode-{}" cx="40" cy="49"'
+    ' r="1"/></g>'
 )
 
 
 def test_marks_are_numbered_by_their_ids(tmp_path: Path) -> None:
-    """Left, top, right, bottom as drawn; the ids say where 0 is and which way round, and 10 comes after 9."""
+    """Left, top, right, bottom as drawn; the ids say where 0 is and which way round, and 10 comes
+    after 9."""
     skin = described(tmp_path, BOX + MARKS.format(2, 9, 10, 11), electrodes='marked = "electrode"')
-    np.testing.assert_allclose(skin.electrode_centres_mm(), [(10, 50), (40, 70), (70, 50), (40, 30)], atol=1e-4)
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm(), [(10, 50), (40, 70), (70, 50), (40, 30)], atol=1e-4
+    )
     assert skin.electrodes.clockwise and skin.electrodes.count == 4
     skin = described(tmp_path, BOX + MARKS.format(3, 2, 1, 0), electrodes='marked = "electrode"')
-    np.testing.assert_allclose(skin.electrode_centres_mm(), [(40, 30), (70, 50), (40, 70), (10, 50)], atol=1e-4)
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm(), [(40, 30), (70, 50), (40, 70), (10, 50)], atol=1e-4
+    )
     assert not skin.electrodes.clockwise
     assert skin_from_table(skin_to_table(skin), "again") == skin
 
 
 def test_marks_without_numbers_lie_along_the_rim(tmp_path: Path) -> None:
     body = BOX + MARKS.format(0, 1, 2, 3).replace('id="electrode-', 'class="e" name="')
-    skin = described(tmp_path, body, electrodes='marked = "e"\nstart_angle_deg = 0\ndirection = "clockwise"')
-    np.testing.assert_allclose(skin.electrode_centres_mm(), [(70, 50), (40, 30), (10, 50), (40, 70)], atol=1e-4)
+    skin = described(
+        tmp_path, body, electrodes='marked = "e"\nstart_angle_deg = 0\ndirection = "clockwise"'
+    )
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm(), [(70, 50), (40, 30), (10, 50), (40, 70)], atol=1e-4
+    )
 
 
 def test_points_and_fractions(tmp_path: Path) -> None:
-    skin = described(tmp_path, BOX, electrodes="points_mm = [[40, 72], [8, 50], [40, 29], [70, 50]]")
-    np.testing.assert_allclose(skin.electrode_centres_mm(), [(40, 70), (10, 50), (40, 30), (70, 50)], atol=1e-4)
-    skin = described(tmp_path, BOX, electrodes="fractions = [0.0, 0.25, 0.5, 0.75]\nstart_angle_deg = 90")
-    np.testing.assert_allclose(skin.electrode_centres_mm(), [(40, 70), (10, 50), (40, 30), (70, 50)], atol=1e-4)
+    skin = described(
+        tmp_path, BOX, electrodes="points_mm = [[40, 72], [8, 50], [40, 29], [70, 50]]"
+    )
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm(), [(40, 70), (10, 50), (40, 30), (70, 50)], atol=1e-4
+    )
+    skin = described(
+        tmp_path, BOX, electrodes="fractions = [0.0, 0.25, 0.5, 0.75]\nstart_angle_deg = 90"
+    )
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm(), [(40, 70), (10, 50), (40, 30), (70, 50)], atol=1e-4
+    )
     path = tmp_path / "disk.toml"
-    path.write_text("[skin]\ndiameter_mm = 100\n[electrodes]\npoints_mm = [[0, 52], [-50, 0], [0, -50], [49, 0]]\n")
-    np.testing.assert_allclose(load_skin(path)[0].electrode_centres_mm(), [(0, 50), (-50, 0), (0, -50), (50, 0)], atol=1e-9)
+    path.write_text(
+        "[skin]\ndiameter_mm = 100\n[electrodes]\npoints_mm = [[0, 52], [-50, 0], [0, -50], [49,"
+        " 0]]\n"
+    )
+    np.testing.assert_allclose(
+        load_skin(path)[0].electrode_centres_mm(), [(0, 50), (-50, 0), (0, -50), (50, 0)], atol=1e-9
+    )
 
 
 def dxf(folder: Path, units: int = 4) -> tuple[ezdxf.document.Drawing, Path]:
@@ -144,7 +190,10 @@ def dxf(folder: Path, units: int = 4) -> tuple[ezdxf.document.Drawing, Path]:
     return document, folder / "a.dxf"
 
 
-@pytest.mark.parametrize(("units", "scale_mm", "width_mm"), [(4, None, 60), (5, None, 600), (1, None, 1524), (0, 2.0, 120)])
+@pytest.mark.parametrize(
+    ("units", "scale_mm", "width_mm"),
+    [(4, None, 60), (5, None, 600), (1, None, 1524), (0, 2.0, 120)],
+)
 def test_dxf_units(tmp_path: Path, units: int, scale_mm: float | None, width_mm: float) -> None:
     document, path = dxf(tmp_path, units)
     document.modelspace().add_lwpolyline([(0, 0), (60, 0), (60, 40), (0, 40)], close=True)
@@ -171,7 +220,10 @@ def test_dxf_pieces_blocks_and_layers(tmp_path: Path) -> None:
     assert shape.area_mm2 == pytest.approx(6000 + math.pi * 900, rel=2e-3)
     assert shape.bounding_box_mm == pytest.approx((-25, 7, 135, 67), abs=0.1)
     assert len(drawing.marked("contacts")) == 4
-    with pytest.raises(GeometryError, match=r"2 closed outlines; name one with element = \.\.\.; names in it are: notes, rim"):
+    with pytest.raises(
+        GeometryError,
+        match=r"2 closed outlines; name one with element = \.\.\.; names in it are: notes, rim",
+    ):
         drawing.outline()
 
 
@@ -179,32 +231,115 @@ def test_dxf_pieces_blocks_and_layers(tmp_path: Path) -> None:
     ("body", "skin", "electrodes", "head", "error", "message"),
     [
         ("", "", "", MM, ConfigError, "nothing is drawn in it"),
-        ('<path d="M10 10 H70 V50"/>', "", "", MM, GeometryError, "no closed outline among 1 shapes"),
-        (BOX + BOX.replace("skin", "other"), "", "", MM, GeometryError, "2 closed outlines; .* other, skin"),
-        (BOX, 'element = "rim"', "", MM, ConfigError, "nothing is named 'rim'; names in it are: skin"),
+        (
+            '<path d="M10 10 H70 V50"/>',
+            "",
+            "",
+            MM,
+            GeometryError,
+            "no closed outline among 1 shapes",
+        ),
+        (
+            BOX + BOX.replace("skin", "other"),
+            "",
+            "",
+            MM,
+            GeometryError,
+            "2 closed outlines; .* other, skin",
+        ),
+        (
+            BOX,
+            'element = "rim"',
+            "",
+            MM,
+            ConfigError,
+            "nothing is named 'rim'; names in it are: skin",
+        ),
         (BOX, "", "", 'width="100" height="80"', ConfigError, "no unit such as mm; give scale_mm"),
-        (BOX, "", "", 'width="100mm" height="90mm" viewBox="0 0 100 80"', ConfigError, "by 1 and 1.125 mm a unit"),
+        (
+            BOX,
+            "",
+            "",
+            'width="100mm" height="90mm" viewBox="0 0 100 80"',
+            ConfigError,
+            "by 1 and 1.125 mm a unit",
+        ),
         (BOX, "", "", 'width="100mm" viewBox="0 0 100"', ConfigError, "viewBox = '0 0 100'"),
-        ('<path d="M10 10 L70 50 V10 L10 50 Z"/>', "", "", MM, GeometryError, "crosses or touches itself"),
+        (
+            '<path d="M10 10 L70 50 V10 L10 50 Z"/>',
+            "",
+            "",
+            MM,
+            GeometryError,
+            "crosses or touches itself",
+        ),
         (BOX, "scale_mm = -1", "", MM, ConfigError, "scale_mm = -1 is out of range"),
         (BOX, "tolerance_mm = 0", "", MM, ConfigError, "tolerance_mm = 0 is out of range"),
         (BOX, "", 'marked = "e"', MM, ConfigError, "nothing is marked 'e'"),
         (BOX, "", "marked = 3", MM, ConfigError, "marked must be a word"),
-        (BOX, "", "points_mm = [[40, 80], [10, 50], [40, 30], [70, 50]]", MM, GeometryError, "electrode 0 .* is 10 mm from the"),
-        (BOX, "", "points_mm = [[40, 70], [40, 30], [10, 50], [70, 50]]", MM, GeometryError, "not in order along the rim; give"),
-        (BOX, "", "points_mm = [[40, 70], [39, 70], [10, 50], [70, 50]]", MM, GeometryError, "0 and 1 .* overlap"),
+        (
+            BOX,
+            "",
+            "points_mm = [[40, 80], [10, 50], [40, 30], [70, 50]]",
+            MM,
+            GeometryError,
+            "electrode 0 .* is 10 mm from the",
+        ),
+        (
+            BOX,
+            "",
+            "points_mm = [[40, 70], [40, 30], [10, 50], [70, 50]]",
+            MM,
+            GeometryError,
+            "not in order along the rim; give",
+        ),
+        (
+            BOX,
+            "",
+            "points_mm = [[40, 70], [39, 70], [10, 50], [70, 50]]",
+            MM,
+            GeometryError,
+            "0 and 1 .* overlap",
+        ),
         (BOX, "", "points_mm = []", MM, ConfigError, "points_mm is empty"),
         (BOX, "", "fractions = [0, 0.2, 0.4, 1.2]", MM, GeometryError, "fraction 3 .* is 1.2"),
-        (BOX, "", "count = 5\nfractions = [0, 0.2, 0.4, 0.6]", MM, GeometryError, "4 entries for 5 electrodes"),
+        (
+            BOX,
+            "",
+            "count = 5\nfractions = [0, 0.2, 0.4, 0.6]",
+            MM,
+            GeometryError,
+            "4 entries for 5 electrodes",
+        ),
         (BOX, "", "fractions = [0, 0.2]\npositions_mm = [0, 9]", MM, ConfigError, "both say where"),
         (BOX, "", "snap_mm = 2", MM, ConfigError, "snap_mm goes with"),
-        (BOX + MARKS.format(1, 1, 2, 3), "", "marked = 'electrode'", MM, GeometryError, "two marks are numbered 1"),
-        ('<g id="a"><use href="#a"/></g>', "", "", MM, ConfigError, "within each other, over 100 deep"),
+        (
+            BOX + MARKS.format(1, 1, 2, 3),
+            "",
+            "marked = 'electrode'",
+            MM,
+            GeometryError,
+            "two marks are numbered 1",
+        ),
+        (
+            '<g id="a"><use href="#a"/></g>',
+            "",
+            "",
+            MM,
+            ConfigError,
+            "within each other, over 100 deep",
+        ),
         ("<g>" * 2000 + "</g>" * 2000, "", "", MM, ConfigError, "within each other, over 100 deep"),
     ],
 )
 def test_refused(
-    tmp_path: Path, body: str, skin: str, electrodes: str, head: str, error: type[EitskinError], message: str
+    tmp_path: Path,
+    body: str,
+    skin: str,
+    electrodes: str,
+    head: str,
+    error: type[EitskinError],
+    message: str,
 ) -> None:
     with pytest.raises(error, match=message) as caught:
         described(tmp_path, body, skin, electrodes, head)
@@ -240,8 +375,12 @@ def test_other_refusals(tmp_path: Path) -> None:
         skin_from_table({"skin": {"diameter_mm": 100, "element": "rim"}}, "here")
 
 
-@pytest.mark.parametrize(("name", "library"), [("drawing_svg", "svgelements"), ("drawing_dxf", "ezdxf")])
-def test_an_absent_library_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str, library: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "library"), [("drawing_svg", "svgelements"), ("drawing_dxf", "ezdxf")]
+)
+def test_an_absent_library_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str, library: str
+) -> None:
     path = tmp_path / ("a.svg" if library == "svgelements" else "a.dxf")
     path.write_text("x")
     monkeypatch.setitem(sys.modules, library, None)
@@ -262,7 +401,9 @@ def test_drawings_give_the_shapes_that_they_were_drawn_from() -> None:
     assert hand.outline.area_mm2 == pytest.approx(as_outline(hand_corners()).area_mm2, rel=1e-3)
     np.testing.assert_allclose(hand.electrode_centres_mm(), hand_places_mm(), atol=0.3)
     forearm, _ = load_skin(EXAMPLES / "forearm.toml")
-    assert forearm.outline.area_mm2 == pytest.approx(as_outline(forearm_corners()).area_mm2, rel=1e-3)
+    assert forearm.outline.area_mm2 == pytest.approx(
+        as_outline(forearm_corners()).area_mm2, rel=1e-3
+    )
     with pytest.raises(GeometryError, match="the side after corner 0"):
         as_outline([Corner(0, 0, 9), Corner(10, 0, 9), Corner(10, 10, 9), Corner(0, 10, 9)])
 

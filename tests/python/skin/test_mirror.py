@@ -42,12 +42,17 @@ def test_no_current_crosses_a_straight_edge(dipole: complex) -> None:
     assert np.abs(seen.imag).max() < 1e-12 * np.abs(seen).max()
 
 
-OUTLINES = {"l": l_shape(), "rounded": rounded_rectangle(), "clockwise": polygon([(0, 0), (0, 60), (90, 0)])}
+OUTLINES = {
+    "l": l_shape(),
+    "rounded": rounded_rectangle(),
+    "clockwise": polygon([(0, 0), (0, 60), (90, 0)]),
+}
 
 
 @pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
 def test_a_straight_mirror_is_the_image_beyond_the_nearest_edge(outline: Outline) -> None:
-    """a / b is the image point, |b| = 1; on the rim it is the point itself, from within as on it and beyond."""
+    """a / b is the image point, |b| = 1; on the rim it is the point itself, from within as on it
+    and beyond."""
     low, high = np.min(outline.vertices_mm, axis=0), np.max(outline.vertices_mm, axis=0)
     points = low + (high - low) * np.random.default_rng(4).random((200, 2))
     points = points[outline.contains(points)]
@@ -58,7 +63,9 @@ def test_a_straight_mirror_is_the_image_beyond_the_nearest_edge(outline: Outline
     corners = np.asarray(outline.vertices_mm) @ [1, 1j]
     along = np.roll(corners, -1) - corners
     share = np.clip(((middle[:, None] - corners) * np.conj(along)).real / np.abs(along) ** 2, 0, 1)
-    assert np.abs(middle[:, None] - corners - share * along).min(axis=1) == pytest.approx(0, abs=1e-9)  # halfway lies the rim
+    assert np.abs(middle[:, None] - corners - share * along).min(axis=1) == pytest.approx(
+        0, abs=1e-9
+    )  # halfway lies the rim
     assert (image - place) * b == pytest.approx(np.abs(image - place))  # straight outward
     for edge in range(len(corners)):
         on, outward = corners[edge] + along[edge] / 2, -1j * along[edge] / abs(along[edge])

@@ -40,7 +40,9 @@ def test_polygon_measures() -> None:
     assert outline.point_at(115) == pytest.approx((100, 15))
     assert outline.point_at(400 + 115) == pytest.approx((100, 15))
     assert outline.point_at(-10) == pytest.approx((0, 10))
-    inside = outline.contains([(10, 10), (90, 10), (10, 90), (50, 50), (-1, 10), (31, 31), (29, 31)])
+    inside = outline.contains(
+        [(10, 10), (90, 10), (10, 90), (50, 50), (-1, 10), (31, 31), (29, 31)]
+    )
     assert inside.tolist() == [True, True, True, False, False, False, True]
 
 
@@ -63,7 +65,9 @@ def test_ray_takes_the_furthest_crossing_and_corners() -> None:
     assert square.point_at(square.arc_length_at_angle(45)) == pytest.approx((50, 50))
     assert square.point_at(square.arc_length_at_angle(-90)) == pytest.approx((0, -50))
     assert notched.point_at(notched.arc_length_at_angle(90))[1] == pytest.approx(10)
-    spiral = polygon([(-50, -50), (60, -50), (60, 60), (-20, 60), (-20, 40), (40, 40), (40, -30), (-50, -30)])
+    spiral = polygon(
+        [(-50, -50), (60, -50), (60, 60), (-20, 60), (-20, 40), (40, 40), (40, -30), (-50, -30)]
+    )
     x, y = spiral.point_at(spiral.arc_length_at_angle(180))
     assert spiral.contains([spiral.centre_mm])[0]
     assert x <= spiral.centre_mm[0] and y == pytest.approx(spiral.centre_mm[1])
@@ -117,15 +121,25 @@ def test_any_star_shaped_outline(radii: list[float], turn: float, clockwise: boo
     angles = [turn + 2 * pi * k / len(radii) for k in range(len(radii))]
     points = [(r * cos(a), r * sin(a)) for r, a in zip(radii, angles, strict=True)]
     outline = polygon(points[::-1] if clockwise else points)
-    shoelace = sum(
-        x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(points, points[1:] + points[:1], strict=True)
-    ) / 2
+    shoelace = (
+        sum(
+            x0 * y1 - x1 * y0
+            for (x0, y0), (x1, y1) in zip(points, points[1:] + points[:1], strict=True)
+        )
+        / 2
+    )
     assert outline.area_mm2 == pytest.approx(shoelace, rel=1e-9)
     assert outline.contains([outline.centre_mm])[0]
     assert outline.perimeter_mm == pytest.approx(
-        sum(hypot(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in zip(points, points[1:] + points[:1], strict=True))
+        sum(
+            hypot(x1 - x0, y1 - y0)
+            for (x0, y0), (x1, y1) in zip(points, points[1:] + points[:1], strict=True)
+        )
     )
     for s in np.linspace(0, outline.perimeter_mm, 11):
         x, y = outline.point_at(float(s))
         # Star-shaped about the origin: just below a rim point is inside, just beyond it is not.
-        assert outline.contains([(0.999 * x, 0.999 * y), (1.001 * x, 1.001 * y)]).tolist() == [True, False]
+        assert outline.contains([(0.999 * x, 0.999 * y), (1.001 * x, 1.001 * y)]).tolist() == [
+            True,
+            False,
+        ]

@@ -77,7 +77,10 @@ def test_opposite_and_skip() -> None:
         (lambda: table(16, []), "shape"),
         (lambda: table(16, [[0, 1, 2]]), "shape"),
         (lambda: table(16, [[0, 1, 2, 3], [0, 1]]), "rows differ in length"),
-        (lambda: table(16, [[0, 1, 2, 3], [1, 2, 3, 16]]), r"row 1 \(from 0\).*0 to 15; count from 0"),
+        (
+            lambda: table(16, [[0, 1, 2, 3], [1, 2, 3, 16]]),
+            r"row 1 \(from 0\).*0 to 15; count from 0",
+        ),
         (lambda: table(16, [[0, 1, 2, -1]]), r"row 0 \(from 0\)"),
         (lambda: table(16, [[0, 1, 2, 300]]), r"row 0 \(from 0\)"),
         (lambda: table(16, [[0, 0, 2, 3]]), "two different electrodes"),
@@ -116,7 +119,15 @@ def test_hash_is_fnv_1a_of_the_documented_bytes() -> None:
 
 
 def test_reciprocity_with_flips() -> None:
-    rows = [[0, 1, 4, 5], [5, 4, 0, 1], [7, 6, 2, 3], [2, 3, 7, 6], [8, 9, 10, 11], [1, 2, 6, 5], [2, 1, 6, 5]]
+    rows = [
+        [0, 1, 4, 5],
+        [5, 4, 0, 1],
+        [7, 6, 2, 3],
+        [2, 3, 7, 6],
+        [8, 9, 10, 11],
+        [1, 2, 6, 5],
+        [2, 1, 6, 5],
+    ]
     pairs = table(16, rows).reciprocal_pairs()
     assert pairs.first.tolist() == [0, 2, 4, 5]
     assert pairs.second.tolist() == [1, 3, -1, 6]
@@ -126,7 +137,8 @@ def test_reciprocity_with_flips() -> None:
 @settings(max_examples=50, deadline=None)
 @given(st.integers(5, 20), st.integers(0, 2**32 - 1))
 def test_reciprocity_of_shuffled_and_flipped_tables(n: int, seed: int) -> None:
-    """Fold an adjacent table whose rows were shuffled and whose pairs were flipped and swapped at random."""
+    """Fold an adjacent table whose rows were shuffled and whose pairs were flipped and swapped at
+    random."""
     rng = np.random.default_rng(seed)
     rows = adjacent(n).drive_measure.astype(int)
     rows = rows[rng.permutation(len(rows))]
@@ -152,7 +164,10 @@ def test_reciprocity_of_shuffled_and_flipped_tables(n: int, seed: int) -> None:
         (adjacent(5, 2e-3), {"kind": "adjacent"}),
         (opposite(8), {"kind": "opposite"}),
         (skip(16, 3), {"kind": "skip", "skip": 3}),
-        (table(6, [[0, 1, 2, 3], [3, 2, 5, 4]]), {"kind": "table", "table": [[0, 1, 2, 3], [3, 2, 5, 4]]}),
+        (
+            table(6, [[0, 1, 2, 3], [3, 2, 5, 4]]),
+            {"kind": "table", "table": [[0, 1, 2, 3], [3, 2, 5, 4]]},
+        ),
     ],
 )
 def test_table_round_trip(protocol: Protocol, kind: dict[str, Any]) -> None:

@@ -24,7 +24,11 @@ def _angles(skin: Skin) -> np.ndarray[Any, Any]:
 
 def test_paper_skin() -> None:
     skin = paper_skin()
-    assert (skin.outline.diameter_mm, skin.thickness_mm, skin.conductivity_s_per_m) == (194, 12, 0.01)
+    assert (skin.outline.diameter_mm, skin.thickness_mm, skin.conductivity_s_per_m) == (
+        194,
+        12,
+        0.01,
+    )
     assert (skin.electrodes.count, skin.electrodes.width_mm) == (16, 4)
     np.testing.assert_allclose(_angles(skin), (90 + np.arange(16) * 22.5) % 360, atol=1e-9)
     spans = skin.electrode_spans_mm()
@@ -47,15 +51,25 @@ def test_kit4_angles(shared_data: Path) -> None:
 
 
 def test_positions_along_the_rim() -> None:
-    skin = Skin("r", RECTANGLE, Electrodes(4, 5, start_angle_deg=270, positions_mm=(0.0, 50.0, 150.0, 350.0)))
-    np.testing.assert_allclose(skin.electrode_centres_mm(), [(100, 0), (150, 0), (200, 50), (50, 100)])
+    skin = Skin(
+        "r",
+        RECTANGLE,
+        Electrodes(4, 5, start_angle_deg=270, positions_mm=(0.0, 50.0, 150.0, 350.0)),
+    )
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm(), [(100, 0), (150, 0), (200, 50), (50, 100)]
+    )
     skin = Skin("r", RECTANGLE, Electrodes(4, 5, 270, True, (0.0, 50.0, 150.0, 350.0)))
-    np.testing.assert_allclose(skin.electrode_centres_mm(), [(100, 0), (50, 0), (0, 50), (150, 100)])
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm(), [(100, 0), (50, 0), (0, 50), (150, 100)]
+    )
 
 
 def test_evenly_by_arc_length_on_a_polygon() -> None:
     skin = Skin("r", RECTANGLE, Electrodes(12, 5, start_angle_deg=0))
-    np.testing.assert_allclose(skin.electrode_centres_mm()[:4], [(200, 50), (200, 100), (150, 100), (100, 100)])
+    np.testing.assert_allclose(
+        skin.electrode_centres_mm()[:4], [(200, 50), (200, 100), (150, 100), (100, 100)]
+    )
     spans = skin.electrode_spans_mm()
     assert sorted(np.round(np.diff(np.sort(spans[:, 0])), 9).tolist()) == [50.0] * 11
 
@@ -64,8 +78,14 @@ def test_evenly_by_arc_length_on_a_polygon() -> None:
     ("electrodes", "message"),
     [
         (Electrodes(16, 40), "16 electrodes of 40 mm do not fit"),
-        (Electrodes(4, 10, positions_mm=(0.0, 100.0, 105.0, 300.0)), r"electrodes 1 and 2 \(from 0\) overlap"),
-        (Electrodes(4, 10, positions_mm=(0.0, 100.0, 200.0, 605.0)), r"electrodes 0 and 3 \(from 0\) overlap"),
+        (
+            Electrodes(4, 10, positions_mm=(0.0, 100.0, 105.0, 300.0)),
+            r"electrodes 1 and 2 \(from 0\) overlap",
+        ),
+        (
+            Electrodes(4, 10, positions_mm=(0.0, 100.0, 200.0, 605.0)),
+            r"electrodes 0 and 3 \(from 0\) overlap",
+        ),
         (Electrodes(4, 10, positions_mm=(0.0, 100.0, 110.2, 300.0)), "gap 0.2 mm, at least 0.5 mm"),
         (Electrodes(4, 1000), "do not fit"),
     ],
@@ -106,8 +126,14 @@ def test_refused_sheet(key: str, value: float) -> None:
     [
         paper_skin(),
         Skin("tank", disk(280), Electrodes(16, 25, 90, True, None, 0.0), 0.3, 70.0),
-        Skin("pad", RECTANGLE, Electrodes(5, 3.5, -12.5, False, (0.0, 9.0, 33.3, 77.0, 400.0), 0.5)),
-        Skin("l", polygon([(0, 0), (0, 100), (30, 100), (30, 30), (100, 30), (100, 0)]), Electrodes(8)),
+        Skin(
+            "pad", RECTANGLE, Electrodes(5, 3.5, -12.5, False, (0.0, 9.0, 33.3, 77.0, 400.0), 0.5)
+        ),
+        Skin(
+            "l",
+            polygon([(0, 0), (0, 100), (30, 100), (30, 30), (100, 30), (100, 0)]),
+            Electrodes(8),
+        ),
     ],
     ids=lambda skin: skin.name,
 )
@@ -171,12 +197,20 @@ DISK = "[skin]\ndiameter_mm = 194\n"
 @pytest.mark.parametrize(
     ("text", "error", "message"),
     [
-        ("[skin]\ndiametre_mm = 3\n", ConfigError, r"\[skin\]: unknown key 'diametre_mm'; did you mean 'diameter_mm'"),
+        (
+            "[skin]\ndiametre_mm = 3\n",
+            ConfigError,
+            r"\[skin\]: unknown key 'diametre_mm'; did you mean 'diameter_mm'",
+        ),
         (DISK + "[electrode]\n", ConfigError, "unknown key 'electrode'; did you mean 'electrodes'"),
         (DISK + "[electrodes]\nwidth = 3\n", ConfigError, "did you mean 'width_mm'"),
         (DISK + "[protocol]\nknd = 'adjacent'\n", ConfigError, "did you mean 'kind'"),
         (DISK + "[protocol]\nkind = 'adjacant'\n", ConfigError, "did you mean 'adjacent'"),
-        (DISK + "[electrodes]\ndirection = 'left'\n", ConfigError, "direction = 'left' is not known"),
+        (
+            DISK + "[electrodes]\ndirection = 'left'\n",
+            ConfigError,
+            "direction = 'left' is not known",
+        ),
         ("[skin]\ndiameter_mm = '194'\n", ConfigError, "diameter_mm must be a number"),
         ("[skin]\ndiameter_mm = -1\n", ConfigError, "out of range"),
         (DISK + "thickness_mm = 0\n", ConfigError, "thickness_mm = 0 is out of range"),
@@ -185,14 +219,26 @@ DISK = "[skin]\ndiameter_mm = 194\n"
         (DISK + "polygon_mm = []\n", ConfigError, "either diameter_mm or polygon_mm"),
         ("[skin]\npolygon_mm = 3\n", ConfigError, "must be a list"),
         ("[skin]\npolygon_mm = [[0, 0], [1]]\n", ConfigError, r"entry 1 \(from 0\)"),
-        ("[skin]\npolygon_mm = [[0, 0], [5, 5], [5, 0], [0, 5]]\n", GeometryError, r"skin\.toml: outline: it crosses"),
-        ("[skin]\ndiameter_mm = 20\n", GeometryError, r"skin\.toml: skin 'skin': 16 electrodes .* do not fit"),
+        (
+            "[skin]\npolygon_mm = [[0, 0], [5, 5], [5, 0], [0, 5]]\n",
+            GeometryError,
+            r"skin\.toml: outline: it crosses",
+        ),
+        (
+            "[skin]\ndiameter_mm = 20\n",
+            GeometryError,
+            r"skin\.toml: skin 'skin': 16 electrodes .* do not fit",
+        ),
         (DISK + "[electrodes]\ncount = 16.5\n", ConfigError, "whole number"),
         (DISK + "[electrodes]\npositions_mm = [1, 'a']\n", ConfigError, "list of numbers"),
         (DISK + "[electrodes]\npositions_mm = [1, 2]\n", GeometryError, "2 entries for 16"),
         (DISK + "[protocol]\nkind = 'skip'\n", ConfigError, "'skip' is required"),
         (DISK + "[protocol]\nskip = 2\n", ConfigError, 'skip goes with kind = "skip"'),
-        (DISK + "[protocol]\nkind = 'skip'\nskip = 9\n", ProtocolError, r"\[protocol\].*use 0 to 6"),
+        (
+            DISK + "[protocol]\nkind = 'skip'\nskip = 9\n",
+            ProtocolError,
+            r"\[protocol\].*use 0 to 6",
+        ),
         (DISK + "[protocol]\nkind = 'table'\n", ConfigError, "needs table ="),
         (DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2]]\n", ConfigError, "row 0"),
         (DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2, 16]]\n", ProtocolError, "0 to 15"),

@@ -15,7 +15,10 @@ DV = GENERATOR.normal(size=(4, 20))
 
 def test_back_projection_divides_by_the_sensitivity() -> None:
     image = baselines.back_projection(J).reconstruct(DV)
-    expected = [[sum(J[i, j] * dv[i] for i in range(20)) / sum(abs(J[:, j])) for j in range(35)] for dv in DV]
+    expected = [
+        [sum(J[i, j] * dv[i] for i in range(20)) / sum(abs(J[:, j])) for j in range(35)]
+        for dv in DV
+    ]
     assert image == pytest.approx(np.array(expected))
     matched = [[float(J[:, j] @ dv / np.sqrt(J[:, j] @ J[:, j])) for j in range(35)] for dv in DV]
     assert baselines.back_projection(J, 2).reconstruct(DV) == pytest.approx(np.array(matched))
@@ -28,7 +31,9 @@ def test_back_projection_divides_by_the_sensitivity() -> None:
 def test_gauss_newton_solves_the_normal_equations(strength: float) -> None:
     a = strength * np.linalg.eigvalsh(J.T @ J).max()
     expected = np.linalg.solve(J.T @ J + a * np.eye(35), J.T @ DV.T).T
-    assert baselines.gauss_newton(J, strength).reconstruct(DV) == pytest.approx(expected, rel=1e-8, abs=1e-10)
+    assert baselines.gauss_newton(J, strength).reconstruct(DV) == pytest.approx(
+        expected, rel=1e-8, abs=1e-10
+    )
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0])
@@ -36,16 +41,22 @@ def test_noser_solves_the_weighted_normal_equations(exponent: float) -> None:
     prior = np.diag(J.T @ J) ** exponent
     a = 0.01 * np.linalg.eigvalsh(J.T @ J).max()
     expected = np.linalg.solve(J.T @ J + a * np.diag(prior / prior.mean()), J.T @ DV.T).T
-    assert baselines.noser(J, 0.01, exponent).reconstruct(DV) == pytest.approx(expected, rel=1e-8, abs=1e-10)
+    assert baselines.noser(J, 0.01, exponent).reconstruct(DV) == pytest.approx(
+        expected, rel=1e-8, abs=1e-10
+    )
 
 
 def test_noser_without_exponent_is_gauss_newton() -> None:
-    assert baselines.noser(J, 0.1, 0.0).matrix == pytest.approx(baselines.gauss_newton(J, 0.1).matrix)
+    assert baselines.noser(J, 0.1, 0.0).matrix == pytest.approx(
+        baselines.gauss_newton(J, 0.1).matrix
+    )
 
 
 def test_strength_is_free_of_units() -> None:
     one = baselines.noser(J, 0.01).reconstruct(DV)
-    assert 1e6 * baselines.noser(J * 1e6, 0.01).reconstruct(DV) == pytest.approx(one, rel=1e-7, abs=1e-10)
+    assert 1e6 * baselines.noser(J * 1e6, 0.01).reconstruct(DV) == pytest.approx(
+        one, rel=1e-7, abs=1e-10
+    )
 
 
 @pytest.mark.parametrize("steps", [1, 2, 5])
@@ -65,7 +76,9 @@ def test_conjugate_gradient_ends_at_the_solution_and_stays() -> None:
     tall = J[:, :8]
     exact = np.linalg.lstsq(tall, DV.T, rcond=None)[0].T
     for steps in (8, 40):
-        assert baselines.ConjugateGradient(tall, steps).reconstruct(DV) == pytest.approx(exact, abs=1e-8)
+        assert baselines.ConjugateGradient(tall, steps).reconstruct(DV) == pytest.approx(
+            exact, abs=1e-8
+        )
     assert (baselines.ConjugateGradient(J, 5).reconstruct(np.zeros((1, 20))) == 0).all()
 
 
@@ -75,7 +88,9 @@ def test_fista_reaches_the_optimum_of_another_solver(signed: bool) -> None:
     method = baselines.PlainFista(J, 6000, 0.1, signed)
     images, lambdas = method.reconstruct(DV), method.lambdas(DV)
     for dv, x, lam in zip(DV, images, lambdas, strict=True):
-        lasso = linear_model.Lasso(alpha=lam / 20, fit_intercept=False, positive=not signed, tol=1e-12, max_iter=10**6)
+        lasso = linear_model.Lasso(
+            alpha=lam / 20, fit_intercept=False, positive=not signed, tol=1e-12, max_iter=10**6
+        )
         best = lasso.fit(J, dv).coef_
 
         def value(z: np.ndarray, dv: np.ndarray = dv, lam: float = lam) -> float:
@@ -99,7 +114,8 @@ def test_fista_optimality_and_lambda_max() -> None:
 
 
 def test_fista_iterations_follow_the_paper() -> None:
-    """Two iterations written out: x1 from 0; momentum (t1 - 1) / t2 is 0 at first, (t2 - 1) / t3 then."""
+    """Two iterations written out: x1 from 0; momentum (t1 - 1) / t2 is 0 at first, (t2 - 1) / t3
+    then."""
     dv = DV[:1]
     step, lam = 1 / np.linalg.norm(J, 2) ** 2, baselines.PlainFista(J, 1, 0.1).lambdas(dv)[0]
 
@@ -118,16 +134,26 @@ def test_fista_iterations_follow_the_paper() -> None:
 
 def test_frame_of_nothing_gives_an_image_of_nothing() -> None:
     for method in (
-        baselines.back_projection(J), baselines.gauss_newton(J, 0.1), baselines.noser(J, 0.1),
-        baselines.ConjugateGradient(J, 5), baselines.PlainFista(J, 5, 0.1), baselines.PlainFista(J, 5, 0.1, True),
+        baselines.back_projection(J),
+        baselines.gauss_newton(J, 0.1),
+        baselines.noser(J, 0.1),
+        baselines.ConjugateGradient(J, 5),
+        baselines.PlainFista(J, 5, 0.1),
+        baselines.PlainFista(J, 5, 0.1, True),
     ):
         assert (method.reconstruct(np.zeros(20)) == np.zeros((1, 35))).all(), method.name
 
 
 def test_many_frames_are_as_one_by_one() -> None:
-    for method in (baselines.ConjugateGradient(J, 4), baselines.PlainFista(J, 30, 0.05), baselines.noser(J, 0.1)):
+    for method in (
+        baselines.ConjugateGradient(J, 4),
+        baselines.PlainFista(J, 30, 0.05),
+        baselines.noser(J, 0.1),
+    ):
         together = method.reconstruct(DV)
-        assert together == pytest.approx(np.concatenate([method.reconstruct(dv) for dv in DV]), abs=1e-12)
+        assert together == pytest.approx(
+            np.concatenate([method.reconstruct(dv) for dv in DV]), abs=1e-12
+        )
 
 
 def test_bad_frames_and_parameters_are_refused() -> None:

@@ -53,7 +53,10 @@ def test_the_same_as_one_after_another(engine: str, threads: int) -> None:
         assert one.coefficients.tobytes() == other.coefficients.tobytes()
         assert one.touches == other.touches  # ids too
         assert one.info == other.info
-    assert sum(len(result.touches) for result in results if isinstance(result, Reconstruction)) > COUNT // 2
+    assert (
+        sum(len(result.touches) for result in results if isinstance(result, Reconstruction))
+        > COUNT // 2
+    )
 
 
 def test_a_second_batch_and_no_touches() -> None:
@@ -83,7 +86,9 @@ def test_options_masks_and_engines_reach_every_thread() -> None:
 def test_reconstruct_many_names_the_frame() -> None:
     frames, quiet = small().frames(45, 5), small().quiet(42, 8)
     results = reconstruct_many(small_model(), frames, quiet, threads=2)
-    expected = [r.info.macs for r in one_by_one("c", frames, quiet) if isinstance(r, Reconstruction)]
+    expected = [
+        r.info.macs for r in one_by_one("c", frames, quiet) if isinstance(r, Reconstruction)
+    ]
     assert [r.info.macs for r in results] == expected
     frames[4] = np.nan
     with pytest.raises(FrameError, match=r"^frame 4 \(from 0\): "):
@@ -91,9 +96,14 @@ def test_reconstruct_many_names_the_frame() -> None:
 
 
 def test_c_runs_without_pythons_lock() -> None:
-    """While one thread is in C, this one counts: it would stand still for as long if the lock were held."""
+    """While one thread is in C, this one counts: it would stand still for as long if the lock were
+    held."""
     frames, quiet = small().frames(46, 4), small().quiet(42, 8)
-    batch = Batch(small_model(), threads=1, options=replace(default_options(small_model()), iterations=60_000, solver="fista"))
+    batch = Batch(
+        small_model(),
+        threads=1,
+        options=replace(default_options(small_model()), iterations=60_000, solver="fista"),
+    )
     batch.tare(quiet)
     counted, done = [0], threading.Event()
 

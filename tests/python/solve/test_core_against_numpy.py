@@ -1,4 +1,5 @@
-"""The C core in both widths against the numpy reference: the same options, the same lambda, after exactly 60 iterations."""
+"""The C core in both widths against the numpy reference: the same options, the same lambda, after
+exactly 60 iterations."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from small_models import DATA_KINDS, SIGNS, STORAGES, small, small_blob, small_m
 
 FRAMES = 20
 F64_BOUND = 1e-12
-# relative to a frame's own peak; the worst, .8e-4 and 1.1e-4, is a frame that is noise, its peak a tenth of the others'
+# relative to a frame's own peak; the worst, .8e-4 and 1.1e-4, is a frame that is noise, its peak a
+# tenth of the others'
 F32_BOUND = {"fista": 1e-4, "working-set": 1.2e-4, "coordinate": 1.5e-4, "active-set": 1.5e-4}
 FISTAS = ("fista", "working-set")
 SOLVED = ("iterations", "optimum")
@@ -28,7 +30,9 @@ def solver(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-def engines(storage: str, data_kind: str, solver: str, **options: object) -> dict[str, Reconstructor]:
+def engines(
+    storage: str, data_kind: str, solver: str, **options: object
+) -> dict[str, Reconstructor]:
     """One of each, without a gate."""
     made = {name: Reconstructor(small_model(storage, data_kind), engine=name) for name in ENGINES}
     for reconstructor in made.values():
@@ -45,16 +49,20 @@ def share_lambda(made: dict[str, Reconstructor], frame: np.ndarray, share: float
 
 
 def narrow(frames: np.ndarray) -> np.ndarray:
-    """Voltages that float32 holds exactly, so that all widths get the same: rounding them is not the core's arithmetic, and a
-    weak touch is a small difference of large voltages."""
+    """Voltages that float32 holds exactly, so that all widths get the same: rounding them is not
+    the core's arithmetic, and a weak touch is a small difference of large voltages."""
     return frames.astype(np.float32).astype(np.float64)
 
 
 def difference(result: Reconstruction, expected: Reconstruction) -> float:
-    """The greatest difference of the images over the expected peak; a zero image must be zero in both."""
+    """The greatest difference of the images over the expected peak; a zero image must be zero in
+    both."""
     peak = float(np.abs(expected.image).max())
     assert (peak > 0) == bool(np.abs(result.image).max() > 0) == (expected.info.stop in SOLVED)
-    if "optimum" not in (result.info.stop, expected.info.stop):  # which rounding ends, a little sooner or later
+    if "optimum" not in (
+        result.info.stop,
+        expected.info.stop,
+    ):  # which rounding ends, a little sooner or later
         assert result.info.iterations == expected.info.iterations
         assert result.info.stop == expected.info.stop
     assert (result.info.stop in SOLVED) == (expected.info.stop in SOLVED)
@@ -62,15 +70,21 @@ def difference(result: Reconstruction, expected: Reconstruction) -> float:
     return float(np.abs(result.image - expected.image).max()) / (peak or 1.0)
 
 
-def agree(made: dict[str, Reconstructor], frames: np.ndarray, *, keep: bool = False) -> dict[str, float]:
-    """The worst difference of each width over ``frames``; ``keep`` what an engine remembers from frame to frame."""
+def agree(
+    made: dict[str, Reconstructor], frames: np.ndarray, *, keep: bool = False
+) -> dict[str, float]:
+    """The worst difference of each width over ``frames``; ``keep`` what an engine remembers from
+    frame to frame."""
     worst = {"c64": 0.0, "c": 0.0}
     for frame in frames:
         if not keep:
             share_lambda(made, frame)
             for reconstructor in made.values():
                 reconstructor.forget()
-        results = {name: reconstructor.reconstruct(frame, touches=False) for name, reconstructor in made.items()}
+        results = {
+            name: reconstructor.reconstruct(frame, touches=False)
+            for name, reconstructor in made.items()
+        }
         solver, info = made["numpy"].options.solver, results["numpy"].info
         assert info.iterations == 60 or info.stop == "optimum" or (keep and info.stop == "zero")
         assert info.stop != "optimum" or solver not in FISTAS
@@ -95,7 +109,8 @@ def test_same_images(storage: str, data_kind: str, drift: bool, solver: str) -> 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", ["f32", "i8"])
 def test_same_images_with_rows_left_out(storage: str, data_kind: str, solver: str) -> None:
-    """Rows masked from the start, one of a reciprocal pair or both, and others that drop out in single frames."""
+    """Rows masked from the start, one of a reciprocal pair or both, and others that drop out in
+    single frames."""
     s, generator = small(), np.random.default_rng(8)
     made = engines(storage, data_kind, solver)
     mask = np.zeros(208, dtype=bool)
@@ -115,8 +130,10 @@ def test_same_images_with_rows_left_out(storage: str, data_kind: str, solver: st
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
 def test_same_images_without_electrodes(storage: str, data_kind: str, solver: str) -> None:
-    """One, two, three electrodes out, of each sign: what is left is whitened anew. In float32 its factors lose what the low floor
-    does not hold, and noise in the data's last figure is raised as all noise is; float64 has the reference's answer."""
+    """One, two, three electrodes out, of each sign: what is left is whitened anew. In float32 its
+    factors lose what the low floor does not hold, and noise in the data's last figure is raised as
+    all noise is; float64 has the reference's answer.
+    """
     s = small()
     made = engines(storage, data_kind, solver, max_masked=208)
     worst = {"c64": 0.0, "c": 0.0}
@@ -126,10 +143,14 @@ def test_same_images_without_electrodes(storage: str, data_kind: str, solver: st
             reconstructor.tare(narrow(s.quiet(1, 8)))
         frames = narrow(s.frames(15 + seed, 6, sign))
         for k, frame in enumerate(frames):
-            frame[np.isin(s.protocol.drive_measure, np.arange(3, 4 + k % 3) * 5 % 16).any(axis=1)] = np.nan
+            frame[
+                np.isin(s.protocol.drive_measure, np.arange(3, 4 + k % 3) * 5 % 16).any(axis=1)
+            ] = np.nan
         found = agree(made, frames)
         worst = {name: max(worst[name], found[name]) for name in worst}
-    assert worst["c64"] <= 1e-10 and worst["c"] <= (1e-2 if data_kind == "log-ratio" else 3e-3), worst
+    assert worst["c64"] <= 1e-10 and worst["c"] <= (1e-2 if data_kind == "log-ratio" else 3e-3), (
+        worst
+    )
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
@@ -144,7 +165,9 @@ def test_same_images_after_a_noisy_tare(storage: str, data_kind: str, solver: st
     worst = agree(made, frames)
     assert worst["c64"] <= 1e-11 and worst["c"] <= 4 * F32_BOUND[solver], worst
     for k in (0, 6):
-        floors = [reconstructor.reconstruct(frames[k]).info.floor for reconstructor in made.values()]
+        floors = [
+            reconstructor.reconstruct(frames[k]).info.floor for reconstructor in made.values()
+        ]
         assert min(floors) > 0.06 and floors == pytest.approx([floors[0]] * len(floors), rel=1e-4)
 
 
@@ -164,14 +187,19 @@ def test_same_facts_without_an_electrode(data_kind: str, solver: str) -> None:
         expected = results["numpy"]
         assert expected.touches and expected.info.stop in SOLVED
         for field in ("lambda_", "lambda_max", "lambda_noise", "residual", "data_norm"):
-            assert getattr(results["c64"].info, field) == pytest.approx(getattr(expected.info, field), rel=1e-8), field
+            assert getattr(results["c64"].info, field) == pytest.approx(
+                getattr(expected.info, field), rel=1e-8
+            ), field
         for one, other in zip(results["c64"].touches, expected.touches, strict=True):
-            assert (one.x_mm, one.y_mm, one.radius_mm) == pytest.approx((other.x_mm, other.y_mm, other.radius_mm), abs=1e-6)
+            assert (one.x_mm, one.y_mm, one.radius_mm) == pytest.approx(
+                (other.x_mm, other.y_mm, other.radius_mm), abs=1e-6
+            )
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_same_images_from_a_warm_start(data_kind: str, solver: str) -> None:
-    """A touch that moves, jumps, lifts; a frame that is refused and one with dropouts in between."""
+    """A touch that moves, jumps, lifts; a frame that is refused and one with dropouts in
+    between."""
     s = small()
     made = engines("f32", data_kind, solver, warm_start=True)
     grid = s.linear.grid
@@ -200,7 +228,8 @@ def test_same_images_from_a_warm_start(data_kind: str, solver: str) -> None:
 @pytest.mark.parametrize(("factor", "halvings"), [(1 / 3, 1), (1 / 16, 4), (1e-9, 8)])
 @pytest.mark.parametrize("solver", FISTAS)
 def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver: str) -> None:
-    """A model that understates its Lipschitz constant: the step is halved and the run starts over, or is given up as zero."""
+    """A model that understates its Lipschitz constant: the step is halved and the run starts over,
+    or is given up as zero."""
     blob = bytearray(small_blob())
     place = sections_of(blob)["DIMS"].offset + 56
     struct.pack_into("<f", blob, place, factor * struct.unpack_from("<f", blob, place)[0])
@@ -215,8 +244,14 @@ def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver
     assert expected.info.step_halvings == halvings
     assert expected.info.stop == ("iterations" if factor > 1e-6 else "diverged")
     for name, bound in (("c64", 1e-10), ("c", 1e-3)):
-        assert (results[name].info.step_halvings, results[name].info.stop) == (halvings, expected.info.stop)
-        assert np.abs(results[name].image - expected.image).max() <= bound * np.abs(expected.image).max()
+        assert (results[name].info.step_halvings, results[name].info.stop) == (
+            halvings,
+            expected.info.stop,
+        )
+        assert (
+            np.abs(results[name].image - expected.image).max()
+            <= bound * np.abs(expected.image).max()
+        )
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
@@ -235,10 +270,17 @@ def test_same_facts(data_kind: str, solver: str) -> None:
             assert expected != 0
             # what is a small difference of voltages keeps fewer figures in float32
             loose = 20 if name == "c" and field in ("noise_v", "lambda_noise") else 1
-            assert getattr(baselines[name], field) == pytest.approx(expected, rel=loose * bound), field
-        nothing = {"gap": bound**1.5 * infos["numpy"].data_norm ** 2, "gap_rel": bound**1.5}  # at the optimum it is rounding
+            assert getattr(baselines[name], field) == pytest.approx(expected, rel=loose * bound), (
+                field
+            )
+        nothing = {
+            "gap": bound**1.5 * infos["numpy"].data_norm ** 2,
+            "gap_rel": bound**1.5,
+        }  # at the optimum it is rounding
         for field in ("lambda_", "lambda_max", "gap", "gap_rel", "residual", "data_norm"):
-            expected = pytest.approx(getattr(infos["numpy"], field), rel=30 * bound, abs=nothing.get(field, 0.0))
+            expected = pytest.approx(
+                getattr(infos["numpy"], field), rel=30 * bound, abs=nothing.get(field, 0.0)
+            )
             assert getattr(infos[name], field) == expected, field
         assert infos[name].nonzeros == infos["numpy"].nonzeros
         assert infos[name].touches == infos["numpy"].touches

@@ -1,4 +1,5 @@
-"""The same bits from every build of the kernels: prepared or not, portable or the processor's own."""
+"""The same bits from every build of the kernels: prepared or not, portable or the processor's
+own."""
 
 from __future__ import annotations
 
@@ -10,7 +11,16 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SOLVERS, Reconstruction
 from eitskin.solve.options import default_options
-from small_models import DATA_KINDS, SIGNS, STORAGES, prebuilt, session, small, small_blob, small_model
+from small_models import (
+    DATA_KINDS,
+    SIGNS,
+    STORAGES,
+    prebuilt,
+    session,
+    small,
+    small_blob,
+    small_model,
+)
 
 BUILDS = [(True, False), (False, False), (True, True), (False, True)]
 
@@ -19,7 +29,9 @@ def same(results: list[Reconstruction]) -> None:
     """Images, coefficients, touches and info, bit for bit."""
     first = results[0]
     for other in results[1:]:
-        assert (other.image == first.image).all() and (other.coefficients == first.coefficients).all()
+        assert (other.image == first.image).all() and (
+            other.coefficients == first.coefficients
+        ).all()
         assert other.touches == first.touches
         assert other.info == first.info
 
@@ -30,7 +42,10 @@ def same(results: list[Reconstruction]) -> None:
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> None:
     blob, s = small_blob(storage, data_kind), small()
-    built = [CoreEngine(blob, width, prepared=prepared, portable=portable) for prepared, portable in BUILDS]
+    built = [
+        CoreEngine(blob, width, prepared=prepared, portable=portable)
+        for prepared, portable in BUILDS
+    ]
     for sign in SIGNS:
         frames = s.frames(30, 3, sign)
         frames[1, 17:25] = np.nan
@@ -52,7 +67,10 @@ def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> 
 def test_a_noisy_tare(solver: str, width: str) -> None:
     """The floor of the whitening is raised."""
     blob, s = small_blob("i8"), small()
-    built = [CoreEngine(blob, width, prepared=prepared, portable=portable) for prepared, portable in BUILDS]
+    built = [
+        CoreEngine(blob, width, prepared=prepared, portable=portable)
+        for prepared, portable in BUILDS
+    ]
     for engine in built:
         engine.set_options(replace(default_options(small_model("i8")), solver=solver))
         engine.set_baseline(s.quiet(32, 8, noise=0.01))
@@ -67,7 +85,10 @@ def test_touches_of_simulated_frames(width: str) -> None:
     _, blob = prebuilt()
     frames = session().as_frames()
     found = 0
-    built = [CoreEngine(blob, width, prepared=prepared, portable=portable) for prepared, portable in BUILDS]
+    built = [
+        CoreEngine(blob, width, prepared=prepared, portable=portable)
+        for prepared, portable in BUILDS
+    ]
     for engine in built:
         engine.set_baseline(frames.reference_voltage_v)
     for frame in frames.voltage_v:
@@ -78,7 +99,8 @@ def test_touches_of_simulated_frames(width: str) -> None:
 
 
 def test_names_and_sizes() -> None:
-    """The portable kernels say so; the copies in panels, of S and of the working set, are what a prepared context has more."""
+    """The portable kernels say so; the copies in panels, of S and of the working set, are what a
+    prepared context has more."""
     model, blob = prebuilt()
     portable, bare = CoreEngine(blob, portable=True), CoreEngine(blob, prepared=False)
     assert portable.kernels == "portable"
@@ -86,13 +108,18 @@ def test_names_and_sizes() -> None:
     assert portable.workspace_bytes - bare.workspace_bytes == 2 * 832 * 64 * 4 + to_align
     wide = CoreEngine(blob, "float64", prepared=False)
     held = 256 * 64 * 4  # held columns are floats in either width
-    assert 1.7 * (bare.workspace_bytes - held) < wide.workspace_bytes - held < 2 * (bare.workspace_bytes - held)
+    assert (
+        1.7 * (bare.workspace_bytes - held)
+        < wide.workspace_bytes - held
+        < 2 * (bare.workspace_bytes - held)
+    )
     assert (bare.n_rows, bare.n_pixels) == (208, model.grid.n_pixels)
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_units_of_the_frames_do_not_matter(scale: float) -> None:
-    """A power of two would give the same bits; any other factor gives the same image to rounding."""
+    """A power of two would give the same bits; any other factor gives the same image to
+    rounding."""
     _, blob = prebuilt()
     frames, images = session().as_frames(), []
     for factor in (1.0, scale):
@@ -112,7 +139,8 @@ def macs_of(iterations: int, **options: object) -> int:
 
 
 def test_macs_follow_the_work() -> None:
-    """Without zeros skipped: per iteration one S'r, one S x of the non-zeros, and the projection."""
+    """Without zeros skipped: per iteration one S'r, one S x of the non-zeros, and the
+    projection."""
     model, _ = prebuilt()
     macs = {count: macs_of(count, solver="fista") for count in (1, 20, 40)}
     whole = model.grid.n_pixels * model.rank
@@ -122,7 +150,8 @@ def test_macs_follow_the_work() -> None:
 
 
 def test_the_working_set_spares_macs() -> None:
-    """A look at every column at iterations 1 and 11 and for the certificate; a few columns at a time in between."""
+    """A look at every column at iterations 1 and 11 and for the certificate; a few columns at a
+    time in between."""
     model, _ = prebuilt()
     whole = model.grid.n_pixels * model.rank
     macs = {count: macs_of(count, solver="working-set") for count in (1, 10, 11, 60)}
@@ -136,9 +165,13 @@ def test_the_working_set_spares_macs() -> None:
 @pytest.mark.parametrize("prepared", [True, False])
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_solver_takes_nothing_over_from_the_one_before(storage: str, prepared: bool) -> None:
-    """The working set's columns are held unpacked; another solver on the same context must not read them for its own."""
+    """The working set's columns are held unpacked; another solver on the same context must not read
+    them for its own."""
     blob, s = small_blob(storage, "difference"), small()
-    frames, chosen = s.frames(32, 2, "increase"), default_options(small_model(storage, "difference"))
+    frames, chosen = (
+        s.frames(32, 2, "increase"),
+        default_options(small_model(storage, "difference")),
+    )
     used = CoreEngine(blob, prepared=prepared)
     used.set_baseline(s.quiet(31, 8))
     for before in SOLVERS:
@@ -151,5 +184,8 @@ def test_a_solver_takes_nothing_over_from_the_one_before(storage: str, prepared:
             fresh.set_baseline(s.quiet(31, 8))
             fresh.set_options(replace(chosen, solver=after))
             one, other = used.reconstruct(frames[1]), fresh.reconstruct(frames[1])
-            assert (one.image == other.image).all() and one.info.gap == other.info.gap, (before, after)
+            assert (one.image == other.image).all() and one.info.gap == other.info.gap, (
+                before,
+                after,
+            )
             assert (one.info.iterations, one.info.stop) == (other.info.iterations, other.info.stop)

@@ -7,11 +7,11 @@ import pytest
 
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
+from eitskin.reference.disc_fit import Disc
+from eitskin.reference.interaction import interplay
 from eitskin.scene.random_touches import Touch
 from eitskin.scene.simulate import conductivity_with
 from eitskin.skin.skin import paper_skin
-from eitskin.solve.reference_coupling import interplay
-from eitskin.solve.reference_fit import Disc
 from small_models import prebuilt
 
 
@@ -21,12 +21,20 @@ def folded(frame_v: np.ndarray) -> np.ndarray:
     return np.asarray((frame_v[fold.first] + fold.sign * frame_v[fold.second]) / 2)
 
 
-PLACES = [((0.0, 0.0), 0.0), ((30.0, 20.0), 1.0), ((0.0, 62.0), 0.0), ((-40.0, 0.0), np.pi / 2)]  # middle, turn
+PLACES = [
+    ((0.0, 0.0), 0.0),
+    ((30.0, 20.0), 1.0),
+    ((0.0, 62.0), 0.0),
+    ((-40.0, 0.0), np.pi / 2),
+]  # middle, turn
 
 
 @pytest.mark.parametrize(("middle", "turn"), PLACES)
-def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(middle: tuple[float, float], turn: float) -> None:
-    """9 mm, contrast 5, 36 mm apart, in the middle and near the rim; a change of 2 (c - 1) / (c + 1) of the sheet's."""
+def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(
+    middle: tuple[float, float], turn: float
+) -> None:
+    """9 mm, contrast 5, 36 mm apart, in the middle and near the rim; a change of 2 (c - 1) / (c +
+    1) of the sheet's."""
     skin, model = paper_skin(), prebuilt()[0]
     sheet = skin.conductivity_s_per_m
     forward = ForwardModel(mesh_for_elements(skin, 11_000), skin, model.protocol)
@@ -45,7 +53,8 @@ def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(middle: tuple[
 
 
 def test_far_apart_and_alone() -> None:
-    """One disc has none; two at the ends of the sheet have a small part of what near ones have; it grows as both changes do."""
+    """One disc has none; two at the ends of the sheet have a small part of what near ones have; it
+    grows as both changes do."""
     model = prebuilt()[0]
     near = [Disc(-12.0, 0.0, 9.0, 0.01, 1.0), Disc(12.0, 0.0, 9.0, 0.01, 1.0)]
     far = [Disc(-70.0, 0.0, 9.0, 0.01, 1.0), Disc(70.0, 0.0, 9.0, 0.01, 1.0)]

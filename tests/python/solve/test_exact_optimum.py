@@ -1,4 +1,5 @@
-"""Both solvers run to a small gap against scikit-learn's coordinate descent: one optimum, and the gap bounds the error."""
+"""Both solvers run to a small gap against scikit-learn's coordinate descent: one optimum, and the
+gap bounds the error."""
 
 from __future__ import annotations
 
@@ -9,11 +10,11 @@ import pytest
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SOLVERS, Options
+from eitskin.reference.engine import orthonormal
+from eitskin.reference.fista import fista
+from eitskin.reference.problem import certify
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.solve.reference import orthonormal
-from eitskin.solve.reference_fista import fista
-from eitskin.solve.reference_problem import certify
 from small_models import prebuilt, session, small, small_blob, small_model
 
 GAP_REL = 1e-6
@@ -36,17 +37,32 @@ def lasso(s: np.ndarray, y: np.ndarray, lam: float, sign: str) -> np.ndarray:
 
 
 def options(sign: str, **changes: object) -> Options:
-    return replace(default_options(small_model()), sign=sign, iterations=100_000, gap_rel=GAP_REL, gate_factor=0.0, **changes)
+    return replace(
+        default_options(small_model()),
+        sign=sign,
+        iterations=100_000,
+        gap_rel=GAP_REL,
+        gate_factor=0.0,
+        **changes,
+    )
 
 
-def problem(seed: int, sign: str, share: float, drift: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def problem(
+    seed: int, sign: str, share: float, drift: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """S, y and basis of one small frame, and a lambda that is ``share`` of lambda_max."""
     model, s = small_model(), small()
-    engine = Reconstructor(model, engine="numpy", options=options(sign, project_baseline=drift))._engine
+    engine = Reconstructor(
+        model, engine="numpy", options=options(sign, project_baseline=drift)
+    )._engine
     engine.set_baseline(s.linear.v0_v[None])
     y, basis, _ = engine.frame_stage(s.frames(seed, 1, sign)[0])
     correlation = model.sensitivity.T @ y
-    top = {"increase": correlation.max(), "decrease": -correlation.min(), "both": np.abs(correlation).max()}[sign]
+    top = {
+        "increase": correlation.max(),
+        "decrease": -correlation.min(),
+        "both": np.abs(correlation).max(),
+    }[sign]
     return model.sensitivity, y, basis, share * float(top)
 
 
@@ -66,7 +82,9 @@ def test_same_optimum(solver: str, sign: str, share: float, drift: bool) -> None
         above = objective(projected, y, result.x, lam) - objective(projected, y, best, lam)
         assert -1e-10 * scale <= above <= result.certificate.gap <= GAP_REL * scale
         # strong convexity in S x: |S x - S x*|^2 / 2 <= f(x) - f*
-        assert np.linalg.norm(projected @ (result.x - best)) <= np.sqrt(2 * result.certificate.gap) * (1 + 1e-6)
+        assert np.linalg.norm(projected @ (result.x - best)) <= np.sqrt(
+            2 * result.certificate.gap
+        ) * (1 + 1e-6)
         assert np.linalg.norm(projected @ (result.x - best)) < 2e-3 * np.linalg.norm(y)
         if sign != "both":
             assert (np.sign(result.x) * (1 if sign == "increase" else -1) >= 0).all()
@@ -75,7 +93,8 @@ def test_same_optimum(solver: str, sign: str, share: float, drift: bool) -> None
 @pytest.mark.parametrize("sign", ["increase", "both"])
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_gap_bounds_the_error_all_the_way(solver: str, sign: str) -> None:
-    """At every number of iterations the reported gap is at least what the objective lacks, and shrinks over the run."""
+    """At every number of iterations the reported gap is at least what the objective lacks, and
+    shrinks over the run."""
     s, y, basis, lam = problem(5, sign, 0.03, True)
     projected = s - basis.T @ (basis @ s)
     best = objective(projected, y, lasso(projected, y, lam, sign), lam)
@@ -84,7 +103,9 @@ def test_the_gap_bounds_the_error_all_the_way(solver: str, sign: str) -> None:
         run = replace(options(sign, solver=solver), iterations=iterations, gap_rel=0.0)
         result = fista(s, y, lam, small_model().lipschitz, run, basis)
         assert result.iterations == iterations
-        assert result.certificate.gap >= objective(projected, y, result.x, lam) - best - 1e-12 * best
+        assert (
+            result.certificate.gap >= objective(projected, y, result.x, lam) - best - 1e-12 * best
+        )
         gaps.append(result.certificate.gap)
     # the working set's gap counts what the columns outside would do at the next look
     assert gaps[-1] < (1e-3 if solver == "fista" else 1e-2) * gaps[0]
@@ -92,14 +113,17 @@ def test_the_gap_bounds_the_error_all_the_way(solver: str, sign: str) -> None:
 
 
 def test_the_gap_is_that_of_the_dual_point() -> None:
-    """The sum of terms that are not negative equals primal minus dual objective at the scaled residual."""
+    """The sum of terms that are not negative equals primal minus dual objective at the scaled
+    residual."""
     s, y, basis, lam = problem(6, "both", 0.1, False)
     basis = np.zeros((0, len(y)))
     x = np.random.default_rng(2).normal(size=s.shape[1]) * 1e-3
     gap, value, residual = certify(s, y, x, s @ x, lam, "both", basis)
     r = y - s @ x
     dual = min(1.0, lam / np.abs(s.T @ r).max()) * r
-    assert gap == pytest.approx(objective(s, y, x, lam) - (0.5 * y @ y - 0.5 * (y - dual) @ (y - dual)), rel=1e-9)
+    assert gap == pytest.approx(
+        objective(s, y, x, lam) - (0.5 * y @ y - 0.5 * (y - dual) @ (y - dual)), rel=1e-9
+    )
     assert value == pytest.approx(objective(s, y, x, lam))
     assert residual == pytest.approx(np.linalg.norm(r))
 
@@ -107,11 +131,18 @@ def test_the_gap_is_that_of_the_dual_point() -> None:
 @pytest.mark.parametrize("width", ["float64", "float32"])
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
-    """C run to a gap on simulated frames: its coefficients are as near to the optimum as it says."""
+    """C run to a gap on simulated frames: its coefficients are as near to the optimum as it
+    says."""
     model, blob = prebuilt()
     gap_rel = 1e-6 if width == "float64" else 1e-4
     engine = CoreEngine(blob, width)
-    chosen = replace(default_options(model), solver=solver, iterations=100_000, gap_rel=gap_rel, project_baseline=False)
+    chosen = replace(
+        default_options(model),
+        solver=solver,
+        iterations=100_000,
+        gap_rel=gap_rel,
+        project_baseline=False,
+    )
     engine.set_options(chosen)
     frames = session().as_frames()
     engine.set_baseline(frames.reference_voltage_v)
@@ -120,11 +151,18 @@ def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
         assert result.info.stop == "gap" and result.info.gap_rel <= gap_rel
         y = engine.reduced_data()[: model.rank].astype(np.float64)
         x = result.coefficients.astype(np.float64)
-        best = objective(model.sensitivity, y, lasso(model.sensitivity, y, result.info.lambda_, "increase"), result.info.lambda_)
+        best = objective(
+            model.sensitivity,
+            y,
+            lasso(model.sensitivity, y, result.info.lambda_, "increase"),
+            result.info.lambda_,
+        )
         above = objective(model.sensitivity, y, x, result.info.lambda_) - best
         rounding = 1e-12 if width == "float64" else 1e-6
         assert -rounding * best <= above <= result.info.gap * (1 + 1e-3) + rounding * best
-        assert result.info.gap == pytest.approx(result.info.gap_rel * 0.5 * result.info.data_norm**2, rel=1e-3)
+        assert result.info.gap == pytest.approx(
+            result.info.gap_rel * 0.5 * result.info.data_norm**2, rel=1e-3
+        )
 
 
 def test_a_fixed_number_of_iterations_is_exactly_that() -> None:

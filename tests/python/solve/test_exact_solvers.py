@@ -1,4 +1,5 @@
-"""Active set and coordinate descent against another implementation, in both widths; the limit of multiply-accumulates."""
+"""Active set and coordinate descent against another implementation, in both widths; the limit of
+multiply-accumulates."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.bench.solve_problems import Problems, bench_options, make_problems
+from eitskin_studies.benchmarks.solve_problems import Problems, bench_options, make_problems
 from small_models import prebuilt, session, small_blob, small_model
 
 
@@ -25,7 +26,9 @@ def problems() -> Problems:
 def solved(problems: Problems, width: str, **options: object) -> list[tuple[np.ndarray, str]]:
     engine, found = CoreEngine(problems.blob, width), []
     for k in range(len(problems)):
-        engine.set_options(bench_options(problems.model, lambda_abs=float(problems.lam[k]), **options))
+        engine.set_options(
+            bench_options(problems.model, lambda_abs=float(problems.lam[k]), **options)
+        )
         engine.bare_solve(problems.y[k])()
         found.append((engine.coefficients(), engine.last_info().stop))
     return found
@@ -37,7 +40,11 @@ def test_the_optimum_is_scikit_learns(problems: Problems) -> None:
     s = np.asfortranarray(problems.s)
     for k in range(0, len(problems), 4):
         lasso = linear_model.Lasso(
-            alpha=problems.lam[k] / len(s), positive=True, fit_intercept=False, tol=1e-10, max_iter=1_000_000
+            alpha=problems.lam[k] / len(s),
+            positive=True,
+            fit_intercept=False,
+            tol=1e-10,
+            max_iter=1_000_000,
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -67,7 +74,13 @@ def test_more_macs_give_a_lower_objective(problems: Problems, solver: str) -> No
         values = []
         for k in range(len(problems)):
             engine.set_options(
-                bench_options(problems.model, lambda_abs=float(problems.lam[k]), solver=solver, iterations=200, mac_limit=limit)
+                bench_options(
+                    problems.model,
+                    lambda_abs=float(problems.lam[k]),
+                    solver=solver,
+                    iterations=200,
+                    mac_limit=limit,
+                )
             )
             engine.bare_solve(problems.y[k])()
             info = engine.last_info()

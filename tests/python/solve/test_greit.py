@@ -1,4 +1,5 @@
-"""The GREIT-like matrix: what it is trained for, what it minimises, and that it sees a small target where it is."""
+"""The GREIT-like matrix: what it is trained for, what it minimises, and that it sees a small target
+where it is."""
 
 from __future__ import annotations
 
@@ -29,7 +30,10 @@ def test_a_small_target_is_shown_as_a_disc_at_its_place() -> None:
     method = train_greit(J, GRID).method(1e-6)
     for pixel in (40, 101, 150):
         image = method.reconstruct(J[:, pixel])[0]
-        place, away = GRID.centres_mm()[pixel], np.hypot(*(GRID.centres_mm() - GRID.centres_mm()[pixel]).T)
+        place, away = (
+            GRID.centres_mm()[pixel],
+            np.hypot(*(GRID.centres_mm() - GRID.centres_mm()[pixel]).T),
+        )
         weight = np.where(image > 0.5 * image.max(), image, 0)
         assert np.hypot(*(weight @ GRID.centres_mm() / weight.sum() - place)) < GRID.pixel_mm
         assert image[away > 2.5 * DISC_RADIUS * HALF_MM].max() < 0.35 * image.max()
@@ -39,13 +43,17 @@ def test_it_is_the_closed_form_and_noise_smooths() -> None:
     training = train_greit(J, GRID, targets=300)
     weight = 1e-3
     noise = weight * np.linalg.eigvalsh(training.spread).max() * np.eye(60)
-    assert training.method(weight).matrix @ (training.spread + noise) == pytest.approx(training.shown, rel=1e-6, abs=1e-9)
+    assert training.method(weight).matrix @ (training.spread + noise) == pytest.approx(
+        training.shown, rel=1e-6, abs=1e-9
+    )
     sizes = [np.linalg.norm(training.method(w).matrix) for w in (1e-6, 1e-4, 1e-2, 1.0)]
     assert sizes == sorted(sizes, reverse=True)
 
 
 def test_units_and_seeds() -> None:
-    one, again, other = (train_greit(J, GRID, targets=200, seed=seed).method(1e-4).matrix for seed in (3, 3, 4))
+    one, again, other = (
+        train_greit(J, GRID, targets=200, seed=seed).method(1e-4).matrix for seed in (3, 3, 4)
+    )
     assert (one == again).all() and not np.allclose(one, other)
     scaled = train_greit(1e-6 * J, GRID, targets=200, seed=3).method(1e-4).matrix
     assert 1e-6 * scaled == pytest.approx(one, rel=1e-7)

@@ -38,7 +38,9 @@ def one_line(error: pytest.ExceptionInfo[EitskinError]) -> str:
 # ---- frames and protocols ----
 
 
-@pytest.mark.parametrize("other", [adjacent(32), opposite(16), table(16, adjacent(16).drive_measure[::-1])])
+@pytest.mark.parametrize(
+    "other", [adjacent(32), opposite(16), table(16, adjacent(16).drive_measure[::-1])]
+)
 def test_another_protocol_is_refused_by_both_hashes(other: object) -> None:
     with pytest.raises(ProtocolError) as error:
         made().check_protocol(other)
@@ -49,17 +51,23 @@ def test_another_protocol_is_refused_by_both_hashes(other: object) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("frame", [np.ones(207), np.ones(209), np.ones((2, 208)), np.ones(0), 1.0, "volts", [1, [2]]])
+@pytest.mark.parametrize(
+    "frame", [np.ones(207), np.ones(209), np.ones((2, 208)), np.ones(0), 1.0, "volts", [1, [2]]]
+)
 def test_frames_of_another_shape(engine: str, frame: object) -> None:
     with pytest.raises(FrameError) as error:
         made(engine).reconstruct(frame)
     assert one_line(error)
     with pytest.raises(FrameError):
-        made(engine).tare(frame if not isinstance(frame, np.ndarray) or frame.ndim != 2 else frame[:, :5])
+        made(engine).tare(
+            frame if not isinstance(frame, np.ndarray) or frame.ndim != 2 else frame[:, :5]
+        )
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("frames", [np.ones((0, 208)), np.ones((2, 2, 208)), [], [[1.0] * 208, [1.0] * 207]])
+@pytest.mark.parametrize(
+    "frames", [np.ones((0, 208)), np.ones((2, 2, 208)), [], [[1.0] * 208, [1.0] * 207]]
+)
 def test_references_of_another_shape(engine: str, frames: object) -> None:
     with pytest.raises(FrameError) as error:
         made(engine).tare(frames)
@@ -93,7 +101,9 @@ def test_a_reference_must_be_whole(engine: str, value: float) -> None:
     for count in (1, 2, 8):
         quiet = session().quiet_v[:count].copy()
         quiet[count // 2, 11] = value
-        with pytest.raises(FrameError, match=rf"reference frame {count // 2} \(from 0\): row 11 \(from 0\)"):
+        with pytest.raises(
+            FrameError, match=rf"reference frame {count // 2} \(from 0\): row 11 \(from 0\)"
+        ):
             made(engine, quiet=False).tare(quiet)
     masked = made(engine, quiet=False)
     masked.mask_rows(np.arange(208) == 11)
@@ -141,7 +151,8 @@ def test_some_bad_channels_cost_little(engine: str, value: float, count: int) ->
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_whole_electrode_lost(engine: str) -> None:
-    """Every row that touches electrode 5: both rows of a pair drop out, and are projected away. Touches near it suffer."""
+    """Every row that touches electrode 5: both rows of a pair drop out, and are projected away.
+    Touches near it suffer."""
     reconstructor = made(engine)
     rows = (session().protocol.drive_measure == 5).any(axis=1)
     assert rows.sum() == 52
@@ -193,7 +204,9 @@ def test_saturated_channels_are_left_out(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("rows", [np.zeros(207, dtype=bool), np.zeros(208), [1, 2], np.zeros((208, 1), dtype=bool)])
+@pytest.mark.parametrize(
+    "rows", [np.zeros(207, dtype=bool), np.zeros(208), [1, 2], np.zeros((208, 1), dtype=bool)]
+)
 def test_masks_of_another_shape(engine: str, rows: object) -> None:
     with pytest.raises(UsageError, match="one truth value for each of 208 rows"):
         made(engine).mask_rows(rows)
@@ -232,7 +245,8 @@ def test_false_alarms(engine: str) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_drift_of_the_gain_costs_little(engine: str) -> None:
-    """5 % more on all channels: under 2 % of the peak with the reference's direction left out, most of it without."""
+    """5 % more on all channels: under 2 % of the peak with the reference's direction left out, most
+    of it without."""
     lost = {}
     for project in (True, False):
         reconstructor = made(engine, project_baseline=project)
@@ -262,13 +276,16 @@ def test_a_reference_upside_down_gives_the_same_image() -> None:
 
 @pytest.mark.parametrize("engine", ["c", "numpy"])
 def test_ids_follow_moving_touches(engine: str) -> None:
-    """Two touches pass, one lifts and comes back elsewhere: each keeps its id, the newcomer gets another."""
+    """Two touches pass, one lifts and comes back elsewhere: each keeps its id, the newcomer gets
+    another."""
     steps = np.linspace(0, 1, 8)
     scenes = []
     for k, t in enumerate(steps):
         touches = [Touch(-60 + 100 * t, 30.0, 9.0, 6.0)]
         if k != 4:
-            touches.append(Touch(50 - 90 * t, -35.0, 8.0, 4.0) if k < 4 else Touch(60.0, -40.0, 8.0, 4.0))
+            touches.append(
+                Touch(50 - 90 * t, -35.0, 8.0, 4.0) if k < 4 else Touch(60.0, -40.0, 8.0, 4.0)
+            )
         scenes.append(Scene(str(k), tuple(touches)))
     simulated = simulate(paper_skin(), adjacent(16), TouchSet("moving", 2, tuple(scenes)))
     reconstructor = made(engine, quiet=False)
@@ -278,7 +295,9 @@ def test_ids_follow_moving_touches(engine: str) -> None:
         assert len(result.touches) == len(scene.touches)
         found = {}
         for touch in result.touches:
-            distance = [np.hypot(touch.x_mm - put.x_mm, touch.y_mm - put.y_mm) for put in scene.touches]
+            distance = [
+                np.hypot(touch.x_mm - put.x_mm, touch.y_mm - put.y_mm) for put in scene.touches
+            ]
             assert min(distance) < 3
             found[int(np.argmin(distance))] = touch.id
         ids.append(found)
@@ -288,11 +307,14 @@ def test_ids_follow_moving_touches(engine: str) -> None:
     assert len(set(second[:4])) == 1 and second[4] is None and len(set(second[5:])) == 1
     assert len({first[0], second[0], second[5]}) == 3
     reconstructor.forget()
-    assert {t.id for t in reconstructor.reconstruct(simulated.frames_v[-1]).touches}.isdisjoint({first[0], second[5]})
+    assert {t.id for t in reconstructor.reconstruct(simulated.frames_v[-1]).touches}.isdisjoint(
+        {first[0], second[5]}
+    )
 
 
 def test_a_warm_start_is_nearer_after_few_iterations_and_leaves_no_ghost() -> None:
-    """Resting touches: after 10 frames of 20 iterations each the optimum is nearer; after lift-off nothing is left."""
+    """Resting touches: after 10 frames of 20 iterations each the optimum is nearer; after lift-off
+    nothing is left."""
     for frame in session().frames_v[:4]:
         target = made(iterations=3000).reconstruct(frame).image
         error, gap = {}, {}
@@ -360,7 +382,9 @@ BAD_OPTIONS = [
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("changes", "text"), BAD_OPTIONS, ids=option_name)
-def test_bad_options_are_named_and_the_old_ones_stay(engine: str, changes: dict[str, object], text: str) -> None:
+def test_bad_options_are_named_and_the_old_ones_stay(
+    engine: str, changes: dict[str, object], text: str
+) -> None:
     reconstructor = made(engine, iterations=7)
     before = reconstructor.options
     with pytest.raises(UsageError) as error:
@@ -370,7 +394,9 @@ def test_bad_options_are_named_and_the_old_ones_stay(engine: str, changes: dict[
     assert reconstructor.reconstruct(session().frames_v[0]).info.iterations == 7
 
 
-@pytest.mark.parametrize("changes", [c for c, _ in BAD_OPTIONS[:-1] if c.get("iterations") is not True], ids=option_name)
+@pytest.mark.parametrize(
+    "changes", [c for c, _ in BAD_OPTIONS[:-1] if c.get("iterations") is not True], ids=option_name
+)
 def test_the_core_refuses_them_by_itself(changes: dict[str, object]) -> None:
     """Python's check and the core's have the same bounds: what passes here would run on a board."""
     engine = CoreEngine(prebuilt()[1])
@@ -379,9 +405,12 @@ def test_the_core_refuses_them_by_itself(changes: dict[str, object]) -> None:
 
 
 EDGES = {
-    "iterations": 1, "gap_every": 2**32 - 1, "max_touches": 16, "max_masked": 0, "lambda_rel": 1.0, "gap_rel": 1.0,
-    "lambda_noise_factor": 1e29, "gate_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0, "touch_share": 1.0,
-    "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000, "follow_mm": 0.0, "lambda_abs": 1e29,
+    "iterations": 1, "gap_every": 2**32 - 1, "max_touches": 16, "max_masked": 0, "lambda_rel": 1.0,
+    "gap_rel": 1.0,
+    "lambda_noise_factor": 1e29, "gate_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0,
+    "touch_share": 1.0,
+    "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000,
+    "follow_mm": 0.0, "lambda_abs": 1e29,
     "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
     "floor_noise_factor": 0.0,
     "touch_search": 7, "refine": True,
@@ -425,7 +454,9 @@ def test_from_a_file(tmp_path: Path) -> None:
     for engine in ENGINES:
         reconstructor = Reconstructor.from_file(path, engine=engine)
         reconstructor.tare(small().linear.v0_v)
-        assert reconstructor.reconstruct(small().frames(1, 1)[0]).image.shape == (small_model().grid.n_pixels,)
+        assert reconstructor.reconstruct(small().frames(1, 1)[0]).image.shape == (
+            small_model().grid.n_pixels,
+        )
     path.write_bytes(small_blob()[:-1])
     with pytest.raises(ModelError, match="truncated"):
         Reconstructor.from_file(path)
@@ -445,7 +476,10 @@ def test_results_do_not_change_afterwards() -> None:
     kept = first.image.copy()
     reconstructor.reconstruct(session().frames_v[1])
     assert (first.image == kept).all()
-    assert first.image.dtype == np.float32 and made("c64").reconstruct(session().frames_v[0]).image.dtype == np.float64
+    assert (
+        first.image.dtype == np.float32
+        and made("c64").reconstruct(session().frames_v[0]).image.dtype == np.float64
+    )
 
 
 def test_two_reconstructors_share_nothing() -> None:

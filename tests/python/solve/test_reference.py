@@ -1,4 +1,5 @@
-"""The numpy reference against the formulas that it writes out: brute force, finite differences, another order of doing."""
+"""The numpy reference against the formulas that it writes out: brute force, finite differences,
+another order of doing."""
 
 from __future__ import annotations
 
@@ -9,12 +10,12 @@ import pytest
 
 from eitskin.model.build import BuildSettings, make_model
 from eitskin.model.model import Model
+from eitskin.reference.disc_fit import Disc, Fit, Reduced, damped_step
+from eitskin.reference.engine import ReferenceEngine
+from eitskin.reference.fista import fista
+from eitskin.reference.problem import greatest, project, shrink
+from eitskin.scoring.metrics import pixel_cover
 from eitskin.solve.options import default_options
-from eitskin.solve.reference import ReferenceEngine
-from eitskin.solve.reference_fista import fista
-from eitskin.solve.reference_fit import Disc, Fit, Reduced, damped_step
-from eitskin.solve.reference_problem import greatest, project, shrink
-from eitskin.study.judge.metrics import pixel_cover
 from small_models import DATA_KINDS, SIGNS, prebuilt, small, small_model
 
 GENERATOR = np.random.default_rng(41)
@@ -31,9 +32,16 @@ def reference(model: Model, **options: object) -> ReferenceEngine:
 @pytest.mark.parametrize("sign", SIGNS)
 def test_shrink_minimises_its_objective(sign: str) -> None:
     """argmin over allowed x of (x - v)^2 / 2 + t |x|, by brute force on a fine grid."""
-    allowed = {"increase": np.linspace(0, 4, 4001), "decrease": np.linspace(-4, 0, 4001), "both": np.linspace(-4, 4, 8001)}
+    allowed = {
+        "increase": np.linspace(0, 4, 4001),
+        "decrease": np.linspace(-4, 0, 4001),
+        "both": np.linspace(-4, 4, 8001),
+    }
     v = GENERATOR.uniform(-3, 3, 50)
-    best = [allowed[sign][np.argmin(0.5 * (allowed[sign] - one) ** 2 + 0.7 * np.abs(allowed[sign]))] for one in v]
+    best = [
+        allowed[sign][np.argmin(0.5 * (allowed[sign] - one) ** 2 + 0.7 * np.abs(allowed[sign]))]
+        for one in v
+    ]
     assert shrink(v, 0.7, sign) == pytest.approx(np.array(best), abs=1e-3)
 
 
@@ -45,13 +53,16 @@ def test_greatest_is_the_lambda_at_which_zero_is_optimal() -> None:
     y, basis, _ = reference(model).frame_stage(small().frames(2, 1)[0])
     top = greatest(model.sensitivity.T @ y, "increase")
     for share, zero in ((1.0001, True), (0.9999, False)):
-        x = fista(model.sensitivity, y, share * top, model.lipschitz, default_options(model), basis).x
+        x = fista(
+            model.sensitivity, y, share * top, model.lipschitz, default_options(model), basis
+        ).x
         assert (not x.any()) == zero
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_data_of_small_changes_are_the_linear_change(data_kind: str) -> None:
-    """For a change towards nothing, y is S g whatever the kind of data; the drift direction is gone from both."""
+    """For a change towards nothing, y is S g whatever the kind of data; the drift direction is gone
+    from both."""
     s, model = small(), small_model("f32", data_kind)
     change = s.discs(np.random.default_rng(1), 2, "increase") * 1e-4
     frame = s.linear.v0_v + s.linear.jacobian @ change
@@ -78,9 +89,13 @@ def test_data_have_the_units_of_the_model_whatever_the_gain(data_kind: str) -> N
 
 @pytest.mark.parametrize("pairs", [1, 10, 30])
 def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
-    """What S sees, and the data that it is to meet, are those of the reduction by SVD of the rows that are left: S'S and S'y."""
+    """What S sees, and the data that it is to meet, are those of the reduction by SVD of the rows
+    that are left: S'S and S'y."""
     s, model = small(), small_model()
-    fold, lost = model.fold, np.random.default_rng(pairs).choice(len(model.fold.first), pairs, replace=False)
+    fold, lost = (
+        model.fold,
+        np.random.default_rng(pairs).choice(len(model.fold.first), pairs, replace=False),
+    )
     damaged = s.frames(4, 1)[0]
     damaged[fold.first[lost]] = damaged[fold.second[lost]] = np.nan
     engine = reference(model, project_baseline=False, findings=0)
@@ -108,10 +123,13 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
 
 @pytest.mark.parametrize("noise", [4e-3, 0.02, 0.5])
 def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> None:
-    """The same S'S, S'y and images, but for a scale, as from a model that was built with that floor."""
+    """The same S'S, S'y and images, but for a scale, as from a model that was built with that
+    floor."""
     s, frame = small(), small().frames(4, 1)[0]
     quiet = s.quiet(6, 8, noise=noise)
-    engine = reference(small_model(), findings=0)  # of discs this strong some rows count as glitches
+    engine = reference(
+        small_model(), findings=0
+    )  # of discs this strong some rows count as glitches
     learned = engine.set_baseline(quiet)
     floor = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
     settings = BuildSettings(rank=37, floor=floor)
@@ -120,10 +138,14 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
     scale = (1 + floor) / 1.01
     y, expected = engine.frame_stage(frame)[0], other.frame_stage(frame)[0]
     assert engine.seen.T @ engine.seen == pytest.approx(scale * other.seen.T @ other.seen, abs=1e-5)
-    assert engine.seen.T @ y == pytest.approx(scale * other.seen.T @ expected, abs=1e-5 * np.linalg.norm(y))
+    assert engine.seen.T @ y == pytest.approx(
+        scale * other.seen.T @ expected, abs=1e-5 * np.linalg.norm(y)
+    )
     images = []
     for one in (engine, other):
-        one.set_options(replace(one.options, solver="active-set", lambda_noise_factor=0.0, gate_factor=0.0))
+        one.set_options(
+            replace(one.options, solver="active-set", lambda_noise_factor=0.0, gate_factor=0.0)
+        )
         result = one.reconstruct(frame)
         assert result.info.floor == pytest.approx(floor, rel=1e-4)
         images.append(result.image)
@@ -148,7 +170,9 @@ def test_one_of_a_pair_stands_for_both() -> None:
     for side in (fold.first, fold.second):
         damaged = frame.copy()
         damaged[side[::2]] = np.nan
-        assert engine.frame_stage(damaged)[0] == pytest.approx(whole, rel=1e-6, abs=1e-9 * np.abs(whole).max())
+        assert engine.frame_stage(damaged)[0] == pytest.approx(
+            whole, rel=1e-6, abs=1e-9 * np.abs(whole).max()
+        )
 
 
 def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
@@ -164,10 +188,14 @@ def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
         d = probe._gain * (quiet[k] - quiet[:k].mean(axis=0))
         fold = model.fold
         folded = 0.5 * (d[fold.first] + fold.sign * d[fold.second])
-        seen.append(np.abs(model.sensitivity.T @ project(model.projection @ folded, direction)).max())
+        seen.append(
+            np.abs(model.sensitivity.T @ project(model.projection @ folded, direction)).max()
+        )
     assert baseline.lambda_noise == pytest.approx(max(seen), rel=1e-9)
     assert baseline.noise_v == pytest.approx(quiet.std(axis=0, ddof=1).mean(), rel=0.1)
-    assert baseline.frames == 10 and ReferenceEngine(model).set_baseline(quiet[:3]).lambda_noise == 0
+    assert (
+        baseline.frames == 10 and ReferenceEngine(model).set_baseline(quiet[:3]).lambda_noise == 0
+    )
 
 
 # ---- discs ----
@@ -176,7 +204,9 @@ def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
 def fit_of(model: Model, **options: object) -> Fit:
     chosen = replace(default_options(model), **options)
     y = GENERATOR.normal(size=model.rank)
-    return Fit(model, Reduced(y, None, model.sensitivity, np.zeros((0, model.rank)), 0.0, 0.0), chosen)
+    return Fit(
+        model, Reduced(y, None, model.sensitivity, np.zeros((0, model.rank)), 0.0, 0.0), chosen
+    )
 
 
 def test_a_discs_answer_is_that_of_the_pixels_it_covers() -> None:
@@ -184,7 +214,9 @@ def test_a_discs_answer_is_that_of_the_pixels_it_covers() -> None:
     fit = fit_of(model)
     disc = Disc(12.0, -20.0, 15.0, 1.0, 1.0)
     atom, _ = fit.answers(disc)
-    exact = model.sensitivity @ (pixel_cover(model.grid, [(12.0, -20.0)], [15.0]) / model.column_weight)
+    exact = model.sensitivity @ (
+        pixel_cover(model.grid, [(12.0, -20.0)], [15.0]) / model.column_weight
+    )
     assert np.linalg.norm(atom - exact) < 0.05 * np.linalg.norm(exact)
 
 
@@ -195,8 +227,12 @@ def test_slopes_are_derivatives() -> None:
     _, slopes = fit.answers(disc)
     step = 1e-5
     for row, name in enumerate(("x_mm", "y_mm", "radius_mm")):
-        up, down = (fit.answers(replace(disc, **{name: getattr(disc, name) + h}))[0] for h in (step, -step))
-        assert slopes[row] == pytest.approx((up - down) / (2 * step), rel=1e-4, abs=1e-6 * np.abs(slopes[row]).max())
+        up, down = (
+            fit.answers(replace(disc, **{name: getattr(disc, name) + h}))[0] for h in (step, -step)
+        )
+        assert slopes[row] == pytest.approx(
+            (up - down) / (2 * step), rel=1e-4, abs=1e-6 * np.abs(slopes[row]).max()
+        )
 
 
 def test_the_step_solves_the_damped_equations_and_leaves_what_nothing_moves() -> None:
@@ -219,9 +255,14 @@ def test_expected_radius_from_strength() -> None:
 
 
 def test_what_a_disc_explains_is_what_leaving_it_out_costs() -> None:
-    """With changes at the joint least-squares optimum: (|residual without k|^2 - |residual|^2) / |y|^2."""
+    """With changes at the joint least-squares optimum: (|residual without k|^2 - |residual|^2) /
+    |y|^2."""
     fit = fit_of(prebuilt()[0])
-    fit.discs = [Disc(-40.0, 20.0, 12.0, 0.0, 1.0), Disc(10.0, -5.0, 15.0, 0.0, 1.0), Disc(20.0, -18.0, 15.0, 0.0, 1.0)]
+    fit.discs = [
+        Disc(-40.0, 20.0, 12.0, 0.0, 1.0),
+        Disc(10.0, -5.0, 15.0, 0.0, 1.0),
+        Disc(20.0, -18.0, 15.0, 0.0, 1.0),
+    ]
     atoms = np.array([fit.answers(disc)[0] for disc in fit.discs]).T
     y = fit.data
     changes, *_ = np.linalg.lstsq(atoms, y, rcond=None)

@@ -31,7 +31,9 @@ def compare(model: Model, quiet: np.ndarray, frames: np.ndarray, **options: obje
         reconstructor.tare(quiet)
     count = 0
     for frame in frames:
-        found = {name: reconstructor.reconstruct(frame).touches for name, reconstructor in made.items()}
+        found = {
+            name: reconstructor.reconstruct(frame).touches for name, reconstructor in made.items()
+        }
         count += len(found["numpy"])
         for name, bound in BOUND_MM.items():
             assert len(found[name]) == len(found["numpy"])
@@ -39,7 +41,9 @@ def compare(model: Model, quiet: np.ndarray, frames: np.ndarray, **options: obje
             assert [t.id for t in found[name]] == [t.id for t in found["numpy"]]
             rel = 1e-6 if name == "c64" else 0.01
             for ours, expected in zip(found[name], found["numpy"], strict=True):
-                assert ours.strength_s_per_m_mm2 == pytest.approx(expected.strength_s_per_m_mm2, rel=rel)
+                assert ours.strength_s_per_m_mm2 == pytest.approx(
+                    expected.strength_s_per_m_mm2, rel=rel
+                )
                 assert ours.confidence == pytest.approx(expected.confidence, rel=rel, abs=1e-4)
     return count
 
@@ -64,7 +68,8 @@ def test_both_signs_and_dropouts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("touch_sweeps", 0), ("touch_change_s_per_m", 0.0), ("max_touches", 1), ("gate_factor", 0.0)]
+    ("name", "value"),
+    [("touch_sweeps", 0), ("touch_change_s_per_m", 0.0), ("max_touches", 1), ("gate_factor", 0.0)],
 )
 def test_other_options(name: str, value: float) -> None:
     frames = session(scenes=40).as_frames()
@@ -73,11 +78,14 @@ def test_other_options(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_touches_are_where_they_were_put(engine: str) -> None:
-    """One touch of 9 mm and contrast 5 at several places, simulated without noise on another mesh."""
+    """One touch of 9 mm and contrast 5 at several places, simulated without noise on another
+    mesh."""
     places = [(0.0, 0.0), (40.0, 10.0), (-20.0, -60.0), (55.0, -45.0), (-70.0, 20.0)]
     scenes = tuple(Scene(str(k), (Put(x, y, 9.0, 5.0),)) for k, (x, y) in enumerate(places))
     ideal = Measurement(snr_db=None, adc_bits=None, contact_spread=0.0, quiet_frames=1)
-    frames = simulate(paper_skin(), adjacent(16), TouchSet("places", 1, scenes), measurement=ideal).as_frames()
+    frames = simulate(
+        paper_skin(), adjacent(16), TouchSet("places", 1, scenes), measurement=ideal
+    ).as_frames()
     made = Reconstructor(prebuilt()[0], engine=engine)
     made.tare(frames.reference_voltage_v)
     for frame, (x, y) in zip(frames.voltage_v, places, strict=True):
@@ -86,8 +94,8 @@ def test_touches_are_where_they_were_put(engine: str) -> None:
         assert len(touches) == 1
         assert np.hypot(touches[0].x_mm - x, touches[0].y_mm - y) < 1.0
         assert touches[0].radius_mm == pytest.approx(9.0, rel=0.12)
-        # a disc of contrast c answers as a linear change of 2 (c - 1) / (c + 1) times the sheet's conductivity, to first order
-        # in its size: higher orders add some 10 % at this one
+        # a disc of contrast c answers as a linear change of 2 (c - 1) / (c + 1) times the sheet's
+        # conductivity, to first order in its size: higher orders add some 10 % at this one
         expected = 2 * 4 / 6 * 0.01 * np.pi * 9.0**2
         assert touches[0].strength_s_per_m_mm2 == pytest.approx(expected, rel=0.15)
         assert touches[0].confidence > 0.9

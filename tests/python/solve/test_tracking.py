@@ -1,4 +1,5 @@
-"""Touches followed in time: the C core's against the numpy reference's, in streams of moving fingers."""
+"""Touches followed in time: the C core's against the numpy reference's, in streams of moving
+fingers."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options, Touch
 from eitskin.fem.grid import Grid
+from eitskin.reference.tracker import Tracker, nearest_pairs
 from eitskin.scene.random_touches import Scene, TouchSet
 from eitskin.scene.random_touches import Touch as Put
 from eitskin.scene.simulate import Measurement, simulate
@@ -18,7 +20,6 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.options import default_options, tracking
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.solve.reference_track import Tracker, nearest_pairs
 from small_models import prebuilt
 
 FRAMES = 24
@@ -26,7 +27,8 @@ FRAMES = 24
 
 @cache
 def stream() -> tuple[np.ndarray, np.ndarray]:
-    """Quiet frames and a stream at 40 dB: a finger that stays, one that moves and is lifted, one that comes."""
+    """Quiet frames and a stream at 40 dB: a finger that stays, one that moves and is lifted, one
+    that comes."""
     scenes = []
     for k in range(FRAMES):
         touches = [Put(-40.0, 10.0, 9.0, 5.0)]
@@ -35,7 +37,12 @@ def stream() -> tuple[np.ndarray, np.ndarray]:
         if k >= 8:
             touches.append(Put(30.0, 60.0 - k, 9.0, 6.0))
         scenes.append(Scene(str(k), tuple(touches)))
-    made = simulate(paper_skin(), adjacent(16), TouchSet("stream", 5, tuple(scenes)), measurement=Measurement(snr_db=40.0))
+    made = simulate(
+        paper_skin(),
+        adjacent(16),
+        TouchSet("stream", 5, tuple(scenes)),
+        measurement=Measurement(snr_db=40.0),
+    )
     return made.quiet_v, made.frames_v
 
 
@@ -63,7 +70,8 @@ def told(chosen: Options) -> list[tuple[Touch, ...]]:
     ids=str,
 )
 def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> None:
-    """What the core finds in each frame, followed by numpy, is what the core tells: ids, places, sizes, order, held ones."""
+    """What the core finds in each frame, followed by numpy, is what the core tells: ids, places,
+    sizes, order, held ones."""
     quiet_v, frames_v = stream()
     chosen = options(**changes)
     bare = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1])
@@ -72,11 +80,27 @@ def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> N
     tracker, most = Tracker(prebuilt()[0].grid), 0
     for frame, expected in zip(frames_v, told(chosen), strict=True):
         result = bare.reconstruct(frame)
-        mine = tracker.step(result.touches, chosen, result.info.lambda_max, result.info.lambda_noise)
+        mine = tracker.step(
+            result.touches, chosen, result.info.lambda_max, result.info.lambda_noise
+        )
         assert [touch.id for touch in mine] == [touch.id for touch in expected]
         for one, other in zip(mine, expected, strict=True):
-            assert (one.x_mm, one.y_mm, one.radius_mm, one.strength_s_per_m_mm2, one.confidence) == pytest.approx(
-                (other.x_mm, other.y_mm, other.radius_mm, other.strength_s_per_m_mm2, other.confidence), rel=1e-9, abs=1e-9
+            assert (
+                one.x_mm,
+                one.y_mm,
+                one.radius_mm,
+                one.strength_s_per_m_mm2,
+                one.confidence,
+            ) == pytest.approx(
+                (
+                    other.x_mm,
+                    other.y_mm,
+                    other.radius_mm,
+                    other.strength_s_per_m_mm2,
+                    other.confidence,
+                ),
+                rel=1e-9,
+                abs=1e-9,
             )
         most = max(most, *(touch.id for touch in expected), 0)
     assert most >= 3
@@ -114,7 +138,9 @@ def test_each_frame_by_itself_is_as_it_was() -> None:
     for frame in frames_v:
         made[1].forget()
         followed, fresh = (one.reconstruct(frame).touches for one in made)
-        assert [replace(touch, id=0) for touch in followed] == [replace(touch, id=0) for touch in fresh]
+        assert [replace(touch, id=0) for touch in followed] == [
+            replace(touch, id=0) for touch in fresh
+        ]
 
 
 def test_touches_stay_on_the_skin() -> None:
@@ -122,7 +148,9 @@ def test_touches_stay_on_the_skin() -> None:
     grid: Grid = prebuilt()[0].grid
     tracker, chosen = Tracker(grid), options(track_hold=50)
     for k in range(5):
-        tracker.step([Touch(0, 20.0 * k - 20, 0.0, 8.0, 1.0, 0.5)], chosen, 10.0 if k < 4 else 1.2, 1.0)
+        tracker.step(
+            [Touch(0, 20.0 * k - 20, 0.0, 8.0, 1.0, 0.5)], chosen, 10.0 if k < 4 else 1.2, 1.0
+        )
     places = [tracker.step([], chosen, 0.0, 1.0) for _ in range(30)]
     assert all(len(one) == 1 and one[0].confidence == 0 for one in places)
     assert 80 < places[-1][0].x_mm < 97 + 2 * grid.pixel_mm

@@ -1,4 +1,5 @@
-"""``eitskin bench findings``: what is counted agrees with the frames, and the page says what the command wrote."""
+"""``eitskin bench findings``: what is counted agrees with the frames, and the page says what the
+command wrote."""
 
 from __future__ import annotations
 
@@ -14,10 +15,23 @@ pytest.importorskip("netgen")
 from eitskin.cli.main import main
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.study.bench import findings as bench_findings
-from eitskin.study.bench.findings_faults import DETACHED, FAULTS, GLITCH, NONE
-from eitskin.study.bench.findings_page import CROWD_HEAD, DETACHED_HEAD, FAULT_HEAD, IMPERFECT_HEAD, PEAK_HEAD
-from eitskin.study.bench.findings_scenes import IMPERFECT, QUIET_FRAMES, ROWS, Table, drawn, swapped
+from eitskin_studies.benchmarks import findings as bench_findings
+from eitskin_studies.benchmarks.findings_faults import DETACHED, FAULTS, GLITCH, NONE
+from eitskin_studies.benchmarks.findings_page import (
+    CROWD_HEAD,
+    DETACHED_HEAD,
+    FAULT_HEAD,
+    IMPERFECT_HEAD,
+    PEAK_HEAD,
+)
+from eitskin_studies.benchmarks.findings_scenes import (
+    IMPERFECT,
+    QUIET_FRAMES,
+    ROWS,
+    Table,
+    drawn,
+    swapped,
+)
 
 SCENES, SEED = 4, 6
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "diagnostics.md"
@@ -43,7 +57,9 @@ def result(page: Path) -> dict[str, list[dict[str, object]]]:
     return whole
 
 
-def rate(result: dict[str, list[dict[str, object]]], fault: str, snr_db: float = 60.0) -> dict[str, object]:
+def rate(
+    result: dict[str, list[dict[str, object]]], fault: str, snr_db: float = 60.0
+) -> dict[str, object]:
     """One of them."""
     return next(one for one in result["rates"] if one["fault"] == fault and one["snr_db"] == snr_db)
 
@@ -56,17 +72,32 @@ def lost(rate: dict[str, object], which: str = "lost") -> float:
 
 
 def test_what_is_certain_is_counted(result: dict[str, list[dict[str, object]]]) -> None:
-    assert len(result["rates"]) == 3 * len(FAULTS) + 2 and all(one["scenes"] == SCENES for one in result["rates"])
+    assert len(result["rates"]) == 3 * len(FAULTS) + 2 and all(
+        one["scenes"] == SCENES for one in result["rates"]
+    )
     lifted = "touch during the tare, then lifted"
-    for fault in (DETACHED, "neighbours bridged by 10 ohm", "neighbours swapped", GLITCH.format(0.3), lifted):
+    for fault in (
+        DETACHED,
+        "neighbours bridged by 10 ohm",
+        "neighbours swapped",
+        GLITCH.format(0.3),
+        lifted,
+    ):
         assert rate(result, fault)["named"] == 1.0 and rate(result, fault)["refused"] == 0
     for snr in (40.0, 50.0, 60.0, 80.0):
         clean = rate(result, NONE, snr)
         assert clean["named"] is None and clean["other"] == 0.0 and lost(clean) == 0.0
     assert lost(rate(result, DETACHED)) < 0.2 < lost(rate(result, DETACHED), "lost_blind")
-    assert lost(rate(result, GLITCH.format(5.0))) < 0.02 < 0.2 < lost(rate(result, GLITCH.format(5.0)), "lost_blind")
+    assert (
+        lost(rate(result, GLITCH.format(5.0)))
+        < 0.02
+        < 0.2
+        < lost(rate(result, GLITCH.format(5.0)), "lost_blind")
+    )
     assert abs(lost(rate(result, "gain off by +20 %", 80.0), "peak_lost")) < 0.02
-    assert [one["touches"] for one in result["crowds"]] == [n for n in range(1, 13) for _ in range(3)]
+    assert [one["touches"] for one in result["crowds"]] == [
+        n for n in range(1, 13) for _ in range(3)
+    ]
     assert all(one["frames"] == 2 for one in result["crowds"])
     assert {one["effect"] for one in result["imperfect"]} == set(IMPERFECT)
 
@@ -77,7 +108,9 @@ def test_counts_are_those_of_the_frames(result: dict[str, list[dict[str, object]
     solver, named = Reconstructor(model, blob=blob), 0
     for case in Table(SEED).cases(range(SCENES), drawn(SEED, SCENES)):
         off = np.isin(ROWS, case.electrode).any(axis=1)
-        assert (case.volts["detached"][off] == 0).all() and (case.volts["detached"][~off] != 0).all()
+        assert (case.volts["detached"][off] == 0).all() and (
+            case.volts["detached"][~off] != 0
+        ).all()
         solver.tare(case.measured(np.tile(case.volts["quiet"], (QUIET_FRAMES, 1)), 60.0, "quiet"))
         noisy = case.measured(case.volts["detached"][None], 60.0, "frame")[0]
         named += solver.reconstruct(noisy).info.open_electrodes == (case.electrode,)
@@ -96,19 +129,34 @@ def test_intervals() -> None:
     assert mean.half_95 == pytest.approx(1.96 * np.sqrt(0.25 * 20 / 19 / 20))
 
 
-def test_the_section_is_replaced_and_nothing_else(result: dict[str, list[dict[str, object]]], page: Path) -> None:
+def test_the_section_is_replaced_and_nothing_else(
+    result: dict[str, list[dict[str, object]]], page: Path
+) -> None:
     text = page.read_text()
-    assert text.startswith("# Findings\n\n## Rules\n\nkept\n\n## Rates\n\nWritten by `eitskin bench findings --scenes 4 ")
-    assert text.endswith("\n## Cost\n\nkept too\n") and "\nold\n" not in text and text.count("## Rates") == 1
+    assert text.startswith(
+        "# Findings\n\n## Rules\n\nkept\n\n## Rates\n\nWritten by `eitskin bench findings"
+        " --scenes 4 "
+    )
+    assert (
+        text.endswith("\n## Cost\n\nkept too\n")
+        and "\nold\n" not in text
+        and text.count("## Rates") == 1
+    )
     assert all(f"\n| {fault.name} | " in text for fault in FAULTS) and result["seed"] == SEED  # type: ignore[comparison-overlap]
 
 
 def test_the_page_is_what_the_command_writes() -> None:
     """Its rows, in their order, and a seed that nothing was chosen on."""
     rates = PAGE.read_text().split("\n## Rates\n\n")[1].split("\n## ")[0]
-    command = "Written by `eitskin bench findings --scenes 640 --crowds 24 --imperfect 40 --seed 4001`"
+    command = (
+        "Written by `eitskin bench findings --scenes 640 --crowds 24 --imperfect 40 --seed 4001`"
+    )
     assert rates.startswith(command)
-    lines = [line.split(" | ")[0].removeprefix("| ") for line in rates.splitlines() if line.startswith("| ")]
+    lines = [
+        line.split(" | ")[0].removeprefix("| ")
+        for line in rates.splitlines()
+        if line.startswith("| ")
+    ]
     heads = [head[0] for head in (FAULT_HEAD, DETACHED_HEAD, PEAK_HEAD, CROWD_HEAD, IMPERFECT_HEAD)]
     assert lines[0] == heads[0] and lines[1 : 1 + len(FAULTS)] == [fault.name for fault in FAULTS]
     assert set(heads) < set(lines) and lines[-len(IMPERFECT) :] == list(IMPERFECT)

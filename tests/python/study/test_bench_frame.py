@@ -1,17 +1,19 @@
-"""The benchmark of a frame: every engine and peer is run, on the same frames, and what it says of them adds up."""
+"""The benchmark of a frame: every engine and peer is run, on the same frames, and what it says of
+them adds up."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.study.bench.frame import pyeit_frames, run, to_text
+from eitskin_studies.benchmarks.frame import pyeit_frames, run, to_text
 
 
 def test_all_are_timed_and_said() -> None:
     times = run(3)
     assert set(times.p50_us) == {
-        "C: solve", "C: touches", "Python: frame to touches", "Python: frame to touches, warm", "numpy: image only",
+        "C: solve", "C: touches", "Python: frame to touches", "Python: frame to touches, warm",
+        "numpy: image only",
         "C, portable kernels: frame to touches",
         "pyEIT: Gauss-Newton, image only", "pyEIT: back projection, image only",
     }  # fmt: skip

@@ -10,7 +10,7 @@ pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
 from eitskin.scene.registry import BUILT_IN
-from eitskin.study.bench import scenes as bench_scenes
+from eitskin_studies.benchmarks import scenes as bench_scenes
 
 
 def test_the_effects_table_has_none_each_and_all() -> None:

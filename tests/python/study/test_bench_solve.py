@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from eitskin.core.results import SOLVERS
-from eitskin.study.bench import solve as bench_solve
-from eitskin.study.bench import solve_peers as bench_solve_peers
-from eitskin.study.bench.solve_problems import Problems, make_problems
+from eitskin_studies.benchmarks import solve as bench_solve
+from eitskin_studies.benchmarks import solve_peers as bench_solve_peers
+from eitskin_studies.benchmarks.solve_problems import Problems, make_problems
 from small_models import prebuilt, session
 
 OWN = {f"eitskin {solver}, {width}" for solver in SOLVERS for width in ("float32", "float64")}
@@ -23,12 +23,18 @@ def problems() -> Problems:
 
 def test_suboptimality_is_judged_in_float64(problems: Problems) -> None:
     zero = np.zeros(problems.s.shape[1])
-    assert problems.objective(0, zero) == pytest.approx(0.5 * problems.y[0] @ problems.y[0], rel=1e-14)
+    assert problems.objective(0, zero) == pytest.approx(
+        0.5 * problems.y[0] @ problems.y[0], rel=1e-14
+    )
     assert problems.suboptimality(0, zero) > 1
-    assert (problems.best_signed <= problems.best * (1 + 1e-13)).all()  # where no sign differs, equal but for rounding
+    assert (
+        problems.best_signed <= problems.best * (1 + 1e-13)
+    ).all()  # where no sign differs, equal but for rounding
 
 
-def test_all_that_is_installed_reaches_its_level(problems: Problems, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_that_is_installed_reaches_its_level(
+    problems: Problems, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(bench_solve, "LEVELS", (1e-2,))
     seen = set()
     for candidate in bench_solve_peers.candidates(problems):
@@ -39,9 +45,17 @@ def test_all_that_is_installed_reaches_its_level(problems: Problems, monkeypatch
         assert plan.median_us > 0
     assert seen >= OWN | {"numpy FISTA, float32", "numpy FISTA, float64"}
     for name, number in bench_solve_peers.versions().items():
-        assert (number is not None) == (name == "numpy" or any(name.split("-")[0].lower() in s.lower() for s in seen)), name
+        assert (number is not None) == (
+            name == "numpy" or any(name.split("-")[0].lower() in s.lower() for s in seen)
+        ), name
 
 
 def test_what_is_absent_is_named() -> None:
-    result = {"machine": "m", "versions": {"numpy": "2", "celer": None}, "seed": 1, "rounds": 3, "tables": []}
+    result = {
+        "machine": "m",
+        "versions": {"numpy": "2", "celer": None},
+        "seed": 1,
+        "rounds": 3,
+        "tables": [],
+    }
     assert "not installed: celer; run  pip install celer" in bench_solve.text(result)

@@ -1,4 +1,5 @@
-"""The doctor before a board: its own faults become findings, its missing rows are looked at, import's remedies are left out."""
+"""The doctor before a board: its own faults become findings, its missing rows are looked at,
+import's remedies are left out."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ import pytest
 pytest.importorskip("scipy")
 
 from eitskin.device.bandwidth import least_every
+from eitskin.device.diagnose_board import Measured, board_findings
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, finite_only, gather
 from eitskin.device.wire.packets import BoardInfo, Fault, FaultCode, Quality, RawFrame, Stream
@@ -18,18 +20,22 @@ from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.doctor.examine import examine
 from eitskin.frames.doctor.subject import subject_from_frames
 from eitskin.skin.protocol import adjacent, opposite, skip
-from eitskin.study.board_doctor import Measured, board_findings
 from small_models import prebuilt, session
 
 
 def info(**changes: object) -> BoardInfo:
     model, blob = prebuilt()
     values: dict[str, object] = {
-        "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi", "serial": "01", "f_cpu_hz": 216_000_000, "electrodes": 16,
-        "bank_bytes": 524256, "data_bytes": 4096, "model_bytes": len(blob), "model_crc": zlib.crc32(blob),
-        "protocol_hash": model.protocol.hash, "n_electrodes": 16, "n_rows": 208, "n_folded": 104, "rank": 64, "n_pixels": 812,
-        "nx": 32, "ny": 32, "storage": 0, "bank": 0, "excitation_millihz": 50_000_000, "sample_rate_hz": 1_000_000, "samples": 80,
-        "settle_us": 16, "slot_us": 100, "check_every": 1, "streaming": 0, "every": 1, "tared": 0, "frame_period_us": 0,
+        "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi", "serial": "01",
+        "f_cpu_hz": 216_000_000, "electrodes": 16,
+        "bank_bytes": 524256, "data_bytes": 4096, "model_bytes": len(blob),
+        "model_crc": zlib.crc32(blob),
+        "protocol_hash": model.protocol.hash, "n_electrodes": 16, "n_rows": 208, "n_folded": 104,
+        "rank": 64, "n_pixels": 812,
+        "nx": 32, "ny": 32, "storage": 0, "bank": 0, "excitation_millihz": 50_000_000,
+        "sample_rate_hz": 1_000_000, "samples": 80,
+        "settle_us": 16, "slot_us": 100, "check_every": 1, "streaming": 0, "every": 1, "tared": 0,
+        "frame_period_us": 0,
         "faults": 0, "volts_per_code_nv": 805664,
     }  # fmt: skip
     return BoardInfo(**(values | changes))  # type: ignore[arg-type]
@@ -50,10 +56,14 @@ def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board() -> Non
     board = info(faults=1 << FaultCode.ELECTRODE_OPEN | 1 << FaultCode.WATCHDOG)
     known = KnownModel(*prebuilt())
     frames = as_frames(run.frames, [], known.model.protocol, board, known, allow_nonfinite=True)
-    report = board_findings(examine(subject_from_frames(frames, known.model.skin)), Measured(run, RawRun(), board, None))
+    report = board_findings(
+        examine(subject_from_frames(frames, known.model.skin)), Measured(run, RawRun(), board, None)
+    )
     by_name = {finding.name: finding for finding in report.findings}
     assert "electrode 5 open, frame 3: it makes no contact" in by_name["board-electrode-open"].text
-    assert by_name["board-watchdog"].severity == "note" and "2 packets" in by_name["board-link"].text
+    assert (
+        by_name["board-watchdog"].severity == "note" and "2 packets" in by_name["board-link"].text
+    )
     assert "not-finite" in by_name and report.exit_code == 11
     assert report.mend == "" and not any(finding.mend for finding in report.findings)
     assert not any("import" in text for text in report.lines())
@@ -65,14 +75,24 @@ def test_protocols_that_need_no_model() -> None:
         assert scanned_protocol(board, None, "x").hash == protocol.hash
     with pytest.raises(DeviceError, match="only its model tells; name its file with"):
         scanned_protocol(info(model_crc=1, protocol_hash=1), None, "x")
-    assert scanned_protocol(info(protocol_hash=1), KnownModel(*prebuilt()), "x").hash == prebuilt()[0].protocol.hash
+    assert (
+        scanned_protocol(info(protocol_hash=1), KnownModel(*prebuilt()), "x").hash
+        == prebuilt()[0].protocol.hash
+    )
 
 
 def test_the_prebuilt_model_is_known_by_its_checksum() -> None:
     known = find_model(info(), None, "x")
     assert known is not None and known.blob == prebuilt()[1]
-    assert find_model(info(model_crc=1), None, "x") is find_model(info(model_bytes=0), None, "x") is None
-    with pytest.raises(DeviceError, match="x: a picture needs the board's model, 00000001, which is not the prebuilt one"):
+    assert (
+        find_model(info(model_crc=1), None, "x")
+        is find_model(info(model_bytes=0), None, "x")
+        is None
+    )
+    with pytest.raises(
+        DeviceError,
+        match="x: a picture needs the board's model, 00000001, which is not the prebuilt one",
+    ):
         need_model(info(model_crc=1), None, "x", "a picture")
     with pytest.raises(DeviceError, match="no model; upload one"):
         need_model(info(model_bytes=0), None, "x", "a picture")
@@ -83,11 +103,15 @@ def test_only_frames_that_are_whole_become_a_frames_file() -> None:
     known = KnownModel(*prebuilt())
 
     def made(quiet: list[RawFrame], frames: list[RawFrame]) -> tuple[int, int]:
-        kept, left_out = finite_only(as_frames(quiet, frames, known.model.protocol, info(), known, allow_nonfinite=True), "x")
+        kept, left_out = finite_only(
+            as_frames(quiet, frames, known.model.protocol, info(), known, allow_nonfinite=True), "x"
+        )
         return kept.n_frames, left_out
 
     assert made(whole, [*whole[:3], *cut[:2]]) == (3, 2)
-    with pytest.raises(FrameError, match=r"x: no frame has all its rows measured; row \d+ is missing most often"):
+    with pytest.raises(
+        FrameError, match=r"x: no frame has all its rows measured; row \d+ is missing most often"
+    ):
         made(whole, cut)
     with pytest.raises(FrameError, match="x: no quiet frame has all"):
         made(cut, whole)
@@ -104,13 +128,24 @@ def test_of_two_tares_the_last_counts() -> None:
     frames = raw_frames()
     order = [True, True, False, False, True, False]
     run = gather(live(raw, quiet) for raw, quiet in zip(frames, order, strict=False))
-    assert [raw.frame for raw in run.quiet] == [4] and [raw.frame for raw in run.frames] == [5] and run.left_out == 4
+    assert (
+        [raw.frame for raw in run.quiet] == [4]
+        and [raw.frame for raw in run.frames] == [5]
+        and run.left_out == 4
+    )
 
 
 def test_what_a_line_carries() -> None:
     everything = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
-    assert least_every(info(), Stream.TOUCHES, 1_000_000) == least_every(info(), Stream.RAW, 1_000_000) == 1
-    for what, size in ((everything, 16 + 5 * 208 + 68 + 4 * 812 + 68 + 24), (Stream.IMAGE, 68 + 4 * 812)):
+    assert (
+        least_every(info(), Stream.TOUCHES, 1_000_000)
+        == least_every(info(), Stream.RAW, 1_000_000)
+        == 1
+    )
+    for what, size in (
+        (everything, 16 + 5 * 208 + 68 + 4 * 812 + 68 + 24),
+        (Stream.IMAGE, 68 + 4 * 812),
+    ):
         every = least_every(info(), what, 1_000_000)
         seconds = every * 20_800e-6
         assert size * 10 / 1e6 < seconds and (every - 1) * 20_800e-6 < 1.3 * size * 10 / 1e6

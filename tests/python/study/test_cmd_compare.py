@@ -11,8 +11,8 @@ import pytest
 pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
-from eitskin.cli import cmd_compare
 from eitskin.errors import ConfigError, EitskinError, FileError, UsageError
+from eitskin_studies.cli import cmd_compare
 
 FEW = ["--scenes", "3", "--train", "2", "--seed", "4"]
 
@@ -42,7 +42,9 @@ def test_json_has_every_method_and_only_json(capsys: pytest.CaptureFixture[str])
     assert run(*FEW, "--json", "--lookup", "bilinear") == 0
     values = json.loads(capsys.readouterr().out)
     assert values["settings"]["lookup"] == "bilinear"
-    assert {"NOSER", "plain FISTA 300, non-negative"} <= {method["name"] for method in values["methods"]}
+    assert {"NOSER", "plain FISTA 300, non-negative"} <= {
+        method["name"] for method in values["methods"]
+    }
     assert all(0.4 < method["miou"]["mean"] < 1 for method in values["methods"])
 
 
@@ -67,7 +69,9 @@ def test_bad_arguments_are_refused_before_the_work(
 
 def test_own_skin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     skin = tmp_path / "skin.toml"
-    skin.write_text('[skin]\nname = "square"\npolygon_mm = [[0, 0], [150, 0], [150, 150], [0, 150]]\n')
+    skin.write_text(
+        '[skin]\nname = "square"\npolygon_mm = [[0, 0], [150, 0], [150, 150], [0, 150]]\n'
+    )
     assert run(*FEW, "--skin", str(skin)) == 0
     assert "square, 16 electrodes" in capsys.readouterr().out
     skin.write_text("[skin]\ndiametre_mm = 3\n")

@@ -1,4 +1,5 @@
-"""The comparison: fixed on training scenes, judged on test scenes, the same for every method, the same every time."""
+"""The comparison: fixed on training scenes, judged on test scenes, the same for every method, the
+same every time."""
 
 from __future__ import annotations
 
@@ -16,16 +17,18 @@ pytest.importorskip("netgen")
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.scene.random_touches import random_touches
+from eitskin.scoring import metrics
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve import baselines
-from eitskin.study.compare.methods import Family, FindsTouches, Learns, Setup, baseline_methods
-from eitskin.study.compare.run import Comparison, Settings, compare, truth_masks
-from eitskin.study.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
-from eitskin.study.judge import metrics
+from eitskin_studies.compare.methods import Family, FindsTouches, Learns, Setup, baseline_methods
+from eitskin_studies.compare.run import Comparison, Settings, compare, truth_masks
+from eitskin_studies.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
-SMALL = Settings(scenes=8, train_scenes=6, seed=3, elements=1500, simulated_elements=2500, lookup="nearest")
+SMALL = Settings(
+    scenes=8, train_scenes=6, seed=3, elements=1500, simulated_elements=2500, lookup="nearest"
+)
 
 
 def quick(setup: Setup) -> tuple[Family, ...]:
@@ -41,13 +44,16 @@ def comparison() -> Comparison:
 
 
 def test_results_are_what_their_parts_give(comparison: Comparison) -> None:
-    """Thresholds, parameter and MIoU of the second method, worked out again from frames and truth."""
+    """Thresholds, parameter and MIoU of the second method, worked out again from frames and
+    truth."""
     setup, result = comparison.setup, comparison.results[1]
     judge = metrics.judge_for(SKIN.outline, setup.grid, lookup="nearest")
 
     def curves(strength: float, of: str) -> np.ndarray:
         session = getattr(comparison, of)
-        images = baselines.noser(setup.jacobian, strength).reconstruct(session.frames_v - session.quiet_v.mean(axis=0))
+        images = baselines.noser(setup.jacobian, strength).reconstruct(
+            session.frames_v - session.quiet_v.mean(axis=0)
+        )
         return judge.curves(images, truth_masks(session.touches, judge.raster.points_mm))
 
     best = max((1e-5, 1e-2), key=lambda a: curves(a, "train").mean(axis=0).max())
@@ -75,8 +81,12 @@ def test_counts_add_up(comparison: Comparison) -> None:
     for result in comparison.results:
         assert sum(m.hits + m.misses for m in result.matchings) == touches
         assert result.hit_share == sum(m.hits for m in result.matchings) / touches
-        assert result.exact_count == sum(m.misses + m.false_touches == 0 for m in result.matchings) / 8
-        assert sum(m.hits + m.false_touches for m in result.matchings) == sum(map(len, result.found_mm))
+        assert (
+            result.exact_count == sum(m.misses + m.false_touches == 0 for m in result.matchings) / 8
+        )
+        assert sum(m.hits + m.false_touches for m in result.matchings) == sum(
+            map(len, result.found_mm)
+        )
         assert result.position_summary.count == sum(m.hits for m in result.matchings)
 
 
@@ -98,7 +108,9 @@ def test_training_does_not_see_the_test_set(comparison: Comparison) -> None:
 def test_bilinear_lookup_changes_the_numbers_and_says_so(comparison: Comparison) -> None:
     other = compare(SKIN, PROTOCOL, replace(SMALL, lookup="bilinear"), families=quick)
     assert other.ceiling > 0.94
-    assert "bilinear" in dict(header(other))["MIoU"] and "nearest" in dict(header(comparison))["MIoU"]
+    assert (
+        "bilinear" in dict(header(other))["MIoU"] and "nearest" in dict(header(comparison))["MIoU"]
+    )
     assert (other.results[1].images == comparison.results[1].images).all()
 
 
@@ -117,10 +129,14 @@ class Oracle:
     def reconstruct(self, dv: np.ndarray) -> np.ndarray:
         sets = {6: "train", 8: "test"}
         scenes = random_touches(SKIN.outline, 3, len(dv), sets[len(dv)]).scenes
-        return np.array([metrics.pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes])  # type: ignore[arg-type]
+        return np.array(
+            [metrics.pixel_cover(self.grid, s.centres_mm(), s.radii_mm()) for s in scenes]
+        )  # type: ignore[arg-type]
 
     def touches(self, dv: np.ndarray) -> Sequence[np.ndarray]:
-        return [scene.centres_mm() for scene in random_touches(SKIN.outline, 3, len(dv), "test").scenes]
+        return [
+            scene.centres_mm() for scene in random_touches(SKIN.outline, 3, len(dv), "test").scenes
+        ]
 
 
 def test_a_method_may_learn_and_may_find_touches_itself() -> None:
@@ -133,11 +149,15 @@ def test_a_method_may_learn_and_may_find_touches_itself() -> None:
 
     outcome = compare(SKIN, PROTOCOL, SMALL, families=families)
     result = outcome.results[0]
-    assert result.exact_count == 1.0 and result.position_summary.p95 == 0.0 and result.hit_share == 1.0
+    assert (
+        result.exact_count == 1.0 and result.position_summary.p95 == 0.0 and result.hit_share == 1.0
+    )
     assert result.touch_threshold is None
     assert outcome.ceiling - 0.03 < result.miou_summary.mean <= outcome.ceiling + 1e-12
     assert [len(quiet) for quiet in made[0].learned] == [64, 64]
-    assert (made[0].learned[0] == outcome.train.quiet_v).all() and (made[0].learned[1] == outcome.test.quiet_v).all()
+    assert (made[0].learned[0] == outcome.train.quiet_v).all() and (
+        made[0].learned[1] == outcome.test.quiet_v
+    ).all()
     assert "own touches" in dict(header(outcome))["positions"]
 
 
@@ -164,8 +184,10 @@ def test_baselines_do_not_have_those_abilities() -> None:
 def test_text_names_every_condition(comparison: Comparison) -> None:
     text = to_text(comparison)
     for part in (
-        "test-s3-n8 (seed 3)", "train-s3-n6 (seed 3)", "60 dB", "20 log10(rms(V0) / sigma)", "12-bit", "+-20 %",
-        f"{comparison.test.mesh_elements} elements", f"{comparison.setup.mesh_elements} elements", "1.5 mm",
+        "test-s3-n8 (seed 3)", "train-s3-n6 (seed 3)", "60 dB", "20 log10(rms(V0) / sigma)",
+        "12-bit", "+-20 %",
+        f"{comparison.test.mesh_elements} elements", f"{comparison.setup.mesh_elements} elements",
+        "1.5 mm",
         "x > t max(x)", "training scenes", "812 pixels", "within 10 mm",
     ):  # fmt: skip
         assert part in text, part
@@ -188,7 +210,12 @@ def test_json_is_json_and_csv_is_csv(comparison: Comparison) -> None:
 
 
 def test_noise_free_frames_do_no_worse(comparison: Comparison) -> None:
-    clean = compare(SKIN, PROTOCOL, replace(SMALL, measurement=replace(SMALL.measurement, snr_db=None)), families=quick)
+    clean = compare(
+        SKIN,
+        PROTOCOL,
+        replace(SMALL, measurement=replace(SMALL.measurement, snr_db=None)),
+        families=quick,
+    )
     assert clean.results[1].miou_summary.mean > comparison.results[1].miou_summary.mean - 0.01
     assert "no noise" in dict(header(clean))["SNR"]
 
@@ -200,7 +227,9 @@ def test_progress_is_told_all_work() -> None:
         told.append((what, len(items)))
         return items
 
-    compare(SKIN, PROTOCOL, replace(SMALL, scenes=2, train_scenes=1), families=quick, progress=watch)
+    compare(
+        SKIN, PROTOCOL, replace(SMALL, scenes=2, train_scenes=1), families=quick, progress=watch
+    )
     assert told == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
 
 

@@ -15,8 +15,8 @@ from eitskin.scene.random_touches import Scene, Touch, TouchSet
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.compare.core_method import core_methods
-from eitskin.study.compare.methods import FindsTouches, Learns, Setup, methods, setup_for
+from eitskin_studies.compare.core_method import core_methods
+from eitskin_studies.compare.methods import FindsTouches, Learns, Setup, methods, setup_for
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
 PLACES = [(30.0, 20.0), (-45.0, 10.0)]
@@ -29,7 +29,9 @@ def setup() -> Setup:
 
 @pytest.fixture(scope="module")
 def session() -> Simulated:
-    touches = TouchSet("own", 1, tuple(Scene(str(k), (Touch(*place, 9.0, 5.0),)) for k, place in enumerate(PLACES)))
+    touches = TouchSet(
+        "own", 1, tuple(Scene(str(k), (Touch(*place, 9.0, 5.0),)) for k, place in enumerate(PLACES))
+    )
     return simulate(SKIN, PROTOCOL, touches, mesh=mesh_for_elements(SKIN, 3000))
 
 

@@ -1,4 +1,5 @@
-"""The experiment ``algorithms``: what it finds on a few scenes, that it goes on where it was cut, and its page's marks."""
+"""The experiment ``algorithms``: what it finds on a few scenes, that it goes on where it was cut,
+and its page's marks."""
 
 from __future__ import annotations
 
@@ -12,16 +13,21 @@ pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
 from eitskin.errors import UsageError
+from eitskin.scoring import metrics
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.experiments import algorithms
-from eitskin.study.experiments.algorithms import measure
-from eitskin.study.experiments.algorithms.entrants import FIXED_STRENGTH, Entrant, entrants, macs_of
-from eitskin.study.experiments.algorithms.measure import TUNING, Field
-from eitskin.study.experiments.algorithms.results import FIXED_THRESHOLD
-from eitskin.study.experiments.algorithms.scenes import NUMBERS, shown_set, touch_set
-from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
-from eitskin.study.judge import metrics
+from eitskin_studies.experiments import algorithms
+from eitskin_studies.experiments.algorithms import measure
+from eitskin_studies.experiments.algorithms.entrants import (
+    FIXED_STRENGTH,
+    Entrant,
+    entrants,
+    macs_of,
+)
+from eitskin_studies.experiments.algorithms.measure import TUNING, Field
+from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD
+from eitskin_studies.experiments.algorithms.scenes import NUMBERS, shown_set, touch_set
+from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "algorithms.md"
 KEPT = (
@@ -34,7 +40,16 @@ KEPT = (
 def few() -> tuple[Entrant, ...]:
     """Those that the tables speak of, with two values each."""
     return tuple(
-        Entrant(e.name, e.short, e.parameter, tuple(sorted({e.values[0], e.fixed})), e.fixed, e.make, e.claimed, e.own)
+        Entrant(
+            e.name,
+            e.short,
+            e.parameter,
+            tuple(sorted({e.values[0], e.fixed})),
+            e.fixed,
+            e.make,
+            e.claimed,
+            e.own,
+        )
         for e in entrants()
         if e.name in KEPT
     )
@@ -62,15 +77,24 @@ def outcome(folder: Path) -> Outcome:
 
 
 def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome: Outcome) -> None:
-    """A fixed t of 0.1 puts them near the paper's 0.4 to 0.5, their own t does not; converged FISTA does not mind."""
+    """A fixed t of 0.1 puts them near the paper's 0.4 to 0.5, their own t does not; converged FISTA
+    does not mind."""
     by_name = {one["name"]: one for one in outcome.data["methods"]}
     for name in ("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"):
         one = by_name[name]
-        assert one["fixed"]["miou"]["all"]["mean"] < 0.57 < 0.62 < one["best"]["miou"]["all"]["mean"], name
-    fista = [by_name[f"plain FISTA {k}, non-negative"]["fixed"]["miou"]["all"]["mean"] for k in (30, 300, 3000)]
+        assert (
+            one["fixed"]["miou"]["all"]["mean"] < 0.57 < 0.62 < one["best"]["miou"]["all"]["mean"]
+        ), name
+    fista = [
+        by_name[f"plain FISTA {k}, non-negative"]["fixed"]["miou"]["all"]["mean"]
+        for k in (30, 300, 3000)
+    ]
     assert fista[0] < 0.6 and fista == sorted(fista) and fista[2] > 0.78
     assert by_name["eitskin 60, touches as discs"]["best"]["miou"]["all"]["mean"] > 0.85
-    assert by_name["eitskin 60, image"]["kmac"] < by_name["plain FISTA 3000, non-negative"]["kmac"] / 100
+    assert (
+        by_name["eitskin 60, image"]["kmac"]
+        < by_name["plain FISTA 3000, non-negative"]["kmac"] / 100
+    )
 
 
 def test_tables_agree_with_the_data(outcome: Outcome) -> None:
@@ -84,10 +108,15 @@ def test_tables_agree_with_the_data(outcome: Outcome) -> None:
         assert one["fixed"]["curve"][at] == pytest.approx(one["fixed"]["miou"]["all"]["mean"])
         low, high = one["fixed"]["tuning_range_over_all_values"]
         assert low <= high
-    assert "2 scenes for each" in outcome.words["conditions"] and "seed 100002" in outcome.words["conditions"]
+    assert (
+        "2 scenes for each" in outcome.words["conditions"]
+        and "seed 100002" in outcome.words["conditions"]
+    )
 
 
-def test_what_is_kept_is_not_computed_again(folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_kept_is_not_computed_again(
+    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
     desk = small(folder, monkeypatch)
 
     def never(*_: object, **__: object) -> None:
@@ -96,17 +125,26 @@ def test_what_is_kept_is_not_computed_again(folder: Path, outcome: Outcome, monk
     monkeypatch.setattr(measure, "setup_for", never)
     monkeypatch.setattr(desk, "scenes", never)
     again = algorithms.run(desk)
-    assert again.data == outcome.data and again.tables == outcome.tables and again.words == outcome.words
+    assert (
+        again.data == outcome.data
+        and again.tables == outcome.tables
+        and again.words == outcome.words
+    )
 
 
-def test_a_cut_run_goes_on_and_gives_the_same(folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The last third of the results gone, with a torn line: only what is missing is reconstructed again."""
+def test_a_cut_run_goes_on_and_gives_the_same(
+    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last third of the results gone, with a torn line: only what is missing is reconstructed
+    again."""
     lines = (folder / "results.jsonl").read_bytes().splitlines(keepends=True)
     cut = 2 * len(lines) // 3
     (folder / "results.jsonl").write_bytes(b"".join(lines[:cut]) + lines[cut][:40])
     made: list[float] = []
     real = measure._reconstructed
-    monkeypatch.setattr(measure, "_reconstructed", lambda *given: made.append(given[2]) or real(*given))
+    monkeypatch.setattr(
+        measure, "_reconstructed", lambda *given: made.append(given[2]) or real(*given)
+    )
     again = algorithms.run(small(folder, monkeypatch))
     assert again.data == outcome.data
     assert len(made) == len(lines) - cut

@@ -1,4 +1,5 @@
-"""The experiment on electrodes and patterns: every pattern out of one solve, what time allows, settings chosen elsewhere."""
+"""The experiment on electrodes and patterns: every pattern out of one solve, what time allows,
+settings chosen elsewhere."""
 
 from __future__ import annotations
 
@@ -15,9 +16,9 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk
 from eitskin.skin.protocol import adjacent, skip
 from eitskin.skin.skin import Skin
-from eitskin.study.experiments import electrodes
-from eitskin.study.experiments.electrodes import measuring, patterns, tables, tuning
-from eitskin.study.experiments.experiment import Settings, desk_in, plain
+from eitskin_studies.experiments import electrodes
+from eitskin_studies.experiments.electrodes import measuring, patterns, tables, tuning
+from eitskin_studies.experiments.experiment import Settings, desk_in, plain
 
 
 @pytest.mark.parametrize("pattern", list(patterns.PATTERNS))
@@ -28,7 +29,9 @@ def test_every_pattern_comes_out_of_the_transfer_matrix(pattern: str) -> None:
     whole = ForwardModel(mesh, skin, patterns.transfer(16)).voltages(sigma)
     protocol = patterns.PATTERNS[pattern](16)
     direct = ForwardModel(mesh, skin, protocol).voltages(sigma)
-    np.testing.assert_allclose(patterns.from_transfer(whole, protocol), direct, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        patterns.from_transfer(whole, protocol), direct, rtol=1e-9, atol=1e-12
+    )
     stacked = patterns.from_transfer(np.stack([whole, 2 * whole]), protocol)
     np.testing.assert_allclose(stacked, [direct, 2 * direct], rtol=1e-9, atol=1e-12)
 
@@ -47,7 +50,12 @@ def test_unique_rows_hold_each_voltage_once() -> None:
     scan = patterns.unique_rows(skip(16, 2))
     assert scan.n_rows == 104 and (scan.reciprocal_pairs().second == -1).all()
     thinned = patterns.unique_rows(adjacent(16), 4)
-    assert {tuple(row) for row in thinned.drive_measure[:, :2].tolist()} <= {(0, 1), (4, 5), (8, 9), (12, 13)}
+    assert {tuple(row) for row in thinned.drive_measure[:, :2].tolist()} <= {
+        (0, 1),
+        (4, 5),
+        (8, 9),
+        (12, 13),
+    }
 
 
 def test_another_floor_is_the_model_built_with_it() -> None:
@@ -57,7 +65,9 @@ def test_another_floor_is_the_model_built_with_it() -> None:
     for floor in (0.1, 1e-3):
         built = make_model(skin, adjacent(16), linear, BuildSettings(rank=40, floor=floor))
         moved = tuning.with_floor(usual, floor)
-        product, wanted = (m.projection.T.astype(np.float64) @ m.sensitivity for m in (moved, built))
+        product, wanted = (
+            m.projection.T.astype(np.float64) @ m.sensitivity for m in (moved, built)
+        )
         np.testing.assert_allclose(product, wanted, atol=1e-4 * np.abs(wanted).max())
         assert moved.lipschitz == pytest.approx(built.lipschitz, rel=1e-4)
         assert moved.noise_gain == pytest.approx(built.noise_gain, rel=1e-3)
@@ -66,11 +76,13 @@ def test_another_floor_is_the_model_built_with_it() -> None:
 def _few(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run on few elements, electrodes, settings and cases."""
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
-    monkeypatch.setattr("eitskin.study.experiments.experiment.Desk.scenes.__defaults__", (2000,))
+    monkeypatch.setattr("eitskin_studies.experiments.experiment.Desk.scenes.__defaults__", (2000,))
     monkeypatch.setattr(measuring, "PAIR_MM", (24.0, 36.0))
     for module in (electrodes, tables):
         monkeypatch.setattr(module, "COUNTS", (16, 32))
-        monkeypatch.setattr(module, "PATTERNS", {name: patterns.PATTERNS[name] for name in ("adjacent", "skip 2")})
+        monkeypatch.setattr(
+            module, "PATTERNS", {name: patterns.PATTERNS[name] for name in ("adjacent", "skip 2")}
+        )
     monkeypatch.setattr(electrodes, "PAIR_MM", (24.0, 36.0))
     monkeypatch.setattr(electrodes, "SWEEP", {16: (40,), 32: (100,)})
     monkeypatch.setattr(electrodes, "GRIDS", (24,))
@@ -83,12 +95,23 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     desk = desk_in(tmp_path, Settings(share=0.03), plain)
     first = electrodes.run(desk)
     by_name = {table.name: table for table in first.tables}
-    assert {name: len(table.rows) for name, table in by_name.items()} == {"noise": 4, "time": 4, "ranks": 6, "scans": 4}
+    assert {name: len(table.rows) for name, table in by_name.items()} == {
+        "noise": 4,
+        "time": 4,
+        "ranks": 6,
+        "scans": 4,
+    }
     for table in first.tables:
         assert all(len(row) == len(table.head) for row in table.rows)
-    cases = {(c["case"]["electrodes"], c["case"]["pattern"], c["case"]["equal"]): c for c in first.data["cases"]}
-    # a wider pair picks up more of the same current's voltage; more electrodes, nearer to each other, less
-    assert cases[16, "skip 2", "noise"]["rms_v0_mv"] > 3 * cases[16, "adjacent", "noise"]["rms_v0_mv"]
+    cases = {
+        (c["case"]["electrodes"], c["case"]["pattern"], c["case"]["equal"]): c
+        for c in first.data["cases"]
+    }
+    # a wider pair picks up more of the same current's voltage; more electrodes, nearer to each other,
+    # less
+    assert (
+        cases[16, "skip 2", "noise"]["rms_v0_mv"] > 3 * cases[16, "adjacent", "noise"]["rms_v0_mv"]
+    )
     assert cases[32, "adjacent", "noise"]["rms_v0_mv"] < cases[16, "adjacent", "noise"]["rms_v0_mv"]
     sixteen = cases[16, "adjacent", "noise"]
     assert first.data["noise_v"] == pytest.approx(1e-6 * sixteen["rms_v0_mv"], rel=0.05)
@@ -105,11 +128,17 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_scenes_are_solved_once_for_every_pattern(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_scenes_are_solved_once_for_every_pattern(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     _few(monkeypatch)
     solved = []
     whole = ForwardModel.voltages
-    monkeypatch.setattr(ForwardModel, "voltages", lambda self, *a: solved.append(self.protocol.n_electrodes) or whole(self, *a))
+    monkeypatch.setattr(
+        ForwardModel,
+        "voltages",
+        lambda self, *a: solved.append(self.protocol.n_electrodes) or whole(self, *a),
+    )
     shop = measuring.Workshop(desk_in(tmp_path, Settings(share=0.03), plain), 16)
     for pattern in ("adjacent", "skip 2", "opposite"):
         for equal in ("noise", "time"):
@@ -121,7 +150,10 @@ def test_scenes_are_solved_once_for_every_pattern(monkeypatch: pytest.MonkeyPatc
 def test_the_least_distance_that_is_told_apart() -> None:
     def exact(*shares: float) -> dict[str, Any]:
         pairs = zip(measuring.PAIR_MM, shares, strict=True)
-        return {f"pair {mm:g}": {"exact": [1] * int(10 * share) + [0] * int(10 - 10 * share)} for mm, share in pairs}
+        return {
+            f"pair {mm:g}": {"exact": [1] * int(10 * share) + [0] * int(10 - 10 * share)}
+            for mm, share in pairs
+        }
 
     assert measuring.resolved_mm(exact(0, 1, 0.5, 0.9, 1, 1)) == 27
     assert measuring.resolved_mm(exact(1, 1, 1, 1, 1, 0.8)) == float("inf")

@@ -1,4 +1,5 @@
-"""The force study, small: what it keeps it does not compute again, seeds tell it, and its physics holds."""
+"""The force study, small: what it keeps it does not compute again, seeds tell it, and its physics
+holds."""
 
 from __future__ import annotations
 
@@ -8,13 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eitskin.study.experiments import force
-from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
-from eitskin.study.experiments.force import anywhere, detection, scenes
-from eitskin.study.experiments.force.law import LOADS_G, NOMINAL, drawn_laws
-from eitskin.study.experiments.force.readouts import PEAK, READOUTS, TOUCH, Readout, as_lists, from_lists
-from eitskin.study.experiments.write import to_json
-from eitskin.study.sessions import SceneSolver
+from eitskin_studies.experiments import force
+from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.force import anywhere, detection, scenes
+from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, drawn_laws
+from eitskin_studies.experiments.force.readouts import (
+    PEAK,
+    READOUTS,
+    TOUCH,
+    Readout,
+    as_lists,
+    from_lists,
+)
+from eitskin_studies.experiments.write import to_json
+from eitskin_studies.harness.sessions import SceneSolver
 
 SHARE = 0.01
 
@@ -55,9 +63,17 @@ def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, Outcome, in
 
 
 def test_every_table_and_mark_has_its_place_on_the_page(done: tuple[Path, Outcome, int]) -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "results" / "force.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[3] / "docs" / "results" / "force.md").read_text(
+        encoding="utf-8"
+    )
     outcome = done[1]
-    assert [table.name for table in outcome.tables] == ["slopes", "anywhere", "by-load", "over-snr", "detection"]
+    assert [table.name for table in outcome.tables] == [
+        "slopes",
+        "anywhere",
+        "by-load",
+        "over-snr",
+        "detection",
+    ]
     for name in (*(table.name for table in outcome.tables), *outcome.words, "command"):
         assert f"<!-- {name} -->" in page and f"<!-- end {name} -->" in page
     for table in outcome.tables:
@@ -65,7 +81,9 @@ def test_every_table_and_mark_has_its_place_on_the_page(done: tuple[Path, Outcom
     assert "Infinity" not in to_json(outcome) and "NaN" not in to_json(outcome)
 
 
-def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(done: tuple[Path, Outcome, int]) -> None:
+def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(
+    done: tuple[Path, Outcome, int],
+) -> None:
     slopes = {name: one["a_gram"] for name, one in json.loads(to_json(done[1]))["slopes"].items()}
     assert slopes[PEAK][0] < 0.3 * slopes[PEAK][-1]
     assert slopes[PEAK][0] < slopes[PEAK][1] < slopes[PEAK][2] < slopes[PEAK][3]
@@ -104,8 +122,12 @@ def test_pictures_are_drawn(done: tuple[Path, Outcome, int], tmp_path: Path) -> 
 
 
 def test_the_law_is_what_the_page_says() -> None:
-    assert NOMINAL.radius_mm(50) == pytest.approx(4.8, abs=0.05) and NOMINAL.radius_mm(200) == pytest.approx(7.6, abs=0.05)
-    assert NOMINAL.contrast(50) == pytest.approx(1.9, abs=0.05) and NOMINAL.contrast(200) == pytest.approx(4.2, abs=0.05)
+    assert NOMINAL.radius_mm(50) == pytest.approx(4.8, abs=0.05) and NOMINAL.radius_mm(
+        200
+    ) == pytest.approx(7.6, abs=0.05)
+    assert NOMINAL.contrast(50) == pytest.approx(1.9, abs=0.05) and NOMINAL.contrast(
+        200
+    ) == pytest.approx(4.2, abs=0.05)
     assert drawn_laws(3, 5)[:2] == drawn_laws(3, 2) != drawn_laws(4, 2)
     spread = np.std(np.log([law.sensitivity_per_gram for law in drawn_laws(1, 400)]))
     assert spread == pytest.approx(0.2, rel=0.1)
@@ -122,13 +144,18 @@ def test_the_least_load_lies_between_two() -> None:
     assert detection.least_load(loads, np.array([0.0, 0.8, 1.0])) == pytest.approx(8.0)
     assert detection.least_load(loads, np.array([0.95, 1.0, 1.0])) == 1.0
     assert detection.least_load(loads, np.array([0.95, 1.0, 0.5])) == float("inf")
-    assert detection.least_load(loads, np.array([0.95, 0.5, 1.0])) > 4.0  # once seen is not always seen
+    assert (
+        detection.least_load(loads, np.array([0.95, 0.5, 1.0])) > 4.0
+    )  # once seen is not always seen
 
 
 def test_false_alarms_have_the_exact_bound() -> None:
     one = detection.Detection(60.0, np.array([1.0]), np.ones((4, 1)), np.ones((4, 1)), 0, 299)
     assert one.false_share() == (0.0, pytest.approx(0.00997, abs=1e-5))  # 3 / n
-    assert detection.Detection(60.0, one.loads_g, one.hits, one.tries, 5, 5).false_share() == (1.0, 1.0)
+    assert detection.Detection(60.0, one.loads_g, one.hits, one.tries, 5, 5).false_share() == (
+        1.0,
+        1.0,
+    )
 
 
 def test_readings_survive_the_store() -> None:

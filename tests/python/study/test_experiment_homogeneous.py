@@ -1,4 +1,5 @@
-"""The experiment ``homogeneous``: the fold, the measures, what each effect does to them, and what the doctor says."""
+"""The experiment ``homogeneous``: the fold, the measures, what each effect does to them, and what
+the doctor says."""
 
 from __future__ import annotations
 
@@ -15,11 +16,15 @@ from eitskin.errors import FileError, FrameError
 from eitskin.frames.homogeneous import homogeneous as predicted
 from eitskin.skin.protocol import Protocol, adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
-from eitskin.study.experiments import homogeneous
-from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
-from eitskin.study.experiments.homogeneous.cases import CASES, IDEAL, INSTRUMENT
-from eitskin.study.experiments.homogeneous.measured import FILE, load_tank
-from eitskin.study.experiments.homogeneous.uniformity import deviations_percent, fold_for, uniformity
+from eitskin_studies.experiments import homogeneous
+from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.homogeneous.cases import CASES, IDEAL, INSTRUMENT
+from eitskin_studies.experiments.homogeneous.measured import FILE, load_tank
+from eitskin_studies.experiments.homogeneous.uniformity import (
+    deviations_percent,
+    fold_for,
+    uniformity,
+)
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "homogeneous.md"
 PROTOCOL = adjacent(16)
@@ -54,7 +59,9 @@ def test_an_even_disk_is_a_u_for_each_drive() -> None:
     assert folded == pytest.approx(np.tile(folded[0], (16, 1)), rel=1e-9)
     size = np.abs(folded[0])
     assert (np.diff(size[:7]) < 0).all() and size == pytest.approx(size[::-1], rel=1e-9)
-    assert all(value < 1e-6 for value in vars(uniformity(EVEN_V, PROTOCOL, fold_for(PROTOCOL))).values())
+    assert all(
+        value < 1e-6 for value in vars(uniformity(EVEN_V, PROTOCOL, fold_for(PROTOCOL))).values()
+    )
 
 
 def test_the_fold_does_not_mind_order_and_polarity() -> None:
@@ -66,7 +73,10 @@ def test_the_fold_does_not_mind_order_and_polarity() -> None:
     other = table(16, turned[order])
     uneven = EVEN_V * generator.uniform(0.9, 1.1, 208)
     assert (fold_for(other).of((sign * uneven)[order]) == fold_for(PROTOCOL).of(uneven)).all()
-    one, same = uniformity((sign * uneven)[order], other, fold_for(other)), uniformity(uneven, PROTOCOL, fold_for(PROTOCOL))
+    one, same = (
+        uniformity((sign * uneven)[order], other, fold_for(other)),
+        uniformity(uneven, PROTOCOL, fold_for(PROTOCOL)),
+    )
     assert vars(one) == pytest.approx(vars(same))
 
 
@@ -76,10 +86,14 @@ def test_measures_see_what_they_are_for() -> None:
     one[fold.row[5, 6]] *= 1.16
     found = uniformity(one, PROTOCOL, fold)
     # one of 16 larger by 16 %: a standard deviation of 16 sqrt(15) / 16 of a mean that is larger by 1 %
-    assert found.worst == pytest.approx(16 * np.sqrt(15) / 16 / 1.01) and found.spread == pytest.approx(found.worst / 13)
+    assert found.worst == pytest.approx(
+        16 * np.sqrt(15) / 16 / 1.01
+    ) and found.spread == pytest.approx(found.worst / 13)
     assert found.reciprocity > 0
     shown = deviations_percent(fold.of(one))
-    assert np.unravel_index(np.argmax(shown), shown.shape) == (5, 6) and shown[5, 6] == pytest.approx(100 * (1.16 / 1.01 - 1))
+    assert np.unravel_index(np.argmax(shown), shown.shape) == (5, 6) and shown[
+        5, 6
+    ] == pytest.approx(100 * (1.16 / 1.01 - 1))
     both = one.copy()
     pairs = PROTOCOL.reciprocal_pairs()
     k = int(np.flatnonzero((pairs.first == fold.row[5, 6]) | (pairs.second == fold.row[5, 6]))[0])
@@ -91,7 +105,10 @@ def test_measures_see_what_they_are_for() -> None:
     ("protocol", "match"),
     [
         (opposite(16), r"row 0 \(from 0\) has the pair \[0, 8\]"),
-        (Protocol(16, ROWS[:-1].astype(np.uint8)), "207 rows are not one for each of 16 adjacent drives"),
+        (
+            Protocol(16, ROWS[:-1].astype(np.uint8)),
+            "207 rows are not one for each of 16 adjacent drives",
+        ),
         (Protocol(16, ROWS[[0, *range(207)]].astype(np.uint8)), "208 rows are not one for each"),
     ],
 )
@@ -103,10 +120,20 @@ def test_scans_that_cannot_be_folded(protocol: Protocol, match: str) -> None:
 def test_each_effect_moves_what_physics_says(outcome: Outcome) -> None:
     usual = spread(outcome, INSTRUMENT)
     assert usual < 1.0
-    half, one, two = (spread(outcome, f"electrodes up to {s:g} mm off their places") for s in (0.5, 1, 2))
-    assert one == pytest.approx(2 * half, rel=0.2) and two == pytest.approx(2 * one, rel=0.2) and half > usual
+    half, one, two = (
+        spread(outcome, f"electrodes up to {s:g} mm off their places") for s in (0.5, 1, 2)
+    )
+    assert (
+        one == pytest.approx(2 * half, rel=0.2)
+        and two == pytest.approx(2 * one, rel=0.2)
+        and half > usual
+    )
     # places and the sheet keep reciprocity, gains and the common mode do not
-    for name in ("electrodes up to 2 mm off their places", "sheet uneven by 20 % (sd)", "an electrode off"):
+    for name in (
+        "electrodes up to 2 mm off their places",
+        "sheet uneven by 20 % (sd)",
+        "an electrode off",
+    ):
         assert spread(outcome, name, "reciprocity") < 0.1, name
     gains = [spread(outcome, f"channel gains ±{s} %", "reciprocity") for s in (1, 5)]
     assert gains[1] == pytest.approx(5 * gains[0], rel=0.1) and gains[0] > 0.3
@@ -125,7 +152,9 @@ def test_the_doctor_names_what_is_broken(outcome: Outcome) -> None:
     assert found[INSTRUMENT] == [[], []] and found[IDEAL] == [[]]
 
 
-def test_what_is_kept_is_not_computed_again(folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_kept_is_not_computed_again(
+    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def never(*_: object) -> None:
         raise AssertionError("computed again")
 
@@ -134,12 +163,16 @@ def test_what_is_kept_is_not_computed_again(folder: Path, outcome: Outcome, monk
     assert again.data == outcome.data and again.tables == outcome.tables
 
 
-def test_only_what_is_missing_is_computed(folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_what_is_missing_is_computed(
+    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lines = (folder / "results.jsonl").read_bytes().splitlines(keepends=True)
     (folder / "results.jsonl").write_bytes(b"".join(lines[:-2]) + lines[-2][:99])
     made: list[str] = []
     real = homogeneous.examined
-    monkeypatch.setattr(homogeneous, "examined", lambda case, *more: made.append(case.name) or real(case, *more))
+    monkeypatch.setattr(
+        homogeneous, "examined", lambda case, *more: made.append(case.name) or real(case, *more)
+    )
     assert homogeneous.run(small(folder, monkeypatch)).data == outcome.data
     assert made == [CASES[-1].name] * 2
 
@@ -164,7 +197,9 @@ def test_the_measured_tank(shared_data: Path) -> None:
     assert tank is not None
     reference = tank.frames.reference_voltage_v.mean(axis=0)
     found = uniformity(reference, tank.frames.protocol, fold_for(tank.frames.protocol))
-    assert 3 < found.spread < 7 and found.reciprocity == pytest.approx(5.3, abs=0.1)  # as docs/guide/tank.md says
+    assert 3 < found.spread < 7 and found.reciprocity == pytest.approx(
+        5.3, abs=0.1
+    )  # as docs/guide/tank.md says
 
 
 def test_pictures_and_marks(outcome: Outcome, tmp_path: Path) -> None:

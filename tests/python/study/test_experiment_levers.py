@@ -1,4 +1,5 @@
-"""The levers: what each search and each image is worth, on few scenes; and that a run goes on where it was."""
+"""The levers: what each search and each image is worth, on few scenes; and that a run goes on where
+it was."""
 
 from __future__ import annotations
 
@@ -7,17 +8,19 @@ from pathlib import Path
 import pytest
 
 from eitskin.core.results import ALL_SEARCH
-from eitskin.study.experiments import levers
-from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
-from eitskin.study.experiments.levers.configurations import IMAGES, SEARCHES
-from eitskin.study.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM, Lab
+from eitskin_studies.experiments import levers
+from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
+from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM, Lab
 
 SETTINGS = Settings(share=0.05)
 
 
 def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
     scenes = Desk.scenes
-    patch.setattr(Desk, "scenes", lambda desk, skin, scan, elements=2500: scenes(desk, skin, scan, elements))
+    patch.setattr(
+        Desk, "scenes", lambda desk, skin, scan, elements=2500: scenes(desk, skin, scan, elements)
+    )
     return levers.run(desk_in(folder, SETTINGS, plain))
 
 
@@ -30,9 +33,14 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
 
 def test_every_lever_is_on_every_set(done: tuple[Path, Outcome]) -> None:
     searches, images = done[1].data["searches"], done[1].data["images"]
-    assert set(searches) == {one.name for one in SEARCHES} and set(images) == {one.name for one in IMAGES}
+    assert set(searches) == {one.name for one in SEARCHES} and set(images) == {
+        one.name for one in IMAGES
+    }
     assert all(set(found) == {RANDOM, *COUNTED} for found in searches.values())
-    assert all(set(found) == {"threshold", *(f"{snr:g}" for snr in IMAGE_SNRS_DB)} for found in images.values())
+    assert all(
+        set(found) == {"threshold", *(f"{snr:g}" for snr in IMAGE_SNRS_DB)}
+        for found in images.values()
+    )
     assert all(len(row) == len(table.head) for table in done[1].tables for row in table.rows)
 
 
@@ -49,15 +57,21 @@ def test_what_coupling_explains_and_refining_costs(done: tuple[Path, Outcome]) -
 
 
 def test_the_default_is_among_them() -> None:
-    assert {one.options["touch_search"] for one in SEARCHES if one.name == "all (the default)"} == {ALL_SEARCH}
+    assert {one.options["touch_search"] for one in SEARCHES if one.name == "all (the default)"} == {
+        ALL_SEARCH
+    }
 
 
-def test_a_run_goes_on_where_it_was(done: tuple[Path, Outcome], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_goes_on_where_it_was(
+    done: tuple[Path, Outcome], monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder, first = done
     lines = (folder / "results.jsonl").read_text(encoding="utf-8")
     monkeypatch.setattr(Lab, "_solve", lambda *_: pytest.fail("solved again"))
     again = _run(folder, monkeypatch)
-    assert again.data == first.data and (folder / "results.jsonl").read_text(encoding="utf-8") == lines
+    assert (
+        again.data == first.data and (folder / "results.jsonl").read_text(encoding="utf-8") == lines
+    )
 
 
 def test_pictures_are_drawn(done: tuple[Path, Outcome], tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
-"""The experiment on many touches: its scenes, its numbers, its doubt, and that a run goes on where it was."""
+"""The experiment on many touches: its scenes, its numbers, its doubt, and that a run goes on where
+it was."""
 
 from __future__ import annotations
 
@@ -13,16 +14,33 @@ from eitskin.errors import GeometryError
 from eitskin.scene.library_scenes import find_scene
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.experiments import multitouch
-from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
-from eitskin.study.experiments.multitouch import measure
-from eitskin.study.experiments.multitouch.ceiling import STEP_MM, Truthful
-from eitskin.study.experiments.multitouch.cells import MIXED, NARROW, RING, WIDE, Cell, counting_cells, draw, mixed_cells
-from eitskin.study.experiments.multitouch.counts import auc, quantile, roc, score, share
-from eitskin.study.experiments.multitouch.doubt import FEATURES, Judged, calibration, features, fit_rule, nearest, reliability
-from eitskin.study.experiments.multitouch.variants import VARIANTS, Seen
-from eitskin.study.experiments.write import write_all, write_page
-from eitskin.study.sessions import SceneSolver
+from eitskin_studies.experiments import multitouch
+from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.multitouch import measure
+from eitskin_studies.experiments.multitouch.ceiling import STEP_MM, Truthful
+from eitskin_studies.experiments.multitouch.cells import (
+    MIXED,
+    NARROW,
+    RING,
+    WIDE,
+    Cell,
+    counting_cells,
+    draw,
+    mixed_cells,
+)
+from eitskin_studies.experiments.multitouch.counts import auc, quantile, roc, score, share
+from eitskin_studies.experiments.multitouch.doubt import (
+    FEATURES,
+    Judged,
+    calibration,
+    features,
+    fit_rule,
+    nearest,
+    reliability,
+)
+from eitskin_studies.experiments.multitouch.variants import VARIANTS, Seen
+from eitskin_studies.experiments.write import write_all, write_page
+from eitskin_studies.harness.sessions import SceneSolver
 
 OUTLINE = paper_skin().outline
 PAGE = Path(__file__).parents[3] / "docs" / "results" / "multitouch.md"
@@ -32,7 +50,9 @@ COARSE = 2500
 def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
     """All of it, on few scenes, a coarse mesh, and one cell of the ceiling."""
     scenes = Desk.scenes
-    patch.setattr(Desk, "scenes", lambda desk, skin, scan, elements=COARSE: scenes(desk, skin, scan, elements))
+    patch.setattr(
+        Desk, "scenes", lambda desk, skin, scan, elements=COARSE: scenes(desk, skin, scan, elements)
+    )
     patch.setattr(measure, "CEILING_CELLS", ((WIDE, 6, 80.0),))
     return multitouch.run(desk_in(folder, Settings(share=0.01), plain))
 
@@ -65,7 +85,9 @@ def test_more_touches_are_harder(done: tuple[Path, Outcome]) -> None:
     assert np.mean([exact[k] for k in (2, 3)]) > np.mean([exact[k] for k in (11, 12)]) + 0.3
 
 
-def test_goes_on_without_computing(done: tuple[Path, Outcome], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_goes_on_without_computing(
+    done: tuple[Path, Outcome], monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder, first = done
     lines = (folder / "results.jsonl").read_text().count("\n")
 
@@ -73,7 +95,7 @@ def test_goes_on_without_computing(done: tuple[Path, Outcome], monkeypatch: pyte
         raise AssertionError("this was computed again")
 
     monkeypatch.setattr(SceneSolver, "session", refuse)
-    monkeypatch.setattr("eitskin.study.experiments.multitouch.lab.setup_for", refuse)
+    monkeypatch.setattr("eitskin_studies.experiments.multitouch.lab.setup_for", refuse)
     again = _run(folder, monkeypatch)
     assert again.tables == first.tables and again.words == first.words
     assert (folder / "results.jsonl").read_text().count("\n") == lines
@@ -85,9 +107,14 @@ def test_fills_its_page_and_draws(done: tuple[Path, Outcome], tmp_path: Path) ->
     write_all(done[1], tmp_path)
     write_page(done[1], tmp_path, page, "multitouch", Settings(share=0.01))
     text = page.read_text()
-    assert "eitskin study multitouch -o out/multitouch --share 0.01" in text and "| touches | scenes |" in text
+    assert (
+        "eitskin study multitouch -o out/multitouch --share 0.01" in text
+        and "| touches | scenes |" in text
+    )
     drawn = sorted(path.name for path in (tmp_path / "pictures" / "multitouch").iterdir())
-    assert drawn == sorted(done[1].pictures) and all(f"pictures/multitouch/{name}" in text for name in drawn)
+    assert drawn == sorted(done[1].pictures) and all(
+        f"pictures/multitouch/{name}" in text for name in drawn
+    )
 
 
 def test_ring_is_that_of_the_library() -> None:
@@ -104,13 +131,17 @@ def test_ring_is_that_of_the_library() -> None:
 def test_random_places_keep_their_distance(geometry: str, least_mm: float) -> None:
     for scene in draw(Cell(geometry, 12, 3), OUTLINE, 5, 3).scenes:
         centres = scene.centres_mm()
-        apart = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))[np.triu_indices(12, 1)]
+        apart = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))[
+            np.triu_indices(12, 1)
+        ]
         assert apart.min() >= least_mm
 
 
 def test_mixed_scenes_depend_on_seed_and_number_only() -> None:
     cell = mixed_cells()[1]
-    many, few, other = (draw(cell, OUTLINE, seed, count) for seed, count in ((1, 26), (1, 5), (2, 5)))
+    many, few, other = (
+        draw(cell, OUTLINE, seed, count) for seed, count in ((1, 26), (1, 5), (2, 5))
+    )
     assert many.scenes[:5] == few.scenes and many.scenes[0] != other.scenes[0]
     assert [len(scene.touches) for scene in many.scenes] == [k % 12 + 1 for k in range(26)]
     assert draw(mixed_cells()[0], OUTLINE, 1, 1).scenes[0].touches != many.scenes[0].touches
@@ -123,8 +154,8 @@ def test_too_many_are_refused() -> None:
 
 
 def test_what_does_not_fit_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eitskin.study.experiments.multitouch.lab import Lab
-    from eitskin.study.experiments.multitouch.tables import exact_table
+    from eitskin_studies.experiments.multitouch.lab import Lab
+    from eitskin_studies.experiments.multitouch.tables import exact_table
 
     monkeypatch.setattr(measure, "counting_cells", lambda: (Cell(WIDE, 40, 1),))
     monkeypatch.setattr(measure, "single_cell", lambda: Cell(WIDE, 41, 1))
@@ -143,7 +174,9 @@ def test_targets_have_more_scenes() -> None:
 
 def test_wilson_interval() -> None:
     eight = share(8, 10)  # R: binom::binom.wilson(8, 10)
-    assert eight.low == pytest.approx(0.4901625, abs=1e-6) and eight.high == pytest.approx(0.9433178, abs=1e-6)
+    assert eight.low == pytest.approx(0.4901625, abs=1e-6) and eight.high == pytest.approx(
+        0.9433178, abs=1e-6
+    )
     assert share(0, 5).low == 0 and share(5, 5).high == 1 and math.isnan(share(0, 0).mean)
 
 
@@ -152,7 +185,11 @@ def test_score_of_places() -> None:
     found = [np.array([[1.0, 0.0], [40.0, 3.0]]), np.array([[30.0, 0.0]])]
     one = score(truth, found, [1000, 3000])
     assert (one.exact.hits, one.right.hits, one.recall.hits, one.recall.count) == (1, 2, 2, 3)
-    assert one.false_a_scene == 0.5 and one.median_mm.value == 2.0 and (one.kmac, one.most_kmac) == (2.0, 3.0)
+    assert (
+        one.false_a_scene == 0.5
+        and one.median_mm.value == 2.0
+        and (one.kmac, one.most_kmac) == (2.0, 3.0)
+    )
     assert math.isnan(quantile([], 0.5).value)
 
 
@@ -160,7 +197,10 @@ def test_area_under_roc() -> None:
     assert auc([0.1, 0.4, 0.35, 0.8], [False, False, True, True]) == 0.75
     assert auc([1, 1, 1], [True, False, False]) == 0.5 and math.isnan(auc([1.0], [True]))
     false, true = roc([0.1, 0.4, 0.35, 0.8], [False, False, True, True])
-    assert float(np.trapezoid(true, false)) == pytest.approx(0.75) and (false[-1], true[-1]) == (1, 1)
+    assert float(np.trapezoid(true, false)) == pytest.approx(0.75) and (false[-1], true[-1]) == (
+        1,
+        1,
+    )
 
 
 def _seen(places: list[tuple[float, float]], confidence: list[float]) -> Seen:
@@ -171,7 +211,10 @@ def _seen(places: list[tuple[float, float]], confidence: list[float]) -> Seen:
 def test_features_of_a_frame() -> None:
     two = _seen([(0.0, 0.0), (27.0, 0.0)], [0.5, 0.01])
     assert nearest(two) == pytest.approx(1.5)
-    assert features(two, nearest(two), 9.0) == pytest.approx((2, 1.5, 1, 0.2, 10, 0.5)) and len(FEATURES) == 6
+    assert (
+        features(two, nearest(two), 9.0) == pytest.approx((2, 1.5, 1, 0.2, 10, 0.5))
+        and len(FEATURES) == 6
+    )
     sure = _seen([(0.0, 0.0)], [0.9])
     assert features(sure, nearest(sure), 9.0) == pytest.approx((1, 2, 1, 0.2, 10, 3))
     assert features(_seen([], []), math.inf, 9.0) == (0, 2, 1, 0, 10, 3)
@@ -190,7 +233,11 @@ def _frames(count: int, seed: int) -> list[Judged]:
 def test_rule_learns_what_matters() -> None:
     rule, test = fit_rule(_frames(1500, 1)), _frames(1500, 2)
     weights = np.abs(rule.weights)
-    assert rule.weights[3] < 0 and weights.argmax() == 3 and weights[3] > 5 * np.delete(weights, 3).max()
+    assert (
+        rule.weights[3] < 0
+        and weights.argmax() == 3
+        and weights[3] > 5 * np.delete(weights, 3).max()
+    )
     shown = calibration(test, rule.says(test))
     assert 0.93 < shown.exact_not_said.mean < 0.99 and shown.exact_said.mean < 0.6
     exact = np.array([one.exact for one in test])
@@ -209,10 +256,15 @@ def test_reliability_of_known_chances() -> None:
 def test_nonlinear_fit_knows_its_slope() -> None:
     skin = paper_skin()
     fits = Truthful(skin, adjacent(skin.electrodes.count))
-    at, contrasts = np.array([20.0, 30.0, 9.0, -40.0, 5.0, 8.0]), [1.2, 1.4]  # weak: an element's answer is linear
+    at, contrasts = (
+        np.array([20.0, 30.0, 9.0, -40.0, 5.0, 8.0]),
+        [1.2, 1.4],
+    )  # weak: an element's answer is linear
     slope = fits._answer(at, contrasts)[1]
     for k in range(len(at)):
         step = np.zeros(len(at))
         step[k] = STEP_MM
-        seen = (fits._answer(at + step, contrasts)[0] - fits._answer(at - step, contrasts)[0]) / (2 * STEP_MM)
+        seen = (fits._answer(at + step, contrasts)[0] - fits._answer(at - step, contrasts)[0]) / (
+            2 * STEP_MM
+        )
         assert np.linalg.norm(slope[:, k] - seen) < 0.02 * np.linalg.norm(seen)

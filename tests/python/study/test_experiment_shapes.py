@@ -1,4 +1,5 @@
-"""The experiment on shapes: what is drawn, what is measured once, and what a finger with one electrode cannot show."""
+"""The experiment on shapes: what is drawn, what is measured once, and what a finger with one
+electrode cannot show."""
 
 from __future__ import annotations
 
@@ -13,14 +14,21 @@ from eitskin.errors import UsageError
 from eitskin.fem.cem import Counters, ForwardModel
 from eitskin.fem.grid import grid_for
 from eitskin.model.build import linearise
-from eitskin.skin.example_drawings import FINGERS, forearm_corners, hand_corners, hand_region, main, rectangle_corners
+from eitskin.skin.example_drawings import (
+    FINGERS,
+    forearm_corners,
+    hand_corners,
+    hand_region,
+    main,
+    rectangle_corners,
+)
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.rounded import as_outline
-from eitskin.study.experiments import registry, shapes
-from eitskin.study.experiments.experiment import Outcome, Settings, desk_in, plain
-from eitskin.study.experiments.scored import share_text
-from eitskin.study.experiments.shapes import measuring
-from eitskin.study.experiments.shapes.variants import Variant, variants
+from eitskin_studies.experiments import registry, shapes
+from eitskin_studies.experiments.experiment import Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.scored import share_text
+from eitskin_studies.experiments.shapes import measuring
+from eitskin_studies.experiments.shapes.variants import Variant, variants
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +41,13 @@ def _small(monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], folder: P
     """A run on two shapes with few elements and scenes."""
     monkeypatch.setattr(shapes, "variants", lambda _: [known["disk, 16"], known["hand, 16 placed"]])
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
-    monkeypatch.setattr("eitskin.study.experiments.experiment.Desk.scenes.__defaults__", (2000,))
+    monkeypatch.setattr("eitskin_studies.experiments.experiment.Desk.scenes.__defaults__", (2000,))
     return shapes.run(desk_in(folder, Settings(share=0.03), plain))
 
 
-def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], tmp_path: Path) -> None:
+def test_a_run_and_one_that_goes_on(
+    monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], tmp_path: Path
+) -> None:
     first = _small(monkeypatch, known, tmp_path)
     assert [table.name for table in first.tables] == ["skins", "found", "lost"]
     for table in first.tables:
@@ -59,7 +69,9 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, known: dict
 
 def test_sets_depend_on_the_seed_only(known: dict[str, Variant], tmp_path: Path) -> None:
     def drawn(seed: int) -> Any:
-        maker = measuring.Maker(desk_in(tmp_path, Settings(seed=seed, share=0.02), plain), known["forearm, 16"])
+        maker = measuring.Maker(
+            desk_in(tmp_path, Settings(seed=seed, share=0.02), plain), known["forearm, 16"]
+        )
         return maker.test.scenes, maker.tuning.scenes
 
     assert drawn(1) == drawn(1)
@@ -84,17 +96,22 @@ def test_regions(known: dict[str, Variant]) -> None:
     assert hand_region([tip for _, tip, _ in FINGERS.values()]) == list(FINGERS)
     assert hand_region([(85, 60)]) == ["palm"]
     disk = known["disk, 16"]
-    assert disk.regions([(0, 0), (50, 0), (90, 0)], 97) == ["innermost third", "middle third", "rim third"]
+    assert disk.regions([(0, 0), (50, 0), (90, 0)], 97) == [
+        "innermost third",
+        "middle third",
+        "rim third",
+    ]
 
 
 def test_a_finger_with_one_electrode_is_blind(known: dict[str, Variant]) -> None:
-    """All current through a finger passes its only electrode, and so would all that is measured there: no row has both."""
+    """All current through a finger passes its only electrode, and so would all that is measured
+    there: no row has both."""
     seen = {}
     for name in ("hand, 16 placed", "hand, 16 in pairs"):
         skin = known[name].skin
         linear = linearise(skin, adjacent(16), elements=2500)
         norm = np.linalg.norm(linear.jacobian, axis=0)
-        place = grid_for(skin.outline).locate([(FINGERS["middle"][1])])[0]
+        place = grid_for(skin.outline).locate([FINGERS["middle"][1]])[0]
         seen[name] = norm[place] / np.median(norm)
     assert seen["hand, 16 placed"] < 0.05
     assert seen["hand, 16 in pairs"] > 10 * seen["hand, 16 placed"]

@@ -1,4 +1,5 @@
-"""The study on measured tank frames: what it refuses, simulates and judges, and what comes out where the frames are."""
+"""The study on measured tank frames: what it refuses, simulates and judges, and what comes out
+where the frames are."""
 
 from __future__ import annotations
 
@@ -12,23 +13,42 @@ from eitskin.cli.main import main
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
 from eitskin.scene.random_touches import random_touches
+from eitskin.scoring import metrics
 from eitskin.skin.skin import load_skin
-from eitskin.study.experiments import tank as study
-from eitskin.study.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
-from eitskin.study.experiments.tank.discs import VARIANTS
-from eitskin.study.experiments.tank.imagers import DISCS, KINDS, TUNED_DISCS, Levers, datum, disc_kernel
-from eitskin.study.experiments.tank.judging import jittered_truth, places, signed_miou
-from eitskin.study.experiments.tank.levers import chosen, one_by_one, together, words_of
-from eitskin.study.experiments.tank.scenes import RULES, simulated, with_signs
-from eitskin.study.experiments.tank.tables import CHOSEN
-from eitskin.study.experiments.tank.tanks import TOUCH_LIKE, folder_of, phantoms, reciprocal_share, rods, tank
-from eitskin.study.judge import metrics
+from eitskin_studies.experiments import tank as study
+from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.tank.discs import VARIANTS
+from eitskin_studies.experiments.tank.imagers import (
+    DISCS,
+    KINDS,
+    TUNED_DISCS,
+    Levers,
+    datum,
+    disc_kernel,
+)
+from eitskin_studies.experiments.tank.judging import jittered_truth, places, signed_miou
+from eitskin_studies.experiments.tank.levers import chosen, one_by_one, together, words_of
+from eitskin_studies.experiments.tank.scenes import RULES, simulated, with_signs
+from eitskin_studies.experiments.tank.tables import CHOSEN
+from eitskin_studies.experiments.tank.tanks import (
+    TOUCH_LIKE,
+    folder_of,
+    phantoms,
+    reciprocal_share,
+    rods,
+    tank,
+)
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "tank_kit4.toml"
 
 
-def test_without_frames_it_says_what_to_give(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["study", "tank", "-o", str(tmp_path / "out"), "--no-pictures"]) == UsageError.exit_code
+def test_without_frames_it_says_what_to_give(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(["study", "tank", "-o", str(tmp_path / "out"), "--no-pictures"])
+        == UsageError.exit_code
+    )
     said = capsys.readouterr().err.strip()
     assert "--data DIR" in said and "kit4_dev.npz" in said and "\n" not in said
     with pytest.raises(UsageError, match=r"has no kit4_dev\.npz"):
@@ -71,7 +91,9 @@ def test_places_of_both_signs_share_a_threshold() -> None:
     grid = grid_for(tank()[0].outline, 32)
     centres = grid.centres_mm()
     at = np.array([[60.0, 0.0], [-60.0, 0.0]])
-    image = np.exp(-((centres - at[0]) ** 2).sum(axis=1) / 200) - 0.4 * np.exp(-((centres - at[1]) ** 2).sum(axis=1) / 200)
+    image = np.exp(-((centres - at[0]) ** 2).sum(axis=1) / 200) - 0.4 * np.exp(
+        -((centres - at[1]) ** 2).sum(axis=1) / 200
+    )
     up, down = places(image, grid.index, centres, 0.3)
     assert np.hypot(*(up[0] - at[0])) < 3 and np.hypot(*(down[0] - at[1])) < 3
     assert [len(part) for part in places(image, grid.index, centres, 0.5)] == [1, 0]
@@ -92,7 +114,10 @@ def test_signs_turn_about_half_and_nothing_else() -> None:
     before = [touch for scene in drawn.scenes for touch in scene.touches]
     after = [touch for scene in turned.scenes for touch in scene.touches]
     assert 0.3 < np.mean([touch.contrast < 1 for touch in after]) < 0.7
-    assert all(replace(a, contrast=1.0) == replace(b, contrast=1.0) for a, b in zip(before, after, strict=True))
+    assert all(
+        replace(a, contrast=1.0) == replace(b, contrast=1.0)
+        for a, b in zip(before, after, strict=True)
+    )
     assert with_signs(drawn).scenes == turned.scenes
 
 
@@ -102,7 +127,9 @@ def test_simulated_noise_is_the_share_of_each_change(tmp_path: Path) -> None:
     clean, noisy = (simulated(desk, 1, 4, True, raster, share) for share in (0.0, 0.05))
     change = clean.frames_v - clean.quiet_v
     noise = noisy.frames_v - clean.frames_v
-    assert np.sqrt((noise**2).mean(axis=1) / (change**2).mean(axis=1)) == pytest.approx(np.full(4, 0.05), rel=0.2)
+    assert np.sqrt((noise**2).mean(axis=1) / (change**2).mean(axis=1)) == pytest.approx(
+        np.full(4, 0.05), rel=0.2
+    )
     assert not (clean.conductive & clean.resistive).any()
     assert sum(map(len, clean.conductive_mm)) + sum(map(len, clean.resistive_mm)) >= 4
 
@@ -118,13 +145,18 @@ def test_levers_are_named_by_what_differs() -> None:
 
 def with_few_values(patch: pytest.MonkeyPatch) -> None:
     """One value a method, and few levers."""
-    few = {"FLOORS": (0.01,), "ITERATIONS": (60,), "LAMBDAS": (0.03,), "PAINTS": ((0.0, 0.0), (2.0, 0.0))}
+    few = {
+        "FLOORS": (0.01,),
+        "ITERATIONS": (60,),
+        "LAMBDAS": (0.03,),
+        "PAINTS": ((0.0, 0.0), (2.0, 0.0)),
+    }
     for name, values in few.items():
-        patch.setattr(f"eitskin.study.experiments.tank.levers.{name}", values)
+        patch.setattr(f"eitskin_studies.experiments.tank.levers.{name}", values)
     for name, tried in (("RATIOS", (1e-3,)), ("STRENGTHS", (1e-3,)), ("STEPS", (20,))):
-        patch.setattr(f"eitskin.study.compare.methods.{name}", tried)
-    patch.setattr("eitskin.study.experiments.tank.discs.VARIANTS", VARIANTS[:2])
-    patch.setattr("eitskin.study.experiments.tank.imagers.CHANGE_RATIOS", (2.0,))
+        patch.setattr(f"eitskin_studies.compare.methods.{name}", tried)
+    patch.setattr("eitskin_studies.experiments.tank.discs.VARIANTS", VARIANTS[:2])
+    patch.setattr("eitskin_studies.experiments.tank.imagers.CHANGE_RATIOS", (2.0,))
 
 
 @pytest.fixture(scope="module")
@@ -149,8 +181,14 @@ def test_every_method_every_kind_every_frame(outcome: tuple[Desk, Outcome]) -> N
     assert all(len(row) == len(table.head) for table in tables.values() for row in table.rows)
 
 
-def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(outcome: tuple[Desk, Outcome]) -> None:
-    discs = next(one for one in outcome[1].data["results"] if (one["name"], one["kind"]) == (DISCS, "log-ratio"))
+def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(
+    outcome: tuple[Desk, Outcome],
+) -> None:
+    discs = next(
+        one
+        for one in outcome[1].data["results"]
+        if (one["name"], one["kind"]) == (DISCS, "log-ratio")
+    )
     assert (discs["touch_like_places"]["found"], discs["touch_like_places"]["false"]) == (8, 0)
     assert np.mean(discs["touch_like"]) >= 0.85
 
@@ -160,7 +198,9 @@ def test_atoms_show_large_objects_better_than_pixels(outcome: tuple[Desk, Outcom
     assert means[str(vars(Levers(atom=2.0)))] > means[str(vars(Levers()))] + 0.03
 
 
-def test_a_run_that_goes_on_computes_nothing_again(outcome: tuple[Desk, Outcome], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_goes_on_computes_nothing_again(
+    outcome: tuple[Desk, Outcome], monkeypatch: pytest.MonkeyPatch
+) -> None:
     desk, first = outcome
     with_few_values(monkeypatch)
     kept = desk.store.path.read_bytes()
@@ -172,7 +212,10 @@ def test_a_run_that_goes_on_computes_nothing_again(outcome: tuple[Desk, Outcome]
 def test_pictures_are_drawn(outcome: tuple[Desk, Outcome], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     assert set(outcome[1].pictures) == {"touch_like.png", "all_frames.png", "curves.png"}
-    for name in ("touch_like.png", "curves.png"):  # all frames: the same function as touch-like ones, in half a minute
+    for name in (
+        "touch_like.png",
+        "curves.png",
+    ):  # all frames: the same function as touch-like ones, in half a minute
         outcome[1].pictures[name](tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
@@ -182,5 +225,10 @@ def test_measured_frames_as_they_are_said_to_be(shared_data: Path) -> None:
     assert set(TOUCH_LIKE) <= set(frames.frame_name)
     assert 0.02 < np.median(reciprocal_share(frames)) < 0.1
     one, two = rods(shared_data)
-    assert (len(one.metal_mm), len(one.plastic_mm), len(two.metal_mm), len(two.plastic_mm)) == (1, 0, 2, 2)
+    assert (len(one.metal_mm), len(one.plastic_mm), len(two.metal_mm), len(two.plastic_mm)) == (
+        1,
+        0,
+        2,
+        2,
+    )
     assert one.metal_mm[0, 1] > 70 and abs(one.metal_mm[0, 0]) < 1

@@ -1,4 +1,5 @@
-"""The experiment on touches in time: its streams, its counting, and that it goes on where it was stopped."""
+"""The experiment on touches in time: its streams, its counting, and that it goes on where it was
+stopped."""
 
 from __future__ import annotations
 
@@ -11,11 +12,18 @@ from eitskin.core.results import Touch
 from eitskin.errors import UsageError
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.skin.skin import paper_skin
-from eitskin.study.experiments import tracking
-from eitskin.study.experiments.experiment import Desk, Settings, desk_in, plain
-from eitskin.study.experiments.tracking import measured, streams
-from eitskin.study.experiments.tracking.counted import Count, count_stream, total
-from eitskin.study.experiments.tracking.streams import FRAMES, GAP_MM, RATE_HZ, Stream, passing_streams, random_streams
+from eitskin_studies.experiments import tracking
+from eitskin_studies.experiments.experiment import Desk, Settings, desk_in, plain
+from eitskin_studies.experiments.tracking import measured, streams
+from eitskin_studies.experiments.tracking.counted import Count, count_stream, total
+from eitskin_studies.experiments.tracking.streams import (
+    FRAMES,
+    GAP_MM,
+    RATE_HZ,
+    Stream,
+    passing_streams,
+    random_streams,
+)
 
 
 @pytest.fixture
@@ -36,7 +44,9 @@ def test_the_whole_and_again(desk: Desk, monkeypatch: pytest.MonkeyPatch, tmp_pa
     for name, draw in outcome.pictures.items():
         draw(tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
-    monkeypatch.setattr(measured, "simulate_frames", lambda compiled: pytest.fail("simulated again"))
+    monkeypatch.setattr(
+        measured, "simulate_frames", lambda compiled: pytest.fail("simulated again")
+    )
     monkeypatch.setattr(measured, "count_stream", lambda *given: pytest.fail("counted again"))
     again = tracking.run(desk_in(desk.folder, desk.settings, plain))
     assert again.tables == outcome.tables
@@ -45,7 +55,9 @@ def test_the_whole_and_again(desk: Desk, monkeypatch: pytest.MonkeyPatch, tmp_pa
 def test_streams_are_those_of_their_seed_and_fingers_stay_apart() -> None:
     outline = paper_skin().outline
     drawn = random_streams(outline, 3, "test", 200, 6)
-    assert [one.facts() for one in drawn[:2]] == [one.facts() for one in random_streams(outline, 3, "test", 200, 2)]
+    assert [one.facts() for one in drawn[:2]] == [
+        one.facts() for one in random_streams(outline, 3, "test", 200, 2)
+    ]
     assert drawn[0].facts() != random_streams(outline, 4, "test", 200, 1)[0].facts()
     for one in drawn:
         for frame in range(FRAMES):
@@ -58,12 +70,17 @@ def test_streams_are_those_of_their_seed_and_fingers_stay_apart() -> None:
             both = finger.there[1:] & finger.there[:-1]
             step = np.hypot(np.diff(finger.x_mm), np.diff(finger.y_mm))[both]
             assert (step <= 200 / RATE_HZ + 1e-9).all() and np.median(step) > 0.9 * 200 / RATE_HZ
-            assert finger.contrast[finger.there].max() > 1.1 * finger.contrast[finger.there][0] > 1  # it lands lightly
+            assert (
+                finger.contrast[finger.there].max() > 1.1 * finger.contrast[finger.there][0] > 1
+            )  # it lands lightly
 
 
 def test_fingers_that_pass_come_near() -> None:
     for one in passing_streams(1, 50, 3):
-        nearest = min(np.hypot(*np.diff(one.true_mm(k)[1], axis=0)[0]) - one.true_mm(k)[2].sum() for k in range(FRAMES))
+        nearest = min(
+            np.hypot(*np.diff(one.true_mm(k)[1], axis=0)[0]) - one.true_mm(k)[2].sum()
+            for k in range(FRAMES)
+        )
         assert 4.9 < nearest < 6.0
 
 
@@ -76,7 +93,8 @@ def at(number: int, x_mm: float) -> Touch:
 
 
 def test_what_is_counted() -> None:
-    """Two fingers, at 0 mm in frames 2 to 9 and at 60 mm in frames 4 to 9; twelve frames are told."""
+    """Two fingers, at 0 mm in frames 2 to 9 and at 60 mm in frames 4 to 9; twelve frames are
+    told."""
     stream = Stream("two", 0, (finger(2, 9, 0.0), finger(4, 9, 60.0)))
     told: list[tuple[Touch, ...]] = [()] * 12
     told[1] = (at(1, 0.0),)  # false: nobody is there yet
@@ -87,7 +105,13 @@ def test_what_is_counted() -> None:
     told[10] = (at(2, 1.0),)  # a ghost
     told[8] += (at(4, 60.0),)
     count = count_stream(stream, told, 120)
-    assert (count.frames, count.true, count.missed, count.false_touches, count.switches) == (12, 14, 6, 3, 2)
+    assert (count.frames, count.true, count.missed, count.false_touches, count.switches) == (
+        12,
+        14,
+        6,
+        3,
+        2,
+    )
     assert count.exact == 4  # frames 0, 3, 8, 11
     assert (count.late, count.ghost, count.fingers, count.never) == ([1, 4], [1, 0], 2, 0)
     assert count.mota == pytest.approx(1 - 11 / 14) and sorted(count.errors_mm) == [0.0] + 7 * [1.0]
@@ -106,7 +130,10 @@ def test_the_best_pairs_may_not_be_the_nearest() -> None:
     distance = np.array([[1.0, 3.0], [2.0, 9.0]])
     assert measured.best_pairs(distance, 10.0) == [(0, 1), (1, 0)]
     assert measured.nearest_pairs(distance, 10.0) == [(0, 0), (1, 1)]
-    assert measured.best_pairs(distance, 2.5) == [(0, 0)] and measured.best_pairs(np.zeros((0, 2)), 1.0) == []
+    assert (
+        measured.best_pairs(distance, 2.5) == [(0, 0)]
+        and measured.best_pairs(np.zeros((0, 2)), 1.0) == []
+    )
 
 
 def test_a_share_that_cannot_be() -> None:

@@ -1,4 +1,5 @@
-"""What all experiments have in common: their names and pages, the command, the files that they leave."""
+"""What all experiments have in common: their names and pages, the command, the files that they
+leave."""
 
 from __future__ import annotations
 
@@ -11,9 +12,9 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.errors import ConfigError, UsageError
-from eitskin.study.experiments import registry
-from eitskin.study.experiments.experiment import Desk, Outcome, Settings, Table, desk_in, plain
-from eitskin.study.experiments.write import to_json, write_all, write_page
+from eitskin_studies.experiments import registry
+from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, Table, desk_in, plain
+from eitskin_studies.experiments.write import to_json, write_all, write_page
 
 PAGES = Path(__file__).parents[3] / "docs" / "results"
 
@@ -33,7 +34,9 @@ class Small:
 
         values = desk.kept({"part": "small"}, make)
         table = Table("small", ("what", "value"), (("mean", f"{values['mean']:g}"),))
-        return Outcome((table,), values, {"small.png": lambda path: path.write_bytes(b"png")}, {"said": "so"})  # type: ignore[arg-type]
+        return Outcome(
+            (table,), values, {"small.png": lambda path: path.write_bytes(b"png")}, {"said": "so"}
+        )  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -49,23 +52,43 @@ def test_each_has_a_title_and_a_page_that_its_command_fills(name: str) -> None:
     experiment = registry.load(name)
     assert experiment.TITLE and callable(experiment.run)
     page = (PAGES / f"{name}.md").read_text(encoding="utf-8")
-    assert f"`eitskin study {name} -o out/{name}" in page and "<!-- command -->\n<!-- end command -->" not in page
+    assert (
+        f"`eitskin study {name} -o out/{name}" in page
+        and "<!-- command -->\n<!-- end command -->" not in page
+    )
     assert f"[{name}]({name}.md)" in (PAGES / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_command_lists_runs_and_goes_on(small: Small, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_lists_runs_and_goes_on(
+    small: Small, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["study", "list"]) == 0
     assert "small        one number" in capsys.readouterr().out
     page = tmp_path / "small.md"
-    page.write_text("".join(f"<!-- {mark} -->\nold\n<!-- end {mark} -->\n" for mark in ("command", "small", "said")))
+    page.write_text(
+        "".join(
+            f"<!-- {mark} -->\nold\n<!-- end {mark} -->\n" for mark in ("command", "small", "said")
+        )
+    )
     for _ in range(2):
-        assert main(["study", "small", "-o", str(tmp_path / "out"), "--seed", "3", "--page", str(page)]) == 0
+        assert (
+            main(
+                ["study", "small", "-o", str(tmp_path / "out"), "--seed", "3", "--page", str(page)]
+            )
+            == 0
+        )
         assert "mean    0.5" in capsys.readouterr().out
     assert small.computed == 1
     assert main(["study", "small", "-o", str(tmp_path / "out"), "--seed", "4", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"mean": 0.5, "none": None} and small.computed == 2
+    assert (
+        json.loads(capsys.readouterr().out) == {"mean": 0.5, "none": None} and small.computed == 2
+    )
     text = page.read_text(encoding="utf-8")
-    assert "| mean | 0.5 |" in text and "old" not in text and "--seed 3 --page docs/results/small.md" in text
+    assert (
+        "| mean | 0.5 |" in text
+        and "old" not in text
+        and "--seed 3 --page docs/results/small.md" in text
+    )
     assert (tmp_path / "pictures" / "small" / "small.png").read_bytes() == b"png"
     assert (tmp_path / "out" / "small.csv").read_text(encoding="utf-8") == "what,value\nmean,0.5\n"
 
@@ -116,6 +139,9 @@ def test_a_torn_line_is_computed_again(tmp_path: Path) -> None:
 
 def test_sets_to_choose_on_are_not_those_that_are_reported() -> None:
     settings = Settings(seed=7, share=0.1)
-    assert settings.tuning_seed != settings.seed and (settings.count(40), settings.count(3)) == (4, 2)
+    assert settings.tuning_seed != settings.seed and (settings.count(40), settings.count(3)) == (
+        4,
+        2,
+    )
     with pytest.raises(UsageError):
         Settings(share=101)

@@ -9,8 +9,8 @@ import pytest
 
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
+from eitskin.scoring.figures_of_merit import figures_of_merit
 from eitskin.skin.outline import disk
-from eitskin.study.judge.figures_of_merit import figures_of_merit
 
 GRID = grid_for(disk(194.0), 194)
 XY = GRID.centres_mm()
@@ -46,7 +46,9 @@ def test_image_drawn_to_the_centre_has_positive_position_error() -> None:
 
 def test_only_a_quarter_of_the_peak_counts_as_target() -> None:
     image = 1.0 * disc(0, 0, 10) + 0.24 * disc(0, 50, 10)
-    assert figures_of_merit(image, XY, GRID.pixel_mm, (0, 0), 10.0, 1.0).resolution == pytest.approx(10 / 97, rel=0.02)
+    assert figures_of_merit(
+        image, XY, GRID.pixel_mm, (0, 0), 10.0, 1.0
+    ).resolution == pytest.approx(10 / 97, rel=0.02)
     image = 1.0 * disc(0, 0, 10) + 0.26 * disc(0, 50, 10)
     figures = figures_of_merit(image, XY, GRID.pixel_mm, (0, 0), 10.0, 1.0)
     assert figures.resolution == pytest.approx(math.sqrt(2) * 10 / 97, rel=0.02)
@@ -54,7 +56,8 @@ def test_only_a_quarter_of_the_peak_counts_as_target() -> None:
 
 
 def test_shape_deformation_of_a_square_is_its_corners() -> None:
-    """A square of side a and its circle of equal area: the part of the square outside, over a^2, is 0.0905."""
+    """A square of side a and its circle of equal area: the part of the square outside, over a^2, is
+    0.0905."""
     radius = 1 / math.sqrt(math.pi)
     corner = 4 * (radius**2 * math.acos(0.5 / radius) - 0.5 * math.sqrt(radius**2 - 0.25))
     image = (np.abs(XY) <= 30).all(axis=1) * 1.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from eitskin.fem.grid import grid_for
+from eitskin.scoring.image_touches import best_touch_threshold, touches_in_image
 from eitskin.skin.outline import polygon
-from eitskin.study.judge.image_touches import best_touch_threshold, touches_in_image
 
 GRID = grid_for(polygon([(0, 0), (80, 0), (80, 80), (0, 80)]), 8)
 XY = GRID.centres_mm()
@@ -34,7 +34,9 @@ def test_threshold_drops_the_weak_and_the_sign_is_obeyed() -> None:
     values = image((1, 1, 1.0), (5, 5, 0.4), (3, 7, -5.0))
     assert len(touches_in_image(values, GRID.index, XY, 0.5)) == 1
     assert len(touches_in_image(values, GRID.index, XY, 0.3)) == 2
-    assert touches_in_image(values, GRID.index, XY, 0.5, sign=-1) == pytest.approx(np.array([[35.0, 75.0]]))
+    assert touches_in_image(values, GRID.index, XY, 0.5, sign=-1) == pytest.approx(
+        np.array([[35.0, 75.0]])
+    )
     assert touches_in_image(np.zeros(64), GRID.index, XY, 0.5).shape == (0, 2)
 
 

@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from eitskin.study.judge.matching import match
+from eitskin.scoring.matching import match
 
 
 def test_crossed_pairs_are_matched_by_the_sum_not_greedily() -> None:
@@ -40,9 +40,12 @@ def test_beyond_the_gate_is_a_miss_and_a_false_touch() -> None:
 
 
 @pytest.mark.parametrize(
-    ("true", "found", "misses", "false"), [([], [], 0, 0), ([[1, 1]], [], 1, 0), ([], [[1, 1]], 0, 1)]
+    ("true", "found", "misses", "false"),
+    [([], [], 0, 0), ([[1, 1]], [], 1, 0), ([], [[1, 1]], 0, 1)],
 )
-def test_nothing_on_a_side(true: list[list[float]], found: list[list[float]], misses: int, false: int) -> None:
+def test_nothing_on_a_side(
+    true: list[list[float]], found: list[list[float]], misses: int, false: int
+) -> None:
     matching = match(true, found)
     assert (matching.hits, matching.misses, matching.false_touches) == (0, misses, false)
     assert matching.exact == (misses == false == 0)

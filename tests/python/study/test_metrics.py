@@ -9,8 +9,8 @@ import pytest
 
 from eitskin.errors import UsageError
 from eitskin.fem.grid import grid_for
+from eitskin.scoring import metrics
 from eitskin.skin.outline import disk, polygon
-from eitskin.study.judge import metrics
 
 SQUARE = polygon([(0, 0), (30, 0), (30, 30), (0, 30)])
 
@@ -37,7 +37,9 @@ def test_overlap_of_two_discs_matches_the_lens_formula() -> None:
     radius, apart = 12.0, 9.0
     a = metrics.disc_mask(raster.points_mm, [[-apart / 2, 3.0]], [radius])
     b = metrics.disc_mask(raster.points_mm, [[apart / 2, 3.0]], [radius])
-    lens = 2 * radius**2 * math.acos(apart / (2 * radius)) - apart / 2 * math.sqrt(4 * radius**2 - apart**2)
+    lens = 2 * radius**2 * math.acos(apart / (2 * radius)) - apart / 2 * math.sqrt(
+        4 * radius**2 - apart**2
+    )
     union = 2 * math.pi * radius**2 - lens
     whole = math.pi * 50.0**2
     touch, rest = lens / union, (whole - union) / (whole - lens)
@@ -63,7 +65,13 @@ def test_bad_rasters_are_refused() -> None:
 def test_mask_lookup_keeps_the_lowest_row_below() -> None:
     mask = np.array([[1, 0], [0, 0]], dtype=bool)
     points = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5], [-1.5, -0.5]])
-    assert metrics.mask_on_points(points, mask, (-1, -1, 1, 1)).tolist() == [True, False, False, False, False]
+    assert metrics.mask_on_points(points, mask, (-1, -1, 1, 1)).tolist() == [
+        True,
+        False,
+        False,
+        False,
+        False,
+    ]
 
 
 def test_nearest_lookup_shows_the_containing_pixel_or_the_next_at_the_rim() -> None:
@@ -72,7 +80,10 @@ def test_nearest_lookup_shows_the_containing_pixel_or_the_next_at_the_rim() -> N
     lookup = metrics.lookup_for(raster.points_mm, grid, "nearest")
     assert lookup.pixel.shape == (len(raster.points_mm), 1) and (lookup.weight == 1).all()
     containing = grid.locate(raster.points_mm)
-    at_edge = np.abs((raster.points_mm - grid.origin_mm) / grid.pixel_mm % 1 - 0.5).max(axis=1) > 0.5 - 1e-9
+    at_edge = (
+        np.abs((raster.points_mm - grid.origin_mm) / grid.pixel_mm % 1 - 0.5).max(axis=1)
+        > 0.5 - 1e-9
+    )
     clear = (containing >= 0) & ~at_edge
     assert np.count_nonzero(clear) > 0.9 * len(clear)
     assert (lookup.pixel[clear, 0] == containing[clear]).all()
@@ -136,7 +147,9 @@ def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
     image = np.random.default_rng(2).uniform(size=36)
     truth = metrics.disc_mask(judge.raster.points_mm, [[12, 17]], [6])
     mask = metrics.touch_mask(image, 0.6)[judge.lookup.pixel[:, 0]]
-    assert judge.curves(image[None], truth[None], [0.6])[0, 0] == pytest.approx(metrics.miou(mask, truth))
+    assert judge.curves(image[None], truth[None], [0.6])[0, 0] == pytest.approx(
+        metrics.miou(mask, truth)
+    )
 
 
 def test_pixel_cover_is_exact_in_area() -> None:
@@ -182,4 +195,8 @@ def test_curves_refuse_what_they_cannot_judge() -> None:
 def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals() -> None:
     curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
     assert metrics.best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
-    assert metrics.THRESHOLDS[0] == 0.02 and metrics.THRESHOLDS[-1] == 0.98 and len(metrics.THRESHOLDS) == 49
+    assert (
+        metrics.THRESHOLDS[0] == 0.02
+        and metrics.THRESHOLDS[-1] == 0.98
+        and len(metrics.THRESHOLDS) == 49
+    )

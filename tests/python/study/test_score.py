@@ -1,4 +1,5 @@
-"""Scores of one frame: perfect, empty and wrong results get what the metrics' definition gives them."""
+"""Scores of one frame: perfect, empty and wrong results get what the metrics' definition gives
+them."""
 
 from __future__ import annotations
 
@@ -10,9 +11,9 @@ import pytest
 from eitskin.core.results import Info, Reconstruction, Touch
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
+from eitskin.scoring import metrics
+from eitskin.scoring.score import scorer_for
 from eitskin.skin.protocol import adjacent
-from eitskin.study.judge import metrics
-from eitskin.study.judge.score import scorer_for
 from small_models import prebuilt, small_model
 
 INFO = Info(60, "iterations", 0, 0, 0, 0, 0, 0, *[0.0] * 7)
@@ -32,8 +33,11 @@ def frames(**changes: object) -> Frames:
     return Frames(adjacent(16), np.ones((2, 208)), np.ones((1, 208)), **(fields | changes))
 
 
-def result(touches: list[tuple[float, float, float]], discs: list[int], polarity: float = 1.0) -> Reconstruction:
-    """An image of how much the discs numbered ``discs`` cover of each pixel, and ``touches`` (x, y, radius)."""
+def result(
+    touches: list[tuple[float, float, float]], discs: list[int], polarity: float = 1.0
+) -> Reconstruction:
+    """An image of how much the discs numbered ``discs`` cover of each pixel, and ``touches`` (x, y,
+    radius)."""
     grid = prebuilt()[0].grid
     cover = metrics.pixel_cover(grid, PLACES[discs], RADII[discs])
     found = tuple(Touch(k, x, y, r, polarity, 1.0) for k, (x, y, r) in enumerate(touches))
@@ -53,9 +57,14 @@ def test_a_perfect_result() -> None:
 
 
 def test_found_touches_are_paired_whatever_their_order() -> None:
-    score = scorer_for(prebuilt()[0]).score(frames(), 0, result(put(1, 0, off=3.0), [0, 1]), "increase")
+    score = scorer_for(prebuilt()[0]).score(
+        frames(), 0, result(put(1, 0, off=3.0), [0, 1]), "increase"
+    )
     assert score is not None
-    assert score.matching.pairs == ((0, 1), (1, 0)) and score.matching.distances_mm == pytest.approx((3, 3))
+    assert score.matching.pairs == (
+        (0, 1),
+        (1, 0),
+    ) and score.matching.distances_mm == pytest.approx((3, 3))
     assert 0.7 < score.miou_touches < 0.95
 
 
@@ -65,7 +74,11 @@ def test_the_gate_and_what_lies_beyond() -> None:
     for off, hits in ((9.9, 2), (10.1, 0)):
         score = scorer.score(frames(), 0, result(put(0, 1, off=off), [0, 1]), "increase")
         assert score is not None
-        assert (score.matching.hits, score.matching.misses, score.matching.false_touches) == (hits, 2 - hits, 2 - hits)
+        assert (score.matching.hits, score.matching.misses, score.matching.false_touches) == (
+            hits,
+            2 - hits,
+            2 - hits,
+        )
 
 
 def test_an_empty_result_has_half_the_background() -> None:
@@ -86,11 +99,15 @@ def test_only_the_wanted_sign_counts() -> None:
     both = scorer.score(frames(), 0, result(put(0, 1, 2), [0, 1, 2]), "both")
     assert both is not None
     assert both.matching.hits == 3 and both.miou_touches == 1 and both.miou_image > 0.85
-    assert scorer.score(frames(touch_sign=np.array([1, 1, 1])), 0, result([], []), "decrease") is None
+    assert (
+        scorer.score(frames(touch_sign=np.array([1, 1, 1])), 0, result([], []), "decrease") is None
+    )
 
 
 def test_unknown_signs_are_touches() -> None:
-    score = scorer_for(prebuilt()[0]).score(frames(touch_sign=np.zeros(3)), 0, result(put(0, 1, 2), [0, 1, 2]), "increase")
+    score = scorer_for(prebuilt()[0]).score(
+        frames(touch_sign=np.zeros(3)), 0, result(put(0, 1, 2), [0, 1, 2]), "increase"
+    )
     assert score is not None and score.matching.hits == 3
 
 

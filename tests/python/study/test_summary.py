@@ -7,12 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from eitskin.study.judge.summary import bootstrap_interval, summarise
+from eitskin.scoring.summary import bootstrap_interval, summarise
 
 
 def test_summary_of_one_to_twenty() -> None:
     summary = summarise(range(1, 21))
-    assert (summary.mean, summary.worst_tenth, summary.median, summary.count) == (10.5, 1.5, 10.5, 20)
+    assert (summary.mean, summary.worst_tenth, summary.median, summary.count) == (
+        10.5,
+        1.5,
+        10.5,
+        20,
+    )
     assert summary.p95 == pytest.approx(19.05)
     assert summarise(range(1, 21), worst="high").worst_tenth == 19.5
 

@@ -12,8 +12,8 @@ pytest.importorskip("scipy")
 from eitskin.core.results import SOLVERS
 from eitskin.errors import ConfigError
 from eitskin.model.storage import STORAGES
-from eitskin.study.tradeoff.configuration import Configuration, configuration_from, load_set
-from eitskin.study.tradeoff.default_set import KNOBS, SCALE, default_set
+from eitskin.tuning.configuration import Configuration, configuration_from, load_set
+from eitskin_studies.tradeoff.default_set import KNOBS, SCALE, default_set
 
 
 def test_the_built_in_set_turns_every_knob_and_every_solver() -> None:

@@ -1,4 +1,5 @@
-"""Which point is chosen: the front, budgets and accuracies on made-up points, and what the shipped results must show."""
+"""Which point is chosen: the front, budgets and accuracies on made-up points, and what the shipped
+results must show."""
 
 from __future__ import annotations
 
@@ -11,9 +12,8 @@ import pytest
 pytest.importorskip("scipy")
 
 from eitskin.errors import ConfigError, FileError, UsageError
-from eitskin.study.tradeoff.configuration import Configuration
-from eitskin.study.tradeoff.default_set import default_set
-from eitskin.study.tradeoff.front import (
+from eitskin.tuning.configuration import Configuration
+from eitskin.tuning.front import (
     Budget,
     Front,
     Point,
@@ -28,20 +28,28 @@ from eitskin.study.tradeoff.front import (
     pareto,
     read_budget,
 )
-from eitskin.study.tradeoff.page import PICTURES, TABLES, fill_page
-from eitskin.study.tradeoff.table import best_points, to_json
-from eitskin.view.tradeoff_pictures import PICTURES as DRAWN
+from eitskin_studies.pictures.tradeoff_pictures import PICTURES as DRAWN
+from eitskin_studies.tradeoff.default_set import default_set
+from eitskin_studies.tradeoff.page import PICTURES, TABLES, fill_page
+from eitskin_studies.tradeoff.table import best_points, to_json
 
 HERE = Where()
 
 
 def point(name: str, accuracy: float, instructions: float, **more: Any) -> Point:
     """A made-up point; its costliest frame takes twice the mean."""
-    fields = {key: more.pop(key) for key in ("flash_bytes", "ram_bytes", "acquisition_us") if key in more}
+    fields = {
+        key: more.pop(key) for key in ("flash_bytes", "ram_bytes", "acquisition_us") if key in more
+    }
     macs = instructions / 2
     score = {
         "scenes": 9,
-        "image": {"mean": accuracy, "worst_tenth": accuracy - 0.1, "low": accuracy - 0.01, "high": accuracy + 0.01},
+        "image": {
+            "mean": accuracy,
+            "worst_tenth": accuracy - 0.1,
+            "low": accuracy - 0.01,
+            "high": accuracy + 0.01,
+        },
         "discs": {"mean": 0.9, "worst_tenth": 0.8, "low": 0.88, "high": 0.91},
         "exact_count": 1.0,
         "position_mm": {"median": 0.5, "p95": 1.0},
@@ -54,7 +62,13 @@ def point(name: str, accuracy: float, instructions: float, **more: Any) -> Point
         Configuration(name, **more),
         0.3,
         1.0,
-        {"flash_bytes": 1000, "ram_bytes": 1000, "pixels_kept": 812, "acquisition_us": 20_800, **fields},
+        {
+            "flash_bytes": 1000,
+            "ram_bytes": 1000,
+            "pixels_kept": 812,
+            "acquisition_us": 20_800,
+            **fields,
+        },
         {"kind": "counted", "mean": instructions, "most": 2 * instructions, "macs_mean": macs},
         {"p50": instructions / 1e4, "p99": instructions, "most": instructions / 5e3},
         {"random": {"60": score}},
@@ -73,12 +87,18 @@ POINTS = (
 COLD = POINTS[:-1]
 
 
-def wish(budget: str | None = None, accuracy: float | None = None, board: str = "f767", **more: Any) -> Wish:
-    return check_wish(Wish(None if budget is None else read_budget(budget), accuracy, board, HERE, **more))
+def wish(
+    budget: str | None = None, accuracy: float | None = None, board: str = "f767", **more: Any
+) -> Wish:
+    return check_wish(
+        Wish(None if budget is None else read_budget(budget), accuracy, board, HERE, **more)
+    )
 
 
 def test_the_front_is_what_nothing_beats() -> None:
-    best = pareto(POINTS[:4], lambda p: p.cost("instructions", "f767", HERE), lambda p: p.accuracy(HERE))
+    best = pareto(
+        POINTS[:4], lambda p: p.cost("instructions", "f767", HERE), lambda p: p.accuracy(HERE)
+    )
     assert [one.name for one in best] == ["a", "b", "c"]
     assert [one.name for one in best_points(POINTS, HERE)] == ["a", "b", "c", "big"]
 
@@ -126,7 +146,9 @@ def test_the_right_point_is_chosen(asked: dict[str, Any], name: str) -> None:
         ({"budget": "1Minstructions", "board": "host"}, "instructions are counted"),
     ],
 )
-def test_what_cannot_be_is_refused_with_how_near_one_comes(asked: dict[str, Any], said: str) -> None:
+def test_what_cannot_be_is_refused_with_how_near_one_comes(
+    asked: dict[str, Any], said: str
+) -> None:
     with pytest.raises(UsageError, match=said) as caught:
         choose(COLD, wish(**asked))
     assert "\n" not in str(caught.value)
@@ -142,9 +164,13 @@ def test_a_longer_scan_is_chosen_only_where_there_is_time() -> None:
 def test_boards_get_only_what_they_can_be_told() -> None:
     half = point("half", 0.89, 300e3, touch_sweeps=2)
     assert choose([*COLD, half], wish("10ms")).name == "c"
-    assert not point("limited", 0.9, 1e5, mac_limit=5).fits_f767 or "mac_limit" in __import__(
-        "eitskin.device.settings", fromlist=["SolverSettings"]
-    ).SolverSettings.__dataclass_fields__
+    assert (
+        not point("limited", 0.9, 1e5, mac_limit=5).fits_f767
+        or "mac_limit"
+        in __import__(
+            "eitskin.device.settings", fromlist=["SolverSettings"]
+        ).SolverSettings.__dataclass_fields__
+    )
     assert not point("large", 0.9, 1e5, ram_bytes=300_000).fits_f767
 
 
@@ -164,7 +190,9 @@ def test_budgets_are_read(text: str, budget: Budget) -> None:
     assert read_budget(text) == budget
 
 
-@pytest.mark.parametrize("text", ["", "10", "ms", "-3ms", "0ms", "1e400ms", "nanms", "3 parsecs", "1ms2"])
+@pytest.mark.parametrize(
+    "text", ["", "10", "ms", "-3ms", "0ms", "1e400ms", "nanms", "3 parsecs", "1ms2"]
+)
 def test_what_is_no_budget_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="--budget"):
         read_budget(text)
@@ -175,7 +203,12 @@ def test_instructions_are_estimated_from_points_of_the_same_storage_and_solver()
     assert estimated_instructions(COLD, packed, (1000.0, 3000.0)) is None
     table = [*COLD, point("i8 too", 0.8, 900e3, storage="i8")]
     estimate = estimated_instructions(table, packed, (1000.0, 3000.0))
-    assert estimate == {"kind": "estimated", "mean": 2000, "most": 6000, "instructions_per_mac": 2.0}
+    assert estimate == {
+        "kind": "estimated",
+        "mean": 2000,
+        "most": 6000,
+        "instructions_per_mac": 2.0,
+    }
 
 
 def test_files_that_are_no_results_are_refused(tmp_path: Path) -> None:
@@ -192,18 +225,29 @@ def test_the_shipped_results_are_of_the_built_in_set_and_reach_the_targets() -> 
     front = load_front()
     names = {one.name for one in front.points}
     missing = {one.name for one in default_set()} - names
-    assert not missing, f"make the shipped results anew (docs/results/tradeoff.md): {sorted(missing)} are not in them"
-    assert all(one.instructions is not None and one.instructions["kind"] == "counted" for one in front.points)
+    assert not missing, (
+        f"make the shipped results anew (docs/results/tradeoff.md): {sorted(missing)} are not in"
+        " them"
+    )
+    assert all(
+        one.instructions is not None and one.instructions["kind"] == "counted"
+        for one in front.points
+    )
     assert choose(front.points, wish("2.5Minstructions")).accuracy(HERE) >= 0.84  # type: ignore[operator]
     assert choose(front.points, wish("2.5Minstructions", worst=True)).accuracy(HERE) >= 0.84  # type: ignore[operator]
     assert max(one.accuracy(HERE) or 0 for one in front.points) >= 0.87
     by_name = {one.name: one for one in front.points}
     for base in ("standard", "fine"):
         for storage in ("f16", "i16", "i8"):
-            packed, plain = by_name[f"{base} {storage}"].accuracy(HERE), by_name[base].accuracy(HERE)
+            packed, plain = (
+                by_name[f"{base} {storage}"].accuracy(HERE),
+                by_name[base].accuracy(HERE),
+            )
             assert packed == pytest.approx(plain, abs=0.005)
     for budget in ("2ms", "5ms", "10ms", "50ms"):
-        assert choose([one for one in front.points if not one.configuration.warm_start], wish(budget)).fits_f767
+        assert choose(
+            [one for one in front.points if not one.configuration.warm_start], wish(budget)
+        ).fits_f767
 
 
 def test_what_ships_is_smaller_and_reads_the_same() -> None:
@@ -218,7 +262,9 @@ def test_the_page_shows_the_shipped_results(tmp_path: Path) -> None:
     text, front = page.read_text(encoding="utf-8"), load_front()
     for name, make in TABLES.items():
         marked = f"<!-- {name} -->\n{make(front)}\n<!-- end {name} -->"
-        assert marked in text, f"the table {name!r} is old: run  eitskin tradeoff run  as the page says"
+        assert marked in text, (
+            f"the table {name!r} is old: run  eitskin tradeoff run  as the page says"
+        )
     assert all((page.parent / PICTURES / name).is_file() for name in DRAWN)
     copy = tmp_path / "page.md"
     copy.write_text(text.replace("| fine |", "| dull |"))

@@ -1,4 +1,5 @@
-"""The measurement on tiny sets: what it measures, that it goes on after a kill, and that frames are what they are said to be."""
+"""The measurement on tiny sets: what it measures, that it goes on after a kill, and that frames are
+what they are said to be."""
 
 from __future__ import annotations
 
@@ -25,19 +26,21 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.study.sessions import Session, copied
-from eitskin.study.tradeoff.configuration import Configuration
-from eitskin.study.tradeoff.front import Front, Where, front_from
-from eitskin.study.tradeoff.run import RESULTS, RunSettings, run
-from eitskin.study.tradeoff.scene_sets import SETS, Workshop
-from eitskin.study.tradeoff.table import best_points, to_csv, to_json, to_text
+from eitskin.tuning.configuration import Configuration
+from eitskin.tuning.front import Front, Where, front_from
+from eitskin_studies.harness.sessions import Session, copied
+from eitskin_studies.tradeoff.run import RESULTS, RunSettings, run
+from eitskin_studies.tradeoff.scene_sets import SETS, Workshop
+from eitskin_studies.tradeoff.table import best_points, to_csv, to_json, to_text
 
 ELEMENTS = 1200
 TINY = RunSettings(6, 4, 2, ("pairs", "drift"), (40.0, 60.0), 5, ELEMENTS, 0, 2, 1)
 PAIR = (
     Configuration("cheap", rank=24, pixels=14, iterations=8),
     Configuration("dear", rank=48, pixels=24, iterations=60, lambda_rel=0.01),
-    Configuration("warm", rank=48, pixels=24, iterations=15, warm_start=True, scan="reciprocal", storage="i8"),
+    Configuration(
+        "warm", rank=48, pixels=24, iterations=15, warm_start=True, scan="reciprocal", storage="i8"
+    ),
 )
 
 
@@ -79,7 +82,10 @@ def test_every_configuration_is_measured_on_every_set(front: Front) -> None:
     where = Where()
     assert (cheap.accuracy(where) or 1) < (dear.accuracy(where) or 0)
     assert (cheap.macs(where) or (9e9,))[0] < (dear.macs(where) or (0,))[0]
-    assert cheap.costs["flash_bytes"] < dear.costs["flash_bytes"] and warm.costs["flash_bytes"] < dear.costs["flash_bytes"]
+    assert (
+        cheap.costs["flash_bytes"] < dear.costs["flash_bytes"]
+        and warm.costs["flash_bytes"] < dear.costs["flash_bytes"]
+    )
     assert (dear.costs["acquisition_us"], warm.costs["acquisition_us"]) == (20_800, 10_400)
     assert dear.score(where)["iterations"] == 60  # type: ignore[index]
     assert best_points(front.points, where) == [cheap, dear]
@@ -88,7 +94,13 @@ def test_every_configuration_is_measured_on_every_set(front: Front) -> None:
 def test_tables_hold_a_row_a_cell(front: Front) -> None:
     lines = to_csv(front).splitlines()
     assert len(lines) == 1 + 3 * 3 * 2
-    assert {"image_mean", "discs_worst_tenth", "force_error_median", "host_p50_us", "threshold"} <= set(lines[0].split(","))
+    assert {
+        "image_mean",
+        "discs_worst_tenth",
+        "force_error_median",
+        "host_p50_us",
+        "threshold",
+    } <= set(lines[0].split(","))
     assert all(line.count(",") == lines[0].count(",") for line in lines)
     again = front_from(json.loads(to_json(front)), "file")
     assert comparable(again) == comparable(front)
@@ -103,7 +115,9 @@ def test_a_second_run_measures_nothing(front: Front, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", [0.3, 0.7, 0.95])
-def test_a_run_that_was_cut_goes_on_to_the_same_table(front: Front, folder: Path, tmp_path: Path, cut: float) -> None:
+def test_a_run_that_was_cut_goes_on_to_the_same_table(
+    front: Front, folder: Path, tmp_path: Path, cut: float
+) -> None:
     """Cut anywhere, also within a line."""
     whole = (folder / RESULTS).read_bytes()
     (tmp_path / RESULTS).write_bytes(whole[: int(cut * len(whole))])
@@ -124,17 +138,42 @@ def test_a_killed_command_goes_on(tmp_path: Path) -> None:
         '[[configuration]]\nname = "a"\nrank = 24\npixels = 14\niterations = 8\n'
         '[[configuration]]\nname = "b"\nrank = 32\npixels = 16\n'
     )
-    command = [sys.executable, "-m", "eitskin.cli.main", "tradeoff", "run", "--set", "set.toml", "--scenes", "8", "--train", "4"]
+    command = [
+        sys.executable,
+        "-m",
+        "eitskin.cli.main",
+        "tradeoff",
+        "run",
+        "--set",
+        "set.toml",
+        "--scenes",
+        "8",
+        "--train",
+        "4",
+    ]
     command += ["--set-scenes", "2", "--sets", "pairs", "--elements", str(ELEMENTS)]
     command += ["--counted", "0", "--rounds", "1", "--no-pictures"]
 
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(str(Path(entry).resolve()) for entry in sys.path)}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(str(Path(entry).resolve()) for entry in sys.path),
+    }
 
     def finished(output: str) -> Any:
         call = [*command, "-o", output]
-        done = subprocess.run(call, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=240, check=False)
+        done = subprocess.run(
+            call,
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=240,
+            check=False,
+        )
         assert done.returncode == 0, done.stderr
-        return comparable(front_from(json.loads((tmp_path / output / "front.json").read_text()), output))
+        return comparable(
+            front_from(json.loads((tmp_path / output / "front.json").read_text()), output)
+        )
 
     call, quiet = [*command, "-o", "cut"], subprocess.DEVNULL
     killed = subprocess.Popen(call, cwd=tmp_path, env=environment, stdout=quiet, stderr=quiet)
@@ -155,7 +194,12 @@ def session(name: str, count: int = 3) -> Session:
 
 def test_random_scenes_are_those_of_compare() -> None:
     skin, protocol = paper_skin(), adjacent(16)
-    theirs = simulate(skin, protocol, random_touches(skin.outline, 5, 3, "test"), mesh=mesh_for_elements(skin, ELEMENTS))
+    theirs = simulate(
+        skin,
+        protocol,
+        random_touches(skin.outline, 5, 3, "test"),
+        mesh=mesh_for_elements(skin, ELEMENTS),
+    )
     ours = session("random").measured(60.0, 80, "full", 1)
     assert np.array_equal(ours.quiet_v, theirs.quiet_v)
     assert np.array_equal(ours.frames_v[:, 0], theirs.frames_v)
@@ -166,9 +210,13 @@ def test_random_scenes_are_those_of_compare() -> None:
 
 def test_noise_falls_with_the_root_of_the_samples_and_stays_the_same_noise() -> None:
     one = session("random")
-    noise = {s: one.measured(40.0, s, "full", 1).frames_v[:, 0] - one.exact_v for s in (20, 80, 320)}
+    noise = {
+        s: one.measured(40.0, s, "full", 1).frames_v[:, 0] - one.exact_v for s in (20, 80, 320)
+    }
     assert noise[20].std() / noise[80].std() == pytest.approx(2, rel=0.02)
-    assert noise[80].std() / noise[320].std() == pytest.approx(2, rel=0.1)  # the converter's steps stay
+    assert noise[80].std() / noise[320].std() == pytest.approx(
+        2, rel=0.1
+    )  # the converter's steps stay
     assert np.corrcoef(noise[20].ravel(), noise[80].ravel())[0, 1] > 0.99
     fine = one.measured(80.0, 80, "full", 1).frames_v[:, 0] - one.exact_v
     expected = np.sqrt((one.exact_quiet_v**2).mean()) * 1e-4
@@ -180,7 +228,9 @@ def test_a_reciprocal_scan_copies_what_it_does_not_measure() -> None:
     fold = one.protocol.reciprocal_pairs()
     full, half = (one.measured(60.0, 80, scan, 1) for scan in ("full", "reciprocal"))
     assert np.array_equal(half.frames_v[..., fold.first], full.frames_v[..., fold.first])
-    assert np.array_equal(half.frames_v[..., fold.second], fold.sign * full.frames_v[..., fold.first])
+    assert np.array_equal(
+        half.frames_v[..., fold.second], fold.sign * full.frames_v[..., fold.first]
+    )
     assert np.array_equal(half.quiet_v, copied(full.quiet_v, one.protocol))
 
 
@@ -189,13 +239,22 @@ def test_sets_hold_what_they_say(name: str) -> None:
     outline = paper_skin().outline
     drawn = SETS[name].draw(outline, 3, 4)
     assert len(drawn.scenes) == 4 and drawn.scenes[:2] == SETS[name].draw(outline, 3, 2).scenes
-    wanted = {"single": {1}, "pairs": {2}, "three": {3}, "six apart": {6}, "six close": {6}, "light": {1, 2}}.get(name, {1, 2, 3})
+    wanted = {
+        "single": {1},
+        "pairs": {2},
+        "three": {3},
+        "six apart": {6},
+        "six close": {6},
+        "light": {1, 2},
+    }.get(name, {1, 2, 3})
     assert {len(scene.touches) for scene in drawn.scenes} <= wanted
     for scene in drawn.scenes:
         centres = scene.centres_mm()
         assert (np.hypot(*centres.T) + scene.radii_mm() <= 97).all()
         if len(centres) > 1:
-            apart = np.linalg.norm(centres[:, None] - centres[None], axis=2)[np.triu_indices(len(centres), 1)].min()
+            apart = np.linalg.norm(centres[:, None] - centres[None], axis=2)[
+                np.triu_indices(len(centres), 1)
+            ].min()
             least = {"pairs": 27.0, "six close": 27.0, "six apart": 45.0}.get(name, 12.0)
             assert apart >= least - 1e-9
             assert name not in ("pairs", "six close") or apart == pytest.approx(27.0)
@@ -206,7 +265,11 @@ def test_drift_is_in_the_frames_and_not_in_the_reference() -> None:
     drifting = session("drift")
     steady = replace(drifting, exact_v=drifting.exact_v)
     assert np.array_equal(steady.exact_quiet_v, drifting.exact_quiet_v)
-    gains = drifting.exact_v @ drifting.exact_quiet_v / (drifting.exact_quiet_v @ drifting.exact_quiet_v)
+    gains = (
+        drifting.exact_v
+        @ drifting.exact_quiet_v
+        / (drifting.exact_quiet_v @ drifting.exact_quiet_v)
+    )
     assert np.ptp(gains) > 0.002
 
 

@@ -15,23 +15,34 @@ from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Quality, RawFrame, Solved, SolvedImage, SolvedTouches
 from eitskin.scene.library_scenes import find_scene
-from eitskin.study.judge.scene_truth import SceneTruth
-from eitskin.study.watch import Watcher, line, spread, table
+from eitskin.scoring.scene_truth import SceneTruth
+from eitskin.scoring.stream_check import Watcher, line, spread, table
 from small_models import prebuilt
 
-SOLVED = Solved(7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0)
+SOLVED = Solved(
+    7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0
+)
 
 
 def touches(*places: tuple[float, float], status: int = 0, time_us: int = 1000) -> LiveFrame:
     found = tuple(Touch(k + 1, x, y, 8.0, 3.0, 0.5) for k, (x, y) in enumerate(places))
-    return LiveFrame(7, 0, time_us, touches=SolvedTouches(replace(SOLVED, status=status, count=len(found)), found))
+    return LiveFrame(
+        7,
+        0,
+        time_us,
+        touches=SolvedTouches(replace(SOLVED, status=status, count=len(found)), found),
+    )
 
 
 def image(*places: tuple[float, float], sign: float = 1.0) -> LiveFrame:
     """An image with a disc at each place."""
     centres = prebuilt()[0].grid.centres_mm()
-    values = sum((np.linalg.norm(centres - place, axis=1) < 10 for place in places), np.zeros(len(centres)))
-    return LiveFrame(7, 0, 1000, image=SolvedImage(SOLVED, (0.01 * sign * values).astype(np.float32)))
+    values = sum(
+        (np.linalg.norm(centres - place, axis=1) < 10 for place in places), np.zeros(len(centres))
+    )
+    return LiveFrame(
+        7, 0, 1000, image=SolvedImage(SOLVED, (0.01 * sign * values).astype(np.float32))
+    )
 
 
 def watcher(scene: str = "two_touch", sign: str = "increase") -> Watcher:
@@ -44,21 +55,34 @@ def test_touches_are_paired_with_the_true_ones() -> None:
     assert seen.errors_mm == {0: pytest.approx(1.0), 1: pytest.approx(3.0)}
     text = line(seen)
     assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text
-    assert "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text and text.endswith(" ms")
+    assert (
+        "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text
+        and text.endswith(" ms")
+    )
     facts = table(seen)
-    assert [touch["error_mm"] for touch in facts["touches"]] == [pytest.approx(1.0), pytest.approx(3.0), None]
+    assert [touch["error_mm"] for touch in facts["touches"]] == [
+        pytest.approx(1.0),
+        pytest.approx(3.0),
+        None,
+    ]
     assert len(facts["true"]) == 2
     assert look.score.as_dict() == {
         "frames": 1, "true": 2, "found": 2, "false": 1, "position_median_mm": pytest.approx(2.0),
         "position_worst_mm": pytest.approx(3.0),
     }  # fmt: skip
-    assert "2 of 2 touches found, 1 false; position error median 2.00 mm, worst 3.00 mm" in look.score.text()
+    assert (
+        "2 of 2 touches found, 1 false; position error median 2.00 mm, worst 3.00 mm"
+        in look.score.text()
+    )
 
 
 def test_nothing_found_is_no_error_of_zero() -> None:
     look = watcher()
     assert " s  no touch; 60 iterations" in line(look.see(touches()))
-    assert look.score.as_dict()["position_worst_mm"] is None and "position error" not in look.score.text()
+    assert (
+        look.score.as_dict()["position_worst_mm"] is None
+        and "position error" not in look.score.text()
+    )
     assert look.score.missed == 2
 
 
@@ -86,24 +110,38 @@ def test_a_refused_frame_says_why_and_is_not_scored() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_an_image_in_brief(sign: float) -> None:
-    seen = Watcher(KnownModel(*prebuilt()), None).see(image((-40.0, 10.0), (30.0, -25.0), sign=sign))
+    seen = Watcher(KnownModel(*prebuilt()), None).see(
+        image((-40.0, 10.0), (30.0, -25.0), sign=sign)
+    )
     assert seen.view is not None and seen.view.places_mm is not None
-    distance = np.linalg.norm(seen.view.places_mm[:, None] - np.array([(-40.0, 10.0), (30.0, -25.0)]), axis=2)
+    distance = np.linalg.norm(
+        seen.view.places_mm[:, None] - np.array([(-40.0, 10.0), (30.0, -25.0)]), axis=2
+    )
     assert (distance.min(axis=0) < 3).all() and len(distance) == 2
     assert seen.view.peak == pytest.approx(0.01 * sign) and seen.errors_mm is None
     assert "off by" not in line(seen)
     assert Watcher(KnownModel(*prebuilt()), None).see(image()).view is not None
-    assert " s  image: flat; 60 iterations" in line(Watcher(KnownModel(*prebuilt()), None).see(image()))
+    assert " s  image: flat; 60 iterations" in line(
+        Watcher(KnownModel(*prebuilt()), None).see(image())
+    )
 
 
 def test_raw_rows_that_are_missing_become_null() -> None:
     volts = np.linspace(1, 2, 5).astype(np.float32)
     volts[2] = np.nan
     quality = np.array([0, 0, Quality.OPEN | Quality.SATURATED, Quality.COPIED, 0], dtype=np.uint8)
-    seen = Watcher(None, None).see(LiveFrame(3, 250_000, 9, raw=RawFrame(3, 9, 20_800, 0, volts, quality)))
+    seen = Watcher(None, None).see(
+        LiveFrame(3, 250_000, 9, raw=RawFrame(3, 9, 20_800, 0, volts, quality))
+    )
     facts = json.loads(json.dumps(table(seen), allow_nan=False))
-    assert facts["voltage_v"][2] is None and facts["voltage_v"][0] == 1.0 and facts["time_s"] == 0.25
-    assert "5 rows in 20.80 ms" in line(seen) and "1 not usable" in line(seen) and "nan" not in line(seen)
+    assert (
+        facts["voltage_v"][2] is None and facts["voltage_v"][0] == 1.0 and facts["time_s"] == 0.25
+    )
+    assert (
+        "5 rows in 20.80 ms" in line(seen)
+        and "1 not usable" in line(seen)
+        and "nan" not in line(seen)
+    )
 
 
 def test_spread_keeps_the_ends() -> None:

@@ -37,7 +37,9 @@ def test_a_frame_is_drawn_and_repeats_byte_for_byte(tmp_path: Path) -> None:
     files = [tmp_path / "a.png", tmp_path / "b.png"]
     for file in files:
         truth, found = [Mark(30, 20, 9, 0.05)], [Mark(31, 20)]
-        draw_frame(file, SKIN, GRID, blob(GRID, 30, 20), truth=truth, found=found, title="one touch")
+        draw_frame(
+            file, SKIN, GRID, blob(GRID, 30, 20), truth=truth, found=found, title="one touch"
+        )
     assert files[0].read_bytes() == files[1].read_bytes()
     assert files[0].read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     height, width, _ = read(files[0]).shape
@@ -46,7 +48,8 @@ def test_a_frame_is_drawn_and_repeats_byte_for_byte(tmp_path: Path) -> None:
 
 
 def test_red_is_where_the_change_is(tmp_path: Path) -> None:
-    """The image panel drawn alone: the reddest place has the blob's coordinates, the bluest those of its negative."""
+    """The image panel drawn alone: the reddest place has the blob's coordinates, the bluest those
+    of its negative."""
     matplotlib = pictures.load_matplotlib()
     for sign, channel in ((1, 0), (-1, 2)):
         figure = matplotlib.figure.Figure(figsize=(4, 4), dpi=100)
@@ -63,7 +66,11 @@ def test_red_is_where_the_change_is(tmp_path: Path) -> None:
 
 
 def test_electrodes_are_numbered_from_0_outside_the_rim() -> None:
-    skin = Skin("ell", polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)]), Electrodes(count=12))
+    skin = Skin(
+        "ell",
+        polygon([(0, 0), (120, 0), (120, 50), (50, 50), (50, 120), (0, 120)]),
+        Electrodes(count=12),
+    )
     axes = pictures.load_matplotlib().figure.Figure().add_subplot()
     pictures.draw_panel(axes, skin, grid_for(skin.outline), Panel("ell"))
     texts = {text.get_text(): text.get_position() for text in axes.texts}
@@ -75,12 +82,17 @@ def test_electrodes_are_numbered_from_0_outside_the_rim() -> None:
 
 def test_frame_without_truth_has_two_panels_and_units(tmp_path: Path) -> None:
     draw_frame(tmp_path / "two.png", SKIN, GRID, np.zeros(GRID.n_pixels), unit="mS/m")
-    draw_frame(tmp_path / "three.png", SKIN, GRID, np.zeros(GRID.n_pixels), truth=[Mark(0, 0, 9, 1.0)])
+    draw_frame(
+        tmp_path / "three.png", SKIN, GRID, np.zeros(GRID.n_pixels), truth=[Mark(0, 0, 9, 1.0)]
+    )
     assert read(tmp_path / "three.png").shape[1] > 1.3 * read(tmp_path / "two.png").shape[1]
 
 
 def test_many_panels(tmp_path: Path) -> None:
-    panels = [Panel(str(k), blob(GRID, 10 * k, 0), (Mark(10 * k, 0, 9),), (Mark(10 * k, 1, 8),)) for k in range(5)]
+    panels = [
+        Panel(str(k), blob(GRID, 10 * k, 0), (Mark(10 * k, 0, 9),), (Mark(10 * k, 1, 8),))
+        for k in range(5)
+    ]
     draw_panels(tmp_path / "many.png", SKIN, GRID, panels, 3, title="five", note="a note")
     height, width, _ = read(tmp_path / "many.png").shape
     assert height / width == pytest.approx((1.95 * 2 + 0.9) / (1.75 * 3 + 0.7), rel=0.01)

@@ -13,18 +13,23 @@ pytest.importorskip("scipy")
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Solved, SolvedImage
 from eitskin.scene.random_touches import Touch
-from eitskin.study.watch import Seen
+from eitskin.scoring.stream_check import Seen
 from eitskin.view.stream_picture import MOST_KEPT, MOST_PANELS, Album, draw_stream
 from small_models import prebuilt
 
 PNG = b"\x89PNG\r\n\x1a\n"
-SOLVED = Solved(7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0)
+SOLVED = Solved(
+    7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0
+)
 
 
 def seen(number: int) -> Seen:
     values = np.zeros(812, dtype=np.float32)
     values[number % 812] = 1.0
-    return Seen(LiveFrame(number, 1000 * number, 0, image=SolvedImage(SOLVED, values)), true=(Touch(0.0, 0.0, 9.0, 5.0),))
+    return Seen(
+        LiveFrame(number, 1000 * number, 0, image=SolvedImage(SOLVED, values)),
+        true=(Touch(0.0, 0.0, 9.0, 5.0),),
+    )
 
 
 def album(count: int) -> Album:

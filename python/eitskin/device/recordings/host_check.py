@@ -1,5 +1,5 @@
-"""Whether a board computes what this host does: its raw frames through the same core, image bits and touches held against what it
-sent."""
+"""Whether a board computes what this host does: its raw frames through the same core, image bits
+and touches held against what it sent."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ from eitskin.solve.reconstructor import Reconstructor
 class HostCheck:
     """How many frames were compared and how that ended.
 
-    ``same``: every bit of the image, and of the touches but their ids, which count on from whatever the board did before, and
+    ``same``: every bit of the image, and of the touches but their ids, which count on from whatever
+        the board did before, and
     all that was found in the frame.
-    ``different``: numbers of frames that are not. ``untold``: frames whose solve or touches began from one that was lost on the
+    ``different``: numbers of frames that are not. ``untold``: frames whose solve or touches began
+        from one that was lost on the
     way, or from a reference that was. ``alone``: solved on the board without its raw frame here.
     """
 
@@ -55,8 +57,8 @@ class HostCheck:
         elif self.different:
             first = self.different[0]
             line = (
-                f"same bits: NO, {len(self.different)} of {self.compared} frames differ, the first is {first}; greatest "
-                f"difference {self.worst:.2e} of the peak"
+                f"same bits: NO, {len(self.different)} of {self.compared} frames differ, the first"
+                f" is {first}; greatest difference {self.worst:.2e} of the peak"
             )
         else:
             line = f"same bits: yes, {self.images} images and the touches of {self.touches} frames"
@@ -87,11 +89,13 @@ class HostTwin:
         return self.check
 
     def lost(self) -> None:
-        """Something is missing here: perhaps a frame from which the next solve began, perhaps a quiet one."""
+        """Something is missing here: perhaps a frame from which the next solve began, perhaps a
+        quiet one."""
         self._sure, self._lost = False, True
 
     def take(self, frame: LiveFrame) -> Reconstruction | None:
-        """The next frame; returns what this host makes of it, None where the board solved nothing."""
+        """The next frame; returns what this host makes of it, None where the board solved
+        nothing."""
         if frame.raw is not None and frame.raw.quiet:
             self._quiet.append(frame.raw)
             return None
@@ -130,9 +134,16 @@ class HostTwin:
             self._judge(frame, frame.refused is not None, 1.0, self._warm)
             return None
         assert frame.solved is not None
-        same, difference = frame.refused is None and same_findings(result.info, raw, frame.solved, self._core.options), 1.0
+        same, difference = (
+            frame.refused is None
+            and same_findings(result.info, raw, frame.solved, self._core.options),
+            1.0,
+        )
         if same and frame.image is not None:
-            same, difference = same_bits(result.image, frame.image.image), _difference(result.image, frame.image.image)
+            same, difference = (
+                same_bits(result.image, frame.image.image),
+                _difference(result.image, frame.image.image),
+            )
         touched = frame.touches is None or same_touches(result.touches, frame.touches.touches)
         if same and not touched:
             self._judge(frame, False, difference, self._warm or self._tracks)
@@ -141,7 +152,8 @@ class HostTwin:
         return result
 
     def _judge(self, frame: LiveFrame, same: bool, difference: float, from_before: bool) -> None:
-        """``from_before``: what differs may come from frames before, of which one may be missing here."""
+        """``from_before``: what differs may come from frames before, of which one may be missing
+        here."""
         check = self.check
         if same:
             check.same += 1
@@ -155,11 +167,12 @@ class HostTwin:
 
 
 def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
-    """The recording ``path`` held against this host's core; also whether it notes the solver's options (else the model's own are
-    taken).
+    """The recording ``path`` held against this host's core; also whether it notes the solver's
+    options (else the model's own are taken).
 
     Raises:
-        FileError, DeviceError, ModelError: the recording or the model cannot be read, or do not belong together.
+        FileError, DeviceError, ModelError: the recording or the model cannot be read, or do not
+            belong together.
     """
     from eitskin.device.client import Device
     from eitskin.device.recordings.recording import FileTransport
@@ -169,7 +182,10 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
     with Device(FileTransport(path)) as device:
         known = need_model(device.board, model, str(path), "the comparison")
         twin = HostTwin(known, board_options(known.model) if options is None else options)
-        return twin.follow(follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)), options is not None
+        return (
+            twin.follow(follow(device, Stream.RAW | Stream.IMAGE | Stream.TOUCHES)),
+            options is not None,
+        )
 
 
 def same_bits(one: npt.NDArray[Any], other: npt.NDArray[np.float32]) -> bool:
@@ -183,9 +199,11 @@ def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
 
 
 def same_findings(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
-    """Whether this host's core found in a frame what the board says of it. Rows that the converter saturated are no numbers to
-    the core: the quality of the raw frame tells them."""
-    lost = int(np.count_nonzero(raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED))
+    """Whether this host's core found in a frame what the board says of it. Rows that the converter
+    saturated are no numbers to the core: the quality of the raw frame tells them."""
+    lost = int(
+        np.count_nonzero(raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED)
+    )
     saturated = 1 << FINDINGS.index("saturated") if lost else 0
     here = info.findings | (saturated & options.findings), info.saturated + lost, info.glitches
     electrodes = info.open_electrodes, info.bridged_electrodes, info.noisy_electrodes
@@ -196,7 +214,14 @@ def same_findings(info: Info, raw: RawFrame, solved: Solved, options: Options) -
 
 
 def _numbers(touch: Touch) -> bytes:
-    values = (touch.x_mm, touch.y_mm, touch.radius_mm, touch.strength_s_per_m_mm2, touch.confidence, touch.load_n)
+    values = (
+        touch.x_mm,
+        touch.y_mm,
+        touch.radius_mm,
+        touch.strength_s_per_m_mm2,
+        touch.confidence,
+        touch.load_n,
+    )
     return np.array(values, dtype="<f4").tobytes()
 
 

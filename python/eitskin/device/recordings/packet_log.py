@@ -1,4 +1,5 @@
-"""Every packet of a session kept in memory, the tare's included, for whoever looks at them afterwards."""
+"""Every packet of a session kept in memory, the tare's included, for whoever looks at them
+afterwards."""
 
 from __future__ import annotations
 

@@ -21,8 +21,9 @@ from eitskin.skin.skin import skin_to_table
 
 @dataclass
 class RawRun:
-    """Raw frames in the order that they were scanned, ``quiet`` ones apart, with the faults told meanwhile and the packets that
-    were lost. ``left_out``: frames before the tare that ``quiet`` is of."""
+    """Raw frames in the order that they were scanned, ``quiet`` ones apart, with the faults told
+    meanwhile and the packets that were lost. ``left_out``: frames before the tare that ``quiet`` is
+    of."""
 
     quiet: list[RawFrame] = field(default_factory=list)
     frames: list[RawFrame] = field(default_factory=list)
@@ -39,12 +40,15 @@ def collect(device: Device, frames: int) -> RawRun:
     """
     run = gather(follow(device, Stream.RAW, frames=frames))
     if not run.frames:
-        raise DeviceError(f"{device.transport.name}: no raw frame came; its scene or recording is over")
+        raise DeviceError(
+            f"{device.transport.name}: no raw frame came; its scene or recording is over"
+        )
     return run
 
 
 def gather(items: Iterable[LiveFrame | Fault | LinkEvent]) -> RawRun:
-    """The raw frames of a stream or recording. Of several tares the last counts, and the frames after it."""
+    """The raw frames of a stream or recording. Of several tares the last counts, and the frames
+    after it."""
     run = RawRun()
     taring = False
     for item in items:
@@ -62,7 +66,8 @@ def gather(items: Iterable[LiveFrame | Fault | LinkEvent]) -> RawRun:
 
 
 def finite_only(frames: Frames, where: str) -> tuple[Frames, int]:
-    """``frames`` without those that have a row which could not be measured, and how many these were.
+    """``frames`` without those that have a row which could not be measured, and how many these
+    were.
 
     Raises:
         FrameError: none are left, or no quiet ones.
@@ -73,13 +78,18 @@ def finite_only(frames: Frames, where: str) -> tuple[Frames, int]:
         which = "quiet frame" if good.any() else "frame"
         bad = frames.reference_voltage_v if good.any() else frames.voltage_v
         row = int(np.argmax((~np.isfinite(bad)).sum(axis=0)))
-        raise FrameError(f"{where}: no {which} has all its rows measured; row {row} is missing most often; see  eitskin doctor")
+        raise FrameError(
+            f"{where}: no {which} has all its rows measured; row {row} is missing most often; see "
+            " eitskin doctor"
+        )
     assert frames.time_s is not None
     kept = replace(
         frames,
         voltage_v=frames.voltage_v[good],
         reference_voltage_v=frames.reference_voltage_v[quiet],
-        frame_name=tuple(name for name, keep in zip(frames.frame_name, good.tolist(), strict=True) if keep),
+        frame_name=tuple(
+            name for name, keep in zip(frames.frame_name, good.tolist(), strict=True) if keep
+        ),
         time_s=frames.time_s[good],
         allow_nonfinite=False,
     )
@@ -98,7 +108,8 @@ def as_frames(
     """The frames, named by their numbers on the board and timed by its clock.
 
     Raises:
-        FrameError: a voltage is not finite (unless ``allow_nonfinite``), or there are no quiet frames.
+        FrameError: a voltage is not finite (unless ``allow_nonfinite``), or there are no quiet
+            frames.
     """
     if not quiet:
         raise FrameError("there is no quiet frame, and images are made of what differs from them")
@@ -111,7 +122,11 @@ def as_frames(
         reference_voltage_v=np.array([raw.voltage_v for raw in quiet], dtype=np.float64),
         frame_name=tuple(str(raw.frame) for raw in frames),
         time_s=np.array([((raw.time_us - start) % 2**32) / 1e6 for raw in frames]),
-        meta={"made_by": f"eitskin {__version__}, board {info.board} {info.serial}", "board": info.as_dict(), **skin},
+        meta={
+            "made_by": f"eitskin {__version__}, board {info.board} {info.serial}",
+            "board": info.as_dict(),
+            **skin,
+        },
         allow_nonfinite=True,
     )
     return result if allow_nonfinite else replace(result, allow_nonfinite=False)

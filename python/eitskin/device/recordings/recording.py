@@ -1,5 +1,6 @@
-"""Recordings (.eits): the packets of a link as they were received, one after another, flushed each, so that a killed recorder
-loses at most the last. Reading one goes through the live decoder. docs/reference/link-protocol.md, "Recordings", specifies the file.
+"""Recordings (.eits): the packets of a link as they were received, one after another, flushed each,
+so that a killed recorder loses at most the last. Reading one goes through the live decoder.
+docs/reference/link-protocol.md, "Recordings", specifies the file.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ MOST_HEAD = 4096
 
 
 class Recorder:
-    """Writes every packet that ``device`` receives to the new file ``path`` until it is closed. ``packets`` and ``bytes`` count.
+    """Writes every packet that ``device`` receives to the new file ``path`` until it is closed.
+    ``packets`` and ``bytes`` count.
 
     Raises:
         FileError: the file exists already, or cannot be written.
@@ -65,7 +67,12 @@ class Recorder:
     def __enter__(self) -> Recorder:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
     def close(self) -> None:
@@ -82,9 +89,14 @@ class Recorder:
         try:
             written = self._file.write(data)
         except (OSError, ValueError) as error:
-            raise FileError(f"{self.path}: cannot go on recording ({error}); what was recorded can be read") from None
+            raise FileError(
+                f"{self.path}: cannot go on recording ({error}); what was recorded can be read"
+            ) from None
         if written != len(data):
-            raise FileError(f"{self.path}: cannot go on recording (the disk is full); what was recorded can be read")
+            raise FileError(
+                f"{self.path}: cannot go on recording (the disk is full); what was recorded can be"
+                " read"
+            )
         self.bytes += len(data)
 
 
@@ -149,24 +161,44 @@ def read_head(path: str | Path) -> dict[str, Any]:
     decoder = Decoder()
     packets, other = decoder.feed(data), decoder.other_version
     if not packets and other is not None:
-        advice = "upgrade eitskin" if other > LINK_VERSION else "read it with the eitskin that recorded it, or record again"
-        raise DeviceError(f"{path}: packets of link version {other}, and this eitskin reads version {LINK_VERSION}; {advice}")
+        advice = (
+            "upgrade eitskin"
+            if other > LINK_VERSION
+            else "read it with the eitskin that recorded it, or record again"
+        )
+        raise DeviceError(
+            f"{path}: packets of link version {other}, and this eitskin reads version"
+            f" {LINK_VERSION}; {advice}"
+        )
     if not packets or packets[0].type != PacketType.RECORDING:
-        raise FileError(f"{path}: no eitskin recording (.eits), or cut in its first bytes; make one with  eitskin record")
+        raise FileError(
+            f"{path}: no eitskin recording (.eits), or cut in its first bytes; make one with "
+            " eitskin record"
+        )
     try:
         head = parse_json(packets[0].payload)
     except ValueError:
         head = None
-    if not isinstance(head, dict) or head.get("format") != FORMAT or not isinstance(head.get("version"), int):
-        raise FileError(f"{path}: no eitskin recording (.eits): its first packet says something else")
+    if (
+        not isinstance(head, dict)
+        or head.get("format") != FORMAT
+        or not isinstance(head.get("version"), int)
+    ):
+        raise FileError(
+            f"{path}: no eitskin recording (.eits): its first packet says something else"
+        )
     if head["version"] > VERSION:
-        raise DeviceError(f"{path}: recording version {head['version']}, this eitskin reads up to {VERSION}; upgrade eitskin")
+        raise DeviceError(
+            f"{path}: recording version {head['version']}, this eitskin reads up to {VERSION};"
+            " upgrade eitskin"
+        )
     return head
 
 
 def frames_of(path: str | Path, model: Path | None = None) -> Frames:
-    """The raw frames of a recording as frames, the quiet ones of its last tare as their reference; rows that were masked or could
-    not be measured are NaN. ``model``: the board's, where its protocol is none of the usual.
+    """The raw frames of a recording as frames, the quiet ones of its last tare as their reference;
+    rows that were masked or could not be measured are NaN. ``model``: the board's, where its
+    protocol is none of the usual.
 
     Raises:
         FileError, DeviceError: it cannot be read, or the model is another.
@@ -185,7 +217,10 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
         protocol = scanned_protocol(device.board, known, name)
         run = gather(follow(device, Stream.RAW))
         if not run.frames:
-            raise FrameError(f"{name}: holds no raw frames; record with raw streaming (eitskin record does by default)")
+            raise FrameError(
+                f"{name}: holds no raw frames; record with raw streaming (eitskin record does by"
+                " default)"
+            )
         return as_frames(run.quiet, run.frames, protocol, device.board, known, allow_nonfinite=True)
 
 

@@ -1,4 +1,5 @@
-"""A run on disk (.eits): a recording that also says how the board was set to solve, so that the host can solve it again."""
+"""A run on disk (.eits): a recording that also says how the board was set to solve, so that the
+host can solve it again."""
 
 from __future__ import annotations
 
@@ -20,13 +21,16 @@ LOOKED_THROUGH = 64 * CHUNK  # the note is among the first packets
 
 
 class RunRecorder(Recorder):
-    """A ``Recorder`` whose file also holds the solver's ``options``, as a second packet of the recording's own type.
+    """A ``Recorder`` whose file also holds the solver's ``options``, as a second packet of the
+    recording's own type.
 
     Raises:
         FileError, DeviceError: as ``Recorder``.
     """
 
-    def __init__(self, path: str | Path, device: Device, options: Options | None, *, overwrite: bool = False) -> None:
+    def __init__(
+        self, path: str | Path, device: Device, options: Options | None, *, overwrite: bool = False
+    ) -> None:
         super().__init__(path, device, overwrite=overwrite)
         if options is not None:
             self._write(PacketType.RECORDING, 0, json.dumps({"solver": asdict(options)}).encode())
@@ -45,7 +49,9 @@ def recorded_options(path: str | Path) -> Options | None:
                 options = Options(**note["solver"])
                 check_options(options)
             except (TypeError, EitskinError) as error:
-                raise FileError(f"{path}: what it notes of the solver cannot be ({error}); record again") from None
+                raise FileError(
+                    f"{path}: what it notes of the solver cannot be ({error}); record again"
+                ) from None
             return options
     return None
 

@@ -1,4 +1,5 @@
-"""The model banks of a simulated board and uploads into them, by the rules of the firmware's upload.c."""
+"""The model banks of a simulated board and uploads into them, by the rules of the firmware's
+upload.c."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ class _Upload:
 
 
 class SimBanks:
-    """Two banks. ``in_use``: the one whose model is taken up, None without a model; ``active``: an upload stops the scan."""
+    """Two banks. ``in_use``: the one whose model is taken up, None without a model; ``active``: an
+    upload stops the scan."""
 
     def __init__(self, banks: list[bytes], electrodes: int) -> None:
         self.banks = [bytearray(bank) for bank in banks]
@@ -61,7 +63,8 @@ class SimBanks:
         return None, why
 
     def begin(self, command: ModelBegin) -> Answer:
-        """MODEL_BEGIN: the bank that is not in use is erased, or an upload of the same model goes on where it was."""
+        """MODEL_BEGIN: the bank that is not in use is erased, or an upload of the same model goes
+        on where it was."""
         if command.bytes < LEAST_MODEL:
             return Answer(Status.RANGE, (4, LEAST_MODEL))
         if command.bytes > self.room:
@@ -70,7 +73,11 @@ class SimBanks:
         now = self._upload
         if now is not None and (now.size, now.crc) == (command.bytes, command.crc):
             return Answer(Status.OK, (now.offset, 0))
-        spare = 1 - self.in_use if self.in_use is not None else int(read_record(bytes(self.banks[0])) is not None)
+        spare = (
+            1 - self.in_use
+            if self.in_use is not None
+            else int(read_record(bytes(self.banks[0])) is not None)
+        )
         self.banks[spare][:] = bytes([ERASED]) * len(self.banks[spare])
         self._upload = _Upload(spare, command.bytes, command.crc)
         return OK
@@ -93,7 +100,8 @@ class SimBanks:
         return OK
 
     def commit(self) -> Answer:
-        """MODEL_COMMIT: OK once the model is verified and its record written; then take it up by ``open_newest``."""
+        """MODEL_COMMIT: OK once the model is verified and its record written; then take it up by
+        ``open_newest``."""
         upload = self._upload
         if upload is None or upload.offset != upload.size:
             return Answer(Status.OFFSET, (-1 if upload is None else upload.offset, 0))
@@ -116,7 +124,10 @@ class SimBanks:
         protocol = solver.model.protocol
         if protocol.n_electrodes > self.electrodes:
             return Answer(Status.MODEL_SCAN, (protocol.n_electrodes, self.electrodes))
-        longest = max(RAW_STRUCT.size + 5 * protocol.n_rows, SOLVED_STRUCT.size + 4 * solver.model.grid.n_pixels)
+        longest = max(
+            RAW_STRUCT.size + 5 * protocol.n_rows,
+            SOLVED_STRUCT.size + 4 * solver.model.grid.n_pixels,
+        )
         if longest > MAX_PAYLOAD:
             return Answer(Status.MODEL_SIZE, (MAX_PAYLOAD, longest))
         return golden(solver)

@@ -1,8 +1,10 @@
-"""A simulated board: the firmware's commands, checks and replies over the host core and a scene's frames.
+"""A simulated board: the firmware's commands, checks and replies over the host core and a scene's
+frames.
 
-What the firmware does with registers is left out: there is no converter (no saturated rows, and open electrodes only once there
-is a reference, by the core) and no processor time; every time that would tell of one is 0. The clock runs only while the board
-scans for someone. All else is as docs/reference/link-protocol.md says, and the packets are the very bytes.
+What the firmware does with registers is left out: there is no converter (no saturated rows, and
+open electrodes only once there is a reference, by the core) and no processor time; every time that
+would tell of one is 0. The clock runs only while the board scans for someone. All else is as
+docs/reference/link-protocol.md says, and the packets are the very bytes.
 """
 
 from __future__ import annotations
@@ -17,7 +19,15 @@ import numpy.typing as npt
 from eitskin import __version__
 from eitskin.core.results import Info
 from eitskin.device.simulated.banks import E_MODEL_MAGIC, SimBanks, golden
-from eitskin.device.simulated.checks import OK, Answer, check_scan, check_size, check_solver, outside, slot_us
+from eitskin.device.simulated.checks import (
+    OK,
+    Answer,
+    check_scan,
+    check_size,
+    check_solver,
+    outside,
+    slot_us,
+)
 from eitskin.device.simulated.faults import SimFaults
 from eitskin.device.simulated.scan import rows_us, scan_frame
 from eitskin.device.simulated.skin import SceneSkin
@@ -54,8 +64,8 @@ class _Tare:
 
 
 class SimBoard:
-    """One board before ``skin``, with two ``banks``. ``receive`` takes the host's bytes, ``take_output`` gives the board's, and
-    ``scan_one`` lets it scan a frame if anyone wants one."""
+    """One board before ``skin``, with two ``banks``. ``receive`` takes the host's bytes,
+    ``take_output`` gives the board's, and ``scan_one`` lets it scan a frame if anyone wants one."""
 
     def __init__(self, skin: SceneSkin, banks: list[bytes]) -> None:
         self.skin, self.banks = skin, SimBanks(banks, skin.electrodes)
@@ -94,7 +104,15 @@ class SimBoard:
         return why
 
     def _tell_no_model(self, why: int) -> None:
-        self._faults.set(Fault(FaultCode.NO_MODEL, self._solver is None, self._frame, 0, why if self._solver is None else 0))
+        self._faults.set(
+            Fault(
+                FaultCode.NO_MODEL,
+                self._solver is None,
+                self._frame,
+                0,
+                why if self._solver is None else 0,
+            )
+        )
 
     # ---- bytes ----
 
@@ -124,7 +142,11 @@ class SimBoard:
     @property
     def wanted(self) -> bool:
         """Whether anyone waits for a frame."""
-        return self._solver is not None and not self.banks.active and (self._tare is not None or bool(self._what))
+        return (
+            self._solver is not None
+            and not self.banks.active
+            and (self._tare is not None or bool(self._what))
+        )
 
     def scan_one(self) -> bool:
         """Scan one frame and send what is asked of it; False where nobody wants one.
@@ -169,7 +191,8 @@ class SimBoard:
                 self._what = Stream(0)
 
     def _examine(self, raw: RawFrame) -> None:
-        """Faults are told whether anything is streamed or not; without a reference nothing is found, and none is stale."""
+        """Faults are told whether anything is streamed or not; without a reference nothing is
+        found, and none is stale."""
         assert self._solver is not None
         tared = self._solver.tared
         self._tell_found(raw, self._solver.examine(raw) if tared else NOTHING, solved=not tared)
@@ -182,7 +205,9 @@ class SimBoard:
         assert self._solver is not None
         tare.frames.append(raw.voltage_v)
         if self._what & Stream.RAW:
-            self._send(PacketType.RAW, build_raw(replace(raw, flags=raw.flags | int(RawFlags.QUIET))))
+            self._send(
+                PacketType.RAW, build_raw(replace(raw, flags=raw.flags | int(RawFlags.QUIET)))
+            )
         if len(tare.frames) < tare.wanted:
             return
         status = self._solver.tare(tare.frames)
@@ -227,9 +252,22 @@ class SimBoard:
         refused = check_size(kind, packet.payload)
         if refused is not None:
             return refused
-        if self._tare is not None and kind not in (cmd.GetInfo, cmd.GetStats, cmd.StreamCommand, cmd.Reset, cmd.ClearFaults):
+        if self._tare is not None and kind not in (
+            cmd.GetInfo,
+            cmd.GetStats,
+            cmd.StreamCommand,
+            cmd.Reset,
+            cmd.ClearFaults,
+        ):
             return Answer(Status.BUSY, (PacketType.TARE, 0))
-        if self.banks.active and kind in (cmd.StreamCommand, cmd.Tare, cmd.Scan, cmd.Solver, cmd.MaskRow, cmd.SelfTest):
+        if self.banks.active and kind in (
+            cmd.StreamCommand,
+            cmd.Tare,
+            cmd.Scan,
+            cmd.Solver,
+            cmd.MaskRow,
+            cmd.SelfTest,
+        ):
             return Answer(Status.BUSY, (PacketType.MODEL_BEGIN, 0))
         parsed = cmd.parse_command(kind, packet.payload)
         assert parsed is not None
@@ -273,11 +311,18 @@ class SimBoard:
             return Answer(Status.NO_MODEL)
         if command.what & ~Stream.RAW and self._solver is not None and not self._solver.tared:
             return Answer(Status.NOT_TARED)
-        self._what, self._every, self._left, self._phase = Stream(command.what), command.every, command.frames, 0
+        self._what, self._every, self._left, self._phase = (
+            Stream(command.what),
+            command.every,
+            command.frames,
+            0,
+        )
         return OK
 
     def _on_tare(self, request: int, command: cmd.Tare) -> Answer | None:
-        bad = outside(4, command.frames, 1, 1024) or (outside(4, command.frames, 4, 1024) if command.frames > 1 else None)
+        bad = outside(4, command.frames, 1, 1024) or (
+            outside(4, command.frames, 4, 1024) if command.frames > 1 else None
+        )
         if bad is not None:
             return bad
         if self._solver is None:
@@ -312,7 +357,9 @@ class SimBoard:
     def _on_mask_row(self, request: int, command: cmd.MaskRow) -> Answer:
         if self._solver is None:
             return Answer(Status.NO_MODEL)
-        bad = outside(4, command.row, 0, self._solver.model.protocol.n_rows - 1) or outside(6, command.bad, 0, 1)
+        bad = outside(4, command.row, 0, self._solver.model.protocol.n_rows - 1) or outside(
+            6, command.bad, 0, 1
+        )
         if bad is not None:
             return bad
         self._solver.mask(command.row, bool(command.bad))

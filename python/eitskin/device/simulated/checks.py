@@ -1,4 +1,5 @@
-"""What the firmware refuses of a command by itself, and how it times a scan; docs/reference/link-protocol.md lists the limits."""
+"""What the firmware refuses of a command by itself, and how it times a scan;
+docs/reference/link-protocol.md lists the limits."""
 
 from __future__ import annotations
 
@@ -41,8 +42,8 @@ def check_size(kind: type[Command], payload: bytes) -> Answer | None:
 
 
 def slot_us(scan: Scan) -> int:
-    """From one measurement to the next: burst, settling, switching; made a whole number of excitation periods where that costs at
-    most a quarter more."""
+    """From one measurement to the next: burst, settling, switching; made a whole number of
+    excitation periods where that costs at most a quarter more."""
     burst = -(-scan.samples * 1_000_000 // scan.sample_rate_hz)
     least = burst + scan.settle_us + SWITCH_US
     for us in range(least, least + least // 4 + 1):
@@ -52,7 +53,8 @@ def slot_us(scan: Scan) -> int:
 
 
 def check_scan(scan: Scan, rows: int) -> Answer | None:
-    """What is wrong with scan settings, for ``rows`` measurements in the longest frame (0: no model)."""
+    """What is wrong with scan settings, for ``rows`` measurements in the longest frame (0: no
+    model)."""
     bad = (
         outside(4, scan.excitation_millihz, 1000, 250_000_000)
         or outside(8, scan.sample_rate_hz, 1000, 5_000_000)
@@ -90,5 +92,7 @@ def check_solver(command: Solver) -> Answer | None:
     for offset, value in ((20, command.lambda_rel), (24, command.gap_rel)):
         if not 0 <= value <= 1:
             return Answer(Status.RANGE, (offset, 1 if value > 1 else 0))
-    found = outside(28, command.solver, 0, len(SOLVERS) - 1) or outside(36, command.findings, 0, ALL_FINDINGS)
+    found = outside(28, command.solver, 0, len(SOLVERS) - 1) or outside(
+        36, command.findings, 0, ALL_FINDINGS
+    )
     return found or outside(40, command.track, 0, 1)

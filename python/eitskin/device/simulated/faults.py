@@ -1,4 +1,5 @@
-"""Faults of a simulated board, told as the firmware tells them: what frames show rises, and goes after frames without it."""
+"""Faults of a simulated board, told as the firmware tells them: what frames show rises, and goes
+after frames without it."""
 
 from __future__ import annotations
 
@@ -61,7 +62,9 @@ class SimFaults:
                 self._run.pop(key, None)
                 continue
             self._run[key] = self._run.get(key, 0) + 1
-            if self._run[key] >= (CLEAN_FRAMES if there else SHOWN_FRAMES if code in DOUBTFUL_FAULTS else 1):
+            if self._run[key] >= (
+                CLEAN_FRAMES if there else SHOWN_FRAMES if code in DOUBTFUL_FAULTS else 1
+            ):
                 self.set(now.get(key, Fault(code, False, frame, index, 0)))
 
 
@@ -75,7 +78,9 @@ def _faults(frame: int, info: Info) -> list[Fault]:
     bits = sum(1 << e for e in bridged)
     for e in bridged:
         other = next(f for f in bridged if f != e) if len(bridged) == 2 else -1
-        found.append(Fault(FaultCode.BRIDGED, True, frame, e, other, (bits % 2**32, bits >> 32, 0, 0, 0)))
+        found.append(
+            Fault(FaultCode.BRIDGED, True, frame, e, other, (bits % 2**32, bits >> 32, 0, 0, 0))
+        )
     found += [Fault(FaultCode.ELECTRODE_NOISY, True, frame, e, 0) for e in info.noisy_electrodes]
     if info.findings >> FINDINGS.index("misfit") & 1:
         found.append(Fault(FaultCode.MISFIT, True, frame, 0, int(1000 * info.misfit + 0.5)))

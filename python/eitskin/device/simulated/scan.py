@@ -17,7 +17,9 @@ def rows_us(solver: SimSolver, scan: Scan, *, full: bool) -> int:
     return rows * slot_us(scan)
 
 
-def scan_frame(skin: SceneSkin, solver: SimSolver, scan: Scan, frame: int, time_us: int) -> tuple[RawFrame, int]:
+def scan_frame(
+    skin: SceneSkin, solver: SimSolver, scan: Scan, frame: int, time_us: int
+) -> tuple[RawFrame, int]:
     """Frame number ``frame``, whose scan begins at ``time_us``, and how long until the next one's.
 
     Raises:
@@ -26,7 +28,10 @@ def scan_frame(skin: SceneSkin, solver: SimSolver, scan: Scan, frame: int, time_
     every, model = scan.check_every, solver.model
     full = every != 0 and frame % every == 0
     flags = RawFlags(0) if every == 1 else RawFlags.CHECK if full else RawFlags.RECIPROCAL
-    volts, quality = skin.frame(model.protocol, time_us), np.zeros(model.protocol.n_rows, dtype=np.uint8)
+    volts, quality = (
+        skin.frame(model.protocol, time_us),
+        np.zeros(model.protocol.n_rows, dtype=np.uint8),
+    )
     if every != 1:
         pairs = model.fold.second >= 0
         first, second = model.fold.first[pairs], model.fold.second[pairs]
@@ -36,5 +41,7 @@ def scan_frame(skin: SceneSkin, solver: SimSolver, scan: Scan, frame: int, time_
     volts[solver.masked] = np.nan
     burst_us = -(-scan.samples * 1_000_000 // scan.sample_rate_hz)
     spent_us = rows_us(solver, scan, full=full)
-    raw = RawFrame(frame, time_us % 2**32, spent_us - slot_us(scan) + burst_us, int(flags), volts, quality)
+    raw = RawFrame(
+        frame, time_us % 2**32, spent_us - slot_us(scan) + burst_us, int(flags), volts, quality
+    )
     return raw, max(scan.frame_period_us, spent_us)

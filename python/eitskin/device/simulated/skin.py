@@ -1,4 +1,5 @@
-"""A scene as what lies before a simulated board: frames of the untouched skin until it begins, then the scene's own."""
+"""A scene as what lies before a simulated board: frames of the untouched skin until it begins, then
+the scene's own."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from eitskin.skin.protocol import Protocol, table
 
 
 class SceneSkin:
-    """The frames of ``scene``, simulated when first asked for, for whatever protocol the board scans. Times: the board's, us."""
+    """The frames of ``scene``, simulated when first asked for, for whatever protocol the board
+    scans. Times: the board's, us."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -41,7 +43,8 @@ class SceneSkin:
         self._began_us = time_us
 
     def begin_quiet(self) -> None:
-        """Show the quiet frames from their first on: a tare of as many takes the reference that the scene's own frames have."""
+        """Show the quiet frames from their first on: a tare of as many takes the reference that the
+        scene's own frames have."""
         self._quiet_shown = 0
 
     def ended(self, time_us: int) -> bool:
@@ -49,7 +52,8 @@ class SceneSkin:
         return self._began_us is not None and self._number(time_us) >= self.scene.frames
 
     def frame(self, protocol: Protocol, time_us: int) -> npt.NDArray[np.float32]:
-        """The voltages (m,) of the frame nearest to ``time_us``; untouched, the quiet frames over and over.
+        """The voltages (m,) of the frame nearest to ``time_us``; untouched, the quiet frames over
+        and over.
 
         Raises:
             EitskinError: the scene cannot be simulated.
@@ -76,5 +80,7 @@ class SceneSkin:
             if not own:  # electrodes that the protocol does not name stay unused
                 rows = protocol.drive_measure.tolist()
                 scene = replace(scene, protocol=table(self.electrodes, rows, protocol.current_a))
-            self._frames[protocol.hash] = simulate_frames(compile_scene(scene)).voltage_v.astype(np.float32)
+            self._frames[protocol.hash] = simulate_frames(compile_scene(scene)).voltage_v.astype(
+                np.float32
+            )
         return self._frames[protocol.hash]

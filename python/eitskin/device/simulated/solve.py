@@ -1,4 +1,5 @@
-"""The solver of a simulated board: the host's core with the firmware's options, results as packets."""
+"""The solver of a simulated board: the host's core with the firmware's options, results as
+packets."""
 
 from __future__ import annotations
 
@@ -41,14 +42,28 @@ def core_status(error: EitskinError) -> int:
 def model_facts(solver: SimSolver | None, bank: int) -> dict[str, Any]:
     """What ``BoardInfo`` says of the model, zeros where there is none."""
     names = (
-        "model_bytes", "model_crc", "protocol_hash", "n_electrodes", "n_rows", "n_folded", "rank", "n_pixels", "nx", "ny",
+        "model_bytes", "model_crc", "protocol_hash", "n_electrodes", "n_rows", "n_folded", "rank",
+        "n_pixels", "nx", "ny",
         "storage", "bank",
     )  # fmt: skip
     if solver is None:
         return dict.fromkeys(names, 0)
-    blob, model, protocol, grid = solver.blob, solver.model, solver.model.protocol, solver.model.grid
+    blob, model, protocol, grid = (
+        solver.blob,
+        solver.model,
+        solver.model.protocol,
+        solver.model.grid,
+    )
     head = len(blob), zlib.crc32(blob), protocol.hash, protocol.n_electrodes, protocol.n_rows
-    rest = len(model.fold.first), model.rank, grid.n_pixels, grid.nx, grid.ny, STORAGES.index(model.stored.storage), bank
+    rest = (
+        len(model.fold.first),
+        model.rank,
+        grid.n_pixels,
+        grid.nx,
+        grid.ny,
+        STORAGES.index(model.stored.storage),
+        bank,
+    )
     return dict(zip(names, (*head, *rest), strict=True))
 
 
@@ -120,8 +135,11 @@ class SimSolver:
         self.engine.follow(raw.voltage_v[None])
         return self.engine.last_info()
 
-    def solve(self, raw: RawFrame, what: Stream) -> tuple[int, Info, list[tuple[PacketType, bytes]]]:
-        """An eits_status, what the core says of a frame, and its IMAGE and TOUCHES, as asked for; times are 0."""
+    def solve(
+        self, raw: RawFrame, what: Stream
+    ) -> tuple[int, Info, list[tuple[PacketType, bytes]]]:
+        """An eits_status, what the core says of a frame, and its IMAGE and TOUCHES, as asked for;
+        times are 0."""
         status, info = 0, NOTHING
         image = np.zeros(self.model.grid.n_pixels, dtype=np.float32)
         touches = ()
@@ -131,12 +149,17 @@ class SimSolver:
         except FrameError as error:
             status, info = core_status(error), self.engine.last_info()
         solved = Solved(
-            frame=raw.frame, time_us=raw.time_us, solve_us=0, touch_us=0, age_us=0, count=len(image), status=status,
+            frame=raw.frame, time_us=raw.time_us, solve_us=0, touch_us=0, age_us=0,
+            count=len(image), status=status,
             stop=info.stop, masked=info.masked, iterations=info.iterations, nonzeros=info.nonzeros,
-            macs=min(info.macs, 2**32 - 1), touch_macs=min(info.touch_macs, 2**32 - 1), lambda_=info.lambda_,
-            lambda_max=info.lambda_max, lambda_noise=info.lambda_noise, gap_rel=info.gap_rel, residual=info.residual,
-            data_norm=info.data_norm, findings=info.findings, saturated=info.saturated, glitches=info.glitches,
-            misfit=info.misfit, open_electrodes=info.open_electrodes, bridged_electrodes=info.bridged_electrodes,
+            macs=min(info.macs, 2**32 - 1), touch_macs=min(info.touch_macs, 2**32 - 1),
+            lambda_=info.lambda_,
+            lambda_max=info.lambda_max, lambda_noise=info.lambda_noise, gap_rel=info.gap_rel,
+            residual=info.residual,
+            data_norm=info.data_norm, findings=info.findings, saturated=info.saturated,
+            glitches=info.glitches,
+            misfit=info.misfit, open_electrodes=info.open_electrodes,
+            bridged_electrodes=info.bridged_electrodes,
             noisy_electrodes=info.noisy_electrodes,
         )  # fmt: skip
         packets = []

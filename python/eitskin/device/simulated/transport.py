@@ -1,4 +1,5 @@
-"""``sim:SCENE``: a simulated board that speaks the very bytes of the link, over the host core. Deterministic; no thread."""
+"""``sim:SCENE``: a simulated board that speaks the very bytes of the link, over the host core.
+Deterministic; no thread."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ from eitskin.device.simulated.skin import SceneSkin
 
 
 class SimTransport:
-    """The bytes of a ``SimBoard``. It scans a frame each time that it is read and has nothing else to say."""
+    """The bytes of a ``SimBoard``. It scans a frame each time that it is read and has nothing else
+    to say."""
 
     synchronous = True
     replays = False
@@ -43,7 +45,8 @@ class SimTransport:
 
 
 def open_simulated(scene: str, *, model: bytes | None = None) -> SimTransport:
-    """A simulated board before ``scene`` (a file or a library scene), with ``model`` in its first bank (or the prebuilt one).
+    """A simulated board before ``scene`` (a file or a library scene), with ``model`` in its first
+    bank (or the prebuilt one).
 
     Raises:
         FileError, ConfigError, GeometryError, ProtocolError: the scene cannot be read.

@@ -1,4 +1,5 @@
-"""The C codec through cffi: packets to bytes and bytes to packets, with every byte that is no packet counted."""
+"""The C codec through cffi: packets to bytes and bytes to packets, with every byte that is no
+packet counted."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from eitskin.errors import DeviceError
 
 @dataclass(frozen=True)
 class Packet:
-    """A packet whose checksum is right. ``lost``: packets that are missing just before it, by their numbers."""
+    """A packet whose checksum is right. ``lost``: packets that are missing just before it, by their
+    numbers."""
 
     type: int
     sequence: int
@@ -28,9 +30,10 @@ class Packet:
 class LinkCounters:
     """What came over a link, counted since it was opened.
 
-    ``skipped_bytes`` came before the first delimiter, ``malformed`` had a right checksum but a payload that is not of its type,
-    ``missing`` packets lie in ``gaps`` gaps (as far as numbers tell), ``duplicates`` and ``stale`` (late) packets were refused,
-    ``dropped`` were left out by the host's own queue because nobody fetched them.
+    ``skipped_bytes`` came before the first delimiter, ``malformed`` had a right checksum but a
+    payload that is not of its type, ``missing`` packets lie in ``gaps`` gaps (as far as numbers
+    tell), ``duplicates`` and ``stale`` (late) packets were refused, ``dropped`` were left out by
+    the host's own queue because nobody fetched them.
     """
 
     bytes: int = 0
@@ -68,7 +71,14 @@ def encode(packet_type: int, sequence: int, payload: bytes) -> bytes:
     module = _core()
     buffer = module.ffi.new("uint8_t[]", len(payload) + len(payload) // 254 + 32)
     size = module.lib.eits_link_encode(
-        buffer, len(buffer), packet_type, sequence % 2**32, payload, len(payload), module.ffi.NULL, 0
+        buffer,
+        len(buffer),
+        packet_type,
+        sequence % 2**32,
+        payload,
+        len(payload),
+        module.ffi.NULL,
+        0,
     )
     if not size:
         raise DeviceError(f"a packet cannot carry {len(payload)} bytes; the most is {MAX_PAYLOAD}")
@@ -76,10 +86,12 @@ def encode(packet_type: int, sequence: int, payload: bytes) -> bytes:
 
 
 class Decoder:
-    """Bytes of one direction of a link to packets, in order and each at most once. ``counters`` is counted into.
+    """Bytes of one direction of a link to packets, in order and each at most once. ``counters`` is
+    counted into.
 
-    What comes before the first delimiter is the rest of a packet that was cut by opening the port, and no error. With
-    ``numbered`` false sequence numbers are not looked at, as boards do with commands.
+    What comes before the first delimiter is the rest of a packet that was cut by opening the port,
+    and no error. With ``numbered`` false sequence numbers are not looked at, as boards do with
+    commands.
     """
 
     def __init__(self, counters: LinkCounters | None = None, *, numbered: bool = True) -> None:
@@ -88,7 +100,9 @@ class Decoder:
         room = int(self._lib.EITS_LINK_MAX_PACKET)
         self._buffer = self._ffi.new("uint64_t[]", (room + 7) // 8)
         self._state = self._ffi.new("eits_link_decoder *")
-        status = self._lib.eits_link_decoder_init(self._state, self._ffi.cast("uint8_t *", self._buffer), room)
+        status = self._lib.eits_link_decoder_init(
+            self._state, self._ffi.cast("uint8_t *", self._buffer), room
+        )
         assert status == 0
         self._packet = self._ffi.new("eits_link_packet *")
         self.counters = LinkCounters() if counters is None else counters
@@ -104,19 +118,24 @@ class Decoder:
         return int(self._state.other_version) if self._state.version_errors else None
 
     def link_lost(self) -> None:
-        """The line was cut: what is half received is no error, and any packet may come next; it will count as one gap."""
-        status = self._lib.eits_link_decoder_init(self._state, self._ffi.cast("uint8_t *", self._buffer), self._state.room)
+        """The line was cut: what is half received is no error, and any packet may come next; it
+        will count as one gap."""
+        status = self._lib.eits_link_decoder_init(
+            self._state, self._ffi.cast("uint8_t *", self._buffer), self._state.room
+        )
         assert status == 0
         self._before = self._counted()
         self._skipping = True
         self._sequence.link_lost()
 
     def forget_sequence(self) -> None:
-        """The next packet is taken whatever its number; used where everything has been refused for too long."""
+        """The next packet is taken whatever its number; used where everything has been refused for
+        too long."""
         self._sequence.link_lost()
 
     def feed(self, data: bytes) -> list[Packet]:
-        """The packets that ``data`` completes. Those that are no news (duplicates, late ones) are counted and left out."""
+        """The packets that ``data`` completes. Those that are no news (duplicates, late ones) are
+        counted and left out."""
         self.counters.bytes += len(data)
         start = 0
         if self._skipping:
@@ -137,11 +156,15 @@ class Decoder:
         return found
 
     def _take(self, packet: Packet) -> list[Packet]:
-        if packet.type == PacketType.RECORDING or not self._numbered:  # the head of a recording is outside of the numbering
+        if (
+            packet.type == PacketType.RECORDING or not self._numbered
+        ):  # the head of a recording is outside of the numbering
             self.counters.packets += 1
             return [packet]
         restart = packet.type == PacketType.INFO and packet.payload[:4] == b"\0\0\0\0"
-        lost = self._sequence.judge(packet.sequence, zlib.crc32(packet.payload, packet.type), restart=restart)
+        lost = self._sequence.judge(
+            packet.sequence, zlib.crc32(packet.payload, packet.type), restart=restart
+        )
         if lost is None:
             if self._sequence.was_late:
                 self._late.append(packet)

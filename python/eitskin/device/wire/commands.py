@@ -1,4 +1,5 @@
-"""What travels to a board: each command's payload as a frozen dataclass, whose first word on the wire is the request number."""
+"""What travels to a board: each command's payload as a frozen dataclass, whose first word on the
+wire is the request number."""
 
 from __future__ import annotations
 
@@ -52,7 +53,8 @@ class ClearFaults(Command):
 
 @dataclass(frozen=True)
 class StreamCommand(Command):
-    """``what``: bits of ``packets.Stream``, 0 stops; ``every`` n-th frame; ``frames`` streamed frames, 0: until told."""
+    """``what``: bits of ``packets.Stream``, 0 stops; ``every`` n-th frame; ``frames`` streamed
+    frames, 0: until told."""
 
     TYPE = PacketType.STREAM
     LAYOUT = struct.Struct("<IHHI")
@@ -72,8 +74,9 @@ class Tare(Command):
 
 @dataclass(frozen=True)
 class Scan(Command):
-    """How frames are scanned; forgets the tare. ``check_every``: 1, every frame is full; n > 1, reciprocal-unique with every n-th
-    full; 0, never full. ``frame_period_us`` 0: as fast as the scan goes."""
+    """How frames are scanned; forgets the tare. ``check_every``: 1, every frame is full; n > 1,
+    reciprocal-unique with every n-th full; 0, never full. ``frame_period_us`` 0: as fast as the
+    scan goes."""
 
     TYPE = PacketType.SCAN
     LAYOUT = struct.Struct("<IIIHHHHI")
@@ -88,8 +91,9 @@ class Scan(Command):
 
 @dataclass(frozen=True)
 class Solver(Command):
-    """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and ``SOLVERS``, ``findings``
-    what is looked for, bit k of ``FINDINGS``; ``track`` 1: touches are followed in time."""
+    """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and
+    ``SOLVERS``, ``findings`` what is looked for, bit k of ``FINDINGS``; ``track`` 1: touches are
+    followed in time."""
 
     TYPE = PacketType.SOLVER
     LAYOUT = struct.Struct("<IIIIIffIIII")
@@ -107,7 +111,8 @@ class Solver(Command):
 
 @dataclass(frozen=True)
 class ModelBegin(Command):
-    """Announces a model of ``bytes`` bytes with CRC-32 ``crc``; stops the scan and erases the bank that is not in use."""
+    """Announces a model of ``bytes`` bytes with CRC-32 ``crc``; stops the scan and erases the bank
+    that is not in use."""
 
     TYPE = PacketType.MODEL_BEGIN
     LAYOUT = struct.Struct("<III")
@@ -150,7 +155,8 @@ class MaskRow(Command):
 COMMANDS: dict[int, type[Command]] = {
     kind.TYPE: kind
     for kind in (
-        GetInfo, StreamCommand, Tare, Scan, Solver, ModelBegin, ModelData, ModelCommit, GetStats, MaskRow, Reset, SelfTest,
+        GetInfo, StreamCommand, Tare, Scan, Solver, ModelBegin, ModelData, ModelCommit, GetStats,
+        MaskRow, Reset, SelfTest,
         ClearFaults,
     )
 }  # fmt: skip
@@ -159,7 +165,8 @@ AnyCommand = TypeVar("AnyCommand", bound=Command)
 
 
 def parse_command(kind: type[AnyCommand], payload: bytes) -> tuple[int, AnyCommand] | None:
-    """Request number and command, as a board reads them; None where the payload's length is not the command's."""
+    """Request number and command, as a board reads them; None where the payload's length is not the
+    command's."""
     size = kind.LAYOUT.size
     if kind is ModelData:
         if len(payload) < size:

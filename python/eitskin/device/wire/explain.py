@@ -1,4 +1,5 @@
-"""A board's numbers in words: replies, faults, statuses; each says what to do where something can be done."""
+"""A board's numbers in words: replies, faults, statuses; each says what to do where something can
+be done."""
 
 from __future__ import annotations
 
@@ -6,7 +7,15 @@ from dataclasses import fields
 
 from eitskin.core.engine import load_core
 from eitskin.device.wire.commands import COMMANDS
-from eitskin.device.wire.packets import FOUND_FAULTS, Fault, FaultCode, PacketType, Quality, Reply, ReplyStatus
+from eitskin.device.wire.packets import (
+    FOUND_FAULTS,
+    Fault,
+    FaultCode,
+    PacketType,
+    Quality,
+    Reply,
+    ReplyStatus,
+)
 
 UPLOAD = "upload one with  eitskin model upload MODEL.eitm"
 
@@ -18,7 +27,7 @@ def status_text(status: int) -> str:
 
 
 def command_name(command: int) -> str:
-    """"TARE"."""
+    """ "TARE"."""
     return PacketType(command).name if command in list(PacketType) else f"command 0x{command:02x}"
 
 
@@ -41,25 +50,53 @@ def reply_text(reply: Reply) -> str:
     name, (first, second) = command_name(reply.command), reply.detail
     texts = {
         ReplyStatus.OK: "done",
-        ReplyStatus.UNKNOWN_COMMAND: "the firmware does not know this command; flash one of this version (eitskin flash)",
-        ReplyStatus.LENGTH: f"the firmware expects {first} bytes; flash one of this version (eitskin flash)",
-        ReplyStatus.RANGE: f"{field_at(reply.command, first)} is out of range, its limit is {second}",
+        ReplyStatus.UNKNOWN_COMMAND: (
+            "the firmware does not know this command; flash one of this version (eitskin flash)"
+        ),
+        ReplyStatus.LENGTH: (
+            f"the firmware expects {first} bytes; flash one of this version (eitskin flash)"
+        ),
+        ReplyStatus.RANGE: (
+            f"{field_at(reply.command, first)} is out of range, its limit is {second}"
+        ),
         ReplyStatus.NO_MODEL: f"the board has no model; {UPLOAD}",
-        ReplyStatus.NOT_TARED: "the board has no reference frame; leave the skin untouched and run  eitskin tare",
+        ReplyStatus.NOT_TARED: (
+            "the board has no reference frame; leave the skin untouched and run  eitskin tare"
+        ),
         ReplyStatus.BUSY: f"the board is busy with {command_name(first)}; wait for it",
-        ReplyStatus.MODEL_SIZE: f"the board takes models of {first} bytes at most; build it with fewer pixels or a lower rank",
-        ReplyStatus.MODEL_INVALID: f"the board refuses the model: {status_text(first)}; the old one stays",
-        ReplyStatus.MODEL_SCAN: f"the model's protocol needs {first} electrodes and the board has {second}; the old model stays",
-        ReplyStatus.MODEL_CRC: "what arrived is not the model that was announced; the old one stays, upload again",
+        ReplyStatus.MODEL_SIZE: (
+            f"the board takes models of {first} bytes at most; build it with fewer pixels or a"
+            " lower rank"
+        ),
+        ReplyStatus.MODEL_INVALID: (
+            f"the board refuses the model: {status_text(first)}; the old one stays"
+        ),
+        ReplyStatus.MODEL_SCAN: (
+            f"the model's protocol needs {first} electrodes and the board has {second}; the old"
+            " model stays"
+        ),
+        ReplyStatus.MODEL_CRC: (
+            "what arrived is not the model that was announced; the old one stays, upload again"
+        ),
         ReplyStatus.OFFSET: f"the board expects the model's bytes from {first} on; upload again",
-        ReplyStatus.FLASH: f"erasing or programming the flash failed at byte {first}; the old model stays, try again",
+        ReplyStatus.FLASH: (
+            f"erasing or programming the flash failed at byte {first}; the old model stays, try"
+            " again"
+        ),
         ReplyStatus.CORE: f"the core refuses: {status_text(first)}",
-        ReplyStatus.PERIODS: f"the samples are no whole number of excitation periods; the nearest that are: {first}",
+        ReplyStatus.PERIODS: (
+            f"the samples are no whole number of excitation periods; the nearest that are: {first}"
+        ),
         ReplyStatus.TOO_FAST: f"this scan needs a frame period of at least {first} us",
-        ReplyStatus.SELF_TEST: f"the golden frame's image differs from the model's by {first} parts in 1e9 of its peak",
+        ReplyStatus.SELF_TEST: (
+            f"the golden frame's image differs from the model's by {first} parts in 1e9 of its peak"
+        ),
     }
     known = reply.status in list(ReplyStatus)
-    return f"{name}: {texts[ReplyStatus(reply.status)] if known else f'refused with the unknown status {reply.status}'}"
+    return (
+        f"{name}:"
+        f" {texts[ReplyStatus(reply.status)] if known else f'refused with the unknown status {reply.status}'}"
+    )
 
 
 def fault_text(fault: Fault) -> str:
@@ -70,7 +107,11 @@ def fault_text(fault: Fault) -> str:
         name, text = FaultCode(fault.code).name.lower().replace("_", " "), _text(fault)
     else:
         name, text = f"fault {fault.code}", f"value {fault.value}"
-    return f"{name}, frame {fault.frame}: {text}" if fault.raised else f"{name}: over, frame {fault.frame}"
+    return (
+        f"{name}, frame {fault.frame}: {text}"
+        if fault.raised
+        else f"{name}: over, frame {fault.frame}"
+    )
 
 
 def found_name(fault: Fault) -> str:
@@ -78,10 +119,20 @@ def found_name(fault: Fault) -> str:
     pair = fault.raised and fault.value >= 0
     names = {
         FaultCode.ELECTRODE_OPEN: f"electrode {fault.index} open",
-        FaultCode.SATURATED: f"{fault.value} rows saturated from row {fault.index} on" if fault.raised else "rows saturated",
-        FaultCode.BRIDGED: f"electrodes {fault.index} and {fault.value} bridged" if pair else f"electrode {fault.index} bridged",
+        FaultCode.SATURATED: (
+            f"{fault.value} rows saturated from row {fault.index} on"
+            if fault.raised
+            else "rows saturated"
+        ),
+        FaultCode.BRIDGED: (
+            f"electrodes {fault.index} and {fault.value} bridged"
+            if pair
+            else f"electrode {fault.index} bridged"
+        ),
         FaultCode.ELECTRODE_NOISY: f"electrode {fault.index} noisy",
-        FaultCode.MISFIT: f"misfit {fault.value / 10:.1f} %" if fault.raised and fault.value else "misfit",
+        FaultCode.MISFIT: (
+            f"misfit {fault.value / 10:.1f} %" if fault.raised and fault.value else "misfit"
+        ),
         FaultCode.STALE_REFERENCE: "stale reference",
     }
     return names[FaultCode(fault.code)]
@@ -92,8 +143,12 @@ _FOUND = {
     FaultCode.SATURATED: "beyond the converter's range; lower the gain or the current",
     FaultCode.BRIDGED: "water, paste or a wire joins them; dry or part them",
     FaultCode.ELECTRODE_NOISY: "a loose contact or wire; press it, or see to its wire",
-    FaultCode.MISFIT: "no such sheet gives such voltages; check order, signs and wiring (eitskin doctor)",
-    FaultCode.STALE_REFERENCE: "the skin has changed since it was taken; leave it untouched and run  eitskin tare",
+    FaultCode.MISFIT: (
+        "no such sheet gives such voltages; check order, signs and wiring (eitskin doctor)"
+    ),
+    FaultCode.STALE_REFERENCE: (
+        "the skin has changed since it was taken; leave it untouched and run  eitskin tare"
+    ),
 }
 
 
@@ -101,13 +156,19 @@ def _text(fault: Fault) -> str:
     pc, lr, cfsr, hfsr, address = fault.words
     texts = {
         FaultCode.NO_MODEL: f"no bank holds a valid model ({status_text(fault.value)}); {UPLOAD}",
-        FaultCode.DEADLINE: f"it took {fault.value} us longer than the frame period; make the period longer",
-        FaultCode.RECIPROCITY: f"row {fault.index} and its reciprocal differ by {fault.value} parts per thousand of the rms "
-        "voltage; check the wiring (eitskin doctor)",
+        FaultCode.DEADLINE: (
+            f"it took {fault.value} us longer than the frame period; make the period longer"
+        ),
+        FaultCode.RECIPROCITY: (
+            f"row {fault.index} and its reciprocal differ by {fault.value} parts per thousand of"
+            " the rms voltage; check the wiring (eitskin doctor)"
+        ),
         FaultCode.SOLVER: f"the solver refused it: {status_text(fault.value)}",
         FaultCode.SCAN_STALLED: "the converter gave nothing in time; reset the board",
-        FaultCode.CRASH: f"the board restarted after a processor fault at pc 0x{pc:08x}, lr 0x{lr:08x}, cfsr 0x{cfsr:08x}, "
-        f"hfsr 0x{hfsr:08x}, address 0x{address:08x}; please report it",
+        FaultCode.CRASH: (
+            f"the board restarted after a processor fault at pc 0x{pc:08x}, lr 0x{lr:08x}, cfsr"
+            f" 0x{cfsr:08x}, hfsr 0x{hfsr:08x}, address 0x{address:08x}; please report it"
+        ),
         FaultCode.WATCHDOG: "the board restarted because its program hung; please report it",
         FaultCode.BUS: "the generator or the multiplexers could not be written; check their wiring",
     }
@@ -117,5 +178,3 @@ def _text(fault: Fault) -> str:
 def quality_text(quality: int) -> str:
     """The names of a row's quality bits; "good" for none."""
     return ", ".join(bit.name.lower() for bit in Quality if quality & bit and bit.name) or "good"
-
-

@@ -1,5 +1,6 @@
-"""What travels from a board: each payload as a frozen dataclass. csrc/include/eitskin/link.h is the contract; a test holds
-the names here against it. Their bytes are in ``payloads``; commands, the other way, in ``commands``.
+"""What travels from a board: each payload as a frozen dataclass. csrc/include/eitskin/link.h is the
+contract; a test holds the names here against it. Their bytes are in ``payloads``; commands, the
+other way, in ``commands``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from eitskin.core.findings import names, words
 from eitskin.core.results import Touch
 
 LINK_VERSION = 3
-SHOWN_FRAMES = 3  # EITS_FAULT_SHOWN_FRAMES: in a row, until what a moving touch may look like for a frame is a fault
+# EITS_FAULT_SHOWN_FRAMES: in a row, until what a moving touch may look like for a frame is a fault
+SHOWN_FRAMES = 3
 CLEAN_FRAMES = 8  # EITS_FAULT_CLEAN_FRAMES: in a row without it, until what was found is over
 MAX_PAYLOAD = 16384
 STAGES = ("scan", "demodulate", "solve", "touches", "send", "frame")
@@ -90,11 +92,16 @@ class FaultCode(IntEnum):
 
 # faults that frames show, and that go after CLEAN_FRAMES; of those of an electrode each has its own
 FOUND_FAULTS = frozenset(
-    (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY, FaultCode.MISFIT,
+    (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY,
+    FaultCode.MISFIT,
      FaultCode.STALE_REFERENCE)
 )  # fmt: skip
-DOUBTFUL_FAULTS = frozenset((FaultCode.ELECTRODE_NOISY, FaultCode.MISFIT, FaultCode.STALE_REFERENCE))  # rise after SHOWN_FRAMES
-ELECTRODE_FAULTS = frozenset((FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY))
+DOUBTFUL_FAULTS = frozenset(
+    (FaultCode.ELECTRODE_NOISY, FaultCode.MISFIT, FaultCode.STALE_REFERENCE)
+)  # rise after SHOWN_FRAMES
+ELECTRODE_FAULTS = frozenset(
+    (FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY)
+)
 
 
 class Quality(IntFlag):
@@ -126,7 +133,8 @@ class Stream(IntFlag):
 
 @dataclass(frozen=True)
 class BoardInfo:
-    """eits_packet_info: the board, its model and its settings. ``faults``: bit k for fault number k."""
+    """eits_packet_info: the board, its model and its settings. ``faults``: bit k for fault number
+    k."""
 
     request: int
     firmware: tuple[int, int, int]
@@ -171,7 +179,8 @@ class BoardInfo:
 
     @property
     def measured_rows(self) -> int:
-        """Measurements in a frame that is no check: all rows, or only one of each reciprocal pair."""
+        """Measurements in a frame that is no check: all rows, or only one of each reciprocal
+        pair."""
         return self.n_rows if self.check_every == 1 else self.n_folded
 
     @property
@@ -185,13 +194,20 @@ class BoardInfo:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        values = asdict(self) | {"firmware": self.firmware_text, "protocol_hash": f"{self.protocol_hash:016x}"}
-        return values | {"model_crc": f"{self.model_crc:08x}", "faults": [code.name.lower() for code in self.fault_codes]}
+        values = asdict(self) | {
+            "firmware": self.firmware_text,
+            "protocol_hash": f"{self.protocol_hash:016x}",
+        }
+        return values | {
+            "model_crc": f"{self.model_crc:08x}",
+            "faults": [code.name.lower() for code in self.fault_codes],
+        }
 
 
 @dataclass(frozen=True)
 class Reply:
-    """eits_packet_reply: how the command with this request number ended; ``explain.reply_text`` puts it in words."""
+    """eits_packet_reply: how the command with this request number ended; ``explain.reply_text``
+    puts it in words."""
 
     request: int
     command: int
@@ -205,8 +221,10 @@ class Reply:
 
 @dataclass(frozen=True, eq=False)
 class RawFrame:
-    """One scanned frame: ``voltage_v`` (m,) float32 exactly as the board's core got it, NaN for rows that cannot be used;
-    ``quality`` (m,) bits of ``Quality``. ``frame`` and ``time_us`` (when its scan began) wrap at 2^32."""
+    """One scanned frame: ``voltage_v`` (m,) float32 exactly as the board's core got it, NaN for
+    rows that cannot be used; ``quality`` (m,) bits of ``Quality``. ``frame`` and ``time_us`` (when
+    its scan began) wrap at 2^32.
+    """
 
     frame: int
     time_us: int
@@ -223,9 +241,9 @@ class RawFrame:
 
 @dataclass(frozen=True)
 class Solved:
-    """eits_packet_solved: what the board's core says of a frame and its solve, and the times. ``status`` is 0 or an eits_status
-    (negative), ``stop`` one of ``core.results.STOPS``, ``findings`` as in ``core.findings``; ``saturated`` also counts
-    what the converter tells."""
+    """eits_packet_solved: what the board's core says of a frame and its solve, and the times.
+    ``status`` is 0 or an eits_status (negative), ``stop`` one of ``core.results.STOPS``,
+    ``findings`` as in ``core.findings``; ``saturated`` also counts what the converter tells."""
 
     frame: int
     time_us: int
@@ -286,7 +304,8 @@ class SolvedTouches:
 
 @dataclass(frozen=True)
 class StageStats:
-    """Times of one stage in us; ``p99_us`` is the upper edge of its bin, an eighth of an octave wide."""
+    """Times of one stage in us; ``p99_us`` is the upper edge of its bin, an eighth of an octave
+    wide."""
 
     count: int
     last_us: int

@@ -1,4 +1,5 @@
-"""Payloads from a board as bytes: their layouts, reading and making them. A test holds the layouts against the C structs."""
+"""Payloads from a board as bytes: their layouts, reading and making them. A test holds the layouts
+against the C structs."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ FAULT_STRUCT = struct.Struct("<HHIii5I")
 
 
 class MalformedPacket(ValueError):
-    """A packet whose checksum is right but whose payload is not of its type: of a board that does not keep to its version."""
+    """A packet whose checksum is right but whose payload is not of its type: of a board that does
+    not keep to its version."""
 
 
 def _exactly(payload: bytes, size: int, what: str) -> None:
@@ -54,7 +56,11 @@ def parse_info(payload: bytes) -> BoardInfo:
 
 def build_info(info: BoardInfo) -> bytes:
     values = list(asdict(info).values())
-    values[1:4] = [bytes([*info.firmware, 0]), info.board.encode("ascii"), info.serial.encode("ascii")]
+    values[1:4] = [
+        bytes([*info.firmware, 0]),
+        info.board.encode("ascii"),
+        info.serial.encode("ascii"),
+    ]
     return INFO_STRUCT.pack(*values)
 
 
@@ -91,7 +97,9 @@ def _bits(word: int) -> tuple[int, ...]:
 def _parse_solved(payload: bytes, what: str, each: int) -> Solved:
     if len(payload) < SOLVED_STRUCT.size:
         raise MalformedPacket(f"{what}: {len(payload)} bytes are too few")
-    f, t, solve, touch, age, count, status, stop, *rest, opened, bridged, noisy = SOLVED_STRUCT.unpack_from(payload)
+    f, t, solve, touch, age, count, status, stop, *rest, opened, bridged, noisy = (
+        SOLVED_STRUCT.unpack_from(payload)
+    )
     _exactly(payload, SOLVED_STRUCT.size + each * count, what)
     if stop >= len(STOPS):
         raise MalformedPacket(f"{what}: stop {stop} is not known")
@@ -101,7 +109,10 @@ def _parse_solved(payload: bytes, what: str, each: int) -> Solved:
 
 def _build_solved(solved: Solved) -> bytes:
     values = asdict(solved) | {"status": -solved.status, "stop": STOPS.index(solved.stop)}
-    values |= {name: sum(1 << e for e in values[name]) for name in ("open_electrodes", "bridged_electrodes", "noisy_electrodes")}
+    values |= {
+        name: sum(1 << e for e in values[name])
+        for name in ("open_electrodes", "bridged_electrodes", "noisy_electrodes")
+    }
     return SOLVED_STRUCT.pack(*values.values())
 
 
@@ -141,11 +152,15 @@ def build_stats(stats: BoardStats) -> bytes:
 def parse_fault(payload: bytes) -> Fault:
     _exactly(payload, FAULT_STRUCT.size, "FAULT")
     code, raised, frame, index, value, *words = FAULT_STRUCT.unpack(payload)
-    return Fault(code, bool(raised), frame, index, value, (words[0], words[1], words[2], words[3], words[4]))
+    return Fault(
+        code, bool(raised), frame, index, value, (words[0], words[1], words[2], words[3], words[4])
+    )
 
 
 def build_fault(fault: Fault) -> bytes:
-    return FAULT_STRUCT.pack(fault.code, fault.raised, fault.frame, fault.index, fault.value, *fault.words)
+    return FAULT_STRUCT.pack(
+        fault.code, fault.raised, fault.frame, fault.index, fault.value, *fault.words
+    )
 
 
 _PARSERS = {
@@ -160,7 +175,8 @@ _PARSERS = {
 
 
 def parse(packet_type: int, payload: bytes) -> FromBoard | None:
-    """The payload of a packet from a board; None for a type that is not known, which is passed over.
+    """The payload of a packet from a board; None for a type that is not known, which is passed
+    over.
 
     Raises:
         MalformedPacket: the payload is not of its type.

@@ -1,8 +1,8 @@
 """Sequence numbers: which packet is next, which are missing, and which are no news.
 
-Numbers count every packet of a direction, modulo 2^32, and a packet that the sender dropped keeps its number. A board's numbers
-begin anew when it restarts, which it says by an INFO with request 0; since that INFO may itself be a duplicate, the packet after
-it decides.
+Numbers count every packet of a direction, modulo 2^32, and a packet that the sender dropped keeps
+its number. A board's numbers begin anew when it restarts, which it says by an INFO with request 0;
+since that INFO may itself be a duplicate, the packet after it decides.
 """
 
 from __future__ import annotations
@@ -29,14 +29,17 @@ class SequenceCounters(Protocol):
 class SequenceCheck:
     """Judges each packet's number against those before. One for each direction of a link.
 
-    ``was_late``: the last one judged was refused as late. ``revived``: so many of those just before the last one judged were of
+    ``was_late``: the last one judged was refused as late. ``revived``: so many of those just before
+        the last one judged were of
     a new life after all.
     """
 
     def __init__(self, counters: SequenceCounters) -> None:
         self._counters = counters
         self._next: int | None = None
-        self._after_restart: int | None = None  # the next number, if the last INFO with request 0 was no duplicate
+        self._after_restart: int | None = (
+            None  # the next number, if the last INFO with request 0 was no duplicate
+        )
         self._cut = False
         self._seen: OrderedDict[int, int] = OrderedDict()
         self._late_run, self._late_next = 0, 0
@@ -49,7 +52,8 @@ class SequenceCheck:
     def judge(self, sequence: int, fingerprint: int, *, restart: bool = False) -> int | None:
         """How many packets are missing just before this one; None if it is to be refused.
 
-        ``fingerprint`` tells a packet that came twice from another one with its number; ``restart``: an INFO with request 0.
+        ``fingerprint`` tells a packet that came twice from another one with its number;
+        ``restart``: an INFO with request 0.
         """
         self.revived, self.was_late = 0, False
         if self._next is None:
@@ -90,8 +94,9 @@ class SequenceCheck:
         return self._accept(sequence, fingerprint, 1)  # how many, nobody knows
 
     def _is_repeated(self, sequence: int, fingerprint: int, ahead: int) -> bool:
-        """After an INFO with request 0: whether this packet came before already. If not, decide whether the board restarted: then
-        this packet follows that INFO more closely than it follows what came before."""
+        """After an INFO with request 0: whether this packet came before already. If not, decide
+        whether the board restarted: then this packet follows that INFO more closely than it follows
+        what came before."""
         begun = self._after_restart
         assert begun is not None
         if ahead >= AHEAD and self._seen.get(sequence) == fingerprint:
@@ -109,8 +114,8 @@ class SequenceCheck:
         return False
 
     def _late(self, sequence: int, fingerprint: int) -> int | None:
-        """A number from before that was not seen: late. Many in a row, one after another, are a board that began anew and whose
-        INFO was lost: then none of them was late."""
+        """A number from before that was not seen: late. Many in a row, one after another, are a
+        board that began anew and whose INFO was lost: then none of them was late."""
         self._late_run = self._late_run + 1 if self._late_run and sequence == self._late_next else 1
         self._late_next = (sequence + 1) % WRAP
         if self._late_run < LATE_IN_A_ROW:

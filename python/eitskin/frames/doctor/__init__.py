@@ -1,4 +1,5 @@
-"""The doctor: what is wrong with frames, said before any image is made of them. One file a check."""
+"""The doctor: what is wrong with frames, said before any image is made of them. One file a
+check."""
 
 from eitskin.frames.doctor.examine import examine
 from eitskin.frames.doctor.report import Finding, Report

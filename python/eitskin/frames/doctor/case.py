@@ -1,4 +1,5 @@
-"""The case before the checks: frames in one order, the prediction to hold them against, which channels to trust."""
+"""The case before the checks: frames in one order, the prediction to hold them against, which
+channels to trust."""
 
 from __future__ import annotations
 
@@ -23,10 +24,12 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """``frames`` (voltages may be NaN) against ``transfer_ohm`` (n, n), for the electrodes that ``rows`` (m, 4) name.
+    """``frames`` (voltages may be NaN) against ``transfer_ohm`` (n, n), for the electrodes that
+    ``rows`` (m, 4) name.
 
-    ``trusted`` (m,): channels that no earlier check has found unusable. ``magnitude``: signs are not known.
-    ``prediction`` is the healthy skin's; ``transfer_ohm`` differs from its own where electrodes are joined.
+    ``trusted`` (m,): channels that no earlier check has found unusable. ``magnitude``: signs are
+    not known. ``prediction`` is the healthy skin's; ``transfer_ohm`` differs from its own where
+    electrodes are joined.
     """
 
     frames: Frames
@@ -46,7 +49,9 @@ class Case:
     def reference(self) -> FloatArray:
         """The mean quiet frame (m,), 0 where it is not finite."""
         with np.errstate(invalid="ignore", over="ignore"):
-            return np.asarray(np.nan_to_num(self.frames.reference_voltage_v.mean(axis=0), posinf=0.0, neginf=0.0))
+            return np.asarray(
+                np.nan_to_num(self.frames.reference_voltage_v.mean(axis=0), posinf=0.0, neginf=0.0)
+            )
 
     @property
     def predicted(self) -> FloatArray:
@@ -55,20 +60,23 @@ class Case:
 
     @property
     def joined(self) -> bool:
-        """Whether two electrodes were found joined, so that single channels are known only roughly."""
+        """Whether two electrodes were found joined, so that single channels are known only
+        roughly."""
         return self.transfer_ohm is not self.prediction.transfer_ohm
 
     def expected(self) -> FloatArray:
-        """The homogeneous frame (m,) as these channels would measure it, in volts: see ``calibrated``."""
+        """The homogeneous frame (m,) as these channels would measure it, in volts: see
+        ``calibrated``."""
         return calibrated(self.reference, self.predicted, self.trusted)
 
     def channel(self, number: int) -> str:
-        """"channel 17 [1, 2, 8, 9]"."""
+        """ "channel 17 [1, 2, 8, 9]"."""
         return f"channel {number} {self.rows[number].tolist()}"
 
 
 def strength_groups(size: FloatArray, usable: BoolArray) -> list[IntArray]:
-    """The ``usable`` channels (m,) sorted by ``size`` (m,) in groups of at least GROUP, never parting equal sizes.
+    """The ``usable`` channels (m,) sorted by ``size`` (m,) in groups of at least GROUP, never
+    parting equal sizes.
 
     On a round skin a group is made of channels that symmetry makes equal.
     """
@@ -82,10 +90,12 @@ def strength_groups(size: FloatArray, usable: BoolArray) -> list[IntArray]:
 
 
 def calibrated(measured: FloatArray, predicted: FloatArray, trusted: BoolArray) -> FloatArray:
-    """``predicted`` (m,) scaled to ``measured`` (m,) by robust ratios, so that only single channels stand out.
+    """``predicted`` (m,) scaled to ``measured`` (m,) by robust ratios, so that only single channels
+    stand out.
 
-    The ratio of a group of like channels (``strength_groups``) is its median of measured / predicted over ``trusted``
-    channels; between groups it is interpolated over log |predicted|. It takes up what a real tank does to near and far.
+    The ratio of a group of like channels (``strength_groups``) is its median of measured /
+    predicted over ``trusted`` channels; between groups it is interpolated over log |predicted|. It
+    takes up what a real tank does to near and far.
     """
     size = np.abs(predicted)
     usable = trusted & (size > SAME * size.max(initial=0.0))
@@ -105,7 +115,8 @@ def rms(values: FloatArray) -> float:
 
 
 def robust_spread(values: FloatArray) -> float:
-    """1.4826 times the median distance from the median: the standard deviation where the values are normal."""
+    """1.4826 times the median distance from the median: the standard deviation where the values are
+    normal."""
     return float(1.4826 * np.median(np.abs(values - np.median(values)))) if values.size else 0.0
 
 

@@ -1,4 +1,5 @@
-"""Saturated channels (many readings exactly at the greatest value) and stuck ones (quiet frames that never change)."""
+"""Saturated channels (many readings exactly at the greatest value) and stuck ones (quiet frames
+that never change)."""
 
 from __future__ import annotations
 
@@ -33,7 +34,9 @@ def check_clipping(case: Case) -> tuple[Case, Outcome]:
                 f"{len(channels)} channel(s) stand at a rail: lower the gain or the current",
                 {
                     "channels": numbers(channels),
-                    "rail_v": [levels[0]] if levels[-1] - levels[0] < 1e-6 else [levels[0], levels[-1]],
+                    "rail_v": (
+                        [levels[0]] if levels[-1] - levels[0] < 1e-6 else [levels[0], levels[-1]]
+                    ),
                     "readings": int(railed.sum()),
                     "in_quiet_frames": int(railed[:quiet].sum()),
                     "frames": names,
@@ -48,7 +51,8 @@ def check_clipping(case: Case) -> tuple[Case, Outcome]:
             Finding(
                 "stuck",
                 FAULT,
-                f"{int(stuck.sum())} channel(s) read exactly the same in all {quiet} quiet frames while others vary",
+                f"{int(stuck.sum())} channel(s) read exactly the same in all {quiet} quiet frames"
+                " while others vary",
                 {"channels": numbers(np.flatnonzero(stuck))},
                 channel_remedy(case, np.flatnonzero(stuck)),
             )
@@ -58,11 +62,12 @@ def check_clipping(case: Case) -> tuple[Case, Outcome]:
 
 
 def at_rail(frames: FloatArray) -> BoolArray:
-    """Which readings (f, m) stand exactly at the greatest or the least value, where far more do than at any other.
+    """Which readings (f, m) stand exactly at the greatest or the least value, where far more do
+    than at any other.
 
-    A rail is a value in the outer half of the range of magnitudes that at least LEAST_TIES readings share, and
-    TIES_PER_USUAL times as many as share a usual value of that half; equal readings of a noiseless or coarsely
-    digitised frame are no rail.
+    A rail is a value in the outer half of the range of magnitudes that at least LEAST_TIES readings
+    share, and TIES_PER_USUAL times as many as share a usual value of that half; equal readings of a
+    noiseless or coarsely digitised frame are no rail.
     """
     found = np.zeros(frames.shape, dtype=bool)
     top = float(np.abs(frames).max(initial=0.0))
@@ -75,15 +80,20 @@ def at_rail(frames: FloatArray) -> BoolArray:
             continue
         hits = values >= limit - SAME * top
         rest = values[(values > top / 2) & ~hits]
-        usual = rest.size / max(len(np.unique(np.round(rest / (SAME * top)))), 1) if rest.size else 1.0
+        usual = (
+            rest.size / max(len(np.unique(np.round(rest / (SAME * top)))), 1) if rest.size else 1.0
+        )
         channels = int(hits.any(axis=0).sum())
-        if hits.sum() >= max(LEAST_TIES, TIES_PER_USUAL * usual) and (rest.size or channels < frames.shape[1]):
+        if hits.sum() >= max(LEAST_TIES, TIES_PER_USUAL * usual) and (
+            rest.size or channels < frames.shape[1]
+        ):
             found |= hits
     return found
 
 
 def _stuck(quiet: FloatArray) -> BoolArray:
-    """Channels (m,) without any change over at least LEAST_QUIET quiet frames, where most channels do change."""
+    """Channels (m,) without any change over at least LEAST_QUIET quiet frames, where most channels
+    do change."""
     if len(quiet) < LEAST_QUIET:
         return np.zeros(quiet.shape[1], dtype=bool)
     still = np.ptp(np.nan_to_num(quiet), axis=0) == 0

@@ -1,4 +1,5 @@
-"""The examination: every check in its turn, each relying only on channels that the earlier ones left trusted."""
+"""The examination: every check in its turn, each relying only on channels that the earlier ones
+left trusted."""
 
 from __future__ import annotations
 
@@ -24,12 +25,14 @@ from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous
 
 RENUMBER_FIRST = (
-    "how to mend what has an electrode's or a channel's number here: renumber by import first, then examine again"
+    "how to mend what has an electrode's or a channel's number here: renumber by import first, then"
+    " examine again"
 )
 
 
 def examine(subject: Subject) -> Report:
-    """What is wrong with ``subject``, with evidence and remedy; see docs/guide/import-and-doctor.md for every check.
+    """What is wrong with ``subject``, with evidence and remedy; see docs/guide/import-and-doctor.md
+    for every check.
 
     Raises:
         UsageError: the skin has another number of electrodes than the frames.
@@ -58,7 +61,9 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
     case, clipping = check_clipping(case)
     case, wiring = check_wiring(case)
     if case.joined:
-        untold = Outcome(untold=("gains, single channels and numbering: part the joined electrodes first",))
+        untold = Outcome(
+            untold=("gains, single channels and numbering: part the joined electrodes first",)
+        )
         outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case), untold]
         return _report(subject, case, outcomes), case
     resemblance = check_resemblance(case)
@@ -68,7 +73,17 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
     case, flips = check_flips(case)
     lost = check_lost(case)
     case, gain = check_gain(case)
-    outcomes += [sign, clipping, wiring, lost, flips, gain, resemblance, check_reciprocity(case), check_noise(case)]
+    outcomes += [
+        sign,
+        clipping,
+        wiring,
+        lost,
+        flips,
+        gain,
+        resemblance,
+        check_reciprocity(case),
+        check_noise(case),
+    ]
     outcomes += [check_orientation(case, numbering.untold), check_unit(case, subject.unit_known)]
     return _report(subject, case, outcomes), case
 
@@ -76,7 +91,14 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
 def _case(frames: Frames, subject: Subject) -> Case:
     rows = np.asarray(frames.protocol.drive_measure, dtype=np.int64)
     prediction = homogeneous(subject.skin, frames.protocol.n_electrodes)
-    return Case(frames, subject.skin, prediction, prediction.transfer_ohm, rows, np.ones(len(rows), dtype=bool))
+    return Case(
+        frames,
+        subject.skin,
+        prediction,
+        prediction.transfer_ohm,
+        rows,
+        np.ones(len(rows), dtype=bool),
+    )
 
 
 def _report(subject: Subject, case: Case, outcomes: list[Outcome]) -> Report:
@@ -88,8 +110,9 @@ def _report(subject: Subject, case: Case, outcomes: list[Outcome]) -> Report:
         findings = tuple(replace(f, mend="") if names_numbers(f.mend) else f for f in findings)
     frames = case.frames
     described = (
-        f"{frames.n_frames} frame(s) of {len(case.rows)} channels, {len(frames.reference_voltage_v)} quiet, "
-        f"{frames.protocol.n_electrodes} electrodes; held against {case.prediction.source}"
+        f"{frames.n_frames} frame(s) of {len(case.rows)} channels,"
+        f" {len(frames.reference_voltage_v)} quiet, {frames.protocol.n_electrodes} electrodes; held"
+        f" against {case.prediction.source}"
     )
     measured: dict[str, object] = {}
     for outcome in outcomes:

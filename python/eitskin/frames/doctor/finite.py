@@ -12,7 +12,8 @@ from eitskin.frames.doctor.report import FAULT, Finding, Outcome
 
 
 def check_finite(case: Case) -> tuple[Case, Outcome]:
-    """NaN and Inf by channel and frame, and a reference that is all zero; such channels are no longer trusted."""
+    """NaN and Inf by channel and frame, and a reference that is all zero; such channels are no
+    longer trusted."""
     quiet, frames = case.frames.reference_voltage_v, case.frames.voltage_v
     bad_quiet, bad = ~np.isfinite(quiet), ~np.isfinite(frames)
     channels = np.flatnonzero(bad_quiet.any(axis=0) | bad.any(axis=0))
@@ -23,7 +24,8 @@ def check_finite(case: Case) -> tuple[Case, Outcome]:
             Finding(
                 "not-finite",
                 FAULT,
-                f"{int(bad_quiet.sum() + bad.sum())} voltages are NaN or Inf, in {len(channels)} channel(s)",
+                f"{int(bad_quiet.sum() + bad.sum())} voltages are NaN or Inf, in {len(channels)}"
+                " channel(s)",
                 {
                     "channels": numbers(channels),
                     "frames": names,

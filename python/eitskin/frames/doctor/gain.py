@@ -1,4 +1,5 @@
-"""The gain of each channel: how the reference compares with the homogeneous frame, by channel and by pair."""
+"""The gain of each channel: how the reference compares with the homogeneous frame, by channel and
+by pair."""
 
 from __future__ import annotations
 
@@ -38,14 +39,16 @@ UNIT_OFF = 30.0
 
 
 def channel_gains(case: Case) -> tuple[FloatArray, BoolArray]:
-    """Reference over expected (m,), and which channels (m,) are trusted and strong enough for it to mean anything."""
+    """Reference over expected (m,), and which channels (m,) are trusted and strong enough for it to
+    mean anything."""
     expected = case.expected()
     strong = case.trusted & (np.abs(expected) > WEAK_PER_RMS * rms(expected))
     return np.divide(case.reference, expected, out=np.ones_like(expected), where=strong), strong
 
 
 def outliers(case: Case) -> BoolArray:
-    """Channels (m,) whose gain is off by more than OUTLIER, or OUTLIER_SPREADS times the usual spread."""
+    """Channels (m,) whose gain is off by more than OUTLIER, or OUTLIER_SPREADS times the usual
+    spread."""
     gain, strong = channel_gains(case)
     limit = max(OUTLIER, OUTLIER_SPREADS * robust_spread(gain[strong]))
     return np.asarray(strong & (np.abs(gain - 1) > limit))
@@ -56,7 +59,9 @@ def check_resemblance(case: Case) -> Outcome:
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     size = np.abs(predicted)
     if size.size < LEAST_CHANNELS or np.ptp(size) <= SAME * size.max():
-        return Outcome(untold=("whether this is a homogeneous skin: too few channels, or all alike",))
+        return Outcome(
+            untold=("whether this is a homogeneous skin: too few channels, or all alike",)
+        )
     reached = correlation(np.abs(measured), size)
     summary = {"reference_correlation": round(reached, 4)}
     if reached >= FOREIGN_BELOW or rms(measured) == 0:
@@ -64,8 +69,9 @@ def check_resemblance(case: Case) -> Outcome:
     finding = Finding(
         "unlike-a-homogeneous-skin",
         FAULT,
-        "the reference does not look like a homogeneous skin in any order known here: another protocol, outline or "
-        "wiring, or the frame was not quiet; if the source has a table of its rows, import it with that",
+        "the reference does not look like a homogeneous skin in any order known here: another"
+        " protocol, outline or wiring, or the frame was not quiet; if the source has a table of its"
+        " rows, import it with that",
         {"correlation": round(reached, 4), "least": FOREIGN_BELOW},
     )
     return Outcome((finding,), measured=summary)
@@ -74,8 +80,8 @@ def check_resemblance(case: Case) -> Outcome:
 def check_gain(case: Case) -> tuple[Case, Outcome]:
     """Single channels that are off, drive or measuring pairs that are off, and the spread of all.
 
-    The gain of a channel is its reference over the expected homogeneous value; the spread is 1.4826 times the median
-    distance from the median.
+    The gain of a channel is its reference over the expected homogeneous value; the spread is 1.4826
+    times the median distance from the median.
     """
     gain, strong = channel_gains(case)
     if strong.sum() < 4:
@@ -92,8 +98,13 @@ def check_gain(case: Case) -> tuple[Case, Outcome]:
             Finding(
                 "channel-gain",
                 FAULT,
-                f"{len(channels)} channel(s) are far off: {short_list(channels)}; worst {case.channel(worst)}",
-                {"channels": numbers(channels), "worst_gain": round(float(gain[worst]), 4), "spread": round(spread, 4)},
+                f"{len(channels)} channel(s) are far off: {short_list(channels)}; worst"
+                f" {case.channel(worst)}",
+                {
+                    "channels": numbers(channels),
+                    "worst_gain": round(float(gain[worst]), 4),
+                    "spread": round(spread, 4),
+                },
                 channel_remedy(case, channels),
             )
         )
@@ -104,7 +115,11 @@ def check_gain(case: Case) -> tuple[Case, Outcome]:
                 "gain-spread",
                 FAULT if fault else NOTE,
                 f"channels have gains of their own, spread {100 * spread:.1f} %: "
-                + ("normalised differences are needed" if fault else "normalised differences may help"),
+                + (
+                    "normalised differences are needed"
+                    if fault
+                    else "normalised differences may help"
+                ),
                 {"spread": round(spread, 4), "note_from": SPREAD_NOTE, "fault_from": SPREAD_FAULT},
                 "--equalise" if fault else "",
             )
@@ -119,7 +134,9 @@ def check_unit(case: Case, unit_known: bool) -> Outcome:
     if not case.trusted.any():
         return Outcome()
     scale = float(np.median(np.abs(case.reference[case.trusted])))
-    predicted = float(np.median(np.abs(case.predicted[case.trusted]))) * case.frames.protocol.current_a
+    predicted = (
+        float(np.median(np.abs(case.predicted[case.trusted]))) * case.frames.protocol.current_a
+    )
     if scale == 0:
         return Outcome()
     ratio = scale / predicted
@@ -135,7 +152,8 @@ def check_unit(case: Case, unit_known: bool) -> Outcome:
 
 
 def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: float) -> list[Finding]:
-    """Drive and measuring pairs whose median gain is off while most of their channels agree about it."""
+    """Drive and measuring pairs whose median gain is off while most of their channels agree about
+    it."""
     findings = []
     for name, said, columns in (("drive", "driven by", [0, 1]), ("measure", "measured by", [2, 3])):
         pairs = case.rows[:, columns]
@@ -144,7 +162,9 @@ def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: floa
             if using.sum() < 4:
                 continue
             middle = float(np.median(gain[using]))
-            if abs(middle - 1) < PAIR_NOTE or robust_spread(gain[using]) > PAIR_AGREE * abs(middle - 1):
+            if abs(middle - 1) < PAIR_NOTE or robust_spread(gain[using]) > PAIR_AGREE * abs(
+                middle - 1
+            ):
                 continue
             if abs(middle - 1) < PAIR_SPREADS * spread / np.sqrt(np.count_nonzero(using)):
                 continue
@@ -154,7 +174,11 @@ def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: floa
                     f"{name}-pair-gain",
                     FAULT if fault else NOTE,
                     f"channels {said} pair {pair.tolist()} read {middle:.3g} of what the others do",
-                    {"pair": numbers(pair), "gain": round(middle, 4), "channels": numbers(np.flatnonzero(using))},
+                    {
+                        "pair": numbers(pair),
+                        "gain": round(middle, 4),
+                        "channels": numbers(np.flatnonzero(using)),
+                    },
                     "--equalise" if fault else "",
                 )
             )

@@ -16,18 +16,22 @@ CONTACTS = (0.0, -0.35, -0.2, 0.2, 0.4)
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Electrodes ``pair`` joined by a wire: the transfer matrix (n, n) in ohm with it, and the ``misfit`` it leaves."""
+    """Electrodes ``pair`` joined by a wire: the transfer matrix (n, n) in ohm with it, and the
+    ``misfit`` it leaves."""
 
     pair: tuple[int, int]
     transfer_ohm: FloatArray
     misfit: float
 
 
-def misfits(measured: FloatArray, predicted: FloatArray, use: BoolArray, magnitude: bool) -> FloatArray:
-    """Relative rms (h,) of what the best multiple of each of ``predicted`` (h, m) leaves of ``measured`` (m,).
+def misfits(
+    measured: FloatArray, predicted: FloatArray, use: BoolArray, magnitude: bool
+) -> FloatArray:
+    """Relative rms (h,) of what the best multiple of each of ``predicted`` (h, m) leaves of
+    ``measured`` (m,).
 
-    Over ``use`` (m,), and the TRIMMED worst channels of a first fit left out of the second. ``magnitude``: signs do not
-    enter. 1 where nothing can be fitted.
+    Over ``use`` (m,), and the TRIMMED worst channels of a first fit left out of the second.
+    ``magnitude``: signs do not enter. 1 where nothing can be fitted.
     """
     y, p = measured[use], predicted[:, use]
     if magnitude:
@@ -55,17 +59,23 @@ def misfit(case: Case, use: BoolArray, magnitude: bool) -> float:
 def best_joined(case: Case, magnitude: bool) -> Joined:
     """The two electrodes whose joining explains the reference best.
 
-    How far an electrode's own potential rises above its neighbours' depends on its width and contact, which are not
-    known well: several values are tried, CONTACTS times the median rise more than predicted.
+    How far an electrode's own potential rises above its neighbours' depends on its width and
+    contact, which are not known well: several values are tried, CONTACTS times the median rise more
+    than predicted.
     """
     pairs = np.array(list(combinations(sorted(set(case.rows.ravel().tolist())), 2)))
     own = np.diag(case.transfer_ohm)
-    beside = np.roll(case.transfer_ohm, -1, axis=1).diagonal() + np.roll(case.transfer_ohm, -1, axis=0).diagonal()
+    beside = (
+        np.roll(case.transfer_ohm, -1, axis=1).diagonal()
+        + np.roll(case.transfer_ohm, -1, axis=0).diagonal()
+    )
     rise = float(np.median((own + np.roll(own, -1) - beside) / 2))
     found = []
     for share in CONTACTS:
         contact = case.transfer_ohm + share * rise * np.eye(len(own))
-        left = misfits(case.reference, shorted_frames(contact, pairs, case.rows), case.trusted, magnitude)
+        left = misfits(
+            case.reference, shorted_frames(contact, pairs, case.rows), case.trusted, magnitude
+        )
         best = int(np.argmin(left))
         found.append((float(left[best]), share, best))
     least, share, best = min(found)

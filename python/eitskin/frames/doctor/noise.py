@@ -1,15 +1,24 @@
 """Noise of each channel, SNR and drift, from the quiet frames.
 
-Noise of a channel: rms of the differences of successive quiet frames over sqrt(2), which slow drift does not enter.
-SNR = 20 log10(rms(V0) / sigma), V0 the mean quiet frame and sigma the rms of the noise over all channels. Drift: by how
-much the common gain of the frame, <V, V0> / <V0, V0>, changes along a straight line through all quiet frames.
+Noise of a channel: rms of the differences of successive quiet frames over sqrt(2), which slow drift
+does not enter. SNR = 20 log10(rms(V0) / sigma), V0 the mean quiet frame and sigma the rms of the
+noise over all channels. Drift: by how much the common gain of the frame, <V, V0> / <V0, V0>,
+changes along a straight line through all quiet frames.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from eitskin.frames.doctor.case import Case, FloatArray, IntArray, numbers, rms, short_list, strength_groups
+from eitskin.frames.doctor.case import (
+    Case,
+    FloatArray,
+    IntArray,
+    numbers,
+    rms,
+    short_list,
+    strength_groups,
+)
 from eitskin.frames.doctor.remedy import channel_remedy
 from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
 from eitskin.frames.orders import touching
@@ -35,7 +44,12 @@ def check_noise(case: Case) -> Outcome:
     quiet = quiet[np.isfinite(quiet[:, case.trusted]).all(axis=1)]
     if len(quiet) < LEAST_QUIET:
         return Outcome(
-            untold=(f"noise, SNR and drift: {len(quiet)} quiet frame(s), they need at least {LEAST_QUIET}",)
+            untold=(
+                (
+                    f"noise, SNR and drift: {len(quiet)} quiet frame(s), they need at least"
+                    f" {LEAST_QUIET}"
+                ),
+            )
         )
     trusted = np.flatnonzero(case.trusted)
     noise = channel_noise(quiet[:, trusted])
@@ -43,10 +57,16 @@ def check_noise(case: Case) -> Outcome:
     if sigma == 0 or level == 0:
         return Outcome(untold=("noise and SNR: the quiet frames are all the same",))
     usual = np.maximum(_usual_noise(case, noise), np.median(noise) / NOISY_TIMES)
-    noisy = noise > NOISY_TIMES * usual if np.median(noise) > 0 else np.zeros(len(noise), dtype=bool)
+    noisy = (
+        noise > NOISY_TIMES * usual if np.median(noise) > 0 else np.zeros(len(noise), dtype=bool)
+    )
     healthy_sigma = rms(noise[~noisy]) or sigma
     snr = 20 * np.log10(level / sigma)
-    measured = {"snr_db": round(float(snr), 2), "noise_v": float(f"{sigma:.4g}"), "quiet_frames": len(quiet)}
+    measured = {
+        "snr_db": round(float(snr), 2),
+        "noise_v": float(f"{sigma:.4g}"),
+        "quiet_frames": len(quiet),
+    }
     findings = []
     if noisy.any():
         channels = trusted[noisy]
@@ -55,21 +75,32 @@ def check_noise(case: Case) -> Outcome:
             Finding(
                 "noisy-channels",
                 FAULT,
-                f"{len(channels)} channel(s) are far noisier than the others: {short_list(channels)}"
+                f"{len(channels)} channel(s) are far noisier than the others:"
+                f" {short_list(channels)}"
                 + ("" if shared is None else f", all of electrode {shared} (from 0)"),
                 {
                     "channels": numbers(channels),
                     "times_usual": [round(float(v), 2) for v in noise[noisy] / usual[noisy]],
                     "snr_db_without_them": round(float(20 * np.log10(level / healthy_sigma)), 2),
                 },
-                f"--drop-electrodes {shared}" if shared is not None else channel_remedy(case, channels),
+                (
+                    f"--drop-electrodes {shared}"
+                    if shared is not None
+                    else channel_remedy(case, channels)
+                ),
             )
         )
     healthy_snr = 20 * np.log10(level / healthy_sigma)
     if healthy_snr < SNR_NOTE_DB:
         fault = healthy_snr < SNR_FAULT_DB
-        text = f"the SNR is {healthy_snr:.1f} dB" + (": too low to image" if fault else ": weak touches will be lost")
-        evidence = {"snr_db": round(float(healthy_snr), 2), "note_below": SNR_NOTE_DB, "fault_below": SNR_FAULT_DB}
+        text = f"the SNR is {healthy_snr:.1f} dB" + (
+            ": too low to image" if fault else ": weak touches will be lost"
+        )
+        evidence = {
+            "snr_db": round(float(healthy_snr), 2),
+            "note_below": SNR_NOTE_DB,
+            "fault_below": SNR_FAULT_DB,
+        }
         findings.append(Finding("snr", FAULT if fault else NOTE, text, evidence))
     drift, uncertainty = _drift(quiet[:, trusted], case.reference[trusted], healthy_sigma)
     measured["drift"] = float(f"{drift:.3g}")
@@ -81,14 +112,19 @@ def check_noise(case: Case) -> Outcome:
                 FAULT if fault else NOTE,
                 f"the gain drifts by {100 * drift:.2f} % over the {len(quiet)} quiet frames: "
                 "take quiet frames nearer in time, or project the reference out",
-                {"drift": round(drift, 5), "uncertainty": float(f"{uncertainty:.3g}"), "fault_from": DRIFT_FAULT},
+                {
+                    "drift": round(drift, 5),
+                    "uncertainty": float(f"{uncertainty:.3g}"),
+                    "fault_from": DRIFT_FAULT,
+                },
             )
         )
     return Outcome(tuple(findings), measured=measured)
 
 
 def _usual_noise(case: Case, noise: FloatArray) -> FloatArray:
-    """The median noise of channels as strong as each trusted one: strong channels may have more noise."""
+    """The median noise of channels as strong as each trusted one: strong channels may have more
+    noise."""
     strength, usual = np.abs(case.predicted[case.trusted]), noise.copy()
     for group in strength_groups(strength, np.ones(len(noise), dtype=bool)):
         usual[group] = np.median(noise[group])
@@ -96,7 +132,8 @@ def _usual_noise(case: Case, noise: FloatArray) -> FloatArray:
 
 
 def _drift(quiet: FloatArray, reference: FloatArray, sigma: float) -> tuple[float, float]:
-    """Change of the common gain along its fitted line over all quiet frames, and its standard deviation by noise."""
+    """Change of the common gain along its fitted line over all quiet frames, and its standard
+    deviation by noise."""
     gain = quiet @ reference / (reference @ reference)
     when = np.linspace(-0.5, 0.5, len(quiet))
     slope = float(when @ gain / (when @ when))

@@ -1,7 +1,9 @@
-"""How the electrodes may be numbered, and what a quiet frame says about it where the skin has no symmetry.
+"""How the electrodes may be numbered, and what a quiet frame says about it where the skin has no
+symmetry.
 
-On a round skin with even electrodes and a protocol that looks the same from every electrode, a quiet frame is the same
-for every rotation and for both directions; there this check says so, and only a touch tells (orientation.py).
+On a round skin with even electrodes and a protocol that looks the same from every electrode, a
+quiet frame is the same for every rotation and for both directions; there this check says so, and
+only a touch tells (orientation.py).
 """
 
 from __future__ import annotations
@@ -20,14 +22,15 @@ CLEARLY = 0.5
 LIKELY = 0.9
 SHOWN = 3
 ALL_ALIKE = (
-    "where electrode 0 is and which way the numbers run: a quiet frame of this symmetric skin and protocol is the same "
-    "for all of them"
+    "where electrode 0 is and which way the numbers run: a quiet frame of this symmetric skin and"
+    " protocol is the same for all of them"
 )
 
 
 @dataclass(frozen=True)
 class Numbering:
-    """Source electrode 0 is electrode ``rotate``, counting on goes down if ``mirror``; ``fit`` is 1 at best."""
+    """Source electrode 0 is electrode ``rotate``, counting on goes down if ``mirror``; ``fit`` is 1
+    at best."""
 
     rotate: int
     mirror: bool
@@ -41,22 +44,30 @@ class Numbering:
     @property
     def option(self) -> str:
         """The options of ``eitskin import`` for it."""
-        return " ".join([f"--rotate {self.rotate}"] * bool(self.rotate) + ["--mirror"] * self.mirror)
+        return " ".join(
+            [f"--rotate {self.rotate}"] * bool(self.rotate) + ["--mirror"] * self.mirror
+        )
 
     def __str__(self) -> str:
         return self.option or "as given"
 
 
 def ranked(fit: FloatArray) -> list[Numbering]:
-    """Numberings, best first, from their ``fit`` (2, n) by mirror and rotation; of equals the one as given leads."""
+    """Numberings, best first, from their ``fit`` (2, n) by mirror and rotation; of equals the one
+    as given leads."""
     found = [Numbering(k, bool(m), float(fit[m, k])) for m in range(2) for k in range(fit.shape[1])]
-    return sorted(found, key=lambda numbering: (-round(numbering.fit, 9), numbering.mirror, numbering.rotate))
+    return sorted(
+        found, key=lambda numbering: (-round(numbering.fit, 9), numbering.mirror, numbering.rotate)
+    )
 
 
 def renumbered_frames(case: Case, transfer_ohm: FloatArray) -> FloatArray:
-    """Voltages (2, n, m) per ampere that each numbering, mirrored or not and rotated, would give."""
+    """Voltages (2, n, m) per ampere that each numbering, mirrored or not and rotated, would
+    give."""
     n = case.n_electrodes
-    maps = np.array([[electrode_map(n, rotate, bool(mirror)) for rotate in range(n)] for mirror in range(2)])
+    maps = np.array(
+        [[electrode_map(n, rotate, bool(mirror)) for rotate in range(n)] for mirror in range(2)]
+    )
     return voltages_of(transfer_ohm, maps[..., case.rows])
 
 
@@ -66,23 +77,34 @@ def best_likeness(case: Case) -> float:
 
 
 def check_numbering(case: Case) -> tuple[Case, Outcome]:
-    """Whether another numbering fits the quiet frame clearly better; the case comes back with its rows renumbered.
+    """Whether another numbering fits the quiet frame clearly better; the case comes back with its
+    rows renumbered.
 
-    Signs are left aside. Numberings that predict the same frame (correlation SAME_FRAME) cannot be told apart.
+    Signs are left aside. Numberings that predict the same frame (correlation SAME_FRAME) cannot be
+    told apart.
     """
     frames = renumbered_frames(case, case.transfer_ohm)
-    alike = np.array([[correlation(np.abs(case.predicted), np.abs(frame)) for frame in side] for side in frames])
+    alike = np.array(
+        [[correlation(np.abs(case.predicted), np.abs(frame)) for frame in side] for side in frames]
+    )
     if (alike >= SAME_FRAME).all():
         return case, Outcome(untold=(ALL_ALIKE,))
     order = ranked(_likeness(case, frames))
     given, best = next(numbering for numbering in order if numbering.given), order[0]
-    measured = {"numbering_by_quiet_frame": {"as given": round(given.fit, 4), str(best): round(best.fit, 4)}}
+    measured = {
+        "numbering_by_quiet_frame": {"as given": round(given.fit, 4), str(best): round(best.fit, 4)}
+    }
     distinct = alike[int(best.mirror), best.rotate] < SAME_FRAME
     if not distinct or best.fit < LIKELY or 1 - best.fit > CLEARLY * (1 - given.fit):
-        like_given = [other for other in ranked(alike) if other.fit >= SAME_FRAME and not other.given]
+        like_given = [
+            other for other in ranked(alike) if other.fit >= SAME_FRAME and not other.given
+        ]
         text = f"whether {' or '.join(map(str, like_given[:SHOWN]))}: the quiet frame is the same"
         return case, Outcome(untold=(text,) if like_given else (), measured=measured)
-    text = f"the quiet frame fits the skin's shape when the electrodes are renumbered ({best}), not as they are"
+    text = (
+        f"the quiet frame fits the skin's shape when the electrodes are renumbered ({best}), not as"
+        " they are"
+    )
     rows = relabel(case.rows, electrode_map(case.n_electrodes, best.rotate, best.mirror))
     finding = Finding("numbering", FAULT, text, measured["numbering_by_quiet_frame"], best.option)
     return replace(case, rows=rows), Outcome((finding,), measured=measured)
@@ -90,4 +112,6 @@ def check_numbering(case: Case) -> tuple[Case, Outcome]:
 
 def _likeness(case: Case, frames: FloatArray) -> FloatArray:
     measured = np.abs(case.reference[case.trusted])
-    return np.array([[correlation(measured, np.abs(frame[case.trusted])) for frame in side] for side in frames])
+    return np.array(
+        [[correlation(measured, np.abs(frame[case.trusted])) for frame in side] for side in frames]
+    )

@@ -1,4 +1,5 @@
-"""In which order do the channels stand, and with which sign? Each hypothesis is held against the homogeneous frame."""
+"""In which order do the channels stand, and with which sign? Each hypothesis is held against the
+homogeneous frame."""
 
 from __future__ import annotations
 
@@ -28,20 +29,26 @@ class OrderChoice:
 
 
 def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -> OrderChoice:
-    """Compare one case an order, by the correlation of |reference| with |homogeneous prediction| (signs left aside).
+    """Compare one case an order, by the correlation of |reference| with |homogeneous prediction|
+    (signs left aside).
 
-    Where none reaches LIKELY, exchanged wires or a dead electrode may hide it: then what is reached without those is
-    compared. Another order than ``given`` is found where it is better by more than BETTER_BY and at least LIKELY.
+    Where none reaches LIKELY, exchanged wires or a dead electrode may hide it: then what is reached
+    without those is compared. Another order than ``given`` is found where it is better by more than
+    BETTER_BY and at least LIKELY.
     """
     said = orders.index(given) if given in orders else -1
     size = np.abs(cases[0].predicted)
     if said >= 0 and np.ptp(size) <= SAME * size.max():
-        return OrderChoice(said, Outcome(untold=("the channel order: the protocol makes all channels alike",)))
+        return OrderChoice(
+            said, Outcome(untold=("the channel order: the protocol makes all channels alike",))
+        )
     reached = [likeness(case, allow_fault=False) for case in cases]
     if max(reached) < LIKELY:
         reached = [likeness(case, allow_fault=True) for case in cases]
     best = int(np.argmax(reached))
-    evidence: dict[str, Any] = {name: round(value, 4) for name, value in zip(orders, reached, strict=True)}
+    evidence: dict[str, Any] = {
+        name: round(value, 4) for name, value in zip(orders, reached, strict=True)
+    }
     measured: dict[str, Any] = {"order_correlation": evidence}
     if said >= 0 and (best == said or reached[best] < max(reached[said] + BETTER_BY, LIKELY)):
         return OrderChoice(said, Outcome(measured=measured))
@@ -58,8 +65,14 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
 
 
 def check_frames(case: Case) -> Outcome:
-    """Frames that are no small change of the reference: another quantity (imaginary parts, times), or another unit."""
-    likeness = np.array([cosine(frame[case.trusted], case.reference[case.trusted]) for frame in _finite_frames(case)])
+    """Frames that are no small change of the reference: another quantity (imaginary parts, times),
+    or another unit."""
+    likeness = np.array(
+        [
+            cosine(frame[case.trusted], case.reference[case.trusted])
+            for frame in _finite_frames(case)
+        ]
+    )
     odd = np.flatnonzero(likeness < UNLIKE)
     if not len(odd):
         return Outcome()
@@ -67,8 +80,9 @@ def check_frames(case: Case) -> Outcome:
     finding = Finding(
         "frames-unlike-the-reference",
         FAULT,
-        f"{len(odd)} frame(s) are nothing like the reference, first {names[0]!r}: imaginary parts or another quantity "
-        "among the columns? Choose with --columns and --complex-part, or --voltage",
+        f"{len(odd)} frame(s) are nothing like the reference, first {names[0]!r}: imaginary parts"
+        " or another quantity among the columns? Choose with --columns and --complex-part, or"
+        " --voltage",
         {"frames": names, "cosine": [round(float(v), 4) for v in likeness[odd]]},
     )
     return Outcome((finding,))
@@ -77,8 +91,9 @@ def check_frames(case: Case) -> Outcome:
 def check_sign(case: Case) -> tuple[Case, Outcome]:
     """Reversed polarity, or magnitudes only; the case comes back with the signs mended.
 
-    Where the homogeneous frame has both signs, magnitudes show by having one. Where it has only one (adjacent
-    patterns), data of the other sign are reversed, or magnitudes; only a channel that crosses zero tells which.
+    Where the homogeneous frame has both signs, magnitudes show by having one. Where it has only one
+    (adjacent patterns), data of the other sign are reversed, or magnitudes; only a channel that
+    crosses zero tells which.
     """
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     level = rms(measured)
@@ -88,7 +103,11 @@ def check_sign(case: Case) -> tuple[Case, Outcome]:
     energy = float((predicted**2).sum())
     positive_share = float((predicted[predicted > 0] ** 2).sum()) / max(energy, 1e-300)
     mixed = MIXED_SHARE < positive_share < 1 - MIXED_SHARE
-    alike = [frame for frame in _finite_frames(case)[:, case.trusted] if cosine(frame, measured) >= UNLIKE]
+    alike = [
+        frame
+        for frame in _finite_frames(case)[:, case.trusted]
+        if cosine(frame, measured) >= UNLIKE
+    ]
     everything = np.concatenate([measured, *alike])
     some_negative = bool((everything < -limit).any())
     evidence: dict[str, Any] = {
@@ -97,7 +116,10 @@ def check_sign(case: Case) -> tuple[Case, Outcome]:
         "greatest_v": float(np.max(everything)),
     }
     if mixed and not (measured < -limit).any():
-        text = "all voltages are above 0 where the homogeneous frame has both signs: these are magnitudes"
+        text = (
+            "all voltages are above 0 where the homogeneous frame has both signs: these are"
+            " magnitudes"
+        )
         finding = Finding("magnitude", FAULT, text, evidence, "--sign magnitude")
         return signed_as_predicted(case), Outcome((finding,))
     if cosine(measured, predicted) < 0:
@@ -106,13 +128,18 @@ def check_sign(case: Case) -> tuple[Case, Outcome]:
             finding = Finding("reversed", FAULT, text, evidence, "--sign reversed")
         else:
             text = (
-                "all voltages are above 0 where the homogeneous frame is below 0: reversed polarity or magnitudes; no "
-                "channel crosses 0, so they cannot be told apart, and both options mend it alike"
+                "all voltages are above 0 where the homogeneous frame is below 0: reversed polarity"
+                " or magnitudes; no channel crosses 0, so they cannot be told apart, and both"
+                " options mend it alike"
             )
             finding = Finding("reversed-or-magnitude", FAULT, text, evidence, "--sign reversed")
         return _negated(case), Outcome((finding,))
     if not mixed and positive_share > 0.5 and not some_negative:
-        return case, Outcome(untold=("whether these are magnitudes: the homogeneous frame is above 0 everywhere, too",))
+        return case, Outcome(
+            untold=(
+                "whether these are magnitudes: the homogeneous frame is above 0 everywhere, too",
+            )
+        )
     return case, Outcome()
 
 
@@ -160,7 +187,9 @@ def _whole_pairs(case: Case, wrong: np.ndarray[Any, Any], columns: tuple[int, in
 
 def _negated(case: Case) -> Case:
     frames = replace(
-        case.frames, voltage_v=-case.frames.voltage_v, reference_voltage_v=-case.frames.reference_voltage_v
+        case.frames,
+        voltage_v=-case.frames.voltage_v,
+        reference_voltage_v=-case.frames.reference_voltage_v,
     )
     return replace(case, frames=frames)
 

@@ -1,6 +1,7 @@
 """Where electrode 0 is and which way the numbers run, told by touches at known places.
 
-One touch alone leaves a mirror image about its own diameter; two that are no mirror image of each other leave nothing.
+One touch alone leaves a mirror image about its own diameter; two that are no mirror image of each
+other leave nothing.
 """
 
 from __future__ import annotations
@@ -22,15 +23,22 @@ SHOWN = 3
 
 
 def check_orientation(case: Case, untold: tuple[str, ...]) -> Outcome:
-    """Hold the changes by known touches against every numbering; ``untold`` is what the quiet frame could not tell."""
+    """Hold the changes by known touches against every numbering; ``untold`` is what the quiet frame
+    could not tell."""
     frames, skin = case.frames, case.skin
     if frames.touch_frame is None:
-        return Outcome(untold=tuple(f"{text}: say where a touch was (--touch X,Y)" for text in untold))
+        return Outcome(
+            untold=tuple(f"{text}: say where a touch was (--touch X,Y)" for text in untold)
+        )
     if skin is None:
-        return Outcome(untold=tuple(f"{text}: known touches need the skin (--skin)" for text in untold))
+        return Outcome(
+            untold=tuple(f"{text}: known touches need the skin (--skin)" for text in untold)
+        )
     measured, transfers = _changes(case)
     if not measured:
-        return Outcome(untold=tuple(f"{text}: the known touches have no sign or no change" for text in untold))
+        return Outcome(
+            untold=tuple(f"{text}: the known touches have no sign or no change" for text in untold)
+        )
     size = np.abs(case.predicted)
     weight = 1 / np.maximum(size, WEAK_PER_GREATEST * size.max())
     order = ranked(_fits(case, measured, transfers, weight))
@@ -41,44 +49,72 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> Outcome:
     if best.fit < LIKELY:
         if _drowned(case, measured, weight):
             return Outcome(untold=("the known touches change the voltages by less than the noise",))
-        text = "the known touches do not explain the change in any numbering: wrong places, signs or frames"
+        text = (
+            "the known touches do not explain the change in any numbering: wrong places, signs or"
+            " frames"
+        )
         return Outcome((Finding("touch-unexplained", NOTE, text, evidence),), measured=summary)
-    rivals = [numbering for numbering in order if 1 - numbering.fit <= (1 - best.fit) * RIVAL_TIMES + CLOSE]
+    rivals = [
+        numbering
+        for numbering in order
+        if 1 - numbering.fit <= (1 - best.fit) * RIVAL_TIMES + CLOSE
+    ]
     if given in rivals:
         return Outcome(untold=_also(given, rivals), measured=summary)
-    text = f"known touches are seen where they were if the electrodes are renumbered ({best}), not as given"
+    text = (
+        f"known touches are seen where they were if the electrodes are renumbered ({best}), not as"
+        " given"
+    )
     if len(rivals) > 1:
         text += f"; {rivals[1]} fits nearly as well, a second touch would tell"
     return Outcome((Finding("numbering", FAULT, text, evidence, best.option),), measured=summary)
 
 
 def _changes(case: Case) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Of each frame with touches of known sign the measured change (m,) and the predicted transfer change (n, n)."""
+    """Of each frame with touches of known sign the measured change (m,) and the predicted transfer
+    change (n, n)."""
     frames, skin = case.frames, case.skin
-    if frames.touch_frame is None or frames.touch_xy_mm is None or frames.touch_radius_mm is None or skin is None:
+    if (
+        frames.touch_frame is None
+        or frames.touch_xy_mm is None
+        or frames.touch_radius_mm is None
+        or skin is None
+    ):
         return [], []
     measured, transfers = [], []
     for frame in np.unique(frames.touch_frame):
         touches = frames.touches_in(int(frame))
-        signs = np.zeros(len(touches), dtype=np.int8) if frames.touch_sign is None else frames.touch_sign[touches]
+        signs = (
+            np.zeros(len(touches), dtype=np.int8)
+            if frames.touch_sign is None
+            else frames.touch_sign[touches]
+        )
         change = frames.voltage_v[frame] - case.reference
         if (signs == 0).any() or not np.isfinite(change).all() or not change.any():
             continue
         measured.append(change)
-        transfers.append(touch_transfer(skin, frames.touch_xy_mm[touches], frames.touch_radius_mm[touches], signs))
+        transfers.append(
+            touch_transfer(
+                skin, frames.touch_xy_mm[touches], frames.touch_radius_mm[touches], signs
+            )
+        )
     return measured, transfers
 
 
 def _fits(
     case: Case, measured: list[FloatArray], transfers: list[FloatArray], weight: FloatArray
 ) -> FloatArray:
-    """Mean cosine (2, n) of the measured changes with those that each numbering predicts, channels times ``weight``."""
+    """Mean cosine (2, n) of the measured changes with those that each numbering predicts, channels
+    times ``weight``."""
     use = case.trusted
     total = np.zeros((2, case.n_electrodes))
     for change, transfer in zip(measured, transfers, strict=True):
         frames = renumbered_frames(case, transfer)
         total += np.array(
-            [[cosine((change * weight)[use], (frame * weight)[use]) for frame in side] for side in frames]
+            [
+                [cosine((change * weight)[use], (frame * weight)[use]) for frame in side]
+                for side in frames
+            ]
         )
     return total / len(measured)
 
@@ -91,7 +127,8 @@ def _also(given: Numbering, rivals: list[Numbering]) -> tuple[str, ...]:
 
 
 def _drowned(case: Case, measured: list[FloatArray], weight: FloatArray) -> bool:
-    """Whether the weighted changes are less than AUDIBLE times the weighted noise of one frame, where that is known."""
+    """Whether the weighted changes are less than AUDIBLE times the weighted noise of one frame,
+    where that is known."""
     quiet = case.frames.reference_voltage_v
     if len(quiet) < LEAST_QUIET:
         return False

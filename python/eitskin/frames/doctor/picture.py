@@ -1,4 +1,5 @@
-"""The doctor's picture: reference against expectation, gains by pair, reciprocity, noise. Needs matplotlib."""
+"""The doctor's picture: reference against expectation, gains by pair, reciprocity, noise. Needs
+matplotlib."""
 
 from __future__ import annotations
 
@@ -42,7 +43,9 @@ def draw(path: str | Path, report: Report, case: Case) -> None:
     for panel in axes.ravel():
         panel.spines[["top", "right"]].set_visible(False)
     faults = [finding.name for finding in report.findings if finding.severity == FAULT]
-    verdict = "nothing must be mended" if not faults else "to mend: " + ", ".join(dict.fromkeys(faults))
+    verdict = (
+        "nothing must be mended" if not faults else "to mend: " + ", ".join(dict.fromkeys(faults))
+    )
     figure.suptitle(f"{Path(report.source).name}: {verdict}", x=0.01, ha="left", fontsize=11)
     with write_beside(path) as temporary:
         figure.savefig(temporary, dpi=110)
@@ -51,10 +54,23 @@ def draw(path: str | Path, report: Report, case: Case) -> None:
 def _reference(panel: Any, case: Case) -> None:
     channels = np.arange(len(case.rows))
     off = ~case.trusted
-    panel.plot(channels, 1e3 * case.expected(), color=EXPECTED, linewidth=2.5, label="expected of a homogeneous skin")
+    panel.plot(
+        channels,
+        1e3 * case.expected(),
+        color=EXPECTED,
+        linewidth=2.5,
+        label="expected of a homogeneous skin",
+    )
     panel.plot(channels, 1e3 * case.reference, color=MEASURED, linewidth=0.9, label="measured")
     if off.any():
-        panel.plot(channels[off], 1e3 * case.reference[off], ".", color=BAD, markersize=6, label="not trusted")
+        panel.plot(
+            channels[off],
+            1e3 * case.reference[off],
+            ".",
+            color=BAD,
+            markersize=6,
+            label="not trusted",
+        )
     panel.set(xlabel="channel (order and sign mended)", ylabel="mV", title="Mean quiet frame")
     low, high = panel.get_ylim()
     panel.set_ylim(low, high + 0.2 * (high - low))
@@ -69,13 +85,21 @@ def _gains(figure: Any, panel: Any, case: Case) -> None:
     grid[drive.ravel(), pair.ravel()] = np.where(strong, gain - 1, np.nan)
     left_out = np.full(grid.shape, np.nan)
     left_out[drive.ravel(), pair.ravel()] = np.where(case.trusted, np.nan, 1.0)
-    shown = panel.imshow(100 * grid, cmap="RdBu_r", vmin=-100 * GAIN_SPAN, vmax=100 * GAIN_SPAN, origin="lower")
+    shown = panel.imshow(
+        100 * grid, cmap="RdBu_r", vmin=-100 * GAIN_SPAN, vmax=100 * GAIN_SPAN, origin="lower"
+    )
     panel.imshow(left_out, cmap="Greys", vmin=0, vmax=2, origin="lower")
     step = max(1, len(drives) // 8)
-    panel.set_yticks(range(0, len(drives), step), [f"{a},{b}" for a, b in drives[::step]], fontsize=8)
+    panel.set_yticks(
+        range(0, len(drives), step), [f"{a},{b}" for a, b in drives[::step]], fontsize=8
+    )
     step = max(1, len(pairs) // 8)
     panel.set_xticks(range(0, len(pairs), step), [f"{a},{b}" for a, b in pairs[::step]], fontsize=8)
-    panel.set(xlabel="measuring pair", ylabel="drive pair", title="Gain of each channel (grey: not trusted)")
+    panel.set(
+        xlabel="measuring pair",
+        ylabel="drive pair",
+        title="Gain of each channel (grey: not trusted)",
+    )
     figure.colorbar(shown, ax=panel, label="% from expected")
 
 
@@ -83,7 +107,11 @@ def _reciprocity(panel: Any, case: Case) -> None:
     pairs = case.frames.protocol.reciprocal_pairs()
     both = pairs.second >= 0
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
-    panel.set(xlabel="voltage of a channel, mV", ylabel="mV", title="Reciprocity: difference within each pair")
+    panel.set(
+        xlabel="voltage of a channel, mV",
+        ylabel="mV",
+        title="Reciprocity: difference within each pair",
+    )
     if not len(first):
         panel.text(0.5, 0.5, "no reciprocal channels", transform=panel.transAxes, ha="center")
         return
@@ -100,8 +128,14 @@ def _noise_or_change(panel: Any, case: Case) -> None:
     if len(quiet) >= LEAST_QUIET:
         noise = 1e6 * channel_noise(np.nan_to_num(quiet))
         panel.semilogy(np.maximum(noise, 1e-6), ".", color=MEASURED, markersize=4)
-        panel.axhline(float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0, color=EXPECTED)
-        panel.set(xlabel="channel", ylabel="µV", title=f"Noise over {len(quiet)} quiet frames (line: median)")
+        panel.axhline(
+            float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0, color=EXPECTED
+        )
+        panel.set(
+            xlabel="channel",
+            ylabel="µV",
+            title=f"Noise over {len(quiet)} quiet frames (line: median)",
+        )
         return
     panel.set(xlabel="channel", ylabel="mV", title="Change of each frame from the quiet one")
     for frame in case.frames.voltage_v[:20]:

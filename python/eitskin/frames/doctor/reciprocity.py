@@ -1,4 +1,5 @@
-"""Reciprocity: exchanging the drive and the measuring pair must not change the voltage, whatever is inside the skin."""
+"""Reciprocity: exchanging the drive and the measuring pair must not change the voltage, whatever is
+inside the skin."""
 
 from __future__ import annotations
 
@@ -20,12 +21,15 @@ WORST = 5
 
 
 def check_reciprocity(case: Case) -> Outcome:
-    """Reciprocity error of each pair |Vi - s Vj| / max(mean(|Vi|, |Vj|), 0.1 rms), and of all: rms(Vi - s Vj) / rms(V).
+    """Reciprocity error of each pair |Vi - s Vj| / max(mean(|Vi|, |Vj|), 0.1 rms), and of all:
+    rms(Vi - s Vj) / rms(V).
 
     The channel of a bad pair whose gain is farther from 1 is named, where the prediction can tell.
     """
     pairs = case.frames.protocol.reciprocal_pairs()
-    both = (pairs.second >= 0) & case.trusted[pairs.first] & case.trusted[np.maximum(pairs.second, 0)]
+    both = (
+        (pairs.second >= 0) & case.trusted[pairs.first] & case.trusted[np.maximum(pairs.second, 0)]
+    )
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
     if not len(first):
         return Outcome(untold=("reciprocity: the protocol has no two channels of one voltage",))
@@ -48,12 +52,16 @@ def check_reciprocity(case: Case) -> Outcome:
     bad = [k for k in order if error[k] > max(PAIR_OFF, PAIR_TIMES_USUAL * usual)]
     findings = []
     if bad:
-        off = [int(first[k] if abs(gain[first[k]] - 1) > abs(gain[second[k]] - 1) else second[k]) for k in bad]
+        off = [
+            int(first[k] if abs(gain[first[k]] - 1) > abs(gain[second[k]] - 1) else second[k])
+            for k in bad
+        ]
         findings.append(
             Finding(
                 "reciprocity-pairs",
                 FAULT,
-                f"{len(bad)} pair(s) of channels that must agree do not; off in each is channel {short_list(off)}",
+                f"{len(bad)} pair(s) of channels that must agree do not; off in each is channel"
+                f" {short_list(off)}",
                 {
                     "errors": {f"{first[k]}/{second[k]}": round(float(error[k]), 4) for k in bad},
                     "off": off,

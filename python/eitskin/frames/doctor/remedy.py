@@ -1,4 +1,5 @@
-"""Which options of ``eitskin import`` mend bad channels, and how the remedies of several findings become one."""
+"""Which options of ``eitskin import`` mend bad channels, and how the remedies of several findings
+become one."""
 
 from __future__ import annotations
 
@@ -12,10 +13,13 @@ CHANNEL_LISTS = ("--flip-channels", "--impute-channels", "--drop-channels", "--d
 
 
 def channel_remedy(case: Case, channels: Any) -> str:
-    """Fill ``channels`` from their reciprocals where those are trusted, and leave out the others."""
+    """Fill ``channels`` from their reciprocals where those are trusted, and leave out the
+    others."""
     bad = set(numbers(channels))
     partner = partners(case.rows, case.n_electrodes)
-    fill = sorted(k for k in bad if k in partner and partner[k][0] not in bad and case.trusted[partner[k][0]])
+    fill = sorted(
+        k for k in bad if k in partner and partner[k][0] not in bad and case.trusted[partner[k][0]]
+    )
     leave = sorted(bad - set(fill))
     return _joined({"--impute-channels": fill, "--drop-channels": leave})
 
@@ -26,7 +30,8 @@ def names_numbers(remedy: str) -> bool:
 
 
 def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
-    """One set of options from those of several findings: lists are united, and no channel is filled from a bad one."""
+    """One set of options from those of several findings: lists are united, and no channel is filled
+    from a bad one."""
     lists: dict[str, set[int]] = {option: set() for option in CHANNEL_LISTS}
     others: list[str] = []
     for remedy in remedies:
@@ -39,11 +44,16 @@ def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
             elif (said := f"{option} {value}".strip()) not in others:
                 others.append(said)
     gone = {
-        row for row, electrodes in enumerate(case.rows.tolist()) if lists["--drop-electrodes"].intersection(electrodes)
+        row
+        for row, electrodes in enumerate(case.rows.tolist())
+        if lists["--drop-electrodes"].intersection(electrodes)
     }
     lists["--drop-channels"] -= gone
     lists["--impute-channels"] -= gone | lists["--drop-channels"]
-    partner, bad = partners(case.rows, case.n_electrodes), lists["--impute-channels"] | lists["--drop-channels"]
+    partner, bad = (
+        partners(case.rows, case.n_electrodes),
+        lists["--impute-channels"] | lists["--drop-channels"],
+    )
     hopeless = {k for k in lists["--impute-channels"] if partner.get(k, (k, 1))[0] in bad}
     lists["--drop-channels"] |= hopeless
     lists["--impute-channels"] -= hopeless
@@ -52,4 +62,6 @@ def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
 
 
 def _joined(lists: dict[str, list[int]]) -> str:
-    return " ".join(f"{option} {','.join(map(str, values))}" for option, values in lists.items() if values)
+    return " ".join(
+        f"{option} {','.join(map(str, values))}" for option, values in lists.items() if values
+    )

@@ -1,4 +1,5 @@
-"""What the doctor says: findings with evidence and remedy, what could not be told, and the numbers measured."""
+"""What the doctor says: findings with evidence and remedy, what could not be told, and the numbers
+measured."""
 
 from __future__ import annotations
 
@@ -15,10 +16,11 @@ SHOWN = 8
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found. ``name`` is stable for programs; ``severity`` FAULT must be mended, NOTE need not.
+    """One thing found. ``name`` is stable for programs; ``severity`` FAULT must be mended, NOTE
+    need not.
 
-    ``evidence`` holds the numbers that it rests on, ``mend`` the options of ``eitskin import`` that mend it ("" where
-    only the hardware can be mended).
+    ``evidence`` holds the numbers that it rests on, ``mend`` the options of ``eitskin import`` that
+    mend it ("" where only the hardware can be mended).
     """
 
     name: str
@@ -30,7 +32,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one check returns: ``findings``, ``untold`` what it could not tell and why, ``measured`` numbers by name."""
+    """What one check returns: ``findings``, ``untold`` what it could not tell and why, ``measured``
+    numbers by name."""
 
     findings: tuple[Finding, ...] = ()
     untold: tuple[str, ...] = ()
@@ -88,16 +91,24 @@ class Report:
         for finding in self.findings:
             lines.append(f"  {finding.severity.upper():5} {finding.name}: {finding.text}")
             if finding.evidence:
-                lines.append("        evidence: " + ", ".join(f"{k} {_shown(v)}" for k, v in finding.evidence.items()))
+                lines.append(
+                    "        evidence: "
+                    + ", ".join(f"{k} {_shown(v)}" for k, v in finding.evidence.items())
+                )
             if finding.mend:
                 lines.append(f"        mend: eitskin import ... {finding.mend}")
         lines.extend(f"  not told: {text}" for text in self.untold)
         if self.measured:
-            lines.append("  measured: " + ", ".join(f"{k} {_shown(v)}" for k, v in self.measured.items()))
+            lines.append(
+                "  measured: " + ", ".join(f"{k} {_shown(v)}" for k, v in self.measured.items())
+            )
         faults = sum(finding.severity == FAULT for finding in self.findings)
         notes = len(self.findings) - faults
         counted = f"{faults} fault{'s' * (faults != 1)}, {notes} note{'s' * (notes != 1)}"
-        lines.append(f"  {counted}: " + ("nothing must be mended" if self.healthy else "mend these before imaging"))
+        lines.append(
+            f"  {counted}: "
+            + ("nothing must be mended" if self.healthy else "mend these before imaging")
+        )
         if self.mend:
             lines.append(f"  all in one: eitskin import {self.source} -o OUT.npz ... {self.mend}")
         return lines

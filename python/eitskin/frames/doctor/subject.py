@@ -1,4 +1,5 @@
-"""What the doctor examines: a frames file, or a source read under each order that its channels could stand in."""
+"""What the doctor examines: a frames file, or a source read under each order that its channels
+could stand in."""
 
 from __future__ import annotations
 
@@ -20,9 +21,11 @@ AS_GIVEN = "as given"
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """``readings``: (order, frames), the channels in the protocol's order if the source stands in that order.
+    """``readings``: (order, frames), the channels in the protocol's order if the source stands in
+    that order.
 
-    ``given``: the order that was said. ``remarks``: what had to be assumed to read it. ``unit_known``: whether the
+    ``given``: the order that was said. ``remarks``: what had to be assumed to read it.
+        ``unit_known``: whether the
     numbers are said to be volts.
     """
 
@@ -35,14 +38,17 @@ class Subject:
 
 
 def subject_from_frames(frames: Frames, skin: Skin | None, source: str = "frames") -> Subject:
-    """``frames`` as they are, and as they would be if their channels really stood in rotating order."""
+    """``frames`` as they are, and as they would be if their channels really stood in rotating
+    order."""
     readings = [(AS_GIVEN, frames)]
     wanted = np.asarray(frames.protocol.drive_measure, dtype=np.int64)
     rotating = source_table("rotating", frames.protocol)
     if not np.array_equal(rotating, wanted):
         index = match_rows(rotating, wanted).index
         moved = replace(
-            frames, voltage_v=frames.voltage_v[:, index], reference_voltage_v=frames.reference_voltage_v[:, index]
+            frames,
+            voltage_v=frames.voltage_v[:, index],
+            reference_voltage_v=frames.reference_voltage_v[:, index],
         )
         readings.append(("rotating", moved))
     unit_known = str(frames.meta.get("unit", "V")) == "V"
@@ -56,7 +62,8 @@ def subject_from_source(
     skin: Skin | None,
     n_electrodes: int | None = None,
 ) -> Subject:
-    """Any file that ``import`` reads, mended as ``options`` say, and a frames file as ``load_frames`` reads it.
+    """Any file that ``import`` reads, mended as ``options`` say, and a frames file as
+    ``load_frames`` reads it.
 
     Unlike import, NaN and Inf pass, and where no quiet frames are named the first frame is taken.
 
@@ -70,7 +77,9 @@ def subject_from_source(
     own_table = options.source.protocol_table is not None or options.table_file is not None
     for order in dict.fromkeys((options.order, *(() if own_table else ORDERS))):
         try:
-            frames = import_frames(path, replace(options, order=order), protocol, skin, n_electrodes, lenient=True)
+            frames = import_frames(
+                path, replace(options, order=order), protocol, skin, n_electrodes, lenient=True
+            )
         except (FrameError, UsageError) as error:
             if order == options.order and isinstance(error, UsageError):
                 raise
@@ -82,4 +91,11 @@ def subject_from_source(
     remarks = []
     if "assumed" in readings[0][1].meta:
         remarks.append(str(readings[0][1].meta["assumed"]))
-    return Subject(str(path), options.order, tuple(readings), skin, tuple(remarks), options.source.scale is not None)
+    return Subject(
+        str(path),
+        options.order,
+        tuple(readings),
+        skin,
+        tuple(remarks),
+        options.source.scale is not None,
+    )

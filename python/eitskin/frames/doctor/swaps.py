@@ -1,8 +1,9 @@
 """Exchanged wires: which renaming of electrodes makes the reference look like a homogeneous frame?
 
-Exchanges are tried pair by pair by the misfit of magnitudes, the best one kept, again and again. The whole is accepted
-only if it leaves little, at most half of what there was, and less than any short circuit leaves. Three electrodes in a
-ring (each in the place of the next) may be too far from the start for this search.
+Exchanges are tried pair by pair by the misfit of magnitudes, the best one kept, again and again.
+The whole is accepted only if it leaves little, at most half of what there was, and less than any
+short circuit leaves. Three electrodes in a ring (each in the place of the next) may be too far from
+the start for this search.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ MOST_SWAPS = 6
 
 @dataclass(frozen=True)
 class Exchange:
-    """``pairs`` of electrodes exchanged one after the other, and the misfit ``before`` and ``after``."""
+    """``pairs`` of electrodes exchanged one after the other, and the misfit ``before`` and
+    ``after``."""
 
     pairs: tuple[tuple[int, int], ...]
     before: float
@@ -50,7 +52,9 @@ def best_exchange(case: Case) -> Exchange:
     pairs: list[tuple[int, int]] = []
     before = best = misfit(case, use, True)
     while best > WORTH_TRYING and len(pairs) < MOST_SWAPS:
-        left = misfits(case.reference, voltages_of(case.transfer_ohm, exchanged[:, rows]), use, True)
+        left = misfits(
+            case.reference, voltages_of(case.transfer_ohm, exchanged[:, rows]), use, True
+        )
         k = int(np.argmin(left))
         if left[k] > STEP * best:
             break
@@ -89,7 +93,8 @@ def renamed(case: Case, exchange: Exchange) -> Case:
 def likeness(case: Case, *, allow_fault: bool) -> float:
     """Correlation of |reference| with |prediction|, in any numbering.
 
-    With ``allow_fault`` the best that is reached after undoing a convincing exchange, or without any one electrode.
+    With ``allow_fault`` the best that is reached after undoing a convincing exchange, or without
+    any one electrode.
     """
     if not allow_fault:
         return best_likeness(case)
@@ -97,4 +102,6 @@ def likeness(case: Case, *, allow_fault: bool) -> float:
     if exchange.convincing:
         return best_likeness(renamed(case, exchange))
     used = set(case.rows.ravel().tolist())
-    return max(best_likeness(replace(case, trusted=case.trusted & ~touching(case.rows, [e]))) for e in used)
+    return max(
+        best_likeness(replace(case, trusted=case.trusted & ~touching(case.rows, [e]))) for e in used
+    )

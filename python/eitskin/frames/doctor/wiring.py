@@ -1,7 +1,9 @@
-"""Electrodes that are dead or joined: every such hypothesis predicts a frame, and the best one is named.
+"""Electrodes that are dead or joined: every such hypothesis predicts a frame, and the best one is
+named.
 
-Joined electrodes: the transfer matrix with the wire in it. A dead electrode: nearly all channels that drive by it, or
-that measure by it, stand out or are silent, and all channels without it are as if nothing had happened.
+Joined electrodes: the transfer matrix with the wire in it. A dead electrode: nearly all channels
+that drive by it, or that measure by it, stand out or are silent, and all channels without it are as
+if nothing had happened.
 """
 
 from __future__ import annotations
@@ -31,19 +33,23 @@ MOST_FAULTS = 4
 
 @dataclass(frozen=True)
 class Dead:
-    """``electrodes`` taken for dead, and the misfit that the channels without them are left with."""
+    """``electrodes`` taken for dead, and the misfit that the channels without them are left
+    with."""
 
     electrodes: tuple[int, ...]
     misfit: float
 
 
 def check_wiring(case: Case) -> tuple[Case, Outcome]:
-    """Name faults while one explains the channels that stand out: dead electrodes, or one short circuit.
+    """Name faults while one explains the channels that stand out: dead electrodes, or one short
+    circuit.
 
     Nothing more is sought once a short circuit is found: its frame is known only roughly.
     """
     findings: list[Finding] = []
-    while len(findings) < MOST_FAULTS and (np.count_nonzero(outliers(case)) >= LEAST_OUTLIERS or _suspects(case)):
+    while len(findings) < MOST_FAULTS and (
+        np.count_nonzero(outliers(case)) >= LEAST_OUTLIERS or _suspects(case)
+    ):
         before = misfit(case, case.trusted, case.magnitude)
         enough = min(GOOD, before / BETTER_TIMES)
         joined, dead = best_joined(case, case.magnitude), _best_dead(case)
@@ -69,7 +75,9 @@ def check_lost(case: Case) -> Outcome:
         using = (case.rows[:, :2] == electrode).any(axis=1) & usable
         if using.sum() < LEAST_OUTLIERS or not len(case.frames.voltage_v):
             continue
-        driven = np.where(np.isfinite(case.frames.voltage_v[:, using]), case.frames.voltage_v[:, using], np.inf)
+        driven = np.where(
+            np.isfinite(case.frames.voltage_v[:, using]), case.frames.voltage_v[:, using], np.inf
+        )
         left = np.median(np.abs(driven / case.reference[using]), axis=1)
         frames = np.flatnonzero(left < LOST)
         if len(frames):
@@ -79,7 +87,11 @@ def check_lost(case: Case) -> Outcome:
                     FAULT,
                     f"electrode {electrode} (from 0) stops driving in {len(frames)} frame(s), "
                     f"first {case.frames.frame_name[frames[0]]!r}",
-                    {"electrode": electrode, "frames": numbers(frames), "left": round(float(left[frames].max()), 4)},
+                    {
+                        "electrode": electrode,
+                        "frames": numbers(frames),
+                        "left": round(float(left[frames].max()), 4),
+                    },
                     f"--drop-electrodes {electrode}",
                 )
             )
@@ -89,12 +101,18 @@ def check_lost(case: Case) -> Outcome:
 def _best_dead(case: Case) -> Dead | None:
     """The fewest suspects without which the other channels are well explained: one, or two."""
     suspects = _suspects(case)
-    sets = [(e,) for e in suspects] + (list(combinations(suspects, 2)) if len(suspects) <= MOST_SUSPECTS else [])
+    sets = [(e,) for e in suspects] + (
+        list(combinations(suspects, 2)) if len(suspects) <= MOST_SUSPECTS else []
+    )
     best: Dead | None = None
     for electrodes in sets:
         others = case.trusted & ~touching(case.rows, electrodes)
         dead = Dead(electrodes, misfit(case, others, case.magnitude) if others.any() else 1.0)
-        if best is None or dead.misfit * (1 if len(electrodes) == len(best.electrodes) else BETTER_TIMES) < best.misfit:
+        if (
+            best is None
+            or dead.misfit * (1 if len(electrodes) == len(best.electrodes) else BETTER_TIMES)
+            < best.misfit
+        ):
             best = dead
     return best
 
@@ -104,7 +122,8 @@ def _suspects(case: Case) -> list[int]:
 
 
 def _sides_off(case: Case, electrode: int) -> dict[str, float]:
-    """Of "driving" and "measuring" those by which nearly all channels of ``electrode`` stand out, with their gain.
+    """Of "driving" and "measuring" those by which nearly all channels of ``electrode`` stand out,
+    with their gain.
 
     They stand out from like channels, or, where too many of those are dead, by being nearly silent.
     """
@@ -123,7 +142,8 @@ def _sides_off(case: Case, electrode: int) -> dict[str, float]:
 
 
 def _strength(case: Case) -> FloatArray:
-    """|Reference| per |prediction| (m,), relative to its upper quartile: robust while fewer than half are dead."""
+    """|Reference| per |prediction| (m,), relative to its upper quartile: robust while fewer than
+    half are dead."""
     size = np.abs(case.predicted)
     ratio = np.divide(np.abs(case.reference), size, out=np.ones_like(size), where=size > 0)
     usual = float(np.quantile(ratio[case.trusted], 0.75)) if case.trusted.any() else 0.0
@@ -137,15 +157,27 @@ def _without(case: Case, dead: Dead, before: float) -> tuple[Case, list[Finding]
         evidence: dict[str, Any] = {"electrode": electrode}
         evidence |= {f"{name}_gain": gain for name, gain in sides.items()}
         evidence |= {"misfit": round(dead.misfit, 4), "misfit_without": round(before, 4)}
-        text = f"electrode {electrode} (from 0) is dead, {' and '.join(sides)}: mend its contact, or leave it out"
-        findings.append(Finding("dead-electrode", FAULT, text, evidence, f"--drop-electrodes {electrode}"))
+        text = (
+            f"electrode {electrode} (from 0) is dead, {' and '.join(sides)}: mend its contact, or"
+            " leave it out"
+        )
+        findings.append(
+            Finding("dead-electrode", FAULT, text, evidence, f"--drop-electrodes {electrode}")
+        )
     return replace(case, trusted=case.trusted & ~touching(case.rows, dead.electrodes)), findings
 
 
 def _with_joined(case: Case, joined: Joined, before: float) -> tuple[Case, Finding]:
     i, j = joined.pair
-    text = f"electrodes {i} and {j} (from 0) are joined by a short circuit: part them; no import option can undo this"
-    evidence = {"electrodes": [i, j], "misfit": round(joined.misfit, 4), "misfit_without": round(before, 4)}
+    text = (
+        f"electrodes {i} and {j} (from 0) are joined by a short circuit: part them; no import"
+        " option can undo this"
+    )
+    evidence = {
+        "electrodes": [i, j],
+        "misfit": round(joined.misfit, 4),
+        "misfit_without": round(before, 4),
+    }
     trusted = case.trusted & ~touching(case.rows, [i, j])
     bridged = replace(case, transfer_ohm=joined.transfer_ohm, trusted=trusted)
     return bridged, Finding("shorted-electrodes", FAULT, text, evidence)

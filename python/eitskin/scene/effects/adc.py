@@ -1,8 +1,10 @@
-"""The converter: voltages become whole numbers of steps, and what is out of range the first or last of them.
+"""The converter: voltages become whole numbers of steps, and what is out of range the first or last
+of them.
 
-Mid-tread, two's complement: B bits over +-range have the step LSB = 2 range / 2^B, codes from -2^(B-1) to 2^(B-1) - 1.
-The error is uniform over a step, with the variance LSB^2 / 12, wherever the signal moves over many steps (Bennett, Bell
-Syst. Tech. J. 27, 1948). What goes out is code times LSB, in V.
+Mid-tread, two's complement: B bits over +-range have the step LSB = 2 range / 2^B, codes from
+-2^(B-1) to 2^(B-1) - 1. The error is uniform over a step, with the variance LSB^2 / 12, wherever
+the signal moves over many steps (Bennett, Bell Syst. Tech. J. 27, 1948). What goes out is code
+times LSB, in V.
 """
 
 from __future__ import annotations
@@ -27,8 +29,12 @@ class Parameters:
     """Resolution, and the range in one of two ways; a headroom of 1.25 without either."""
 
     bits: int = parameter(12, "bit", "resolution", low=1, high=32)
-    range_v: float | None = parameter(None, "V", "the converter spans +- this", low=0, open_low=True)
-    headroom: float | None = parameter(None, "1", "range / largest untouched voltage", low=0, high=1e6, open_low=True)
+    range_v: float | None = parameter(
+        None, "V", "the converter spans +- this", low=0, open_low=True
+    )
+    headroom: float | None = parameter(
+        None, "1", "range / largest untouched voltage", low=0, high=1e6, open_low=True
+    )
 
     def __post_init__(self) -> None:
         if self.range_v is not None and self.headroom is not None:

@@ -1,9 +1,9 @@
 """The current's amplitude wanders: a slope, and a random walk.
 
-References and gain resistors drift with temperature and age; over a session that is a slope to first order, with a
-random walk (the integral of white noise, whose deviation grows with the square root of time; Allan, Proc. IEEE 54,
-1966) on top. All voltages scale alike. I(t) = I_0 (1 + slope t + walk), t from the session's first frame, where it is
-0.
+References and gain resistors drift with temperature and age; over a session that is a slope to
+first order, with a random walk (the integral of white noise, whose deviation grows with the square
+root of time; Allan, Proc. IEEE 54, 1966) on top. All voltages scale alike. I(t) = I_0 (1 + slope t
++ walk), t from the session's first frame, where it is 0.
 """
 
 from __future__ import annotations
@@ -26,12 +26,17 @@ SUMMARY = "The current's amplitude drifts slowly."
 class Parameters:
     """The slope and the walk."""
 
-    slope_per_min: float = parameter(0.01, "1/min", "relative change of the amplitude a minute", low=-10, high=10)
-    walk_per_sqrt_min: float = parameter(0.0, "1/sqrt(min)", "deviation of the walk after a minute", low=0, high=10)
+    slope_per_min: float = parameter(
+        0.01, "1/min", "relative change of the amplitude a minute", low=-10, high=10
+    )
+    walk_per_sqrt_min: float = parameter(
+        0.0, "1/sqrt(min)", "deviation of the walk after a minute", low=0, high=10
+    )
 
 
 def walk(parameters: Parameters, session: Session) -> FloatArray:
-    """The random walk's value at each frame (n_frames,), 0 at the first. Draws nothing if it is still."""
+    """The random walk's value at each frame (n_frames,), 0 at the first. Draws nothing if it is
+    still."""
     if parameters.walk_per_sqrt_min == 0:
         return np.zeros(session.n_frames)
     step = parameters.walk_per_sqrt_min * sqrt(1 / (60 * session.rate_hz))
@@ -48,5 +53,10 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         return np.asarray(v * factors[frame])
 
     drawn = session.n_frames - 1 if parameters.walk_per_sqrt_min else 0
-    note = f"{100 * parameters.slope_per_min:g} % a minute, walk {100 * parameters.walk_per_sqrt_min:g} % in a minute"
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=drawn), note, apply)
+    note = (
+        f"{100 * parameters.slope_per_min:g} % a minute, walk"
+        f" {100 * parameters.walk_per_sqrt_min:g} % in a minute"
+    )
+    return VoltageStep(
+        NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=drawn), note, apply
+    )

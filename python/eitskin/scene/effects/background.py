@@ -1,10 +1,11 @@
 """A sheet that is not even: a smooth random pattern of conductivity, its mean over the area kept.
 
-The pattern is a Gaussian random field with the covariance exp(-d^2 / (2 length^2)), as a sum of cosines whose wave
-vectors are normal with deviation 1 / length (random Fourier features; Rahimi and Recht, NIPS 2007). It is a function of
-place, so that another mesh samples the same pattern. With f of unit variance and q = ln(1 + spread^2), the conductivity
-is multiplied by exp(sqrt(q) f), log-normal with a relative deviation of ``spread``, so always above 0; dividing by its
-mean over the area makes the mean exactly what the skin's description says.
+The pattern is a Gaussian random field with the covariance exp(-d^2 / (2 length^2)), as a sum of
+cosines whose wave vectors are normal with deviation 1 / length (random Fourier features; Rahimi and
+Recht, NIPS 2007). It is a function of place, so that another mesh samples the same pattern. With f
+of unit variance and q = ln(1 + spread^2), the conductivity is multiplied by exp(sqrt(q) f),
+log-normal with a relative deviation of ``spread``, so always above 0; dividing by its mean over the
+area makes the mean exactly what the skin's description says.
 """
 
 from __future__ import annotations
@@ -28,18 +29,26 @@ COSINES = 256
 class Parameters:
     """How strong and how smooth."""
 
-    spread: float = parameter(0.1, "1", "relative standard deviation of the conductivity", low=0, high=2)
-    length_mm: float = parameter(30.0, "mm", "distance over which the pattern is alike", low=0, open_low=True)
+    spread: float = parameter(
+        0.1, "1", "relative standard deviation of the conductivity", low=0, high=2
+    )
+    length_mm: float = parameter(
+        30.0, "mm", "distance over which the pattern is alike", low=0, open_low=True
+    )
 
 
-def random_field(places_mm: FloatArray, length_mm: float, generator: np.random.Generator) -> FloatArray:
+def random_field(
+    places_mm: FloatArray, length_mm: float, generator: np.random.Generator
+) -> FloatArray:
     """A smooth Gaussian random field of mean 0 and variance 1 at ``places_mm`` (k, 2): (k,)."""
     waves_per_mm = generator.standard_normal((COSINES, 2)) / length_mm
     phases = generator.uniform(0, 2 * np.pi, COSINES)
     return np.asarray(np.cos(places_mm @ waves_per_mm.T + phases).sum(axis=1) * sqrt(2 / COSINES))
 
 
-def pattern(places_mm: FloatArray, areas: FloatArray, parameters: Parameters, draw: np.random.Generator) -> FloatArray:
+def pattern(
+    places_mm: FloatArray, areas: FloatArray, parameters: Parameters, draw: np.random.Generator
+) -> FloatArray:
     """Factors (k,) above 0 whose mean weighted by ``areas`` (k,) is 1."""
     field = random_field(places_mm, parameters.length_mm, draw)
     factors = np.exp(sqrt(log(1 + parameters.spread**2)) * field)
@@ -54,5 +63,8 @@ def make(parameters: Parameters, session: Session) -> MaterialStep:
     def apply(conductivity: FloatArray, time_s: float, frame: int) -> FloatArray:
         return np.asarray(conductivity * factors)
 
-    note = f"conductivity varies by {100 * parameters.spread:g} % over {parameters.length_mm:g} mm, its mean kept"
+    note = (
+        f"conductivity varies by {100 * parameters.spread:g} % over {parameters.length_mm:g} mm,"
+        " its mean kept"
+    )
     return MaterialStep(NAME, Cost(random_numbers=3 * COSINES), note, apply)

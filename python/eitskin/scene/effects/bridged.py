@@ -1,8 +1,8 @@
 """Electrodes joined by a resistor: a solder bridge, a drop of gel on the rim, wires that touch.
 
-A resistor R between electrodes i and j carries (U_i - U_j) / R, by Kirchhoff's current law one more term in the
-electrodes' balance: it adds [[1, -1], [-1, 1]] / R to their block of the matrix, which stays symmetric, so that
-reciprocity holds. R = 0 makes them one electrode.
+A resistor R between electrodes i and j carries (U_i - U_j) / R, by Kirchhoff's current law one more
+term in the electrodes' balance: it adds [[1, -1], [-1, 1]] / R to their block of the matrix, which
+stays symmetric, so that reciprocity holds. R = 0 makes them one electrode.
 """
 
 from __future__ import annotations
@@ -24,12 +24,18 @@ SUMMARY = "Electrodes are joined by a resistance."
 class Parameters:
     """Which, and by what."""
 
-    electrodes: tuple[int, ...] = parameter((0, 1), "", "electrodes joined in a chain (from 0)", low=0)
-    resistance_ohm: float = parameter(10.0, "ohm", "between one and the next of the chain", low=0, high=1e12)
+    electrodes: tuple[int, ...] = parameter(
+        (0, 1), "", "electrodes joined in a chain (from 0)", low=0
+    )
+    resistance_ohm: float = parameter(
+        10.0, "ohm", "between one and the next of the chain", low=0, high=1e12
+    )
 
     def __post_init__(self) -> None:
         if len(self.electrodes) < 2 or len(set(self.electrodes)) != len(self.electrodes):
-            raise ConfigError(f"electrodes = {list(self.electrodes)}: name at least two, and none twice")
+            raise ConfigError(
+                f"electrodes = {list(self.electrodes)}: name at least two, and none twice"
+            )
 
 
 def make(parameters: Parameters, session: Session) -> ContactStep:
@@ -41,11 +47,18 @@ def make(parameters: Parameters, session: Session) -> ContactStep:
     count = session.skin.electrodes.count
     for electrode in parameters.electrodes:
         if not 0 <= electrode < count:
-            raise ConfigError(f"electrodes: {electrode} does not exist; the skin's are 0 to {count - 1}")
+            raise ConfigError(
+                f"electrodes: {electrode} does not exist; the skin's are 0 to {count - 1}"
+            )
     bridges = tuple((i, j, parameters.resistance_ohm) for i, j in pairwise(parameters.electrodes))
 
     def apply(contacts: Contacts, time_s: float, frame: int) -> Contacts:
         return replace(contacts, bridges=contacts.bridges + bridges)
 
     joined = " - ".join(str(electrode) for electrode in parameters.electrodes)
-    return ContactStep(NAME, Cost(), f"electrodes {joined} (from 0) joined by {parameters.resistance_ohm:g} ohm", apply)
+    return ContactStep(
+        NAME,
+        Cost(),
+        f"electrodes {joined} (from 0) joined by {parameters.resistance_ohm:g} ohm",
+        apply,
+    )

@@ -1,8 +1,10 @@
-"""Channels with gains of their own: in instruments with an amplifier for each measuring pair, gains do not match.
+"""Channels with gains of their own: in instruments with an amplifier for each measuring pair, gains
+do not match.
 
-Resistors of 1 % make gains that differ by about 1 %. Each measuring pair (V+, V-) is a channel with the gain
-1 + uniform(-spread, spread), drawn once. Two rows that reciprocity makes equal are read by different channels, so their
-difference tells the mismatch; a difference image relative to the reference (dv / v) cancels it.
+Resistors of 1 % make gains that differ by about 1 %. Each measuring pair (V+, V-) is a channel with
+the gain 1 + uniform(-spread, spread), drawn once. Two rows that reciprocity makes equal are read by
+different channels, so their difference tells the mismatch; a difference image relative to the
+reference (dv / v) cancels it.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ SUMMARY = "Each measuring pair has a gain of its own."
 class Parameters:
     """How far gains differ."""
 
-    spread: float = parameter(0.01, "1", "each channel's gain differs from 1 by up to this", low=0, high=1)
+    spread: float = parameter(
+        0.01, "1", "each channel's gain differs from 1 by up to this", low=0, high=1
+    )
 
 
 def gains(parameters: Parameters, session: Session) -> FloatArray:
@@ -44,4 +48,6 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
 
     count = len(channels(session.protocol)[0])
     note = f"{count} channels whose gains differ by up to {100 * parameters.spread:g} %"
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=count), note, apply)
+    return VoltageStep(
+        NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=count), note, apply
+    )

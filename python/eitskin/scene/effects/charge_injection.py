@@ -1,15 +1,16 @@
 """Charge injection: a switch that closes pushes a little charge onto its wire.
 
-The gate's charge Q on the line's capacitance C is a step Q / C, which leaks away with the time constant tau (an
-ADG1206 injects typically 0.5 pC; its datasheet). The two measuring lines of a pair get nearly the same, and the
-difference is what the amplifier sees: each electrode's switch on each line differs by up to ``spread``. The
-demodulator multiplies by 2 sin(w t) and averages over a window of whole periods that begins ``dwell_us`` after
-switching, with the phase 0, so that of the step a exp(-t / tau) it keeps
+The gate's charge Q on the line's capacitance C is a step Q / C, which leaks away with the time
+constant tau (an ADG1206 injects typically 0.5 pC; its datasheet). The two measuring lines of a pair
+get nearly the same, and the difference is what the amplifier sees: each electrode's switch on each
+line differs by up to ``spread``. The demodulator multiplies by 2 sin(w t) and averages over a
+window of whole periods that begins ``dwell_us`` after switching, with the phase 0, so that of the
+step a exp(-t / tau) it keeps
 
     a (2 / T) exp(-dwell / tau) (1 - exp(-T / tau)) w / (1 / tau^2 + w^2)
 
-for a window T (an elementary integral); at frequency 0 the window's plain mean. A line whose electrode stays the same
-from row to row gets no charge. The voltage does not depend on the signal.
+for a window T (an elementary integral); at frequency 0 the window's plain mean. A line whose
+electrode stays the same from row to row gets no charge. The voltage does not depend on the signal.
 """
 
 from __future__ import annotations
@@ -36,18 +37,29 @@ class Parameters:
     """Charge, line, and the demodulator's window."""
 
     charge_pc: float = parameter(0.5, "pC", "mean charge of a closing switch", low=-1e6, high=1e6)
-    spread: float = parameter(0.3, "1", "each switch's charge differs by up to this part", low=0, high=1)
+    spread: float = parameter(
+        0.3, "1", "each switch's charge differs by up to this part", low=0, high=1
+    )
     capacitance_pf: float = parameter(100.0, "pF", "of a line with its wire", low=0, open_low=True)
-    settling_us: float = parameter(20.0, "us", "time constant with which the charge leaks away", low=0, open_low=True)
+    settling_us: float = parameter(
+        20.0, "us", "time constant with which the charge leaks away", low=0, open_low=True
+    )
     dwell_us: float = parameter(40.0, "us", "from switching to the window's start", low=0, high=1e9)
-    window_us: float = parameter(100.0, "us", "length of the window: whole periods", low=0, high=1e9, open_low=True)
-    frequency_hz: float = parameter(50e3, "Hz", "of the demodulator; 0 is direct current", low=0, high=1e9)
+    window_us: float = parameter(
+        100.0, "us", "length of the window: whole periods", low=0, high=1e9, open_low=True
+    )
+    frequency_hz: float = parameter(
+        50e3, "Hz", "of the demodulator; 0 is direct current", low=0, high=1e9
+    )
 
     def __post_init__(self) -> None:
         periods = self.frequency_hz * self.window_us * 1e-6
-        if not isclose(periods, round(periods), rel_tol=1e-6) or (self.frequency_hz and round(periods) < 1):
+        if not isclose(periods, round(periods), rel_tol=1e-6) or (
+            self.frequency_hz and round(periods) < 1
+        ):
             raise ConfigError(
-                f"window_us = {self.window_us:g} is {periods:g} periods of {self.frequency_hz:g} Hz; give whole periods"
+                f"window_us = {self.window_us:g} is {periods:g} periods of {self.frequency_hz:g}"
+                " Hz; give whole periods"
             )
 
 
@@ -63,11 +75,14 @@ def kept_by_demodulator(parameters: Parameters) -> float:
 
 
 def charges_pc(parameters: Parameters, session: Session) -> FloatArray:
-    """The charge of each electrode's switch on the lines V+ and V-, (2, L). Draws nothing without a spread."""
+    """The charge of each electrode's switch on the lines V+ and V-, (2, L). Draws nothing without a
+    spread."""
     count = session.skin.electrodes.count
     charges = np.full((2, count), parameters.charge_pc)
     if parameters.spread:
-        charges = charges * (1 + session.stream(NAME).uniform(-parameters.spread, parameters.spread, (2, count)))
+        charges = charges * (
+            1 + session.stream(NAME).uniform(-parameters.spread, parameters.spread, (2, count))
+        )
     return charges
 
 
@@ -76,12 +91,19 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
     plus, minus = session.protocol.drive_measure[:, 2:].T
     charges, moved = charges_pc(parameters, session), switched(session.protocol)
     onto_plus, onto_minus = charges[0, plus] * moved[:, 2], charges[1, minus] * moved[:, 3]
-    offsets_v = (onto_plus - onto_minus) / parameters.capacitance_pf * kept_by_demodulator(parameters)
+    offsets_v = (
+        (onto_plus - onto_minus) / parameters.capacitance_pf * kept_by_demodulator(parameters)
+    )
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
         return np.asarray(v + offsets_v)
 
     drawn = charges.size if parameters.spread else 0
     largest_v = float(np.abs(offsets_v).max())
-    note = f"{parameters.charge_pc:g} pC on {parameters.capacitance_pf:g} pF: up to {largest_v:.3g} V a row"
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=drawn), note, apply)
+    note = (
+        f"{parameters.charge_pc:g} pC on {parameters.capacitance_pf:g} pF: up to {largest_v:.3g} V"
+        " a row"
+    )
+    return VoltageStep(
+        NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=drawn), note, apply
+    )

@@ -1,10 +1,12 @@
-"""The amplifier's common mode: what both inputs share comes through, divided by the rejection ratio.
+"""The amplifier's common mode: what both inputs share comes through, divided by the rejection
+ratio.
 
-An instrumentation amplifier gives v_difference + v_common / CMRR (referred to its input), v_common = (V+ + V-) / 2
-against its ground (Pallas-Areny and Webster, Sensors and Signal Conditioning). 80 to 100 dB at direct current shrink
-to 50 to 70 dB at 50 kHz, mostly by unequal capacitances of the two lines, so that either sign occurs. With a grounded
-sink the electrodes ride at half the driven voltage, often far above the difference that is measured; a balanced source
-keeps their mean at ground.
+An instrumentation amplifier gives v_difference + v_common / CMRR (referred to its input), v_common
+= (V+ + V-) / 2 against its ground (Pallas-Areny and Webster, Sensors and Signal Conditioning). 80
+to 100 dB at direct current shrink to 50 to 70 dB at 50 kHz, mostly by unequal capacitances of the
+two lines, so that either sign occurs. With a grounded sink the electrodes ride at half the driven
+voltage, often far above the difference that is measured; a balanced source keeps their mean at
+ground.
 """
 
 from __future__ import annotations
@@ -26,8 +28,12 @@ SUMMARY = "A part of the inputs' common voltage is taken for signal."
 class Parameters:
     """The rejection, and what is ground."""
 
-    cmrr_db: float = parameter(60.0, "dB", "common-mode rejection ratio at the excitation's frequency", low=0, high=300)
-    ground: str = parameter("sink", "", "the electrode I-, or the mean of all electrodes", choices=("sink", "mean"))
+    cmrr_db: float = parameter(
+        60.0, "dB", "common-mode rejection ratio at the excitation's frequency", low=0, high=300
+    )
+    ground: str = parameter(
+        "sink", "", "the electrode I-, or the mean of all electrodes", choices=("sink", "mean")
+    )
     inverted: bool = parameter(False, "", "whether it enters with the opposite sign")
 
 

@@ -1,10 +1,12 @@
 """Contacts that are not ideal: a resistance times area between each electrode and the sheet.
 
-In the complete electrode model (Cheng, Isaacson, Newell and Gisser, IEEE Trans. Biomed. Eng. 36, 1989; Somersalo,
-Cheney and Isaacson, SIAM J. Appl. Math. 52, 1992) the potential drops by z times the current density across the
-interface: phi + z sigma dphi/dn = U. Fitted to saline of 0.35 to 3.4 S/m on metal, Cheng et al. found 58 down to 7.5
-ohm cm2 (6e-3 to 8e-4 ohm m2). z = 0 is an ideal shunt. Electrodes differ: z_l = mean (1 + uniform(-spread, spread)),
-drawn once.
+In the complete electrode model (Cheng, Isaacson, Newell and Gisser, IEEE Trans. Biomed. Eng. 36,
+1989; Somersalo, Cheney and Isaacson, SIAM J. Appl. Math. 52, 1992) the potential drops by z times
+the current density across the
+interface: phi + z sigma dphi/dn = U. Fitted to saline of 0.35 to 3.4 S/m on metal, Cheng et al.
+    found 58 down to 7.5
+ohm cm2 (6e-3 to 8e-4 ohm m2). z = 0 is an ideal shunt. Electrodes differ: z_l = mean (1 +
+uniform(-spread, spread)), drawn once.
 """
 
 from __future__ import annotations
@@ -27,8 +29,12 @@ SUMMARY = "Current meets a resistance where it enters and leaves the sheet."
 class Parameters:
     """The electrodes' mean, and how they differ."""
 
-    mean_ohm_m2: float = parameter(0.01, "ohm m2", "resistance of a contact times its area", low=0, high=1e3)
-    spread: float = parameter(0.0, "1", "each electrode's differs by up to this part of the mean", low=0, high=1)
+    mean_ohm_m2: float = parameter(
+        0.01, "ohm m2", "resistance of a contact times its area", low=0, high=1e3
+    )
+    spread: float = parameter(
+        0.0, "1", "each electrode's differs by up to this part of the mean", low=0, high=1
+    )
 
     def __post_init__(self) -> None:
         if self.spread == 1:

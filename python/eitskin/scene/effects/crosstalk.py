@@ -1,10 +1,12 @@
-"""Cross-talk: wires of electrodes next in number couple, so that a measuring wire picks up its neighbours' potential.
+"""Cross-talk: wires of electrodes next in number couple, so that a measuring wire picks up its
+neighbours' potential.
 
-Neighbouring wires of a ribbon cable, and neighbouring switches of a multiplexer, couple by a capacitance of the order
-of a pF; a datasheet states the part that comes through in dB (the ADG1206: -85 dB at 1 MHz, in 50 ohm; cables with
-higher source impedances are far worse). The driven wires carry by far the largest potentials, so they alone are taken
-as sources: a measuring wire next in number to a driven one gets 10^(dB / 20) of its potential, against the mean of all
-electrodes. The first and the last wire are not neighbours.
+Neighbouring wires of a ribbon cable, and neighbouring switches of a multiplexer, couple by a
+capacitance of the order of a pF; a datasheet states the part that comes through in dB (the ADG1206:
+-85 dB at 1 MHz, in 50 ohm; cables with higher source impedances are far worse). The driven wires
+carry by far the largest potentials, so they alone are taken as sources: a measuring wire next in
+number to a driven one gets 10^(dB / 20) of its potential, against the mean of all electrodes. The
+first and the last wire are not neighbours.
 """
 
 from __future__ import annotations
@@ -27,13 +29,18 @@ SUMMARY = "Driven wires couple into measuring wires beside them."
 class Parameters:
     """How much."""
 
-    coupling_db: float = parameter(-60.0, "dB", "voltage picked up / the driven wire's potential", low=-300, high=0)
+    coupling_db: float = parameter(
+        -60.0, "dB", "voltage picked up / the driven wire's potential", low=-300, high=0
+    )
 
 
 def pick_up(protocol: Protocol) -> tuple[FloatArray, FloatArray]:
-    """How often the source's and the sink's wire couples into each row's voltage, (m,) each, in {-1, 0, 1}."""
+    """How often the source's and the sink's wire couples into each row's voltage, (m,) each, in
+    {-1, 0, 1}."""
     rows = protocol.drive_measure.astype(np.int64)
-    beside = (np.abs(rows[:, None, :2] - rows[:, 2:, None]) == 1).astype(np.float64)  # (m, [V+, V-], [I+, I-])
+    beside = (np.abs(rows[:, None, :2] - rows[:, 2:, None]) == 1).astype(
+        np.float64
+    )  # (m, [V+, V-], [I+, I-])
     onto = beside[:, 0] - beside[:, 1]
     return onto[:, 0].copy(), onto[:, 1].copy()
 

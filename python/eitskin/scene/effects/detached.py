@@ -1,8 +1,9 @@
 """Electrodes that have come off: no current passes them, and nothing is read on them.
 
-The complete electrode model's limit for an infinite contact impedance: the rim under a detached electrode is
-insulated. A current source on it drives nothing (its output only rises to the supply), and an input on it floats; both
-are taken to read 0 V in every row that uses the electrode. A wobbling plug is off during a part of the time only.
+The complete electrode model's limit for an infinite contact impedance: the rim under a detached
+electrode is insulated. A current source on it drives nothing (its output only rises to the supply),
+and an input on it floats; both are taken to read 0 V in every row that uses the electrode. A
+wobbling plug is off during a part of the time only.
 """
 
 from __future__ import annotations
@@ -31,13 +32,18 @@ class Parameters:
 
     def __post_init__(self) -> None:
         if not self.electrodes or len(set(self.electrodes)) != len(self.electrodes):
-            raise ConfigError(f"electrodes = {list(self.electrodes)}: name at least one, and none twice")
+            raise ConfigError(
+                f"electrodes = {list(self.electrodes)}: name at least one, and none twice"
+            )
         if self.from_s is not None and self.until_s is not None and self.until_s <= self.from_s:
-            raise ConfigError(f"until_s = {self.until_s:g} must come after from_s = {self.from_s:g}")
+            raise ConfigError(
+                f"until_s = {self.until_s:g} must come after from_s = {self.from_s:g}"
+            )
 
 
 def is_off(time_s: float, parameters: Parameters) -> bool:
-    """Whether the electrodes are off at ``time_s``: from ``from_s`` on, until just before ``until_s``."""
+    """Whether the electrodes are off at ``time_s``: from ``from_s`` on, until just before
+    ``until_s``."""
     came_off = parameters.from_s is None or time_s >= parameters.from_s
     return came_off and (parameters.until_s is None or time_s < parameters.until_s)
 
@@ -51,11 +57,15 @@ def make(parameters: Parameters, session: Session) -> ContactStep:
     count = session.skin.electrodes.count
     for electrode in parameters.electrodes:
         if not 0 <= electrode < count:
-            raise ConfigError(f"electrodes: {electrode} does not exist; the skin's are 0 to {count - 1}")
+            raise ConfigError(
+                f"electrodes: {electrode} does not exist; the skin's are 0 to {count - 1}"
+            )
     gone = np.isin(np.arange(count), parameters.electrodes)
     lost = np.asarray(gone[session.protocol.drive_measure].any(axis=1))
     if lost.all():
-        raise ConfigError("electrodes: without them no row of the protocol can be measured; name fewer")
+        raise ConfigError(
+            "electrodes: without them no row of the protocol can be measured; name fewer"
+        )
     varies = parameters.from_s is not None or parameters.until_s is not None
 
     def apply(contacts: Contacts, time_s: float, frame: int) -> Contacts:

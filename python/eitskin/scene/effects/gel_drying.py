@@ -1,12 +1,14 @@
 """A hydrogel that dries: its conductivity falls as water leaves.
 
-Thin-layer drying in the falling-rate period is first order (Lewis, Ind. Eng. Chem. 13, 1921): the free water content
-decays exponentially to that in balance with the air. The conductivity of a porous medium filled with electrolyte goes
-with a power of its water fraction (Archie, Trans. AIME 146, 1942; exponents of 1.3 to 2), so that
+Thin-layer drying in the falling-rate period is first order (Lewis, Ind. Eng. Chem. 13, 1921): the
+free water content decays exponentially to that in balance with the air. The conductivity of a
+porous medium filled with electrolyte goes with a power of its water fraction (Archie, Trans. AIME
+146, 1942; exponents of 1.3 to 2), so that
 
     water(t) = final + (1 - final) exp(-t / tau),    sigma(t) = sigma_0 water(t)^exponent.
 
-The whole sheet dries alike; time counts from the session's first frame, at which the sheet is as described.
+The whole sheet dries alike; time counts from the session's first frame, at which the sheet is as
+described.
 """
 
 from __future__ import annotations
@@ -29,9 +31,15 @@ SUMMARY = "The sheet's conductivity falls as its water leaves."
 class Parameters:
     """How fast, how far, and how conductivity follows."""
 
-    time_constant_h: float = parameter(4.0, "h", "time in which 63 % of the free water leaves", low=0, open_low=True)
-    final_water: float = parameter(0.5, "1", "water left at the end / water at the start", low=0, high=1, open_low=True)
-    exponent: float = parameter(1.5, "1", "conductivity goes with this power of the water content", low=0, high=5)
+    time_constant_h: float = parameter(
+        4.0, "h", "time in which 63 % of the free water leaves", low=0, open_low=True
+    )
+    final_water: float = parameter(
+        0.5, "1", "water left at the end / water at the start", low=0, high=1, open_low=True
+    )
+    exponent: float = parameter(
+        1.5, "1", "conductivity goes with this power of the water content", low=0, high=5
+    )
 
 
 def drying_factor(age_s: float, parameters: Parameters) -> float:
@@ -49,8 +57,8 @@ def make(parameters: Parameters, session: Session) -> MaterialStep:
         return np.asarray(conductivity * drying_factor(time_s - start_s, parameters))
 
     note = (
-        f"conductivity x water^{parameters.exponent:g}, water falling to {parameters.final_water:g} "
-        f"with {parameters.time_constant_h:g} h"
+        f"conductivity x water^{parameters.exponent:g}, water falling to {parameters.final_water:g}"
+        f" with {parameters.time_constant_h:g} h"
     )
     cost = Cost(factorisations_per_frame=1, vector_passes_per_frame=1)
     return MaterialStep(NAME, cost, note, apply, varies=True)

@@ -1,14 +1,17 @@
-"""Jitter of sampling: each sample is taken a little early or late, which the sine turns into a wrong amplitude.
+"""Jitter of sampling: each sample is taken a little early or late, which the sine turns into a
+wrong amplitude.
 
-A sample at t + d of a sin(w t) is demodulated by 2 sin(w t) as a [cos(w d) - cos(2 w t + w d)]. With d normal of
-deviation s / w, independent from sample to sample, and N samples evenly over whole periods (at least three a period,
-no two phases coinciding in the second harmonic), the amplitude found has exactly
+A sample at t + d of a sin(w t) is demodulated by 2 sin(w t) as a [cos(w d) - cos(2 w t + w d)].
+With d normal of deviation s / w, independent from sample to sample, and N samples evenly over whole
+periods (at least three a period, no two phases coinciding in the second harmonic), the amplitude
+found has exactly
 
     mean      a exp(-s^2 / 2)
     variance  a^2 / N [(1 - exp(-s^2))^2 / 2 + (1 - exp(-s^2)) / 2]    (about a^2 s^2 / (2 N))
 
-and, being a mean of N, is nearly normal. The factor s = 2 pi f d is the classical bound on a converter's SNR by its
-clock (Shinagawa, Akazawa and Wakimoto, IEEE J. Solid-State Circuits 25, 1990). Small signals get small errors.
+and, being a mean of N, is nearly normal. The factor s = 2 pi f d is the classical bound on a
+converter's SNR by its clock (Shinagawa, Akazawa and Wakimoto, IEEE J. Solid-State Circuits 25,
+1990). Small signals get small errors.
 """
 
 from __future__ import annotations
@@ -32,9 +35,15 @@ SHARED = {"frequency_hz": "excitation frequency"}
 class Parameters:
     """The clock's, and how many samples make a value."""
 
-    jitter_ns: float = parameter(10.0, "ns", "standard deviation of a sample's time", low=0, high=1e9)
-    frequency_hz: float = parameter(50e3, "Hz", "the excitation's frequency", low=0, high=1e9, open_low=True)
-    samples: int = parameter(64, "", "samples that are demodulated to one voltage", low=3, high=1_000_000)
+    jitter_ns: float = parameter(
+        10.0, "ns", "standard deviation of a sample's time", low=0, high=1e9
+    )
+    frequency_hz: float = parameter(
+        50e3, "Hz", "the excitation's frequency", low=0, high=1e9, open_low=True
+    )
+    samples: int = parameter(
+        64, "", "samples that are demodulated to one voltage", low=3, high=1_000_000
+    )
 
 
 def amplitude_error(parameters: Parameters) -> tuple[float, float]:
@@ -49,8 +58,15 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
     mean, deviation = amplitude_error(parameters)
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
-        return np.asarray(v * (mean + deviation * session.stream(NAME, frame).standard_normal(len(v))))
+        return np.asarray(
+            v * (mean + deviation * session.stream(NAME, frame).standard_normal(len(v)))
+        )
 
     rows = session.protocol.n_rows
-    note = f"{parameters.jitter_ns:g} ns at {parameters.frequency_hz:g} Hz: {100 * deviation:.3g} % of each voltage"
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=2, random_numbers_per_frame=rows), note, apply)
+    note = (
+        f"{parameters.jitter_ns:g} ns at {parameters.frequency_hz:g} Hz: {100 * deviation:.3g} % of"
+        " each voltage"
+    )
+    return VoltageStep(
+        NAME, STAGE, Cost(vector_passes_per_frame=2, random_numbers_per_frame=rows), note, apply
+    )

@@ -1,9 +1,10 @@
 """Mains hum: what is left of the power line's 50 or 60 Hz after the demodulator.
 
-Electric fields of the mains couple into high-impedance wires (Huhta and Webster, IEEE Trans. Biomed. Eng. 20, 1973).
-It adds amplitude sin(2 pi f t + phase) to every row, at the time at which that row is read: rows follow each other
-evenly over a frame, so that neighbouring rows see nearly the same, and rows of one number sample it at the frame rate
-r, where it shows at the aliased frequency |f - r round(f / r)|.
+Electric fields of the mains couple into high-impedance wires (Huhta and Webster, IEEE Trans.
+Biomed. Eng. 20, 1973). It adds amplitude sin(2 pi f t + phase) to every row, at the time at which
+that row is read: rows follow each other evenly over a frame, so that neighbouring rows see nearly
+the same, and rows of one number sample it at the frame rate r, where it shows at the aliased
+frequency |f - r round(f / r)|.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ class Parameters:
 
     amplitude_v: float = parameter(1e-3, "V", "peak amplitude", low=0, high=1e6)
     frequency_hz: float = parameter(50.0, "Hz", "the power line's", low=0, high=1e6, open_low=True)
-    phase_deg: float = parameter(0.0, "deg", "of the sine at the first recorded frame", low=-360, high=360)
+    phase_deg: float = parameter(
+        0.0, "deg", "of the sine at the first recorded frame", low=-360, high=360
+    )
 
 
 def alias_hz(frequency_hz: float, rate_hz: float) -> float:
@@ -46,5 +49,8 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         return np.asarray(v + parameters.amplitude_v * np.sin(omega * (time_s + delays_s) + phase))
 
     alias = alias_hz(parameters.frequency_hz, session.rate_hz)
-    note = f"{parameters.amplitude_v:g} V at {parameters.frequency_hz:g} Hz, seen at {alias:g} Hz from frame to frame"
+    note = (
+        f"{parameters.amplitude_v:g} V at {parameters.frequency_hz:g} Hz, seen at {alias:g} Hz from"
+        " frame to frame"
+    )
     return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=3), note, apply)

@@ -1,8 +1,8 @@
 """Electrodes that are not where the description says: each is shifted along the rim.
 
-Hand-made skins carry electrodes to about a millimetre. Shifts are given, or uniform within +- spread, drawn once; a
-reconstruction that assumes the described places then has a wrong model (the classical modelling error of absolute EIT;
-difference imaging cancels most of it).
+Hand-made skins carry electrodes to about a millimetre. Shifts are given, or uniform within +-
+spread, drawn once; a reconstruction that assumes the described places then has a wrong model (the
+classical modelling error of absolute EIT; difference imaging cancels most of it).
 """
 
 from __future__ import annotations
@@ -26,14 +26,19 @@ SUMMARY = "Electrodes sit beside the places that the description gives."
 class Parameters:
     """By chance, or as measured."""
 
-    spread_mm: float = parameter(1.0, "mm", "each electrode is shifted along the rim by up to this, either way", low=0)
+    spread_mm: float = parameter(
+        1.0, "mm", "each electrode is shifted along the rim by up to this, either way", low=0
+    )
     shift_mm: tuple[float, ...] = parameter(
-        (), "mm", "known shifts instead, one an electrode, along the numbering; nothing is then drawn"
+        (),
+        "mm",
+        "known shifts instead, one an electrode, along the numbering; nothing is then drawn",
     )
 
 
 def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
-    """``skin`` with each electrode moved by ``shift_mm`` (L,) along the rim, in the direction of numbering.
+    """``skin`` with each electrode moved by ``shift_mm`` (L,) along the rim, in the direction of
+    numbering.
 
     Raises:
         GeometryError: electrodes overlap or change their order.
@@ -52,10 +57,18 @@ def make(parameters: Parameters, session: Session) -> GeometryStep:
     Raises:
         ConfigError: there is not one known shift for each electrode, or shifted electrodes overlap.
     """
-    count, spread, known = session.skin.electrodes.count, parameters.spread_mm, len(parameters.shift_mm)
+    count, spread, known = (
+        session.skin.electrodes.count,
+        parameters.spread_mm,
+        len(parameters.shift_mm),
+    )
     if known not in (0, count):
         raise ConfigError(f"shift_mm: {known} shifts for {count} electrodes; give one each")
-    shift_mm = np.array(parameters.shift_mm) if known else session.stream(NAME).uniform(-spread, spread, count)
+    shift_mm = (
+        np.array(parameters.shift_mm)
+        if known
+        else session.stream(NAME).uniform(-spread, spread, count)
+    )
     try:
         shifted(session.skin, shift_mm)
     except GeometryError as error:

@@ -1,11 +1,13 @@
-"""The multiplexers: a resistance in series with the signal, and a voltage that has not settled when it is sampled.
+"""The multiplexers: a resistance in series with the signal, and a voltage that has not settled when
+it is sampled.
 
-Two closed switches (V+ and V-) stand between the electrodes and the amplifier's input resistance, a divider R_in /
-(R_in + R_plus + R_minus). Switches of one part differ a little; an ADG1206 has typically 120 ohm, matched to a few ohm
-(its datasheet, at +-15 V). After switching, the voltage (the demodulated amplitude) approaches the new value with the
-time constant of resistance and line capacitance, a first-order step response: of the distance from the voltage of the
-row before, exp(-dwell / tau) is left. The order of the scan therefore matters. The row before the first is the last
-one of the same frame: the scan is taken as periodic.
+Two closed switches (V+ and V-) stand between the electrodes and the amplifier's input resistance, a
+divider R_in / (R_in + R_plus + R_minus). Switches of one part differ a little; an ADG1206 has
+typically 120 ohm, matched to a few ohm (its datasheet, at +-15 V). After switching, the voltage
+(the demodulated amplitude) approaches the new value with the time constant of resistance and line
+capacitance, a first-order step response: of the distance from the voltage of the row before,
+exp(-dwell / tau) is left. The order of the scan therefore matters. The row before the first is the
+last one of the same frame: the scan is taken as periodic.
 """
 
 from __future__ import annotations
@@ -30,10 +32,18 @@ class Parameters:
     """Resistances, and the times of settling."""
 
     on_resistance_ohm: float = parameter(120.0, "ohm", "one closed switch", low=0, high=1e9)
-    on_spread_ohm: float = parameter(0.0, "ohm", "each electrode's switch differs by up to this", low=0, high=1e9)
-    input_resistance_ohm: float = parameter(1e7, "ohm", "between the amplifier's inputs", low=0, open_low=True)
-    settling_us: float = parameter(20.0, "us", "time constant of settling; 0 settles at once", low=0, high=1e9)
-    dwell_us: float = parameter(100.0, "us", "from switching to the sample", low=0, high=1e9, open_low=True)
+    on_spread_ohm: float = parameter(
+        0.0, "ohm", "each electrode's switch differs by up to this", low=0, high=1e9
+    )
+    input_resistance_ohm: float = parameter(
+        1e7, "ohm", "between the amplifier's inputs", low=0, open_low=True
+    )
+    settling_us: float = parameter(
+        20.0, "us", "time constant of settling; 0 settles at once", low=0, high=1e9
+    )
+    dwell_us: float = parameter(
+        100.0, "us", "from switching to the sample", low=0, high=1e9, open_low=True
+    )
 
 
 def unsettled(parameters: Parameters) -> float:
@@ -42,15 +52,20 @@ def unsettled(parameters: Parameters) -> float:
 
 
 def dividers(parameters: Parameters, session: Session) -> FloatArray:
-    """What part of each row's voltage (m,) reaches the amplifier. Draws nothing without a spread."""
+    """What part of each row's voltage (m,) reaches the amplifier. Draws nothing without a
+    spread."""
     count = session.skin.electrodes.count
     switches = np.full((2, count), parameters.on_resistance_ohm)
     if parameters.on_spread_ohm:
         spread = parameters.on_spread_ohm
-        switches = np.maximum(switches + session.stream(NAME).uniform(-spread, spread, (2, count)), 0.0)
+        switches = np.maximum(
+            switches + session.stream(NAME).uniform(-spread, spread, (2, count)), 0.0
+        )
     plus, minus = session.protocol.drive_measure[:, 2:].T
     in_series = switches[0, plus] + switches[1, minus]
-    return np.asarray(parameters.input_resistance_ohm / (parameters.input_resistance_ohm + in_series))
+    return np.asarray(
+        parameters.input_resistance_ohm / (parameters.input_resistance_ohm + in_series)
+    )
 
 
 def make(parameters: Parameters, session: Session) -> VoltageStep:
@@ -61,6 +76,11 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
         return settled_from_the_row_before(v * gains, left)
 
-    note = f"{parameters.on_resistance_ohm:g} ohm a switch; {100 * left:.3g} % of the row before is left"
+    note = (
+        f"{parameters.on_resistance_ohm:g} ohm a switch; {100 * left:.3g} % of the row before is"
+        " left"
+    )
     drawn = 2 * session.skin.electrodes.count if parameters.on_spread_ohm else 0
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=4, random_numbers=drawn), note, apply)
+    return VoltageStep(
+        NAME, STAGE, Cost(vector_passes_per_frame=4, random_numbers=drawn), note, apply
+    )

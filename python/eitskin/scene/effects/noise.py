@@ -1,7 +1,9 @@
-"""White noise: normal, of one deviation on every row, independent from row to row and frame to frame.
+"""White noise: normal, of one deviation on every row, independent from row to row and frame to
+frame.
 
-Thermal and amplifier noise in the demodulator's band. The signal-to-noise ratio counts against the exact frame V0 of
-the untouched skin with ideal electrodes: SNR_dB = 20 log10(rms(V0) / sigma), rms over the protocol's rows.
+Thermal and amplifier noise in the demodulator's band. The signal-to-noise ratio counts against the
+exact frame V0 of the untouched skin with ideal electrodes: SNR_dB = 20 log10(rms(V0) / sigma), rms
+over the protocol's rows.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ DEFAULT_SNR_DB = 60.0
 class Parameters:
     """Its size, in one of two ways; 60 dB without either."""
 
-    snr_db: float | None = parameter(None, "dB", "20 log10(rms of the untouched frame / deviation)", low=-100, high=300)
+    snr_db: float | None = parameter(
+        None, "dB", "20 log10(rms of the untouched frame / deviation)", low=-100, high=300
+    )
     noise_v: float | None = parameter(None, "V", "standard deviation", low=0, high=1e6)
 
     def __post_init__(self) -> None:

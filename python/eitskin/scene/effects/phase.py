@@ -1,11 +1,13 @@
-"""The alternating current's phase: displacement current in the sheet, and a capacitive interface under the electrodes.
+"""The alternating current's phase: displacement current in the sheet, and a capacitive interface
+under the electrodes.
 
-At the angular frequency w the sheet's conductivity becomes the admittivity sigma + j w eps_0 eps_r (Maxwell), and the
-charge-transfer resistance of an interface stands parallel to its double layer's capacitance C (Randles, Discuss.
-Faraday Soc. 1, 1947, without diffusion): z(w) = z / (1 + j w C z). Metal in water has 0.1 to 0.4 F/m2 (Bard and
-Faulkner, Electrochemical Methods), which at 50 kHz all but shorts the interface. z is that of ``contact_impedance``;
-without that effect electrodes stay ideal shunts, and only the sheet has a phase. The demodulator gives the part in
-phase with the current, or the magnitude with the sign of that part.
+At the angular frequency w the sheet's conductivity becomes the admittivity sigma + j w eps_0 eps_r
+(Maxwell), and the charge-transfer resistance of an interface stands parallel to its double layer's
+capacitance C (Randles, Discuss. Faraday Soc. 1, 1947, without diffusion): z(w) = z / (1 + j w C z).
+Metal in water has 0.1 to 0.4 F/m2 (Bard and Faulkner, Electrochemical Methods), which at 50 kHz all
+but shorts the interface. z is that of ``contact_impedance``; without that effect electrodes stay
+ideal shunts, and only the sheet has a phase. The demodulator gives the part in phase with the
+current, or the magnitude with the sign of that part.
 """
 
 from __future__ import annotations
@@ -25,26 +27,40 @@ SUMMARY = "Capacitances turn the voltages' phase: a complex solve."
 SHARED = {"frequency_hz": "excitation frequency"}
 VACUUM_F_PER_M = 8.8541878128e-12
 NO_CONTACT_OHM_M2 = 1e4
-"""From here on an electrode does not touch (that is how detached ones are solved), so it has no double layer either."""
+"""From here on an electrode does not touch (that is how detached ones are solved), so it has no
+double layer either."""
 
 
 @dataclass(frozen=True)
 class Parameters:
     """Frequency, the two capacitances, and how a complex voltage becomes a number."""
 
-    frequency_hz: float = parameter(50e3, "Hz", "the excitation's frequency", low=0, high=1e9, open_low=True)
-    relative_permittivity: float = parameter(80.0, "1", "the sheet's; water has 78 to 80", low=0, high=1e8)
-    capacitance_f_per_m2: float = parameter(0.1, "F/m2", "double layer's, per contact area", low=0, high=1e3)
+    frequency_hz: float = parameter(
+        50e3, "Hz", "the excitation's frequency", low=0, high=1e9, open_low=True
+    )
+    relative_permittivity: float = parameter(
+        80.0, "1", "the sheet's; water has 78 to 80", low=0, high=1e8
+    )
+    capacitance_f_per_m2: float = parameter(
+        0.1, "F/m2", "double layer's, per contact area", low=0, high=1e3
+    )
     readout: str = parameter("in_phase", "", "what is measured", choices=("in_phase", "magnitude"))
 
 
-def admittivity(conductivity: FloatArray, frequency_hz: float, relative_permittivity: float) -> ComplexArray:
+def admittivity(
+    conductivity: FloatArray, frequency_hz: float, relative_permittivity: float
+) -> ComplexArray:
     """sigma + j w eps (E,) in S/m."""
-    return np.asarray(conductivity + 2j * pi * frequency_hz * VACUUM_F_PER_M * relative_permittivity)
+    return np.asarray(
+        conductivity + 2j * pi * frequency_hz * VACUUM_F_PER_M * relative_permittivity
+    )
 
 
-def interface(impedance_ohm_m2: FloatArray, frequency_hz: float, capacitance_f_per_m2: float) -> ComplexArray:
-    """Charge-transfer resistance parallel to the double layer, (L,) in ohm m2; 0 and no contact stay what they are."""
+def interface(
+    impedance_ohm_m2: FloatArray, frequency_hz: float, capacitance_f_per_m2: float
+) -> ComplexArray:
+    """Charge-transfer resistance parallel to the double layer, (L,) in ohm m2; 0 and no contact
+    stay what they are."""
     touching = impedance_ohm_m2 < NO_CONTACT_OHM_M2
     susceptance = 2 * pi * frequency_hz * capacitance_f_per_m2 * touching
     return np.asarray(impedance_ohm_m2 / (1 + 1j * susceptance * impedance_ohm_m2))
@@ -67,7 +83,10 @@ def make(parameters: Parameters, session: Session) -> PhaseStep:
     return PhaseStep(
         name=NAME,
         cost=Cost(vector_passes_per_frame=2),
-        note=f"complex solve at {hertz:g} Hz, eps_r {permittivity:g}, {capacitance:g} F/m2; {parameters.readout} read",
+        note=(
+            f"complex solve at {hertz:g} Hz, eps_r {permittivity:g}, {capacitance:g} F/m2;"
+            f" {parameters.readout} read"
+        ),
         frequency_hz=hertz,
         admittivity=lambda conductivity: admittivity(conductivity, hertz, permittivity),
         contact=lambda impedance: interface(impedance, hertz, capacitance),

@@ -1,7 +1,8 @@
 """Saturation: an amplifier cannot go beyond its supply, so that larger voltages are clipped.
 
-A hard limiter, symmetric about 0. The limit is given in V or as a multiple of the largest voltage of the untouched skin
-with ideal electrodes. The characteristic is the same for every row and has no memory: equal rows stay equal.
+A hard limiter, symmetric about 0. The limit is given in V or as a multiple of the largest voltage
+of the untouched skin with ideal electrodes. The characteristic is the same for every row and has no
+memory: equal rows stay equal.
 """
 
 from __future__ import annotations
@@ -25,8 +26,12 @@ DEFAULT_HEADROOM = 1.25
 class Parameters:
     """The limit, in one of two ways; a headroom of 1.25 without either."""
 
-    limit_v: float | None = parameter(None, "V", "the largest voltage either way", low=0, open_low=True)
-    headroom: float | None = parameter(None, "1", "limit / largest untouched voltage", low=0, high=1e6, open_low=True)
+    limit_v: float | None = parameter(
+        None, "V", "the largest voltage either way", low=0, open_low=True
+    )
+    headroom: float | None = parameter(
+        None, "1", "limit / largest untouched voltage", low=0, high=1e6, open_low=True
+    )
 
     def __post_init__(self) -> None:
         if self.limit_v is not None and self.headroom is not None:
@@ -48,4 +53,6 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
         return np.asarray(np.clip(v, -limit, limit))
 
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=1), f"clipped at +-{limit:.3g} V", apply)
+    return VoltageStep(
+        NAME, STAGE, Cost(vector_passes_per_frame=1), f"clipped at +-{limit:.3g} V", apply
+    )

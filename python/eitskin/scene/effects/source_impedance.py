@@ -1,10 +1,11 @@
 """A current source with a finite output impedance: a larger load gets less current.
 
-The source's current divides between its output impedance (a resistance parallel to stray capacitance) and the load, so
-that the load's share is 1 / (1 + Z_load Y_out), Y_out = 1 / R + j w C. Howland sources reach some 100 kohm to 1 Mohm
-at 50 kHz, with tens of pF (Bertemes-Filho, Felipe and Vincence, Circuits and Systems 4, 2013). The load is the sheet
-with its contacts, seen from the driven pair, and what lies in series (two multiplexers' on-resistance). Where no
-``phase`` is named, the part in phase with the current is taken, in real arithmetic.
+The source's current divides between its output impedance (a resistance parallel to stray
+capacitance) and the load, so that the load's share is 1 / (1 + Z_load Y_out), Y_out = 1 / R + j w
+C. Howland sources reach some 100 kohm to 1 Mohm at 50 kHz, with tens of pF (Bertemes-Filho, Felipe
+and Vincence, Circuits and Systems 4, 2013). The load is the sheet with its contacts, seen from the
+driven pair, and what lies in series (two multiplexers' on-resistance). Where no ``phase`` is named,
+the part in phase with the current is taken, in real arithmetic.
 """
 
 from __future__ import annotations
@@ -29,13 +30,20 @@ class Parameters:
     """The output impedance, and what is in series with the sheet."""
 
     resistance_ohm: float = parameter(500e3, "ohm", "output resistance", low=0, open_low=True)
-    capacitance_pf: float = parameter(20.0, "pF", "stray capacitance parallel to it", low=0, high=1e9)
-    frequency_hz: float = parameter(50e3, "Hz", "the excitation's; 0 is direct current", low=0, high=1e9)
-    series_ohm: float = parameter(0.0, "ohm", "in series with the sheet, as closed switches", low=0, high=1e9)
+    capacitance_pf: float = parameter(
+        20.0, "pF", "stray capacitance parallel to it", low=0, high=1e9
+    )
+    frequency_hz: float = parameter(
+        50e3, "Hz", "the excitation's; 0 is direct current", low=0, high=1e9
+    )
+    series_ohm: float = parameter(
+        0.0, "ohm", "in series with the sheet, as closed switches", low=0, high=1e9
+    )
 
 
 def share(load_ohm: Voltages, parameters: Parameters) -> Voltages:
-    """The part of the current that passes the load, (m,); for real loads the part in phase, which is real."""
+    """The part of the current that passes the load, (m,); for real loads the part in phase, which
+    is real."""
     total = load_ohm + parameters.series_ohm
     conductance = 1 / parameters.resistance_ohm
     susceptance = 2 * pi * parameters.frequency_hz * parameters.capacitance_pf * 1e-12

@@ -1,9 +1,9 @@
 """Warmth: the conductivity of an aqueous electrolyte rises by about 2 % a kelvin.
 
-sigma(T) = sigma_0 (1 + alpha (T - T_0)), the linear compensation that conductivity meters use; alpha is 0.019 to 0.022
-per K for dilute salts near 25 degrees C (ISO 7888 gives the tables), because water becomes less viscous and ions move
-faster. T_0 is the temperature at which the skin has the conductivity in its description. Time counts from the session's
-first frame.
+sigma(T) = sigma_0 (1 + alpha (T - T_0)), the linear compensation that conductivity meters use;
+alpha is 0.019 to 0.022 per K for dilute salts near 25 degrees C (ISO 7888 gives the tables),
+because water becomes less viscous and ions move faster. T_0 is the temperature at which the skin
+has the conductivity in its description. Time counts from the session's first frame.
 """
 
 from __future__ import annotations
@@ -26,9 +26,15 @@ SUMMARY = "The sheet's conductivity follows its temperature."
 class Parameters:
     """The temperature's course, and what a kelvin does."""
 
-    offset_k: float = parameter(0.0, "K", "temperature at the first frame - described skin's", low=-50, high=100)
-    drift_k_per_min: float = parameter(0.2, "K/min", "how fast the temperature rises", low=-1000, high=1000)
-    coefficient_per_k: float = parameter(0.02, "1/K", "relative change of conductivity a kelvin", low=-0.1, high=0.1)
+    offset_k: float = parameter(
+        0.0, "K", "temperature at the first frame - described skin's", low=-50, high=100
+    )
+    drift_k_per_min: float = parameter(
+        0.2, "K/min", "how fast the temperature rises", low=-1000, high=1000
+    )
+    coefficient_per_k: float = parameter(
+        0.02, "1/K", "relative change of conductivity a kelvin", low=-0.1, high=0.1
+    )
 
 
 def temperature_factor(age_s: float, parameters: Parameters) -> float:
@@ -47,7 +53,8 @@ def make(parameters: Parameters, session: Session) -> MaterialStep:
     ages_s = (0.0, float(times_s[-1] - times_s[0]))
     if min(temperature_factor(age_s, parameters) for age_s in ages_s) <= 0:
         raise ConfigError(
-            f"drift_k_per_min: over the session's {ages_s[1]:g} s the conductivity would fall to 0; use a smaller drift"
+            f"drift_k_per_min: over the session's {ages_s[1]:g} s the conductivity would fall to 0;"
+            " use a smaller drift"
         )
     varies = parameters.drift_k_per_min != 0 and parameters.coefficient_per_k != 0
 
@@ -55,8 +62,8 @@ def make(parameters: Parameters, session: Session) -> MaterialStep:
         return np.asarray(conductivity * temperature_factor(time_s - float(times_s[0]), parameters))
 
     note = (
-        f"conductivity x (1 + {parameters.coefficient_per_k:g}/K dT), dT = {parameters.offset_k:g} K "
-        f"+ {parameters.drift_k_per_min:g} K/min"
+        f"conductivity x (1 + {parameters.coefficient_per_k:g}/K dT), dT = {parameters.offset_k:g}"
+        f" K + {parameters.drift_k_per_min:g} K/min"
     )
     each = 1 if varies else 0
     cost = Cost(factorisations_per_frame=each, vector_passes_per_frame=each)

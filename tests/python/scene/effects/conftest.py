@@ -30,7 +30,11 @@ def make_session(small_mesh: Mesh, v0: FloatArray) -> MakeSession:
     """Sessions on the paper's skin; ``drawn`` records the streams that were asked for."""
 
     def make(
-        n_frames: int = 40, quiet_frames: int = 8, rate_hz: float = 20.0, seed: int = 1, drawn: list[str] | None = None
+        n_frames: int = 40,
+        quiet_frames: int = 8,
+        rate_hz: float = 20.0,
+        seed: int = 1,
+        drawn: list[str] | None = None,
     ) -> Session:
         def make_stream(name: str, index: int) -> np.random.Generator:
             if drawn is not None:

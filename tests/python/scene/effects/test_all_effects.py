@@ -1,4 +1,5 @@
-"""What every effect must keep: reciprocity where physics does, its own stream, its arguments, its documented ranges."""
+"""What every effect must keep: reciprocity where physics does, its own stream, its arguments, its
+documented ranges."""
 
 from __future__ import annotations
 
@@ -44,15 +45,18 @@ STRONG: dict[str, dict[str, Any]] = {
     "adc": {"bits": 8},
     "jitter": {"jitter_ns": 100.0},
 }
-# The sheet is a reciprocal network whatever its conductivity, contacts and resistors. One factor for a whole frame, and
-# a characteristic that is the same for all rows, keep equal rows equal. Everything that treats the two rows of a pair
-# differently breaks it: their time, order, channel, load, potentials or chance.
+# The sheet is a reciprocal network whatever its conductivity, contacts and resistors. One factor for
+# a whole frame, and a characteristic that is the same for all rows, keep equal rows equal.
+# Everything that treats the two rows of a pair differently breaks it: their time, order, channel,
+# load, potentials or chance.
 KEEP = {
-    "misplacement", "background", "temperature", "gel_drying", "contact_impedance", "detached", "bridged", "phase",
+    "misplacement", "background", "temperature", "gel_drying", "contact_impedance", "detached",
+    "bridged", "phase",
     "amplitude_drift", "saturation", "adc",
 }  # fmt: skip
 RANDOM = {
-    "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux", "charge_injection",
+    "misplacement", "background", "contact_impedance", "amplitude_drift", "channel_gain", "mux",
+    "charge_injection",
     "jitter", "noise",
 }  # fmt: skip
 
@@ -64,7 +68,9 @@ def _frames(effects: dict[str, Any], seed: int = 5, frames: int = 2) -> FloatArr
         "touch": [{"x_mm": 37.0, "y_mm": 22.0, "radius_mm": 20.0, "contrast": 9.0}],
         "effects": effects,
     }
-    return simulate_frames(compile_scene(scene_from_table(table, "test", Path()), bench=BENCH)).voltage_v[1:]
+    return simulate_frames(
+        compile_scene(scene_from_table(table, "test", Path()), bench=BENCH)
+    ).voltage_v[1:]
 
 
 def _irreciprocity(v: FloatArray) -> float:
@@ -92,7 +98,9 @@ def test_reciprocity(name: str, plain: FloatArray) -> None:
         assert _irreciprocity(v[-1]) > 1e-3
 
 
-def test_without_effects_the_sheet_is_reciprocal_and_all_kept_together_keep_it(plain: FloatArray) -> None:
+def test_without_effects_the_sheet_is_reciprocal_and_all_kept_together_keep_it(
+    plain: FloatArray,
+) -> None:
     assert _irreciprocity(plain[-1]) < 1e-10
     assert _irreciprocity(_frames({name: STRONG[name] for name in sorted(KEEP)})[-1]) < 1e-9
 
@@ -103,7 +111,10 @@ def test_streams_are_the_effects_own(name: str, make_session: MakeSession) -> No
     module = importlib.import_module(BUILT_IN[name])
     drawn: list[str] = []
     session = make_session(drawn=drawn)
-    values = {key: tuple(value) if isinstance(value, list) else value for key, value in STRONG[name].items()}
+    values = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in STRONG[name].items()
+    }
     step = module.make(module.Parameters(**values), session)
     if isinstance(step, VoltageStep):
         step.apply(np.ones(208), 0.0, 3)
@@ -132,7 +143,10 @@ def test_another_effect_leaves_the_noises_samples_as_they_were(name: str) -> Non
 def test_a_step_is_a_pure_function(name: str, make_session: MakeSession) -> None:
     """Applied twice, out of order, it gives the same and leaves its arguments as they are."""
     module = importlib.import_module(BUILT_IN[name])
-    values = {key: tuple(value) if isinstance(value, list) else value for key, value in STRONG[name].items()}
+    values = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in STRONG[name].items()
+    }
     step = module.make(module.Parameters(**values), make_session())
     assert step.name == name and step.stage is module.STAGE and step.note
     if not isinstance(step, VoltageStep | LoadedStep):
@@ -174,10 +188,16 @@ def test_the_page_tells_of_every_effect_and_parameter(name: str) -> None:
     module = importlib.import_module(BUILT_IN[name])
     assert module.SUMMARY in section and f"({name}.png)" in section
     for row in describe_parameters(module):
-        line = next(line for line in section.splitlines() if line.startswith(f"| `{row['name']}` |"))
+        line = next(
+            line for line in section.splitlines() if line.startswith(f"| `{row['name']}` |")
+        )
         assert row["doc"] in line and (row["unit"] or "-") in line
         default = row["default"]
-        shown = "-" if default is None else str(list(default) if isinstance(default, tuple) else default)
+        shown = (
+            "-"
+            if default is None
+            else str(list(default) if isinstance(default, tuple) else default)
+        )
         assert f"| {shown} |" in line
     assert 2_000 < (folder / f"{name}.png").stat().st_size < 60_000
 

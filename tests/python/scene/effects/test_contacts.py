@@ -1,4 +1,5 @@
-"""Contact impedance at the complete electrode model's limits, the interface's phase against an RC circuit."""
+"""Contact impedance at the complete electrode model's limits, the interface's phase against an RC
+circuit."""
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ def test_a_vanishing_impedance_is_a_shunt(make_session: MakeSession, small_mesh:
     shunt = forward.voltages(0.01)
     assert np.array_equal(forward.voltages(0.01, _impedance(make_session(), 0.0)), shunt)
     distance = [
-        np.linalg.norm(forward.voltages(0.01, _impedance(make_session(), z)) - shunt) / np.linalg.norm(shunt)
+        np.linalg.norm(forward.voltages(0.01, _impedance(make_session(), z)) - shunt)
+        / np.linalg.norm(shunt)
         for z in (1e-4, 1e-5, 1e-6)
     ]
     assert distance[0] < 1e-3
@@ -53,35 +55,51 @@ def test_a_vanishing_impedance_is_a_shunt(make_session: MakeSession, small_mesh:
     assert distance[1] / distance[2] == pytest.approx(10, rel=0.05)
 
 
-def test_a_large_impedance_adds_z_over_area_on_driven_electrodes(make_session: MakeSession, small_mesh: Mesh) -> None:
-    forward = ForwardModel(small_mesh, paper_skin(), table(16, [[0, 5, 0, 5], [0, 5, 5, 0]], 1e-3), 0.0)
+def test_a_large_impedance_adds_z_over_area_on_driven_electrodes(
+    make_session: MakeSession, small_mesh: Mesh
+) -> None:
+    forward = ForwardModel(
+        small_mesh, paper_skin(), table(16, [[0, 5, 0, 5], [0, 5, 5, 0]], 1e-3), 0.0
+    )
     edges = small_mesh.nodes_mm[small_mesh.electrode_edges[0]]  # chords, a little shorter than 4 mm
     area_m2 = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum() * 1e-3 * 12e-3
-    one, ten, hundred = (forward.voltages(0.01, _impedance(make_session(), z))[0] for z in (1e3, 1e4, 1e5))
+    one, ten, hundred = (
+        forward.voltages(0.01, _impedance(make_session(), z))[0] for z in (1e3, 1e4, 1e5)
+    )
     assert (ten - one) / 9e3 == pytest.approx(2e-3 / area_m2, rel=1e-6)
     assert (hundred - ten) / (ten - one) == pytest.approx(10, rel=1e-6)  # linear in z
     assert hundred / 1e5 == pytest.approx(2e-3 / area_m2, rel=1e-3)
 
 
-def test_under_a_large_impedance_four_point_voltages_are_the_gap_models(make_session: MakeSession) -> None:
-    """The gap model (current density uniform under an electrode) has a closed Fourier series on a disk."""
+def test_under_a_large_impedance_four_point_voltages_are_the_gap_models(
+    make_session: MakeSession,
+) -> None:
+    """The gap model (current density uniform under an electrode) has a closed Fourier series on a
+    disk."""
     skin, protocol = paper_skin(), adjacent(16)
     k = np.arange(1, 20001)
     x, y = skin.electrode_centres_mm().T
     between = np.subtract.outer(np.arctan2(y, x), np.arctan2(y, x))
-    z = np.cos(between[..., None] * k) @ (np.sinc(k * 2.0 / 97.0 / pi) ** 2 / k) / (pi * 0.01 * 12e-3)
+    z = (
+        np.cos(between[..., None] * k)
+        @ (np.sinc(k * 2.0 / 97.0 / pi) ** 2 / k)
+        / (pi * 0.01 * 12e-3)
+    )
     a, b, c, d = protocol.drive_measure.T.astype(int)
     series = protocol.current_a * (z[c, a] - z[c, b] - z[d, a] + z[d, b])
     forward = ForwardModel(mesh_for_elements(skin, 6000), skin, protocol, 0.0)
     large, larger = (forward.voltages(0.01, _impedance(make_session(), z)) for z in (1e4, 1e6))
     assert np.linalg.norm(large - series) < 2e-3 * np.linalg.norm(series)
-    assert np.linalg.norm(larger - large) < 1e-4 * np.linalg.norm(series)  # z itself no longer enters
+    assert np.linalg.norm(larger - large) < 1e-4 * np.linalg.norm(
+        series
+    )  # z itself no longer enters
     shunt = forward.voltages(0.01)
     assert np.linalg.norm(shunt - series) > 4e-3 * np.linalg.norm(series)
 
 
 def _bar(cells: int = 8) -> tuple[Mesh, Skin]:
-    """A bar of 80 x 20 mm, 5 mm thick: electrodes 2 and 3 cover its ends, 0 and 1 are short ones on its lower side.
+    """A bar of 80 x 20 mm, 5 mm thick: electrodes 2 and 3 cover its ends, 0 and 1 are short ones on
+    its lower side.
 
     Electrode 0 lies from 20 to 25 mm, electrode 1 from 55 to 60 mm.
     """
@@ -89,12 +107,19 @@ def _bar(cells: int = 8) -> tuple[Mesh, Skin]:
     x, y = np.meshgrid(np.linspace(0, 80, nx + 1), np.linspace(0, 20, ny + 1))
     number = np.arange((nx + 1) * (ny + 1)).reshape(ny + 1, nx + 1)
     a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
-    triangles = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    triangles = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
     ends = [np.column_stack([number[:-1, k], number[1:, k]]) for k in (0, -1)]
-    below = [np.column_stack([number[0, k : k + 1], number[0, k + 1 : k + 2]]) for k in (nx // 4, nx * 11 // 16)]
+    below = [
+        np.column_stack([number[0, k : k + 1], number[0, k + 1 : k + 2]])
+        for k in (nx // 4, nx * 11 // 16)
+    ]
     mesh = Mesh(np.column_stack([x.ravel(), y.ravel()]), triangles, (*below, *ends))
     outline = polygon([(0, 0), (80, 0), (80, 20), (0, 20)])
-    return mesh, Skin("bar", outline, Electrodes(4, 5.0), conductivity_s_per_m=0.05, thickness_mm=5.0)
+    return mesh, Skin(
+        "bar", outline, Electrodes(4, 5.0), conductivity_s_per_m=0.05, thickness_mm=5.0
+    )
 
 
 @pytest.mark.parametrize("hertz", [100.0, 5e3, 50e3, 1e6])
@@ -102,7 +127,8 @@ def _bar(cells: int = 8) -> tuple[Mesh, Skin]:
 def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(
     make_session: MakeSession, hertz: float, resistance: float
 ) -> None:
-    """A bar with whole ends as electrodes: Z = length / ((sigma + j w eps) area) + 2 (R || C) / area, exactly."""
+    """A bar with whole ends as electrodes: Z = length / ((sigma + j w eps) area) + 2 (R || C) /
+    area, exactly."""
     mesh, skin = _bar()
     protocol = table(4, [[2, 3, 2, 3], [2, 3, 0, 1]])
     parameters = phase.Parameters(hertz, relative_permittivity=2e4, capacitance_f_per_m2=0.02)
@@ -111,11 +137,18 @@ def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(
     contacts = np.array([9e5, 9e5, resistance, resistance])
     solver = FactoriseComplex(forward, _only_ends(step), Work())
     nothing = Change(np.zeros(0, np.int64), np.zeros(0))
-    v: Any = forward.patterns.voltages(solver.electrodes(np.full(mesh.n_elements, 0.05), nothing, contacts)) * 1e-3
+    v: Any = (
+        forward.patterns.voltages(
+            solver.electrodes(np.full(mesh.n_elements, 0.05), nothing, contacts)
+        )
+        * 1e-3
+    )
     omega, area_m2 = 2 * pi * hertz, 20e-3 * 5e-3
     admittivity = 0.05 + 1j * omega * 8.8541878128e-12 * 2e4
     interface = resistance / (1 + 1j * omega * resistance * 0.02)
-    assert v[0] == pytest.approx(1e-3 * (80e-3 / (admittivity * area_m2) + 2 * interface / area_m2), rel=1e-9)
+    assert v[0] == pytest.approx(
+        1e-3 * (80e-3 / (admittivity * area_m2) + 2 * interface / area_m2), rel=1e-9
+    )
     assert v[1] == pytest.approx(1e-3 * 35e-3 / (admittivity * area_m2), rel=1e-6)
     np.testing.assert_allclose(step.readout(v), v.real, rtol=0)
     magnitude = phase.make(phase.Parameters(hertz, readout="magnitude"), make_session()).readout
@@ -123,7 +156,8 @@ def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(
 
 
 def _only_ends(step: PhaseStep) -> PhaseStep:
-    """``step`` with electrodes 0 and 1 left without a double layer: voltmeters that do not disturb the bar."""
+    """``step`` with electrodes 0 and 1 left without a double layer: voltmeters that do not disturb
+    the bar."""
     inner = step.contact
     return replace(step, contact=lambda z: np.where(np.arange(len(z)) < 2, z + 0j, inner(z)))
 
@@ -135,9 +169,16 @@ def test_the_interface_is_a_resistance_parallel_to_a_capacitance() -> None:
     assert corner[1] == pytest.approx(0.01 / (1 + 1j))
     fast = phase.interface(z, 1e9, 0.1)
     np.testing.assert_allclose(fast[1:3], 1 / (2j * pi * 1e9 * 0.1), rtol=1e-6)
-    assert fast[0] == 0 and fast[3] == 1e6  # a shunt stays one, and what does not touch has no double layer
-    assert contact_impedance.Parameters.__dataclass_fields__["mean_ohm_m2"].metadata["high"] < phase.NO_CONTACT_OHM_M2
-    assert min(OPEN_OHM_M2, OPEN_BRIDGED_OHM_M2) >= phase.NO_CONTACT_OHM_M2  # detached electrodes are solved with these
+    assert (
+        fast[0] == 0 and fast[3] == 1e6
+    )  # a shunt stays one, and what does not touch has no double layer
+    assert (
+        contact_impedance.Parameters.__dataclass_fields__["mean_ohm_m2"].metadata["high"]
+        < phase.NO_CONTACT_OHM_M2
+    )
+    assert (
+        min(OPEN_OHM_M2, OPEN_BRIDGED_OHM_M2) >= phase.NO_CONTACT_OHM_M2
+    )  # detached electrodes are solved with these
     y = phase.admittivity(np.array([0.01]), 50e3, 80.0)
     assert y[0].imag == pytest.approx(2.2253e-4, rel=1e-3)
 
@@ -154,8 +195,14 @@ def test_detached_electrodes_are_marked_while_they_are_off(make_session: MakeSes
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda s: detached.make(detached.Parameters((16,)), s), "16 does not exist; the skin's are 0 to 15"),
-        (lambda s: detached.make(detached.Parameters(tuple(range(13))), s), "no row of the protocol can be measured"),
+        (
+            lambda s: detached.make(detached.Parameters((16,)), s),
+            "16 does not exist; the skin's are 0 to 15",
+        ),
+        (
+            lambda s: detached.make(detached.Parameters(tuple(range(13))), s),
+            "no row of the protocol can be measured",
+        ),
         (lambda s: detached.Parameters(()), "name at least one"),
         (lambda s: detached.Parameters((1,), 2.0, 1.0), "until_s = 1 must come after from_s = 2"),
         (lambda s: bridged.Parameters((3,)), "name at least two"),
@@ -164,6 +211,8 @@ def test_detached_electrodes_are_marked_while_they_are_off(make_session: MakeSes
         (lambda s: contact_impedance.Parameters(spread=1.0), "must be below 1"),
     ],
 )
-def test_impossible_contacts_are_refused(make_session: MakeSession, build: Any, message: str) -> None:
+def test_impossible_contacts_are_refused(
+    make_session: MakeSession, build: Any, message: str
+) -> None:
     with pytest.raises(ConfigError, match=message):
         build(make_session())

@@ -18,7 +18,9 @@ def _frames(step: Any, v: FloatArray, count: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("snr_db", [20.0, 60.0, 90.0])
-def test_snr_is_the_ratio_of_rms_to_deviation(make_session: MakeSession, v0: FloatArray, snr_db: float) -> None:
+def test_snr_is_the_ratio_of_rms_to_deviation(
+    make_session: MakeSession, v0: FloatArray, snr_db: float
+) -> None:
     session = make_session()
     step = noise.make(noise.Parameters(snr_db=snr_db), session)
     error = _frames(step, v0, 500) - v0
@@ -35,19 +37,25 @@ def test_snr_is_the_ratio_of_rms_to_deviation(make_session: MakeSession, v0: Flo
 def test_noise_in_volts_and_its_default(make_session: MakeSession, v0: FloatArray) -> None:
     session = make_session()
     assert noise.deviation_v(noise.Parameters(noise_v=3e-4), session) == 3e-4
-    assert noise.deviation_v(noise.Parameters(), session) == pytest.approx(np.sqrt(np.mean(v0**2)) / 1000)
+    assert noise.deviation_v(noise.Parameters(), session) == pytest.approx(
+        np.sqrt(np.mean(v0**2)) / 1000
+    )
     with pytest.raises(ConfigError, match="either snr_db or noise_v"):
         noise.Parameters(snr_db=60.0, noise_v=1e-3)
 
 
-def test_a_frame_of_noise_is_the_same_however_it_is_asked_for(make_session: MakeSession, v0: FloatArray) -> None:
+def test_a_frame_of_noise_is_the_same_however_it_is_asked_for(
+    make_session: MakeSession, v0: FloatArray
+) -> None:
     step = noise.make(noise.Parameters(), make_session())
     assert np.array_equal(step.apply(v0, 0.0, 7), step.apply(v0, 0.0, 7))
     assert not np.array_equal(step.apply(v0, 0.0, 7), step.apply(v0, 0.0, 8))
 
 
 @pytest.mark.parametrize("bits", [6, 12, 16])
-def test_quantisation_error_has_the_variance_of_a_uniform_step(make_session: MakeSession, bits: int) -> None:
+def test_quantisation_error_has_the_variance_of_a_uniform_step(
+    make_session: MakeSession, bits: int
+) -> None:
     session = make_session()
     step = adc.make(adc.Parameters(bits=bits, range_v=2.0), session)
     lsb = 4.0 / 2**bits
@@ -69,11 +77,18 @@ def test_codes_are_whole_and_end_where_twos_complement_does(make_session: MakeSe
     np.testing.assert_array_equal(out / lsb, [-128, -128, 0, 0, 1, 127, 127])
 
 
-def test_headroom_counts_from_the_largest_untouched_voltage(make_session: MakeSession, v0: FloatArray) -> None:
+def test_headroom_counts_from_the_largest_untouched_voltage(
+    make_session: MakeSession, v0: FloatArray
+) -> None:
     session = make_session()
     assert adc.range_v(adc.Parameters(headroom=2.0), session) == pytest.approx(2 * np.abs(v0).max())
-    assert saturation.limit_v(saturation.Parameters(headroom=0.5), session) == pytest.approx(np.abs(v0).max() / 2)
-    for both in (lambda: adc.Parameters(range_v=1.0, headroom=1.0), lambda: saturation.Parameters(1.0, 1.0)):
+    assert saturation.limit_v(saturation.Parameters(headroom=0.5), session) == pytest.approx(
+        np.abs(v0).max() / 2
+    )
+    for both in (
+        lambda: adc.Parameters(range_v=1.0, headroom=1.0),
+        lambda: saturation.Parameters(1.0, 1.0),
+    ):
         with pytest.raises(ConfigError, match="give either"):
             both()
 
@@ -81,17 +96,22 @@ def test_headroom_counts_from_the_largest_untouched_voltage(make_session: MakeSe
 def test_saturation_clips_exactly(make_session: MakeSession) -> None:
     step = saturation.make(saturation.Parameters(limit_v=0.7), make_session())
     v = np.array([-5.0, -0.7000001, -0.7, -0.3, 0.0, 0.69, 0.7, 0.70001, 1e9])
-    np.testing.assert_array_equal(step.apply(v, 0.0, 0), [-0.7, -0.7, -0.7, -0.3, 0.0, 0.69, 0.7, 0.7, 0.7])
+    np.testing.assert_array_equal(
+        step.apply(v, 0.0, 0), [-0.7, -0.7, -0.7, -0.3, 0.0, 0.69, 0.7, 0.7, 0.7]
+    )
 
 
 def _demodulated(s: float, samples: int, trials: int) -> FloatArray:
-    """Amplitudes (trials,) that a demodulator finds in a sine whose samples are off by a phase of deviation s."""
+    """Amplitudes (trials,) that a demodulator finds in a sine whose samples are off by a phase of
+    deviation s."""
     angle = 2 * pi * 5 * np.arange(samples) / samples  # five whole periods
     off = np.random.default_rng(11).standard_normal((trials, samples)) * s
     return np.asarray(2 * np.mean(np.sin(angle + off) * np.sin(angle), axis=1))
 
 
-@pytest.mark.parametrize(("jitter_ns", "samples"), [(10.0, 64), (300.0, 64), (2000.0, 16), (6000.0, 32)])
+@pytest.mark.parametrize(
+    ("jitter_ns", "samples"), [(10.0, 64), (300.0, 64), (2000.0, 16), (6000.0, 32)]
+)
 def test_jitter_is_what_a_demodulator_of_jittered_samples_finds(
     make_session: MakeSession, jitter_ns: float, samples: int
 ) -> None:

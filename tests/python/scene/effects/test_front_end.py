@@ -29,7 +29,9 @@ def test_channels_of_adjacent_measurement_are_the_sixteen_pairs() -> None:
     assert np.array_equal(pairs[number], adjacent(16).drive_measure[:, 2:])
 
 
-def test_a_channel_has_one_gain_within_its_spread(make_session: MakeSession, v0: FloatArray) -> None:
+def test_a_channel_has_one_gain_within_its_spread(
+    make_session: MakeSession, v0: FloatArray
+) -> None:
     session = make_session()
     gain = channel_gain.make(channel_gain.Parameters(0.05), session).apply(np.ones(208), 0.0, 0)
     _, number = channels(session.protocol)
@@ -38,11 +40,15 @@ def test_a_channel_has_one_gain_within_its_spread(make_session: MakeSession, v0:
     assert len(np.unique(gain)) == 16
     assert np.abs(gain - 1).max() <= 0.05
     assert np.abs(gain - 1).max() > 0.02
-    assert np.array_equal(channel_gain.make(channel_gain.Parameters(0.0), session).apply(v0, 0.0, 0), v0)
+    assert np.array_equal(
+        channel_gain.make(channel_gain.Parameters(0.0), session).apply(v0, 0.0, 0), v0
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 3.0, 30.0])
-def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(make_session: MakeSession, ratio: float) -> None:
+def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(
+    make_session: MakeSession, ratio: float
+) -> None:
     """From a single step in the scan: the rows after it, each by itself, against exp(-t / tau)."""
     parameters = mux.Parameters(on_resistance_ohm=0.0, settling_us=10.0, dwell_us=10.0 * ratio)
     step = mux.make(parameters, make_session())
@@ -52,7 +58,9 @@ def test_settling_leaves_exp_of_dwell_over_tau_of_the_row_before(make_session: M
     assert mux.unsettled(parameters) == pytest.approx(exp(-ratio))
     reached = out[100]
     assert reached == pytest.approx(1 - exp(-ratio), rel=1e-12)
-    np.testing.assert_allclose(out[101:110] / reached, np.exp(-ratio * np.arange(1, 10)), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        out[101:110] / reached, np.exp(-ratio * np.arange(1, 10)), rtol=1e-9, atol=1e-15
+    )
     # a constant passes unchanged
     np.testing.assert_allclose(step.apply(np.full(208, 0.3), 0.0, 0), 0.3, rtol=1e-12)
 
@@ -64,7 +72,9 @@ def test_settling_is_the_periodic_recurrence(left: float) -> None:
     np.testing.assert_allclose(found, target + left * (np.roll(found, 1) - target), atol=1e-11)
 
 
-def test_settling_depends_on_the_order_of_the_scan(make_session: MakeSession, v0: FloatArray) -> None:
+def test_settling_depends_on_the_order_of_the_scan(
+    make_session: MakeSession, v0: FloatArray
+) -> None:
     session = make_session()
     parameters = mux.Parameters(settling_us=50.0)
     order = np.random.default_rng(4).permutation(208)
@@ -78,7 +88,9 @@ def test_settling_depends_on_the_order_of_the_scan(make_session: MakeSession, v0
 
 
 def test_on_resistance_divides(make_session: MakeSession) -> None:
-    parameters = mux.Parameters(on_resistance_ohm=100.0, input_resistance_ohm=800.0, settling_us=0.0)
+    parameters = mux.Parameters(
+        on_resistance_ohm=100.0, input_resistance_ohm=800.0, settling_us=0.0
+    )
     session = make_session()
     assert mux.make(parameters, session).apply(np.ones(208), 0.0, 0) == pytest.approx(0.8)
     spread = mux.make(replace(parameters, on_spread_ohm=50.0), session).apply(np.ones(208), 0.0, 0)
@@ -96,7 +108,8 @@ def test_switched_lines() -> None:
 
 
 def _quadrature(p: charge_injection.Parameters) -> float:
-    """The demodulator's mean of 2 sin(w t) exp(-(dwell + t) / tau) over the window, by the midpoint rule."""
+    """The demodulator's mean of 2 sin(w t) exp(-(dwell + t) / tau) over the window, by the midpoint
+    rule."""
     t = (np.arange(2_000_000) + 0.5) / 2_000_000 * p.window_us
     decay = np.exp(-(p.dwell_us + t) / p.settling_us)
     weight = 2 * np.sin(2 * pi * p.frequency_hz * t * 1e-6) if p.frequency_hz else 1.0
@@ -109,16 +122,23 @@ def _quadrature(p: charge_injection.Parameters) -> float:
         charge_injection.Parameters(),
         charge_injection.Parameters(frequency_hz=0.0),
         charge_injection.Parameters(settling_us=3.0, dwell_us=1.0, window_us=20.0),
-        charge_injection.Parameters(settling_us=500.0, dwell_us=100.0, window_us=1000.0, frequency_hz=1e3),
+        charge_injection.Parameters(
+            settling_us=500.0, dwell_us=100.0, window_us=1000.0, frequency_hz=1e3
+        ),
     ],
 )
 def test_what_a_demodulator_keeps_of_injected_charge(parameters: Any) -> None:
-    assert charge_injection.kept_by_demodulator(parameters) == pytest.approx(_quadrature(parameters), rel=1e-6)
+    assert charge_injection.kept_by_demodulator(parameters) == pytest.approx(
+        _quadrature(parameters), rel=1e-6
+    )
 
 
 def test_injected_charge_is_q_over_c_on_lines_that_switch(make_session: MakeSession) -> None:
-    """One line switches, the other stays: exactly Q / C, with the line's sign, whatever the signal."""
-    session = replace(make_session(), protocol=table(8, [[0, 1, 2, 4], [0, 1, 3, 4], [1, 2, 3, 4], [1, 2, 3, 5]]))
+    """One line switches, the other stays: exactly Q / C, with the line's sign, whatever the
+    signal."""
+    session = replace(
+        make_session(), protocol=table(8, [[0, 1, 2, 4], [0, 1, 3, 4], [1, 2, 3, 4], [1, 2, 3, 5]])
+    )
     p = charge_injection.Parameters(charge_pc=2.0, capacitance_pf=100.0, spread=0.0)
     step = charge_injection.make(p, session)
     unit = 0.02 * charge_injection.kept_by_demodulator(p)
@@ -147,18 +167,23 @@ def test_crosstalk_comes_from_driven_wires_beside(make_session: MakeSession) -> 
     np.testing.assert_allclose(got, expected, atol=1e-13)
 
 
-@pytest.mark.parametrize(("frequency_hz", "alias"), [(50.0, 10.0), (60.0, 0.0), (50.3, 9.7), (47.0, 7.0)])
+@pytest.mark.parametrize(
+    ("frequency_hz", "alias"), [(50.0, 10.0), (60.0, 0.0), (50.3, 9.7), (47.0, 7.0)]
+)
 def test_mains_aliases_at_its_frequency_and_amplitude(
     make_session: MakeSession, frequency_hz: float, alias: float
 ) -> None:
-    """400 frames at 20 Hz: the spectrum of any row has one line, at the alias, with the amplitude given."""
+    """400 frames at 20 Hz: the spectrum of any row has one line, at the alias, with the amplitude
+    given."""
     session = make_session(n_frames=400, quiet_frames=0)
     step = mains.make(mains.Parameters(2e-3, frequency_hz, 30.0), session)
     seen = np.array([step.apply(np.zeros(208), t, k) for k, t in enumerate(session.times_s())])
     assert mains.alias_hz(frequency_hz, 20.0) == pytest.approx(alias)
     row, frame = 77, 13
     time_s = frame / 20 + 77 / (208 * 20)
-    assert seen[frame, row] == pytest.approx(2e-3 * sin(2 * pi * frequency_hz * time_s + pi / 6), abs=1e-15)
+    assert seen[frame, row] == pytest.approx(
+        2e-3 * sin(2 * pi * frequency_hz * time_s + pi / 6), abs=1e-15
+    )
     spectrum = np.abs(np.fft.rfft(seen[:, row])) / 400
     place = np.fft.rfftfreq(400, 1 / 20)
     assert place[np.argmax(spectrum)] == pytest.approx(alias)
@@ -166,15 +191,25 @@ def test_mains_aliases_at_its_frequency_and_amplitude(
         assert 2 * spectrum.max() == pytest.approx(2e-3, rel=1e-9)
         assert np.sort(spectrum)[-2] < 1e-12
     # through the rows of one frame, it is a sine at its own frequency
-    np.testing.assert_allclose(seen[0], 2e-3 * np.sin(2 * pi * frequency_hz * row_delays_s(session) + pi / 6))
+    np.testing.assert_allclose(
+        seen[0], 2e-3 * np.sin(2 * pi * frequency_hz * row_delays_s(session) + pi / 6)
+    )
 
 
 @pytest.mark.parametrize("cmrr_db", [0.0, 40.0, 80.0])
-def test_common_mode_is_the_inputs_mean_over_the_rejection(make_session: MakeSession, cmrr_db: float) -> None:
+def test_common_mode_is_the_inputs_mean_over_the_rejection(
+    make_session: MakeSession, cmrr_db: float
+) -> None:
     loads, v = _loads(), np.linspace(-1, 1, 208)
     middle = (loads.plus_v + loads.minus_v) / 2
     for ground, common in (("sink", middle - loads.sink_v), ("mean", middle)):
         step = common_mode.make(common_mode.Parameters(cmrr_db, ground), make_session())
-        np.testing.assert_allclose(step.apply(v, loads, 0.0, 0) - v, common * 10 ** (-cmrr_db / 20), atol=1e-15)
-        other = common_mode.make(common_mode.Parameters(cmrr_db, ground, inverted=True), make_session())
-        np.testing.assert_allclose(other.apply(v, loads, 0.0, 0) + step.apply(v, loads, 0.0, 0), 2 * v, atol=1e-14)
+        np.testing.assert_allclose(
+            step.apply(v, loads, 0.0, 0) - v, common * 10 ** (-cmrr_db / 20), atol=1e-15
+        )
+        other = common_mode.make(
+            common_mode.Parameters(cmrr_db, ground, inverted=True), make_session()
+        )
+        np.testing.assert_allclose(
+            other.apply(v, loads, 0.0, 0) + step.apply(v, loads, 0.0, 0), 2 * v, atol=1e-14
+        )

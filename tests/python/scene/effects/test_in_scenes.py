@@ -24,7 +24,9 @@ BENCH = Bench()  # keeps the meshes
 
 def _compiled(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any) -> Compiled:
     given = {"quiet_frames": 1, "frames": 1, "elements": ELEMENTS, "seed": 3, **more}
-    return compile_scene(Scene("test", protocol=protocol or adjacent(16), effects=effects, **given), bench=BENCH)
+    return compile_scene(
+        Scene("test", protocol=protocol or adjacent(16), effects=effects, **given), bench=BENCH
+    )
 
 
 def _last(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any) -> FloatArray:
@@ -39,17 +41,32 @@ def _direct(impedance: Any = 0.0, protocol: Protocol | None = None) -> FloatArra
 @pytest.mark.parametrize("contact", [{}, {"contact_impedance": {"mean_ohm_m2": 0.02}}])
 @pytest.mark.parametrize("ohm", [0.0, 1.0, 300.0, 1e5, 1e9])
 def test_a_bridge_is_a_resistor_parallel_to_the_skin(ohm: float, contact: dict[str, Any]) -> None:
-    """Seen from electrodes 3 and 4 the skin is R_34: a bridge leaves R / (R + R_34) of their voltage."""
+    """Seen from electrodes 3 and 4 the skin is R_34: a bridge leaves R / (R + R_34) of their
+    voltage."""
     rows = table(16, [[3, 4, 3, 4], [0, 8, 3, 4], [12, 5, 4, 3]])
     whole = _last(contact, rows)
     skin_ohm = whole[0] / rows.current_a
     bridged = _last({**contact, "bridged": {"electrodes": [3, 4], "resistance_ohm": ohm}}, rows)
-    np.testing.assert_allclose(bridged, whole * ohm / (ohm + skin_ohm), rtol=1e-9, atol=1e-12 * np.abs(whole).max())
+    np.testing.assert_allclose(
+        bridged, whole * ohm / (ohm + skin_ohm), rtol=1e-9, atol=1e-12 * np.abs(whole).max()
+    )
 
 
 def test_bridged_without_resistance_electrodes_are_at_one_potential() -> None:
-    """A chain of three: rows between its electrodes read 0 V, all others the same on each of them."""
-    rows = table(16, [[0, 8, 2, 3], [0, 8, 3, 9], [0, 8, 2, 9], [0, 8, 2, 6], [0, 8, 9, 6], [2, 8, 5, 6], [3, 8, 5, 6]])
+    """A chain of three: rows between its electrodes read 0 V, all others the same on each of
+    them."""
+    rows = table(
+        16,
+        [
+            [0, 8, 2, 3],
+            [0, 8, 3, 9],
+            [0, 8, 2, 9],
+            [0, 8, 2, 6],
+            [0, 8, 9, 6],
+            [2, 8, 5, 6],
+            [3, 8, 5, 6],
+        ],
+    )
     v = _last({"bridged": {"electrodes": [2, 3, 9], "resistance_ohm": 0.0}}, rows)
     assert np.abs(v[:3]).max() < 1e-12
     assert v[3] == pytest.approx(v[4], rel=1e-9)
@@ -59,7 +76,9 @@ def test_bridged_without_resistance_electrodes_are_at_one_potential() -> None:
 
 @pytest.mark.parametrize("others", [{}, {"contact_impedance": {"mean_ohm_m2": 0.01}}])
 @pytest.mark.parametrize("electrodes", [[5], [0, 15], [2, 3, 11]])
-def test_detached_electrodes_carry_no_signal_and_leave_the_rest(electrodes: list[int], others: dict[str, Any]) -> None:
+def test_detached_electrodes_carry_no_signal_and_leave_the_rest(
+    electrodes: list[int], others: dict[str, Any]
+) -> None:
     v = _last({**others, "detached": {"electrodes": electrodes}})
     impedance = np.full(16, others["contact_impedance"]["mean_ohm_m2"] if others else 0.0)
     impedance[electrodes] = 1e5
@@ -82,9 +101,13 @@ def test_a_wobbling_electrode_is_lost_for_a_while() -> None:
 def test_phase_leaves_detached_electrodes_detached() -> None:
     """The double layer would else shunt what does not touch."""
     off = {"detached": {"electrodes": [5]}, "contact_impedance": {"mean_ohm_m2": 0.01}}
-    slow = {"phase": {"frequency_hz": 1e-3, "relative_permittivity": 1.0, "capacitance_f_per_m2": 1e-3}}
+    slow = {
+        "phase": {"frequency_hz": 1e-3, "relative_permittivity": 1.0, "capacitance_f_per_m2": 1e-3}
+    }
     np.testing.assert_allclose(_last({**off, **slow}), _last(off), rtol=1e-6, atol=1e-9)
-    fast = {"phase": {"frequency_hz": 50e3, "relative_permittivity": 1.0, "capacitance_f_per_m2": 10.0}}
+    fast = {
+        "phase": {"frequency_hz": 50e3, "relative_permittivity": 1.0, "capacitance_f_per_m2": 10.0}
+    }
     np.testing.assert_allclose(
         _last({**off, **fast}), _last({"detached": {"electrodes": [5]}}), rtol=1e-4, atol=1e-6
     )
@@ -106,13 +129,20 @@ def test_phase_on_an_even_sheet_with_shunts_is_one_complex_factor() -> None:
 def test_source_impedance_divides_the_current(hertz: float, with_phase: bool) -> None:
     """The load is what a row measures on the driven electrodes themselves."""
     rows = table(16, [[0, 8, 0, 8], [0, 8, 3, 4], [1, 2, 1, 2], [1, 2, 9, 11]])
-    source = {"resistance_ohm": 30e3, "capacitance_pf": 200.0, "frequency_hz": hertz, "series_ohm": 240.0}
+    source = {
+        "resistance_ohm": 30e3,
+        "capacitance_pf": 200.0,
+        "frequency_hz": hertz,
+        "series_ohm": 240.0,
+    }
     more = {"phase": {"frequency_hz": 50e3}} if with_phase else {}
     truth = simulate_frames(_compiled(more, rows)).true_v[0]
     load = np.repeat(truth[[0, 2]] / rows.current_a, 2) + 240.0
     share = 1 / (1 + load * (1 / 30e3 + 2j * pi * hertz * 200e-12))
     expected = (truth * share).real
-    np.testing.assert_allclose(_last({**more, "source_impedance": source}, rows), expected, rtol=1e-9)
+    np.testing.assert_allclose(
+        _last({**more, "source_impedance": source}, rows), expected, rtol=1e-9
+    )
     assert 0.3 < abs(share).min() < abs(share).max() < 0.9
 
 
@@ -145,7 +175,8 @@ def test_misplacement_is_the_forward_models_on_the_moved_skin(make_session: Make
 
 
 def test_common_mode_with_a_grounded_sink() -> None:
-    """Row [0, 8, 3, 12]: the common voltage is the mean of what [0, 8, 3, 8] and [0, 8, 12, 8] read."""
+    """Row [0, 8, 3, 12]: the common voltage is the mean of what [0, 8, 3, 8] and [0, 8, 12, 8]
+    read."""
     rows = table(16, [[0, 8, 3, 12], [0, 8, 3, 8], [0, 8, 12, 8]])
     plain = _last({}, rows)
     mixed = _last({"common_mode": {"cmrr_db": 40.0}}, rows)
@@ -158,7 +189,10 @@ def test_common_mode_with_a_grounded_sink() -> None:
         ({"detached": {"electrodes": list(range(14))}}, r"\[effects.detached\]: .*no row"),
         ({"bridged": {"electrodes": [0, 77]}}, r"\[effects.bridged\]: .*77 does not exist"),
         ({"noise": {"snr_db": 60.0, "noise_v": 1e-3}}, r"\[effects.noise\]: snr_db: give either"),
-        ({"charge_injection": {"window_us": 15.0}}, r"\[effects.charge_injection\]: window_us = 15"),
+        (
+            {"charge_injection": {"window_us": 15.0}},
+            r"\[effects.charge_injection\]: window_us = 15",
+        ),
         ({"misplacement": {"spread_mm": 80.0}}, r"\[effects.misplacement\]: spread_mm = 80"),
         ({"phase": {"readout": "in_fase"}}, r"\[effects.phase\].*did you mean 'in_phase'"),
         ({"mux": {"dwell_us": 0.0}}, r"\[effects.mux\].*dwell_us.*above 0"),

@@ -1,4 +1,5 @@
-"""A scene against a measurement that nobody here made: phantom 1_3, a metal rod in a tank of saline."""
+"""A scene against a measurement that nobody here made: phantom 1_3, a metal rod in a tank of
+saline."""
 
 from __future__ import annotations
 
@@ -34,7 +35,9 @@ def scene() -> Scene:
 def measured(shared_data: Path) -> Frame:
     path = shared_data / "kit4_dev.npz"
     if not path.is_file():
-        pytest.skip("the measured frames are not part of the project: no ../shared/data/kit4_dev.npz")
+        pytest.skip(
+            "the measured frames are not part of the project: no ../shared/data/kit4_dev.npz"
+        )
     with np.load(path) as data:
         frame = list(data["frame_name"]).index("1_3")
         return Frame(data["reference_voltage"], data["voltage"][frame] - data["reference_voltage"])
@@ -63,14 +66,21 @@ def _irreciprocal(scene: Scene, v: FloatArray) -> FloatArray:
 def test_the_scene_predicts_the_measured_difference(scene: Scene, measured: Frame) -> None:
     found = _predicted(scene, "common_mode", "misplacement")
     assert set(scene.effects) == {"common_mode", "misplacement"}
-    assert _correlation(found.change, measured.change) >= 0.99  # the issue asks for 0.95; 0.9968 was seen
+    assert (
+        _correlation(found.change, measured.change) >= 0.99
+    )  # the issue asks for 0.95; 0.9968 was seen
     assert _correlation(found.saline, measured.saline) >= 0.999
 
 
-def test_the_rod_alone_is_enough_for_the_bound_and_its_place_is_needed(scene: Scene, measured: Frame) -> None:
+def test_the_rod_alone_is_enough_for_the_bound_and_its_place_is_needed(
+    scene: Scene, measured: Frame
+) -> None:
     assert _correlation(_predicted(scene).change, measured.change) >= 0.99
     track = scene.touches[0]
-    for x_mm, y_mm, at_most in ((-track.keyframes[0].x_mm, track.keyframes[0].y_mm, 0.9), (8.1, -49.4, 0.3)):
+    for x_mm, y_mm, at_most in (
+        (-track.keyframes[0].x_mm, track.keyframes[0].y_mm, 0.9),
+        (8.1, -49.4, 0.3),
+    ):
         keys = tuple(replace(key, x_mm=x_mm, y_mm=y_mm) for key in track.keyframes)
         moved = replace(scene, touches=(replace(track, keyframes=keys),))
         assert _correlation(_predicted(moved).change, measured.change) < at_most
@@ -90,7 +100,10 @@ def test_each_effect_explains_a_part_of_the_saline_frame(scene: Scene, measured:
 def test_the_common_mode_predicts_what_breaks_reciprocity(scene: Scene, measured: Frame) -> None:
     """Its rejection was read off the saline frame; the rod's frame was not looked at for it."""
     found = _predicted(scene, "common_mode", "misplacement")
-    for bound, seen, made in ((0.8, measured.saline, found.saline), (0.93, measured.change, found.change)):
+    for bound, seen, made in (
+        (0.8, measured.saline, found.saline),
+        (0.93, measured.change, found.change),
+    ):
         assert _correlation(_irreciprocal(scene, made), _irreciprocal(scene, seen)) > bound
     still = _predicted(scene, "misplacement")
     assert np.abs(_irreciprocal(scene, still.change)).max() < 1e-9 * np.abs(still.change).max()

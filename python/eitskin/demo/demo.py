@@ -1,0 +1,152 @@
+"""Three simulated touches, found by each engine: the whole path from a skin to touches in one small
+session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from eitskin.core.engine import CoreEngine
+from eitskin.core.results import Reconstruction
+from eitskin.frames.frames import Frames
+from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.simulate import Measurement, simulate
+from eitskin.scoring.score import FrameScore, scorer_for
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.solve.reconstructor import ENGINES, Reconstructor
+
+TOUCHES = (Touch(-38.0, 34.0, 9.0, 8.0), Touch(44.0, 22.0, 7.0, 5.0), Touch(-6.0, -52.0, 11.0, 4.0))
+TIMED_RUNS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Demo:
+    """The session, each engine's result, the float32 core's score, and its times in
+    microseconds."""
+
+    frames: Frames
+    model: Model
+    results: dict[str, Reconstruction]
+    score: FrameScore
+    time_us_p50: float
+    time_us_p99: float
+    kernels: str
+
+    @property
+    def result(self) -> Reconstruction:
+        """Of the float32 core, as on a board."""
+        return self.results["c"]
+
+    def difference_to_numpy(self, engine: str) -> float:
+        """The greatest difference of an engine's image to numpy's, over the peak."""
+        reference = self.results["numpy"].image
+        return float(
+            np.abs(self.results[engine].image - reference).max() / (np.abs(reference).max() or 1.0)
+        )
+
+
+def run_demo(seed: int, snr_db: float) -> Demo:
+    """Simulate on another, finer mesh with noise and contacts drawn under ``seed``, and reconstruct
+    with the prebuilt model.
+
+    Raises:
+        MissingExtraError: scipy or netgen is not installed.
+    """
+    touches = TouchSet("demo", seed, (Scene("demo", TOUCHES),))
+    frames = simulate(
+        paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=snr_db)
+    ).as_frames()
+    model, blob = load_prebuilt()
+    results = {}
+    for engine in ENGINES:
+        reconstructor = Reconstructor(model, engine=engine, blob=blob)
+        reconstructor.tare(frames.reference_voltage_v)
+        results[engine] = reconstructor.reconstruct(frames.voltage_v[0])
+    score = scorer_for(model).score(frames, 0, results["c"], "increase")
+    assert score is not None  # the frames carry their truth
+    core = CoreEngine(blob)
+    core.set_baseline(frames.reference_voltage_v)
+    p50, p99 = _times_us(core, frames)
+    return Demo(frames, model, results, score, p50, p99, core.kernels)
+
+
+def _times_us(core: CoreEngine, frames: Frames) -> tuple[float, float]:
+    """Median and 99th percentile of a frame from volts to touches, through cffi."""
+    times = []
+    for _ in range(TIMED_RUNS):
+        start = perf_counter()
+        core.reconstruct(frames.voltage_v[0])
+        times.append(1e6 * (perf_counter() - start))
+    p50, p99 = np.percentile(times, [50, 99])
+    return float(p50), float(p99)
+
+
+def to_json(demo: Demo) -> dict[str, Any]:
+    """Everything that the text says, in full."""
+    info, score = demo.result.info, demo.score
+    return {
+        "true": [[t.x_mm, t.y_mm, t.radius_mm] for t in TOUCHES],
+        "found": [[t.x_mm, t.y_mm, t.radius_mm] for t in demo.result.touches],
+        "hits": score.matching.hits,
+        "false": score.matching.false_touches,
+        "position_errors_mm": list(score.matching.distances_mm),
+        "miou_image": score.miou_image,
+        "miou_touches": score.miou_touches,
+        "difference_to_numpy_over_peak": {
+            "c_float32": demo.difference_to_numpy("c"),
+            "c_float64": demo.difference_to_numpy("c64"),
+        },
+        "iterations": info.iterations,
+        "macs_solve": info.macs,
+        "macs_touches": info.touch_macs,
+        "time_us_p50": demo.time_us_p50,
+        "time_us_p99": demo.time_us_p99,
+        "kernels": demo.kernels,
+        "snr_db": demo.frames.meta["snr_db"],
+        "mesh_elements_simulated": demo.frames.meta["mesh_elements"],
+        "mesh_elements_model": demo.model.meta.get("mesh_elements"),
+    }
+
+
+def to_text(demo: Demo) -> str:
+    """A table of the touches beside the truth, then what it cost."""
+    facts, info, matching = to_json(demo), demo.result.info, demo.score.matching
+    lines = [
+        (
+            f"simulated on {facts['mesh_elements_simulated']} elements at {facts['snr_db']:g} dB; "
+            f"model from {facts['mesh_elements_model']} elements"
+        ),
+        "          true x      y  radius |  found x      y  radius | error mm",
+    ]
+    found_of = dict(matching.pairs)
+    for k, true in enumerate(TOUCHES):
+        row = f"touch {k + 1} {true.x_mm:9.2f} {true.y_mm:6.2f} {true.radius_mm:7.2f} |"
+        if k in found_of:
+            t = demo.result.touches[found_of[k]]
+            error = float(np.hypot(t.x_mm - true.x_mm, t.y_mm - true.y_mm))
+            lines.append(f"{row} {t.x_mm:8.2f} {t.y_mm:6.2f} {t.radius_mm:7.2f} | {error:8.2f}")
+        else:
+            lines.append(f"{row}      not found")
+    differences = facts["difference_to_numpy_over_peak"]
+    lines += [
+        (
+            f"{matching.false_touches} false touches; MIoU image {demo.score.miou_image:.3f}, "
+            f"touches as discs {demo.score.miou_touches:.3f}"
+        ),
+        (
+            f"greatest difference to numpy over the peak: C float32 {differences['c_float32']:.1e},"
+            f" C float64 {differences['c_float64']:.1e}"
+        ),
+        (
+            f"{info.iterations} iterations, {info.macs / 1e6:.2f} + {info.touch_macs / 1e6:.2f}"
+            f" million MACs (solve + touches); {demo.time_us_p50:.0f} us a frame, p99"
+            f" {demo.time_us_p99:.0f} us ({demo.kernels} kernels)"
+        ),
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,150 @@
+"""The demo's touches on the emulated board: the firmware's own results beside this host's, bit for
+bit."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from eitskin.core.results import Touch
+from eitskin.device.bandwidth import carried_every
+from eitskin.device.known_model import need_model
+from eitskin.device.link import LinkEvent
+from eitskin.device.live import LiveFrame, LiveSummary, begin_scene, follow, set_up, take_reference
+from eitskin.device.open import open_device
+from eitskin.device.recordings.host_check import HostCheck, HostTwin
+from eitskin.device.recordings.packet_log import PacketLog
+from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.wire.packets import BoardInfo, Stream
+from eitskin.errors import DeviceError
+from eitskin.scene.random_touches import Touch as TrueTouch
+from eitskin.scoring.matching import Matching
+from eitskin.scoring.scene_truth import truth_of
+
+TARE_FRAMES = 8
+FRAMES = 3
+EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
+
+
+@dataclass(frozen=True, eq=False)
+class BoardDemo:
+    """What the board found in the last of its frames, what this host made of the same raw frame,
+    and whether all frames agree."""
+
+    url: str
+    info: BoardInfo
+    frame: LiveFrame
+    board: tuple[Touch, ...]
+    host: tuple[Touch, ...]
+    true: tuple[TrueTouch, ...]
+    matching: Matching
+    check: HostCheck
+    summary: LiveSummary
+    seconds: float
+
+
+def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None) -> BoardDemo:
+    """Tare the board behind ``url`` (sim: or emu:) and let it solve ``frames`` frames of its scene.
+
+    Raises:
+        DeviceError: it gives no frame.
+        MissingExtraError: the emulator is not installed.
+    """
+    start = perf_counter()
+    truth, summary, host = truth_of(url), LiveSummary(), None
+    assert truth is not None
+    with open_device(url, image=image) as device:
+        known = need_model(device.board, None, device.transport.name, "the comparison")
+        options = set_up(device, ScanSettings(), SolverSettings(), known)
+        assert options is not None
+        log = PacketLog(device)
+        take_reference(device, TARE_FRAMES, streamed=True)
+        began_us, _ = begin_scene(device)
+        if began_us is not None:
+            truth.begin(began_us)
+        for item in follow(
+            device, EVERYTHING, every=carried_every(device, EVERYTHING), frames=frames
+        ):
+            if isinstance(item, LiveFrame):
+                summary.add(item)
+        log.stop()
+        info = device.board
+    twin, last = HostTwin(known, options), None
+    for item in log.frames(EVERYTHING):
+        if isinstance(item, LiveFrame):
+            result = twin.take(item)
+            if result is not None:
+                last, host = item, result
+        elif isinstance(item, LinkEvent):
+            twin.lost()
+    if last is None or host is None or last.touches is None:
+        raise DeviceError(f"{url}: the board solved no frame")
+    true, found = truth.touches(last.board_us), last.touches.touches
+    matching = truth.judge(true, [(t.x_mm, t.y_mm) for t in found])
+    return BoardDemo(
+        url,
+        info,
+        last,
+        found,
+        host.touches,
+        true,
+        matching,
+        twin.check,
+        summary,
+        perf_counter() - start,
+    )
+
+
+def to_json(demo: BoardDemo) -> dict[str, Any]:
+    """Everything that the text says, in full."""
+    quantiles = demo.summary.solve_quantiles_us
+    return {
+        "device": demo.url,
+        "board": demo.info.board,
+        "firmware": demo.info.firmware_text,
+        "frame": demo.frame.number,
+        "true": [[t.x_mm, t.y_mm, t.radius_mm] for t in demo.true],
+        "board_touches": [asdict(touch) for touch in demo.board],
+        "host_touches": [asdict(touch) for touch in demo.host],
+        "position_errors_mm": list(demo.matching.distances_mm),
+        "false": demo.matching.false_touches,
+        "check": demo.check.as_dict(),
+        "solve_us_p50": None if quantiles is None else quantiles[0],
+        "seconds": demo.seconds,
+    }
+
+
+def to_text(demo: BoardDemo) -> str:
+    """The touches beside this host's and the truth, and whether all bits agree."""
+    solved = demo.summary.solve_quantiles_us
+    time = "" if solved is None else f", {solved[0] / 1e3:.1f} ms a solve in the board's time"
+    lines = [
+        (
+            f"the same three touches through {demo.url}: {demo.info.board}, firmware"
+            f" {demo.info.firmware_text}{time}"
+        ),
+        "        board x      y  radius |   host x      y  radius | error mm",
+    ]
+    true_of = {
+        found: d
+        for (_, found), d in zip(demo.matching.pairs, demo.matching.distances_mm, strict=True)
+    }
+    place = {found: true for true, found in demo.matching.pairs}
+    for n, k in enumerate(
+        sorted(range(len(demo.board)), key=lambda k: place.get(k, len(demo.true)))
+    ):
+        touch = demo.board[k]
+        row = f"touch {n + 1} {touch.x_mm:7.2f} {touch.y_mm:6.2f} {touch.radius_mm:7.2f} |"
+        other = demo.host[k] if k < len(demo.host) else None
+        row += (
+            "      none               |"
+            if other is None
+            else f" {other.x_mm:8.2f} {other.y_mm:6.2f} {other.radius_mm:7.2f} |"
+        )
+        lines.append(row + (f" {true_of[k]:8.2f}" if k in true_of else "    false"))
+    if demo.matching.misses:
+        lines.append(f"{demo.matching.misses} touches not found")
+    lines.append(f"{demo.check.text()} ({demo.seconds:.1f} s)")
+    return "\n".join(lines)

@@ -1,0 +1,148 @@
+"""A board before the doctor: frames that it measures now, and the faults and counts that it reports
+itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from eitskin.device.client import Device
+from eitskin.device.known_model import KnownModel, scanned_protocol
+from eitskin.device.live import begin_scene
+from eitskin.device.recordings.raw_frames import RawRun, as_frames, collect
+from eitskin.device.wire.explain import fault_text
+from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault, FaultCode
+from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Report
+from eitskin.frames.doctor.subject import AS_GIVEN, Subject
+from eitskin.skin.skin import Skin
+
+NOT_FOR_THE_SKIN = frozenset(
+    (FaultCode.DEADLINE, FaultCode.WATCHDOG, FaultCode.CRASH, FaultCode.STALE_REFERENCE)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a board gave: ``quiet`` and ``touched`` frames, what it is, what it counted (None: a
+    recording)."""
+
+    quiet: RawRun
+    touched: RawRun
+    info: BoardInfo
+    stats: BoardStats | None
+
+
+def measure(
+    device: Device, frames: int, *, touched: bool, before_touches: Callable[[], None]
+) -> Measured:
+    """``frames`` raw frames of the untouched skin, and where ``touched`` as many after
+    ``before_touches`` was called. A recording gives its own quiet frames, where it has some.
+
+    Raises:
+        DeviceError: none came.
+    """
+    first = collect(device, 0 if device.transport.replays else frames)
+    if device.transport.replays:
+        quiet = _with_frames(first, first.quiet or first.frames[:frames])
+        after = _with_frames(first, first.frames if first.quiet else first.frames[frames:])
+        return Measured(quiet, after if touched else RawRun(), device.board, None)
+    after = RawRun()
+    if touched:
+        before_touches()
+        begin_scene(device)
+        after = collect(device, frames)
+    ended = device.link.ended
+    return Measured(
+        first, after, device.board if ended else device.info(), None if ended else device.stats()
+    )
+
+
+def board_subject(
+    device: Device, measured: Measured, known: KnownModel | None, skin: Skin | None
+) -> Subject:
+    """For the doctor's checks; the skin is the model's own unless another is given.
+
+    Raises:
+        DeviceError: the protocol that is scanned is not known here.
+    """
+    protocol = scanned_protocol(measured.info, known, device.transport.name)
+    if skin is None and known is not None:
+        skin = known.model.skin
+    frames = as_frames(
+        measured.quiet.frames,
+        measured.touched.frames,
+        protocol,
+        measured.info,
+        known,
+        allow_nonfinite=True,
+    )
+    remarks = () if measured.info.check_every == 1 else (
+        "reciprocity of every row: the board measures one of each pair; scan fully with  eitskin stream --full",
+    )  # fmt: skip
+    return Subject(device.transport.url, AS_GIVEN, ((AS_GIVEN, frames),), skin, remarks)
+
+
+def board_findings(report: Report, measured: Measured) -> Report:
+    """``report`` with what the board itself says. Remedies of ``eitskin import`` are taken out: a
+    board is mended by hand."""
+    raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]
+    told = {
+        (fault.code, fault.index if fault.code in ELECTRODE_FAULTS else 0): fault
+        for fault in raised
+    }
+    own = [_finding(fault) for fault in told.values()]
+    codes = {fault.code for fault in raised}
+    own += [_standing(code) for code in measured.info.fault_codes if code not in codes]
+    missing = measured.quiet.missing + measured.touched.missing
+    if missing:
+        own.append(
+            Finding(
+                "board-link",
+                NOTE,
+                f"{missing} packets were lost between board and host",
+                {"missing": missing},
+            )
+        )
+    if measured.stats is not None and measured.stats.slots_repeated:
+        count = measured.stats.slots_repeated
+        text = f"{count} measurements were repeated because the multiplexers were switched too late"
+        own.append(Finding("board-slots", NOTE, text, {"slots_repeated": count}))
+    findings = tuple(replace(finding, mend="") for finding in (*report.findings, *own))
+    counted: dict[str, object] = (
+        {} if measured.stats is None else {"board_frames_scanned": measured.stats.frames_scanned}
+    )
+    return replace(report, findings=findings, mend="", measured={**report.measured, **counted})
+
+
+def _severity(code: int) -> str:
+    return NOTE if code in NOT_FOR_THE_SKIN else FAULT
+
+
+def _name(code: int) -> str:
+    return "board-" + (
+        FaultCode(code).name.lower().replace("_", "-") if code in list(FaultCode) else str(code)
+    )
+
+
+def _finding(fault: Fault) -> Finding:
+    evidence = {"frame": fault.frame, "index": fault.index, "value": fault.value}
+    return Finding(
+        _name(fault.code),
+        _severity(fault.code),
+        f"the board reports: {fault_text(fault)}",
+        evidence,
+    )
+
+
+def _standing(code: FaultCode) -> Finding:
+    text = (
+        f"the board has reported {code.name.lower().replace('_', ' ')} since before; reset it and"
+        " look again"
+    )
+    return Finding(_name(code), _severity(code), text)
+
+
+def _with_frames(run: RawRun, frames: list[Any]) -> RawRun:
+    """``run`` with other frames."""
+    return RawRun(run.quiet, frames, run.faults, run.missing, run.left_out)

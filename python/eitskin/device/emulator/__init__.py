@@ -1,3 +1,0 @@
-"""An emulated NUCLEO-F767ZI: the unmodified firmware image, peripherals by registers, simulated analog parts;
-docs/guide/emulated-board.md.
-"""

@@ -1,1 +1,0 @@
-"""What hangs on the processor's pins: generator, multiplexers, skin, converter's input; each says what it leaves out."""

@@ -1,0 +1,21 @@
+"""From the voltage between the electrodes to codes: the amplifier's gain, half the reference as
+bias, 12 bits (docs/guide/hardware.md).
+
+The converter's transfer is ideal: code k from k - 1/2 to k + 1/2 steps of VREF / 4096, and its ends
+beyond. No noise: that is the scene's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+REFERENCE_V = 3.3
+STEPS = 4096
+GAIN = 1.5
+STEP_V = REFERENCE_V / STEPS / GAIN  # of one code, at the electrodes
+
+
+def codes(v: npt.NDArray[np.float64]) -> npt.NDArray[np.uint16]:
+    """Codes (.,) of the voltages ``v`` (.,) between the electrodes."""
+    return np.clip(np.round(STEPS / 2 + v / STEP_V), 0, STEPS - 1).astype(np.uint16)

@@ -1,0 +1,28 @@
+"""The firmware image that runs on the emulated board: one of the user's, or the one that ships with
+eitskin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from eitskin.errors import DeviceError
+from eitskin.fileio import read_bytes
+
+ELF = b"\x7fELF"
+
+
+def image_bytes(path: Path | None) -> bytes:
+    """The image in ``path`` (.bin), or without it the one that ships.
+
+    Raises:
+        FileError: it cannot be read.
+        DeviceError: it is an .elf.
+    """
+    if path is None:
+        from eitskin.firmware.prebuilt import load_image
+
+        return load_image()[0]
+    image = read_bytes(path, "firmware image")
+    if image.startswith(ELF):
+        raise DeviceError(f"{path}: this is an .elf; give the .bin that is built beside it")
+    return image

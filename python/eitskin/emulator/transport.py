@@ -1,0 +1,116 @@
+"""``emu:SCENE``: the bytes of the unmodified firmware on an emulated board. Deterministic; no
+thread; time is the board's."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from eitskin.device.bank import bank_bytes
+from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
+from eitskin.errors import DeviceError, missing_extra
+
+if TYPE_CHECKING:
+    from eitskin.emulator.board import EmulatedBoard
+
+GATHER_TICKS = 200 * TICKS_PER_US  # bytes that follow within this time are read together
+START_TICKS = (
+    TICKS_PER_S  # that a board may take until it speaks: a command that comes earlier is lost
+)
+# of one read: an emulated second takes some five, and an image that hangs must not hang its user
+MOST_WALL_S = 120.0
+
+
+class EmulatedTransport:
+    """The host's end of the emulated board's serial line. ``board`` may be looked at, and
+    disturbed."""
+
+    synchronous = True
+    replays = False
+    ended = False  # the scene's last frame is held; the board goes on
+
+    def __init__(self, name: str, board: EmulatedBoard) -> None:
+        self.url = self.name = f"emu:{name}"
+        self.board = board
+        self._closed = False
+
+    def read(self, timeout_s: float) -> bytes:
+        """Let the board run until bytes have come, or ``timeout_s`` of its time has passed.
+
+        Raises:
+            DeviceError: it is closed, the processor has locked up, or the emulation takes minutes.
+        """
+        board, line = self.board, self.board.line
+        self._check_open()
+        until = board.clock.now + max(round(timeout_s * TICKS_PER_S), 1)
+        give_up = time.monotonic() + MOST_WALL_S
+
+        def enough() -> bool:
+            if time.monotonic() > give_up:
+                raise DeviceError(
+                    f"{self.name}: the emulated board said nothing in {MOST_WALL_S:.0f} s; its"
+                    " firmware hangs, or this computer is too slow for it"
+                )
+            return line.up_next_end() <= board.clock.now
+
+        board.run_until(until, enough)
+        if line.up_next_end() <= board.clock.now:
+            board.run_until(min(board.clock.now + GATHER_TICKS, until))
+        return board.receive()
+
+    def write(self, data: bytes) -> None:
+        """Send ``data``: it reaches the board at 1 Mbaud from now on.
+
+        Raises:
+            DeviceError: it is closed.
+        """
+        self._check_open()
+        self.board.send(data)
+
+    def reopen(self) -> bool:
+        return not self._closed
+
+    def begin_scene(self) -> None:
+        """Let the scene's time 0 be now."""
+        self.board.skin.begin(self.board.clock.now)
+
+    def close(self) -> None:
+        self._closed = True
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise DeviceError(f"{self.name}: it has been closed; open it again")
+
+
+def open_emulated(
+    scene: str, *, model: bytes | None = None, image: Path | None = None
+) -> EmulatedTransport:
+    """An emulated board before ``scene`` (a file or a library scene), with ``model`` in its first
+    bank (or the prebuilt one) and the firmware ``image`` (.bin; or the one that ships). Until
+    ``begin_scene`` the skin is untouched (``analog.skin``).
+
+    Raises:
+        MissingExtraError: unicorn, or what simulates the scene, is not installed.
+        FileError, ConfigError, GeometryError, ProtocolError: scene or image cannot be read, or the
+            model is for other electrodes.
+        ModelError, DeviceError: the model is none, or too long; the image is none.
+    """
+    try:
+        import unicorn  # noqa: F401
+    except ImportError:
+        raise missing_extra("emulator", "unicorn") from None
+    from eitskin.device.open import find_device_scene
+    from eitskin.emulator.board import EmulatedBoard
+    from eitskin.emulator.image import image_bytes
+    from eitskin.emulator.scene_skin import skin_of
+    from eitskin.model.eitm import decode_model
+    from eitskin.model.prebuilt import load_prebuilt
+
+    program = image_bytes(image)
+    described = find_device_scene(scene)
+    prebuilt, blob = load_prebuilt() if model is None else (decode_model(model, "the model"), model)
+    banks = (bank_bytes(blob, 1),)
+    board = EmulatedBoard(program, skin_of(described, prebuilt.protocol), banks)
+    board.run_until(START_TICKS, lambda: board.line.up_next_end() <= board.clock.now)
+    return EmulatedTransport(scene, board)

@@ -1,0 +1,114 @@
+"""How a touch's strength and place tell its load: the optional section LOAD of a model
+(docs/guide/calibration.md), read and used."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import ModelError
+
+FloatArray = npt.NDArray[np.float64]
+
+HEAD = struct.Struct("<IIfff12x")
+MAX_POINTS, MAX_ORDER = 64, 4
+MOST_GAIN = 4.0  # csrc/src/load.c
+LEAST_RADIUS_MM, HUGE, MOST_REACH, MOST_COEFFICIENT = 1e-6, 1e30, 1e3, 1e6
+
+
+def terms_of(order: int) -> list[tuple[int, int]]:
+    """Powers (a, b) of u and v in the order of the coefficients: 1, u, v, u^2, u v, v^2..."""
+    return [(degree - b, b) for degree in range(order + 1) for b in range(degree + 1)]
+
+
+def monomials(u: FloatArray, v: FloatArray, order: int) -> FloatArray:
+    """(k, t) numbers: each of :func:`terms_of` at (u, v), both (k,)."""
+    return np.stack([u**a * v**b for a, b in terms_of(order)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadLaw:
+    """A calibration. ``strength`` (p,) S/m mm^2 and ``load_n`` (p,) N both ascend from 0: the table
+    where the gain is 1. ``gain`` (t,) are coefficients of :func:`terms_of` (``order``) in u = x /
+    ``radius_mm``, v = y / ``radius_mm``, trusted to ``reach`` = sqrt(u^2 + v^2); ``uncertainty`` is
+    relative: 95 % of the loads that were left out of the fit were within it. float32 all.
+    """
+
+    strength: npt.NDArray[np.float32]
+    load_n: npt.NDArray[np.float32]
+    gain: npt.NDArray[np.float32]
+    order: int
+    radius_mm: float
+    reach: float
+    uncertainty: float
+
+    def gains_at(self, place_mm: FloatArray) -> FloatArray:
+        """What strengths at places (k, 2) are multiplied by: the polynomial, within 1/4 to 4;
+        beyond ``reach`` as there."""
+        u, v = np.asarray(place_mm).T / self.radius_mm
+        away = np.hypot(u, v)
+        inward = np.where(away > self.reach, self.reach / np.maximum(away, 1e-300), 1.0)
+        value = monomials(u * inward, v * inward, self.order) @ self.gain.astype(np.float64)
+        return np.asarray(np.clip(value, 1 / MOST_GAIN, MOST_GAIN))
+
+    def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
+        """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the
+        table by its last slope, to twice its greatest load. What eits_load_n in csrc/src/load.c
+        gives."""
+        seen = np.abs(strength) * self.gains_at(place_mm)
+        s, n = self.strength.astype(np.float64), self.load_n.astype(np.float64)
+        k = np.clip(np.searchsorted(s, seen), 1, len(s) - 1)
+        return np.asarray(
+            np.minimum(
+                n[k - 1] + (seen - s[k - 1]) / (s[k] - s[k - 1]) * (n[k] - n[k - 1]), 2 * n[-1]
+            )
+        )
+
+
+def encode_load(law: LoadLaw) -> bytes:
+    """The section's bytes.
+
+    Raises:
+        ModelError: it is none that a reader would take.
+    """
+    head = HEAD.pack(len(law.strength), law.order, law.radius_mm, law.reach, law.uncertainty)
+    content = head + b"".join(
+        part.astype("<f4").tobytes() for part in (law.strength, law.load_n, law.gain)
+    )
+    decode_load(content, "calibration")
+    return content
+
+
+def decode_load(content: bytes, where: str) -> LoadLaw:
+    """The section LOAD; ``where`` names its file in errors.
+
+    Raises:
+        ModelError: a length or number is out of range.
+    """
+    wrong = ModelError(
+        f"{where}: holds a calibration (section 'LOAD') that is out of range; calibrate again"
+    )
+    if len(content) < HEAD.size:
+        raise wrong
+    points, order, radius_mm, reach, uncertainty = HEAD.unpack_from(content)
+    in_range = (
+        2 <= points <= MAX_POINTS
+        and order <= MAX_ORDER
+        and LEAST_RADIUS_MM <= radius_mm <= HUGE
+        and 0 <= reach <= MOST_REACH
+        and 0 <= uncertainty <= HUGE
+    )
+    if not in_range or len(content) != HEAD.size + 4 * (2 * points + len(terms_of(order))):
+        raise wrong
+    strength, load_n, gain = np.split(
+        np.frombuffer(content, dtype="<f4", offset=HEAD.size), [points, 2 * points]
+    )
+    for ascending in (strength, load_n):
+        if ascending[0] != 0 or not ascending[-1] <= HUGE or not (np.diff(ascending) > 0).all():
+            raise wrong
+    if not (np.abs(gain) <= MOST_COEFFICIENT).all():
+        raise wrong
+    return LoadLaw(strength, load_n, gain, order, radius_mm, reach, uncertainty)

@@ -1,0 +1,464 @@
+"""The numpy reference: the same mathematics as the C core, in float64, written for reading; the
+core is judged against it.
+
+minimise |y - S x|^2 / 2 + lambda |x|_1 by FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009)
+183, doi 10.1137/080716542); ``reference_exact`` has the other solvers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from time import perf_counter_ns
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.findings import FINDINGS, with_findings
+from eitskin.core.results import (
+    COUPLED,
+    STRAIGHT,
+    Baseline,
+    Info,
+    Options,
+    Reconstruction,
+    Touch,
+    check_quiet,
+)
+from eitskin.errors import FrameError, UsageError
+from eitskin.model.model import Model
+from eitskin.reference.diagnostics import Examiner, Folded, Found, Reference
+from eitskin.reference.disc_fit import Disc, Reduced
+from eitskin.reference.exact import ActiveSet, coordinate
+from eitskin.reference.fista import fista
+from eitskin.reference.interaction import interplay
+from eitskin.reference.problem import Certificate, FloatArray, Problem, Result, greatest, project
+from eitskin.reference.reference_outliers import clean
+from eitskin.reference.touches import find_touches
+from eitskin.reference.tracker import Tracker
+from eitskin.reference.whitening import Whitening, form_of, whiten
+from eitskin.solve.options import default_options
+
+BoolArray = npt.NDArray[np.bool_]
+
+ROUNDING = 2.0**-49
+BASIS_TOLERANCE = 1e-6
+LEAST_SQUARE = 2.0**-969
+SOLVED = ("iterations", "gap", "optimum")
+DEAD = "all voltages are zero; is the skin driven and connected?"
+
+
+def orthonormal(candidates: list[FloatArray], rank: int) -> FloatArray:
+    """An orthonormal basis (k, r) of the span of ``candidates`` (each (r,)), in their order."""
+    rows = np.zeros((0, rank))
+    for candidate in candidates:
+        before = float(candidate @ candidate)
+        v = project(project(candidate, rows), rows)
+        after = float(v @ v)
+        if len(rows) < rank and before > 0 and after > BASIS_TOLERANCE * before:
+            rows = np.vstack([rows, v / np.sqrt(after)])
+    return rows
+
+
+class ReferenceEngine:
+    """The numpy engine: one model's frames to images and touches. Slow, and plain."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.options = default_options(model)
+        self._s, self._p = model.sensitivity, model.projection.astype(np.float64)
+        self._v_ref = model.v_ref_v.astype(np.float64)
+        self._form = form_of(self._p, self._s)
+        self._whitening: Whitening | None = None
+        self.seen = self._s
+        self._bad = np.zeros(model.protocol.n_rows, dtype=bool)
+        self._without_reference = self._bad
+        self._v0: FloatArray | None = None
+        self._drift_v0: FloatArray | None = None
+        self._gain = 1.0
+        self._v0_rms = 0.0
+        self._lambda_noise = 0.0
+        self._warm: FloatArray | None = None
+        self._tracker = Tracker(model.grid)
+        self._examiner = Examiner(model)
+        self._noise_v = self._noise_energy = 0.0
+        self._ready = False
+        self._straight: FloatArray | None = None
+        self._known = np.ones(len(model.fold.first), dtype=np.bool_)
+
+    def set_options(self, options: Options) -> None:
+        """Replace the options.
+
+        Raises:
+            UsageError: a limit of multiply-accumulates, which are not counted here.
+        """
+        if options.mac_limit:
+            raise UsageError(
+                "options: the numpy reference counts no multiply-accumulates; give no mac_limit, or"
+                " use the C core"
+            )
+        if options.sign != self.options.sign:
+            self._warm = None
+        self.options = options
+        self._examiner.wanted = {
+            name for bit, name in enumerate(FINDINGS) if options.findings >> bit & 1
+        }
+
+    def mask_rows(self, rows: BoolArray) -> None:
+        """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
+        self._bad = rows.copy()
+
+    def forget(self) -> None:
+        """Forget the warm start and the touches that were followed."""
+        self._warm = None
+        self._tracker.forget()
+
+    def _fold_reference(self, v0: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Folded reference (k,) and where it is known."""
+        fold, usable = self.model.fold, ~(self._bad | self._without_reference)
+        first = usable[fold.first]
+        second = (fold.second >= 0) & usable[fold.second]
+        total = np.where(first, v0[fold.first], 0) + np.where(
+            second, fold.sign * v0[fold.second], 0
+        )
+        count = first.astype(int) + second
+        return total / np.maximum(count, 1), count > 0
+
+    def _fit_to_model(self, v0: FloatArray) -> float:
+        folded, known = self._fold_reference(v0)
+        v, r = folded[known], self._v_ref[known]
+        if not np.abs(v).max(initial=0.0) > 0:
+            raise FrameError(f"reference frame: {DEAD}")
+        correlation = float(v @ r / np.sqrt((v @ v) * (r @ r)))
+        self._gain = float(np.sqrt((r @ r) / (v @ v))) * (-1 if correlation < 0 else 1)
+        self._v0, self._v0_rms = v0, float(np.sqrt(np.mean(v**2)))
+        self._drift_v0, self._warm = v0, None
+        return correlation
+
+    def set_baseline(self, frames: FloatArray) -> Baseline:
+        """Take the reference from quiet ``frames`` (k, m) volts, as CoreEngine.set_baseline does.
+
+        Raises:
+            FrameError: a frame cannot be used.
+        """
+        check_quiet(frames, self._bad, self.options.saturation_v)
+        frames = np.where(self._bad, 0.0, frames)
+        before, self._without_reference = (self._without_reference, self._noise_v), self._bad.copy()
+        lambda_noise, self._noise_v, left = 0.0, 0.0, np.zeros(frames.shape, dtype=np.bool_)
+        was_ready, self._ready = self._ready, False
+        try:
+            if len(frames) >= 4:
+                if "glitch" in self._examiner.wanted:
+                    frames, left = clean(frames, self.model.fold, ~self._bad)
+                lambda_noise = self._learn_lambda_noise(frames, left)
+                self._noise_v = self._noise_of(frames)
+            correlation = self._fit_to_model(frames.mean(axis=0))
+        except FrameError:
+            (self._without_reference, self._noise_v), self._ready = (
+                before,
+                was_ready and self._v0 is not None,
+            )
+            raise
+        self._lambda_noise, self._ready = lambda_noise, True
+        return Baseline(
+            len(frames),
+            correlation,
+            self._gain,
+            self._v0_rms,
+            self._noise_v,
+            lambda_noise,
+            int(left.sum()),
+        )
+
+    def _noise_of(self, frames: FloatArray) -> float:
+        """The rms over rows of the deviation of ``frames`` (k, m), V."""
+        return float(np.sqrt(frames[:, ~self._bad].var(axis=0, ddof=1).mean()))
+
+    def _learn_lambda_noise(self, frames: FloatArray, left: BoolArray) -> float:
+        """The greatest max |S'y| of the second half of ``frames``, each against the mean of those
+        before it; readings in ``left`` are not used."""
+        half, seen = len(frames) // 2, 0.0
+        try:
+            self._fit_to_model(frames[:half].mean(axis=0))
+            self._noise_v = self._noise_of(
+                frames[:half]
+            )  # lambda_noise is learned with the floor that it asks for
+            for k in range(half, len(frames)):
+                self._v0 = frames[:k].mean(axis=0)
+                y = self.frame_stage(np.where(left[k], np.nan, frames[k]))[0]
+                seen = max(seen, greatest(self.seen.T @ y, "both") / self._noise_ratio)
+        except FrameError:
+            self._v0 = None
+            raise
+        return seen
+
+    def _datum(self, frame: FloatArray, v0: FloatArray, kind: str) -> FloatArray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if kind == "normalised":
+                return (frame - v0) / v0
+            if kind == "log-ratio":
+                return self._gain * v0 * np.log(np.clip(frame / v0, 1 / 16, 16))
+        return self._gain * (frame - v0)
+
+    def frame_stage(self, frame: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+        """Reduced projected data y (r,), the basis (k, r) of what is ignored, and how many rows
+        were left out.
+
+        ``self.seen`` (r, n) is then S, or what stands for it where rows are left out.
+
+        Raises:
+            FrameError: no reference, or too many unusable channels.
+        """
+        if self._v0 is None:
+            raise FrameError("frame: no reference frame has been set")
+        limit, look = self.options.saturation_v, self._examiner
+        look.found = Found()
+        masked = self._bad | self._without_reference
+        saturated = (np.abs(np.nan_to_num(frame)) >= limit) & (limit > 0)
+        unusable = masked | ~np.isfinite(frame) | saturated
+        look.found.saturated = int((saturated & ~masked).sum())
+        look.found.names |= {"saturated"} & look.wanted if look.found.saturated else set()
+        judged = (
+            Reference(np.where(masked, np.nan, self._v0), self._v0_rms, self._gain, self._noise_v)
+            if self._ready
+            else None
+        )
+        if judged:
+            unusable = unusable | look.electrodes(frame, judged, masked, unusable)
+        self._check_rows(frame, unusable)
+        if look.found.no_signal:
+            raise FrameError(f"frame: {DEAD}")
+        folded = self._fold(frame, unusable)
+        if judged:
+            unusable = unusable | look.glitches(folded, judged)
+            folded = self._fold(frame, self._check_rows(frame, unusable))
+        if judged and look.misfit(folded, self._along(folded), judged):
+            glitch = look.unpaired(folded)
+            if glitch.any():
+                look.found.misfit, unusable = 0.0, unusable | glitch
+                folded = self._fold(frame, self._check_rows(frame, unusable))
+            else:
+                look.found.names |= {"misfit"} & look.wanted
+        self._noise_energy = look.noise_energy(folded, judged) if judged else 0.0
+        known = folded.first | folded.second
+        self._leave_out(known)
+        basis = orthonormal(self._directions(folded), self.model.rank)
+        y = project(self._reduce(folded.d), basis)
+        self._known, self._straight = known, self._straight_data(frame, unusable, basis)
+        directions = len(y) if self._whitening is None else min(len(y), int(known.sum()))
+        # where the basis leaves no direction, what is there is rounding
+        return y if len(basis) < directions else np.zeros_like(y), basis, int(unusable.sum())
+
+    def _straight_data(
+        self, frame: FloatArray, unusable: BoolArray, basis: FloatArray
+    ) -> FloatArray | None:
+        """What v0 log(v / v0) gives (r,), which strong touches bend less; None where it is not
+        asked for."""
+        model = self.model
+        if (
+            model.data_kind != "difference"
+            or not self.options.touch_search & STRAIGHT
+            or not self._ready
+        ):
+            return None
+        return project(self._reduce(self._fold(frame, unusable, "log-ratio").d), basis)
+
+    def _check_rows(self, frame: FloatArray, unusable: BoolArray) -> BoolArray:
+        """``unusable`` (m,), if there are not too many of them.
+
+        Raises:
+            FrameError: there are, or all others are zero.
+        """
+        if int(unusable.sum()) > self.options.max_masked:
+            raise FrameError(
+                with_findings(
+                    "frame: too many channels of the frame are unusable", self._examiner.found
+                )
+            )
+        if not unusable.all() and not frame[~unusable].any():
+            raise FrameError(f"frame: {DEAD}")
+        return unusable
+
+    def _fold(self, frame: FloatArray, unusable: BoolArray, kind: str = "") -> Folded:
+        """The data of ``frame`` of a ``kind``, else of the model's, folded; zero where a fold is
+        left out."""
+        assert self._v0 is not None
+        fold, kind = self.model.fold, kind or self.model.data_kind
+        out = unusable | ((kind != "difference") & (np.abs(self._v0) < 1e-6 * self._v0_rms))
+        value = np.where(out, 0.0, self._datum(np.where(out, self._v0, frame), self._v0, kind))
+        sign = np.ones_like(fold.sign) if kind == "normalised" else fold.sign
+        first, second = ~out[fold.first], (fold.second >= 0) & ~out[fold.second]
+        one, other = value[fold.first], np.where(second, sign * value[fold.second], 0.0)
+        d = (np.where(first, one, 0.0) + other) / np.maximum(first.astype(int) + second, 1)
+        size = (
+            np.ones(len(one)) if kind == "normalised" else np.abs(self._gain * self._v0[fold.first])
+        )
+        apart = first & second & (np.abs(one - other) > ROUNDING * size)
+        return Folded(d, np.where(apart, one - other, 0.0), first, second)
+
+    def _along(self, folded: Folded) -> FloatArray | None:
+        """What drift of the gain makes of the folded data, (k,); None where it is not ignored."""
+        if not self.options.project_baseline or self._drift_v0 is None:
+            return None
+        fold, v0, count = self.model.fold, self._drift_v0, folded.first.astype(int) + folded.second
+        if self.model.data_kind == "normalised":
+            return np.where(count > 0, 1.0, 0.0)
+        total = np.where(folded.first, v0[fold.first], 0.0) + np.where(
+            folded.second, fold.sign * v0[fold.second], 0.0
+        )
+        return np.asarray(self._gain * total / np.maximum(count, 1))
+
+    @property
+    def _noise_ratio(self) -> float:
+        return 1.0 if self._whitening is None else self._whitening.noise_ratio
+
+    @property
+    def _floor(self) -> float:
+        stored = 0.0 if self._form is None else self._form.floor
+        return stored if self._whitening is None else self._whitening.floor
+
+    def _leave_out(self, known: BoolArray) -> None:
+        """Whiten anew for the folded rows (k,) that are known, and for the noise."""
+        asked = self.options.floor_noise_factor * self._noise_v / self._v0_rms
+        self._whitening = None if self._form is None else whiten(self._form, known, asked)
+        self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
+
+    def _reduce(self, d: FloatArray) -> FloatArray:
+        """Folded data (k,) to reduced data (r,)."""
+        return self._p @ d if self._whitening is None else self._whitening.data @ (self._p @ d)
+
+    def _directions(self, folded: Folded) -> list[FloatArray]:
+        """What the misfit ignores: P's columns of folds left out, unless that is whitened anew, and
+        the drift of the gain."""
+        left_out: list[int] = (
+            [] if self._whitening else np.flatnonzero(~(folded.first | folded.second)).tolist()
+        )
+        directions, along = [self._p[:, k] for k in left_out], self._along(folded)
+        return directions if along is None else [*directions, self._reduce(along)]
+
+    def reconstruct(self, frame: FloatArray, *, touches: bool = True) -> Reconstruction:
+        """One frame (m,) volts to image and touches.
+
+        Raises:
+            FrameError: the frame cannot be used.
+        """
+        if frame.shape != (self.model.protocol.n_rows,):
+            raise FrameError(
+                f"frame: has shape {frame.shape}, but the model's protocol has"
+                f" {self.model.protocol.n_rows} rows"
+            )
+        began_ns = perf_counter_ns()
+        try:
+            y, basis, masked = self.frame_stage(np.asarray(frame, dtype=np.float64))
+        except FrameError:
+            self._warm = None
+            raise
+        o, norm = self.options, float(np.linalg.norm(y))
+        lambda_noise = self._lambda_noise * self._noise_ratio
+        correlation = self.seen.T @ y
+        self._examiner.stale(correlation, o.sign, greatest(correlation, o.sign), lambda_noise)
+        result, lam, lambda_max = self._solve(
+            y, basis, lambda_noise, self._warm if o.warm_start else None
+        )
+        self._warm = result.x if result.stop in SOLVED else None
+        image = self._image(result)
+        found: tuple[Touch, ...] = ()
+        solved_ns = perf_counter_ns()
+        if touches:
+            whole = float((self._p**2).sum()) * (
+                1.0 if self._whitening is None else self._whitening.energy_ratio
+            )
+            noise = self._noise_energy / len(self.model.fold.first) * whole
+            reduced = Reduced(y, self._straight, self.seen, basis, lambda_noise, noise)
+            added = partial(self._interplay, basis, self._known) if self._couples else None
+            found, self._examiner.found.unexplained, coupled = find_touches(
+                self.model, reduced, image, o, added
+            )
+            clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
+            self._examiner.crowd(found, o, clearness)
+            many = len(found) > 1
+            found = self._loaded(self._tracker.step(found, o, lambda_max, lambda_noise))
+            if o.refine and many and added is not None and o.touch_sweeps > 0:
+                first = result.iterations
+                result, lam, lambda_max = self._solve(coupled, basis, lambda_noise, None)
+                if result.stop in SOLVED:
+                    norm = float(np.linalg.norm(coupled))
+                else:
+                    result, lam, lambda_max = self._solve(y, basis, lambda_noise, None)
+                result = replace(result, iterations=first + result.iterations)
+                self._warm, image = result.x if result.stop in SOLVED else None, self._image(result)
+        gap = result.certificate.gap
+        info = Info(
+            result.iterations, result.stop, int(np.count_nonzero(result.x)), masked,
+            result.step_halvings, len(found), 0, 0,
+            lam, lambda_max, lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300),
+            result.certificate.residual, norm,
+            **self._examiner.of_frame(), floor=self._floor,
+            solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
+        )  # fmt: skip
+        return Reconstruction(image, result.x, found, info)
+
+    def _loaded(self, touches: tuple[Touch, ...]) -> tuple[Touch, ...]:
+        """With their loads, where the model is calibrated."""
+        if self.model.load is None:
+            return touches
+        places = np.array([(t.x_mm, t.y_mm) for t in touches]).reshape(-1, 2)
+        loads = self.model.load.loads_at(
+            places, np.array([t.strength_s_per_m_mm2 for t in touches])
+        )
+        return tuple(replace(t, load_n=float(load)) for t, load in zip(touches, loads, strict=True))
+
+    def _image(self, result: Result) -> FloatArray:
+        return np.asarray(result.x * self.model.column_weight.astype(np.float64))
+
+    @property
+    def _couples(self) -> bool:
+        """Whether this model can tell what touches do to each other, and is asked to."""
+        model = self.model
+        return (
+            model.fields is not None
+            and model.data_kind == "difference"
+            and bool(self.options.touch_search & COUPLED)
+        )
+
+    def _interplay(self, basis: FloatArray, known: BoolArray, discs: Sequence[Disc]) -> FloatArray:
+        """What discs add to y (r,) by what they do to each other, by the folds that are
+        ``known``."""
+        return project(self._reduce(np.where(known, interplay(self.model, discs), 0.0)), basis)
+
+    def _solve(
+        self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None
+    ) -> tuple[Result, float, float]:
+        """The coefficients for ``y``, with lambda and lambda_max."""
+        o, norm = self.options, float(np.linalg.norm(y))
+        lambda_max = greatest(self.seen.T @ y, o.sign)
+        lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
+        nothing, zero = Certificate(0.0, 0.5 * norm**2, norm), np.zeros(self.model.grid.n_pixels)
+        if o.gate_factor > 0 and lambda_max < o.gate_factor * lambda_noise:
+            return Result(zero, 0, "gate", nothing, 0), lam, lambda_max
+        if not lambda_max > lam or norm**2 < LEAST_SQUARE:
+            return Result(zero, 0, "zero", nothing, 0), lam, lambda_max
+        result = self._run(Problem(self.seen, y, lam, o.sign, basis), start)
+        if result.stop == "diverged":
+            result = Result(zero, result.iterations, "diverged", nothing, result.step_halvings)
+        return result, lam, lambda_max
+
+    def _run(self, problem: Problem, last: FloatArray | None) -> Result:
+        """The chosen solver, from the ``last`` coefficients or from zero."""
+        start, o = self._start(problem, last), self.options
+        if o.solver == "coordinate":
+            return coordinate(problem, o, start)
+        if o.solver == "active-set":
+            return ActiveSet(problem, o, self.model.grid, self.model.lipschitz).run(start)
+        return fista(
+            problem.s, problem.y, problem.lam, self.model.lipschitz, o, problem.basis, start
+        )
+
+    def _start(self, problem: Problem, last: FloatArray | None) -> FloatArray | None:
+        """The ``last`` coefficients, unless zero is the better start."""
+        if last is None:
+            return None
+        residual = problem.residual(last)
+        worse = residual @ residual + 2 * problem.lam * np.abs(last).sum() >= problem.y @ problem.y
+        return None if worse else last

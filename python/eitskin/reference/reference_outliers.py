@@ -1,0 +1,61 @@
+"""Glitches in quiet frames, in numpy: the rules of csrc/src/quiet.c, written for reading."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.reference.diagnostics import GLITCH_MOST, robust
+from eitskin.skin.protocol import Reciprocity
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+PAIRED, PAIRED_LEAST, UNPAIRED, UNPAIRED_LEAST, OWN_LEAST = 12.0, 1e-3, 16.0, 1e-2, 0.05
+
+
+def odd_rows(
+    newer: FloatArray, older: FloatArray, fold: Reciprocity, used: BoolArray
+) -> tuple[BoolArray, BoolArray]:
+    """Folds (k,) whose rows do not agree on how ``newer`` (m,) differs from ``older``, none where
+    they are too many to be glitches; and the rows (m,) of those that changed most."""
+    change = np.where(used, newer - older, 0.0)
+    has_second = fold.second >= 0
+    both = has_second & used[fold.first] & used[fold.second]
+    first, second = change[fold.first], np.where(has_second, fold.sign * change[fold.second], 0.0)
+    paired = np.where(both, np.abs(first - second), 0.0)
+    greater = np.maximum(np.abs(first), np.abs(second))
+    largest = float(np.abs(older[used]).max(initial=0.0))
+    rows = np.zeros(len(newer), dtype=np.bool_)
+    if paired.any():
+        off, limit = paired, max(PAIRED * robust(paired), PAIRED_LEAST * largest)
+    else:
+        off, limit = greater, max(UNPAIRED * robust(greater), UNPAIRED_LEAST * largest)
+    size = np.where(used, np.abs(older), 0.0)
+    own = np.maximum(size[fold.first], np.where(has_second, size[fold.second], 0.0))
+    odd = (off > limit) & (off > OWN_LEAST * own)
+    if odd.sum() > GLITCH_MOST:
+        odd[:] = False
+    rows[fold.first[odd & (np.abs(first) > 0) & (np.abs(first) >= np.abs(second) / 2)]] = True
+    rows[fold.second[odd & (np.abs(second) > 0) & (np.abs(second) >= np.abs(first) / 2)]] = True
+    return odd, rows
+
+
+def clean(frames: FloatArray, fold: Reciprocity, used: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Quiet ``frames`` (k, m) with readings that nothing else bears out replaced, and which (k, m):
+    one of the first two by the other where a third tells, later ones by the mean so far."""
+    done, left = frames.copy(), np.zeros(frames.shape, dtype=np.bool_)
+    (between, rows), (first, _), (second, _) = (
+        odd_rows(frames[new], frames[old], fold, used) for new, old in ((1, 0), (2, 0), (2, 1))
+    )
+    for k, odd in ((0, between & first & ~second), (1, between & second & ~first)):
+        mine = np.zeros(len(rows), dtype=np.bool_)
+        mine[fold.first[odd]] = True
+        mine[fold.second[odd & (fold.second >= 0)]] = True
+        left[k] = mine & rows
+        done[k, left[k]] = frames[1 - k, left[k]]
+    for k in range(2, len(frames)):
+        so_far = done[:k].mean(axis=0)
+        left[k] = odd_rows(frames[k], so_far, fold, used)[1]
+        done[k, left[k]] = so_far[left[k]]
+    return done, left

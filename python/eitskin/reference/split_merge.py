@@ -1,0 +1,124 @@
+"""The numpy reference of csrc/src/regroup.c: discs that are one touch are joined, those that are
+two are parted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from eitskin.reference.disc_fit import Disc, Fit
+
+NEAR, JOIN_WHOLE, JOIN_LEFT, NOISE = 0.7, 0.002, 0.5, 20.0
+PART_WHOLE, PART_NOISE, PART_FIRST, PART_GAIN, PART_APART = 0.001, 1.3, 2.0, 0.85, -0.1
+PART_OFFSET, PART_RADIUS = 1.3, 0.7
+DIRECTIONS, JOIN_SWEEPS, PART_SWEEPS = 4, 3, 4
+
+
+def edges_apart(a: Disc, b: Disc) -> float:
+    """How far apart two discs' edges are, in the smaller radius."""
+    distance = float(np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm))
+    return (distance - a.radius_mm - b.radius_mm) / min(a.radius_mm, b.radius_mm)
+
+
+def join(fit: Fit) -> bool:
+    """Join near pairs of one sign, the nearest first, where one disc explains as much; whether any
+    were."""
+    any_joined = False
+    while pairs := _near_pairs(fit.discs):
+        joined = next((True for _, i, j in pairs if _try_join(fit, i, j)), False)
+        if not joined:
+            break
+        any_joined = True
+    return any_joined
+
+
+def _near_pairs(discs: list[Disc]) -> list[tuple[float, int, int]]:
+    pairs = [
+        (edges_apart(a, discs[j]), i, j)
+        for i, a in enumerate(discs)
+        for j in range(i + 1, len(discs))
+    ]
+    return sorted(p for p in pairs if p[0] < NEAR and discs[p[1]].polarity == discs[p[2]].polarity)
+
+
+def _try_join(fit: Fit, i: int, j: int) -> bool:
+    before, left, a, b = list(fit.discs), fit.left(), fit.discs[i], fit.discs[j]
+    of_a, of_b = abs(a.change) * a.radius_mm**2, abs(b.change) * b.radius_mm**2
+    w = of_a / (of_a + of_b) if of_a + of_b > 0 else 0.5
+    radius = min(float(np.hypot(a.radius_mm, b.radius_mm)), fit.options.touch_max_radius_mm)
+    one = Disc(
+        w * a.x_mm + (1 - w) * b.x_mm, w * a.y_mm + (1 - w) * b.y_mm, radius, 0.0, a.polarity
+    )
+    fit.discs[i] = one
+    del fit.discs[j]
+    fit.discs[i] = replace(one, change=fit.best_change(one, fit.answers(one)[0], fit.residual()))
+    fit.settle([i], JOIN_SWEEPS)
+    fit.move_all(1)
+    if fit.left() <= left + JOIN_WHOLE * fit.whole + JOIN_LEFT * left + NOISE * fit.noise:
+        return True
+    fit.discs = before
+    return False
+
+
+def part(fit: Fit) -> bool:
+    """Part discs, the largest first, where two explain clearly more; whether any were."""
+    enough = PART_WHOLE * fit.whole + PART_NOISE * fit.noise * fit.model.rank
+    any_parted = False
+    left_to_look = list(range(len(fit.discs)))
+    while left_to_look and len(fit.discs) < fit.options.max_touches and fit.left() >= enough:
+        k = max(left_to_look, key=lambda i: (fit.discs[i].radius_mm, -i))
+        left_to_look.remove(k)
+        any_parted |= _try_part(fit, k)
+    return any_parted
+
+
+def _try_part(fit: Fit, k: int) -> bool:
+    before, left, last = list(fit.discs), fit.left(), len(fit.discs)
+    best = min(_pairs_for(fit, k), key=lambda found: found[0], default=None)
+    if best is None or best[0] > PART_FIRST * left:
+        return False
+    fit.discs[k] = best[1]
+    fit.discs.append(best[2])
+    for _ in range(PART_SWEEPS):
+        fit.settle([k], 1)
+        fit.settle([last], 1)
+    fit.move_all(1)
+    now = fit.left()
+    gained = now <= PART_GAIN * left and left - now >= PART_WHOLE * fit.whole + NOISE * fit.noise
+    if gained and edges_apart(fit.discs[k], fit.discs[last]) > PART_APART:
+        return True
+    fit.discs = before
+    return False
+
+
+def _pairs_for(fit: Fit, k: int) -> list[tuple[float, Disc, Disc]]:
+    """Pairs that could take the place of disc k, with what they would leave, squared."""
+    one, target = fit.discs[k], fit.residual(leave_out=k)
+    radius = max(PART_RADIUS * one.radius_mm, fit.options.touch_min_radius_mm)
+    found = []
+    for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
+        dx, dy = (
+            PART_OFFSET * one.radius_mm * np.cos(angle),
+            PART_OFFSET * one.radius_mm * np.sin(angle),
+        )
+        two = [
+            replace(one, x_mm=one.x_mm + s * dx, y_mm=one.y_mm + s * dy, radius_mm=radius)
+            for s in (1, -1)
+        ]
+        if not all(fit.on_skin(disc) for disc in two):
+            continue
+        atoms = np.array([fit.answers(disc)[0] for disc in two])
+        gram = atoms @ atoms.T
+        if not np.linalg.det(gram) > 1e-5 * gram[0, 0] * gram[1, 1]:
+            continue
+        change = np.linalg.solve(gram, atoms @ target)
+        if (change * one.polarity > 0).all():
+            rest = target - change @ atoms
+            found.append(
+                (
+                    float(rest @ rest),
+                    *(replace(d, change=float(c)) for d, c in zip(two, change, strict=True)),
+                )
+            )
+    return found  # type: ignore[return-value]

@@ -1,0 +1,90 @@
+"""The numpy reference of the search for touches in csrc/src/touch.c and track.c: the same steps,
+written for reading."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import REGROUP, Options, Touch
+from eitskin.model.model import Model
+from eitskin.reference.disc_fit import Disc, Fit, Reduced
+from eitskin.reference.split_merge import join, part
+
+FloatArray = npt.NDArray[np.float64]
+Interplay = Callable[[Sequence[Disc]], FloatArray]
+
+SEARCH_RADIUS, FINAL_RADIUS = 2.0, 0.4
+ROUNDS, LATER_SWEEPS = 2, 2
+MOST_INTERPLAY = 0.25
+
+
+def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | None) -> FloatArray:
+    """Discs for the ``image`` (n,), fitted to ``frame``; returns what each explains. ``interplay``
+    gives what discs add to y (r,) by what they do to each other; None where the model cannot tell.
+    """
+    o = fit.options
+    later, straight = (
+        min(o.touch_sweeps, LATER_SWEEPS),
+        frame.straight is not None or fit.model.data_kind == "log-ratio",
+    )
+    regroups = bool(o.touch_search & REGROUP) and (straight or interplay is not None)
+
+    def couple() -> None:
+        added = (
+            interplay(fit.discs)
+            if interplay is not None and len(fit.discs) > 1
+            else np.zeros_like(frame.y)
+        )
+        fit.data = frame.y - added if added @ added <= MOST_INTERPLAY * fit.whole else frame.y
+
+    fit.radius_weight = o.touch_radius_weight * (SEARCH_RADIUS if interplay is not None else 1.0)
+    fit.data = frame.straight if frame.straight is not None and o.touch_sweeps > 0 else frame.y
+    fit.seed(image)
+    fit.fit_strengths()
+    if o.touch_change_s_per_m > 0:
+        fit.discs = [replace(disc, radius_mm=fit.expected_radius(disc)) for disc in fit.discs]
+        fit.fit_strengths()
+    fit.move_all(o.touch_sweeps - later)
+    explained = fit.keep_real()
+    if o.touch_sweeps == 0:
+        return explained
+    if regroups:
+        join(fit)
+    for _ in range(ROUNDS):
+        if interplay is not None and len(fit.discs) > 1:
+            couple()
+            fit.move_all(later)
+    for _ in range(ROUNDS if regroups else 0):
+        joined, parted = join(fit), part(fit)
+        if not joined and not parted:
+            break
+        couple()
+        fit.move_all(later)
+        fit.keep_real()
+    fit.radius_weight = o.touch_radius_weight * (FINAL_RADIUS if interplay is not None else 1.0)
+    couple()
+    fit.move_all(later)
+    return fit.keep_real()
+
+
+def find_touches(
+    model: Model, frame: Reduced, image: FloatArray, options: Options, interplay: Interplay | None
+) -> tuple[tuple[Touch, ...], float, FloatArray]:
+    """The touches of an ``image`` (n,) of ``frame``, strongest first and without ids or loads, the
+    share of |y|^2 that they leave (0 where the image is zero), and the data (r,) that they were
+    fitted to in the end."""
+    fit = Fit(model, frame, options)
+    explained = np.zeros(0)
+    if np.abs(image).max() > 0:
+        explained = search(fit, frame, image, interplay)
+    found = [
+        Touch(0, d.x_mm, d.y_mm, d.radius_mm, d.change * fit.area_mm2(d), min(1.0, float(e)))
+        for d, e in zip(fit.discs, explained, strict=True)
+    ]
+    found.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))
+    unexplained = fit.left() / fit.whole if fit.whole > 0 and np.abs(image).max() > 0 else 0.0
+    return tuple(found), unexplained, fit.data

@@ -1,0 +1,305 @@
+"""How well an image shows where the touches are: MIoU on a fine raster, as a curve over the
+threshold.
+
+The exact rule, with every choice that moves the number, is in docs/reference/metrics.md. In short:
+MIoU = (IoU(background) + IoU(touch)) / 2 over the cells of a fine raster inside the skin; a cell of
+the image is a touch where x > t max(x); the fraction t is chosen once per method, on training
+scenes, and then kept. A cell shows the nearest pixel, or is interpolated between pixels: the choice
+moves every number, so it is always named.
+
+Nothing here knows a reconstruction method or a mesh: images come as (frames, pixels), the truth as
+discs or as a mask.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import UsageError
+from eitskin.fem.grid import Grid
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
+
+RASTER_MM = 1.5
+LOOKUPS = ("nearest", "bilinear")
+LOOKUP = "bilinear"
+THRESHOLDS: tuple[float, ...] = tuple(round(0.02 * k, 2) for k in range(1, 50))
+
+
+class Region(Protocol):
+    """What the raster needs of an outline (``eitskin.skin.outline.Outline`` is one)."""
+
+    @property
+    def bounding_box_mm(self) -> tuple[float, float, float, float]:
+        """(xmin, ymin, xmax, ymax)."""
+
+    def contains(self, points: FloatArray) -> BoolArray:
+        """Which of ``points`` (k, 2) lie inside: (k,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """The cells on which masks are compared.
+
+    Attributes:
+        points_mm: (p, 2) centres of the cells that lie inside the skin.
+        spacing_mm: side of a cell.
+    """
+
+    points_mm: FloatArray
+    spacing_mm: float
+
+
+def raster_inside(region: Region, spacing_mm: float = RASTER_MM) -> Raster:
+    """Square cells of ``spacing_mm`` over the bounding box; those whose centre is inside ``region``
+    are kept.
+
+    Raises:
+        UsageError: the spacing is not positive, or so coarse that no cell is inside.
+    """
+    if not spacing_mm > 0:
+        raise UsageError(f"raster spacing {spacing_mm!r} mm must be above 0; 1.5 is usual")
+    x0, y0, x1, y1 = region.bounding_box_mm
+    x = np.arange(x0 + spacing_mm / 2, x1, spacing_mm)
+    y = np.arange(y0 + spacing_mm / 2, y1, spacing_mm)
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    kept = points[region.contains(points)] if len(points) else points
+    if not len(kept):
+        raise UsageError(
+            f"a raster of {spacing_mm:g} mm has no cell inside this skin; use a finer one"
+        )
+    return Raster(kept, spacing_mm)
+
+
+def disc_mask(
+    points_mm: FloatArray, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike
+) -> BoolArray:
+    """Which of ``points_mm`` (p, 2) lie in any disc, given by centres (k, 2) and radii (k,); k may
+    be 0."""
+    centres = np.asarray(centres_mm, dtype=np.float64).reshape(-1, 2)
+    radii = np.broadcast_to(np.asarray(radii_mm, dtype=np.float64), (len(centres),))
+    inside = np.zeros(len(points_mm), dtype=np.bool_)
+    along_x, along_y = np.ascontiguousarray(points_mm.T)
+    for (x, y), radius in zip(centres, radii, strict=True):
+        inside |= (along_x - x) ** 2 + (along_y - y) ** 2 <= radius**2
+    return inside
+
+
+def mask_on_points(
+    points_mm: FloatArray, mask: npt.ArrayLike, box_mm: tuple[float, float, float, float]
+) -> BoolArray:
+    """Look a truth mask (ny, nx), row 0 lowest, spread over ``box_mm`` (xmin, ymin, xmax, ymax), up
+    at points (p, 2).
+
+    Points outside the box are background.
+    """
+    cells = np.asarray(mask, dtype=np.bool_)
+    ny, nx = cells.shape
+    x0, y0, x1, y1 = box_mm
+    ix = np.floor((points_mm[:, 0] - x0) / (x1 - x0) * nx).astype(np.int64)
+    iy = np.floor((points_mm[:, 1] - y0) / (y1 - y0) * ny).astype(np.int64)
+    inside = (ix >= 0) & (ix < nx) & (iy >= 0) & (iy < ny)
+    found = np.zeros(len(points_mm), dtype=np.bool_)
+    found[inside] = cells[iy[inside], ix[inside]]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Lookup:
+    """How cells show an image: the value of cell i is sum_j weight[i, j] x[pixel[i, j]].
+
+    Attributes:
+        pixel: (p, c) places among the kept pixels; c is 1 for "nearest" and 4 for "bilinear".
+        weight: (p, c), each row summing to 1.
+    """
+
+    pixel: IntArray
+    weight: FloatArray
+
+    def show(self, values: npt.ArrayLike) -> FloatArray:
+        """Pixel values (..., n) as values of the cells (..., p)."""
+        return np.asarray(
+            (np.asarray(values, dtype=np.float64)[..., self.pixel] * self.weight).sum(axis=-1)
+        )
+
+
+def lookup_for(points_mm: FloatArray, grid: Grid, kind: str = LOOKUP) -> Lookup:
+    """The lookup from cells at ``points_mm`` (p, 2) to the kept pixels of ``grid``.
+
+    "nearest" shows the nearest kept pixel. "bilinear" weights the up to four pixels whose centres
+    surround the cell, leaving out those that are not kept (where none is, the nearest one is
+    shown), as smooth pictures do.
+
+    Raises:
+        UsageError: ``kind`` is neither.
+    """
+    nearest = _nearest_pixels(points_mm, grid.centres_mm())
+    if kind == "nearest":
+        return Lookup(nearest[:, None], np.ones((len(points_mm), 1)))
+    if kind != "bilinear":
+        raise UsageError(f"lookup {kind!r} is not known; use one of {', '.join(LOOKUPS)}")
+    place = (points_mm - np.asarray(grid.origin_mm)) / grid.pixel_mm - 0.5
+    low = np.floor(place).astype(np.int64)
+    part = place - low
+    framed = np.pad(grid.number, 2, constant_values=-1)
+    pixel, weight = [], []
+    for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        ix, iy = (
+            np.clip(low[:, k] + step + 2, 0, framed.shape[1 - k] - 1)
+            for k, step in ((0, right), (1, up))
+        )
+        pixel.append(framed[iy, ix])
+        weight.append(
+            (part[:, 0] if right else 1 - part[:, 0]) * (part[:, 1] if up else 1 - part[:, 1])
+        )
+    pixels, weights = np.stack(pixel, axis=1), np.stack(weight, axis=1)
+    weights[pixels < 0] = 0.0
+    total = weights.sum(axis=1, keepdims=True)
+    alone = total[:, 0] <= 1e-12
+    weights = np.where(
+        alone[:, None],
+        np.array([1.0, 0.0, 0.0, 0.0]),
+        weights / np.where(total > 1e-12, total, 1.0),
+    )
+    return Lookup(np.where((pixels < 0) | alone[:, None], nearest[:, None], pixels), weights)
+
+
+def _nearest_pixels(points_mm: FloatArray, centres_mm: FloatArray) -> IntArray:
+    """For each point (p, 2) the index of the nearest of ``centres_mm`` (n, 2): (p,)."""
+    found = np.empty(len(points_mm), dtype=np.int64)
+    for start in range(0, len(points_mm), 2048):
+        block = points_mm[start : start + 2048]
+        distance = ((block[:, None, :] - centres_mm[None, :, :]) ** 2).sum(axis=2)
+        found[start : start + 2048] = np.argmin(distance, axis=1)
+    return found
+
+
+def touch_mask(values: npt.ArrayLike, threshold: npt.ArrayLike, sign: int = 1) -> BoolArray:
+    """x > t max(x) along the last axis; ``sign`` = -1 looks for resistive changes (-x > t max(-x)).
+
+    ``threshold`` is one number, or an array that broadcasts against ``values``: (T, 1) gives T
+    masks of one image.
+
+    An image without any value of the wanted sign has no touch: its mask is empty.
+    """
+    wanted = sign * np.asarray(values, dtype=np.float64)
+    top = wanted.max(axis=-1, keepdims=True)
+    return np.asarray((wanted > threshold * top) & (top > 0))
+
+
+def iou(estimate: BoolArray, truth: BoolArray) -> float:
+    """|both| / |either| of two masks of one shape; 1 where both are empty, for then they agree."""
+    either = np.count_nonzero(estimate | truth)
+    return float(np.count_nonzero(estimate & truth) / either) if either else 1.0
+
+
+def miou(estimate: BoolArray, truth: BoolArray) -> float:
+    """The mean of IoU(touch) and IoU(background) of two masks of one shape."""
+    return (iou(estimate, truth) + iou(~estimate, ~truth)) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """MIoU of pixel images on one raster.
+
+    Attributes:
+        raster: the cells.
+        lookup: what each cell shows of an image.
+        n_pixels: how many values an image has.
+    """
+
+    raster: Raster
+    lookup: Lookup
+    n_pixels: int
+
+    def curves(
+        self,
+        images: npt.ArrayLike,
+        truths: BoolArray,
+        thresholds: npt.ArrayLike = THRESHOLDS,
+        sign: int = 1,
+    ) -> FloatArray:
+        """MIoU of images (k, n) against truths (k, p) at each of T ascending thresholds: (k, T).
+
+        max(x) is that of the pixels. Each cell is counted once, at the highest threshold that it
+        passes; sums over thresholds do the rest, so that the curve costs little more than one of
+        its points.
+
+        Raises:
+            UsageError: shapes disagree, thresholds do not ascend, or an image has a value that is
+                not finite.
+        """
+        values = np.asarray(images, dtype=np.float64)
+        steps = np.asarray(thresholds, dtype=np.float64).reshape(-1)
+        if values.ndim != 2 or values.shape != (len(truths), self.n_pixels):
+            wanted = (len(truths), self.n_pixels)
+            raise UsageError(
+                f"images are {values.shape}, but {wanted} (frames, pixels) are to be judged"
+            )
+        if (np.diff(steps) <= 0).any():
+            raise UsageError("thresholds of an MIoU curve must ascend")
+        finite = np.isfinite(values).all(axis=1)
+        if not finite.all():
+            raise UsageError(
+                f"image {int(np.argmin(finite))} (from 0) has values that are not finite; cannot"
+                " judge it"
+            )
+        result = np.empty((len(values), len(steps)))
+        for k, image in enumerate(sign * values):
+            top = max(float(image.max()), 0.0)
+            passed = (
+                np.searchsorted(steps * top, self.lookup.show(image), side="left") if top else 0
+            )
+            result[k] = _miou_of_passed(
+                np.broadcast_to(passed, truths[k].shape), truths[k], len(steps)
+            )
+        return result
+
+
+def _miou_of_passed(passed: IntArray, truth: BoolArray, count: int) -> FloatArray:
+    """MIoU (count,) where cell i (p,) is a touch at the first ``passed[i]`` thresholds."""
+    claimed = np.cumsum(np.bincount(passed, minlength=count + 1)[::-1])[::-1][1:]
+    hit = np.cumsum(np.bincount(passed[truth], minlength=count + 1)[::-1])[::-1][1:]
+    true = np.count_nonzero(truth)
+    either = claimed + true - hit
+    background, not_both = len(truth) - either, len(truth) - hit
+    touch = np.divide(hit, either, out=np.ones(count), where=either > 0)
+    rest = np.divide(background, not_both, out=np.ones(count), where=not_both > 0)
+    return np.asarray((touch + rest) / 2)
+
+
+def judge_for(
+    region: Region, grid: Grid, spacing_mm: float = RASTER_MM, lookup: str = LOOKUP
+) -> Judge:
+    """The judge for images on ``grid`` of the skin ``region``.
+
+    Raises:
+        UsageError: as :func:`raster_inside` and :func:`lookup_for`.
+    """
+    raster = raster_inside(region, spacing_mm)
+    return Judge(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)
+
+
+def pixel_cover(
+    grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16
+) -> FloatArray:
+    """The part of each pixel that discs cover, from ``samples`` squared points a pixel: (n,). A
+    perfect pixel image."""
+    steps = ((np.arange(samples) + 0.5) / samples - 0.5) * grid.pixel_mm
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    points = (grid.centres_mm()[:, None, :] + offsets[None]).reshape(-1, 2)
+    return np.asarray(
+        disc_mask(points, centres_mm, radii_mm).reshape(grid.n_pixels, -1).mean(axis=1)
+    )
+
+
+def best_threshold(curves: FloatArray, thresholds: npt.ArrayLike = THRESHOLDS) -> float:
+    """The threshold with the highest mean of training ``curves`` (k, T); the lowest of equals."""
+    steps = np.asarray(thresholds, dtype=np.float64).reshape(-1)
+    return float(steps[int(np.argmax(curves.mean(axis=0).round(12)))])

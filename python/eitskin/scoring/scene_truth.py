@@ -1,0 +1,143 @@
+"""Where a simulated or emulated board's touches truly are, and how far off the found ones were."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.device.link import LinkEvent
+from eitskin.device.live import LiveFrame
+from eitskin.device.open import find_device_scene
+from eitskin.device.wire.packets import Fault
+from eitskin.scene.description import Scene
+from eitskin.scene.random_touches import Touch
+from eitskin.scene.touch_path import touches_at
+from eitskin.scoring.matching import GATE_MM, Matching, match
+from eitskin.skin.skin import size_to_paper
+
+FloatArray = npt.NDArray[np.float64]
+Live: TypeAlias = Generator[LiveFrame | Fault | LinkEvent, None, None]
+WRAP_US = 2**32
+LOOKED_FOR = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
+
+
+class SceneTruth:
+    """The touches of ``scene`` at the board's times; ``sign`` is which changes the board looks for.
+    A simulated board shows the scene's frame that is nearest to the beginning of a scan, an
+    emulated one (``held``) the last that has begun by then.
+    """
+
+    def __init__(self, scene: Scene, sign: str = "increase", *, held: bool = False) -> None:
+        self.scene = scene
+        self._ahead = 1e-9 if held else 0.5
+        self.gate_mm = GATE_MM * size_to_paper(scene.skin.outline)
+        self._samples, self._wanted = scene.samples(), LOOKED_FOR[sign]
+        self._began_us: int | None = None
+
+    def begin(self, time_us: int) -> None:
+        """The scene's time 0 is ``time_us`` of the board's clock; where nobody said so, the first
+        frame's that is asked for."""
+        self._began_us = time_us
+
+    def touches(self, time_us: int) -> tuple[Touch, ...]:
+        """What was there when the scan of a frame began at ``time_us``."""
+        if self._began_us is None:
+            self._began_us = time_us
+        frame = min(self._frame(time_us), self.scene.frames - 1)
+        return tuple(
+            t
+            for t in touches_at(self._samples, frame)
+            if int(np.sign(t.contrast - 1)) in self._wanted
+        )
+
+    def over(self, time_us: int) -> bool:
+        """Whether the scene has ended when the scan of a frame begins at ``time_us``."""
+        return self._began_us is not None and self._frame(time_us) >= self.scene.frames
+
+    def _frame(self, time_us: int) -> int:
+        elapsed_s = ((time_us - (self._began_us or 0)) % WRAP_US) / 1e6
+        return int(elapsed_s * self.scene.rate_hz + self._ahead)
+
+    def judge(self, true: Sequence[Touch], found_mm: npt.ArrayLike) -> Matching:
+        """Which of the found places (k, 2) in mm is which true touch; within 10 mm on the paper's
+        skin, else in proportion."""
+        return match([(t.x_mm, t.y_mm) for t in true], found_mm, self.gate_mm)
+
+
+def until_over(items: Iterator[LiveFrame | Fault | LinkEvent], truth: SceneTruth | None) -> Live:
+    """``items`` until the scene is over; an emulated board would hold its last frame for ever."""
+    try:
+        for item in items:
+            if truth is not None and isinstance(item, LiveFrame) and truth.over(item.board_us):
+                return
+            yield item
+    finally:
+        if isinstance(items, Generator):
+            items.close()
+
+
+def truth_of(url: str, sign: str = "increase") -> SceneTruth | None:
+    """The truth of a simulated or emulated board's scene; None for any other device. Raises as
+    ``scene_of``."""
+    scene = scene_of(url)
+    return None if scene is None else SceneTruth(scene, sign, held=url.startswith("emu:"))
+
+
+def scene_of(url: str) -> Scene | None:
+    """The scene that a device URL names; None for boards and recordings.
+
+    Raises:
+        FileError, ConfigError, GeometryError, ProtocolError: it cannot be read.
+    """
+    scheme, _, rest = url.partition(":")
+    return find_device_scene(rest) if scheme in ("sim", "emu") else None
+
+
+@dataclass
+class TruthScore:
+    """Matchings of many frames, added up: touches found and not, false ones, and every position
+    error in mm."""
+
+    frames: int = 0
+    found: int = 0
+    missed: int = 0
+    false_touches: int = 0
+    errors_mm: list[float] = field(default_factory=list)
+
+    def add(self, matching: Matching) -> None:
+        """One frame's."""
+        self.frames += 1
+        self.found += matching.hits
+        self.missed += matching.misses
+        self.false_touches += matching.false_touches
+        self.errors_mm += matching.distances_mm
+
+    def as_dict(self) -> dict[str, float | int | None]:
+        """For JSON; None for an error where nothing was found."""
+        some = bool(self.errors_mm)
+        return {
+            "frames": self.frames,
+            "true": self.found + self.missed,
+            "found": self.found,
+            "false": self.false_touches,
+            "position_median_mm": float(np.median(self.errors_mm)) if some else None,
+            "position_worst_mm": max(self.errors_mm) if some else None,
+        }
+
+    def text(self) -> str:
+        """In a line."""
+        facts = self.as_dict()
+        line = (
+            f"against the scene's truth: {facts['found']} of {facts['true']} touches found,"
+            f" {facts['false']} false"
+        )
+        if self.errors_mm:
+            line += (
+                f"; position error median {facts['position_median_mm']:.2f} mm, worst"
+                f" {facts['position_worst_mm']:.2f} mm"
+            )
+        return line

@@ -1,0 +1,114 @@
+"""How well a reconstruction agrees with the truth that its frames carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import Reconstruction, Touch
+from eitskin.frames.frames import Frames
+from eitskin.model.model import Model
+from eitskin.scoring import metrics
+from eitskin.scoring.matching import GATE_MM, Matching, match
+from eitskin.skin.skin import size_to_paper
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
+
+
+@dataclass(frozen=True)
+class FrameScore:
+    """One frame against its truth.
+
+    ``miou_image``: MIoU of the mask x > t max(x), t the model's own, image interpolated bilinearly.
+        ``miou_touches``: MIoU
+    of the touches as discs. ``matching`` of touch centres with the true ones.
+    """
+
+    miou_image: float
+    miou_touches: float
+    matching: Matching
+
+
+@dataclass(frozen=True, eq=False)
+class Scorer:
+    """Scores the frames of one model; ``gate_mm`` is how near a touch must be to its true one."""
+
+    model: Model
+    judge: metrics.Judge
+    gate_mm: float
+
+    def score(
+        self, frames: Frames, number: int, result: Reconstruction, sign: str
+    ) -> FrameScore | None:
+        """Frame ``number`` of ``frames``; None where no truth of the wanted ``sign`` is known.
+
+        Raises:
+            MissingExtraError: scipy is not installed.
+        """
+        wanted = WANTED_SIGNS[sign]
+        truth = self._truth(frames, number, wanted)
+        if truth is None:
+            return None
+        image = np.asarray(result.image, dtype=np.float64)
+        values = np.abs(image) if sign == "both" else image * wanted[0]
+        shown = metrics.touch_mask(
+            self.judge.lookup.show(values), self.model.defaults.mask_threshold
+        )
+        discs = self._discs(result.touches)
+        true_places = [i for i in frames.touches_in(number) if _sign_of(frames, i) in wanted]
+        true_mm = (
+            frames.touch_xy_mm[true_places] if frames.touch_xy_mm is not None else np.zeros((0, 2))
+        )
+        found_mm = [(touch.x_mm, touch.y_mm) for touch in result.touches]
+        return FrameScore(
+            metrics.miou(shown, truth),
+            metrics.miou(discs, truth),
+            match(true_mm, np.array(found_mm), self.gate_mm),
+        )
+
+    def _discs(self, touches: tuple[Touch, ...]) -> BoolArray:
+        centres = np.array([(touch.x_mm, touch.y_mm) for touch in touches]).reshape(-1, 2)
+        radii = np.array([touch.radius_mm for touch in touches])
+        return metrics.disc_mask(self.judge.raster.points_mm, centres, radii)
+
+    def _truth(self, frames: Frames, number: int, wanted: tuple[int, ...]) -> BoolArray | None:
+        points = self.judge.raster.points_mm
+        if frames.truth_mask is not None and frames.truth_mask_extent_mm is not None:
+            mask = np.isin(frames.truth_mask[number], wanted)
+            return (
+                metrics.mask_on_points(points, mask, frames.truth_mask_extent_mm)
+                if mask.any()
+                else None
+            )
+        if frames.touch_xy_mm is None or frames.touch_radius_mm is None:
+            return None
+        places = [i for i in frames.touches_in(number) if _sign_of(frames, i) in wanted]
+        return (
+            metrics.disc_mask(points, frames.touch_xy_mm[places], frames.touch_radius_mm[places])
+            if places
+            else None
+        )
+
+
+def _sign_of(frames: Frames, touch: int) -> int:
+    """Unknown signs count as conductive: what a touch is."""
+    sign = 0 if frames.touch_sign is None else int(frames.touch_sign[touch])
+    return sign or 1
+
+
+def scorer_for(model: Model) -> Scorer:
+    """The scorer on the model's own skin: a raster of 1.5 mm and a gate of 10 mm on the paper's
+    skin, in proportion elsewhere.
+
+    Raises:
+        ConfigError: the model does not say which skin it is for.
+    """
+    outline = model.skin.outline
+    scale = size_to_paper(outline)
+    judge = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale)
+    return Scorer(model, judge, GATE_MM * scale)

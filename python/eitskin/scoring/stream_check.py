@@ -1,0 +1,233 @@
+"""What a board's frames show, held against the truth where there is one: touches, places in images,
+raw rows in brief."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.findings import words
+from eitskin.core.results import load_text, solve_text
+from eitskin.device.known_model import KnownModel
+from eitskin.device.live import LiveFrame
+from eitskin.device.wire.explain import quality_text
+from eitskin.errors import MissingExtraError
+from eitskin.scene.random_touches import Touch as TrueTouch
+from eitskin.scoring.image_touches import touches_in_image
+from eitskin.scoring.scene_truth import SceneTruth, TruthScore
+
+FloatArray = npt.NDArray[np.float64]
+WORST_ROWS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class ImageView:
+    """An image in brief: its ``peak`` in S/m and where, and ``places_mm`` (k, 2), the centroids of
+    what stands out of it, strongest first (``image_touches``, at the model's threshold for
+    touches); None where scipy is not installed.
+    """
+
+    peak: float
+    peak_mm: tuple[float, float]
+    places_mm: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A frame and what it shows. ``true``: the touches that were there, None where no truth is
+    known; ``errors_mm``: position error by number of the found touch (of the touches, or without
+    them of the image's places)."""
+
+    frame: LiveFrame
+    view: ImageView | None = None
+    true: tuple[TrueTouch, ...] | None = None
+    errors_mm: dict[int, float] | None = None
+
+    @property
+    def found_mm(self) -> FloatArray | None:
+        """Places (k, 2) of what was found; None where the frame does not tell."""
+        if self.frame.touches is not None:
+            return np.array(
+                [(t.x_mm, t.y_mm) for t in self.frame.touches.touches], dtype=np.float64
+            ).reshape(-1, 2)
+        return None if self.view is None else self.view.places_mm
+
+
+class Watcher:
+    """Turns frames into what they show; ``score`` adds up how far off it is."""
+
+    def __init__(self, known: KnownModel | None, truth: SceneTruth | None) -> None:
+        self._known, self._truth = known, truth
+        self.score = TruthScore()
+
+    def see(self, frame: LiveFrame) -> Seen:
+        """What ``frame`` shows."""
+        view = None
+        if frame.image is not None and self._known is not None and not frame.refused:
+            view = image_view(self._known, frame.image.image)
+        seen = Seen(frame, view)
+        found = seen.found_mm
+        if self._truth is None or found is None or frame.refused:
+            return seen
+        true = self._truth.touches(frame.board_us)
+        matching = self._truth.judge(true, found)
+        self.score.add(matching)
+        errors = {
+            number: d for (_, number), d in zip(matching.pairs, matching.distances_mm, strict=True)
+        }
+        return Seen(frame, view, true, errors)
+
+
+def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
+    """The image (n,) in brief."""
+    grid, model = known.model.grid, known.model
+    values, centres = np.asarray(image, dtype=np.float64), grid.centres_mm()
+    top = int(np.argmax(np.abs(values)))
+    places: FloatArray | None = np.zeros((0, 2))
+    if values[top] != 0:
+        try:
+            sign = 1 if values[top] > 0 else -1
+            places = touches_in_image(
+                values, grid.index, centres, model.defaults.touch_threshold, sign
+            )
+        except MissingExtraError:
+            places = None
+    return ImageView(float(values[top]), (float(centres[top, 0]), float(centres[top, 1])), places)
+
+
+def line(seen: Seen) -> str:
+    """A frame in a line."""
+    frame = seen.frame
+    parts = [_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame)]
+    if frame.refused:
+        parts = [f"refused: {frame.refused}", _raw_text(frame)]
+    text = "; ".join(part for part in (*parts, _found_text(frame)) if part)
+    return f"{frame.number:7d} {frame.time_us / 1e6:9.3f} s  {text}"
+
+
+def _solve_text(frame: LiveFrame) -> str:
+    solved = frame.solved
+    if solved is None:
+        return ""
+    macs, time_us = solved.macs + solved.touch_macs, solved.solve_us + solved.touch_us
+    return solve_text(solved.iterations, solved.stop, solved.gap_rel, macs, time_us)
+
+
+def _found_text(frame: LiveFrame) -> str:
+    return "" if frame.solved is None else ", ".join(words(frame.solved))
+
+
+def _error(seen: Seen, number: int) -> str:
+    if seen.errors_mm is None:
+        return ""
+    return f", off by {seen.errors_mm[number]:.2f} mm" if number in seen.errors_mm else ", false"
+
+
+def _touches_text(seen: Seen) -> str:
+    if seen.frame.touches is None:
+        return ""
+    found = [
+        f"#{t.id} ({t.x_mm:.1f}, {t.y_mm:.1f}) mm, radius {t.radius_mm:.1f} mm,"
+        f" {t.strength_s_per_m_mm2:.2f} S/m"
+        f" mm2{', ' + load_text(t.load_n) if t.load_n else ''}{_error(seen, k)}"
+        for k, t in enumerate(seen.frame.touches.touches)
+    ]
+    return " | ".join(found) or "no touch"
+
+
+def _image_text(seen: Seen) -> str:
+    if seen.frame.image is None:
+        return ""
+    if seen.view is None:
+        return f"image of {len(seen.frame.image.image)} pixels"
+    view = seen.view
+    if view.peak == 0:
+        return "image: flat"
+    text = f"image: peak {view.peak:.4f} S/m at ({view.peak_mm[0]:.1f}, {view.peak_mm[1]:.1f}) mm"
+    if view.places_mm is None or seen.frame.touches is not None:
+        return text
+    places = (f"({x:.1f}, {y:.1f}) mm{_error(seen, k)}" for k, (x, y) in enumerate(view.places_mm))
+    return f"{text}; places " + " | ".join(places)
+
+
+def _raw_text(frame: LiveFrame) -> str:
+    if frame.raw is None:
+        return ""
+    volts = frame.raw.voltage_v.astype(np.float64)
+    usable = volts[np.isfinite(volts)]
+    rms = 1e3 * float(np.sqrt(np.mean(usable**2))) if len(usable) else 0.0
+    text = f"raw: {len(volts)} rows in {frame.raw.scan_us / 1e3:.2f} ms, rms {rms:.3f} mV"
+    if len(usable) < len(volts):
+        text += f", {len(volts) - len(usable)} not usable"
+    said = Counter(quality_text(int(quality)) for quality in frame.raw.quality if quality)
+    return text + "".join(f", {count} {what}" for what, count in said.items())
+
+
+def table(seen: Seen) -> dict[str, Any]:
+    """A frame as JSON values; what is not finite becomes null."""
+    frame = seen.frame
+    facts: dict[str, Any] = {
+        "frame": frame.number,
+        "time_s": frame.time_us / 1e6,
+        "board_us": frame.board_us,
+    }
+    if frame.refused:
+        facts["refused"] = frame.refused
+    if frame.touches is not None:
+        facts["touches"] = [
+            asdict(t) | _error_entry(seen, k) for k, t in enumerate(frame.touches.touches)
+        ]
+    if frame.image is not None:
+        facts["image_s_per_m"] = frame.image.image.tolist()
+    if seen.view is not None:
+        facts |= {"peak_s_per_m": seen.view.peak, "peak_mm": list(seen.view.peak_mm)}
+        if seen.view.places_mm is not None:
+            listed = ({"x_mm": x, "y_mm": y} for x, y in seen.view.places_mm.tolist())
+            errors = frame.touches is None
+            facts["places"] = [
+                one | (_error_entry(seen, k) if errors else {}) for k, one in enumerate(listed)
+            ]
+    if frame.raw is not None:
+        volts = frame.raw.voltage_v.tolist()
+        facts |= {
+            "voltage_v": [v if np.isfinite(v) else None for v in volts],
+            "quality": frame.raw.quality.tolist(),
+        }
+        facts |= {"scan_us": frame.raw.scan_us, "quiet": frame.raw.quiet}
+    if frame.solved is not None:
+        facts["info"] = {
+            key: value if _finite(value) else None for key, value in frame.solved.as_dict().items()
+        }
+    if seen.true is not None:
+        facts["true"] = [true_table(t) for t in seen.true]
+    return facts
+
+
+def true_table(touch: TrueTouch) -> dict[str, float]:
+    """A true touch as JSON values."""
+    return {
+        "x_mm": touch.x_mm,
+        "y_mm": touch.y_mm,
+        "radius_mm": touch.radius_mm,
+        "contrast": touch.contrast,
+    }
+
+
+def _error_entry(seen: Seen, number: int) -> dict[str, float | None]:
+    return {} if seen.errors_mm is None else {"error_mm": seen.errors_mm.get(number)}
+
+
+def _finite(value: Any) -> bool:
+    return not isinstance(value, float) or bool(np.isfinite(value))
+
+
+def spread(frames: Sequence[Seen], most: int) -> list[Seen]:
+    """At most ``most`` of ``frames``, evenly, the first and the last among them."""
+    if len(frames) <= most:
+        return list(frames)
+    return [frames[round(k * (len(frames) - 1) / (most - 1))] for k in range(most)]

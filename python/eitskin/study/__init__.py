@@ -1,1 +1,0 @@
-"""Judging and comparing: metrics, the comparison of methods."""

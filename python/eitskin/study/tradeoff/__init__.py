@@ -1,1 +1,0 @@
-"""What accuracy costs in time: configurations over one scale, measured on the same scenes, and which to choose."""

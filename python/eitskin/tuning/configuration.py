@@ -1,0 +1,194 @@
+"""A configuration: every choice between a skin and its touches that trades accuracy for cost, as
+one frozen value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from eitskin.config import check_keys, choice, integer, load_toml, number
+from eitskin.core.results import ALL_SEARCH, SOLVERS, Options
+from eitskin.errors import ConfigError
+from eitskin.model.model import Defaults
+from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_FLOOR
+from eitskin.model.storage import STORAGES
+from eitskin.scoring.snr import BASE_SAMPLES
+
+SCANS = ("full", "reciprocal")
+PERIOD_SAMPLES = 20
+HELD_FRAMES = 4
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One point of the scale. The defaults are those of a model that ``eitskin model build`` makes,
+    and of a board's scan.
+
+    Attributes:
+        name: what tables and pictures call it.
+        rank, pixels, storage, floor, column_power: of the model: rows of the reduced Jacobian,
+            pixels along the skin's longer side, the type it is stored in, mu and p of the reduction
+            (``eitskin.model.reduction``).
+        solver, iterations, gap, mac_limit: how the image is found; at most ``iterations``, or until
+            the relative duality gap is below ``gap`` (0: never), or at most ``mac_limit``
+            multiply-accumulates (0: no limit) where the core has one.
+        lambda_rel: least lambda over lambda_max; below what the noise asks for it changes nothing.
+        warm_start: each frame begins from the last one's image. Judged at the fourth frame of
+            touches that are held, after others were: what a user sees of touches that rest, not of
+            those that land.
+        touch_sweeps: of the off-grid fit; 0 leaves touches at the image's peaks.
+        search: parts of the search for touches (``core.results``: straight data 1, regrouping 2,
+            coupling 4).
+        refine: the image is solved again with the touches' interplay taken out of the data; not
+            over a board's link.
+        samples: of a measurement, at 1 MS/s; white noise falls with the root of them.
+        scan: "full" measures every row, "reciprocal" one of each reciprocal pair, in half the time
+            with sqrt(2) of the noise.
+    """
+
+    name: str
+    rank: int = 64
+    pixels: int = 32
+    storage: str = "f32"
+    floor: float = DEFAULT_FLOOR
+    column_power: float = DEFAULT_COLUMN_POWER
+    solver: str = Defaults.solver
+    iterations: int = Defaults.iterations
+    gap: float = 0.0
+    mac_limit: int = 0
+    lambda_rel: float = Defaults.lambda_rel
+    warm_start: bool = False
+    touch_sweeps: int = 6
+    samples: int = BASE_SAMPLES
+    scan: str = "full"
+    refine: bool = False
+    search: int = ALL_SEARCH
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+    @property
+    def model_settings(self) -> tuple[int, int, str, float, float]:
+        """What a model is built by: pixels, rank, storage, floor, column power."""
+        return self.pixels, self.rank, self.storage, self.floor, self.column_power
+
+    @property
+    def solver_settings(self) -> dict[str, Any]:
+        """What the solver is told, by the names of ``core.results.Options``."""
+        settings = {
+            "solver": self.solver,
+            "iterations": self.iterations,
+            "gap_rel": self.gap,
+            "lambda_rel": self.lambda_rel,
+            "warm_start": self.warm_start,
+            "touch_sweeps": self.touch_sweeps,
+            "touch_search": self.search,
+        }
+        settings |= {"refine": True} if self.refine else {}
+        return settings | ({"mac_limit": self.mac_limit} if self.mac_limit else {})
+
+    @property
+    def held(self) -> int:
+        """How many frames touches are held before they are judged."""
+        return HELD_FRAMES if self.warm_start else 1
+
+
+def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
+    """A configuration from a TOML table or a results file; what is not there has its default.
+
+    Raises:
+        ConfigError: a key is unknown, a value out of range, or the core does not know it.
+    """
+    check_keys(table, [one.name for one in fields(Configuration)], where)
+    name = table.get("name")
+    if not isinstance(name, str) or not name.strip() or "," in name:
+        raise ConfigError(
+            f"{where}: the key 'name' is required: a word or two without commas, for tables and"
+            " pictures"
+        )
+    where = f"{where} {name!r}"
+    for key in ("warm_start", "refine"):
+        if not isinstance(table.get(key, False), bool):
+            raise ConfigError(f"{where}: {key} must be true or false, not {table[key]!r}")
+    one = Configuration(
+        name=name,
+        rank=integer(table, "rank", Configuration.rank, where, low=1, high=1024),
+        pixels=integer(table, "pixels", Configuration.pixels, where, low=4, high=128),
+        storage=choice(table, "storage", Configuration.storage, STORAGES, where),
+        floor=number(table, "floor", Configuration.floor, where, low=0, high=1e6),
+        column_power=number(
+            table, "column_power", Configuration.column_power, where, low=0, high=1
+        ),
+        solver=choice(table, "solver", Configuration.solver, SOLVERS, where),
+        iterations=integer(
+            table, "iterations", Configuration.iterations, where, low=1, high=100_000
+        ),
+        gap=number(table, "gap", Configuration.gap, where, low=0, high=1),
+        mac_limit=integer(table, "mac_limit", Configuration.mac_limit, where, low=0, high=2**62),
+        lambda_rel=number(table, "lambda_rel", Configuration.lambda_rel, where, low=0, high=1),
+        warm_start=table.get("warm_start", Configuration.warm_start),
+        touch_sweeps=integer(
+            table, "touch_sweeps", Configuration.touch_sweeps, where, low=0, high=1000
+        ),
+        samples=integer(
+            table, "samples", Configuration.samples, where, low=PERIOD_SAMPLES, high=1020
+        ),
+        scan=choice(table, "scan", Configuration.scan, SCANS, where),
+        refine=table.get("refine", Configuration.refine),
+        search=integer(table, "search", Configuration.search, where, low=0, high=ALL_SEARCH),
+    )
+    if one.mac_limit and "mac_limit" not in {entry.name for entry in fields(Options)}:
+        raise ConfigError(
+            f"{where}: mac_limit = {one.mac_limit}, but this build's core has no limit of MACs;"
+            " leave it out"
+        )
+    if one.samples % PERIOD_SAMPLES:
+        raise ConfigError(
+            f"{where}: samples = {one.samples} is no whole number of the excitation's periods; use"
+            f" a multiple of {PERIOD_SAMPLES}"
+        )
+    return one
+
+
+def load_set(path: str | Path) -> tuple[Configuration, ...]:
+    """The configurations in a TOML file: tables ``[[configuration]]``, and ``[defaults]`` for what
+    they share.
+
+    Raises:
+        FileError: it cannot be read.
+        ConfigError: it is no such file, is empty, names something twice, or a value is out of
+            range.
+    """
+    tables = load_toml(path, "set of configurations")
+    check_keys(tables, ("defaults", "configuration"), str(path))
+    shared, listed = tables.get("defaults", {}), tables.get("configuration", [])
+    if (
+        not isinstance(shared, dict)
+        or not isinstance(listed, list)
+        or not all(isinstance(one, dict) for one in listed)
+    ):
+        raise ConfigError(
+            f"{path}: expects one [defaults] table at most and [[configuration]] tables"
+        )
+    return checked_set(
+        [configuration_from({**shared, **one}, f"{path} [[configuration]]") for one in listed],
+        str(path),
+    )
+
+
+def checked_set(configurations: Sequence[Configuration], where: str) -> tuple[Configuration, ...]:
+    """``configurations`` if there are any and no two have one name.
+
+    Raises:
+        ConfigError: otherwise.
+    """
+    names = [one.name for one in configurations]
+    if not names:
+        raise ConfigError(f"{where}: holds no [[configuration]]; add at least one with a name")
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"{where}: two configurations are named {name!r}; names must differ")
+    return tuple(configurations)

@@ -1,0 +1,407 @@
+"""Measured points, which of them nothing beats, and which to choose for a budget or an accuracy."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from eitskin.device.bank import BANK_BYTES, RECORD_BYTES
+from eitskin.device.settings import SolverSettings
+from eitskin.errors import ConfigError, FileError, UsageError
+from eitskin.fileio import parse_json, read_bytes
+from eitskin.tuning.configuration import Configuration, configuration_from
+
+FORMAT, VERSION = "eitskin-tradeoff", 1
+SHIPPED = "front.json"
+F767_MHZ = 216
+F767_RAM = 256 * 1024  # the linker script promises the workspace as much
+BOARDS = ("f767", "host")
+JUDGED = ("image", "discs")
+DEFAULT_PERIOD_US = 20_800  # of the default scan
+LEAST_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost of the discs
+SHIPPED_SCORES = (
+    "scenes", "image", "discs", "exact_count", "position_mm", "force_error", "solve_macs",
+    "touch_macs", "most_macs",
+)  # fmt: skip
+MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_search"}  # of the solver's settings
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A bound of a frame's solve and touches: ``unit`` is "us", "MACs" or "instructions"."""
+
+    value: float
+    unit: str
+
+    def __str__(self) -> str:
+        if self.unit == "us":
+            return f"{self.value / 1000:.3g} ms"
+        return f"{self.value / 1e6:.3g} million {self.unit}"
+
+
+UNITS = {
+    "us": (1.0, "us"), "ms": (1e3, "us"), "s": (1e6, "us"),
+    "macs": (1.0, "MACs"), "kmacs": (1e3, "MACs"), "mmacs": (1e6, "MACs"),
+    "instructions": (1.0, "instructions"), "kinstructions": (1e3, "instructions"),
+    "minstructions": (1e6, "instructions"),
+}  # fmt: skip
+
+
+def read_budget(text: str) -> Budget:
+    """A budget from "10ms", "800us", "600kMACs" or "2.5Minstructions".
+
+    Raises:
+        UsageError: it is none.
+    """
+    match = re.fullmatch(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?)\s*([A-Za-z]+)", text.strip())
+    unit = None if match is None else match.group(2).lower()
+    unit = unit if unit in UNITS or unit is None else f"{unit}s"
+    if match is None or unit not in UNITS or not 0 < float(match.group(1)) < 1e15:
+        raise UsageError(
+            f"--budget {text}: give a number above 0 and a unit: 10ms, 800us, 600kMACs or"
+            " 2.5Minstructions"
+        )
+    factor, kind = UNITS[unit]
+    return Budget(float(match.group(1)) * factor, kind)
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A configuration as measured.
+
+    Attributes:
+        threshold, force_scale: what was trained.
+        costs: ``flash_bytes``, ``ram_bytes``, ``pixels_kept``, ``acquisition_us``.
+        instructions: of solve and touches on the Cortex-M7: ``kind`` ("counted" or "estimated"),
+            ``mean``, ``most``...; or None.
+        host_us: ``p50``, ``p99`` and ``most`` (``host_times``) of solve and touches; or None.
+        scores: by set, then by SNR in dB as text.
+    """
+
+    configuration: Configuration
+    threshold: float
+    force_scale: float
+    costs: dict[str, Any]
+    instructions: dict[str, Any] | None
+    host_us: dict[str, Any] | None
+    scores: dict[str, dict[str, dict[str, Any]]]
+
+    @property
+    def name(self) -> str:
+        """The configuration's."""
+        return self.configuration.name
+
+    def score(self, where: Where) -> dict[str, Any] | None:
+        """The scores on a set at an SNR; None where that was not measured."""
+        return self.scores.get(where.scenes, {}).get(f"{where.snr_db:g}")
+
+    def accuracy(self, where: Where) -> float | None:
+        """Mean MIoU there."""
+        score = self.score(where)
+        return None if score is None else float(score[where.judged]["mean"])
+
+    def macs(self, where: Where) -> tuple[float, float] | None:
+        """Mean and most MACs of solve and touches there."""
+        score = self.score(where)
+        return (
+            None
+            if score is None
+            else (score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"])
+        )
+
+    def cost(self, unit: str, board: str, where: Where, worst: bool = False) -> float | None:
+        """Solve and touches of a frame in ``unit``: the mean (host: the median), or of the
+        costliest frame that was counted or timed; None if unknown. Times of the F767 are estimates:
+        an instruction a cycle."""
+        if unit == "MACs":
+            macs = self.macs(where)
+            return None if macs is None else macs[worst]
+        if unit == "us" and board == "host":
+            return None if self.host_us is None else float(self.host_us["most" if worst else "p50"])
+        if self.instructions is None:
+            return None
+        return float(self.instructions["most" if worst else "mean"]) / (
+            1 if unit == "instructions" else F767_MHZ
+        )
+
+    @property
+    def fits_f767(self) -> bool:
+        """Whether flash and RAM of the NUCLEO-F767ZI hold model and workspace, and model and SOLVER
+        command the settings."""
+        fits = (
+            self.costs["flash_bytes"] <= BANK_BYTES - RECORD_BYTES
+            and self.costs["ram_bytes"] <= F767_RAM
+        )
+        return bool(fits) and not unusual(self.configuration) - MODEL_HOLDS - board_takes()
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "configuration": self.configuration.as_dict(),
+            "threshold": self.threshold,
+            "force_scale": self.force_scale,
+            "costs": self.costs,
+            "instructions": self.instructions,
+            "host_us": self.host_us,
+            "scores": self.scores,
+        }
+
+
+def unusual(one: Configuration) -> set[str]:
+    """The names of the solver's settings in which ``one`` differs from the defaults."""
+    usual = Configuration("").solver_settings
+    return {name for name, value in one.solver_settings.items() if value != usual.get(name)}
+
+
+def board_takes() -> set[str]:
+    """The names of the solver's settings that a board can be told."""
+    return {one.name for one in fields(SolverSettings)}
+
+
+@dataclass(frozen=True)
+class Where:
+    """What accuracy means: which scenes, at which SNR, and whether images or discs are judged."""
+
+    scenes: str = "random"
+    snr_db: float = 60.0
+    judged: str = "image"
+
+    def __str__(self) -> str:
+        return f"{self.judged} MIoU, {self.scenes} at {self.snr_db:g} dB"
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """A file of results: what was measured under which ``settings``."""
+
+    settings: dict[str, Any]
+    points: tuple[Point, ...]
+    where_from: str = "the shipped results"
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        listed = [one.as_dict() for one in self.points]
+        return {"format": FORMAT, "version": VERSION, "settings": self.settings, "points": listed}
+
+
+def for_package(front: Front) -> Front:
+    """What ships: of the sets beside "random" 60 dB only, of each cell what ``choose`` and its
+    answer need."""
+    kept = []
+    for one in front.points:
+        scores = {
+            name: {
+                snr: {key: _rounded(score[key]) for key in SHIPPED_SCORES}
+                for snr, score in cells.items()
+                if name == "random" or snr == "60"
+            }
+            for name, cells in one.scores.items()
+        }
+        kept.append(replace(one, scores=scores))
+    return Front(front.settings, tuple(kept), front.where_from)
+
+
+def _rounded(value: Any) -> Any:
+    """Numbers to four decimals."""
+    if isinstance(value, dict):
+        return {key: _rounded(one) for key, one in value.items()}
+    return round(value, 4) if isinstance(value, float) else value
+
+
+def front_from(values: Any, where: str) -> Front:
+    """Results from JSON values.
+
+    Raises:
+        ConfigError: they are none, or of another version.
+    """
+    try:
+        if values["format"] != FORMAT or values["version"] != VERSION:
+            raise KeyError("format")
+        points = []
+        for one in values["points"]:
+            parts = {
+                name: one[name]
+                for name in (
+                    "threshold",
+                    "force_scale",
+                    "costs",
+                    "instructions",
+                    "host_us",
+                    "scores",
+                )
+            }
+            points.append(Point(configuration_from(one["configuration"], where), **parts))
+        return Front(dict(values["settings"]), tuple(points), where)
+    except (KeyError, TypeError, AttributeError):
+        raise ConfigError(
+            f"{where}: no results of  eitskin tradeoff run  of version {VERSION}; run it again"
+        ) from None
+
+
+def load_front(path: Path | None = None) -> Front:
+    """The results in ``path``, or those that ship with the package.
+
+    Raises:
+        FileError: it cannot be read.
+        ConfigError: it holds no results.
+    """
+    if path is not None:
+        try:
+            return front_from(parse_json(read_bytes(path, "results file")), str(path))
+        except ValueError:
+            raise ConfigError(
+                f"{path}: not JSON; name the front.json that  eitskin tradeoff run  wrote"
+            ) from None
+    try:
+        text = resources.files("eitskin.tuning").joinpath(SHIPPED).read_text(encoding="utf-8")
+    except OSError:
+        raise FileError(
+            "the shipped results of  eitskin tradeoff run  are missing from this installation; name"
+            " others with  --front"
+        ) from None
+    return front_from(json.loads(text), "the shipped results")
+
+
+def pareto(
+    points: Sequence[Point],
+    cost: Callable[[Point], float | None],
+    accuracy: Callable[[Point], float | None],
+    least_gain: float = 0.0,
+) -> list[Point]:
+    """Those that no other beats: none that costs no more is as accurate, less ``least_gain``.
+    Cheapest first."""
+    known = [
+        (c, -a, k)
+        for k, p in enumerate(points)
+        if (c := cost(p)) is not None and (a := accuracy(p)) is not None
+    ]
+    best = float("-inf")
+    kept: list[Point] = []
+    for _, negative, k in sorted(known):
+        if -negative > best + (least_gain if kept else 0.0):
+            best = -negative
+            kept.append(points[k])
+    return kept
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is asked for: at most ``budget``, for the mean frame or the ``worst``, at least
+    ``accuracy``, on ``board``; a frame measured within ``period_us``."""
+
+    budget: Budget | None
+    accuracy: float | None
+    board: str
+    where: Where
+    period_us: float | None = None
+    worst: bool = False
+
+    @property
+    def acquisition_us(self) -> float:
+        """How long measuring may take: the period, or without one the longer of the budget and the
+        default scan."""
+        if self.period_us is not None:
+            return self.period_us
+        longest = self.budget.value if self.budget is not None and self.budget.unit == "us" else 0.0
+        return max(longest, DEFAULT_PERIOD_US)
+
+    @property
+    def unit(self) -> str:
+        """In which cost is compared."""
+        return "us" if self.budget is None else self.budget.unit
+
+
+def check_wish(wish: Wish) -> Wish:
+    """``wish`` if it can be.
+
+    Raises:
+        UsageError: nothing is asked for, or a number is out of range.
+    """
+    if wish.budget is None and wish.accuracy is None:
+        raise UsageError("name what to choose by:  --budget 10ms  or  --accuracy 0.86")
+    if wish.accuracy is not None and not 0 < wish.accuracy < 1:
+        raise UsageError(f"--accuracy {wish.accuracy:g} is an MIoU; use above 0 to below 1")
+    if wish.period_us is not None and not wish.period_us > 0:
+        raise UsageError("--period must be above 0")
+    if wish.board == "host" and wish.budget is not None and wish.budget.unit == "instructions":
+        raise UsageError(
+            "instructions are counted on the Cortex-M7; use a time or MACs for the host, or "
+            " --board f767"
+        )
+    return wish
+
+
+def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") -> Point:
+    """With a budget the most accurate point within it; with an accuracy the cheapest that reaches
+    it; with both the cheapest that does both. Points that save on the fit of touches are left out.
+    ``what`` names the points in the refusal.
+
+    Raises:
+        UsageError: none does; the text says how near one comes.
+    """
+    known = []
+    for one in points:
+        cost, accuracy = (
+            one.cost(wish.unit, wish.board, wish.where, wish.worst),
+            one.accuracy(wish.where),
+        )
+        usable = one.configuration.touch_sweeps >= LEAST_SWEEPS and (
+            wish.board == "host" or one.fits_f767
+        )
+        if cost is not None and accuracy is not None and usable:
+            known.append((cost, accuracy, one))
+    if not known:
+        raise UsageError(
+            f"no {what} has {wish.where} and a cost in {wish.unit} on the {wish.board}; run "
+            " eitskin tradeoff run"
+        )
+    known = [row for row in known if row[2].costs["acquisition_us"] <= wish.acquisition_us]
+    if not known:
+        raise UsageError(
+            f"no {what} measures a frame within {wish.acquisition_us / 1000:g} ms; allow more with "
+            " --period"
+        )
+    within = [row for row in known if wish.budget is None or row[0] <= wish.budget.value]
+    if not within:
+        least = min(known, key=lambda row: row[0])
+        takes = Budget(least[0], wish.unit)
+        raise UsageError(
+            f"no {what} keeps to {wish.budget}; the cheapest, {least[2].name!r}, takes {takes}"
+        )
+    if wish.accuracy is None:
+        return min(within, key=lambda row: (-row[1], row[0]))[2]
+    reached = [row for row in within if row[1] >= wish.accuracy]
+    if not reached:
+        best = max(within, key=lambda row: row[1])
+        bound = "" if wish.budget is None else f" within {wish.budget}"
+        found = f"the best, {best[2].name!r}, has {best[1]:.3f} ({wish.where})"
+        raise UsageError(f"no {what} reaches {wish.accuracy:g}{bound}; {found}")
+    return min(reached, key=lambda row: (row[0], -row[1]))[2]
+
+
+def estimated_instructions(
+    points: Sequence[Point], one: Configuration, macs: tuple[float, float]
+) -> dict[str, Any] | None:
+    """Instructions from MACs by the counted points of the same storage and solver (their mean
+    instructions a MAC); None if there are none. An estimate, and called so."""
+    same = [
+        p.instructions["mean"] / p.instructions["macs_mean"]
+        for p in points
+        if p.instructions is not None
+        and p.instructions["kind"] == "counted"
+        and (p.configuration.storage, p.configuration.solver) == (one.storage, one.solver)
+    ]
+    if not same:
+        return None
+    ratio = sum(same) / len(same)
+    rounded = {
+        "mean": round(ratio * macs[0]),
+        "most": round(ratio * macs[1]),
+        "instructions_per_mac": round(ratio, 3),
+    }
+    return {"kind": "estimated", **rounded}

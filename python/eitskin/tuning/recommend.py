@@ -1,0 +1,177 @@
+"""From a chosen point to what a user does with it: a model with the settings inside, and the
+options for the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from eitskin.core.results import ALL_SEARCH
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+from eitskin.tuning.configuration import Configuration
+from eitskin.tuning.front import Point, Wish
+
+if TYPE_CHECKING:
+    from eitskin.model.build import BuildSettings
+
+ELEMENTS = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """A point and why: ``wish`` is what was asked for."""
+
+    point: Point
+    wish: Wish
+
+    @property
+    def frame_us(self) -> float | None:
+        """From frame to frame: the longer of measuring and solving, which go on at the same
+        time."""
+        solve = self.point.cost("us", self.wish.board, self.wish.where)
+        return None if solve is None else max(solve, self.point.costs["acquisition_us"])
+
+    @property
+    def options(self) -> list[str]:
+        """Command-line options of ``eitskin stream`` and ``record`` for what a model does not
+        hold."""
+        one = self.point.configuration
+        options = [f"--samples {one.samples}", "--full" if one.scan == "full" else "--reciprocal 0"]
+        if one.warm_start:
+            options.append("--warm")
+        if one.gap:
+            options.append(f"--gap {one.gap:g}")
+        if one.refine:
+            options.append("--refine (of reconstruct)")
+        return options
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        point, wish = self.point, self.wish
+        return {
+            "name": point.name,
+            "configuration": point.configuration.as_dict(),
+            "threshold": point.threshold,
+            "force_scale": point.force_scale,
+            "judged": str(wish.where),
+            "accuracy": point.accuracy(wish.where),
+            "score": point.score(wish.where),
+            "board": wish.board,
+            "budget": (
+                None
+                if wish.budget is None
+                else {"value": wish.budget.value, "unit": wish.budget.unit}
+            ),
+            "cost": point.cost(wish.unit, wish.board, wish.where, wish.worst),
+            "worst": wish.worst,
+            "unit": wish.unit,
+            "solve_us": point.cost("us", wish.board, wish.where),
+            "solve_most_us": point.cost("us", wish.board, wish.where, True),
+            "acquisition_us": point.costs["acquisition_us"],
+            "frame_us": self.frame_us,
+            "instructions": point.instructions,
+            "flash_bytes": point.costs["flash_bytes"],
+            "ram_bytes": point.costs["ram_bytes"],
+            "options": self.options,
+        }
+
+    def text(self) -> str:
+        """In words."""
+        point, wish, one = self.point, self.wish, self.point.configuration
+        score = point.score(wish.where)
+        assert score is not None
+        image, discs = score["image"], score["discs"]
+        solve, most = (point.cost("us", wish.board, wish.where, worst) for worst in (False, True))
+        acquisition = point.costs["acquisition_us"]
+        lines = [
+            (
+                f"{point.name}: image MIoU {image['mean']:.3f} ({image['low']:.3f} to"
+                f" {image['high']:.3f}; worst tenth {image['worst_tenth']:.3f}), discs"
+                f" {discs['mean']:.3f}, exact count {100 * score['exact_count']:.0f} %;"
+                f" {wish.where.scenes}, {wish.where.snr_db:g} dB"
+            ),
+            (
+                f"model: rank {one.rank}, {one.pixels} pixels across, {one.storage}, mu"
+                f" {one.floor:g}; {point.costs['flash_bytes'] / 1e3:.0f} kB of flash,"
+                f" {point.costs['ram_bytes'] / 1e3:.0f} kB of RAM"
+            ),
+            f"solver: {one.solver}, {one.iterations} iterations at most, lambda_rel"
+            f" {one.lambda_rel:g}"
+            + (f", gap {one.gap:g}" if one.gap else "")
+            + (f", at most {one.mac_limit} MACs" if one.mac_limit else "")
+            + f", {'warm' if one.warm_start else 'cold'}, {one.touch_sweeps} sweeps; mask t"
+            f" {point.threshold:g}",
+        ]
+        if solve is not None and most is not None and self.frame_us is not None:
+            lines.append(_time_line(wish.board, solve, most, point))
+            bound = "measuring" if acquisition >= solve else "solving"
+            lines.append(
+                f"scan: {one.scan}, {one.samples} samples: {acquisition / 1000:.1f} ms a frame;"
+                f" {bound} bounds the rate: {1e6 / self.frame_us:.1f} frames a second"
+            )
+        lines.append("options: " + " ".join(self.options))
+        return "\n".join(lines)
+
+
+def _time_line(board: str, solve_us: float, most_us: float, point: Point) -> str:
+    if board == "host":
+        return (
+            f"host: solve and touches median {solve_us / 1000:.3f} ms, of the costliest scene"
+            f" {most_us / 1000:.3f} ms"
+        )
+    assert point.instructions is not None
+    kind = point.instructions["kind"]
+    return (
+        f"F767: solve and touches about {solve_us / 1000:.1f} ms a frame, {most_us / 1000:.1f} ms"
+        f" at most: {kind} instructions ({point.instructions['mean'] / 1e6:.2f} million, most"
+        f" {point.instructions['most'] / 1e6:.2f}) at one a cycle and 216 MHz, an estimate"
+    )
+
+
+def write_model(path: Path, point: Point, skin: Skin, protocol: Protocol) -> int:
+    """Build and write the model of a point for ``skin``, the solver's settings and t as its
+    defaults; returns its bytes.
+
+    Raises:
+        GeometryError, ProtocolError, MissingExtraError, UsageError, FileError: from building and
+            writing.
+    """
+    from eitskin.model.build import build_model
+    from eitskin.model.eitm import save_model
+
+    return save_model(
+        path,
+        build_model(skin, protocol, build_settings(point.configuration, skin, point.threshold)),
+    )
+
+
+def build_settings(
+    one: Configuration, skin: Skin, mask_threshold: float | None = None
+) -> BuildSettings:
+    """How the model of a configuration is built; its solver's settings and t become the model's
+    defaults, as far as a model has
+    them: not the gap, a limit of MACs, the warm start and the sweeps."""
+    from eitskin.model.build import BuildSettings, scaled_defaults
+
+    usual = scaled_defaults(skin, "difference")
+    left_out = ALL_SEARCH & ~one.search
+    defaults = replace(
+        usual,
+        solver=one.solver,
+        iterations=one.iterations,
+        lambda_rel=one.lambda_rel,
+        search_left_out=left_out,
+    )
+    if mask_threshold is not None:
+        defaults = replace(defaults, mask_threshold=mask_threshold)
+    return BuildSettings(
+        rank=one.rank,
+        pixels_across=one.pixels,
+        storage=one.storage,
+        floor=one.floor,
+        column_power=one.column_power,
+        elements=ELEMENTS,
+        defaults=defaults,
+    )

@@ -1,0 +1,398 @@
+"""What a frame costs on the board: exact instruction counts under QEMU, memory, and the frame rate
+of the emulated NUCLEO-F767ZI.
+
+Instructions are exact. Times on silicon are an estimate from them: one a cycle at 216 MHz. A
+Cortex-M7 issues up to two a cycle and waits for flash and memory; nobody has measured it here.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eitskin.core.results import Options
+from eitskin.errors import UsageError
+from eitskin.model.eitm import encode_model
+from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.model.storage import STORAGES, store
+from eitskin.scene.random_touches import random_touches
+from eitskin.scene.simulate import Simulated, simulate
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.solve.options import default_options
+from eitskin_studies.harness.emulated import (
+    PROGRAM,
+    build_cortex_m7,
+    checkout_root,
+    need_tools,
+    run_frames,
+)
+from eitskin_studies.harness.sections import markdown_table, text_table
+
+Progress = Callable[[Sequence[Any]], Iterable[Any]]
+
+CLOCK_HZ = 216_000_000
+IMAGE = "eitskin_nucleo_f767zi"
+TARGETS = ("frames_m7", IMAGE, "eitskin_mps2_an500")
+SCENE = "emu:two_touch"
+TARE_FRAMES = 8
+CODE, STATICS, STACK = (
+    (".vectors", ".text", ".ARM.exidx"),
+    (".data", ".bss", ".dtcm", ".noinit"),
+    ".stack",
+)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """One storage, start and build of the kernels over all scenes; instructions of solve and
+    touches, MACs likewise."""
+
+    storage: str
+    kernels: str
+    warm: bool
+    solve_mean: float
+    touches_mean: float
+    worst: int
+    worst_tenth: float
+    macs_mean: float
+    model_bytes: int
+    workspace_bytes: int
+    stack_bytes: int
+
+    @property
+    def mean(self) -> float:
+        """Instructions of solve and touches."""
+        return self.solve_mean + self.touches_mean
+
+    @property
+    def per_mac(self) -> float:
+        """Instructions a multiply-accumulate."""
+        return self.mean / self.macs_mean
+
+
+@dataclass(frozen=True)
+class ImageSize:
+    """Bytes of a firmware image: code and constants, statics, what is set aside for the stack."""
+
+    board: str
+    code_bytes: int
+    static_bytes: int
+    stack_bytes: int
+
+
+@dataclass(frozen=True)
+class Rate:
+    """The emulated NUCLEO-F767ZI on a scene of two touches: rows and samples measured a frame, the
+    time that takes, solve and touches on the board (interrupts included), frames a second, and the
+    stack that the firmware used.
+    """
+
+    storage: str
+    rows: int
+    samples: int
+    acquire_us: int
+    solve_us_p50: float
+    solve_us_worst: int
+    rate_hz: float
+    stack_used: int
+
+    @property
+    def bound(self) -> str:
+        """What the frame rate is bounded by."""
+        return "solve" if self.solve_us_p50 > self.acquire_us else "acquisition"
+
+
+@dataclass(frozen=True)
+class BoardCost:
+    """All that ``eitskin bench board`` measures."""
+
+    scenes: int
+    seed: int
+    compiler: str
+    qemu: str
+    costs: tuple[Cost, ...]
+    images: tuple[ImageSize, ...]
+    rates: tuple[Rate, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        values = asdict(self)
+        for cost, entry in zip(self.costs, values["costs"], strict=True):
+            entry |= {"mean": cost.mean, "per_mac": cost.per_mac}
+        for rate, entry in zip(self.rates, values["rates"], strict=True):
+            entry["bound"] = rate.bound
+        return values
+
+
+def run(
+    scenes: int, seed: int, *, frames: int = 8, build: Path | None = None, progress: Progress = iter
+) -> BoardCost:
+    """Build, run ``scenes`` random scenes in every storage, cold and warm, and ``frames`` frames on
+    the emulated board (0: none).
+
+    ``build`` is where an earlier build may be, and this one stays; without it, a folder that is
+    removed.
+
+    Raises:
+        UsageError: no checkout, a tool is missing, or the build fails.
+        MissingExtraError: the mesher, or for ``frames`` the emulator, is not installed.
+    """
+    root = checkout_root()
+    need_tools("arm-none-eabi-gcc", "qemu-system-arm", "cmake", "ninja")
+    model, _ = load_prebuilt()
+    blobs = {
+        storage: encode_model(replace(model, stored=store(model.sensitivity, storage)))
+        for storage in STORAGES
+    }
+    session = simulate(
+        paper_skin(), adjacent(16), random_touches(paper_skin().outline, seed, scenes, "test")
+    )
+    with tempfile.TemporaryDirectory(prefix="eitskin-board-") as name:
+        folder = Path(name)
+        built = build_cortex_m7(root, build or folder / "build", *TARGETS)
+        program = built / PROGRAM
+        plans = [
+            (storage, *how)
+            for storage in STORAGES
+            for how in ((True, False), (False, False), (False, True))
+        ]
+        costs = tuple(
+            _cost(program, folder, model, blobs, session, *plan) for plan in progress(plans)
+        )
+        images = tuple(size_of(built / "firmware" / f"{image}.elf") for image in TARGETS[1:])
+        rates: tuple[Rate, ...] = ()
+        if frames:
+            image = built / "firmware" / f"{IMAGE}.bin"
+            scans = [(storage, check_every) for storage in STORAGES for check_every in (1, 0)]
+            rates = tuple(
+                measure_rate(blobs[s], s, image, check_every, frames)
+                for s, check_every in progress(scans)
+            )
+    return BoardCost(
+        scenes,
+        seed,
+        _first_line("arm-none-eabi-gcc"),
+        _first_line("qemu-system-arm"),
+        costs,
+        images,
+        rates,
+    )
+
+
+def _first_line(tool: str) -> str:
+    done = subprocess.run([tool, "--version"], capture_output=True, text=True, check=True)
+    return re.sub(r" emulator version|\s*\([^)]*\)", "", done.stdout.splitlines()[0])
+
+
+def _cost(
+    program: Path,
+    folder: Path,
+    model: Model,
+    blobs: dict[str, bytes],
+    session: Simulated,
+    storage: str,
+    portable: bool,
+    warm: bool,
+) -> Cost:
+    options: Options = replace(default_options(model), warm_start=warm)
+    blob = blobs[storage]
+    done = run_frames(
+        program, folder, blob, session.quiet_v, session.frames_v, options, portable=portable
+    )
+    each = np.sort([frame.instructions for frame in done.frames])
+    return Cost(
+        storage=storage,
+        kernels=done.kernels,
+        warm=warm,
+        solve_mean=float(np.mean([frame.solve_instructions for frame in done.frames])),
+        touches_mean=float(np.mean([frame.touch_instructions for frame in done.frames])),
+        worst=int(each[-1]),
+        worst_tenth=float(each[-max(1, len(each) // 10) :].mean()),
+        macs_mean=float(np.mean([frame.macs for frame in done.frames])),
+        model_bytes=len(blob),
+        workspace_bytes=done.workspace_bytes,
+        stack_bytes=max(frame.stack_bytes for frame in done.frames),
+    )
+
+
+def size_of(elf: Path) -> ImageSize:
+    """The sizes of an image.
+
+    Raises:
+        UsageError: there are no tools for it.
+    """
+    tool = shutil.which("arm-none-eabi-size")
+    if tool is None:
+        raise UsageError("missing arm-none-eabi-size; scripts/test installs it")
+    done = subprocess.run([tool, "-A", str(elf)], capture_output=True, text=True, check=True)
+    sizes = {
+        name: int(size) for name, size in re.findall(r"^(\.\S+)\s+(\d+)\s+\d+$", done.stdout, re.M)
+    }
+    code, statics = (sum(sizes.get(name, 0) for name in names) for names in (CODE, STATICS))
+    return ImageSize(elf.stem.removeprefix("eitskin_"), code, statics, sizes.get(STACK, 0))
+
+
+def measure_rate(blob: bytes, storage: str, image: Path, check_every: int, frames: int) -> Rate:
+    """Let the emulated board with the firmware ``image`` solve ``frames`` frames; ``check_every``
+    as in ``ScanSettings``.
+
+    Raises:
+        MissingExtraError: the emulator is not installed.
+        DeviceError: the board gives no frames.
+    """
+    from eitskin.device.live import LiveFrame, begin_scene, follow, take_reference
+    from eitskin.device.open import open_device
+    from eitskin.device.settings import ScanSettings, apply_scan
+    from eitskin.device.wire.packets import Stream
+
+    solved: list[tuple[int, int]] = []
+    with open_device(SCENE, model=blob, image=image) as device:
+        apply_scan(device, ScanSettings(check_every=check_every))
+        take_reference(device, TARE_FRAMES)
+        begin_scene(device)
+        for item in follow(device, Stream.TOUCHES, every=1, frames=frames):
+            if isinstance(item, LiveFrame) and item.solved is not None:
+                solved.append((item.time_us, item.solved.solve_us + item.solved.touch_us))
+        stats, info = device.stats(), device.board
+    times, costs = np.array(solved).T
+    rate = 1e6 * (len(times) - 1) / float(times[-1] - times[0])
+    return Rate(
+        storage, info.measured_rows, info.samples, info.measured_rows * info.slot_us,
+        float(np.median(costs)),
+        int(costs.max()), rate, stats.stack_used,
+    )  # fmt: skip
+
+
+# ---- tables ----
+
+
+def _million(value: float) -> str:
+    return f"{value / 1e6:.2f}"
+
+
+def _milliseconds(instructions: float) -> str:
+    return f"{1e3 * instructions / CLOCK_HZ:.1f}"
+
+
+COST_HEAD = (
+    "storage", "kernels", "start", "solve", "touches", "mean", "worst tenth", "worst", "MACs",
+    "a MAC",
+    "ms at 216 MHz (estimate)", "model, flash", "workspace, RAM",
+)  # fmt: skip
+IMAGE_HEAD = ("image", "code and constants", "statics", "set aside for the stack")
+RATE_HEAD = (
+    "storage", "rows x samples", "acquisition", "solve and touches, p50", "worst",
+    "frames a second", "bounded by",
+    "stack used",
+)  # fmt: skip
+
+
+def cost_rows(result: BoardCost) -> list[tuple[str, ...]]:
+    """The cost table's rows under ``COST_HEAD``; millions of instructions and of MACs, bytes."""
+    return [
+        (
+            c.storage,
+            "plain C" if c.kernels == "portable" else "M7",
+            "warm" if c.warm else "cold",
+            *map(
+                _million,
+                (c.solve_mean, c.touches_mean, c.mean, c.worst_tenth, c.worst, c.macs_mean),
+            ),
+            f"{c.per_mac:.2f}",
+            _milliseconds(c.mean),
+            f"{c.model_bytes}",
+            f"{c.workspace_bytes}",
+        )
+        for c in result.costs
+    ]
+
+
+def image_rows(result: BoardCost) -> list[tuple[str, ...]]:
+    """Rows under ``IMAGE_HEAD``."""
+    return [
+        (i.board, f"{i.code_bytes}", f"{i.static_bytes}", f"{i.stack_bytes or '-'}")
+        for i in result.images
+    ]
+
+
+def rate_rows(result: BoardCost) -> list[tuple[str, ...]]:
+    """Rows under ``RATE_HEAD``; times in ms."""
+    return [
+        (
+            r.storage, f"{r.rows} x {r.samples}", f"{r.acquire_us / 1e3:.1f} ms",
+            f"{r.solve_us_p50 / 1e3:.2f} ms",
+            f"{r.solve_us_worst / 1e3:.2f} ms", f"{r.rate_hz:.1f}", r.bound, f"{r.stack_used}",
+        )
+        for r in result.rates
+    ]  # fmt: skip
+
+
+def as_text(result: BoardCost) -> str:
+    """For a terminal."""
+    parts = [f"{result.scenes} random scenes, seed {result.seed}; {result.compiler}; {result.qemu}"]
+    for head, rows in (
+        (COST_HEAD, cost_rows(result)),
+        (IMAGE_HEAD, image_rows(result)),
+        (RATE_HEAD, rate_rows(result)),
+    ):
+        if rows:
+            parts.append(text_table(head, rows))
+    return "\n\n".join(parts)
+
+
+def as_markdown(result: BoardCost, command: str) -> str:
+    """The page that ``docs/results/board-cost.md`` is; ``command`` made it."""
+    stack = max(cost.stack_bytes for cost in result.costs if cost.kernels != "portable")
+    f32 = {c.storage: c for c in result.costs if c.kernels != "portable" and not c.warm}
+    ratios = ", ".join(
+        f"{name} {f32[name].mean / f32['f32'].mean:.2f}" for name in STORAGES if name != "f32"
+    )
+    parts = [
+        "# What a frame costs on the board",
+        (
+            f"Written by `{command}`. The prebuilt model with its default options (working set, 60"
+            f" iterations, rank 64), {result.scenes} random scenes of the test set of seed"
+            f" {result.seed} (1 to 3 touches, 60 dB), compiled by {result.compiler}."
+        ),
+        "## Instructions, flash and RAM",
+        (
+            f"Counted exactly by {result.qemu} on mps2-an500 (`-icount shift=6`), in millions;"
+            " worst is that of one frame, worst tenth the mean of a tenth of the frames. *M7* is"
+            " `kernels_m7.c`, *plain C* the portable kernels on the same processor: the same bits"
+            " of images and touches. *Warm* starts from the scene before, which has nothing to do"
+            " with it. Milliseconds are an **estimate**: an instruction a cycle at 216 MHz. A"
+            " Cortex-M7 issues up to two a cycle, and waits for flash; no silicon was measured."
+        ),
+        markdown_table(COST_HEAD, cost_rows(result)),
+        (
+            f"Cold, by the M7 kernels, relative to f32: {ratios}. Columns in use are unpacked to"
+            " float once and held in the workspace (64 KiB of it at rank 64, 256 columns), so that"
+            " only the three products a frame with every column convert, and those of a working"
+            f" set that is greater. Solve and touches take at most {stack} bytes of stack."
+        ),
+        "## Firmware",
+        "Bytes of the images. The NUCLEO's workspace is what its SRAM has left.",
+        markdown_table(IMAGE_HEAD, image_rows(result)),
+    ]
+    if result.rates:
+        parts += [
+            "## Frame rate",
+            (
+                f"The unmodified image on the emulated NUCLEO-F767ZI (`{SCENE}`), whose clock takes"
+                " an instruction a cycle: the same estimate. 104 rows are one of each reciprocal"
+                " pair (`--reciprocal 0`). Solve and touches run while the next frame is acquired,"
+                " and include its interrupts: demodulating a burst takes part of each 100 us slot."
+            ),
+            markdown_table(RATE_HEAD, rate_rows(result)),
+        ]
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,1 @@
+"""The commands that join `eitskin` where the studies are installed."""

@@ -1,0 +1,396 @@
+"""``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes,
+boards, kernels, growth, batches; and what findings are worth."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from eitskin.errors import UsageError
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``bench`` and its own subcommands."""
+    parser = subparsers.add_parser("bench", help="measure speed, side by side in one run")
+    what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    frame = what.add_parser(
+        "frame", help="one frame through cffi: p50, p99, share outside C, beside numpy"
+    )
+    frame.add_argument("--runs", type=int, default=2000, help="default: %(default)s")
+    frame.add_argument("--json", action="store_true")
+    frame.set_defaults(run=run_frame)
+    solve = what.add_parser(
+        "solve", help="the solve alone: time to a suboptimality, beside other solvers"
+    )
+    solve.add_argument(
+        "--scenes", type=int, default=20, help="problems of each model (default: %(default)s)"
+    )
+    solve.add_argument("--seed", type=int, default=3, help="of the scenes (default: %(default)s)")
+    solve.add_argument(
+        "--rounds", type=int, default=11, help="interleaved rounds (default: %(default)s)"
+    )
+    solve.add_argument(
+        "--picture", type=Path, metavar="PNG", help="draw suboptimality against MIoU instead"
+    )
+    solve.add_argument("--json", action="store_true")
+    solve.set_defaults(run=run_solve)
+    jacobian = what.add_parser(
+        "jacobian", help="building: Jacobian beside pyEIT's, and the whole model"
+    )
+    jacobian.add_argument("--json", action="store_true")
+    jacobian.set_defaults(run=run_jacobian)
+    board = what.add_parser(
+        "board",
+        help=(
+            "a frame on the emulated board: exact instructions, memory, frame rate; needs a"
+            " checkout"
+        ),
+        description=(
+            "Build the Cortex-M7 program and both firmware images from the source checkout, run"
+            " random scenes under QEMU in every storage with the M7's kernels and with plain C, and"
+            " the firmware itself on the emulated NUCLEO-F767ZI."
+        ),
+    )
+    board.add_argument(
+        "--scenes", type=int, default=60, help="random scenes (default: %(default)s)"
+    )
+    board.add_argument("--seed", type=int, default=1, help="of the scenes (default: %(default)s)")
+    board.add_argument(
+        "--frames",
+        type=int,
+        default=8,
+        help="on the emulated NUCLEO, 0 for none (default: %(default)s)",
+    )
+    board.add_argument(
+        "--build", type=Path, metavar="DIR", help="keep the build there, or take up an earlier one"
+    )
+    board.add_argument(
+        "--markdown",
+        type=Path,
+        metavar="FILE.md",
+        help="write the page docs/results/board-cost.md is",
+    )
+    board.add_argument("--json", action="store_true")
+    board.set_defaults(run=run_board)
+    kernels = what.add_parser(
+        "kernels",
+        help="each C kernel beside the machine's measured peaks; needs a checkout",
+        description=(
+            "Build a C program from the source checkout that times every kernel beside this"
+            " machine's peaks of memory and arithmetic, in turns, and say how far from its limit"
+            " each is."
+        ),
+    )
+    kernels.add_argument(
+        "--rank", type=int, default=64, help="numbers of a column (default: %(default)s)"
+    )
+    kernels.add_argument("--columns", type=int, default=812, help="default: %(default)s")
+    kernels.add_argument("--rounds", type=int, default=41, help="default: %(default)s")
+    _add_page(kernels, "Kernels")
+    kernels.set_defaults(run=run_kernels)
+    growth = what.add_parser(
+        "growth", help="a frame's time and MACs against pixels, rows, rank, touches and electrodes"
+    )
+    growth.add_argument("--rounds", type=int, default=15, help="default: %(default)s")
+    growth.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="keeps the models (default: beside other temporary files)",
+    )
+    growth.add_argument("--picture", type=Path, metavar="PNG", help="draw it")
+    _add_page(growth, "Growth")
+    growth.set_defaults(run=run_growth)
+    batches = what.add_parser(
+        "batches", help="batches of frames over threads, beside one after another"
+    )
+    batches.add_argument("--frames", type=int, default=1000, help="default: %(default)s")
+    batches.add_argument("--rounds", type=int, default=9, help="default: %(default)s")
+    batches.add_argument(
+        "--threads", type=int, nargs="+", default=[1, 2], metavar="N", help="default: 1 2"
+    )
+    _add_page(batches, "Batches")
+    batches.set_defaults(run=run_batches)
+    findings = what.add_parser(
+        "findings",
+        help="how often faults are called by their name, and what they cost the image",
+        description=(
+            "Spoil frames of random scenes in every way that docs/reference/diagnostics.md names,"
+            " count how often that is said in that very frame, and compare the image with that of"
+            " the same frame without the fault; some five minutes."
+        ),
+    )
+    findings.add_argument(
+        "--scenes", type=int, default=640, help="that every fault is put on (default: %(default)s)"
+    )
+    findings.add_argument(
+        "--crowds",
+        type=int,
+        default=24,
+        help="scenes of each number of touches (default: %(default)s)",
+    )
+    findings.add_argument(
+        "--imperfect", type=int, default=40, help="scenes of each front end (default: %(default)s)"
+    )
+    findings.add_argument(
+        "--seed", type=int, default=4001, help="of scenes and noise (default: %(default)s)"
+    )
+    _add_page(findings, "Rates")
+    findings.set_defaults(run=run_findings)
+    effects = what.add_parser(
+        "effects", help="scenes: the time with no effect, with each alone, with all"
+    )
+    effects.add_argument("--frames", type=int, default=100, help="default: %(default)s")
+    effects.add_argument("--json", action="store_true")
+    effects.set_defaults(run=run_effects)
+    scenes = what.add_parser(
+        "scenes", help="scenes: frames/s of a moving touch, static scenes/s of a dataset"
+    )
+    scenes.add_argument(
+        "--frames", type=int, default=400, help="of the moving touch (default: %(default)s)"
+    )
+    scenes.add_argument(
+        "--scenes", type=int, default=500, help="of the dataset (default: %(default)s)"
+    )
+    scenes.add_argument(
+        "--elements", type=int, default=3000, help="of the mesh (default: %(default)s)"
+    )
+    scenes.add_argument("--json", action="store_true")
+    scenes.set_defaults(run=run_scenes)
+
+
+def _add_page(parser: argparse.ArgumentParser, title: str) -> None:
+    parser.add_argument(
+        "--markdown", type=Path, metavar="FILE.md", help=f'write the section "{title}" of that page'
+    )
+    parser.add_argument("--json", action="store_true")
+
+
+PAGE = "Kernels, growth, batches"
+
+
+def _show(
+    options: argparse.Namespace, title: str, result: Any, text: str, section: str, page: str = PAGE
+) -> int:
+    from eitskin_studies.harness.sections import put_section
+
+    if options.markdown is not None:
+        put_section(options.markdown, title, section, page)
+    print(json.dumps(result.as_dict(), indent=2) if options.json else text)
+    return 0
+
+
+def run_kernels(options: argparse.Namespace) -> int:
+    """Time each kernel beside the machine's peaks."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import kernels as bench_kernels
+
+    _within("--rank", options.rank, 8, 1024)
+    _within("--columns", options.columns, 48, 20_000)
+    _within("--rounds", options.rounds, 1, 200)
+    refuse_unwritable(options.markdown)
+    result = bench_kernels.run(options.rank, options.columns, options.rounds)
+    command = (
+        f"eitskin bench kernels --rank {options.rank} --columns {options.columns} --rounds"
+        f" {options.rounds}"
+    )
+    return _show(
+        options,
+        "Kernels",
+        result,
+        bench_kernels.as_text(result),
+        bench_kernels.as_markdown(result, command),
+    )
+
+
+def run_growth(options: argparse.Namespace) -> int:
+    """Time frames of growing models."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import growth as bench_growth
+
+    _within("--rounds", options.rounds, 1, 1000)
+    refuse_unwritable(options.markdown, options.picture)
+    if options.picture is not None:
+        from eitskin.view.pictures import load_matplotlib
+
+        load_matplotlib()
+    result = bench_growth.run(options.rounds, options.cache, progress=_progress)
+    picture = None
+    if options.picture is not None:
+        from eitskin_studies.pictures.growth_picture import draw_growth
+
+        draw_growth(options.picture, result)
+        beside = options.markdown is not None and options.picture.resolve().is_relative_to(
+            options.markdown.resolve().parent
+        )
+        folder = options.markdown.resolve().parent if beside else Path.cwd()
+        picture = (
+            options.picture.resolve().relative_to(folder).as_posix()
+            if beside
+            else options.picture.as_posix()
+        )
+    command = f"eitskin bench growth --rounds {options.rounds}"
+    return _show(
+        options,
+        "Growth",
+        result,
+        bench_growth.as_text(result),
+        bench_growth.as_markdown(result, command, picture),
+    )
+
+
+def run_batches(options: argparse.Namespace) -> int:
+    """Time batches over threads."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin.solve.batch import check_threads
+    from eitskin_studies.benchmarks import batches as bench_batches
+
+    _within("--frames", options.frames, 8, 1_000_000)
+    _within("--rounds", options.rounds, 1, 1000)
+    for count in options.threads:
+        check_threads(count)
+    refuse_unwritable(options.markdown)
+    result = bench_batches.run(options.frames, options.rounds, options.threads)
+    command = f"eitskin bench batches --frames {options.frames} --rounds {options.rounds}"
+    return _show(
+        options,
+        "Batches",
+        result,
+        bench_batches.as_text(result),
+        bench_batches.as_markdown(result, command),
+    )
+
+
+def run_findings(options: argparse.Namespace) -> int:
+    """Count how often faults are named, and what they cost."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import findings as bench_findings
+    from eitskin_studies.benchmarks import findings_page as bench_findings_page
+
+    _within("--scenes", options.scenes, 2, 100_000)
+    _within("--crowds", options.crowds, 2, 10_000)
+    _within("--imperfect", options.imperfect, 1, 10_000)
+    _within("--seed", options.seed, 0, 2**31 - 1)
+    refuse_unwritable(options.markdown)
+    result = bench_findings.run(
+        options.seed, options.scenes, options.crowds, options.imperfect, progress=_progress
+    )
+    sizes = f"--scenes {options.scenes} --crowds {options.crowds} --imperfect {options.imperfect}"
+    section = bench_findings_page.as_markdown(
+        result, f"eitskin bench findings {sizes} --seed {options.seed}"
+    )
+    return _show(options, "Rates", result, bench_findings_page.as_text(result), section, "Findings")
+
+
+def run_frame(options: argparse.Namespace) -> int:
+    """Time a frame."""
+    from eitskin_studies.benchmarks import frame as bench_frame
+
+    if not 100 <= options.runs <= 10_000_000:
+        raise UsageError(f"bench frame: --runs {options.runs} is out of range; use 100 to 10000000")
+    times = bench_frame.run(options.runs)
+    print(json.dumps(times.as_dict(), indent=2) if options.json else bench_frame.to_text(times))
+    return 0
+
+
+def run_solve(options: argparse.Namespace) -> int:
+    """Time the solvers, or draw what their suboptimality means for images."""
+    from eitskin.fileio import refuse_unwritable
+
+    _within("--scenes", options.scenes, 4, 1000)
+    _within("--seed", options.seed, 0, 2**31 - 1)
+    _within("--rounds", options.rounds, 3, 10_000)
+    refuse_unwritable(options.picture)
+    if options.picture is not None:
+        from eitskin_studies.benchmarks import suboptimality
+        from eitskin_studies.pictures.suboptimality_picture import draw
+
+        curves = suboptimality.run(options.scenes, options.seed, _progress)
+        draw(options.picture, curves)
+        print(
+            json.dumps(curves.as_dict(), indent=2) if options.json else suboptimality.text(curves)
+        )
+        return 0
+    from eitskin_studies.benchmarks import solve as bench_solve
+
+    result = bench_solve.run(options.scenes, options.seed, options.rounds, _progress)
+    print(json.dumps(result, indent=2) if options.json else bench_solve.text(result))
+    return 0
+
+
+def run_jacobian(options: argparse.Namespace) -> int:
+    """Time the Jacobian beside pyEIT's."""
+    from eitskin_studies.benchmarks import jacobian as bench_jacobian
+
+    times = bench_jacobian.run()
+    print(json.dumps(times, indent=2) if options.json else bench_jacobian.text(times))
+    return 0
+
+
+def run_board(options: argparse.Namespace) -> int:
+    """Count what a frame costs on the emulated board."""
+    from eitskin.fileio import refuse_unwritable, write_bytes
+    from eitskin_studies.benchmarks import board as bench_board
+
+    _within("--scenes", options.scenes, 1, 2000)
+    _within("--seed", options.seed, 0, 2**31)
+    if options.frames:
+        _within("--frames", options.frames, 2, 1000)
+    refuse_unwritable(options.markdown)
+    result = bench_board.run(
+        options.scenes, options.seed, frames=options.frames, build=options.build, progress=_progress
+    )
+    if options.markdown is not None:
+        command = (
+            f"eitskin bench board --scenes {options.scenes} --seed {options.seed} --frames"
+            f" {options.frames} --markdown"
+        )
+        write_bytes(
+            options.markdown,
+            bench_board.as_markdown(result, f"{command} {options.markdown.as_posix()}").encode(
+                "utf-8"
+            ),
+        )
+    print(json.dumps(result.as_dict(), indent=2) if options.json else bench_board.as_text(result))
+    return 0
+
+
+def _within(name: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise UsageError(f"bench: {name} {value} is out of range; use {low} to {high}")
+
+
+def _progress(items: Sequence[Any]) -> Iterable[Any]:
+    """A bar on stderr where that is a terminal; nothing otherwise."""
+    from tqdm import tqdm
+
+    shown: Iterable[Any] = tqdm(items, unit="", leave=False, disable=not sys.stderr.isatty())
+    return shown
+
+
+def run_effects(options: argparse.Namespace) -> int:
+    """Time each effect on one scene."""
+    from eitskin_studies.benchmarks import scenes as bench_scenes
+
+    _within("--frames", options.frames, 2, 100_000)
+    result = bench_scenes.effects_table(options.frames, progress=_progress)
+    print(json.dumps(result, indent=2) if options.json else bench_scenes.effects_text(result))
+    return 0
+
+
+def run_scenes(options: argparse.Namespace) -> int:
+    """Time a moving touch and a dataset."""
+    from eitskin_studies.benchmarks import scenes as bench_scenes
+
+    _within("--frames", options.frames, 2, 100_000)
+    _within("--scenes", options.scenes, 1, 1_000_000)
+    _within("--elements", options.elements, 200, 200_000)
+    result = bench_scenes.scenes_table(
+        options.frames, options.scenes, options.elements, progress=_progress
+    )
+    print(json.dumps(result, indent=2) if options.json else bench_scenes.scenes_text(result))
+    return 0

@@ -1,0 +1,146 @@
+"""``eitskin compare``: reconstructions side by side on the same simulated scenes."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from eitskin.errors import FileError, UsageError
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``compare``."""
+    parser = subparsers.add_parser(
+        "compare",
+        help="compare reconstructions on the same simulated scenes",
+        description=(
+            "Draw random touches, simulate their frames on a fine mesh, reconstruct them with every"
+            " method, and print how well each shows and counts the touches. Parameters and"
+            " thresholds are fixed on training scenes."
+        ),
+    )
+    parser.add_argument(
+        "--skin",
+        metavar="TOML",
+        type=Path,
+        help="skin description (default: the paper's 194 mm disk)",
+    )
+    parser.add_argument(
+        "--scenes", metavar="N", type=int, default=180, help="test scenes (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--train", metavar="N", type=int, default=60, help="training scenes (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seed",
+        metavar="S",
+        type=int,
+        default=1,
+        help="of all that is random (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--snr-db",
+        metavar="DB",
+        type=float,
+        default=60.0,
+        help="20 log10(rms(V0)/sigma) (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--lookup",
+        choices=("nearest", "bilinear"),
+        help=(
+            "what a cell of MIoU's raster shows: the nearest pixel, or one interpolated (default:"
+            " bilinear)"
+        ),
+    )
+    parser.add_argument(
+        "--threads",
+        metavar="N",
+        type=int,
+        default=1,
+        help="of the C core's frames (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON, with the curves over the threshold"
+    )
+    parser.add_argument("--csv", metavar="FILE", type=Path, help="write the numbers of every scene")
+    parser.add_argument(
+        "--picture", metavar="PNG", type=Path, help="draw test scenes as each method shows them"
+    )
+    parser.add_argument("--curves", metavar="PNG", type=Path, help="draw MIoU over the threshold")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare and print."""
+    from eitskin.fileio import write_bytes
+    from eitskin.scene.simulate import Measurement
+    from eitskin.scoring import metrics
+    from eitskin.skin.protocol import adjacent
+    from eitskin.skin.skin import load_skin, paper_skin
+    from eitskin_studies.compare.methods import methods
+    from eitskin_studies.compare.run import Settings, compare
+    from eitskin_studies.compare.table import to_csv, to_json, to_text
+
+    _check(options)
+    skin, protocol = (
+        (paper_skin(), adjacent(16)) if options.skin is None else load_skin(options.skin)
+    )
+    settings = Settings(
+        scenes=options.scenes,
+        train_scenes=options.train,
+        seed=options.seed,
+        measurement=Measurement(snr_db=options.snr_db),
+        lookup=options.lookup or metrics.LOOKUP,
+    )
+    comparison = compare(
+        skin,
+        protocol,
+        settings,
+        families=partial(methods, threads=options.threads),
+        progress=progress,
+    )
+    if options.csv is not None:
+        write_bytes(options.csv, to_csv(comparison).encode("utf-8"))
+    if options.picture is not None or options.curves is not None:
+        from eitskin_studies.pictures import comparison_pictures
+
+        if options.picture is not None:
+            comparison_pictures.draw_scenes(options.picture, comparison)
+        if options.curves is not None:
+            comparison_pictures.draw_curves(options.curves, comparison)
+    print(json.dumps(to_json(comparison), indent=2) if options.json else to_text(comparison))
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Refuse before the work what would fail after it."""
+    from eitskin.solve.batch import check_threads
+
+    if not -20 <= options.snr_db <= 200:
+        raise UsageError(f"--snr-db {options.snr_db:g} is out of range; use -20 to 200")
+    check_threads(options.threads)
+    if options.seed < 0:
+        raise UsageError(f"--seed {options.seed} must be 0 or above")
+    for path in (options.csv, options.picture, options.curves):
+        if path is not None and not path.parent.is_dir():
+            raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
+    if options.picture is not None or options.curves is not None:
+        from eitskin.view.pictures import load_matplotlib
+
+        load_matplotlib()
+
+
+def progress(items: Sequence[Any], what: str) -> Iterable[Any]:
+    """A bar on stderr where that is a terminal; nothing otherwise."""
+    from tqdm import tqdm
+
+    shown: Iterable[Any] = tqdm(
+        items, desc=what, unit="", leave=False, disable=not sys.stderr.isatty()
+    )
+    return shown

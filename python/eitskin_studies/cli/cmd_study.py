@@ -1,0 +1,82 @@
+"""``eitskin study NAME``: the paper's experiments, and past them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from eitskin.errors import FileError
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``study``."""
+    parser = subparsers.add_parser(
+        "study",
+        help="the paper's experiments, and past them: data, tables, pictures, a page",
+        description=(
+            "Run one experiment whole: seeded, with progress, every result kept as it comes, so"
+            " that a run that is stopped, even by kill -9, goes on where it was. `eitskin study"
+            " list` names them."
+        ),
+    )
+    parser.add_argument("name", metavar="NAME", help="of the experiment, or: list")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="folder of its results (default: out/NAME)"
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=1,
+        metavar="S",
+        help="of all that is random (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--share",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="of the usual number of scenes (default: 1)",
+    )
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR", help="measured frames, for the study on them"
+    )
+    parser.add_argument(
+        "--page", type=Path, metavar="FILE.md", help="fill the marked places of this page"
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="tables and data only")
+    parser.add_argument("--json", action="store_true", help="print the data instead of tables")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run, write, print."""
+    from eitskin_studies.experiments.experiment import Settings, desk_in
+    from eitskin_studies.experiments.registry import EXPERIMENTS, load
+
+    if options.name == "list":
+        print("\n".join(f"{name:12} {text}" for name, text in EXPERIMENTS.items()))
+        return 0
+
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.cli.cmd_compare import progress
+    from eitskin_studies.experiments.write import to_json, to_text, write_all, write_page
+
+    experiment = load(options.name)
+    folder = options.output or Path("out") / options.name
+    if folder.exists() and not folder.is_dir():
+        raise FileError(f"-o {folder}: this is a file; name a folder")
+    refuse_unwritable(options.page)
+    if options.data is not None and not options.data.is_dir():
+        raise FileError(f"--data {options.data}: no such folder; name that of the measured frames")
+    settings = Settings(options.seed, options.share, options.data)
+    if not options.no_pictures:
+        from eitskin.view.pictures import load_matplotlib
+
+        load_matplotlib()
+    outcome = experiment.run(desk_in(folder, settings, progress))
+    write_all(outcome, folder, not options.no_pictures)
+    if options.page is not None:
+        write_page(outcome, folder, options.page, options.name, settings)
+    print(to_json(outcome) if options.json else to_text(outcome))
+    return 0

@@ -1,0 +1,112 @@
+"""This project's own reconstruction under comparison: the C core that the board runs, on the
+host."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import Reconstruction
+from eitskin.errors import FrameError, UsageError
+from eitskin.model.build import BuildSettings, make_model
+from eitskin.scoring.metrics import pixel_cover
+from eitskin.solve.batch import Batch
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.compare.methods import Family, Setup
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class CoreMethod:
+    """The C core in float32, cold for every frame, with the touches that it reports itself.
+
+    Args:
+        solver: with the model and the options to compare.
+        painted: judge the touches, painted as discs, instead of the image.
+        threads: how many frames at once; the results are the same.
+    """
+
+    def __init__(self, solver: Reconstructor, painted: bool = False, threads: int = 1) -> None:
+        self._solver, self._painted = solver, painted
+        self._batch = Batch(
+            solver.model, threads=threads, engine=solver.engine, options=solver.options
+        )
+        self._reference: FloatArray | None = None
+        self._solved: tuple[FloatArray, list[Reconstruction]] | None = None
+        self.name = (
+            f"eitskin {solver.options.iterations}, {'touches as discs' if painted else 'image'}"
+        )
+
+    def learn(self, quiet_v: FloatArray) -> None:
+        """Reference and noise from quiet frames (q, m) in V."""
+        self._batch.tare(quiet_v)
+        self._reference, self._solved = np.asarray(quiet_v.mean(axis=0)), None
+
+    def reconstruct(self, dv: FloatArray) -> FloatArray:
+        """Images (k, n) of difference frames (k, m) in V: in S/m, or where painted the part of each
+        pixel in a disc.
+
+        Raises:
+            UsageError: nothing was learned yet.
+            FrameError: a frame cannot be used.
+        """
+        if not self._painted:
+            return np.array([result.image for result in self._solve(dv)], dtype=np.float64)
+        radii = [[touch.radius_mm for touch in result.touches] for result in self._solve(dv)]
+        grid = self._solver.model.grid
+        return np.array(
+            [
+                pixel_cover(grid, xy, radius)
+                for xy, radius in zip(self.touches(dv), radii, strict=True)
+            ]
+        )
+
+    def touches(self, dv: FloatArray) -> list[FloatArray]:
+        """Positions (t, 2) in mm of the touches of each difference frame; raises as
+        :meth:`reconstruct`."""
+        return [
+            np.array([(t.x_mm, t.y_mm) for t in r.touches]).reshape(-1, 2) for r in self._solve(dv)
+        ]
+
+    def macs_of(self, dv: FloatArray) -> FloatArray:
+        """Multiply-accumulates of each difference frame, solve and touches, (k,); raises as
+        :meth:`reconstruct`."""
+        return np.array(
+            [result.info.macs + result.info.touch_macs for result in self._solve(dv)],
+            dtype=np.float64,
+        )
+
+    def _solve(self, dv: FloatArray) -> list[Reconstruction]:
+        if self._reference is None:
+            raise UsageError(f"{self.name}: no quiet frames were given; call learn first")
+        if self._solved is None or self._solved[0] is not dv:
+            results = []
+            for result in self._batch.each(self._reference + dv):
+                if isinstance(result, FrameError):
+                    raise result
+                results.append(result)
+            self._solved = dv, results
+        return self._solved[1]
+
+
+def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
+    """The image after 30 and after 60 iterations, and the touches after 60; all else are the
+    model's defaults.
+
+    The model is made from the same Jacobian as every other method. Nothing is trained but
+    thresholds.
+
+    Raises:
+        UsageError: the C core is not built.
+    """
+    model = make_model(setup.skin, setup.protocol, setup.linearisation, BuildSettings())
+
+    def family(iterations: int, painted: bool) -> Family:
+        def make(_: float) -> CoreMethod:
+            solver = Reconstructor(model)
+            solver.with_options(iterations=iterations)
+            return CoreMethod(solver, painted, threads)
+
+        return Family("", (0.0,), make)
+
+    return family(30, False), family(60, False), family(60, True)

@@ -1,0 +1,41 @@
+"""Single, double and triple touch by every method (the paper's Figs. 7 and 8), at fixed parameters
+and at each one's best."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from eitskin.fem.grid import grid_for
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin_studies.experiments.algorithms.entrants import entrants
+from eitskin_studies.experiments.algorithms.measure import Field
+from eitskin_studies.experiments.algorithms.results import result_of
+from eitskin_studies.experiments.algorithms.tables import data, tables, words
+from eitskin_studies.experiments.experiment import Desk, Outcome
+
+TITLE = "Single, double and triple touch by every method"
+TEST_SCENES, TUNING_SCENES = 60, 20
+
+
+def run(desk: Desk) -> Outcome:
+    """All methods on all sets.
+
+    Raises:
+        UsageError: the C core is not built.
+        FileError: the desk's folder cannot be written.
+        GeometryError, MissingExtraError: from meshing and simulating.
+    """
+    from eitskin_studies.pictures import algorithms_pictures as pictures
+
+    count = desk.settings.count
+    field = Field(desk, paper_skin(), adjacent(16), count(TUNING_SCENES), count(TEST_SCENES))
+    results = [result_of(field, entrant) for entrant in desk.progress(entrants(), "methods")]
+    grid = grid_for(field.skin.outline)
+    drawn = {
+        "images.png": partial(pictures.draw_images, skin=field.skin, grid=grid, results=results),
+        "masks.png": partial(pictures.draw_masks, skin=field.skin, grid=grid, results=results),
+        "curves.png": partial(pictures.draw_curves, results=results),
+        "bars.png": partial(pictures.draw_bars, results=results),
+    }
+    return Outcome(tables(results), data(field, results), drawn, words(field, results))

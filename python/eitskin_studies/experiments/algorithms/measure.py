@@ -1,0 +1,254 @@
+"""What is measured: curves of MIoU over the threshold, positions, counts and MACs, in parts that
+are kept as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.scoring import metrics
+from eitskin.scoring.image_touches import match_all, touches_in_image
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+from eitskin_studies.compare.methods import FindsTouches, Learns, Method, Setup, setup_for
+from eitskin_studies.experiments.algorithms.entrants import Entrant, macs_of
+from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Desk
+from eitskin_studies.harness.sessions import SceneSolver, Session
+
+FloatArray = npt.NDArray[np.float64]
+Arrays = dict[str, npt.NDArray[Any]]
+
+SNR_DB = 60.0
+TOUCH_THRESHOLDS = tuple(round(0.1 * k, 1) for k in range(1, 10))
+TUNING, TEST = "tuning", "test"
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was chosen on tuning scenes: the parameter's ``value``, t of MIoU for each lookup, and t
+    of positions (None where the method reports touches itself)."""
+
+    value: float
+    thresholds: dict[str, float]
+    touch_threshold: float | None
+
+    @property
+    def threshold(self) -> float:
+        """t of MIoU as it is reported."""
+        return self.thresholds[metrics.LOOKUP]
+
+
+@dataclass(eq=False)
+class Field:
+    """Scenes, judges and methods, each made when it is first needed: where all is kept, nothing is
+    made.
+
+    Attributes:
+        tuning, test: scenes a set, there is one for each number of touches.
+    """
+
+    desk: Desk
+    skin: Skin
+    protocol: Protocol
+    tuning: int
+    test: int
+
+    def __post_init__(self) -> None:
+        self._sessions: dict[tuple[str, int], Session] = {}
+
+    @cached_property
+    def setup(self) -> Setup:
+        """What methods are built from."""
+        return setup_for(self.skin, self.protocol, elements=MODEL_ELEMENTS)
+
+    @cached_property
+    def judges(self) -> dict[str, metrics.Judge]:
+        """By lookup; all on one raster."""
+        raster = metrics.raster_inside(self.skin.outline)
+        grid = self.setup.grid
+        return {
+            k: metrics.Judge(raster, metrics.lookup_for(raster.points_mm, grid, k), grid.n_pixels)
+            for k in metrics.LOOKUPS
+        }
+
+    @cached_property
+    def solver(self) -> SceneSolver:
+        """Of scenes, on a mesh of its own."""
+        return self.desk.scenes(self.skin, self.protocol)
+
+    def seed_and_count(self, role: str) -> tuple[int, int]:
+        """Of the sets of "tuning" and "test"."""
+        settings = self.desk.settings
+        return (settings.tuning_seed, self.tuning) if role == TUNING else (settings.seed, self.test)
+
+    def session(self, role: str, number: int = 0) -> Session:
+        """The set "tuning" or "test" of scenes with ``number`` touches, or "shown"; solved when
+        first asked for."""
+        if (role, number) not in self._sessions:
+            drawn = shown_set(self.desk.settings.seed)
+            if role != SHOWN:
+                drawn = touch_set(self.skin.outline, number, *self.seed_and_count(role))
+            name = role if role == SHOWN else f"{drawn.role} touch, {role}"
+            self._sessions[role, number] = self.solver.session(drawn, self.desk.progress, name)
+        return self._sessions[role, number]
+
+    def facts(
+        self, part: str, entrant: Entrant, value: float, role: str, number: int, **more: Any
+    ) -> dict[str, Any]:
+        """All that a part depends on."""
+        elements = [SIMULATED_ELEMENTS, MODEL_ELEMENTS]
+        sets = [role, number, *(() if role == SHOWN else self.seed_and_count(role))]
+        return {"experiment": "algorithms", "part": part, "method": entrant.name, "value": value,
+            "set": sets, "snr_db": SNR_DB,
+                "elements": elements, **more}  # fmt: skip
+
+
+def choose(field: Field, entrant: Entrant) -> Chosen:
+    """The value and t with the best mean MIoU on all tuning scenes, each value at its own best t,
+    as ``eitskin compare`` does."""
+    curves = {value: tuning_curves(field, entrant, value) for value in entrant.values}
+    value = max(curves, key=lambda v: curves[v][metrics.LOOKUP].max())
+    thresholds = {
+        lookup: metrics.best_threshold(curve[None]) for lookup, curve in curves[value].items()
+    }
+    scores = np.array([_counting(field, entrant, value, number) for number in NUMBERS]).sum(axis=0)
+    if not len(scores):
+        return Chosen(value, thresholds, None)
+    best = max(range(len(scores)), key=lambda k: (*scores[k], -k))
+    return Chosen(value, thresholds, TOUCH_THRESHOLDS[best])
+
+
+def tuning_curves(field: Field, entrant: Entrant, value: float) -> dict[str, FloatArray]:
+    """Mean MIoU over all tuning scenes at each of ``metrics.THRESHOLDS``, (T,), by lookup."""
+    of_number = [_tuning(field, entrant, value, number) for number in NUMBERS]
+    return {
+        lookup: np.mean([one[lookup] for one in of_number], axis=0) for lookup in metrics.LOOKUPS
+    }
+
+
+def judged(
+    field: Field, entrant: Entrant, value: float, number: int, touch_threshold: float | None = None
+) -> Arrays:
+    """The test scenes of ``number`` touches: MIoU (k, T) by lookup, "macs" (k,), and with t of
+    positions, or where the method reports touches itself, "exact" (k,) 0 or 1, "hits", "false" (k,)
+    and "distances_mm" of all hits.
+    """
+
+    def make() -> Arrays:
+        session, dv = field.session(TEST, number), _differences(field.session(TEST, number))
+        method, images = _reconstructed(field, entrant, value, session, dv)
+        found = _found(field, method, dv, images, touch_threshold)
+        positions = {} if found is None else _positions(session, found)
+        return {**_curves(field, session, images), "macs": macs_of(method, dv), **positions}
+
+    return field.desk.kept_arrays(
+        field.facts("test", entrant, value, TEST, number, touch_threshold=touch_threshold), make
+    )
+
+
+def shown(field: Field, entrant: Entrant, value: float, touch_threshold: float | None) -> Arrays:
+    """The scenes of the pictures: "images" (3, n), MIoU (3, T) by lookup, "found_mm" (f, 2), each
+    in scene "found_in"."""
+
+    def make() -> Arrays:
+        session, dv = field.session(SHOWN), _differences(field.session(SHOWN))
+        method, images = _reconstructed(field, entrant, value, session, dv)
+        found = _found(field, method, dv, images, touch_threshold) or []
+        where = np.array([k for k, places in enumerate(found) for _ in places], dtype=np.int64)
+        places = np.concatenate([np.zeros((0, 2)), *found])
+        return {
+            **_curves(field, session, images),
+            "images": images,
+            "found_mm": places,
+            "found_in": where,
+        }
+
+    return field.desk.kept_arrays(
+        field.facts("shown", entrant, value, SHOWN, 0, touch_threshold=touch_threshold), make
+    )
+
+
+def _tuning(field: Field, entrant: Entrant, value: float, number: int) -> dict[str, FloatArray]:
+    def make() -> dict[str, list[float]]:
+        session = field.session(TUNING, number)
+        images = _reconstructed(field, entrant, value, session, _differences(session))[1]
+        return {
+            lookup: curves.mean(axis=0).round(7).tolist()
+            for lookup, curves in _curves(field, session, images).items()
+        }
+
+    kept = field.desk.kept(field.facts("tuning", entrant, value, TUNING, number), make)
+    return {lookup: np.array(curve) for lookup, curve in kept.items()}
+
+
+def _counting(field: Field, entrant: Entrant, value: float, number: int) -> list[list[int]]:
+    """For each t of positions: exactly counted tuning scenes, hits less false touches. Empty where
+    the method reports touches."""
+
+    def make() -> list[list[int]]:
+        session = field.session(TUNING, number)
+        dv = _differences(session)
+        method, images = _reconstructed(field, entrant, value, session, dv)
+        if isinstance(method, FindsTouches):
+            return []
+        truths = [scene.centres_mm() for scene in session.touches.scenes]
+        scores = []
+        for threshold in TOUCH_THRESHOLDS:
+            found = _found(field, method, dv, images, threshold)
+            matchings = match_all(truths, found or [])
+            scores.append(
+                [sum(m.exact for m in matchings), sum(m.hits - m.false_touches for m in matchings)]
+            )
+        return scores
+
+    scores: list[list[int]] = field.desk.kept(
+        field.facts("counting", entrant, value, TUNING, number), make
+    )
+    return scores
+
+
+def _differences(session: Session) -> FloatArray:
+    measured = session.measured(SNR_DB)
+    return np.asarray(measured.frames_v[:, -1] - measured.quiet_v.mean(axis=0))
+
+
+def _reconstructed(
+    field: Field, entrant: Entrant, value: float, session: Session, dv: FloatArray
+) -> tuple[Method, FloatArray]:
+    method = entrant.make(field.setup, value)
+    if isinstance(method, Learns):
+        method.learn(session.measured(SNR_DB).quiet_v)
+    return method, np.asarray(method.reconstruct(dv), dtype=np.float64)
+
+
+def _curves(field: Field, session: Session, images: FloatArray) -> dict[str, FloatArray]:
+    judges = field.judges
+    truths = session.truths(judges[metrics.LOOKUP].raster)
+    return {lookup: judge.curves(images, truths) for lookup, judge in judges.items()}
+
+
+def _found(
+    field: Field, method: Method, dv: FloatArray, images: FloatArray, threshold: float | None
+) -> list[FloatArray] | None:
+    if isinstance(method, FindsTouches):
+        return [np.asarray(places).reshape(-1, 2) for places in method.touches(dv)]
+    if threshold is None:
+        return None
+    grid = field.setup.grid
+    return [touches_in_image(image, grid.index, grid.centres_mm(), threshold) for image in images]
+
+
+def _positions(session: Session, found: Sequence[FloatArray]) -> Arrays:
+    matchings = match_all([scene.centres_mm() for scene in session.touches.scenes], found)
+    return {
+        "exact": np.array([m.exact for m in matchings], dtype=np.int64),
+        "hits": np.array([m.hits for m in matchings], dtype=np.int64),
+        "false": np.array([m.false_touches for m in matchings], dtype=np.int64),
+        "distances_mm": np.array([d for m in matchings for d in m.distances_mm]),
+    }

@@ -1,0 +1,92 @@
+"""A scan's model with the floor, lambda, iterations and t that do best on the tuning scenes:
+patterns differ in how fast their singular values fall, and what suits one starves another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.model.build import LIPSCHITZ_MARGIN
+from eitskin.model.model import Model
+from eitskin.model.reduction import DEFAULT_FLOOR, noise_gain, spectral_norm_squared
+from eitskin.model.storage import store
+from eitskin.scene.random_touches import Scene
+from eitskin.scoring import metrics
+from eitskin.solve.batch import reconstruct_many
+from eitskin_studies.experiments.scored import Bench
+
+FloatArray = npt.NDArray[np.float64]
+
+FLOORS, LAMBDAS, ITERATIONS = (0.1, DEFAULT_FLOOR, 1e-3), (0.03, 0.01, 0.003), (60, 150)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was chosen: mu of the whitening, least lambda over lambda_max, iterations, t of the
+    mask."""
+
+    floor: float
+    lambda_rel: float
+    iterations: int
+    t: float
+
+
+def with_floor(model: Model, floor: float) -> Model:
+    """``model``, made with the default floor, as it is with another: its singular vectors stay,
+    only rows are scaled.
+
+    A row of S has the norm a = s / sqrt(s^2 + mu s_1^2), which says s / s_1.
+    """
+    norm = np.linalg.norm(model.sensitivity, axis=1)
+    square = np.minimum(norm**2, 1 - 1e-9)
+    relative = DEFAULT_FLOOR * square / (1 - square)
+    scale = np.sqrt((relative + DEFAULT_FLOOR) / (relative + floor))
+    projection = (scale[:, None] * model.projection).astype(np.float32)
+    stored = store(scale[:, None] * model.sensitivity, model.stored.storage)
+    decoded = stored.decode(model.rank)
+    return replace(
+        model,
+        projection=projection,
+        stored=stored,
+        lipschitz=float(np.float32(spectral_norm_squared(decoded) * (1 + LIPSCHITZ_MARGIN))),
+        noise_gain=float(np.float32(noise_gain(projection, decoded))),
+    )
+
+
+def tuned(
+    model: Model,
+    judge: metrics.Judge,
+    scenes: Sequence[Scene],
+    quiet_v: FloatArray,
+    frames_v: FloatArray,
+) -> tuple[Bench, Chosen]:
+    """The best of all settings on tuning scenes with their frames, quiet (q, m) and touched (k, m):
+    by the sum of image MIoU, disc MIoU and exactly counted share; the first of equals."""
+    best: tuple[float, Bench, Chosen] | None = None
+    for floor in FLOORS:
+        floored = with_floor(model, floor)
+        for lambda_rel, iterations in product(LAMBDAS, ITERATIONS):
+            defaults = replace(model.defaults, lambda_rel=lambda_rel, iterations=iterations)
+            bench = Bench(replace(floored, defaults=defaults), judge)
+            truths = bench.truths(scenes)
+            results = reconstruct_many(bench.model, frames_v, quiet_v, threads=1)
+            curves = judge.curves(
+                np.array([one.image for one in results], dtype=np.float64), truths
+            )
+            t = metrics.best_threshold(curves)
+            discs = [
+                metrics.miou(bench.discs(one), truth)
+                for one, truth in zip(results, truths, strict=True)
+            ]
+            exact = [
+                bench.matched(scene, one).exact for scene, one in zip(scenes, results, strict=True)
+            ]
+            value = round(float(curves.mean(axis=0).max() + np.mean(discs) + np.mean(exact)), 9)
+            if best is None or value > best[0]:
+                best = value, bench, Chosen(floor, lambda_rel, iterations, t)
+    assert best is not None
+    return best[1:]

@@ -1,0 +1,141 @@
+"""Loads at four radii, a calibration that makes one load read the same anywhere, and the smallest
+load that is detected."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin_studies.experiments.experiment import Desk, Outcome
+from eitskin_studies.experiments.force import anywhere, curves, detection, scenes
+from eitskin_studies.experiments.force.law import NOMINAL, drawn_laws
+from eitskin_studies.experiments.force.readouts import (
+    READOUTS,
+    TOUCH,
+    Instruments,
+    Readout,
+    as_lists,
+    from_lists,
+)
+
+if TYPE_CHECKING:
+    from eitskin_studies.experiments.force.scenes import PressSet
+
+TITLE = (
+    "Loads at four radii, the calibration that makes one load read the same anywhere, and the"
+    " smallest load (Figs. 9 to 11)"
+)
+
+SNR_DB, AVERAGED_DB = 60.0, 72.0  # the second is what the mean of sixteen frames at the first has
+SNRS_DB = (40.0, 50.0, SNR_DB, AVERAGED_DB, 84.0)
+
+
+def run(desk: Desk) -> Outcome:
+    """All of it; what the desk has kept is not computed again."""
+    from eitskin_studies.pictures import force_pictures as pictures
+
+    settings, skin = desk.settings, paper_skin()
+    protocol = adjacent(skin.electrodes.count)
+    radius_mm = (skin.outline.diameter_mm or 0.0) / 2
+    solver, instruments = desk.scenes(skin, protocol), Instruments(skin, protocol)
+    laws = (NOMINAL, *drawn_laws(settings.seed, settings.count(16)))
+    put = partial(scenes.solved, desk, solver)
+    nominal = put("force curves", settings.seed, scenes.curve_rows(radius_mm))
+    uncertain = put("force laws", settings.seed, scenes.law_rows(radius_mm, len(laws)), laws)
+    tuning = scenes.spiral(settings.tuning_seed, settings.count(24, 8), radius_mm)
+    tuned = put("force tuning", settings.tuning_seed, scenes.spread_rows(tuning))
+    places = scenes.spiral(settings.seed, settings.count(36, 8), radius_mm)
+    reported = put("force reported", settings.seed, scenes.spread_rows(places))
+    light = put("force light", settings.seed, scenes.light_rows(radius_mm, settings.count(15, 6)))
+
+    told, of_laws = (_read(desk, instruments, one, SNR_DB) for one in (nominal, uncertain))
+    drawn = curves.curves_of(nominal, told, uncertain, of_laws)
+    judged: dict[tuple[str, float], anywhere.Anywhere] = {}
+    for snr in desk.progress(SNRS_DB, "calibrating"):
+        on, read = (_read(desk, instruments, one, snr) for one in (tuned, reported))
+        for name in READOUTS:
+            facts = {
+                "part": "anywhere",
+                "snr_db": snr,
+                "reading": name,
+                "sets": [tuned.facts, reported.facts],
+            }
+            judge = partial(
+                anywhere.judge, tuned, on[name], reported, read[name], instruments.radius_mm
+            )
+            judged[name, snr] = anywhere.Anywhere.from_dict(
+                desk.kept(facts, lambda judge=judge: judge().as_dict())  # type: ignore[misc]
+            )
+    reps, quiet = settings.count(30, 4), settings.count(4000, 80)
+    found = []
+    for snr in desk.progress(detection.SNRS_DB, "light presses"):
+        facts = {
+            "part": "detection",
+            "snr_db": snr,
+            "reps": reps,
+            "quiet": quiet,
+            "set": light.facts,
+        }
+        look = partial(detection.detect, instruments, light, snr, reps, quiet)
+        found.append(
+            detection.Detection.from_dict(
+                desk.kept(facts, lambda look=look: look().as_dict())  # type: ignore[misc]
+            )
+        )
+
+    both = (SNR_DB, AVERAGED_DB)
+    tables = (
+        curves.table_of(drawn), anywhere.table_of(judged, both), anywhere.by_load(judged, both),
+        anywhere.over_snr(judged, SNRS_DB), detection.table_of(found),
+    )  # fmt: skip
+    data = {
+        "slopes": {
+            name: {"a_gram": one.slopes.tolist(), "mean": one.mean.tolist()}
+            for name, one in drawn.items()
+        },
+        "anywhere": [
+            {"reading": name, "snr_db": snr, **one.as_dict()} for (name, snr), one in judged.items()
+        ],
+        "detection": [one.as_dict() for one in found],
+    }
+    touch = judged[TOUCH, AVERAGED_DB]
+    return Outcome(
+        tables,
+        data,
+        {
+            "curves.png": lambda path: pictures.draw_curves(path, drawn),
+            "skin.png": lambda path: pictures.draw_skin(path, skin, places, judged, AVERAGED_DB),
+            "detection.png": lambda path: pictures.draw_detection(path, found),
+        },
+        {"sets": _sets(desk, tuned, reported, laws, reps, touch)},
+    )
+
+
+def _read(
+    desk: Desk, instruments: Instruments, presses: PressSet, snr_db: float
+) -> dict[str, Readout]:
+    facts = {"part": "readings", "set": presses.facts, "snr_db": snr_db}
+    return from_lists(desk.kept(facts, lambda: as_lists(instruments.read(presses.session, snr_db))))
+
+
+def _sets(
+    desk: Desk,
+    tuned: PressSet,
+    reported: PressSet,
+    laws: tuple[object, ...],
+    reps: int,
+    touch: anywhere.Anywhere,
+) -> str:
+    def of(one: PressSet) -> str:
+        return (
+            f"{len(set(map(tuple, one.place_mm.tolist())))} places (`{one.session.touches.name}`)"
+        )
+
+    return (
+        f"Sets of seed {desk.settings.seed}: calibrated on {of(tuned)}, reported on {of(reported)},"
+        f" each with five loads; {len(laws) - 1} laws beside the nominal one; {reps} frames of each"
+        f" light press. The law that was chosen for the touch at {AVERAGED_DB:g} dB is"
+        f" *{touch.form}*, its gain of order {touch.order}."
+    )

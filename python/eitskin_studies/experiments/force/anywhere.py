@@ -1,0 +1,162 @@
+"""One load, anywhere: how readings of a load scatter over the skin, raw and after the calibration
+of ``eitskin calibrate``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.calibration.fit import calibrate
+from eitskin.calibration.presses import Presses
+from eitskin.core.results import NEWTONS_PER_GRAM
+from eitskin_studies.experiments.experiment import Table
+from eitskin_studies.experiments.force.law import LOADS_G
+from eitskin_studies.experiments.force.readouts import LOG_TOUCH, READOUTS, TOUCH, Readout
+from eitskin_studies.experiments.force.scenes import PressSet
+
+FloatArray = npt.NDArray[np.float64]
+
+RESAMPLES = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Anywhere:
+    """One readout at one SNR, on places that nothing was tuned on.
+
+    Attributes:
+        raw: readings over their load's mean, less 1: (places, loads); NaN where the press was not
+            found.
+        calibrated: loads over the true ones, less 1; likewise.
+        order, form: of the gain and the law that leaving places out chose on the tuning places.
+        found: share of the presses that were.
+        macs: of a frame.
+    """
+
+    raw: FloatArray
+    calibrated: FloatArray
+    order: int
+    form: str
+    found: float
+    macs: float
+
+    @classmethod
+    def from_dict(cls, facts: dict[str, Any]) -> Anywhere:
+        """From the store."""
+        raw, calibrated = (
+            np.array(facts[name], dtype=np.float64) for name in ("raw", "calibrated")
+        )
+        return cls(
+            raw,
+            calibrated,
+            int(facts["order"]),
+            str(facts["form"]),
+            float(facts["found"]),
+            float(facts["macs"]),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For the store; what is NaN becomes null."""
+
+        def plain(values: FloatArray) -> list[list[float | None]]:
+            return [[None if v != v else v for v in row] for row in values.tolist()]
+
+        return {**vars(self), "raw": plain(self.raw), "calibrated": plain(self.calibrated)}
+
+
+def judge(
+    tuned: PressSet, on: Readout, reported: PressSet, read: Readout, radius_mm: float
+) -> Anywhere:
+    """Calibrate on the set ``tuned``, read the set ``reported``."""
+    seen = np.isfinite(on.value) & (on.value > 0)
+    presses = Presses(tuned.grams[seen] * NEWTONS_PER_GRAM, on.value[seen], on.place_mm[seen])
+    found = calibrate(presses, radius_mm, resamples=0)
+    there = np.isfinite(read.value) & (read.value > 0)
+    loads = np.full(len(read.value), np.nan)
+    loads[there] = found.law.loads_at(read.place_mm[there], read.value[there]) / NEWTONS_PER_GRAM
+    values = np.where(there, read.value, np.nan).reshape(-1, len(LOADS_G))
+    raw = values / np.nanmean(values, axis=0) - 1
+    off = (loads / reported.grams - 1).reshape(raw.shape)
+    return Anywhere(raw, off, found.fitted.order, found.fitted.form, float(there.mean()), read.macs)
+
+
+def scatter(errors: FloatArray) -> float:
+    """Relative standard deviation over places, pooled over loads, each around its own mean; of
+    errors (places, loads)."""
+    return float(
+        np.sqrt(
+            np.nanmean(np.nanvar(errors, axis=0, ddof=1) / (1 + np.nanmean(errors, axis=0)) ** 2)
+        )
+    )
+
+
+def scatter_interval(errors: FloatArray) -> tuple[float, float]:
+    """95 % of it over places drawn with replacement."""
+    generator = np.random.default_rng(0)
+    drawn = [
+        scatter(errors[generator.integers(0, len(errors), len(errors))]) for _ in range(RESAMPLES)
+    ]
+    low, high = np.nanquantile(drawn, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _of(errors: FloatArray) -> str:
+    low, high = scatter_interval(errors)
+    return f"{100 * scatter(errors):.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def _macs(macs: float) -> str:
+    return f"{macs / 1e6:.2f} million" if macs else "not counted"
+
+
+def table_of(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, float]) -> Table:
+    """Every readout at a frame's and at an averaged SNR."""
+    rows = []
+    for name in READOUTS:
+        cells = []
+        for snr in snrs_db:
+            one = results[name, snr]
+            cells += [_of(one.raw), _of(one.calibrated)]
+        rows.append((name, *cells, _macs(results[name, snrs_db[0]].macs)))
+    head = [part for snr in snrs_db for part in (f"raw, {snr:g} dB", f"calibrated, {snr:g} dB")]
+    return Table("anywhere", ("reading", *head, "MACs a frame"), tuple(rows))
+
+
+def by_load(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, float]) -> Table:
+    """The touch's calibrated load, weight by weight: scatter, bias, worst tenth."""
+    rows = []
+    for name in (TOUCH, LOG_TOUCH):
+        for snr in snrs_db:
+            errors = results[name, snr].calibrated
+            for k, grams in enumerate(LOADS_G):
+                one = errors[:, k][np.isfinite(errors[:, k])]
+                tenth = np.sort(np.abs(one))[-max(1, -(-len(one) // 10)) :]
+                cells = (
+                    f"{100 * one.std(ddof=1):.1f} %",
+                    f"{100 * one.mean():+.1f} %",
+                    f"{100 * tenth.mean():.1f} %",
+                )
+                rows.append((name, f"{snr:g} dB", f"{grams:g} g", *cells))
+    return Table(
+        "by-load",
+        ("reading", "SNR", "load", "deviation over places", "off on average", "worst tenth"),
+        tuple(rows),
+    )
+
+
+def over_snr(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, ...]) -> Table:
+    """Calibrated scatter by SNR, with the share found where not all were, and the order that was
+    chosen."""
+    rows = []
+    for name in READOUTS:
+        cells = []
+        for snr in snrs_db:
+            one = results[name, snr]
+            lost = "" if one.found == 1 else f", {100 * one.found:.0f} % found"
+            cells.append(f"{100 * scatter(one.calibrated):.1f} %, order {one.order}{lost}")
+        rows.append((name, *cells))
+    return Table(
+        "over-snr", ("reading, calibrated", *(f"{snr:g} dB" for snr in snrs_db)), tuple(rows)
+    )

@@ -1,0 +1,163 @@
+"""The smallest load that is detected, over SNR and radius; and how often a quiet frame shows a
+touch that is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import Reconstruction
+from eitskin.scene.simulate import measure
+from eitskin.scoring.snr import noise_deviation_v
+from eitskin_studies.experiments.experiment import Table
+from eitskin_studies.experiments.force.readouts import Instruments
+from eitskin_studies.experiments.force.scenes import RADIUS_SHARES, PressSet
+from eitskin_studies.harness.sessions import converter_for
+
+FloatArray = npt.NDArray[np.float64]
+
+SNRS_DB = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
+PROBABILITY = 0.9
+NEAR_MM = 10.0
+TARES, QUIET = 8, 64
+RESAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """At one SNR: ``hits`` of ``tries``, both (radii, loads), presses of ``loads_g`` (loads,);
+    ``false`` of ``quiet`` frames."""
+
+    snr_db: float
+    loads_g: FloatArray
+    hits: FloatArray
+    tries: FloatArray
+    false: int
+    quiet: int
+
+    @classmethod
+    def from_dict(cls, facts: dict[str, Any]) -> Detection:
+        """From the store."""
+        loads, hits, tries = (
+            np.array(facts[name], dtype=np.float64) for name in ("loads_g", "hits", "tries")
+        )
+        return cls(
+            float(facts["snr_db"]), loads, hits, tries, int(facts["false"]), int(facts["quiet"])
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For the store."""
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in vars(self).items()
+        }
+
+    def threshold(self, radius: int) -> tuple[float, float, float]:
+        """The load in g that is detected with probability 0.9 at the radius of this number, and its
+        95 % by the bootstrap; infinite where no load of the ladder is."""
+        hits, tries = self.hits[radius], self.tries[radius]
+        generator = np.random.default_rng(radius)
+        drawn = [
+            least_load(self.loads_g, generator.binomial(tries.astype(int), hits / tries) / tries)
+            for _ in range(RESAMPLES)
+        ]
+        low, high = np.quantile(drawn, [0.025, 0.975], method="nearest")
+        return least_load(self.loads_g, hits / tries), float(low), float(high)
+
+    def false_share(self) -> tuple[float, float]:
+        """False alarms a quiet frame, and the upper 95 % bound (Clopper and Pearson, Biometrika 26,
+        1934)."""
+        from scipy.stats import beta
+
+        upper = (
+            1.0
+            if self.false == self.quiet
+            else float(beta.ppf(0.95, self.false + 1, self.quiet - self.false))
+        )
+        return self.false / self.quiet, upper
+
+
+def least_load(loads_g: FloatArray, share: FloatArray) -> float:
+    """From which on the ``share`` detected (loads,) stays at 0.9 or more, between loads by their
+    logarithms; infinite: never."""
+    below = np.flatnonzero(share < PROBABILITY)
+    if not len(below):
+        return float(loads_g[0])
+    k = int(below[-1])
+    if k == len(loads_g) - 1:
+        return float("inf")
+    part = (PROBABILITY - share[k]) / (share[k + 1] - share[k])
+    return float(np.exp(np.log(loads_g[k]) + part * np.log(loads_g[k + 1] / loads_g[k])))
+
+
+def detect(
+    instruments: Instruments, light: PressSet, snr_db: float, reps: int, quiet_frames: int
+) -> Detection:
+    """``reps`` frames of each press; quiet frames after several tares."""
+    session, seed = light.session, light.session.touches.seed
+    how, exact = converter_for(snr_db), session.exact_quiet_v
+    span_v = how.adc_headroom * float(np.abs(exact).max())
+    lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
+    converter = noise_deviation_v(exact, snr_db), lsb_v, span_v, seed
+    false, looked, each = 0, 0, -(-quiet_frames // TARES)
+    for tare in range(TARES):
+        quiet, _ = measure(np.tile(exact, (QUIET, 1)), *converter, f"force tare {tare} {snr_db:g}")
+        batch = instruments.batch("difference", quiet)
+        still, _ = measure(np.tile(exact, (each, 1)), *converter, f"force still {tare} {snr_db:g}")
+        results = list(batch.each(still))
+        false += sum(isinstance(r, Reconstruction) and len(r.touches) > 0 for r in results)
+        looked += len(results)
+    frames, _ = measure(
+        np.repeat(session.exact_v, reps, axis=0), *converter, f"force light {snr_db:g}"
+    )
+    loads = np.unique(light.grams)
+    hits, tries = np.zeros((2, len(RADIUS_SHARES), len(loads)))
+    for k, result in enumerate(batch.each(frames)):
+        press = k // reps
+        at = int(light.group[press]), int(np.searchsorted(loads, light.grams[press]))
+        tries[at] += 1
+        if isinstance(result, Reconstruction):
+            hits[at] += any(
+                np.hypot(*(light.place_mm[press] - (t.x_mm, t.y_mm))) <= NEAR_MM
+                for t in result.touches
+            )
+    return Detection(snr_db, loads, hits, tries, false, looked)
+
+
+def _grams(value: float) -> str:
+    return "none" if value == float("inf") else f"{value:.2g}" if value < 10 else f"{value:.0f}"
+
+
+def table_of(found: list[Detection]) -> Table:
+    """Thresholds with their intervals, and false alarms."""
+    rows = []
+    for one in found:
+        cells = []
+        for radius in range(len(RADIUS_SHARES)):
+            load, low, high = one.threshold(radius)
+            most = _grams(one.loads_g[-1])
+            cells.append(
+                f"more than {most} g"
+                if load == float("inf")
+                else f"{_grams(load)} g ({_grams(low)} to {_grams(high)})"
+            )
+        share, upper = one.false_share()
+        rows.append(
+            (
+                f"{one.snr_db:g} dB",
+                *cells,
+                f"{one.false} of {one.quiet}",
+                f"{100 * upper:.2f} %" if share < 1 else "all",
+            )
+        )
+    head = (
+        "SNR",
+        "centre",
+        *(f"{share:g} R" for share in RADIUS_SHARES[1:]),
+        "false alarms, quiet frames",
+        "at most, 95 %",
+    )
+    return Table("detection", head, tuple(rows))

@@ -1,0 +1,75 @@
+"""What a weight does to the sheet, and how sure that is: a disc's radius by Hertz, its contrast by
+the piezoresistive law.
+
+- Contact radius: a rigid round tip of radius rho on an elastic half-space of reduced modulus E*
+  under load F has a = (3 F rho / (4 E*))^(1/3) (Hertz 1882; Johnson, Contact Mechanics, 1985,
+  section 4.2). Hydrogels of skins have moduli of tens of kPa. The sheet, 12 mm, is no half-space
+  beside contacts of 8 mm: that goes into the deviation of the modulus.
+- Contrast: ``scene.laws.Piezoresistive``, 1 + c (1 - exp(-s grams / c)).
+
+Parameters are uncertain by relative standard deviations (log-normal), which say how far real gels
+and tips may be from this one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import NEWTONS_PER_GRAM
+from eitskin.scene.laws import Piezoresistive
+from eitskin.scene.random_touches import Touch
+from eitskin.scene.streams import stream
+
+FloatArray = npt.NDArray[np.float64]
+
+LOADS_G = (50.0, 80.0, 100.0, 150.0, 200.0)
+DEVIATION = {"modulus_pa": 0.25, "tip_mm": 0.1, "sensitivity_per_gram": 0.2, "saturation": 0.2}
+
+
+@dataclass(frozen=True)
+class PressLaw:
+    """A skin and a tip: ``modulus_pa`` E*, ``tip_mm`` rho, ``sensitivity_per_gram`` s,
+    ``saturation`` c (the greatest contrast less 1)."""
+
+    modulus_pa: float = 40e3
+    tip_mm: float = 12.0
+    sensitivity_per_gram: float = 0.02
+    saturation: float = 9.0
+
+    def radius_mm(self, grams: float) -> float:
+        """Of the contact."""
+        newtons = grams * NEWTONS_PER_GRAM
+        return float(1e3 * (0.75 * newtons * self.tip_mm * 1e-3 / self.modulus_pa) ** (1 / 3))
+
+    def contrast(self, grams: float) -> float:
+        """Under it."""
+        law = Piezoresistive(self.sensitivity_per_gram, 1 + self.saturation)
+        return float(law.contrast_at(np.array(grams)))
+
+    def touch(self, grams: float, place_mm: npt.ArrayLike) -> Touch:
+        """The disc that a weight makes at a place."""
+        x, y = np.asarray(place_mm, dtype=np.float64)
+        return Touch(float(x), float(y), self.radius_mm(grams), self.contrast(grams))
+
+
+NOMINAL = PressLaw()
+
+
+def drawn_laws(seed: int, count: int) -> tuple[PressLaw, ...]:
+    """``count`` skins and tips; the first ones are those of a lesser count."""
+    laws = []
+    for k in range(count):
+        normal = stream(seed, "force law", k).standard_normal(len(DEVIATION))
+        factors = np.exp(np.array(list(DEVIATION.values())) * normal).tolist()
+        laws.append(
+            PressLaw(
+                **{
+                    name: getattr(NOMINAL, name) * by
+                    for name, by in zip(DEVIATION, factors, strict=True)
+                }
+            )
+        )
+    return tuple(laws)

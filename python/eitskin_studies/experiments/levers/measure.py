@@ -1,0 +1,196 @@
+"""Searches and images on sets that nothing was chosen on; thresholds from tuning sets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import Reconstruction
+from eitskin.model.build import linearise, make_model
+from eitskin.model.model import Model
+from eitskin.scene.random_touches import Scene, TouchSet, random_touches, spaced_touches
+from eitskin.scoring import metrics
+from eitskin.scoring.matching import match
+from eitskin.scoring.summary import summarise
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin.solve.batch import reconstruct_many
+from eitskin.solve.options import default_options
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk
+from eitskin_studies.experiments.levers.configurations import Lever
+from eitskin_studies.experiments.scored import session_in_parts
+from eitskin_studies.harness.sessions import Session, apparent_change_s_per_m_mm2
+
+FloatArray = npt.NDArray[np.float64]
+
+RANDOM, SCENES, TUNING = "1 to 3 random", 160, 60
+IMAGE_SNRS_DB = (40.0, 50.0, 60.0, 80.0)
+# name: touches, spacing in radii, SNR in dB, scenes
+COUNTED: dict[str, tuple[int, float, float, int]] = {
+    "6 at 4 radii, 80 dB": (6, 4.0, 80.0, 60),
+    "8 at 4 radii, 80 dB": (8, 4.0, 80.0, 60),
+    "3 at 2.5 radii, 60 dB": (3, 2.5, 60.0, 60),
+    "5 at 2.5 radii, 60 dB": (5, 2.5, 60.0, 60),
+}
+DIGITS = 6
+
+
+class Lab:
+    """Scenes, models and judges, each made when it is first needed."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk, self.skin, self.protocol = desk, paper_skin(), adjacent(16)
+        self._models: dict[str, Model] = {}
+        self._sessions: dict[tuple[str, bool], Session] = {}
+
+    @cached_property
+    def _solver(self) -> Any:
+        return self.desk.scenes(self.skin, self.protocol)
+
+    @cached_property
+    def _raster(self) -> metrics.Raster:
+        return metrics.raster_inside(self.skin.outline)
+
+    def searched(self, lever: Lever) -> dict[str, Any]:
+        """How a search does on every set; by set."""
+        found: dict[str, Any] = {}
+        for name in (RANDOM, *COUNTED):
+            snr_db = 60.0 if name == RANDOM else COUNTED[name][2]
+            facts = self._facts("search", lever, name, snr_db)
+            found[name] = self.desk.kept(facts, partial(self._search, lever, name, snr_db))
+        return found
+
+    def imaged(self, lever: Lever) -> dict[str, Any]:
+        """MIoU of the image and cost at every SNR, t chosen on tuning scenes at 60 dB; by SNR."""
+        threshold = self.desk.kept(
+            self._facts("t", lever, RANDOM, 60.0), partial(self._threshold, lever)
+        )
+        found: dict[str, Any] = {"threshold": threshold}
+        for snr_db in IMAGE_SNRS_DB:
+            facts = self._facts("image", lever, RANDOM, snr_db)
+            found[f"{snr_db:g}"] = self.desk.kept(
+                facts, partial(self._image, lever, snr_db, threshold)
+            )
+        return found
+
+    def _facts(self, part: str, lever: Lever, name: str, snr_db: float) -> dict[str, Any]:
+        return {
+            "part": part,
+            "set": name,
+            "snr_db": snr_db,
+            "share": self.desk.settings.share,
+            **lever.facts(),
+        }
+
+    def session(self, name: str, tuning: bool = False) -> Session:
+        """The set ``name``, or its tuning twin."""
+        if (name, tuning) not in self._sessions:
+            drawn = self._draw(name, tuning)
+            role = "tuning" if tuning else "test"
+            self._sessions[name, tuning] = session_in_parts(
+                self._solver, drawn, self.desk.progress, f"{name}, {role}"
+            )
+        return self._sessions[name, tuning]
+
+    def _draw(self, name: str, tuning: bool) -> TouchSet:
+        how, outline = self.desk.settings, self.skin.outline
+        seed = how.tuning_seed if tuning else how.seed
+        if name == RANDOM:
+            return random_touches(outline, seed, how.count(TUNING if tuning else SCENES), "levers")
+        touches, spacing, _, usual = COUNTED[name]
+        return spaced_touches(outline, seed, how.count(usual), touches, spacing)
+
+    def model(self, lever: Lever) -> Model:
+        """Of a lever; those of equal settings are one."""
+        key = repr(lever.settings)
+        if key not in self._models:
+            linear = linearise(
+                self.skin,
+                self.protocol,
+                pixels_across=lever.settings.pixels_across,
+                elements=MODEL_ELEMENTS,
+            )
+            self._models[key] = make_model(self.skin, self.protocol, linear, lever.settings)
+        return self._models[key]
+
+    def _solve(self, lever: Lever, session: Session, snr_db: float) -> list[Reconstruction]:
+        model, measured = self.model(lever), session.measured(snr_db)
+        options = replace(default_options(model), **lever.options)
+        return list(
+            reconstruct_many(model, measured.frames_v[:, -1], measured.quiet_v, options=options)
+        )
+
+    def _curves(
+        self, lever: Lever, session: Session, results: Sequence[Reconstruction]
+    ) -> FloatArray:
+        grid = self.model(lever).grid
+        judge = metrics.Judge(
+            self._raster, metrics.lookup_for(self._raster.points_mm, grid), grid.n_pixels
+        )
+        return judge.curves(
+            np.array([one.image for one in results], dtype=np.float64), session.truths(self._raster)
+        )
+
+    def _threshold(self, lever: Lever) -> float:
+        session = self.session(RANDOM, tuning=True)
+        return metrics.best_threshold(
+            self._curves(lever, session, self._solve(lever, session, 60.0))
+        )
+
+    def _image(self, lever: Lever, snr_db: float, threshold: float) -> dict[str, Any]:
+        session = self.session(RANDOM)
+        results = self._solve(lever, session, snr_db)
+        values = self._curves(lever, session, results)[:, metrics.THRESHOLDS.index(threshold)]
+        return {
+            "image": vars(summarise(values.round(DIGITS))),
+            "macs": float(np.mean([_macs(one) for one in results])),
+        }
+
+    def _search(self, lever: Lever, name: str, snr_db: float) -> dict[str, Any]:
+        session = self.session(name)
+        results, scenes = self._solve(lever, session, snr_db), session.touches.scenes
+        discs = [self._disc_miou(one, scene) for one, scene in zip(results, scenes, strict=True)]
+        matchings = [
+            match(scene.centres_mm(), _places(one))
+            for one, scene in zip(results, scenes, strict=True)
+        ]
+        errors = [d for m in matchings for d in m.distances_mm]
+        strengths = np.array(
+            [
+                results[k].touches[found].strength_s_per_m_mm2
+                / apparent_change_s_per_m_mm2(scenes[k].touches[true], session.sheet_s_per_m)
+                for k, m in enumerate(matchings)
+                for true, found in m.pairs
+            ]
+        )
+        return {
+            "discs": vars(summarise(np.round(discs, DIGITS))),
+            "exact": [int(m.exact) for m in matchings],
+            "position_mm": vars(summarise(np.round(errors, DIGITS), worst="high")),
+            "strength_sd": (
+                float(strengths.std() / strengths.mean()) if len(strengths) else float("nan")
+            ),
+            "unexplained": float(np.median([one.info.unexplained for one in results])),
+            "touch_macs": float(np.mean([one.info.touch_macs for one in results])),
+            "macs": float(np.mean([_macs(one) for one in results])),
+        }
+
+    def _disc_miou(self, one: Reconstruction, scene: Scene) -> float:
+        points = self._raster.points_mm
+        found = metrics.disc_mask(points, _places(one), [touch.radius_mm for touch in one.touches])
+        return metrics.miou(found, metrics.disc_mask(points, scene.centres_mm(), scene.radii_mm()))
+
+
+def _places(one: Reconstruction) -> FloatArray:
+    return np.array([(touch.x_mm, touch.y_mm) for touch in one.touches], dtype=np.float64).reshape(
+        -1, 2
+    )
+
+
+def _macs(one: Reconstruction) -> int:
+    return one.info.macs + one.info.touch_macs

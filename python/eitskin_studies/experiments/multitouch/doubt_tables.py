@@ -1,0 +1,134 @@
+"""The doubt's tables: the present signal, the linear score, and the confidence of each touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from eitskin_studies.experiments.experiment import Table
+from eitskin_studies.experiments.multitouch.counts import auc
+from eitskin_studies.experiments.multitouch.doubt import (
+    FEATURES,
+    Calibration,
+    Judged,
+    Reliability,
+    calibration,
+    reliability,
+)
+from eitskin_studies.experiments.multitouch.lab import SNRS_DB
+from eitskin_studies.experiments.multitouch.measure import Doubts
+from eitskin_studies.experiments.multitouch.tables import NAMES, percent
+
+HEAD = (
+    "count right where not said", "exact where not said", "not said", "count right where said",
+    "exact where said",
+    "wrong counts that are said",
+)  # fmt: skip
+
+
+def doubt_table(doubts: Doubts) -> Table:
+    """The core's ``crowded`` and the linear score on the same test frames."""
+    rows = []
+    for name in NAMES:
+        for text, frames in (("mixed", doubts.mixed[name]), ("cells", doubts.cells[name])):
+            for snr_db in (*SNRS_DB, None):
+                mine = [one for one in frames if snr_db in (None, one.snr_db)]
+                at = "all" if snr_db is None else f"{snr_db:g}"
+                rows.append((name, text, at, str(len(mine)), "crowded", *_cells(calibration(mine))))
+                rows.append(
+                    (
+                        name,
+                        text,
+                        at,
+                        str(len(mine)),
+                        "score",
+                        *_cells(calibration(mine, doubts.rule.says(mine))),
+                    )
+                )
+    return Table("doubt", ("method", "set", "SNR, dB", "frames", "signal", *HEAD), tuple(rows))
+
+
+def _cells(one: Calibration) -> tuple[str, ...]:
+    return tuple(
+        percent(share)
+        for share in (
+            one.right_not_said,
+            one.exact_not_said,
+            one.not_said,
+            one.right_said,
+            one.exact_said,
+            one.wrong_said,
+        )
+    )
+
+
+def rule_table(doubts: Doubts) -> Table:
+    """The score's coefficients, as the core could take them."""
+    rule = doubts.rule
+    rows = [(text, f"{weight:.4g}") for text, weight in zip(FEATURES, rule.weights, strict=True)]
+    rows += [("offset", f"{rule.offset:.4g}"), ("said below a score of", f"{rule.bar:.3f}")]
+    return Table("rule", ("feature", "coefficient"), tuple(rows))
+
+
+def found_some(frames: Sequence[Judged]) -> list[Judged]:
+    """Frames in which something was found: a score says nothing about the others."""
+    return [one for one in frames if one.found > 0]
+
+
+def reliabilities(doubts: Doubts, name: str) -> dict[str, Reliability]:
+    """Of the score's chances on test frames, by SNR in dB as text, and "all"."""
+    result = {}
+    for snr_db in (*SNRS_DB, None):
+        mine = [one for one in found_some(doubts.mixed[name]) if snr_db in (None, one.snr_db)]
+        exact = np.array([one.exact for one in mine], dtype=np.bool_)
+        result["all" if snr_db is None else f"{snr_db:g}"] = reliability(
+            doubts.rule.chances(mine), exact
+        )
+    return result
+
+
+def chance_table(doubts: Doubts) -> Table:
+    """How good the score's chances are."""
+    rows = []
+    for name in NAMES:
+        for snr, one in reliabilities(doubts, name).items():
+            mine = [f for f in found_some(doubts.mixed[name]) if snr in ("all", f"{f.snr_db:g}")]
+            exact = np.array([f.exact for f in mine], dtype=np.bool_)
+            base = float(exact.mean()) if len(exact) else float("nan")
+            area = auc(doubts.rule.scores(mine), exact)
+            rows.append((name, snr, str(len(mine)), f"{100 * base:.0f}", f"{area:.3f}",
+                f"{one.brier:.3f}",
+                         f"{base * (1 - base):.3f}", f"{one.error:.3f}"))  # fmt: skip
+    head = (
+        "method",
+        "SNR, dB",
+        "frames",
+        "exact, %",
+        "area under ROC",
+        "Brier score",
+        "of the mean alone",
+        "calibration error",
+    )
+    return Table("chance", head, tuple(rows))
+
+
+def confidence_table(doubts: Doubts) -> Table:
+    """How well a touch's own numbers tell true from false touches."""
+    rows = []
+    for name in NAMES:
+        one = doubts.touches[name]
+        areas = (
+            f"{auc(values, one.true):.3f}"
+            for values in (one.explained, one.over_noise, one.strength)
+        )
+        rows.append((name, str(len(one.true)), str(int((~one.true).sum())), *areas))
+    head = (
+        "method",
+        "found touches",
+        "of these false",
+        "confidence",
+        "its root over noise",
+        "strength / greatest",
+    )
+    return Table("confidence", head, tuple(rows))

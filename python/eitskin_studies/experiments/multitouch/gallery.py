@@ -1,0 +1,107 @@
+"""Example scenes for the picture: truth, the core's image and touches, Gauss-Newton's image and the
+touches read off it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import GeometryError
+from eitskin.scene.random_touches import Scene
+from eitskin.solve.options import default_options
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE, Cell, counting_cells
+from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, Lab
+from eitskin_studies.experiments.multitouch.variants import (
+    VARIANTS,
+    Trained,
+    differences_v,
+    read_images,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+EXAMPLES = (
+    (RING, 7),
+    (RING, 10),
+    (WIDE, 6),
+    (WIDE, 8),
+    (NARROW, 3),
+    (NARROW, 5),
+    (NARROW, 8),
+    (WIDE, 12),
+)
+SCENE = 0  # the first of each set, so that none was picked for its looks
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """Images (n,) on the grid of 32 pixels across; found (t, 3): x, y and radius in mm; classical
+    (t, 2)."""
+
+    title: str
+    scene: Scene
+    image: FloatArray
+    found: FloatArray
+    said: bool
+    classical_image: FloatArray
+    classical: FloatArray
+
+
+def gallery(lab: Lab, desk: Desk) -> list[Example]:
+    """The first scene of each of ``EXAMPLES``, at 60 dB; what does not fit on the skin is left
+    out."""
+    usual = {(cell.geometry, cell.touches): cell for cell in counting_cells()}
+    found = []
+    for geometry, touches in EXAMPLES:
+        cell = usual[geometry, touches]
+        try:
+            scene = lab.scenes(cell).scenes[SCENE]
+        except GeometryError:
+            continue
+        trained = lab.trained(CLASSICAL[0])
+
+        def make(cell: Cell = cell, trained: Trained = trained) -> dict[str, npt.NDArray[Any]]:
+            measured, grid = lab.session(cell).measured(HEADLINE_DB), lab.setup.grid
+            model = lab.model(VARIANTS[0])
+            solver = Reconstructor(
+                model, options=replace(default_options(model), **VARIANTS[0].options)
+            )
+            solver.tare(measured.quiet_v)
+            result = solver.reconstruct(measured.frames_v[SCENE, -1])
+            method, frame = lab.method(CLASSICAL[0]), differences_v(measured)[SCENE : SCENE + 1]
+            return {
+                "image": np.asarray(result.image, dtype=np.float64),
+                "found": (
+                    np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in result.touches]).reshape(-1, 3)
+                ),
+                "said": np.array("crowded" in result.info.findings_by_name),
+                "classical_image": method.reconstruct(frame)[0],
+                "classical": read_images(
+                    method, frame, trained.threshold, grid.index, grid.centres_mm()
+                )[0],
+            }
+
+        facts = {
+            **lab.facts("gallery", cell, HEADLINE_DB, False),
+            **VARIANTS[0].facts(),
+            **asdict(trained),
+        }
+        a = desk.kept_arrays(facts, make)
+        title = f"{geometry}, {touches}"
+        found.append(
+            Example(
+                title,
+                scene,
+                a["image"],
+                a["found"],
+                bool(a["said"]),
+                a["classical_image"],
+                a["classical"],
+            )
+        )
+    return found

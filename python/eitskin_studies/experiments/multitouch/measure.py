@@ -1,0 +1,224 @@
+"""Everything that the experiment measures, in the order of its page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import GeometryError
+from eitskin.scoring.matching import match
+from eitskin.scoring.snr import noise_deviation_v
+from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.multitouch import ceiling
+from eitskin_studies.experiments.multitouch.cells import (
+    MIXED,
+    NARROW,
+    RING,
+    WIDE,
+    Cell,
+    counting_cells,
+    mixed_cells,
+    single_cell,
+    uneven_cells,
+)
+from eitskin_studies.experiments.multitouch.counts import Score, score
+from eitskin_studies.experiments.multitouch.doubt import (
+    Confidences,
+    Judged,
+    Rule,
+    confidences,
+    fit_rule,
+    judge,
+)
+from eitskin_studies.experiments.multitouch.lab import (
+    CLASSICAL,
+    CLASSICAL_SCENES,
+    HEADLINE_DB,
+    SNRS_DB,
+    Lab,
+)
+from eitskin_studies.experiments.multitouch.variants import VARIANTS, Seen, Variant
+from eitskin_studies.harness.sessions import Measured
+
+FloatArray = npt.NDArray[np.float64]
+
+CEILING_CELLS = (
+    (WIDE, 6, 80.0), (WIDE, 8, 80.0), (WIDE, 12, 80.0), (NARROW, 3, 60.0), (NARROW, 5, 60.0),
+    (NARROW, 8, 60.0),
+    (RING, 8, 60.0), (RING, 10, 60.0), (RING, 12, 60.0),
+)  # fmt: skip
+CEILING_SCENES = 12
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Scores by (geometry, touches, method, SNR in dB); ``unfit``: (geometry, touches) with why
+    they cannot be drawn."""
+
+    scores: dict[tuple[str, int, str, float], Score]
+    unfit: dict[tuple[str, int], str]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A cell's first scenes: how many the core has exactly, how many its fit that begins at the
+    truth, how many the nonlinear fit that does; the nonlinear fit's worst place in the median
+    scene, and what noise alone would give it, mm.
+    """
+
+    geometry: str
+    touches: int
+    snr_db: float
+    scenes: int
+    core: dict[str, int]
+    told: dict[str, int]
+    nonlinear: int
+    worst_mm: float
+    deviation_mm: float
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """Frames of every test cell and of the mixed test set, and each found touch of these, by
+    variant; and the one rule that the tuning frames of all variants gave: the core has one."""
+
+    rule: Rule
+    cells: dict[str, list[Judged]]
+    mixed: dict[str, list[Judged]]
+    touches: dict[str, Confidences]
+
+
+def count_all(lab: Lab, desk: Desk) -> Counted:
+    """The core at each SNR, and the classical methods at 60 dB."""
+    counted = Counted({}, {})
+    for cell in desk.progress(
+        (*counting_cells(), single_cell(), *uneven_cells()), "counting touches"
+    ):
+        try:
+            truths = lab.truths_mm(cell)
+        except GeometryError as error:
+            counted.unfit[cell.geometry, cell.touches] = str(error)
+            continue
+        for variant in VARIANTS:
+            for snr_db in SNRS_DB:
+                seen = lab.seen(cell, variant, snr_db)
+                key = cell.geometry, cell.touches, variant.name, snr_db
+                counted.scores[key] = score(
+                    truths, [one.places_mm for one in seen], [one.macs for one in seen]
+                )
+        for name in CLASSICAL:
+            found = lab.classical(cell, name)
+            counted.scores[cell.geometry, cell.touches, name, HEADLINE_DB] = score(
+                truths[:CLASSICAL_SCENES], found
+            )
+    return counted
+
+
+def limits(lab: Lab, desk: Desk) -> list[Limit]:
+    """Of ``CEILING_CELLS``, each kept."""
+    found = []
+    usual = {(cell.geometry, cell.touches): cell for cell in counting_cells()}
+    for geometry, touches, snr_db in desk.progress(CEILING_CELLS, "fitting from the truth"):
+        cell, count = usual[geometry, touches], desk.settings.count(CEILING_SCENES)
+        facts = {
+            **lab.facts("ceiling", cell, snr_db, False),
+            "scenes": count,
+            "variants": [v.facts() for v in VARIANTS],
+        }
+        found.append(
+            Limit(
+                **desk.kept(
+                    facts,
+                    lambda cell=cell, snr=snr_db, n=count: asdict(  # type: ignore[misc]
+                        _limit(lab, cell, snr, n)
+                    ),
+                )
+            )
+        )
+    return found
+
+
+def _limit(lab: Lab, cell: Cell, snr_db: float, count: int) -> Limit:
+    session, fits = lab.session(cell), ceiling.Truthful(lab.skin, lab.protocol)
+    scenes, whole = session.touches.scenes[:count], session.measured(snr_db)
+    measured = Measured(whole.quiet_v, whole.frames_v[: len(scenes)])
+    quiet_v, noise_v = (
+        ceiling.quiet_mean(measured),
+        noise_deviation_v(session.exact_quiet_v, snr_db),
+    )
+    fitted = [
+        fits.fit(f, quiet_v, noise_v, s)
+        for f, s in zip(measured.frames_v[:, -1], scenes, strict=True)
+    ]
+    core, told = {}, {}
+    for variant in VARIANTS:
+        seen = lab.seen(cell, variant, snr_db)[: len(scenes)]
+        core[variant.name] = sum(
+            match(s.centres_mm(), one.places_mm).exact for s, one in zip(scenes, seen, strict=True)
+        )
+        told[variant.name] = sum(ceiling.core_told(lab.model(variant), measured, scenes))
+    return Limit(
+        cell.geometry, cell.touches, snr_db, len(scenes), core, told,
+        sum(one.exact for one in fitted),
+        round(float(np.median([one.worst_mm for one in fitted])), 3),
+        round(float(np.median([one.deviation_mm for one in fitted])), 4),
+    )  # fmt: skip
+
+
+def doubts(lab: Lab, desk: Desk, counted: Counted) -> Doubts:
+    """The core's own signal on all that was counted, and on mixed scenes; the rule from mixed
+    tuning scenes."""
+
+    def frames(which: Sequence[Cell], variant: Variant, tuning: bool = False) -> list[Judged]:
+        return [
+            judge(seen, truth, snr_db, lab.seed_radius_mm(variant))
+            for cell in which for snr_db in SNRS_DB for seen,
+            truth in _pairs(lab, cell, variant, snr_db, tuning)
+        ]  # fmt: skip
+
+    cells = [
+        c
+        for c in (*counting_cells(), single_cell(), *uneven_cells())
+        if (c.geometry, c.touches) not in counted.unfit
+    ]
+    parts = mixed_cells()
+    found = Doubts(
+        fit_rule([frame for variant in VARIANTS for frame in frames(parts, variant, tuning=True)]),
+        {},
+        {},
+        {},
+    )
+    for variant in desk.progress(VARIANTS, "judging doubt"):
+        found.cells[variant.name], found.mixed[variant.name] = (
+            frames(cells, variant),
+            frames(parts, variant),
+        )
+        pairs = [
+            pair
+            for cell in parts
+            for snr_db in SNRS_DB
+            for pair in _pairs(lab, cell, variant, snr_db)
+        ]
+        found.touches[variant.name] = confidences(pairs)
+    return found
+
+
+def _pairs(
+    lab: Lab, cell: Cell, variant: Variant, snr_db: float, tuning: bool = False
+) -> list[tuple[Seen, FloatArray]]:
+    return list(
+        zip(lab.seen(cell, variant, snr_db, tuning), lab.truths_mm(cell, tuning), strict=True)
+    )
+
+
+def prepare_mixed(lab: Lab, desk: Desk) -> None:
+    """Mixed scenes, solved and counted part by part, so that a run that is cut goes on with the
+    next."""
+    for cell in desk.progress(mixed_cells(), f"{MIXED} scenes"):
+        for tuning in (True, False):
+            for variant in VARIANTS:
+                for snr_db in SNRS_DB:
+                    lab.seen(cell, variant, snr_db, tuning)

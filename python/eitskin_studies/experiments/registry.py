@@ -1,0 +1,43 @@
+"""The experiments by name; each is imported when it is run."""
+
+from __future__ import annotations
+
+import importlib
+from typing import cast
+
+from eitskin.config import nearest
+from eitskin.errors import UsageError
+from eitskin_studies.experiments.experiment import Experiment
+
+EXPERIMENTS = {
+    "algorithms": (
+        "single, double and triple touch by every method, at fixed parameters and at each one's"
+        " best (Figs. 7, 8)"
+    ),
+    "force": "loads at four radii, calibration, the smallest load that is detected (Figs. 9 to 11)",
+    "multitouch": (
+        "two to twelve touches: counts, positions, and when the core says that it cannot tell (Fig."
+        " 12, Table 1)"
+    ),
+    "tracking": "touches in streams of moving fingers: births confirmed, ids held, places smoothed",
+    "homogeneous": (
+        "the 208-value waveform of an untouched skin, and what the doctor reads from it (Fig. 4b)"
+    ),
+    "electrodes": "16, 32 and 64 electrodes and skip patterns, at equal noise and at equal time",
+    "shapes": "a rounded rectangle, a forearm and a hand outline",
+    "tank": "measured frames of water tanks, every method, plain and normalised difference",
+    "levers": (
+        "what was tried to do better, each for itself: what helps for its MACs, and what does not"
+    ),
+}
+
+
+def load(name: str) -> Experiment:
+    """The experiment ``name``.
+
+    Raises:
+        UsageError: there is none.
+    """
+    if name not in EXPERIMENTS:
+        raise UsageError(f"study: no experiment is named {name!r}; {nearest(name, EXPERIMENTS)}")
+    return cast(Experiment, importlib.import_module(f"eitskin_studies.experiments.{name}"))

@@ -1,0 +1,155 @@
+"""One shape measured: its model, random touches on it, what was found of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
+from eitskin.scene.random_touches import Scene, TouchSet, random_touches, rim_distance_mm
+from eitskin.scoring import metrics
+from eitskin.scoring.matching import GATE_MM
+from eitskin.skin.protocol import Protocol, adjacent
+from eitskin.solve.batch import reconstruct_many
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk
+from eitskin_studies.experiments.scored import Bench, session_in_parts
+from eitskin_studies.experiments.shapes.variants import Variant
+from eitskin_studies.harness.sessions import SceneSolver, Session
+
+SNR_DB = 60.0
+TUNING, TEST = 40, 160
+RANKS = {16: 64, 32: 128}
+
+
+@dataclass(eq=False)
+class Maker:
+    """A variant's meshes, model and frames, each made when first asked for: a run that finds every
+    result makes none."""
+
+    desk: Desk
+    variant: Variant
+
+    @cached_property
+    def protocol(self) -> Protocol:
+        """Adjacent drive and measurement."""
+        return adjacent(self.variant.skin.electrodes.count)
+
+    @cached_property
+    def linear(self) -> Linearisation:
+        """The model's Jacobian."""
+        return linearise(self.variant.skin, self.protocol, elements=MODEL_ELEMENTS)
+
+    @cached_property
+    def bench(self) -> Bench:
+        """The model and its judge, lengths in proportion to the skin."""
+        settings = BuildSettings(
+            rank=RANKS[self.variant.skin.electrodes.count], elements=MODEL_ELEMENTS
+        )
+        model, scale = (
+            make_model(self.variant.skin, self.protocol, self.linear, settings),
+            self.variant.scale,
+        )
+        judge = metrics.judge_for(self.variant.skin.outline, model.grid, metrics.RASTER_MM * scale)
+        return Bench(model, judge, GATE_MM * scale)
+
+    @cached_property
+    def tuning(self) -> TouchSet:
+        """Scenes to choose t on."""
+        return self._drawn("shapes train", self.desk.settings.tuning_seed, TUNING)
+
+    @cached_property
+    def test(self) -> TouchSet:
+        """Scenes to report."""
+        return self._drawn("shapes test", self.desk.settings.seed, TEST)
+
+    def _drawn(self, role: str, seed: int, usual: int) -> TouchSet:
+        count = self.desk.settings.count(usual)
+        return random_touches(self.variant.skin.outline, seed, count, role, self.variant.rules)
+
+    def session(self, drawn: TouchSet) -> Session:
+        """Its frames."""
+        return session_in_parts(
+            self._solver,
+            drawn,
+            self.desk.progress,
+            f"{self.variant.name.replace(',', '')} {drawn.role}",
+        )
+
+    @cached_property
+    def _solver(self) -> SceneSolver:
+        return self.desk.scenes(self.variant.skin, self.protocol)
+
+    def measured(self) -> dict[str, Any]:
+        """Everything of the shape in plain values: ``t``, ``scores`` of the test scenes, and
+        ``about`` skin and model."""
+        desk = self.desk
+        t = desk.kept(self._facts("threshold", self.tuning), self._threshold)
+        scores = desk.kept({**self._facts("scores", self.test), "t": t}, lambda: self._scores(t))
+        return {
+            "t": t,
+            "scores": scores,
+            "about": desk.kept(self._facts("about", self.test), self._about),
+        }
+
+    def _facts(self, what: str, drawn: TouchSet) -> dict[str, Any]:
+        skin = self.variant.skin
+        place = {
+            "skin": skin.name,
+            "outline": repr(skin.outline),
+            "electrodes": repr(skin.electrodes),
+        }
+        return {
+            "shapes": what,
+            **place,
+            "set": drawn.name,
+            "rules": repr(self.variant.rules),
+            "snr_db": SNR_DB,
+        }
+
+    def _variety(self, scene: Scene) -> tuple[int, int]:
+        """In how many regions a scene's touches lie, and how many they are; the picture shows the
+        first of the richest."""
+        return len(set(self.variant.regions(scene.centres_mm(), 50.0 * self.variant.scale))), len(
+            scene.touches
+        )
+
+    def _threshold(self) -> float:
+        measured = self.session(self.tuning).measured(SNR_DB)
+        return self.bench.threshold(self.tuning.scenes, measured.quiet_v, measured.frames_v[:, -1])
+
+    def _scores(self, t: float) -> dict[str, Any]:
+        measured = self.session(self.test).measured(SNR_DB)
+        return self.bench.scores(self.test.scenes, measured.quiet_v, measured.frames_v[:, -1], t)
+
+    def _about(self) -> dict[str, Any]:
+        model, judge, scenes = self.bench.model, self.bench.judge, self.test.scenes
+        norm = np.linalg.norm(self.linear.jacobian, axis=0)
+        perfect = np.array(
+            [
+                metrics.pixel_cover(model.grid, scene.centres_mm(), scene.radii_mm())
+                for scene in scenes
+            ]
+        )
+        session = self.session(self.test)
+        chosen = max(range(len(scenes)), key=lambda k: self._variety(scenes[k]))
+        measured = session.measured(SNR_DB)
+        one = reconstruct_many(
+            model, measured.frames_v[chosen : chosen + 1, -1], measured.quiet_v, threads=1
+        )[0]
+        return {
+            "rms_v0_mv": 1e3 * float(np.sqrt(np.mean(session.exact_quiet_v**2))),
+            "pixels": model.grid.n_pixels,
+            "pixel_mm": model.grid.pixel_mm,
+            "rank": model.rank,
+            "deepest_mm": float(
+                rim_distance_mm(self.variant.skin.outline, model.grid.centres_mm()).max()
+            ),
+            "sensitivity_log10": np.log10(norm / norm.max()).round(3).tolist(),
+            "ceiling": float(judge.curves(perfect, self.bench.truths(scenes), [0.5]).mean()),
+            "scene_image": [float(f"{value:.4g}") for value in one.image],
+            "scene_found": [[t.x_mm, t.y_mm, t.radius_mm] for t in one.touches],
+            "scene_true": [[t.x_mm, t.y_mm, t.radius_mm] for t in scenes[chosen].touches],
+        }

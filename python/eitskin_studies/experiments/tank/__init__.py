@@ -1,0 +1,148 @@
+"""Measured frames of water tanks: every method, three kinds of data, and what makes images of large
+objects better."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eitskin.model.build import linearise
+from eitskin.scoring import metrics
+from eitskin.scoring.matching import GATE_MM
+from eitskin.skin.skin import size_to_paper
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk, Outcome
+from eitskin_studies.experiments.tank import levers as lever_work
+from eitskin_studies.experiments.tank import tables
+from eitskin_studies.experiments.tank.contest import Grounds, contest
+from eitskin_studies.experiments.tank.discs import varied
+from eitskin_studies.experiments.tank.imagers import (
+    KINDS,
+    Entry,
+    Tank,
+    baseline_entries,
+    core_entries,
+)
+from eitskin_studies.experiments.tank.judging import jittered_truth
+from eitskin_studies.experiments.tank.scenes import simulated
+from eitskin_studies.experiments.tank.tanks import (
+    PHANTOMS,
+    RADIUS_MM,
+    RODS,
+    folder_of,
+    objects_of,
+    phantoms,
+    reciprocal_share,
+    rods,
+    tank,
+    touch_like,
+    truth_of,
+)
+
+TITLE = "Measured frames of water tanks: every method, three kinds of data"
+
+TUNING_SCENES, TEST_SCENES = 40, 60
+TRUTH_ERRORS = (
+    0.0,
+    0.03,
+    0.04,
+    0.05,
+)  # of the tank's radius; the truth is said to be good to 0.03 to 0.05
+DRAWS = 200
+
+
+def run(desk: Desk) -> Outcome:
+    """All of it.
+
+    Raises:
+        UsageError: no folder of measured frames is given, or it lacks one of them.
+    """
+    folder = folder_of(desk.settings.data)
+    ours = _tank()
+    grounds, facts = _grounds(desk, ours, folder)
+    levers = lever_work.tried(desk, ours, grounds, facts)
+    best = lever_work.chosen(levers)
+    entries = [
+        entry
+        for kind in KINDS
+        for entry in (*baseline_entries(ours, kind), *core_entries(ours, kind))
+    ]
+    entries.append(lever_work.entry_of(ours, tables.CHOSEN, best))
+    results = []
+    for entry in _watched(desk, entries):
+        asked = {**facts, "entry": entry.name, "kind": entry.kind, "values": entry.values}
+        if entry.name == tables.CHOSEN:
+            asked["levers"] = repr(best)
+        results.append(desk.kept(asked, partial(contest, entry, grounds)))
+    ceiling = desk.kept({**facts, "what": "ceiling"}, lambda: _ceiling(desk, grounds))
+    discs = varied(desk, ours, grounds, facts)
+    return tables.outcome(grounds, results, levers, best, discs, ceiling, desk.settings)
+
+
+def _watched(desk: Desk, entries: list[Entry]) -> Iterable[Entry]:
+    return desk.progress(entries, "methods")
+
+
+def _tank() -> Tank:
+    skin, protocol = tank()
+    return Tank(skin, protocol, linearise(skin, protocol, elements=MODEL_ELEMENTS))
+
+
+def _grounds(desk: Desk, ours: Tank, folder: Path) -> tuple[Grounds, dict[str, Any]]:
+    """What is judged on, and what all results depend on."""
+    measured = phantoms(folder)
+    scale = size_to_paper(ours.skin.outline)
+    judge = metrics.judge_for(ours.skin.outline, ours.grid, metrics.RASTER_MM * scale)
+    share = float(np.median(reciprocal_share(measured)))
+    settings = desk.settings
+    tuning, test = settings.count(TUNING_SCENES), settings.count(TEST_SCENES)
+    grounds = Grounds(
+        judge,
+        ours.grid,
+        simulated(desk, settings.tuning_seed, tuning, False, judge.raster, share),
+        simulated(desk, settings.tuning_seed, tuning, True, judge.raster, share),
+        simulated(desk, settings.seed, test, False, judge.raster, share),
+        measured,
+        rods(folder),
+        GATE_MM * scale,
+        share,
+    )
+    digest = hashlib.sha256(
+        b"".join((folder / name).read_bytes() for name in (PHANTOMS, *(one[0] for one in RODS)))
+    )
+    return grounds, {
+        "frames": digest.hexdigest()[:16],
+        "tuning": tuning,
+        "test": test,
+        "share": round(share, 9),
+    }
+
+
+def _ceiling(desk: Desk, grounds: Grounds) -> list[dict[str, Any]]:
+    """MIoU of the true discs, moved by so much, against the truth, for each touch-like frame."""
+    frames, points = grounds.phantoms, grounds.judge.raster.points_mm
+    assert frames.touch_xy_mm is not None and frames.touch_radius_mm is not None
+    conductive, _ = truth_of(frames, grounds.judge.raster)
+    found, draws = [], desk.settings.count(DRAWS)
+    for off in TRUTH_ERRORS:
+        scores = []
+        for k in touch_like(frames):
+            there = objects_of(frames, k, 1)
+            centres, radii = frames.touch_xy_mm[there], frames.touch_radius_mm[there]
+            scores.append(
+                jittered_truth(
+                    points,
+                    conductive[k],
+                    centres,
+                    radii,
+                    off * RADIUS_MM,
+                    desk.settings.seed,
+                    draws,
+                )
+            )
+        found.append({"off": off, "miou": scores})
+    return found

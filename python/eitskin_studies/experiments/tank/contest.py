@@ -1,0 +1,241 @@
+"""One entry at a time: its parameter and thresholds from simulated scenes, then the measured
+frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import Touch
+from eitskin.fem.grid import Grid
+from eitskin.frames.frames import Frames
+from eitskin.scoring import metrics
+from eitskin.scoring.image_touches import match_all, touches_in_image
+from eitskin.scoring.matching import Matching
+from eitskin_studies.experiments.tank.imagers import Entry, Imager, Shown
+from eitskin_studies.experiments.tank.judging import match_signs, places, signed_curves, signed_miou
+from eitskin_studies.experiments.tank.scenes import Set
+from eitskin_studies.experiments.tank.tanks import Rods, objects_of, touch_like, truth_of
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+DIGITS = 5
+PLACE_THRESHOLDS = metrics.THRESHOLDS[4::5]
+
+
+@dataclass(frozen=True, eq=False)
+class Grounds:
+    """What entries are judged on: sets to choose by (``metal``, ``mixed``), a set to report
+    (``test``), the measured frames; ``noise_share`` is the simulated noise over the rms of a
+    frame's change."""
+
+    judge: metrics.Judge
+    grid: Grid
+    metal: Set
+    mixed: Set
+    test: Set
+    phantoms: Frames
+    rods: tuple[Rods, ...]
+    gate_mm: float
+    noise_share: float
+
+
+def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
+    """Everything about an entry in plain values, fit for JSON.
+
+    The parameter is the one with the best mean MIoU on the metal set, each value at its own best
+    threshold t. t for both signs and the thresholds of places are chosen after it, on the mixed and
+    the metal set.
+    """
+    best: tuple[float, float, Imager, FloatArray, Shown] | None = None
+    for value in entry.values:
+        imager = entry.make(value)
+        shown = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, False)
+        curves = curves_of(shown, grounds.metal.conductive, grounds.judge)
+        score = float(curves.mean(axis=0).max())
+        if best is None or score > best[0] + 1e-12:
+            best = score, value, imager, curves, shown
+    assert best is not None
+    trained, value, imager, curves, metal = best
+    threshold = metrics.best_threshold(curves)
+    at = metrics.THRESHOLDS.index(threshold)
+    test = imager.show(grounds.test.quiet_v, grounds.test.frames_v, False)
+    test_curves = curves_of(test, grounds.test.conductive, grounds.judge)
+    chosen = touch_like(grounds.phantoms)
+    frames = grounds.phantoms.voltage_v[chosen]
+    measured = imager.show(grounds.phantoms.reference_voltage_v, frames, False)
+    conductive, _ = truth_of(grounds.phantoms, grounds.judge.raster)
+    measured_curves = curves_of(measured, conductive[chosen], grounds.judge)
+    place_threshold = None
+    if metal.touches is None:
+        place_threshold = best_place_threshold(metal.images, grounds)
+    found = increases(measured, place_threshold, grounds.grid)
+    matchings = match_all(
+        [places_of(grounds.phantoms, k, 1) for k in chosen], found, grounds.gate_mm
+    )
+    simulated = match_all(
+        grounds.test.conductive_mm, increases(test, place_threshold, grounds.grid), grounds.gate_mm
+    )
+    result = {
+        "name": entry.name,
+        "kind": entry.kind,
+        "parameter": entry.parameter,
+        "value": value,
+        "threshold": threshold,
+        "place_threshold": place_threshold,
+        "macs": measured.macs,
+        "tuned": trained,
+        "tuned_curve": _plain(curves.mean(axis=0)),
+        "simulated": _plain(test_curves[:, at]),
+        "simulated_places": _counts(simulated),
+        "touch_like": _plain(measured_curves[:, at]),
+        "touch_like_curve": _plain(measured_curves.mean(axis=0)),
+        "touch_like_places": _counts(matchings),
+        "images": [_plain(image) for image in measured.images],
+        "discs": _touches(measured),
+    }
+    return {**result, **(_both_signs(imager, place_threshold, grounds) if entry.both_signs else {})}
+
+
+def curves_of(shown: Shown, truth: BoolArray, judge: metrics.Judge) -> FloatArray:
+    """MIoU (k, T) of increases; discs are judged as discs, the same at each threshold."""
+    if shown.touches is None:
+        return judge.curves(shown.images, truth)
+    scores = [
+        metrics.miou(_discs(touches, 1, judge), true)
+        for touches, true in zip(shown.touches, truth, strict=True)
+    ]
+    return np.repeat(np.array(scores)[:, None], len(metrics.THRESHOLDS), axis=1)
+
+
+def signed_curves_of(
+    shown: Shown, conductive: BoolArray, resistive: BoolArray, judge: metrics.Judge
+) -> FloatArray:
+    """The same of both signs."""
+    if shown.touches is None:
+        return signed_curves(judge, shown.images, conductive, resistive)
+    scores = [
+        signed_miou(_discs(touches, 1, judge), _discs(touches, -1, judge), up, down)
+        for touches, up, down in zip(shown.touches, conductive, resistive, strict=True)
+    ]
+    return np.repeat(np.array(scores)[:, None], len(metrics.THRESHOLDS), axis=1)
+
+
+def _discs(touches: Sequence[Touch], sign: int, judge: metrics.Judge) -> BoolArray:
+    own = [t for t in touches if t.strength_s_per_m_mm2 * sign > 0]
+    return metrics.disc_mask(
+        judge.raster.points_mm, [(t.x_mm, t.y_mm) for t in own], [t.radius_mm for t in own]
+    )
+
+
+def best_place_threshold(images: FloatArray, grounds: Grounds) -> float:
+    """Of the metal set's ``images``: the threshold with most scenes counted exactly, then most hits
+    less false ones."""
+    best, best_score = PLACE_THRESHOLDS[0], (-1, 0)
+    index, centres = grounds.grid.index, grounds.grid.centres_mm()
+    for threshold in PLACE_THRESHOLDS:
+        found = [touches_in_image(image, index, centres, threshold) for image in images]
+        matchings = match_all(grounds.metal.conductive_mm, found, grounds.gate_mm)
+        score = (sum(m.exact for m in matchings), sum(m.hits - m.false_touches for m in matchings))
+        if score > best_score:
+            best, best_score = threshold, score
+    return best
+
+
+def _both_signs(imager: Imager, place_threshold: float | None, grounds: Grounds) -> dict[str, Any]:
+    """All nine frames and the rods, with both signs."""
+    mixed, frames = grounds.mixed, grounds.phantoms
+    tuned = imager.show(mixed.quiet_v, mixed.frames_v, True)
+    curves = signed_curves_of(tuned, mixed.conductive, mixed.resistive, grounds.judge)
+    threshold = metrics.best_threshold(curves)
+    shown = imager.show(frames.reference_voltage_v, frames.voltage_v, True)
+    truths = truth_of(frames, grounds.judge.raster)
+    scores = signed_curves_of(shown, *truths, grounds.judge)[:, metrics.THRESHOLDS.index(threshold)]
+    matchings: list[Matching] = []
+    for k, found in enumerate(_both(shown, place_threshold, grounds.grid)):
+        matchings += match_signs(
+            (places_of(frames, k, 1), places_of(frames, k, -1)), found, grounds.gate_mm
+        )
+    at_rods, rod_images, rod_discs = [], [], []
+    for one in grounds.rods:
+        seen = imager.show(one.frames.reference_voltage_v, one.frames.voltage_v, True)
+        found = _both(seen, place_threshold, grounds.grid)[0]
+        metal, plastic = match_signs((one.metal_mm, one.plastic_mm), found, grounds.gate_mm)
+        at_rods.append({"metal": _counts([metal]), "plastic": _counts([plastic])})
+        rod_images.append(_plain(seen.images[0]))
+        rod_discs += _touches(seen)
+    return {
+        "tuned_both": float(curves.mean(axis=0).max()),
+        "threshold_both": threshold,
+        "nine": _plain(scores),
+        "nine_places": _counts(matchings),
+        "images_both": [_plain(image) for image in shown.images],
+        "discs_both": _touches(shown),
+        "rods": at_rods,
+        "rod_images": rod_images,
+        "rod_discs": rod_discs,
+    }
+
+
+def places_of(frames: Frames, number: int, sign: int) -> FloatArray:
+    """Centres (t, 2) mm of the objects of one sign."""
+    assert frames.touch_xy_mm is not None
+    return frames.touch_xy_mm[objects_of(frames, number, sign)]
+
+
+def increases(shown: Shown, threshold: float | None, grid: Grid) -> list[FloatArray]:
+    """Where increases are found in each image, (t, 2) mm: touches where there are, else groups of
+    pixels beyond ``threshold``."""
+    if shown.touches is not None:
+        return [_centres(touches, 1) for touches in shown.touches]
+    assert threshold is not None
+    return [
+        touches_in_image(image, grid.index, grid.centres_mm(), threshold) for image in shown.images
+    ]
+
+
+def _both(shown: Shown, threshold: float | None, grid: Grid) -> list[tuple[FloatArray, FloatArray]]:
+    if shown.touches is not None:
+        return [(_centres(touches, 1), _centres(touches, -1)) for touches in shown.touches]
+    assert threshold is not None
+    return [places(image, grid.index, grid.centres_mm(), threshold) for image in shown.images]
+
+
+def _centres(touches: Sequence[Touch], sign: int) -> FloatArray:
+    return np.array(
+        [(t.x_mm, t.y_mm) for t in touches if t.strength_s_per_m_mm2 * sign > 0]
+    ).reshape(-1, 2)
+
+
+def _counts(matchings: Sequence[Matching]) -> dict[str, Any]:
+    return {
+        "true": sum(m.hits + m.misses for m in matchings),
+        "found": sum(m.hits for m in matchings),
+        "false": sum(m.false_touches for m in matchings),
+        "distances_mm": [round(d, DIGITS) for m in matchings for d in m.distances_mm],
+    }
+
+
+def _touches(shown: Shown) -> list[list[list[float]]]:
+    """x, y, radius (mm) and sign of each touch."""
+    return [
+        [
+            [
+                round(t.x_mm, 3),
+                round(t.y_mm, 3),
+                round(t.radius_mm, 3),
+                float(np.sign(t.strength_s_per_m_mm2)),
+            ]
+            for t in touches
+        ]
+        for touches in shown.touches or ()
+    ]
+
+
+def _plain(values: FloatArray) -> list[float]:
+    top = float(np.abs(values).max()) or 1.0
+    return [float(f"{value:.{DIGITS}g}") if abs(value) > 1e-6 * top else 0.0 for value in values]

@@ -1,0 +1,103 @@
+"""What makes images of large objects better, each lever for itself and all together, chosen on
+simulated tank scenes only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, replace
+from functools import partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from eitskin.scoring import metrics
+from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.tank.contest import Grounds
+from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, Tank
+from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
+
+FLOORS = (0.01, 0.03, 0.1, 0.3)
+ITERATIONS = (15, 30, 60, 120)
+LAMBDAS = (0.01, 0.03, 0.1)
+PAINTS = ((0.0, 0.0), (0.0, 1.0), (0.0, 1.5), (1.5, 0.0), (2.0, 0.0))  # (atom, blur)
+
+
+def one_by_one(kind: str) -> list[Levers]:
+    """The defaults on data of ``kind``, and each lever alone."""
+    start = Levers(kind=kind)
+    changes: list[dict[str, Any]] = [{}]
+    changes += [{"floor": value} for value in FLOORS if value != start.floor]
+    changes += [{"iterations": value} for value in ITERATIONS if value != start.iterations]
+    changes += [{"lambda_rel": value} for value in LAMBDAS if value != start.lambda_rel]
+    changes += [{"atom": atom, "blur": blur} for atom, blur in PAINTS if atom or blur]
+    return [replace(start, **change) for change in changes]
+
+
+def together(kind: str) -> list[Levers]:
+    """Floor, iterations and paint together, at the usual lambda."""
+    return [
+        Levers(kind=kind, floor=floor, iterations=iterations, atom=atom, blur=blur)
+        for (atom, blur), floor, iterations in product(PAINTS, FLOORS, ITERATIONS)
+    ]
+
+
+def tried(
+    desk: Desk, tank: Tank, grounds: Grounds, facts: dict[str, Any]
+) -> dict[Levers, dict[str, Any]]:
+    """Every setting of levers that is looked at, with what it gave."""
+    wanted = list(
+        dict.fromkeys([one for kind in KINDS for one in one_by_one(kind)] + together("difference"))
+    )
+    found = {}
+    for levers in _watched(desk, wanted):
+        found[levers] = desk.kept(
+            {**facts, "levers": asdict(levers)}, partial(_measured, tank, grounds, levers)
+        )
+    return found
+
+
+def chosen(found: dict[Levers, dict[str, Any]]) -> Levers:
+    """The best on the simulated set; of those that are equal to three digits the cheapest."""
+    return max(found, key=lambda levers: (round(found[levers]["tuned"], 3), -found[levers]["macs"]))
+
+
+def entry_of(tank: Tank, name: str, levers: Levers) -> Entry:
+    """Levers as an entry of the contest."""
+    return Entry(name, levers.kind, "", (0.0,), lambda _: CoreImager(tank, levers))
+
+
+def words_of(levers: Levers) -> str:
+    """What differs from the defaults."""
+    start, words = Levers(kind=levers.kind), []
+    words += [f"mu {levers.floor:g}"] if levers.floor != start.floor else []
+    words += [f"{levers.iterations} iterations"] if levers.iterations != start.iterations else []
+    words += [f"lambda {levers.lambda_rel:g}"] if levers.lambda_rel != start.lambda_rel else []
+    words += [f"atoms of {levers.atom:g} pixels"] if levers.atom else []
+    words += [f"blur of {levers.blur:g} pixels"] if levers.blur else []
+    return ", ".join(words) or "defaults"
+
+
+def _watched(desk: Desk, wanted: list[Levers]) -> Iterable[Levers]:
+    return desk.progress(wanted, "levers")
+
+
+def _measured(tank: Tank, grounds: Grounds, levers: Levers) -> dict[str, Any]:
+    imager = CoreImager(tank, levers)
+    tuned = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, False)
+    curves = grounds.judge.curves(tuned.images, grounds.metal.conductive)
+    threshold = metrics.best_threshold(curves)
+    at = metrics.THRESHOLDS.index(threshold)
+    places = touch_like(grounds.phantoms)
+    real = imager.show(
+        grounds.phantoms.reference_voltage_v, grounds.phantoms.voltage_v[places], False
+    )
+    truth = truth_of(grounds.phantoms, grounds.judge.raster)[0][places]
+    measured = grounds.judge.curves(real.images, truth)
+    return {
+        "tuned": float(curves.mean(axis=0).max()),
+        "threshold": threshold,
+        "macs": tuned.macs,
+        "touch_like": [float(value) for value in measured[:, at]],
+        "best_threshold_mean": float(np.max(measured.mean(axis=0))),
+    }

@@ -1,0 +1,198 @@
+"""Streams measured with noise and reconstructed by the core: what is told in each frame, by each
+way of tracking."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import Options, Touch
+from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.reference.tracker import Pairing, Tracker, nearest_pairs
+from eitskin.scene.compiler import compile_scene
+from eitskin.scene.runner import simulate_frames
+from eitskin.scene.session import Bench
+from eitskin.scene.simulate import Measurement, measure
+from eitskin.scoring.snr import noise_deviation_v
+from eitskin.solve.options import default_options, tracking
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.tracking.counted import Count, count_stream
+from eitskin_studies.experiments.tracking.streams import ELEMENTS, Stream
+from eitskin_studies.harness.sessions import converter_for
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way of tracking: the core's ``options``."""
+
+    name: str
+    options: Options
+
+
+def ways(model: Model) -> tuple[Way, ...]:
+    """Tracking off, its parts, all of it."""
+    off = default_options(model)
+    whole = tracking(off)
+    low = replace(off, gate_factor=whole.gate_factor)
+    return (
+        Way("off", off),
+        Way("births confirmed", replace(off, track_confirm=whole.track_confirm)),
+        Way("ids held", replace(off, track_hold=whole.track_hold)),
+        Way("places smoothed", replace(off, track_smooth=whole.track_smooth)),
+        Way("lower gate alone", low),
+        Way("lower gate, births confirmed", replace(low, track_confirm=whole.track_confirm)),
+        Way("all, gate as it was", replace(whole, gate_factor=off.gate_factor)),
+        Way("all", whole),
+    )
+
+
+def choices(model: Model) -> tuple[Way, ...]:
+    """All, and each part chosen otherwise."""
+    whole = tracking(default_options(model))
+    gate = default_options(model).gate_factor
+    return (
+        Way("as chosen", whole),
+        *(Way(f"confirm {n}", replace(whole, track_confirm=n)) for n in (1, 3, 4)),
+        *(Way(f"hold {n}", replace(whole, track_hold=n)) for n in (0, 1, 4)),
+        *(
+            Way(f"smooth {pixels:g}", replace(whole, track_smooth=pixels))
+            for pixels in (0.0, 0.33, 1.32)
+        ),
+        *(
+            Way(f"gate {share:g}", replace(whole, gate_factor=share * gate))
+            for share in (1.0, 0.87, 0.6)
+        ),
+    )
+
+
+class Measurer:
+    """Solves, measures and reconstructs streams; everything is kept at the desk."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self.model, blob = load_prebuilt()
+        self._skin = Reconstructor(self.model, blob=blob)
+        self._bench = Bench()
+
+    def count(self, stream: Stream, snr_db: float, way: Way) -> Count:
+        """The core's own tracking."""
+        facts = {
+            "what": "tracking",
+            "stream": stream.facts(),
+            "snr_db": snr_db,
+            "options": vars(way.options),
+        }
+
+        def make() -> dict[str, object]:
+            told, macs = self.told(stream, snr_db, way.options)
+            return count_stream(stream, told, macs).as_dict()
+
+        return Count(**self.desk.kept(facts, make))
+
+    def count_paired(self, stream: Stream, snr_db: float, pairing: Pairing, name: str) -> Count:
+        """Tracking by the numpy reference with another rule for who is who."""
+        facts = {
+            "what": "tracking by pairs",
+            "stream": stream.facts(),
+            "snr_db": snr_db,
+            "pairs": name,
+        }
+
+        def make() -> dict[str, object]:
+            return count_stream(stream, self._told_paired(stream, snr_db, pairing), 0).as_dict()
+
+        return Count(**self.desk.kept(facts, make))
+
+    def told(
+        self, stream: Stream, snr_db: float, options: Options
+    ) -> tuple[list[tuple[Touch, ...]], int]:
+        """The touches of each frame, and the MACs of all."""
+        frames_v = self._start(stream, snr_db, options)
+        results = [self._skin.reconstruct(frame) for frame in frames_v]
+        return [one.touches for one in results], sum(
+            one.info.macs + one.info.touch_macs for one in results
+        )
+
+    def _told_paired(
+        self, stream: Stream, snr_db: float, pairing: Pairing
+    ) -> list[tuple[Touch, ...]]:
+        whole = tracking(default_options(self.model))
+        single = replace(default_options(self.model), gate_factor=whole.gate_factor)
+        tracker, told = Tracker(self.model.grid, pairing), []
+        for frame in self._start(stream, snr_db, single):
+            result = self._skin.reconstruct(frame)
+            told.append(
+                tracker.step(
+                    result.touches, whole, result.info.lambda_max, result.info.lambda_noise
+                )
+            )
+        return told
+
+    def _start(self, stream: Stream, snr_db: float, options: Options) -> FloatArray:
+        """Take the reference; returns the frames (f, m) V."""
+        exact_v, how = self._exact_v(stream), converter_for(snr_db)
+        noise_v = noise_deviation_v(exact_v[0], snr_db)
+        span_v = how.adc_headroom * float(np.abs(exact_v[0]).max())
+        assert how.adc_bits is not None
+        converter = (noise_v, 2 * span_v / 2**how.adc_bits, span_v, self.desk.settings.seed)
+        quiet_v, _ = measure(
+            np.tile(exact_v[0], (Measurement.quiet_frames, 1)), *converter, f"quiet {stream.name}"
+        )
+        frames_v, _ = measure(exact_v[1:], *converter, f"frame {stream.name}")
+        self._skin.set_options(options)
+        self._skin.tare(quiet_v)
+        self._skin.forget()
+        return frames_v
+
+    def _exact_v(self, stream: Stream) -> FloatArray:
+        """The quiet frame, then those of the stream, without noise: (1 + f, m)."""
+
+        def make() -> dict[str, FloatArray]:
+            return {
+                "voltage_v": (
+                    simulate_frames(compile_scene(stream.scene(), bench=self._bench)).voltage_v
+                )
+            }
+
+        return self.desk.kept_arrays(
+            {"what": "stream", "stream": stream.facts(), "elements": ELEMENTS}, make
+        )["voltage_v"]
+
+
+def best_pairs(distance_mm: FloatArray, reach_mm: float) -> list[tuple[int, int]]:
+    """Pairs (row, column) with the least sum of squares, as many as possible within ``reach_mm``.
+
+    Raises:
+        MissingExtraError: scipy is not installed.
+    """
+    from eitskin.errors import missing_extra
+
+    try:
+        from scipy.optimize import linear_sum_assignment
+    except ImportError:
+        raise missing_extra("model", "scipy") from None
+    within = distance_mm <= reach_mm
+    cost = np.where(within, distance_mm**2, reach_mm**2 * (min(distance_mm.shape) + 1.0))
+    return [
+        (int(i), int(k)) for i, k in zip(*linear_sum_assignment(cost), strict=True) if within[i, k]
+    ]
+
+
+PAIRINGS: tuple[tuple[str, Pairing], ...] = (
+    ("nearest first", nearest_pairs),
+    ("least sum of squares", best_pairs),
+)
+
+
+def counts(
+    measurer: Measurer, streams: Sequence[Stream], snr_db: float, way: Way, what: str
+) -> list[Count]:
+    """Of each stream."""
+    return [measurer.count(one, snr_db, way) for one in measurer.desk.progress(streams, what)]

@@ -1,0 +1,103 @@
+"""What ``tests/emulated/frames_m7.c`` can be told to do, and the files that tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.results import SIGNS, SOLVERS, Options
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Open a model and start a context; nothing of the last one stays."""
+
+    blob: bytes
+
+
+@dataclass(frozen=True)
+class Choose:
+    """Put options in force."""
+
+    options: Options
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """Leave the protocol rows where ``rows`` (m,) is true out of every frame, and use the
+    others."""
+
+    rows: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Tare:
+    """Take the reference from quiet frames (k, m), volts, until one is refused; fewer than four:
+    each anew."""
+
+    quiet_v: npt.NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Play:
+    """Reconstruct frames (k, m), volts."""
+
+    frames_v: npt.NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Solve:
+    """The solver alone on reduced data (k, r)."""
+
+    data: npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Forget:
+    """Forget the warm start and the touches that were followed."""
+
+
+Step = Load | Choose | Mask | Tare | Play | Solve | Forget
+
+
+def write_steps(folder: Path, steps: Sequence[Step], *, portable: bool = False) -> None:
+    """Write "script.txt", the models and "frames.f32" into ``folder``."""
+    lines, numbers, models = [f"portable {int(portable)}"], [], 0
+    for step in steps:
+        if isinstance(step, Load):
+            (folder / f"model{models}.eitm").write_bytes(step.blob)
+            lines.append(f"model model{models}.eitm")
+            models += 1
+        elif isinstance(step, Choose):
+            lines += [*_option_lines(step.options), "choose"]
+        elif isinstance(step, Mask):
+            lines += [f"mask {row} {int(bad)}" for row, bad in enumerate(step.rows)]
+        elif isinstance(step, Forget):
+            lines.append("forget")
+        else:
+            word, values = _numbers_of(step)
+            lines.append(f"{word} {len(values)}")
+            numbers.append(np.asarray(values).astype("<f4").tobytes())
+    (folder / "script.txt").write_text("\n".join(lines) + "\n", encoding="ascii")
+    (folder / "frames.f32").write_bytes(b"".join(numbers))
+
+
+def _numbers_of(step: Tare | Play | Solve) -> tuple[str, npt.NDArray[Any]]:
+    if isinstance(step, Tare):
+        return "quiet", step.quiet_v
+    return ("frames", step.frames_v) if isinstance(step, Play) else ("solve", step.data)
+
+
+def _option_lines(options: Options) -> list[str]:
+    """Reals with the digits that give a float32 again."""
+    values = asdict(options)
+    values |= {"sign": SIGNS.index(options.sign), "solver": SOLVERS.index(options.solver)}
+    return [
+        f"option {name} {int(value) if isinstance(value, bool) else f'{value:.10g}'}"
+        for name, value in values.items()
+    ]

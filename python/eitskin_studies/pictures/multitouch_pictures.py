@@ -1,0 +1,310 @@
+"""The pictures of the experiment on many touches: exact counts, example scenes, and what doubt is
+worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.grid import grid_for
+from eitskin.skin.skin import Skin
+from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, LEAST, MOST, NARROW, RING, WIDE
+from eitskin_studies.experiments.multitouch.counts import Score, Share, auc, roc, share_of
+from eitskin_studies.experiments.multitouch.doubt import Judged
+from eitskin_studies.experiments.multitouch.doubt_tables import found_some, reliabilities
+from eitskin_studies.experiments.multitouch.gallery import Example
+from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, SNRS_DB
+from eitskin_studies.experiments.multitouch.measure import Counted, Doubts
+from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
+from eitskin_studies.pictures.comparison_pictures import truth_marks
+
+FloatArray = npt.NDArray[np.float64]
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PAPER_TOUCHES = 7
+SNR_COLOURS = {40.0: "#b26a00", 60.0: "#00796b", 80.0: "#283593"}
+CLASSICAL_COLOURS = ("#9e9e9e", "#5d4037", "#c2185b")
+TITLES = {RING: "ring of 60 mm", WIDE: "random, 4 radii apart", NARROW: "random, 2.5 radii apart"}
+NEAREST_EDGES = (0.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.5, 20.0)
+SAID, NOT_SAID = "#c62828", "#00796b"
+
+
+def draw_counts(path: str | Path, counted: Counted) -> None:
+    """Exact counts over the number of touches: a row a variant of the core beside the classical
+    methods, a column a geometry.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(
+            figsize=(11.5, 3.3 * len(NAMES) + 0.5), layout="constrained"
+        )
+        for row, variant in enumerate(NAMES):
+            lines = [
+                (variant, snr_db, SNR_COLOURS[snr_db], f"core, {snr_db:g} dB") for snr_db in SNRS_DB
+            ]
+            lines += [(name, HEADLINE_DB, colour, f"{SHORT.get(name, name)}, {HEADLINE_DB:g} dB")
+                      for name,
+                      colour in zip(CLASSICAL, CLASSICAL_COLOURS, strict=True)]  # fmt: skip
+            for column, geometry in enumerate(GEOMETRIES):
+                axes = figure.add_subplot(len(NAMES), 3, 3 * row + column + 1)
+                for place, (name, snr_db, colour, label) in enumerate(lines):
+                    points = [(k, counted.scores[geometry, k, name, snr_db]) for k in range(LEAST,
+                        MOST + 1)
+                              if (geometry, k, name, snr_db) in counted.scores]  # fmt: skip
+                    if points:
+                        _line(axes, points, (place - len(lines) / 2) * 0.06, colour, label)
+                axes.axvline(PAPER_TOUCHES, color=INK, linewidth=0.8, linestyle=":", zorder=0)
+                axes.text(PAPER_TOUCHES + 0.1, 1.035, "paper: 7", fontsize=8, va="bottom")
+                axes.set(
+                    xlabel="touches" if row == len(NAMES) - 1 else "",
+                    ylim=(-0.03, 1.12),
+                    xticks=range(LEAST, MOST + 1),
+                )
+                axes.set_title(f"{variant}: {TITLES[geometry]}")
+                axes.grid(linewidth=0.4, alpha=0.5)
+                if column == 0:
+                    axes.set_ylabel("share of scenes counted exactly")
+        handles, labels = axes.get_legend_handles_labels()
+        figure.legend(
+            handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=8
+        )
+        save_png(figure, path)
+
+
+def _line(
+    axes: Axes, points: Sequence[tuple[int, Score]], shift: float, colour: str, label: str
+) -> None:
+    exact = [score.exact for _, score in points]
+    mean, errors = _means(exact)
+    x = np.array([k for k, _ in points]) + shift
+    axes.errorbar(
+        x, mean, errors, color=colour, marker="o", label=label, elinewidth=0.7, capsize=1.5,
+        linewidth=1.3, markersize=3,
+    )  # fmt: skip
+
+
+def _means(shares: Sequence[Share]) -> tuple[FloatArray, FloatArray]:
+    """Means (k,) and how far their intervals reach below and above (2, k)."""
+    values = (
+        np.array([(one.mean, one.low, one.high) for one in shares], dtype=np.float64)
+        .reshape(-1, 3)
+        .T
+    )
+    return values[0], np.maximum([values[0] - values[1], values[2] - values[0]], 0.0)
+
+
+def draw_gallery(path: str | Path, skin: Skin, examples: Sequence[Example]) -> None:
+    """A column an example: truth, the core, Gauss-Newton.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    truths = [truth_marks(one.scene, skin.conductivity_s_per_m) for one in examples]
+    panels = [
+        Panel(f"{one.title}", None, truth, fill_truth=True)
+        for one, truth in zip(examples, truths, strict=True)
+    ]
+    for one, truth in zip(examples, truths, strict=True):
+        found = tuple(Mark(*map(float, row)) for row in one.found)
+        panels.append(
+            Panel(f"core: {len(found)}{', crowded' if one.said else ''}", one.image, truth, found)
+        )
+    for one, truth in zip(examples, truths, strict=True):
+        found = tuple(Mark(*map(float, row)) for row in one.classical)
+        panels.append(Panel(f"Gauss-Newton: {len(found)}", one.classical_image, truth, found))
+    note = (
+        "60 dB; the first scene of each set. Circles: true touches; crosses (dashed: radius): found"
+        " ones; above each: how many"
+    )
+    draw_panels(
+        path,
+        skin,
+        grid_for(skin.outline, 32),
+        panels,
+        len(examples),
+        title="Truth, core, Gauss-Newton",
+        note=note,
+    )
+
+
+def draw_doubt(path: str | Path, doubts: Doubts) -> None:
+    """What ``crowded`` and the score are worth, by what can be known of a frame; mixed test scenes,
+    the usual variant.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    matplotlib = load_matplotlib()
+    frames = doubts.mixed[NAMES[0]]
+    says = {
+        "crowded": np.array([f.said for f in frames], dtype=np.bool_),
+        "score": doubts.rule.says(frames),
+    }
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(11.5, 6.8), layout="constrained")
+        for row, (signal, said) in enumerate(says.items()):
+            for column, (title, ticks, group) in enumerate(_groupings(frames)):
+                axes = figure.add_subplot(2, 4, 4 * row + column + 1)
+                _bars(axes, frames, said, group, ticks)
+                if (row, column) == (0, 0):
+                    axes.legend(frameon=False, fontsize=7, loc="lower left")
+                axes.set_xlabel(title)
+                axes.set_title(f"{signal}: {100 * said.mean():.0f} % of frames", fontsize=9)
+                if column == 0:
+                    axes.set_ylabel("share with the right count")
+        axes = figure.add_subplot(2, 4, 4)
+        _chances(axes, doubts)
+        axes = figure.add_subplot(2, 4, 8)
+        _trade(axes, doubts)
+        save_png(figure, path)
+
+
+def _groupings(frames: Sequence[Judged]) -> list[tuple[str, list[str], npt.NDArray[np.int64]]]:
+    found = np.array([f.found for f in frames])
+    near = np.digitize([f.nearest for f in frames], NEAREST_EDGES[1:])
+    snr = np.array([SNRS_DB.index(f.snr_db) for f in frames])
+    edges = ["0", *(f"{low:g}" for low in NEAREST_EDGES[1:-1]), "one"]
+    return [
+        ("touches found", [str(k) for k in range(int(found.max()) + 1)], found),
+        ("nearest pair / sum of its radii, from", edges, near),
+        ("SNR, dB", [f"{one:g}" for one in SNRS_DB], snr),
+    ]
+
+
+def _bars(
+    axes: Axes,
+    frames: Sequence[Judged],
+    said: npt.NDArray[np.bool_],
+    group: npt.NDArray[np.int64],
+    ticks: Sequence[str],
+) -> None:
+    right = np.array([f.right for f in frames], dtype=np.bool_)
+    for offset, which, colour, label in (
+        (-0.15, ~said, NOT_SAID, "not said"),
+        (0.15, said, SAID, "said"),
+    ):
+        shares = [share_of(right[which & (group == k)]) for k in range(len(ticks))]
+        kept = [(k, one) for k, one in enumerate(shares) if one.count >= 5]
+        _points(axes, [k + offset for k, _ in kept], [one for _, one in kept], colour, label)
+    whole = np.array([max(1, int((group == k).sum())) for k in range(len(ticks))])
+    axes.bar(range(len(ticks)), [said[group == k].sum() / whole[k] for k in range(len(ticks))],
+        color=SAID, alpha=0.13, zorder=0,
+             label="share said")  # fmt: skip
+    axes.set(ylim=(0, 1.03), xlim=(-0.6, len(ticks) - 0.4))
+    axes.set_xticks(range(len(ticks)), ticks, fontsize=7)
+
+
+def _points(
+    axes: Axes, x: Sequence[float], shares: Sequence[Share], colour: str, label: str
+) -> None:
+    mean, errors = _means(shares)
+    axes.errorbar(
+        x,
+        mean,
+        errors,
+        color=colour,
+        marker="o",
+        markersize=4,
+        linestyle="none",
+        elinewidth=1.0,
+        label=label,
+    )
+
+
+def _chances(axes: Axes, doubts: Doubts) -> None:
+    axes.plot([0, 1], [0, 1], color=INK, linewidth=0.7, linestyle=":")
+    for number, name in enumerate(NAMES):
+        one = reliabilities(doubts, name)["all"]
+        kept = [(c, t) for c, t in zip(one.chance, one.truth, strict=True) if t.count >= 5]
+        _points(
+            axes,
+            [c for c, _ in kept],
+            [t for _, t in kept],
+            f"C{number}",
+            f"{name}, Brier {one.brier:.3f}",
+        )
+    axes.set(xlabel="chance by the score", ylabel="share exact", xlim=(0, 1), ylim=(0, 1.03))
+    axes.set_title("score: reliability", fontsize=9)
+    axes.legend(frameon=False, fontsize=7, loc="upper left")
+
+
+def _trade(axes: Axes, doubts: Doubts) -> None:
+    """Exact frames of those not said, over how many are not said: as the bar moves, and where
+    ``crowded`` is."""
+    name = NAMES[0]
+    for snr_db, colour in SNR_COLOURS.items():
+        mine = [f for f in found_some(doubts.mixed[name]) if f.snr_db == snr_db]
+        if not mine:
+            continue
+        exact = np.array([f.exact for f in mine])[
+            np.argsort(-doubts.rule.scores(mine), kind="stable")
+        ]
+        part = np.arange(1, len(exact) + 1) / len(exact)
+        so_far = np.cumsum(exact) / np.arange(1, len(exact) + 1)
+        axes.plot(part, so_far, color=colour, linewidth=1.2, label=f"score, {snr_db:g} dB")
+        quiet = [f for f in mine if not f.said]
+        if quiet:
+            axes.plot(
+                len(quiet) / len(mine),
+                np.mean([f.exact for f in quiet]),
+                "x",
+                color=colour,
+                markersize=7,
+            )
+    axes.axhline(0.95, color=INK, linewidth=0.7, linestyle=":")
+    axes.set(
+        xlabel="share of frames not said", ylabel="of these exact", xlim=(0, 1), ylim=(0.3, 1.03)
+    )
+    axes.set_title("the bar's choice; crosses: crowded", fontsize=9)
+    axes.legend(frameon=False, fontsize=7, loc="lower left")
+
+
+def draw_confidence(path: str | Path, doubts: Doubts) -> None:
+    """How a touch's numbers order true and false touches: ROC curves, a panel a variant.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    matplotlib = load_matplotlib()
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(3.9 * len(NAMES), 3.9), layout="constrained")
+        for number, name in enumerate(NAMES):
+            axes = figure.add_subplot(1, len(NAMES), number + 1)
+            one = doubts.touches[name]
+            named = (
+                ("confidence", one.explained),
+                ("its root over noise", one.over_noise),
+                ("strength / greatest", one.strength),
+            )
+            for text, values in named:
+                false, true = roc(values, one.true)
+                axes.plot(false, true, linewidth=1.3, label=f"{text}: {auc(values, one.true):.3f}")
+            axes.plot([0, 1], [0, 1], color=INK, linewidth=0.7, linestyle=":")
+            axes.set(
+                xlabel="false touches above the bar",
+                ylabel="true touches above the bar",
+                title=name,
+                aspect="equal",
+            )
+            axes.legend(
+                frameon=False,
+                fontsize=8,
+                loc="lower right",
+                title="area under ROC",
+                title_fontsize=8,
+            )
+        save_png(figure, path)

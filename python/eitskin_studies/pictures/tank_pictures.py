@@ -1,0 +1,125 @@
+"""Measured tank frames as each method shows them, and MIoU over the threshold, simulated and
+measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eitskin.scoring.metrics import THRESHOLDS
+from eitskin.view.frame_pictures import true_marks
+from eitskin.view.pictures import STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin_studies.experiments.tank.contest import Grounds
+from eitskin_studies.experiments.tank.tanks import tank, touch_like
+
+ROD_MM = 8.0  # as drawn; how thick the rods were is not stated
+SHORT = (
+    ("linear back projection", "back projection"),
+    (" (Tikhonov)", ""),
+    ("conjugate gradient", "CG"),
+    ("plain FISTA", "FISTA"),
+    ("non-negative", "x >= 0"),
+    ("eitskin, image, levers from simulation", "eitskin, levers"),
+    ("eitskin, touches as discs, change from simulation", "eitskin, discs, tuned"),
+    ("eitskin, touches as discs", "eitskin, discs"),
+)
+
+
+def draw_gallery(
+    path: str | Path, grounds: Grounds, results: Sequence[dict[str, Any]], both: bool
+) -> None:
+    """A row a frame, a column a method, truth first, as a PNG; all frames and the rods where
+    ``both`` signs are shown, else those of metal.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    frames = grounds.phantoms
+    numbers = list(range(frames.n_frames)) if both else touch_like(frames)
+    images, discs, scores = (
+        ("images_both", "discs_both", "nine") if both else ("images", "discs", "touch_like")
+    )
+    panels = []
+    for row, number in enumerate(numbers):
+        marks = true_marks(frames, number)
+        panels.append(Panel(f"truth {frames.frame_name[number]}", None, marks, fill_truth=True))
+        for one in results:
+            name = f"{_short(one['name'])}\n{one['kind']}\n" if row == 0 else ""
+            found = (
+                tuple(Mark(x, y, radius) for x, y, radius, _ in one[discs][row])
+                if one[discs]
+                else ()
+            )
+            panels.append(
+                Panel(f"{name}{one[scores][row]:.2f}", np.array(one[images][row]), marks, found)
+            )
+    for k, rods in enumerate(grounds.rods if both else ()):
+        marks = tuple(Mark(x, y, ROD_MM, 1.0) for x, y in rods.metal_mm)
+        marks += tuple(Mark(x, y, ROD_MM, -1.0) for x, y in rods.plastic_mm)
+        panels.append(Panel(f"rods {k + 1}, as stated", None, marks, fill_truth=True))
+        for one in results:
+            found = (
+                tuple(Mark(x, y, radius) for x, y, radius, _ in one["rod_discs"][k])
+                if one["rod_discs"]
+                else ()
+            )
+            panels.append(Panel("", np.array(one["rod_images"][k]), marks, found))
+    draw_panels(
+        path,
+        tank()[0],
+        grounds.grid,
+        panels,
+        1 + len(results),
+        title=(
+            "Measured frames of a water tank, every method on the data with which it did best on"
+            " simulated frames"
+        ),
+        note=(
+            "circles: true objects, digitised by hand; dashed: discs found; numbers: MIoU at the t"
+            " of simulated frames; red: more conductive, blue: less"
+        ),
+    )
+
+
+def draw_curves(path: str | Path, results: Sequence[dict[str, Any]]) -> None:
+    """MIoU over t: on the simulated frames that t was chosen on (lines), on the measured ones
+    (dashed), and where t was put.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: the file cannot be written.
+    """
+    matplotlib = load_matplotlib()
+    columns = 4
+    with matplotlib.rc_context(STYLE):
+        rows = -(-len(results) // columns)
+        figure = matplotlib.figure.Figure(
+            figsize=(2.6 * columns, 2.1 * rows + 0.5), layout="constrained"
+        )
+        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for ax in axes.flat[len(results) :]:
+            ax.set_axis_off()
+        for ax, one in zip(axes.flat, results, strict=False):
+            ax.plot(THRESHOLDS, one["tuned_curve"], color="C0", label="simulated")
+            ax.plot(THRESHOLDS, one["touch_like_curve"], "--", color="C1", label="measured")
+            ax.plot(
+                one["threshold"], float(np.mean(one["touch_like"])), "o", color="C1", markersize=5
+            )
+            ax.axvline(one["threshold"], color="C0", linewidth=0.7, linestyle=":")
+            ax.set_title(f"{_short(one['name'])}\n{one['kind']}", fontsize=8)
+            ax.set_ylim(0.4, 1.0)
+            ax.grid(linewidth=0.4, alpha=0.5)
+        axes.flat[0].legend(frameon=False, fontsize=7, loc="lower left")
+        figure.supxlabel("threshold t: an object is where x > t max(x)", fontsize=9)
+        figure.supylabel("mean MIoU", fontsize=9)
+        save_png(figure, path)
+
+
+def _short(name: str) -> str:
+    for long, short in SHORT:
+        name = name.replace(long, short)
+    return name

@@ -1,0 +1,98 @@
+"""A configuration's model and core: each model is made once, from one Jacobian a grid on one
+mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eitskin.errors import UsageError
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.fields import electrode_fields
+from eitskin.fem.grid import grid_for
+from eitskin.fem.mesh import mesh_for_elements
+from eitskin.fem.sensitivity import sensitivity
+from eitskin.model.build import Linearisation, make_model
+from eitskin.model.eitm import encode_model
+from eitskin.model.model import Model
+from eitskin.scoring import metrics
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin.tuning.configuration import Configuration
+from eitskin.tuning.recommend import ELEMENTS, build_settings
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A configuration made ready: its model, the file's bytes, and the judge of its images."""
+
+    model: Model
+    blob: bytes
+    judge: metrics.Judge
+
+    def reconstructor(self, one: Configuration) -> Reconstructor:
+        """The C core in float32 with the configuration's settings."""
+        solver = Reconstructor(self.model, blob=self.blob)
+        solver.with_options(**one.solver_settings)
+        return solver
+
+
+class ModelShop:
+    """Makes the models of configurations for one skin, on one mesh of about 3,000 elements, as
+    ``eitskin model build`` does."""
+
+    def __init__(self, skin: Skin, protocol: Protocol) -> None:
+        self.skin, self.protocol = skin, protocol
+        self._forward: ForwardModel | None = None
+        self._linear: dict[int, Linearisation] = {}
+        self._judges: dict[int, metrics.Judge] = {}
+        self._raster = metrics.raster_inside(skin.outline)
+
+    def refuse(self, one: Configuration) -> None:
+        """Refuse a configuration whose model could not be made.
+
+        Raises:
+            UsageError: its rank exceeds what protocol and grid allow.
+        """
+        most = min(
+            len(self.protocol.reciprocal_pairs().first),
+            grid_for(self.skin.outline, one.pixels).n_pixels,
+        )
+        if one.rank > most:
+            raise UsageError(
+                f"configuration {one.name!r}: rank = {one.rank} is out of range; use 1 to {most}"
+            )
+
+    def build(self, one: Configuration) -> Built:
+        """The model of a configuration.
+
+        Raises:
+            UsageError: the model cannot be; see ``refuse``.
+            GeometryError, MissingExtraError: from meshing.
+        """
+        model = make_model(
+            self.skin, self.protocol, self._linearise(one.pixels), build_settings(one, self.skin)
+        )
+        return Built(model, encode_model(model), self._judge(one.pixels))
+
+    def _linearise(self, pixels: int) -> Linearisation:
+        if self._forward is None:
+            self._forward = ForwardModel(
+                mesh_for_elements(self.skin, ELEMENTS), self.skin, self.protocol
+            )
+        if pixels not in self._linear:
+            grid = grid_for(self.skin.outline, pixels)
+            jacobian, v0_v = sensitivity(self._forward, self.skin.conductivity_s_per_m, grid)
+            fields = electrode_fields(self._forward, self.skin.conductivity_s_per_m, grid)
+            self._linear[pixels] = Linearisation(
+                grid, jacobian, v0_v, self._forward.mesh.n_elements, fields
+            )
+        return self._linear[pixels]
+
+    def _judge(self, pixels: int) -> metrics.Judge:
+        if pixels not in self._judges:
+            grid = self._linearise(pixels).grid
+            self._judges[pixels] = metrics.Judge(
+                self._raster, metrics.lookup_for(self._raster.points_mm, grid), grid.n_pixels
+            )
+        return self._judges[pixels]

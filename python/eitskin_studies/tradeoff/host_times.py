@@ -1,0 +1,60 @@
+"""Microseconds of a frame on this host: solve and touches in C, all configurations interleaved,
+medians."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.core.engine import CoreEngine
+from eitskin.tuning.configuration import Configuration
+from eitskin_studies.harness.sessions import Measured, Progress
+from eitskin_studies.tradeoff.engines import Built
+
+SCENES = 8
+
+
+def host_times(
+    entries: Sequence[tuple[Configuration, Built, Measured]], rounds: int, progress: Progress
+) -> tuple[list[dict[str, Any]], str]:
+    """p50 and p99 of each configuration over ``rounds`` rounds of eight scenes, ``most``: the
+    median of the costliest scene (which, unlike p99, does not tell of whatever else the machine
+    did), and the kernels' name. In each round every configuration has its turn, so that all meet
+    alike what disturbs them."""
+    engines = []
+    for one, built, measured in entries:
+        engine = CoreEngine(built.blob)
+        engine.set_options(built.reconstructor(one).options)
+        engine.set_baseline(measured.quiet_v)
+        engines.append(engine)
+    samples: list[list[list[float]]] = [[[] for _ in range(SCENES)] for _ in entries]
+    for turn in progress(range(-1, rounds), "timing"):
+        for engine, (one, _, measured), times in zip(engines, entries, samples, strict=True):
+            count = len(measured.frames_v)
+            for k in range(SCENES):
+                if not one.warm_start:
+                    engine.forget()
+                frames_v = measured.frames_v[(k * count) // SCENES]
+                for frame_v in frames_v[:-1]:
+                    engine.reconstruct(frame_v)
+                solve, touches = engine.bare_calls(frames_v[-1])
+                start = perf_counter_ns()
+                solve()
+                touches()
+                if turn >= 0:
+                    times[k].append((perf_counter_ns() - start) / 1000)
+    return [_row(np.array(times)) for times in samples], engines[0].kernels
+
+
+def _row(times: npt.NDArray[np.float64]) -> dict[str, Any]:
+    """Of ``times`` (scenes, rounds) in us."""
+    return {
+        "p50": round(float(np.median(times)), 1),
+        "p99": round(float(np.percentile(times, 99)), 1),
+        "most": round(float(np.median(times, axis=1).max()), 1),
+        "frames": times.size,
+    }

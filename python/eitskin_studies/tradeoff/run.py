@@ -1,0 +1,313 @@
+"""The whole measurement: train, score, count and time every configuration; each result is kept as
+it comes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from eitskin import __version__
+from eitskin.core.engine import load_core
+from eitskin.errors import ConfigError, FileError, UsageError
+from eitskin.skin.protocol import Protocol, adjacent
+from eitskin.skin.skin import Skin, paper_skin
+from eitskin.tuning.configuration import Configuration
+from eitskin.tuning.front import Front, Point, estimated_instructions, load_front
+from eitskin.tuning.recommend import ELEMENTS
+from eitskin_studies.benchmarks.frame import machine
+from eitskin_studies.harness.sessions import Progress, Session
+from eitskin_studies.harness.store import Store
+from eitskin_studies.tradeoff.accuracy import Solved, Trained, score, solve_session, train
+from eitskin_studies.tradeoff.costs import static_costs
+from eitskin_studies.tradeoff.emulation import Emulator, count_instructions, make_emulator
+from eitskin_studies.tradeoff.engines import Built, ModelShop
+from eitskin_studies.tradeoff.host_times import host_times
+from eitskin_studies.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, Workshop
+
+RESULTS = "results.jsonl"
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How much is measured.
+
+    Attributes:
+        scenes, train_scenes, set_scenes: of the set "random", of "train", and of each other set.
+        sets: those beside "random".
+        snrs_db: 60 is always among them: t and costs are of 60 dB.
+        seed: of all that is random.
+        simulated_elements: of the mesh that frames come from; models are made on one of about
+            3,000.
+        counted, costliest: scenes whose instructions are counted: evenly spread, and those with the
+            most MACs; 0: none.
+        rounds: of eight scenes in which times are taken; 0: none.
+    """
+
+    scenes: int = 180
+    train_scenes: int = 60
+    set_scenes: int = 30
+    sets: tuple[str, ...] = tuple(name for name in SETS if name not in (TRAIN, HEADLINE))
+    snrs_db: tuple[float, ...] = (40.0, 60.0, 80.0)
+    seed: int = 1
+    simulated_elements: int = 11_000
+    counted: int = 24
+    costliest: int = 8
+    rounds: int = 25
+
+    def __post_init__(self) -> None:
+        for name in ("scenes", "train_scenes", "set_scenes"):
+            if not 1 <= getattr(self, name) <= 100_000:
+                value = getattr(self, name)
+                raise UsageError(
+                    f"tradeoff run: {name.replace('_', ' ')} = {value} is out of range; use 1 to"
+                    " 100000"
+                )
+        for name in self.sets:
+            if name not in SETS or name in (TRAIN, HEADLINE):
+                others = ", ".join(one for one in SETS if one not in (TRAIN, HEADLINE))
+                raise UsageError(
+                    f"tradeoff run: no set of scenes is named {name!r}; known are {others}"
+                )
+        if HEADLINE_DB not in self.snrs_db or not all(0 <= snr <= 200 for snr in self.snrs_db):
+            raise UsageError(
+                f"tradeoff run: SNRs must be within 0 to 200 dB, with {HEADLINE_DB:g} among them"
+            )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {**vars(self), "sets": list(self.sets), "snrs_db": list(self.snrs_db)}
+
+
+@dataclass(eq=False)
+class _Desk:
+    """What the steps of a run share."""
+
+    settings: RunSettings
+    store: Store
+    workshop: Workshop
+    shop: ModelShop
+    world: dict[str, Any]
+    progress: Progress
+
+    def __post_init__(self) -> None:
+        self._built: dict[tuple[Any, ...], Built] = {}
+
+    def built(self, one: Configuration) -> Built:
+        key = (*one.model_settings, one.solver, one.iterations, one.lambda_rel)
+        if key not in self._built:
+            self._built[key] = self.shop.build(one)
+        return self._built[key]
+
+    def session(self, name: str) -> Session:
+        counts = {TRAIN: self.settings.train_scenes, HEADLINE: self.settings.scenes}
+        return self.workshop.session(
+            name, counts.get(name, self.settings.set_scenes), self.progress
+        )
+
+    def facts(self, one: Configuration, what: str, **more: Any) -> dict[str, Any]:
+        settings = {name: value for name, value in one.as_dict().items() if name != "name"}
+        return {**self.world, "what": what, "configuration": settings, **more}
+
+
+def run(
+    configurations: Sequence[Configuration], settings: RunSettings, folder: Path, progress: Progress
+) -> Front:
+    """Measure ``configurations``; what ``folder`` holds already is not measured again.
+
+    Raises:
+        FileError: the folder cannot be written.
+        UsageError, ConfigError: a configuration cannot be.
+        GeometryError, MissingExtraError: from meshing.
+        VerificationError: the emulated core disagrees with this host's.
+    """
+    skin, protocol = paper_skin(), adjacent(16)
+    shop = ModelShop(skin, protocol)
+    for one in configurations:  # what cannot be is refused before anything is written
+        shop.refuse(one)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(
+            f"{folder}: cannot make this folder ({error.strerror}); name another with -o"
+        ) from None
+    desk = _Desk(
+        settings,
+        Store(folder / RESULTS),
+        Workshop(skin, protocol, settings.seed, settings.simulated_elements, folder / "frames"),
+        shop,
+        _world(settings, skin, protocol),
+        progress,
+    )
+    for name in (TRAIN, HEADLINE, *settings.sets):
+        desk.session(name)
+    trained = {
+        one.name: _train(desk, one) for one in progress(configurations, "choosing thresholds")
+    }
+    cells = [(name, snr_db) for name in (HEADLINE, *settings.sets) for snr_db in settings.snrs_db]
+    scores: dict[str, dict[str, dict[str, Any]]] = {one.name: {} for one in configurations}
+    # cell by cell, so that frames with noise are made once for all configurations that measure alike
+    for name, snr_db, one in progress(
+        [(*cell, one) for cell in cells for one in configurations], "scoring"
+    ):
+        scores[one.name].setdefault(name, {})[f"{snr_db:g}"] = _score(
+            desk, one, name, snr_db, trained[one.name]
+        )
+    counted, why = _instructions(desk, configurations, folder)
+    times, kernels = _host(desk, configurations)
+    points = [
+        Point(
+            one,
+            trained[one.name].threshold,
+            trained[one.name].force_scale,
+            static_costs(one, desk.built(one)),
+            counted[one.name],
+            times[one.name],
+            scores[one.name],
+        )
+        for one in configurations
+    ]
+    facts: dict[str, Any] = {
+        "made_by": f"eitskin {__version__}, eitskin tradeoff run",
+        "machine": machine(),
+        "kernels": kernels,
+    }
+    facts |= {"skin": skin.name, "instructions": why, "model_elements": ELEMENTS}
+    return Front({**settings.as_dict(), **facts}, tuple(_estimated(points)), str(folder))
+
+
+def _world(settings: RunSettings, skin: Skin, protocol: Protocol) -> dict[str, Any]:
+    """What a result depends on besides its configuration: the core's own bytes among it, so that
+    another build measures anew."""
+    module = load_core("float32")
+    core = hashlib.sha256(Path(module.__file__).read_bytes()).hexdigest()[:16]
+    counts = [settings.train_scenes, settings.simulated_elements, ELEMENTS, settings.seed]
+    return {
+        "version": __version__,
+        "core": core,
+        "skin": skin.name,
+        "protocol": f"{protocol.hash:016x}",
+        "counts": counts,
+    }
+
+
+def _train(desk: _Desk, one: Configuration) -> Trained:
+    facts = desk.facts(one, "train")
+    kept = desk.store.get(facts)
+    if kept is None:
+        session = desk.session(TRAIN)
+        done = train(
+            desk.built(one), session, solve_session(one, desk.built(one), session, HEADLINE_DB)
+        )
+        kept = desk.store.put(facts, vars(done))
+    return Trained(**kept)
+
+
+def _score(
+    desk: _Desk, one: Configuration, name: str, snr_db: float, trained: Trained
+) -> dict[str, Any]:
+    session = desk.session(name)
+    facts = desk.facts(one, "score", set=name, scenes=session.scenes, snr_db=snr_db)
+    kept = desk.store.get(facts)
+    if kept is None:
+        solved = solve_session(one, desk.built(one), session, snr_db)
+        kept = desk.store.put(facts, score(desk.built(one), session, solved, trained))
+    values: dict[str, Any] = kept
+    return values
+
+
+def _instructions(
+    desk: _Desk, configurations: Sequence[Configuration], folder: Path
+) -> tuple[dict[str, dict[str, Any] | None], str]:
+    """Counted instructions by configuration, None where they were not; and a word about how."""
+    how, found = desk.settings, {}
+    wanted: list[Configuration] = []
+    for one in configurations:
+        found[one.name] = desk.store.get(_counting(desk, one)) if how.counted else None
+        if found[one.name] is None:
+            wanted.append(one)
+    scenes = (
+        f"{how.counted} test scenes evenly, and the {how.costliest} with the most MACs for the most"
+    )
+    text = f"counted under QEMU on {scenes}; at {HEADLINE_DB:g} dB"
+    if not how.counted:
+        return found, "not counted: estimated from MACs"
+    if not wanted:
+        return found, text
+    emulator = make_emulator(folder)
+    if isinstance(emulator, str):
+        return found, f"estimated from MACs: {emulator}"
+    session = desk.session(HEADLINE)
+    solved = {one.name: solve_session(one, desk.built(one), session, HEADLINE_DB) for one in wanted}
+    with ThreadPoolExecutor(2) as pool:
+        jobs = [(one, pool.submit(_count, desk, emulator, one, solved[one.name])) for one in wanted]
+        try:
+            for one, job in desk.progress(jobs, "emulating"):
+                found[one.name] = desk.store.put(_counting(desk, one), job.result())
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return found, text
+
+
+def _counting(desk: _Desk, one: Configuration) -> dict[str, Any]:
+    how = desk.settings
+    return desk.facts(one, "instructions", counted=[how.scenes, how.counted, how.costliest])
+
+
+def _count(desk: _Desk, emulator: Emulator, one: Configuration, solved: Solved) -> dict[str, Any]:
+    measured = desk.session(HEADLINE).measured(HEADLINE_DB, one.samples, one.scan, one.held)
+    how = desk.settings
+    return count_instructions(
+        emulator, one, desk.built(one), measured, solved, how.counted, how.costliest
+    )
+
+
+def _host(
+    desk: _Desk, configurations: Sequence[Configuration]
+) -> tuple[dict[str, dict[str, Any] | None], str]:
+    """Times by configuration; all are taken together, or none."""
+    rounds = desk.settings.rounds
+    if not rounds:
+        return {one.name: None for one in configurations}, "not timed"
+    facts = {
+        **desk.world,
+        "what": "host",
+        "machine": machine(),
+        "rounds": rounds,
+        "scenes": desk.settings.scenes,
+    }
+    facts["configurations"] = [desk.facts(one, "host")["configuration"] for one in configurations]
+    kept = desk.store.get(facts)
+    if kept is None:
+        session = desk.session(HEADLINE)
+        entries = [
+            (one, desk.built(one), session.measured(HEADLINE_DB, one.samples, one.scan, one.held))
+            for one in configurations
+        ]
+        rows, kernels = host_times(entries, rounds, desk.progress)
+        kept = desk.store.put(facts, {"rows": rows, "kernels": kernels})
+    return {one.name: row for one, row in zip(configurations, kept["rows"], strict=True)}, str(
+        kept["kernels"]
+    )
+
+
+def _estimated(points: Sequence[Point]) -> list[Point]:
+    """``points``, where nothing was counted with an estimate from those that were, or from the
+    shipped results."""
+    if all(one.instructions is not None for one in points):
+        return list(points)
+    table = [*points]
+    with suppress(FileError, ConfigError):
+        table += load_front().points
+    result = []
+    for one in points:
+        score = one.scores[HEADLINE][f"{HEADLINE_DB:g}"]
+        macs = (score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"])
+        counted = one.instructions or estimated_instructions(table, one.configuration, macs)
+        result.append(Point(**{**vars(one), "instructions": counted}))
+    return result
