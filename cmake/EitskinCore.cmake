@@ -3,9 +3,20 @@
 # Contraction and re-association stay off: kernels say fma where they mean it, and the bits must not depend on the target.
 
 set(EITSKIN_CORE_SOURCES
-    types.c model.c load.c kernels.c columns.c kernels_portable.c context.c stages.c baseline.c frame.c floor.c observed.c map.c
-    electrodes.c glitch.c quiet.c misfit.c solve.c certificate.c fista.c
-    working_set.c coordinate.c active_set.c missing.c factor.c disc.c coupling.c fit.c keep.c regroup.c touch.c crowded.c track.c batch.c self_test.c link.c)
+    base/status.c
+    kernels/kernels.c kernels/portable.c
+    model/model.c model/force.c
+    context/column_cache.c context/workspace.c
+    frame/projection.c frame/reference.c frame/frame.c frame/regularisation.c frame/whitening.c
+    frame/map.c frame/reference_outliers.c
+    diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c
+    diagnostics/crowded.c
+    solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c solve/coordinate_descent.c
+    solve/active_set.c solve/violations.c solve/gram_factor.c
+    touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c
+    touch/touch.c touch/tracker.c
+    api/batch.c api/self_test.c
+    link/link.c)
 
 set(EITSKIN_WARNINGS -Wall -Wextra -Wconversion -Wdouble-promotion -Werror)
 set(EITSKIN_ARITHMETIC -fno-fast-math -ffp-contract=off -fno-math-errno) # in this order: the first resets the last
@@ -22,12 +33,12 @@ function(eitskin_add_core name)
         target_compile_definitions(${name} PUBLIC EITS_DOUBLE)
     endif()
     if(EITSKIN_AVX2)
-        target_sources(${name} PRIVATE ${root}/src/kernels_avx2.c)
-        set_source_files_properties(${root}/src/kernels_avx2.c PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma;-mf16c")
+        target_sources(${name} PRIVATE ${root}/src/kernels/avx2.c)
+        set_source_files_properties(${root}/src/kernels/avx2.c PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma;-mf16c")
         target_compile_definitions(${name} PRIVATE EITS_BUILD_AVX2)
     endif()
     if(EITSKIN_M7)
-        target_sources(${name} PRIVATE ${root}/src/kernels_m7.c)
+        target_sources(${name} PRIVATE ${root}/src/kernels/m7.c)
         target_compile_definitions(${name} PRIVATE EITS_BUILD_M7)
     endif()
     if(NOT CMAKE_SYSTEM_NAME STREQUAL "Generic")

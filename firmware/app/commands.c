@@ -1,9 +1,16 @@
-/* Commands: lengths and ranges are checked before anything is changed, and one that is sent again is answered again. */
+/* Commands: lengths and ranges are checked before anything is changed, and one that is sent again
+ * is answered again. */
 #include "app/instrument.h"
 
 #include <string.h>
 
-enum { MOST_ITERATIONS = 1000, MOST_SETTLE_US = 50000, MOST_PERIOD_US = 600000000, LEAST_SAMPLES = 4, LEAST_MODEL = 64 };
+enum {
+    MOST_ITERATIONS = 1000,
+    MOST_SETTLE_US = 50000,
+    MOST_PERIOD_US = 600000000,
+    LEAST_SAMPLES = 4,
+    LEAST_MODEL = 64
+};
 enum { LEAST_EXCITATION_MILLIHZ = 1000, MOST_EXCITATION_MILLIHZ = 250000000 };
 
 static fw_answer answer(eits_reply_status status, int32_t a, int32_t b)
@@ -73,7 +80,8 @@ static fw_answer on_stream(fw_instrument *instrument, const void *payload, size_
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
     if ((c.what & ~EITS_STREAM_RAW) != 0 && !instrument->engine.tared)
         return answer(EITS_REPLY_NOT_TARED, 0, 0);
-    instrument->stream = (fw_stream){.what = c.what, .every = c.every, .left = c.frames, .counted = c.frames != 0};
+    instrument->stream =
+        (fw_stream){.what = c.what, .every = c.every, .left = c.frames, .counted = c.frames != 0};
     return ok();
 }
 
@@ -84,11 +92,13 @@ static fw_answer on_tare(fw_instrument *instrument, const void *payload, size_t 
     (void)size;
     memcpy(&c, payload, sizeof c);
     const size_t at = offsetof(eits_command_tare, frames);
-    if (outside(&bad, at, c.frames, 1, FW_TARE_MOST) || (c.frames > 1 && outside(&bad, at, c.frames, 4, FW_TARE_MOST)))
+    if (outside(&bad, at, c.frames, 1, FW_TARE_MOST) ||
+        (c.frames > 1 && outside(&bad, at, c.frames, 4, FW_TARE_MOST)))
         return bad;
     if (!instrument->engine.open)
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
-    fw_tare_begin(&instrument->tare, &instrument->engine, c.request, c.frames, fw_now_us(instrument));
+    fw_tare_begin(&instrument->tare, &instrument->engine, c.request, c.frames,
+                  fw_now_us(instrument));
     return (fw_answer){.later = true};
 }
 
@@ -96,23 +106,28 @@ static fw_answer on_tare(fw_instrument *instrument, const void *payload, size_t 
 static fw_answer check_scan(const fw_instrument *instrument, const eits_command_scan *c)
 {
     fw_answer bad;
-    if (outside(&bad, offsetof(eits_command_scan, excitation_millihz), c->excitation_millihz, LEAST_EXCITATION_MILLIHZ,
-                MOST_EXCITATION_MILLIHZ) ||
-        outside(&bad, offsetof(eits_command_scan, sample_rate_hz), c->sample_rate_hz, FW_LEAST_RATE_HZ, FW_MOST_RATE_HZ) ||
-        outside(&bad, offsetof(eits_command_scan, samples), c->samples, LEAST_SAMPLES, FW_MAX_SAMPLES) ||
+    if (outside(&bad, offsetof(eits_command_scan, excitation_millihz), c->excitation_millihz,
+                LEAST_EXCITATION_MILLIHZ, MOST_EXCITATION_MILLIHZ) ||
+        outside(&bad, offsetof(eits_command_scan, sample_rate_hz), c->sample_rate_hz,
+                FW_LEAST_RATE_HZ, FW_MOST_RATE_HZ) ||
+        outside(&bad, offsetof(eits_command_scan, samples), c->samples, LEAST_SAMPLES,
+                FW_MAX_SAMPLES) ||
         outside(&bad, offsetof(eits_command_scan, settle_us), c->settle_us, 0, MOST_SETTLE_US) ||
         outside(&bad, offsetof(eits_command_scan, reserved), c->reserved, 0, 0) ||
-        outside(&bad, offsetof(eits_command_scan, frame_period_us), c->frame_period_us, 0, MOST_PERIOD_US))
+        outside(&bad, offsetof(eits_command_scan, frame_period_us), c->frame_period_us, 0,
+                MOST_PERIOD_US))
         return bad;
     const uint64_t half_rate_millihz = (uint64_t)c->sample_rate_hz * 500u;
     if (c->excitation_millihz >= half_rate_millihz) /* more than two samples a period */
         return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
                       (int32_t)(half_rate_millihz - 1));
     if (fw_ad9833_tuning(instrument->board->mclk_hz, c->excitation_millihz) == 0)
-        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz), LEAST_EXCITATION_MILLIHZ);
+        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
+                      LEAST_EXCITATION_MILLIHZ);
     if (!fw_whole_periods(c->excitation_millihz, c->sample_rate_hz, c->samples))
-        return answer(EITS_REPLY_PERIODS,
-                      (int32_t)fw_nearest_whole(c->excitation_millihz, c->sample_rate_hz, c->samples), 0);
+        return answer(
+            EITS_REPLY_PERIODS,
+            (int32_t)fw_nearest_whole(c->excitation_millihz, c->sample_rate_hz, c->samples), 0);
     return ok();
 }
 
@@ -124,11 +139,12 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     fw_answer checked = check_scan(instrument, &c);
     if (checked.status != EITS_REPLY_OK)
         return checked;
-    const fw_scan_settings settings = {c.excitation_millihz, c.sample_rate_hz, c.samples, c.settle_us, c.check_every,
-                                       c.frame_period_us};
+    const fw_scan_settings settings = {c.excitation_millihz, c.sample_rate_hz, c.samples,
+                                       c.settle_us,          c.check_every,    c.frame_period_us};
     const fw_scan_table table = fw_engine_table(&instrument->engine);
     const uint64_t least_us = (uint64_t)fw_scan_rows(&settings, &table) * fw_slot_us(&settings);
-    if (instrument->engine.open && settings.frame_period_us != 0 && settings.frame_period_us < least_us)
+    if (instrument->engine.open && settings.frame_period_us != 0 &&
+        settings.frame_period_us < least_us)
         return answer(EITS_REPLY_TOO_FAST, least_us > INT32_MAX ? INT32_MAX : (int32_t)least_us, 0);
     fw_stop_scan(instrument);
     if (fw_scan_configure(&instrument->scan, &settings) == FW_OK) {
@@ -161,8 +177,10 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
     fw_answer bad;
     (void)size;
     memcpy(&c, payload, sizeof c);
-    if (outside(&bad, offsetof(eits_command_solver, iterations), c.iterations, 1, MOST_ITERATIONS) ||
-        outside(&bad, offsetof(eits_command_solver, max_touches), c.max_touches, 0, EITS_MAX_TOUCHES) ||
+    if (outside(&bad, offsetof(eits_command_solver, iterations), c.iterations, 1,
+                MOST_ITERATIONS) ||
+        outside(&bad, offsetof(eits_command_solver, max_touches), c.max_touches, 0,
+                EITS_MAX_TOUCHES) ||
         outside(&bad, offsetof(eits_command_solver, warm_start), c.warm_start, 0, 1) ||
         outside(&bad, offsetof(eits_command_solver, sign), c.sign, 0, EITS_SIGN_BOTH) ||
         share_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
@@ -196,7 +214,8 @@ static fw_answer on_mask_row(fw_instrument *instrument, const void *payload, siz
     memcpy(&c, payload, sizeof c);
     if (!instrument->engine.open)
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
-    if (outside(&bad, offsetof(eits_command_mask_row, row), c.row, 0, instrument->engine.model.n_rows - 1) ||
+    if (outside(&bad, offsetof(eits_command_mask_row, row), c.row, 0,
+                instrument->engine.model.n_rows - 1) ||
         outside(&bad, offsetof(eits_command_mask_row, bad), c.bad, 0, 1))
         return bad;
     (void)eits_mask_row(&instrument->engine.ctx, c.row, c.bad);
@@ -209,7 +228,8 @@ static fw_answer on_model_begin(fw_instrument *instrument, const void *payload, 
     (void)size;
     memcpy(&c, payload, sizeof c);
     if (c.bytes < LEAST_MODEL)
-        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_model_begin, bytes), LEAST_MODEL);
+        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_model_begin, bytes),
+                      LEAST_MODEL);
     return fw_upload_begin(instrument, c.bytes, c.crc);
 }
 
@@ -217,7 +237,8 @@ static fw_answer on_model_data(fw_instrument *instrument, const void *payload, s
 {
     eits_command_model_data c;
     memcpy(&c, payload, sizeof c);
-    return fw_upload_data(instrument, c.offset, (const uint8_t *)payload + sizeof c, size - sizeof c);
+    return fw_upload_data(instrument, c.offset, (const uint8_t *)payload + sizeof c,
+                          size - sizeof c);
 }
 
 static fw_answer on_model_commit(fw_instrument *instrument, const void *payload, size_t size)
@@ -277,7 +298,8 @@ static const command COMMANDS[] = {
     {EITS_PACKET_SCAN, sizeof(eits_command_scan), NOT_IN_TARE | NOT_IN_UPLOAD, on_scan},
     {EITS_PACKET_SOLVER, sizeof(eits_command_solver), NOT_IN_TARE | NOT_IN_UPLOAD, on_solver},
     {EITS_PACKET_MODEL_BEGIN, sizeof(eits_command_model_begin), NOT_IN_TARE, on_model_begin},
-    {EITS_PACKET_MODEL_DATA, sizeof(eits_command_model_data), NOT_IN_TARE | MORE_BYTES, on_model_data},
+    {EITS_PACKET_MODEL_DATA, sizeof(eits_command_model_data), NOT_IN_TARE | MORE_BYTES,
+     on_model_data},
     {EITS_PACKET_MODEL_COMMIT, sizeof(eits_command_plain), NOT_IN_TARE, on_model_commit},
     {EITS_PACKET_GET_STATS, sizeof(eits_command_get_stats), 0, on_get_stats},
     {EITS_PACKET_MASK_ROW, sizeof(eits_command_mask_row), NOT_IN_TARE | NOT_IN_UPLOAD, on_mask_row},
@@ -310,7 +332,8 @@ static bool sent_again(fw_instrument *instrument, eits_packet_type type, uint32_
     const eits_packet_reply *last = &instrument->reply;
     if (type == EITS_PACKET_TARE && instrument->tare.active && instrument->tare.request == request)
         return true;
-    if (type == EITS_PACKET_TARE && instrument->tare_answered && instrument->tare_reply.request == request)
+    if (type == EITS_PACKET_TARE && instrument->tare_answered &&
+        instrument->tare_reply.request == request)
         last = &instrument->tare_reply;
     else if (!instrument->answered || last->command != type || last->request != request)
         return false;

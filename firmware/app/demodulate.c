@@ -1,6 +1,6 @@
 #include "app/demodulate.h"
 
-#include "app/turn.h"
+#include "app/sincos.h"
 
 static uint64_t greatest_divisor(uint64_t a, uint64_t b)
 {
@@ -28,8 +28,10 @@ uint32_t fw_nearest_whole(uint32_t excitation_millihz, uint32_t rate_hz, uint32_
 
 uint32_t fw_volts_per_code_nv(const fw_capture *capture)
 {
-    const uint64_t steps = (uint64_t)capture->full_scale_code + 1u, gain = capture->front_end_gain_ppm;
-    return (uint32_t)(((uint64_t)capture->reference_uv * 1000000000u + steps * gain / 2) / (steps * gain));
+    const uint64_t steps = (uint64_t)capture->full_scale_code + 1u,
+                   gain = capture->front_end_gain_ppm;
+    return (uint32_t)(((uint64_t)capture->reference_uv * 1000000000u + steps * gain / 2) /
+                      (steps * gain));
 }
 
 static int16_t to_q15(float value)
@@ -37,14 +39,16 @@ static int16_t to_q15(float value)
     return (int16_t)(32767.0f * value + (value < 0 ? -0.5f : 0.5f));
 }
 
-fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint32_t mclk_hz, uint32_t tuning,
-                              uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples)
+fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint32_t mclk_hz,
+                              uint32_t tuning, uint32_t excitation_millihz, uint32_t rate_hz,
+                              uint32_t samples)
 {
-    if (samples > FW_MAX_SAMPLES || !fw_whole_periods(excitation_millihz, rate_hz, samples) || mclk_hz == 0 ||
-        mclk_hz % 1000000u != 0 || capture->front_end_gain_ppm == 0 || capture->full_scale_code == 0 ||
-        capture->full_scale_code > UINT16_MAX)
+    if (samples > FW_MAX_SAMPLES || !fw_whole_periods(excitation_millihz, rate_hz, samples) ||
+        mclk_hz == 0 || mclk_hz % 1000000u != 0 || capture->front_end_gain_ppm == 0 ||
+        capture->full_scale_code == 0 || capture->full_scale_code > UINT16_MAX)
         return FW_E_ARGUMENT;
-    const uint32_t periods = (uint32_t)((uint64_t)excitation_millihz * samples / ((uint64_t)rate_hz * 1000u));
+    const uint32_t periods =
+        (uint32_t)((uint64_t)excitation_millihz * samples / ((uint64_t)rate_hz * 1000u));
     const uint64_t steps = (uint64_t)capture->full_scale_code + 1u;
     int64_t sum[2] = {0, 0};
     for (uint32_t k = 0; k < samples; ++k) {
@@ -55,7 +59,8 @@ fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint
         sum[0] += d->cosine[k];
         sum[1] += d->sine[k];
     }
-    const float code_v = (float)capture->reference_uv / ((float)steps * (float)capture->front_end_gain_ppm);
+    const float code_v =
+        (float)capture->reference_uv / ((float)steps * (float)capture->front_end_gain_ppm);
     d->samples = samples;
     d->full_scale_code = capture->full_scale_code;
     d->turn_per_us = (uint32_t)((uint64_t)tuning * (mclk_hz / 1000000u) & 0x0FFFFFFFu);
@@ -76,7 +81,8 @@ bool fw_demodulate(const fw_demodulator *d, const uint16_t *samples, uint32_t st
         in_phase += (int64_t)code * d->cosine[k];
         quadrature += (int64_t)code * d->sine[k];
     }
-    /* with code = A cos(phase + 2 pi k periods / samples): in_phase ~ A cos(phase), quadrature ~ -A sin(phase) */
+    /* with code = A cos(phase + 2 pi k periods / samples): in_phase ~ A cos(phase), quadrature ~ -A
+     * sin(phase) */
     const float i = d->scale * (float)in_phase, q = -d->scale * (float)quadrature;
     float c, s;
     fw_turn_cos_sin(d->turn_per_us * start_us << 4, &c, &s);

@@ -7,7 +7,8 @@ void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes)
     *engine = (fw_engine){.workspace = workspace, .workspace_bytes = workspace_bytes, .cosine = 1};
 }
 
-/* From the workspace's start: the core's part. From its end: what is kept while another model is tried. Between: the rest. */
+/* From the workspace's start: the core's part. From its end: what is kept while another model is
+ * tried. Between: the rest. */
 static size_t kept_bytes(const eits_model *model)
 {
     return EITS_ALIGN16(model->n_rows * sizeof(float)) + EITS_ALIGN16(model->n_rows);
@@ -15,14 +16,16 @@ static size_t kept_bytes(const eits_model *model)
 
 static size_t frame_bytes(const eits_model *model)
 {
-    return EITS_ALIGN16(model->n_rows * sizeof(fw_iq)) + EITS_ALIGN16(model->n_rows * (sizeof(float) + 1u));
+    return EITS_ALIGN16(model->n_rows * sizeof(fw_iq)) +
+           EITS_ALIGN16(model->n_rows * (sizeof(float) + 1u));
 }
 
 size_t fw_engine_needs(const eits_model *model)
 {
     const size_t rows = model->n_rows;
-    return EITS_ALIGN16(eits_workspace_size(model, 0)) + 2 * frame_bytes(model) + EITS_ALIGN16(rows * sizeof(uint16_t)) +
-           EITS_ALIGN16(rows) + EITS_ALIGN16(model->n_folded) + kept_bytes(model);
+    return EITS_ALIGN16(eits_workspace_size(model, 0)) + 2 * frame_bytes(model) +
+           EITS_ALIGN16(rows * sizeof(uint16_t)) + EITS_ALIGN16(rows) +
+           EITS_ALIGN16(model->n_folded) + kept_bytes(model);
 }
 
 static void *take(uint8_t **next, size_t bytes)
@@ -48,11 +51,13 @@ static void lay_out(fw_engine *engine)
     engine->flags = take(&next, rows);
     engine->sides = take(&next, engine->model.n_folded);
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
-    engine->kept.bad = end - EITS_ALIGN16(rows); /* not cleared: it may hold what is to be restored */
+    /* not cleared: it may hold what is to be restored */
+    engine->kept.bad = end - EITS_ALIGN16(rows);
     engine->kept.v0 = (float *)(void *)(end - kept_bytes(&engine->model));
 }
 
-/* Rows that no fold names as a second one, in order. Rows that no fold names at all are among them. */
+/* Rows that no fold names as a second one, in order. Rows that no fold names at all are among them.
+ */
 static void list_unique(fw_engine *engine)
 {
     const eits_model *model = &engine->model;
@@ -71,7 +76,8 @@ static void list_unique(fw_engine *engine)
 /* Frames follow one another here, so that touches are followed in time. */
 static eits_status start_core(fw_engine *engine)
 {
-    const eits_status status = eits_init(&engine->ctx, &engine->model, engine->workspace, eits_workspace_size(&engine->model, 0));
+    const eits_status status = eits_init(&engine->ctx, &engine->model, engine->workspace,
+                                         eits_workspace_size(&engine->model, 0));
     if (status == EITS_OK)
         (void)eits_options_track(&engine->ctx.options);
     return status;
@@ -104,10 +110,12 @@ void fw_engine_close(fw_engine *engine)
 
 fw_scan_table fw_engine_table(const fw_engine *engine)
 {
-    return (fw_scan_table){engine->model.protocol, engine->model.n_rows, engine->unique, engine->n_unique};
+    return (fw_scan_table){engine->model.protocol, engine->model.n_rows, engine->unique,
+                           engine->n_unique};
 }
 
-/* Which sides are in use decides when the next solved frame builds its basis anew, and so its MACs: that is put back. */
+/* Which sides are in use decides when the next solved frame builds its basis anew, and so its MACs:
+ * that is put back. */
 void fw_engine_examine(fw_engine *engine, const float *volts)
 {
     eits_context *ctx = &engine->ctx;

@@ -1,4 +1,5 @@
-/* The solver on a board: the model that is open, the core's context, and the frames, laid out in the board's workspace. */
+/* The solver on a board: the model that is open, the core's context, and the frames, laid out in
+ * the board's workspace. */
 #ifndef FW_ENGINE_H
 #define FW_ENGINE_H
 
@@ -6,13 +7,14 @@
 #include "eitskin/eitskin.h"
 #include "hal/hal.h"
 
-/* What a baseline and its settings are, apart from the context: to go back to when a tare or a self-test fails. */
+/* What a baseline and its settings are, apart from the context: to go back to when a tare or a
+ * self-test fails. */
 typedef struct fw_kept {
     eits_baseline baseline;
     eits_options options;
     uint32_t next_id; /* of touches: ids are not used twice */
-    float *v0;    /* n_rows */
-    uint8_t *bad; /* n_rows */
+    float *v0;        /* n_rows */
+    uint8_t *bad;     /* n_rows */
     float cosine, sine;
     bool tared, angle_known;
 } fw_kept;
@@ -23,13 +25,13 @@ typedef struct fw_engine {
     eits_model model;
     eits_context ctx;
     bool open, tared;
-    bool angle_known;        /* learned at a tare; else it is estimated from each frame */
-    float cosine, sine;      /* of the angle that the voltages' phase has */
+    bool angle_known;   /* learned at a tare; else it is estimated from each frame */
+    float cosine, sine; /* of the angle that the voltages' phase has */
     fw_frame frames[2];
-    uint16_t *unique;        /* rows that are no other's reciprocal */
+    uint16_t *unique; /* rows that are no other's reciprocal */
     uint32_t n_unique;
-    uint8_t *flags;          /* n_rows: bits of the frame under way */
-    uint8_t *sides;          /* n_folded: scratch */
+    uint8_t *flags; /* n_rows: bits of the frame under way */
+    uint8_t *sides; /* n_folded: scratch */
     fw_kept kept;
 } fw_engine;
 
@@ -38,25 +40,27 @@ void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes);
 /* Workspace that a model needs here, frames included. */
 size_t fw_engine_needs(const eits_model *model);
 
-/* Take up an open model (copied) with its default options and tracking; not tared. Whatever was open is forgotten.
- * Errors: those of eits_init; EITS_E_WORKSPACE where memory is short; nothing is open then. */
+/* Take up an open model (copied) with its default options and tracking; not tared. Whatever was
+ * open is forgotten. Errors: those of eits_init; EITS_E_WORKSPACE where memory is short; nothing is
+ * open then. */
 eits_status fw_engine_open(fw_engine *engine, const eits_model *model);
 void fw_engine_close(fw_engine *engine);
 
 /* The table that the scan measures. */
 fw_scan_table fw_engine_table(const fw_engine *engine);
 
-/* The core's frame stage on a frame that is not solved: fills ctx.info as far as that goes. The frames that are solved get the
- * bits that they would have got without it. */
+/* The core's frame stage on a frame that is not solved: fills ctx.info as far as that goes. The
+ * frames that are solved get the bits that they would have got without it. */
 void fw_engine_examine(fw_engine *engine, const float *volts);
 
 /* Keep baseline, options, masks and angle; restore puts them back, the warm start forgotten. */
 void fw_engine_keep(fw_engine *engine);
 void fw_engine_restore(fw_engine *engine);
 
-/* Run the golden frame of `model`, which may be another than the open one; scanning may go on only if it is the open one.
- * Afterwards the open model is as before but for the warm start; its tare is lost only where memory is too short to keep it
- * beside `model`. Errors: EITS_E_WORKSPACE, those of eits_self_test. */
+/* Run the golden frame of `model`, which may be another than the open one; scanning may go on only
+ * if it is the open one. Afterwards the open model is as before but for the warm start; its tare is
+ * lost only where memory is too short to keep it beside `model`. Errors: EITS_E_WORKSPACE, those of
+ * eits_self_test. */
 eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, float *difference);
 
 #endif

@@ -21,7 +21,8 @@ static void tell(fw_faults *faults, eits_fault code, bool there, fw_fault_detail
 
 static bool of_electrode(eits_fault code)
 {
-    return code == EITS_FAULT_ELECTRODE_OPEN || code == EITS_FAULT_BRIDGED || code == EITS_FAULT_ELECTRODE_NOISY;
+    return code == EITS_FAULT_ELECTRODE_OPEN || code == EITS_FAULT_BRIDGED ||
+           code == EITS_FAULT_ELECTRODE_NOISY;
 }
 
 static uint32_t place_of(eits_fault code, fw_fault_detail detail)
@@ -65,6 +66,7 @@ void fw_faults_clear(fw_faults *faults, uint32_t frame)
 {
     for (uint32_t code = 1; code < EITS_FAULTS; ++code) {
         for (int32_t k = 0; k < 32; ++k)
-            fw_fault_set(faults, (eits_fault)code, false, (fw_fault_detail){.frame = frame, .index = k});
+            fw_fault_set(faults, (eits_fault)code, false,
+                         (fw_fault_detail){.frame = frame, .index = k});
     }
 }

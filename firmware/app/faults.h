@@ -1,15 +1,16 @@
-/* Faults: each is told once when it rises and once when it has gone. Those of an electrode (ELECTRODE_OPEN, BRIDGED,
- * ELECTRODE_NOISY) count for each electrode, detail.index, below 32. */
+/* Faults: each is told once when it rises and once when it has gone. Those of an electrode
+ * (ELECTRODE_OPEN, BRIDGED, ELECTRODE_NOISY) count for each electrode, detail.index, below 32. */
 #ifndef FW_FAULTS_H
 #define FW_FAULTS_H
 
-#include "app/outbox.h"
+#include "app/tx_queue.h"
 
 typedef struct fw_faults {
     fw_outbox *outbox;
     uint32_t raised;             /* bit k: fault number k */
     uint32_t there[EITS_FAULTS]; /* of an electrode's: bit e; of others: bit 0 */
-    uint8_t run[EITS_FAULTS][32]; /* frames in a row without what is there, or with what is not, by the same bits */
+    /* frames in a row without what is there, or with what is not, by the same bits */
+    uint8_t run[EITS_FAULTS][32];
 } fw_faults;
 
 typedef struct fw_fault_detail {
@@ -23,8 +24,9 @@ void fw_faults_init(fw_faults *faults, fw_outbox *outbox);
 /* The fault is there, or is not: a packet goes out where that changed. */
 void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail);
 
-/* A frame shows the fault, or does not: it rises at once, from ELECTRODE_NOISY on with the EITS_FAULT_SHOWN_FRAMES-th in a row, and
- * goes with the EITS_FAULT_CLEAN_FRAMES-th that does not, so that what comes and goes with the noise does not fill the line. */
+/* A frame shows the fault, or does not: it rises at once, from ELECTRODE_NOISY on with the
+ * EITS_FAULT_SHOWN_FRAMES-th in a row, and goes with the EITS_FAULT_CLEAN_FRAMES-th that does not,
+ * so that what comes and goes with the noise does not fill the line. */
 void fw_fault_found(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail);
 
 bool fw_fault_is(const fw_faults *faults, eits_fault code);

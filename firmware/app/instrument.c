@@ -17,11 +17,13 @@ void fw_stop_scan(fw_instrument *instrument)
     (void)fw_scan_stop(&instrument->scan);
 }
 
-/* The generator at the tuning word that the settings ask for; it is left alone where it has it already, for its phase. */
+/* The generator at the tuning word that the settings ask for; it is left alone where it has it
+ * already, for its phase. */
 static fw_status start_generator(fw_instrument *instrument)
 {
     fw_ad9833 *generator = &instrument->generator;
-    const uint32_t tuning = fw_ad9833_tuning(instrument->board->mclk_hz, instrument->settings.excitation_millihz);
+    const uint32_t tuning =
+        fw_ad9833_tuning(instrument->board->mclk_hz, instrument->settings.excitation_millihz);
     if (generator->state == FW_AD9833_RUNNING && generator->tuning == tuning)
         return FW_OK;
     return fw_ad9833_start(generator, tuning, 0, FW_SINE);
@@ -38,8 +40,9 @@ void fw_start_scan(fw_instrument *instrument)
     bool bus = status != FW_OK;
     if (status == FW_OK && instrument->engine.open && !instrument->upload.active) {
         const fw_scan_table table = fw_engine_table(&instrument->engine);
-        status = fw_demodulate_setup(&instrument->demodulator, &board->capture, board->mclk_hz, instrument->generator.tuning,
-                                     s->excitation_millihz, s->sample_rate_hz, s->samples);
+        status = fw_demodulate_setup(&instrument->demodulator, &board->capture, board->mclk_hz,
+                                     instrument->generator.tuning, s->excitation_millihz,
+                                     s->sample_rate_hz, s->samples);
         if (status == FW_OK)
             status = fw_scan_start(&instrument->scan, s, &table, instrument->engine.frames);
         bus = status == FW_E_BUS;
@@ -56,7 +59,8 @@ void fw_fail_tare(fw_instrument *instrument, eits_status why)
     if (!instrument->tare.active)
         return;
     fw_tare_abort(&instrument->tare, &instrument->engine);
-    fw_send_tare_reply(instrument, (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)why}});
+    fw_send_tare_reply(instrument,
+                       (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)why}});
 }
 
 /* A scan that gives nothing is started anew; so is one that could not be started. */
@@ -65,7 +69,8 @@ static void watch_scan(fw_instrument *instrument)
     const uint32_t now_us = fw_now_us(instrument);
     const bool wanted = instrument->engine.open && !instrument->upload.active;
     if (fw_scan_stalled(&instrument->scan, now_us)) {
-        fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true, (fw_fault_detail){.frame = instrument->last_frame});
+        fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true,
+                     (fw_fault_detail){.frame = instrument->last_frame});
         fw_fail_tare(instrument, EITS_E_BASELINE_SHORT);
         fw_start_scan(instrument);
     } else if (wanted && !instrument->scan.running && now_us - instrument->tried_us > FW_RETRY_US) {
@@ -78,7 +83,8 @@ static void watch_scan(fw_instrument *instrument)
 void fw_tell_no_model(fw_instrument *instrument)
 {
     fw_fault_set(&instrument->faults, EITS_FAULT_NO_MODEL, !instrument->engine.open,
-                 (fw_fault_detail){.frame = instrument->last_frame, .value = (int32_t)instrument->no_model_why});
+                 (fw_fault_detail){.frame = instrument->last_frame,
+                                   .value = (int32_t)instrument->no_model_why});
 }
 
 static eits_status open_bank(fw_instrument *instrument, uint32_t bank)
@@ -112,7 +118,8 @@ void fw_open_newest(fw_instrument *instrument)
             instrument->no_model_why = status;
     }
     const fw_scan_table table = fw_engine_table(&instrument->engine);
-    const uint64_t least_us = (uint64_t)fw_scan_rows(&instrument->settings, &table) * fw_slot_us(&instrument->settings);
+    const uint64_t least_us =
+        (uint64_t)fw_scan_rows(&instrument->settings, &table) * fw_slot_us(&instrument->settings);
     if (instrument->engine.open && instrument->settings.frame_period_us < least_us)
         instrument->settings.frame_period_us = 0; /* it was for a shorter table */
     fw_tell_no_model(instrument);
@@ -133,8 +140,10 @@ void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
     (void)eits_link_decoder_init(&instrument->decoder, instrument->received, FW_RECEIVE_ROOM);
     instrument->uptime_us = fw_now_us(instrument);
     const fw_last_reset *last = &board->last_reset;
-    fw_fault_set(&instrument->faults, EITS_FAULT_CRASH, last->crash != 0, (fw_fault_detail){.words = last->words});
-    fw_fault_set(&instrument->faults, EITS_FAULT_WATCHDOG, last->watchdog != 0, (fw_fault_detail){0});
+    fw_fault_set(&instrument->faults, EITS_FAULT_CRASH, last->crash != 0,
+                 (fw_fault_detail){.words = last->words});
+    fw_fault_set(&instrument->faults, EITS_FAULT_WATCHDOG, last->watchdog != 0,
+                 (fw_fault_detail){0});
     fw_open_newest(instrument);
     fw_start_scan(instrument);
     fw_send_info(instrument, 0);
@@ -204,7 +213,8 @@ static void restart(fw_instrument *instrument)
 
 int fw_instrument_run(fw_instrument *instrument, const fw_board *board)
 {
-    if (board->workspace == NULL || (uintptr_t)board->workspace % 16 != 0 || board->mclk_hz % 1000000u != 0)
+    if (board->workspace == NULL || (uintptr_t)board->workspace % 16 != 0 ||
+        board->mclk_hz % 1000000u != 0)
         return 1;
     fw_instrument_init(instrument, board);
     for (;;) {

@@ -3,7 +3,10 @@
 #include <math.h>
 #include <string.h>
 
-enum { FAILED = EITS_QUALITY_SATURATED | EITS_QUALITY_UNSETTLED, UNUSABLE = FAILED | EITS_QUALITY_OPEN | EITS_QUALITY_MASKED };
+enum {
+    FAILED = EITS_QUALITY_SATURATED | EITS_QUALITY_UNSETTLED,
+    UNUSABLE = FAILED | EITS_QUALITY_OPEN | EITS_QUALITY_MASKED
+};
 
 /* Of the voltages that the model expects, over all rows that have a fold. */
 static float rms_expected(const eits_model *model)
@@ -51,13 +54,15 @@ typedef struct evidence {
 } evidence;
 
 /* What one row says of its electrodes, given the square of the magnitude below which it is dead. */
-static void weigh(const fw_engine *engine, const fw_frame *frame, uint32_t row, float limit2, evidence *so_far)
+static void weigh(const fw_engine *engine, const fw_frame *frame, uint32_t row, float limit2,
+                  evidence *so_far)
 {
-    if (row == EITS_FOLD_NONE || engine->flags[row] == 0 || (frame->quality[row] & EITS_QUALITY_UNSETTLED) != 0 ||
-        engine->ctx.bad[row])
+    if (row == EITS_FOLD_NONE || engine->flags[row] == 0 ||
+        (frame->quality[row] & EITS_QUALITY_UNSETTLED) != 0 || engine->ctx.bad[row])
         return;
     const fw_iq z = frame->z[row];
-    const bool dead = (frame->quality[row] & EITS_QUALITY_SATURATED) != 0 || z.i * z.i + z.q * z.q < limit2;
+    const bool dead =
+        (frame->quality[row] & EITS_QUALITY_SATURATED) != 0 || z.i * z.i + z.q * z.q < limit2;
     for (uint32_t k = 0; k < 4; ++k) {
         const uint32_t electrode = engine->model.protocol[4 * (size_t)row + k];
         ++so_far->significant[electrode];
@@ -69,7 +74,8 @@ static uint32_t find_open(const fw_engine *engine, const fw_frame *frame)
 {
     const eits_model *model = &engine->model;
     const float expected_rms = rms_expected(model), least = FW_OPEN_SIGNIFICANT * expected_rms;
-    const float share = expected_rms > 0 ? FW_OPEN_SHARE * rms_of_z(engine, frame) / expected_rms : 0;
+    const float share =
+        expected_rms > 0 ? FW_OPEN_SHARE * rms_of_z(engine, frame) / expected_rms : 0;
     evidence found = {.alive = 0};
     uint32_t open = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
@@ -104,7 +110,8 @@ static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_judge
     judged->checked = all > 0;
     for (uint32_t k = 0; k < model->n_folded && judged->checked; ++k) {
         const eits_fold fold = model->fold[k];
-        if (fold.second == EITS_FOLD_NONE || ((frame->quality[fold.first] | frame->quality[fold.second]) & UNUSABLE) != 0)
+        if (fold.second == EITS_FOLD_NONE ||
+            ((frame->quality[fold.first] | frame->quality[fold.second]) & UNUSABLE) != 0)
             continue;
         const float off = frame->volts[fold.first] - (float)fold.sign * frame->volts[fold.second];
         const float share = (off < 0 ? -off : off) / all;
@@ -129,7 +136,8 @@ static void copy_reciprocals(const fw_engine *engine, fw_frame *frame)
             continue;
         frame->volts[fold.second] = (float)fold.sign * frame->volts[fold.first];
         frame->quality[fold.second] =
-            (uint8_t)((frame->quality[fold.first] & ~(unsigned)EITS_QUALITY_MASKED) | EITS_QUALITY_COPIED);
+            (uint8_t)((frame->quality[fold.first] & ~(unsigned)EITS_QUALITY_MASKED) |
+                      EITS_QUALITY_COPIED);
     }
 }
 
@@ -149,7 +157,8 @@ void fw_quality_judge(fw_engine *engine, fw_frame *frame, bool by_model, fw_judg
     for (uint32_t i = 0; i < rows; ++i) {
         if (engine->ctx.bad[i])
             frame->quality[i] |= EITS_QUALITY_MASKED;
-        const bool saturated = (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !engine->ctx.bad[i];
+        const bool saturated =
+            (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !engine->ctx.bad[i];
         if (saturated && judged->saturated++ == 0)
             judged->first_saturated = i;
         if ((frame->quality[i] & UNUSABLE) != 0)

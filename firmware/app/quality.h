@@ -1,36 +1,44 @@
-/* What is wrong with a frame's rows, and until there is a reference with its electrodes, before the solver sees it. */
+/* What is wrong with a frame's rows, and until there is a reference with its electrodes, before the
+ * solver sees it. */
 #ifndef FW_QUALITY_H
 #define FW_QUALITY_H
 
 #include "app/engine.h"
 #include "eitskin/link.h"
 
-/* A row takes part in the judgement of its electrodes where the model expects at least this share of the rms of all rows. */
-#define FW_OPEN_SIGNIFICANT 0.3f
+/* A row takes part in the judgement of its electrodes where the model expects at least this share
+ * of the rms of all rows. */
+#define FW_OPEN_SIGNIFICANT  0.3f
 /* Such a row is dead below this share of what is expected. */
-#define FW_OPEN_SHARE 0.02f
-#define FW_OPEN_LEAST_ROWS 3u
-/* Reciprocal rows disagree by more than this share of the frame's rms. Channels whose gains differ by a few parts in a hundred,
- * which a tare takes out, give half of it (scene real_board: 0.054); electrodes that are mixed up give far more. */
+#define FW_OPEN_SHARE        0.02f
+#define FW_OPEN_LEAST_ROWS   3u
+/* Reciprocal rows disagree by more than this share of the frame's rms. Channels whose gains differ
+ * by a few parts in a hundred, which a tare takes out, give half of it (scene real_board: 0.054);
+ * electrodes that are mixed up give far more. */
 #define FW_RECIPROCITY_SHARE 0.1f
 
 typedef struct fw_judgement {
     uint32_t saturated, first_saturated; /* rows, masked ones apart */
-    uint32_t open;                       /* bit e: electrode e is open, as far as the model tells */
-    bool checked;                        /* reciprocity could be judged */
-    uint32_t worst_row, worst_permille;  /* of the frame's rms */
+    /* bit e: electrode e is open, as far as the model tells */
+    uint32_t open;
+    bool checked;                       /* reciprocity could be judged */
+    uint32_t worst_row, worst_permille; /* of the frame's rms */
 } fw_judgement;
 
-/* Before all else: notes which rows the frame measured, and clears what the others hold from earlier frames. */
+/* Before all else: notes which rows the frame measured, and clears what the others hold from
+ * earlier frames. */
 void fw_quality_prepare(fw_engine *engine, fw_frame *frame);
 
-/* Judge and finish a prepared frame whose measured rows have volts and the scan's quality bits: sets the remaining bits, copies
- * reciprocals where they are not to be used as measured, and makes rows that must not be used NaN.
+/* Judge and finish a prepared frame whose measured rows have volts and the scan's quality bits:
+ * sets the remaining bits, copies reciprocals where they are not to be used as measured, and makes
+ * rows that must not be used NaN.
  *
- * Against a reference the core finds open electrodes (findings.h). Without one, and in the frames of a tare, which must not be
- * learned with an electrode off, `by_model` asks for them here: an electrode is open where every significant row that uses it is
- * dead or saturated, and there are at least three of them. The model tells shares only, the frame itself gives the scale: the
- * limit is 0.6 % of the rms voltage, and noise above a third of that hides an open electrode until there is a tare. */
+ * Against a reference the core finds open electrodes (findings.h). Without one, and in the frames
+ * of a tare, which must not be learned with an electrode off, `by_model` asks for them here: an
+ * electrode is open where every significant row that uses it is dead or saturated, and there are at
+ * least three of them. The model tells shares only, the frame itself gives the scale: the limit is
+ * 0.6 % of the rms voltage, and noise above a third of that hides an open electrode until there is
+ * a tare. */
 void fw_quality_judge(fw_engine *engine, fw_frame *frame, bool by_model, fw_judgement *judged);
 
 #endif

@@ -40,7 +40,8 @@ void fw_send_info(fw_instrument *instrument, uint32_t request)
                              .electrodes = FW_ELECTRODES,
                              .bank_bytes = fw_store_room(&board->store),
                              .data_bytes = FW_DATA_BYTES,
-                             .excitation_millihz = (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning),
+                             .excitation_millihz =
+                                 (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning),
                              .sample_rate_hz = s->sample_rate_hz,
                              .samples = (uint16_t)s->samples,
                              .settle_us = (uint16_t)s->settle_us,
@@ -84,7 +85,8 @@ static void collect(fw_instrument *instrument, eits_packet_stats *stats)
 void fw_send_stats(fw_instrument *instrument, uint32_t request, bool reset)
 {
     eits_packet_stats *stats = &instrument->last_stats;
-    if (!instrument->stats_told || stats->request != request) { /* a request sent again gets the same numbers */
+    /* a request sent again gets the same numbers */
+    if (!instrument->stats_told || stats->request != request) {
         collect(instrument, stats);
         stats->request = request;
         instrument->stats_told = true;
@@ -102,16 +104,19 @@ static eits_packet_reply make_reply(eits_packet_type command, uint32_t request, 
                                .detail = {answer.detail[0], answer.detail[1]}};
 }
 
-void fw_send_reply(fw_instrument *instrument, eits_packet_type command, uint32_t request, fw_answer answer)
+void fw_send_reply(fw_instrument *instrument, eits_packet_type command, uint32_t request,
+                   fw_answer answer)
 {
     instrument->reply = make_reply(command, request, answer);
     instrument->answered = true;
-    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_REPLY, &instrument->reply, sizeof instrument->reply, NULL, 0);
+    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_REPLY, &instrument->reply,
+                         sizeof instrument->reply, NULL, 0);
 }
 
 void fw_send_tare_reply(fw_instrument *instrument, fw_answer answer)
 {
     instrument->tare_reply = make_reply(EITS_PACKET_TARE, instrument->tare.request, answer);
     instrument->tare_answered = true;
-    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_REPLY, &instrument->tare_reply, sizeof instrument->tare_reply, NULL, 0);
+    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_REPLY, &instrument->tare_reply,
+                         sizeof instrument->tare_reply, NULL, 0);
 }

@@ -14,7 +14,8 @@ void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *de
 
 uint32_t fw_burst_us(const fw_scan_settings *s)
 {
-    return (uint32_t)(((uint64_t)s->samples * 1000000u + s->sample_rate_hz - 1) / s->sample_rate_hz);
+    return (uint32_t)(((uint64_t)s->samples * 1000000u + s->sample_rate_hz - 1) /
+                      s->sample_rate_hz);
 }
 
 uint32_t fw_slot_us(const fw_scan_settings *s)
@@ -58,7 +59,8 @@ static void plan_frame(fw_scan *scan)
     scan->next_full = every != 0 && scan->next_number % every == 0;
 }
 
-/* The free frame begins with the burst that began at start_us; false: none is free, or it is not due yet. */
+/* The free frame begins with the burst that began at start_us; false: none is free, or it is not
+ * due yet. */
 static bool begin_frame(fw_scan *scan, uint32_t start_us)
 {
     const uint32_t filled = atomic_load_explicit(&scan->filled, memory_order_relaxed);
@@ -78,7 +80,9 @@ static bool begin_frame(fw_scan *scan, uint32_t start_us)
     frame->time_us = start_us;
     frame->busy_us = 0;
     frame->bus_errors = 0;
-    frame->flags = scan->settings.check_every == 1 ? 0 : (scan->next_full ? EITS_RAW_CHECK : EITS_RAW_RECIPROCAL);
+    frame->flags = scan->settings.check_every == 1
+                       ? 0
+                       : (scan->next_full ? EITS_RAW_CHECK : EITS_RAW_RECIPROCAL);
     scan->frame = frame;
     return true;
 }
@@ -100,7 +104,8 @@ static void on_burst(void *user, const fw_burst *burst)
     const uint32_t entered_us = now_us(scan);
     atomic_fetch_add_explicit(&scan->bursts, 1, memory_order_relaxed);
     /* the clock was read after the switch and rounded down: one more microsecond makes it sure */
-    const bool settled = scan->switched && (int32_t)(burst->start_us - scan->switched_us) > (int32_t)scan->settings.settle_us;
+    const bool settled = scan->switched && (int32_t)(burst->start_us - scan->switched_us) >
+                                               (int32_t)scan->settings.settle_us;
     const bool good = settled && !burst->lost;
     if (!good && scan->tries < FW_MOST_TRIES) {
         ++scan->tries;
@@ -126,7 +131,8 @@ static void on_burst(void *user, const fw_burst *burst)
     scan->tries = 0;
     frame->bus_errors += bus_error;
     if (good) {
-        const bool saturated = fw_demodulate(scan->demodulator, burst->samples, burst->start_us, &frame->z[row]);
+        const bool saturated =
+            fw_demodulate(scan->demodulator, burst->samples, burst->start_us, &frame->z[row]);
         frame->quality[row] = saturated ? EITS_QUALITY_SATURATED : 0;
     } else {
         frame->z[row] = (fw_iq){0, 0};
@@ -140,11 +146,13 @@ static void on_burst(void *user, const fw_burst *burst)
 fw_status fw_scan_configure(fw_scan *scan, const fw_scan_settings *settings)
 {
     const fw_capture *capture = &scan->board->capture;
-    const fw_capture_setup setup = {settings->sample_rate_hz, settings->samples, fw_slot_us(settings)};
+    const fw_capture_setup setup = {settings->sample_rate_hz, settings->samples,
+                                    fw_slot_us(settings)};
     return capture->ops->configure(capture->ctx, &setup, on_burst, scan);
 }
 
-fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const fw_scan_table *table, fw_frame *frames)
+fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const fw_scan_table *table,
+                        fw_frame *frames)
 {
     const fw_capture *capture = &scan->board->capture;
     (void)fw_scan_stop(scan);

@@ -1,7 +1,9 @@
-/* The scan: measures the rows of a protocol table slot by slot, from the capture's interrupt, into one of two frames.
+/* The scan: measures the rows of a protocol table slot by slot, from the capture's interrupt, into
+ * one of two frames.
  *
- * In each interrupt the multiplexers are switched for the next row first, and the burst of the last is demodulated while they
- * settle. A row whose switch came too late is measured again. While both frames are full, the scan waits. */
+ * In each interrupt the multiplexers are switched for the next row first, and the burst of the last
+ * is demodulated while they settle. A row whose switch came too late is measured again. While both
+ * frames are full, the scan waits. */
 #ifndef FW_SCAN_H
 #define FW_SCAN_H
 
@@ -11,20 +13,25 @@
 
 #include <stdatomic.h>
 
-#define FW_SWITCH_US 3u       /* allowance in a slot for interrupt latency and break before make */
-#define FW_MOST_TRIES 8u      /* of one row, before it is given up as unsettled */
+#define FW_SWITCH_US     3u /* allowance in a slot for interrupt latency and break before make */
+#define FW_MOST_TRIES    8u /* of one row, before it is given up as unsettled */
 #define FW_LEAST_RATE_HZ 1000u
-#define FW_MOST_RATE_HZ 5000000u
+#define FW_MOST_RATE_HZ  5000000u
 
 typedef struct fw_scan_settings {
     uint32_t excitation_millihz, sample_rate_hz;
     uint32_t samples, settle_us;
-    uint32_t check_every;     /* 1: every frame is full; n > 1: reciprocal-unique, every n-th full; 0: never full */
+    /* 1: every frame is full; n > 1: reciprocal-unique, every n-th full; 0: never full */
+    uint32_t check_every;
     uint32_t frame_period_us; /* 0: as fast as it goes */
 } fw_scan_settings;
 
-#define FW_SCAN_DEFAULT \
-    {.excitation_millihz = 50000000u, .sample_rate_hz = 1000000u, .samples = 80, .settle_us = 16, .check_every = 1}
+#define FW_SCAN_DEFAULT               \
+    {.excitation_millihz = 50000000u, \
+     .sample_rate_hz = 1000000u,      \
+     .samples = 80,                   \
+     .settle_us = 16,                 \
+     .check_every = 1}
 
 typedef struct fw_frame {
     uint32_t number, time_us; /* when its first burst began */
@@ -38,11 +45,12 @@ typedef struct fw_frame {
     uint8_t *quality;         /* n_rows */
 } fw_frame;
 
-/* What is measured: rows of a protocol, and those that are left when reciprocals are taken as known. */
+/* What is measured: rows of a protocol, and those that are left when reciprocals are taken as
+ * known. */
 typedef struct fw_scan_table {
     const uint8_t *protocol; /* n_rows x 4 */
     uint32_t n_rows;
-    const uint16_t *unique;  /* n_unique rows in order */
+    const uint16_t *unique; /* n_unique rows in order */
     uint32_t n_unique;
 } fw_scan_table;
 
@@ -53,7 +61,7 @@ typedef struct fw_scan {
     fw_scan_table table;
     fw_scan_settings settings;
     uint32_t slot_us, burst_us;
-    fw_frame *frames;  /* two */
+    fw_frame *frames; /* two */
     bool running;
     /* of the interrupt, while running */
     fw_frame *frame;   /* being filled; NULL: between frames */
@@ -61,7 +69,7 @@ typedef struct fw_scan {
     uint32_t tries;
     uint32_t switched_us;
     uint32_t next_due_us;
-    bool switched;     /* the row at `position` is selected */
+    bool switched; /* the row at `position` is selected */
     bool due_known, next_full;
     uint32_t next_number;
     /* of both */
@@ -72,8 +80,8 @@ typedef struct fw_scan {
 
 void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *demodulator);
 
-/* Length of a burst, and of a slot: burst, settling and switching, and where that costs at most a quarter more, made a whole
- * number of excitation periods. */
+/* Length of a burst, and of a slot: burst, settling and switching, and where that costs at most a
+ * quarter more, made a whole number of excitation periods. */
 uint32_t fw_burst_us(const fw_scan_settings *settings);
 uint32_t fw_slot_us(const fw_scan_settings *settings);
 
@@ -83,9 +91,10 @@ uint32_t fw_scan_rows(const fw_scan_settings *settings, const fw_scan_table *tab
 /* Set the stopped capture up for these settings. Errors: those of the capture. */
 fw_status fw_scan_configure(fw_scan *scan, const fw_scan_settings *settings);
 
-/* Begin to scan `table` into frames[0] and frames[1], which belong to the scan until fw_scan_stop. The demodulator is set up.
- * Errors: those of the capture and the lines; nothing runs then. */
-fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const fw_scan_table *table, fw_frame *frames);
+/* Begin to scan `table` into frames[0] and frames[1], which belong to the scan until fw_scan_stop.
+ * The demodulator is set up. Errors: those of the capture and the lines; nothing runs then. */
+fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const fw_scan_table *table,
+                        fw_frame *frames);
 
 /* Stop, all electrodes off; frames that were not taken are lost. Errors: those of the lines. */
 fw_status fw_scan_stop(fw_scan *scan);

@@ -1,4 +1,5 @@
-/* How long each stage takes: last, worst, and the 99th percentile from bins an eighth of an octave wide. */
+/* How long each stage takes: last, worst, and the 99th percentile from bins an eighth of an octave
+ * wide. */
 #ifndef FW_STATS_H
 #define FW_STATS_H
 

@@ -17,11 +17,13 @@ uint32_t fw_store_room(const fw_store *store)
 bool fw_store_record(const fw_store *store, uint32_t bank, fw_record *record)
 {
     memcpy(record, bytes_of(store, bank) + fw_store_room(store), sizeof *record);
-    return record->magic == FW_RECORD_MAGIC && record->crc == eits_crc32(0, record, FW_RECORD_BYTES - 4u) &&
+    return record->magic == FW_RECORD_MAGIC &&
+           record->crc == eits_crc32(0, record, FW_RECORD_BYTES - 4u) &&
            record->model_bytes <= fw_store_room(store);
 }
 
-eits_status fw_store_open(const fw_store *store, uint32_t bank, const fw_record *record, eits_model *model)
+eits_status fw_store_open(const fw_store *store, uint32_t bank, const fw_record *record,
+                          eits_model *model)
 {
     const uint8_t *bytes = bytes_of(store, bank);
     if (eits_crc32(0, bytes, record->model_bytes) != record->model_crc)
@@ -47,12 +49,18 @@ uint32_t fw_store_newest(const fw_store *store, uint32_t banks[FW_BANKS])
     return count;
 }
 
-fw_status fw_store_commit(const fw_store *store, uint32_t bank, uint32_t generation, uint32_t model_bytes, uint32_t model_crc)
+fw_status fw_store_commit(const fw_store *store, uint32_t bank, uint32_t generation,
+                          uint32_t model_bytes, uint32_t model_crc)
 {
-    fw_record record = {.magic = FW_RECORD_MAGIC, .generation = generation, .model_bytes = model_bytes, .model_crc = model_crc};
+    fw_record record = {.magic = FW_RECORD_MAGIC,
+                        .generation = generation,
+                        .model_bytes = model_bytes,
+                        .model_crc = model_crc};
     record.crc = eits_crc32(0, &record, FW_RECORD_BYTES - 4u);
-    fw_status status = store->ops->program(store->ctx, bank, fw_store_room(store), &record, sizeof record);
-    if (status == FW_OK && memcmp(bytes_of(store, bank) + fw_store_room(store), &record, sizeof record) != 0)
+    fw_status status =
+        store->ops->program(store->ctx, bank, fw_store_room(store), &record, sizeof record);
+    if (status == FW_OK &&
+        memcmp(bytes_of(store, bank) + fw_store_room(store), &record, sizeof record) != 0)
         status = FW_E_FLASH;
     return status;
 }

@@ -1,6 +1,6 @@
 /* What becomes of a frame: judged, given to the tare or to the solver, and sent. */
-#include "app/angle.h"
 #include "app/instrument.h"
+#include "app/phase.h"
 
 /* What the scan itself tells. */
 static void tell_scan(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
@@ -21,7 +21,8 @@ static void tell_scan(fw_instrument *instrument, const fw_frame *frame, const fw
     instrument->agreeing = doubtful ? 0 : instrument->agreeing + 1;
     detail.index = (int32_t)judged->worst_row;
     detail.value = (int32_t)judged->worst_permille;
-    if (instrument->doubtful >= FW_RECIPROCITY_FRAMES || instrument->agreeing >= FW_RECIPROCITY_FRAMES)
+    if (instrument->doubtful >= FW_RECIPROCITY_FRAMES ||
+        instrument->agreeing >= FW_RECIPROCITY_FRAMES)
         fw_fault_set(faults, EITS_FAULT_RECIPROCITY, doubtful, detail);
 }
 
@@ -43,7 +44,8 @@ static void examine(fw_instrument *instrument, const fw_frame *frame, const fw_j
         fw_engine_examine(&instrument->engine, frame->volts);
     else
         instrument->engine.ctx.info = (eits_info){.open_electrodes = judged->open};
-    tell_found(instrument, frame, !instrument->engine.tared); /* without a reference none is stale */
+    /* without a reference none is stale */
+    tell_found(instrument, frame, !instrument->engine.tared);
 }
 
 static void send_raw(fw_instrument *instrument, const fw_frame *frame, uint32_t flags)
@@ -55,7 +57,8 @@ static void send_raw(fw_instrument *instrument, const fw_frame *frame, uint32_t 
                                   .n_rows = (uint16_t)rows,
                                   .flags = (uint16_t)(frame->flags | flags)};
     if ((instrument->stream.what & EITS_STREAM_RAW) != 0)
-        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_RAW, &head, sizeof head, frame->volts, 5 * (size_t)rows);
+        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_RAW, &head, sizeof head, frame->volts,
+                             5 * (size_t)rows);
 }
 
 static void take_tare(fw_instrument *instrument, const fw_frame *frame)
@@ -65,11 +68,13 @@ static void take_tare(fw_instrument *instrument, const fw_frame *frame)
     if (step == FW_TARE_TAKEN || step == FW_TARE_DONE)
         send_raw(instrument, frame, EITS_RAW_QUIET);
     if (step == FW_TARE_DONE) {
-        fw_fault_set(&instrument->faults, EITS_FAULT_STALE_REFERENCE, false, (fw_fault_detail){.frame = frame->number});
+        fw_fault_set(&instrument->faults, EITS_FAULT_STALE_REFERENCE, false,
+                     (fw_fault_detail){.frame = frame->number});
         fw_send_tare_reply(instrument, (fw_answer){0});
     }
     if (step == FW_TARE_FAILED)
-        fw_send_tare_reply(instrument, (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)status}});
+        fw_send_tare_reply(instrument,
+                           (fw_answer){.status = EITS_REPLY_CORE, .detail = {(int32_t)status}});
 }
 
 /* Whether this frame is one of those that are streamed. */
@@ -90,26 +95,28 @@ static uint32_t low_word(uint64_t count)
     return count > UINT32_MAX ? UINT32_MAX : (uint32_t)count;
 }
 
-static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_packet_solved *head, const eits_touch *touches,
-                        uint32_t count)
+static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_packet_solved *head,
+                        const eits_touch *touches, uint32_t count)
 {
     const eits_context *ctx = &instrument->engine.ctx;
     const uint32_t pixels = instrument->engine.model.n_pixels;
     if ((instrument->stream.what & EITS_STREAM_IMAGE) != 0) {
         head->count = (uint16_t)pixels;
         head->age_us = fw_now_us(instrument) - frame->end_us;
-        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_IMAGE, head, sizeof *head, ctx->image, pixels * sizeof(float));
+        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_IMAGE, head, sizeof *head, ctx->image,
+                             pixels * sizeof(float));
     }
     if ((instrument->stream.what & EITS_STREAM_TOUCHES) != 0) {
         eits_packet_touch body[EITS_MAX_TOUCHES];
         for (uint32_t k = 0; k < count; ++k) {
             const eits_touch t = touches[k];
-            body[k] = (eits_packet_touch){t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence,
-                                        t.load_n};
+            body[k] = (eits_packet_touch){
+                t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n};
         }
         head->count = (uint16_t)count;
         head->age_us = fw_now_us(instrument) - frame->end_us;
-        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_TOUCHES, head, sizeof *head, body, count * sizeof body[0]);
+        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_TOUCHES, head, sizeof *head, body,
+                             count * sizeof body[0]);
     }
 }
 
@@ -120,7 +127,8 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count = 0;
     const uint32_t began_us = fw_now_us(instrument);
-    const eits_status status = eits_reconstruct(ctx, frame->volts, instrument->engine.model.n_rows, NULL, NULL);
+    const eits_status status =
+        eits_reconstruct(ctx, frame->volts, instrument->engine.model.n_rows, NULL, NULL);
     const uint32_t solved_us = fw_now_us(instrument);
     const bool wanted = (instrument->stream.what & EITS_STREAM_TOUCHES) != 0;
     if (wanted && status == EITS_OK)
@@ -162,8 +170,9 @@ static void check_deadline(fw_instrument *instrument, const fw_frame *frame, uin
     const uint32_t period = instrument->settings.frame_period_us, late = now_us - frame->end_us;
     const bool missed = period != 0 && late > period;
     instrument->deadlines_missed += missed;
-    fw_fault_set(&instrument->faults, EITS_FAULT_DEADLINE, missed,
-                 (fw_fault_detail){.frame = frame->number, .value = missed ? (int32_t)(late - period) : 0});
+    fw_fault_set(
+        &instrument->faults, EITS_FAULT_DEADLINE, missed,
+        (fw_fault_detail){.frame = frame->number, .value = missed ? (int32_t)(late - period) : 0});
 }
 
 void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
@@ -171,7 +180,8 @@ void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
     fw_engine *engine = &instrument->engine;
     fw_stream *stream = &instrument->stream;
     const bool quiet = fw_tare_wants(&instrument->tare, frame);
-    const bool solved = engine->tared && (stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0;
+    const bool solved =
+        engine->tared && (stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0;
     fw_judgement judged;
     instrument->last_frame = frame->number;
     fw_quality_prepare(engine, frame);

@@ -1,6 +1,7 @@
 #include "app/tare.h"
 
-void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames, uint32_t now_us)
+void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames,
+                   uint32_t now_us)
 {
     fw_engine_keep(engine);
     *tare = (fw_tare){.active = true, .request = request, .wanted = frames, .since_us = now_us};
@@ -37,7 +38,8 @@ static eits_status add(fw_tare *tare, fw_engine *engine, const fw_frame *frame)
     return status;
 }
 
-fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame, eits_status *status)
+fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame,
+                         eits_status *status)
 {
     if (!fw_tare_wants(tare, frame))
         return FW_TARE_NOT_YET;

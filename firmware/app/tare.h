@@ -1,11 +1,13 @@
-/* Learning the reference from quiet frames. Until it is done, the last reference stays; should it fail, it comes back. */
+/* Learning the reference from quiet frames. Until it is done, the last reference stays; should it
+ * fail, it comes back. */
 #ifndef FW_TARE_H
 #define FW_TARE_H
 
 #include "app/engine.h"
 
 #define FW_TARE_MOST 1024u
-#define FW_TARE_REFUSED 16u /* quiet frames that may be refused (a saturated row...) before the tare fails */
+#define FW_TARE_REFUSED \
+    16u /* quiet frames that may be refused (a saturated row...) before the tare fails */
 
 typedef struct fw_tare {
     bool active;
@@ -22,14 +24,16 @@ typedef enum fw_tare_step {
 } fw_tare_step;
 
 /* 1 frame, or 4 to FW_TARE_MOST. */
-void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames, uint32_t now_us);
+void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames,
+                   uint32_t now_us);
 
 /* Whether the frame belongs to the tare; the first such must give the angle (fw_tare_first). */
 bool fw_tare_wants(const fw_tare *tare, const fw_frame *frame);
 bool fw_tare_first(const fw_tare *tare);
 
 /* Take a judged frame. */
-fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame, eits_status *status);
+fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame,
+                         eits_status *status);
 
 /* Give up: the last reference is back. */
 void fw_tare_abort(fw_tare *tare, fw_engine *engine);

@@ -1,4 +1,5 @@
-/* A model over the wire into the bank that is not in use: verified, tried, made valid, and only then taken up. */
+/* A model over the wire into the bank that is not in use: verified, tried, made valid, and only
+ * then taken up. */
 #include "app/instrument.h"
 
 static fw_answer refuse(eits_reply_status status, int32_t a, int32_t b)
@@ -14,7 +15,8 @@ fw_answer fw_model_fits(const fw_instrument *instrument, const eits_model *model
     if (model->n_electrodes > FW_ELECTRODES)
         return refuse(EITS_REPLY_MODEL_SCAN, (int32_t)model->n_electrodes, (int32_t)FW_ELECTRODES);
     if (raw > EITS_LINK_MAX_PAYLOAD || image > EITS_LINK_MAX_PAYLOAD)
-        return refuse(EITS_REPLY_MODEL_SIZE, (int32_t)EITS_LINK_MAX_PAYLOAD, (int32_t)(raw > image ? raw : image));
+        return refuse(EITS_REPLY_MODEL_SIZE, (int32_t)EITS_LINK_MAX_PAYLOAD,
+                      (int32_t)(raw > image ? raw : image));
     if (fw_engine_needs(model) > memory)
         return refuse(EITS_REPLY_MODEL_SIZE, (int32_t)memory, (int32_t)fw_engine_needs(model));
     return (fw_answer){0};
@@ -52,7 +54,8 @@ fw_answer fw_upload_begin(fw_instrument *instrument, uint32_t bytes, uint32_t cr
     if (bytes > fw_store_room(store))
         return refuse(EITS_REPLY_MODEL_SIZE, (int32_t)fw_store_room(store), 0);
     pause_scan(instrument);
-    if (upload->begun && upload->bytes == bytes && upload->crc == crc) /* cut short earlier: goes on where it was */
+    /* cut short earlier: goes on where it was */
+    if (upload->begun && upload->bytes == bytes && upload->crc == crc)
         return refuse(EITS_REPLY_OK, (int32_t)upload->offset, 0);
     upload->bank = spare_bank(instrument);
     upload->bytes = bytes;
@@ -66,20 +69,26 @@ fw_answer fw_upload_begin(fw_instrument *instrument, uint32_t bytes, uint32_t cr
     return refuse(EITS_REPLY_FLASH, 0, 0);
 }
 
-static fw_status program(const fw_store *store, const fw_upload *upload, const uint8_t *bytes, size_t size)
+static fw_status program(const fw_store *store, const fw_upload *upload, const uint8_t *bytes,
+                         size_t size)
 {
     const size_t whole = size - size % 4u;
-    fw_status status = whole > 0 ? store->ops->program(store->ctx, upload->bank, upload->offset, bytes, whole) : FW_OK;
-    if (status == FW_OK && whole < size) { /* the end of a model: what fills the last word stays erased */
+    fw_status status =
+        whole > 0 ? store->ops->program(store->ctx, upload->bank, upload->offset, bytes, whole)
+                  : FW_OK;
+    /* the end of a model: what fills the last word stays erased */
+    if (status == FW_OK && whole < size) {
         uint8_t last[4] = {0xFF, 0xFF, 0xFF, 0xFF};
         for (size_t k = whole; k < size; ++k)
             last[k - whole] = bytes[k];
-        status = store->ops->program(store->ctx, upload->bank, upload->offset + (uint32_t)whole, last, sizeof last);
+        status = store->ops->program(store->ctx, upload->bank, upload->offset + (uint32_t)whole,
+                                     last, sizeof last);
     }
     return status;
 }
 
-fw_answer fw_upload_data(fw_instrument *instrument, uint32_t offset, const uint8_t *bytes, size_t size)
+fw_answer fw_upload_data(fw_instrument *instrument, uint32_t offset, const uint8_t *bytes,
+                         size_t size)
 {
     fw_upload *upload = &instrument->upload;
     if (!upload->begun)
@@ -91,7 +100,8 @@ fw_answer fw_upload_data(fw_instrument *instrument, uint32_t offset, const uint8
     if (size > left)
         return refuse(EITS_REPLY_RANGE, 4, (int32_t)upload->bytes);
     if (size % 4u != 0 && size != left)
-        return refuse(EITS_REPLY_LENGTH, (int32_t)(sizeof(eits_command_model_data) + size - size % 4u), 0);
+        return refuse(EITS_REPLY_LENGTH,
+                      (int32_t)(sizeof(eits_command_model_data) + size - size % 4u), 0);
     if (program(&instrument->board->store, upload, bytes, size) != FW_OK) {
         upload->begun = false;
         leave(instrument);
@@ -105,7 +115,8 @@ fw_answer fw_upload_data(fw_instrument *instrument, uint32_t offset, const uint8
 static fw_answer try_model(fw_instrument *instrument, eits_model *model)
 {
     const fw_upload *upload = &instrument->upload;
-    const uint8_t *bytes = instrument->board->store.ops->bank(instrument->board->store.ctx, upload->bank);
+    const uint8_t *bytes =
+        instrument->board->store.ops->bank(instrument->board->store.ctx, upload->bank);
     if (eits_crc32(0, bytes, upload->bytes) != upload->crc)
         return refuse(EITS_REPLY_MODEL_CRC, 0, 0);
     eits_status status = eits_model_open(model, bytes, upload->bytes);
@@ -135,7 +146,8 @@ fw_answer fw_upload_commit(fw_instrument *instrument)
     fw_answer answer = try_model(instrument, &model);
     if (answer.status == EITS_REPLY_OK) {
         fw_record other;
-        const uint32_t generation = fw_store_record(store, 1u - upload->bank, &other) ? other.generation + 1u : 1u;
+        const uint32_t generation =
+            fw_store_record(store, 1u - upload->bank, &other) ? other.generation + 1u : 1u;
         if (fw_store_commit(store, upload->bank, generation, upload->bytes, upload->crc) != FW_OK)
             answer = refuse(EITS_REPLY_FLASH, (int32_t)fw_store_room(store), 0);
         else
@@ -147,6 +159,7 @@ fw_answer fw_upload_commit(fw_instrument *instrument)
 
 void fw_upload_check(fw_instrument *instrument)
 {
-    if (instrument->upload.active && fw_now_us(instrument) - instrument->upload.last_us > FW_UPLOAD_TIMEOUT_US)
+    if (instrument->upload.active &&
+        fw_now_us(instrument) - instrument->upload.last_us > FW_UPLOAD_TIMEOUT_US)
         leave(instrument);
 }

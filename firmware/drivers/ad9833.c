@@ -10,7 +10,7 @@ enum {
 };
 
 #define MOST_MCLK_HZ 64000000u /* so that 2^28 times it in millihertz fits 64 bits */
-#define FULL_TURN ((uint64_t)1 << 28)
+#define FULL_TURN    ((uint64_t)1 << 28)
 
 uint32_t fw_ad9833_tuning(uint32_t mclk_hz, uint64_t millihertz)
 {
@@ -36,15 +36,20 @@ uint16_t fw_ad9833_phase(uint32_t millidegrees)
 static uint16_t waveform_bits(fw_waveform waveform)
 {
     switch (waveform) {
-    case FW_SINE: break;
-    case FW_TRIANGLE: return CONTROL_MODE;
-    case FW_SQUARE: return CONTROL_OPBITEN | CONTROL_DIV2;
-    case FW_SQUARE_HALF: return CONTROL_OPBITEN;
+    case FW_SINE:
+        break;
+    case FW_TRIANGLE:
+        return CONTROL_MODE;
+    case FW_SQUARE:
+        return CONTROL_OPBITEN | CONTROL_DIV2;
+    case FW_SQUARE_HALF:
+        return CONTROL_OPBITEN;
     }
     return 0;
 }
 
-void fw_ad9833_words(uint32_t tuning, uint16_t phase, fw_waveform waveform, uint16_t words[FW_AD9833_WORDS])
+void fw_ad9833_words(uint32_t tuning, uint16_t phase, fw_waveform waveform,
+                     uint16_t words[FW_AD9833_WORDS])
 {
     words[0] = FW_AD9833_RESET_WORD;
     words[1] = (uint16_t)(ADDRESS_FREQ0 | (tuning & 0x3FFFu));
@@ -66,14 +71,16 @@ fw_status fw_ad9833_stop(fw_ad9833 *generator)
     return status;
 }
 
-fw_status fw_ad9833_start(fw_ad9833 *generator, uint32_t tuning, uint16_t phase, fw_waveform waveform)
+fw_status fw_ad9833_start(fw_ad9833 *generator, uint32_t tuning, uint16_t phase,
+                          fw_waveform waveform)
 {
     uint16_t words[FW_AD9833_WORDS];
     if (tuning >> 28 != 0 || phase >> 12 != 0)
         return FW_E_ARGUMENT;
     fw_ad9833_words(tuning, phase, waveform, words);
     generator->state = FW_AD9833_UNKNOWN;
-    for (size_t k = 0; k < FW_AD9833_WORDS; ++k) { /* one by one: what precedes a failure is known to be written */
+    /* one by one: what precedes a failure is known to be written */
+    for (size_t k = 0; k < FW_AD9833_WORDS; ++k) {
         const fw_status status = generator->spi.ops->write(generator->spi.ctx, &words[k], 1);
         if (status != FW_OK) {
             (void)fw_ad9833_stop(generator);

@@ -1,7 +1,8 @@
 /* Four ADG1206 16:1 multiplexers, one each for I+, I-, V+ and V-, switched together.
  *
- * Each decodes its own address, so that it joins one electrode at most; while they change, all are disabled: for no
- * moment are two electrodes joined through one, whatever the skew of the address lines. */
+ * Each decodes its own address, so that it joins one electrode at most; while they change, all are
+ * disabled: for no moment are two electrodes joined through one, whatever the skew of the address
+ * lines. */
 #ifndef FW_ADG1206_H
 #define FW_ADG1206_H
 
@@ -9,17 +10,21 @@
 
 #define FW_ELECTRODES 16u
 
-/* tOFF(EN): at most 140 ns from -40 to 125 C on +-15 V (ADG1206/ADG1207 data sheet, Table 1); margin for 12 V supplies. The
- * part's own break before make (tBBM, at least 10 ns) covers a change of address only. */
+/* tOFF(EN): at most 140 ns from -40 to 125 C on +-15 V (ADG1206/ADG1207 data sheet, Table 1);
+ * margin for 12 V supplies. The part's own break before make (tBBM, at least 10 ns) covers a change
+ * of address only. */
 #define FW_ADG1206_OFF_NS 200u
 
 #define FW_MUX_ADDRESSES 0x0000FFFFu
-#define FW_MUX_ENABLES 0x000F0000u
+#define FW_MUX_ENABLES   0x000F0000u
 
-typedef struct fw_adg1206 { fw_lines lines; } fw_adg1206;
+typedef struct fw_adg1206 {
+    fw_lines lines;
+} fw_adg1206;
 
-/* Drive through i_plus and i_minus, measure from v_plus to v_minus. Errors: FW_E_ARGUMENT (an electrode above 15, or both of
- * a pair the same; nothing is switched), those of the lines (then all are left disabled, if the lines let it). */
+/* Drive through i_plus and i_minus, measure from v_plus to v_minus. Errors: FW_E_ARGUMENT (an
+ * electrode above 15, or both of a pair the same; nothing is switched), those of the lines (then
+ * all are left disabled, if the lines let it). */
 fw_status fw_adg1206_select(const fw_adg1206 *bank, const uint8_t electrodes[4]);
 
 /* No electrode at all. Errors: those of the lines. */

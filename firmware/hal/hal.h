@@ -1,6 +1,8 @@
-/* What the application and the drivers need of a board: small tables of functions, each with its context pointer.
+/* What the application and the drivers need of a board: small tables of functions, each with its
+ * context pointer.
  *
- * A board fills one fw_board and calls fw_run. Nothing above this file knows a register; nothing below it knows a frame.
+ * A board fills one fw_board and calls fw_run. Nothing above this file knows a register; nothing
+ * below it knows a frame.
  */
 #ifndef FW_HAL_H
 #define FW_HAL_H
@@ -18,21 +20,30 @@ typedef enum fw_status {
     FW_E_RANGE = -5    /* a setting that this board cannot do */
 } fw_status;
 
-/* ---- SPI: 16-bit words, most significant bit first, SCLK idle high, data valid on the falling edge (mode 2); chip select
- * low around each word ---- */
+/* ---- SPI: 16-bit words, most significant bit first, SCLK idle high, data valid on the falling
+ * edge (mode 2); chip select low around each word ---- */
 typedef struct fw_spi_ops {
-    fw_status (*write)(void *ctx, const uint16_t *words, size_t count); /* returns when the last bit is out */
+    /* returns when the last bit is out */
+    fw_status (*write)(void *ctx, const uint16_t *words, size_t count);
 } fw_spi_ops;
-typedef struct fw_spi { const fw_spi_ops *ops; void *ctx; } fw_spi;
+typedef struct fw_spi {
+    const fw_spi_ops *ops;
+    void *ctx;
+} fw_spi;
 
 /* ---- digital outputs that are set together ---- */
 typedef struct fw_lines_ops {
-    fw_status (*write)(void *ctx, uint32_t mask, uint32_t levels); /* lines in `mask` take their bit of `levels` */
-    void (*wait_ns)(void *ctx, uint32_t ns);                       /* at least */
+    /* lines in `mask` take their bit of `levels` */
+    fw_status (*write)(void *ctx, uint32_t mask, uint32_t levels);
+    void (*wait_ns)(void *ctx, uint32_t ns); /* at least */
 } fw_lines_ops;
-typedef struct fw_lines { const fw_lines_ops *ops; void *ctx; } fw_lines;
+typedef struct fw_lines {
+    const fw_lines_ops *ops;
+    void *ctx;
+} fw_lines;
 
-/* ---- sampling: slots of equal length, in each a burst of samples, started by hardware at the slot's start ---- */
+/* ---- sampling: slots of equal length, in each a burst of samples, started by hardware at the
+ * slot's start ---- */
 typedef struct fw_capture_setup {
     uint32_t sample_rate_hz;
     uint32_t samples; /* per slot, at most FW_MAX_SAMPLES */
@@ -42,51 +53,70 @@ typedef struct fw_capture_setup {
 
 typedef struct fw_burst {
     const uint16_t *samples; /* right-aligned codes; valid until the next burst ends */
-    uint32_t start_us;       /* of its slot on the board's clock, exact: differences are multiples of slot_us */
-    uint32_t next_start_us;  /* when the next slot's first sample will be taken */
-    bool lost;               /* the converter overran or DMA failed: do not use it */
+    /* of its slot on the board's clock, exact: differences are multiples of slot_us */
+    uint32_t start_us;
+    uint32_t next_start_us; /* when the next slot's first sample will be taken */
+    bool lost;              /* the converter overran or DMA failed: do not use it */
 } fw_burst;
 
 typedef struct fw_capture_ops {
-    /* `done` is called from an interrupt when a slot's burst is complete. FW_E_RANGE: cannot be done. */
-    fw_status (*configure)(void *ctx, const fw_capture_setup *setup, void (*done)(void *user, const fw_burst *burst), void *user);
+    /* `done` is called from an interrupt when a slot's burst is complete. FW_E_RANGE: cannot be
+     * done. */
+    fw_status (*configure)(void *ctx, const fw_capture_setup *setup,
+                           void (*done)(void *user, const fw_burst *burst), void *user);
     fw_status (*start)(void *ctx); /* the first slot starts at least 20 us later */
     void (*stop)(void *ctx);       /* after it `done` is not called */
 } fw_capture_ops;
 typedef struct fw_capture {
     const fw_capture_ops *ops;
     void *ctx;
-    uint32_t full_scale_code;  /* 4095 for 12 bits; the bias lies at half of full_scale_code + 1 */
-    uint32_t reference_uv;     /* of the converter: full_scale_code + 1 steps (STM32 data sheets, "1 LSB ideal = VREF+ / 4096") */
-    uint32_t front_end_gain_ppm; /* volts at the converter for a volt between the electrodes, in millionths */
+    /* 4095 for 12 bits; the bias lies at half of full_scale_code + 1 */
+    uint32_t full_scale_code;
+    /* of the converter: full_scale_code + 1 steps (STM32 data sheets, "1 LSB ideal = VREF+ /
+     * 4096") */
+    uint32_t reference_uv;
+    /* volts at the converter for a volt between the electrodes, in millionths */
+    uint32_t front_end_gain_ppm;
 } fw_capture;
 
 /* ---- the link: bytes to and from the host; never blocks ---- */
 typedef struct fw_link_ops {
-    bool (*write)(void *ctx, const uint8_t *bytes, size_t size); /* all or nothing; false: no room now */
+    /* all or nothing; false: no room now */
+    bool (*write)(void *ctx, const uint8_t *bytes, size_t size);
     size_t (*read)(void *ctx, uint8_t *bytes, size_t room);
     bool (*ended)(void *ctx); /* no byte will come any more: fw_run returns. NULL: never */
 } fw_link_ops;
-typedef struct fw_link { const fw_link_ops *ops; void *ctx; } fw_link;
+typedef struct fw_link {
+    const fw_link_ops *ops;
+    void *ctx;
+} fw_link;
 
 /* ---- model storage: FW_BANKS regions that are erased whole and read in place ---- */
 #define FW_BANKS 2u
 typedef struct fw_store_ops {
     const uint8_t *(*bank)(void *ctx, uint32_t bank); /* 16-byte aligned, memory-mapped */
-    fw_status (*erase)(void *ctx, uint32_t bank);     /* to 0xFF; may take seconds; feeds the watchdog */
-    fw_status (*program)(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size); /* multiples of 4; reads back */
+    /* to 0xFF; may take seconds; feeds the watchdog */
+    fw_status (*erase)(void *ctx, uint32_t bank);
+    /* multiples of 4; reads back */
+    fw_status (*program)(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size);
 } fw_store_ops;
-typedef struct fw_store { const fw_store_ops *ops; void *ctx; uint32_t bank_bytes; } fw_store;
+typedef struct fw_store {
+    const fw_store_ops *ops;
+    void *ctx;
+    uint32_t bank_bytes;
+} fw_store;
 
 /* ---- the rest of a board ---- */
 typedef struct fw_system_ops {
-    uint32_t (*time_us)(void *ctx);      /* wraps; runs from the clock that the generator's MCLK comes from */
-    void (*wait)(void *ctx);             /* until an interrupt has come since the last call, or at most about 1 ms */
-    uint32_t (*lock)(void *ctx);         /* interrupts off; returns what unlock wants */
+    /* wraps; runs from the clock that the generator's MCLK comes from */
+    uint32_t (*time_us)(void *ctx);
+    /* until an interrupt has come since the last call, or at most about 1 ms */
+    void (*wait)(void *ctx);
+    uint32_t (*lock)(void *ctx); /* interrupts off; returns what unlock wants */
     void (*unlock)(void *ctx, uint32_t state);
     void (*feed_watchdog)(void *ctx);
-    void (*reset)(void *ctx);            /* does not return */
-    uint32_t (*stack_used)(void *ctx);   /* most bytes so far */
+    void (*reset)(void *ctx);               /* does not return */
+    uint32_t (*stack_used)(void *ctx);      /* most bytes so far */
     void (*show)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
 } fw_system_ops;
 
@@ -98,20 +128,21 @@ typedef struct fw_last_reset {
 } fw_last_reset;
 
 typedef struct fw_board {
-    const char *name;      /* at most 15 characters */
-    const char *serial;    /* at most 24 characters, hexadecimal */
+    const char *name;   /* at most 15 characters */
+    const char *serial; /* at most 24 characters, hexadecimal */
     uint32_t f_cpu_hz;
-    uint32_t mclk_hz;      /* of the generator */
+    uint32_t mclk_hz; /* of the generator */
     uint32_t stack_bytes;
-    fw_spi generator;      /* AD9833 */
-    fw_lines multiplexers; /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
+    fw_spi generator; /* AD9833 */
+    /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
+    fw_lines multiplexers;
     fw_capture capture;
     fw_link link;
     fw_store store;
     const fw_system_ops *system;
     void *system_ctx;
     fw_last_reset last_reset;
-    void *workspace;       /* 16-byte aligned: the core's, and the frames' */
+    void *workspace; /* 16-byte aligned: the core's, and the frames' */
     size_t workspace_bytes;
 } fw_board;
 

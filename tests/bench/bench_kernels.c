@@ -1,9 +1,10 @@
 /* Times each kernel beside this machine's peaks, in turns: bench_kernels RANK COLUMNS ROUNDS.
- * Prints a line a case: name, storage, multiply-accumulates and bytes of a call, bytes of its working memory, least number of
- * dependent FMAs, and the nanoseconds of a call in each round. Peaks are cases too: "read" (bytes), "fma" (multiply-accumulates)
- * and "chain" (dependent FMAs). One thread, whose own
- * time is taken; data stay where a call leaves them, so caches are as warm as they get. */
-#include "kernels.h"
+ * Prints a line a case: name, storage, multiply-accumulates and bytes of a call, bytes of its
+ * working memory, least number of dependent FMAs, and the nanoseconds of a call in each round.
+ * Peaks are cases too: "read" (bytes), "fma" (multiply-accumulates) and "chain" (dependent FMAs).
+ * One thread, whose own time is taken; data stay where a call leaves them, so caches are as warm as
+ * they get. */
+#include "kernels/kernels.h"
 
 #include <immintrin.h>
 #include <stdio.h>
@@ -16,12 +17,12 @@ enum { MOST_CASES = 64, MOST_ROUNDS = 200, FEW_COLUMNS = 48 };
 #ifdef EITS_DOUBLE
 enum { LANES = 4 };
 typedef __m256d vector;
-#define FMA _mm256_fmadd_pd
+#define FMA  _mm256_fmadd_pd
 #define SET1 _mm256_set1_pd
 #else
 enum { LANES = 8 };
 typedef __m256 vector;
-#define FMA _mm256_fmadd_ps
+#define FMA  _mm256_fmadd_ps
 #define SET1 _mm256_set1_ps
 #endif
 
@@ -32,7 +33,7 @@ typedef struct work {
     uint32_t *index, *few;
     float *unpacked;
     uint8_t *memory;
-    size_t bytes;      /* of a read */
+    size_t bytes; /* of a read */
     eits_storage storage;
     uint32_t columns;
     uint64_t sink;
@@ -75,7 +76,8 @@ static void call_read(work *w)
     const uint8_t *at = w->memory, *end = at + w->bytes / 256 * 256;
     for (; at < end; at += 256) {
         for (int k = 0; k < 8; ++k)
-            sum[k] = _mm256_xor_si256(sum[k], _mm256_load_si256((const __m256i *)(const void *)(at + 32 * k)));
+            sum[k] = _mm256_xor_si256(
+                sum[k], _mm256_load_si256((const __m256i *)(const void *)(at + 32 * k)));
     }
     for (int k = 1; k < 8; ++k)
         sum[0] = _mm256_xor_si256(sum[0], sum[k]);
@@ -84,8 +86,8 @@ static void call_read(work *w)
 
 enum { FMA_TURNS = 1000, FMA_CHAINS = 10 };
 
-#define STEP(S)                                                                                                            \
-    S = FMA(S, a, b);                                                                                                      \
+#define STEP(S)       \
+    S = FMA(S, a, b); \
     __asm__ volatile("" : "+x"(S)); /* the turns are not to be folded */
 
 static void call_fma(work *w)
@@ -115,12 +117,14 @@ static void call_chain(work *w)
 
 static void call_mul(work *w)
 {
-    w->kernels->mul(&w->matrix[w->storage], w->columns == FEW_COLUMNS ? w->few : w->index, w->x, w->columns, w->out);
+    w->kernels->mul(&w->matrix[w->storage], w->columns == FEW_COLUMNS ? w->few : w->index, w->x,
+                    w->columns, w->out);
 }
 
 static void call_mul_t(work *w)
 {
-    w->kernels->mul_t(&w->matrix[w->storage], w->columns == FEW_COLUMNS ? w->few : NULL, w->columns, w->v, w->out);
+    w->kernels->mul_t(&w->matrix[w->storage], w->columns == FEW_COLUMNS ? w->few : NULL, w->columns,
+                      w->v, w->out);
 }
 
 static void call_dots(work *w)
@@ -155,11 +159,17 @@ static void call_prox(work *w)
     w->kernels->prox(&how, w->columns, w->x, w->y, w->out, w->z);
 }
 
-static bench_case *add(const char *name, const char *storage, void (*call)(work *), double macs, double bytes)
+static bench_case *add(const char *name, const char *storage, void (*call)(work *), double macs,
+                       double bytes)
 {
     if (case_count == MOST_CASES)
         exit(1);
-    cases[case_count] = (bench_case){.name = name, .storage = storage, .call = call, .macs = macs, .bytes = bytes, .footprint = bytes};
+    cases[case_count] = (bench_case){.name = name,
+                                     .storage = storage,
+                                     .call = call,
+                                     .macs = macs,
+                                     .bytes = bytes,
+                                     .footprint = bytes};
     return &cases[case_count++];
 }
 
@@ -200,9 +210,11 @@ int main(int count, char **argument)
 {
     static const char *const names[4] = {"f32", "f16", "i16", "i8"};
     static const uint32_t item[4] = {4, 2, 2, 1};
-    const uint32_t rows = count == 4 ? (uint32_t)atoi(argument[1]) : 0, cols = count == 4 ? (uint32_t)atoi(argument[2]) : 0;
+    const uint32_t rows = count == 4 ? (uint32_t)atoi(argument[1]) : 0,
+                   cols = count == 4 ? (uint32_t)atoi(argument[2]) : 0;
     const int rounds = count == 4 ? atoi(argument[3]) : 0;
-    if (rows < 8 || rows > 1024 || cols < FEW_COLUMNS || cols > 20000 || rounds < 1 || rounds > MOST_ROUNDS) {
+    if (rows < 8 || rows > 1024 || cols < FEW_COLUMNS || cols > 20000 || rounds < 1 ||
+        rounds > MOST_ROUNDS) {
         fprintf(stderr, "usage: bench_kernels RANK COLUMNS ROUNDS\n");
         return 2;
     }
@@ -241,11 +253,13 @@ int main(int count, char **argument)
             else
                 ((int8_t *)data)[k] = (int8_t)(k % 101);
         }
-        w.matrix[s] = (eits_matrix){data, s >= EITS_STORAGE_I16 ? scale : NULL, rows, cols, stride, (eits_storage)s};
+        w.matrix[s] = (eits_matrix){
+            data, s >= EITS_STORAGE_I16 ? scale : NULL, rows, cols, stride, (eits_storage)s};
     }
     eits_make_panels(&w.matrix[0], w.panels);
 
-    const double all = (double)rows * cols, some = (double)rows * FEW_COLUMNS, real = sizeof(eits_real);
+    const double all = (double)rows * cols, some = (double)rows * FEW_COLUMNS,
+                 real = sizeof(eits_real);
     add("fma", "-", call_fma, (double)FMA_TURNS * FMA_CHAINS * LANES, 0);
     add("chain", "-", call_chain, 0, 0)->chain = FMA_TURNS;
     add("read", "-", call_read, 0, 64 << 20)->read_bytes = (size_t)64 << 20;
@@ -281,8 +295,8 @@ int main(int count, char **argument)
         run_round(&w, round);
     printf("kernels %s\n", w.kernels->name);
     for (int k = 0; k < case_count; ++k) {
-        printf("case %s;%s;%.0f;%.0f;%.0f;%.0f;", cases[k].name, cases[k].storage, cases[k].macs, cases[k].bytes, cases[k].footprint,
-               cases[k].chain);
+        printf("case %s;%s;%.0f;%.0f;%.0f;%.0f;", cases[k].name, cases[k].storage, cases[k].macs,
+               cases[k].bytes, cases[k].footprint, cases[k].chain);
         for (int round = 0; round < rounds; ++round)
             printf("%s%.3f", round > 0 ? "," : "", cases[k].ns[round]);
         printf("\n");

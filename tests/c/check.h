@@ -1,4 +1,5 @@
-/* A few words to test with: each failed CHECK says where (the first MOST_SHOWN of them); main returns checks_report(). */
+/* A few words to test with: each failed CHECK says where (the first MOST_SHOWN of them); main
+ * returns checks_report(). */
 #ifndef EITSKIN_TEST_CHECK_H
 #define EITSKIN_TEST_CHECK_H
 
@@ -8,10 +9,10 @@
 #include <stdio.h>
 
 #ifdef EITS_DOUBLE
-#define EPS DBL_EPSILON
+#define EPS                       DBL_EPSILON
 #define BOTH_WIDTHS(narrow, wide) (wide)
 #else
-#define EPS ((double)FLT_EPSILON)
+#define EPS                       ((double)FLT_EPSILON)
 #define BOTH_WIDTHS(narrow, wide) (narrow)
 #endif
 
@@ -29,17 +30,20 @@ static inline void check_that(int right, const char *file, int line, const char 
         printf("%s:%d: not true: %s\n", file, line, what);
 }
 
-static inline void check_near(double got, double want, double tolerance, const char *file, int line, const char *what)
+static inline void check_near(double got, double want, double tolerance, const char *file, int line,
+                              const char *what)
 {
     const double off = got > want ? got - want : want - got;
     ++checks_made;
     if (off <= tolerance) /* false for NaN */
         return;
     if (++checks_failed <= MOST_SHOWN)
-        printf("%s:%d: %s = %.9g, expected %.9g within %.3g\n", file, line, what, got, want, tolerance);
+        printf("%s:%d: %s = %.9g, expected %.9g within %.3g\n", file, line, what, got, want,
+               tolerance);
 }
 
-static inline void check_equal(long long got, long long want, const char *file, int line, const char *what)
+static inline void check_equal(long long got, long long want, const char *file, int line,
+                               const char *what)
 {
     ++checks_made;
     if (got == want)
@@ -52,11 +56,13 @@ static inline void check_equal(long long got, long long want, const char *file, 
 #define CHECK_NEAR(value, expected, tolerance) \
     check_near((double)(value), (double)(expected), (double)(tolerance), __FILE__, __LINE__, #value)
 /* Of whole numbers, statuses, enums. */
-#define CHECK_EQUAL(value, expected) check_equal((long long)(value), (long long)(expected), __FILE__, __LINE__, #value)
+#define CHECK_EQUAL(value, expected) \
+    check_equal((long long)(value), (long long)(expected), __FILE__, __LINE__, #value)
 
 static inline int checks_report(const char *name)
 {
-    printf("%s, %d bytes a real: %d checks, %d failed\n", name, (int)sizeof(eits_real), checks_made, checks_failed);
+    printf("%s, %d bytes a real: %d checks, %d failed\n", name, (int)sizeof(eits_real), checks_made,
+           checks_failed);
     return checks_failed == 0 && checks_made > 0 ? 0 : 1;
 }
 

@@ -24,14 +24,19 @@ double dense_entry(const eits_matrix *matrix, uint32_t column, uint32_t row)
 {
     const size_t at = (size_t)matrix->stride * column + row;
     switch (matrix->storage) {
-    case EITS_STORAGE_F32: return (double)((const float *)matrix->data)[at];
-    case EITS_STORAGE_I16: return ((const int16_t *)matrix->data)[at];
-    case EITS_STORAGE_I8: return ((const int8_t *)matrix->data)[at];
-    case EITS_STORAGE_F16: break;
+    case EITS_STORAGE_F32:
+        return (double)((const float *)matrix->data)[at];
+    case EITS_STORAGE_I16:
+        return ((const int16_t *)matrix->data)[at];
+    case EITS_STORAGE_I8:
+        return ((const int8_t *)matrix->data)[at];
+    case EITS_STORAGE_F16:
+        break;
     }
     const uint16_t half = ((const uint16_t *)matrix->data)[at];
     const int exponent = (half >> 10) & 31, fraction = half & 1023;
-    const double value = exponent == 0 ? ldexp(fraction, -24) : ldexp(1024 + fraction, exponent - 25);
+    const double value =
+        exponent == 0 ? ldexp(fraction, -24) : ldexp(1024 + fraction, exponent - 25);
     return half & 0x8000 ? -value : value;
 }
 
@@ -48,8 +53,8 @@ static double *dense_matrix(const eits_matrix *matrix)
 
 dense dense_of(const eits_model *model)
 {
-    const dense d = {model->rank, model->n_pixels, model->n_folded, dense_matrix(&model->sensitivity),
-                     dense_matrix(&model->reduction)};
+    const dense d = {model->rank, model->n_pixels, model->n_folded,
+                     dense_matrix(&model->sensitivity), dense_matrix(&model->reduction)};
     return d;
 }
 
@@ -111,7 +116,8 @@ double dense_gap(const dense *d, const double *y, const double *x, double lambda
     dense_residual(d, y, x, r);
     dense_correlate(d, r, c);
     for (uint32_t j = 0; j < d->n; ++j) {
-        const double along = sign == EITS_SIGN_INCREASE ? c[j] : (sign == EITS_SIGN_DECREASE ? -c[j] : fabs(c[j]));
+        const double along =
+            sign == EITS_SIGN_INCREASE ? c[j] : (sign == EITS_SIGN_DECREASE ? -c[j] : fabs(c[j]));
         largest = along > largest ? along : largest;
     }
     const double t = largest > lambda ? lambda / largest : 1.0;
@@ -132,7 +138,8 @@ static double soft(double v, double threshold, eits_sign sign)
     return 0;
 }
 
-void dense_fista(const dense *d, const double *y, double lambda, double lipschitz, uint32_t iterations, eits_sign sign, double *x)
+void dense_fista(const dense *d, const double *y, double lambda, double lipschitz,
+                 uint32_t iterations, eits_sign sign, double *x)
 {
     double *z = dense_numbers(d->n), *r = dense_numbers(d->rank), *c = dense_numbers(d->n), t = 1;
     memcpy(z, x, d->n * sizeof *z);
@@ -173,15 +180,18 @@ void dense_project_out(double *v, double *directions, uint32_t count, uint32_t r
 static double datum(eits_data_kind kind, double gain, double v, double v0)
 {
     switch (kind) {
-    case EITS_DATA_DIFFERENCE: break;
-    case EITS_DATA_NORMALISED: return (v - v0) / v0;
-    case EITS_DATA_LOG_RATIO: return gain * v0 * log(fmin(16, fmax(1.0 / 16, v / v0)));
+    case EITS_DATA_DIFFERENCE:
+        break;
+    case EITS_DATA_NORMALISED:
+        return (v - v0) / v0;
+    case EITS_DATA_LOG_RATIO:
+        return gain * v0 * log(fmin(16, fmax(1.0 / 16, v / v0)));
     }
     return gain * (v - v0);
 }
 
-void dense_frame(const eits_model *model, const dense *d, const double *v0, double gain, const double *v0_drift,
-                 const eits_real *frame, const uint8_t *out, double *y)
+void dense_frame(const eits_model *model, const dense *d, const double *v0, double gain,
+                 const double *v0_drift, const eits_real *frame, const uint8_t *out, double *y)
 {
     const uint32_t rank = d->rank;
     const int turns = model->data_kind != EITS_DATA_NORMALISED;

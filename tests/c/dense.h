@@ -1,4 +1,5 @@
-/* The problem again, dense and in double, written apart from the core: what the core's answers are held against. */
+/* The problem again, dense and in double, written apart from the core: what the core's answers are
+ * held against. */
 #ifndef EITSKIN_TEST_DENSE_H
 #define EITSKIN_TEST_DENSE_H
 
@@ -29,15 +30,17 @@ double dense_objective(const dense *d, const double *y, const double *x, double 
 double dense_gap(const dense *d, const double *y, const double *x, double lambda, eits_sign sign);
 
 /* FISTA as in the paper, each product computed anew; from x, which gets the result. */
-void dense_fista(const dense *d, const double *y, double lambda, double lipschitz, uint32_t iterations, eits_sign sign, double *x);
+void dense_fista(const dense *d, const double *y, double lambda, double lipschitz,
+                 uint32_t iterations, eits_sign sign, double *x);
 
-/* v without its part in the span of `count` directions of `rank` numbers (changed to an orthonormal basis). */
+/* v without its part in the span of `count` directions of `rank` numbers (changed to an orthonormal
+ * basis). */
 void dense_project_out(double *v, double *directions, uint32_t count, uint32_t rank);
 
-/* The frame stage: y (rank) from a frame. `out` (n_rows) marks rows left out; `gain` is taken as given; with v0_drift not NULL,
- * changes along that reference are projected away. */
-void dense_frame(const eits_model *model, const dense *d, const double *v0, double gain, const double *v0_drift,
-                 const eits_real *frame, const uint8_t *out, double *y);
+/* The frame stage: y (rank) from a frame. `out` (n_rows) marks rows left out; `gain` is taken as
+ * given; with v0_drift not NULL, changes along that reference are projected away. */
+void dense_frame(const eits_model *model, const dense *d, const double *v0, double gain,
+                 const double *v0_drift, const eits_real *frame, const uint8_t *out, double *y);
 
 /* sum a b; and the greatest |a - b|. */
 double dense_dot(const double *a, const double *b, size_t count);

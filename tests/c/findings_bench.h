@@ -1,12 +1,13 @@
-/* A small skin with quiet frames, and what its rows use: for tests of what is found wrong with a frame. */
+/* A small skin with quiet frames, and what its rows use: for tests of what is found wrong with a
+ * frame. */
 #ifndef EITSKIN_TEST_FINDINGS_BENCH_H
 #define EITSKIN_TEST_FINDINGS_BENCH_H
 
 #include "check.h"
 #include "small_model.h"
 
-#include "examine.h"
-#include "vec.h"
+#include "base/vec.h"
+#include "diagnostics/diagnostics.h"
 
 #include <math.h>
 #include <string.h>
@@ -26,14 +27,16 @@ static inline void add_noise(bench *b, eits_real *frame)
         frame[i] += (eits_real)(1e-3 * small_random(&b->state));
 }
 
-/* 8 electrodes: with 40 rows each electrode has 20 of them, each pair 5 or 6 that drive or measure across it. */
+/* 8 electrodes: with 40 rows each electrode has 20 of them, each pair 5 or 6 that drive or measure
+ * across it. */
 static inline eits_context *set_up(bench *b, int noise_known)
 {
     b->made = small_model_make((small_spec){.rank = 12, .side = 4});
     small_context_open(&b->c, &b->made, 0);
     b->state = 7;
     small_reference(&b->c.model, 1, b->frame);
-    for (uint32_t i = 0; i < SMALL_ROWS; ++i) /* all rows of a like size, so that all are significant */
+    /* all rows of a like size, so that all are significant */
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b->frame[i] = b->frame[i] < 0 ? R(-1) : R(1);
     for (int k = 0; k < QUIET; ++k) {
         memcpy(b->quiet[k], b->frame, sizeof b->frame);
@@ -66,8 +69,8 @@ static inline int row_uses(const eits_context *ctx, uint32_t i, uint32_t e)
 static inline int row_crosses(const eits_context *ctx, uint32_t i, uint32_t e, uint32_t f)
 {
     const uint8_t *row = eits_row(ctx, i);
-    return (row[0] == e && row[1] == f) || (row[0] == f && row[1] == e) || (row[2] == e && row[3] == f) ||
-           (row[2] == f && row[3] == e);
+    return (row[0] == e && row[1] == f) || (row[0] == f && row[1] == e) ||
+           (row[2] == e && row[3] == f) || (row[2] == f && row[3] == e);
 }
 
 static inline void look_for(eits_context *ctx, uint32_t findings)

@@ -1,4 +1,5 @@
-/* A small whitened model, a frame, and what the core's map makes of S: for tests of rows left out and of the floor. */
+/* A small whitened model, a frame, and what the core's map makes of S: for tests of rows left out
+ * and of the floor. */
 #ifndef EITSKIN_TEST_OBSERVED_BENCH_H
 #define EITSKIN_TEST_OBSERVED_BENCH_H
 
@@ -6,10 +7,10 @@
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/solve.h"
-#include "kernels.h"
-#include "observed.h"
-#include "vec.h"
+#include "frame/whitening.h"
+#include "kernels/kernels.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -82,7 +83,8 @@ static inline void map_column(eits_context *ctx, const double *column, int proje
         out[i] = (double)v[i];
 }
 
-/* S'F'y of one row's datum, squared and summed over S's columns; with `whole` that of a frame with all rows. */
+/* S'F'y of one row's datum, squared and summed over S's columns; with `whole` that of a frame with
+ * all rows. */
 static inline double energy_of_row(bench *b, uint32_t k, int whole)
 {
     eits_context *ctx = &b->b.c.ctx;
@@ -120,7 +122,8 @@ static inline double greatest_eigenvalue(const double *s)
     return size;
 }
 
-/* Each solver solves the problem of F S and y; the gap is the true one; the stated step suffices. The frame is staged. */
+/* Each solver solves the problem of F S and y; the gap is the true one; the stated step suffices.
+ * The frame is staged. */
 static inline void solve_what_is_seen(bench *b, int sign)
 {
     eits_context *ctx = &b->b.c.ctx;
@@ -136,7 +139,8 @@ static inline void solve_what_is_seen(bench *b, int sign)
     o.sign = (eits_sign)sign;
     o.lambda_rel = R(0.05);
     o.gate_factor = 0;
-    for (int solver = 3; solver >= 0; --solver) { /* the active set first: its gap bounds the optimum from below */
+    /* the active set first: its gap bounds the optimum from below */
+    for (int solver = 3; solver >= 0; --solver) {
         o.solver = (eits_solver)solver;
         o.iterations = 4000;
         o.gap_rel = R(BOTH_WIDTHS(1e-5, 1e-9));
@@ -154,7 +158,8 @@ static inline void solve_what_is_seen(bench *b, int sign)
             CHECK(info.gap <= BOTH_WIDTHS(1e-5, 1e-9) * scale);
             least = objective - (double)info.gap - room;
         }
-        CHECK(objective >= least && objective <= least + (double)info.gap + BOTH_WIDTHS(1.2e-4, 1e-8) * scale);
+        CHECK(objective >= least &&
+              objective <= least + (double)info.gap + BOTH_WIDTHS(1.2e-4, 1e-8) * scale);
         CHECK(info.gap <= R(1e-3) * (eits_real)scale);
         free(got);
     }

@@ -5,8 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char TAGS[SMALL_SECTIONS + 1][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW",
-                                                 "GRID", "DEFS", "GOLD", "SCAL", "META", "FLDS"};
+static const char TAGS[SMALL_SECTIONS + 1][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU",
+                                                 "SENS", "COLW", "GRID", "DEFS", "GOLD",
+                                                 "SCAL", "META", "FLDS"};
 enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META, FLDS };
 
 void *small_aligned(void **memory, size_t size)
@@ -56,14 +57,16 @@ uint32_t small_get_u32(const uint8_t *at)
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
-static uint16_t half_of(double value) /* towards zero, too small becomes zero: good enough for tests */
+/* towards zero, too small becomes zero: good enough for tests */
+static uint16_t half_of(double value)
 {
     int exponent;
     const double fraction = frexp(fabs(value), &exponent); /* in [0.5, 1) */
     const uint32_t sign = value < 0 ? 0x8000u : 0;
     if (value == 0 || exponent < -13)
         return (uint16_t)sign;
-    return (uint16_t)(sign | (uint32_t)(exponent + 14) << 10 | (uint32_t)((fraction * 2 - 1) * 1024));
+    return (uint16_t)(sign | (uint32_t)(exponent + 14) << 10 |
+                      (uint32_t)((fraction * 2 - 1) * 1024));
 }
 
 static void fill_protocol(uint8_t *protocol, uint8_t *fold)
@@ -99,7 +102,8 @@ static void fill_protocol(uint8_t *protocol, uint8_t *fold)
     }
     if (count != SMALL_ROWS || pairs != SMALL_PAIRS + 1)
         abort();
-    for (uint32_t k = 2; k < SMALL_PAIRS; k += 5) { /* measured the other way round: the reciprocal's sign turns */
+    /* measured the other way round: the reciprocal's sign turns */
+    for (uint32_t k = 2; k < SMALL_PAIRS; k += 5) {
         uint8_t *row = rows[fold[8 * k + 2]], kept = row[2];
         row[2] = row[3];
         row[3] = kept;
@@ -113,7 +117,8 @@ static uint32_t kept_cells(const small_spec *spec, uint32_t cells[64 * 64])
 {
     uint32_t n = 0;
     for (uint32_t cell = 0; cell < spec->side * spec->side; ++cell) {
-        const double x = cell % spec->side + 0.5 - 0.5 * spec->side, y = cell / spec->side + 0.5 - 0.5 * spec->side;
+        const double x = cell % spec->side + 0.5 - 0.5 * spec->side,
+                     y = cell / spec->side + 0.5 - 0.5 * spec->side;
         if (!spec->round || x * x + y * y < 0.25 * spec->side * spec->side)
             cells[n++] = cell;
     }
@@ -147,7 +152,8 @@ static double *make_s(const small_spec *spec, const uint32_t *cells, uint32_t n)
             if (spec->shape == SMALL_RANDOM)
                 value = small_random(&state) / sqrt(n);
             else if (spec->shape != SMALL_IDENTITY)
-                value = wave(i % across, cells[j] % side, side) * wave(i / across, cells[j] / side, side);
+                value = wave(i % across, cells[j] % side, side) *
+                        wave(i / across, cells[j] / side, side);
             if (spec->shape == SMALL_WHITENED)
                 value *= pow(SMALL_DECAY, i) * whitening(i);
             s[(size_t)j * rank + i] = value;
@@ -184,7 +190,8 @@ static double greatest_eigenvalue(const double *s, uint32_t rank, uint32_t n)
     return value;
 }
 
-static void store_s(const small_spec *spec, const double *s, uint32_t n, uint32_t stride, uint8_t *sens, uint8_t *scal)
+static void store_s(const small_spec *spec, const double *s, uint32_t n, uint32_t stride,
+                    uint8_t *sens, uint8_t *scal)
 {
     const uint32_t rank = spec->rank;
     for (uint32_t j = 0; j < n; ++j) {
@@ -192,33 +199,45 @@ static void store_s(const small_spec *spec, const double *s, uint32_t n, uint32_
         double largest = 1e-6;
         for (uint32_t i = 0; i < rank; ++i)
             largest = fabs(column[i]) > largest ? fabs(column[i]) : largest;
-        const float scale = (float)(largest * (1 + 0.1 * (j % 3)) / (spec->storage == EITS_STORAGE_I8 ? 127.0 : 32767.0));
+        const float scale = (float)(largest * (1 + 0.1 * (j % 3)) /
+                                    (spec->storage == EITS_STORAGE_I8 ? 127.0 : 32767.0));
         small_put_f32(scal + 4 * j, scale);
         for (uint32_t i = 0; i < rank; ++i) {
             const size_t at = (size_t)j * stride + i;
             switch (spec->storage) {
-            case EITS_STORAGE_F32: small_put_f32(sens + 4 * at, (float)column[i]); break;
-            case EITS_STORAGE_F16: small_put_u16(sens + 2 * at, half_of(column[i])); break;
-            case EITS_STORAGE_I16: small_put_u16(sens + 2 * at, (uint32_t)(int32_t)lrint(column[i] / (double)scale)); break;
-            case EITS_STORAGE_I8: sens[at] = (uint8_t)(int8_t)lrint(column[i] / (double)scale); break;
+            case EITS_STORAGE_F32:
+                small_put_f32(sens + 4 * at, (float)column[i]);
+                break;
+            case EITS_STORAGE_F16:
+                small_put_u16(sens + 2 * at, half_of(column[i]));
+                break;
+            case EITS_STORAGE_I16:
+                small_put_u16(sens + 2 * at, (uint32_t)(int32_t)lrint(column[i] / (double)scale));
+                break;
+            case EITS_STORAGE_I8:
+                sens[at] = (uint8_t)(int8_t)lrint(column[i] / (double)scale);
+                break;
             }
         }
     }
 }
 
-/* Each electrode's current goes in at its point of a circle of radius R around the image: E = (z - p) / |z - p|^2, times R / 20 mm;
- * the mirror of the circle is a = R, b = conj(z) / R. */
+/* Each electrode's current goes in at its point of a circle of radius R around the image: E = (z -
+ * p) / |z - p|^2, times R / 20 mm; the mirror of the circle is a = R, b = conj(z) / R. */
 static void fill_fields(const small_spec *spec, const uint32_t *cells, uint32_t n, uint8_t *flds)
 {
-    const double pixel = spec->pixel_mm > 0 ? (double)spec->pixel_mm : 6.0, half = 0.5 * spec->side, radius = 0.75 * spec->side * pixel;
+    const double pixel = spec->pixel_mm > 0 ? (double)spec->pixel_mm : 6.0, half = 0.5 * spec->side,
+                 radius = 0.75 * spec->side * pixel;
     small_put_f32(flds, 20.0f);
     small_put_f32(flds + 4, 3.0f);
     for (uint32_t j = 0; j < n; ++j) {
         uint8_t *column = flds + 16 + 2 * (size_t)j * SMALL_FIELDS_STRIDE;
-        const double x = pixel * (cells[j] % spec->side + 0.5 - half), y = pixel * (cells[j] / spec->side + 0.5 - half);
+        const double x = pixel * (cells[j] % spec->side + 0.5 - half),
+                     y = pixel * (cells[j] / spec->side + 0.5 - half);
         for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
             const double angle = 6.28318530717958647692 * e / SMALL_ELECTRODES;
-            const double dx = x - radius * cos(angle), dy = y - radius * sin(angle), unit = radius / 20 / (dx * dx + dy * dy);
+            const double dx = x - radius * cos(angle), dy = y - radius * sin(angle),
+                         unit = radius / 20 / (dx * dx + dy * dy);
             small_put_u16(column + 2 * e, half_of(unit * dx));
             small_put_u16(column + 2 * (SMALL_ELECTRODES + e), half_of(unit * dy));
         }
@@ -228,19 +247,25 @@ static void fill_fields(const small_spec *spec, const uint32_t *cells, uint32_t 
     }
 }
 
-static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *const at[SMALL_SECTIONS + 1])
+static void fill_sections(const small_spec *spec, uint32_t stride,
+                          uint8_t *const at[SMALL_SECTIONS + 1])
 {
     uint32_t cells[64 * 64];
     const uint32_t n = kept_cells(spec, cells);
     const int identity = spec->shape == SMALL_IDENTITY;
     double *s = make_s(spec, cells, n);
     const double factor = spec->lipschitz_factor > 0 ? spec->lipschitz_factor : 1.02;
-    const uint32_t whole[10] = {SMALL_ELECTRODES, SMALL_ROWS, SMALL_FOLDED, spec->rank, stride, n, spec->side, spec->side,
-                                (uint32_t)spec->storage, (uint32_t)spec->kind};
+    const uint32_t whole[10] = {SMALL_ELECTRODES,    SMALL_ROWS, SMALL_FOLDED,
+                                spec->rank,          stride,     n,
+                                spec->side,          spec->side, (uint32_t)spec->storage,
+                                (uint32_t)spec->kind};
     for (uint32_t i = 0; i < 10; ++i)
         small_put_u32(at[DIMS] + 4 * i, whole[i]);
-    const float pixel = spec->pixel_mm > 0 ? spec->pixel_mm : 6.0f, corner = -0.5f * pixel * (float)spec->side;
-    const float numbers[6] = {pixel, corner, corner, 1e-3f, (float)(factor * greatest_eigenvalue(s, spec->rank, n)), 1.0f};
+    const float pixel = spec->pixel_mm > 0 ? spec->pixel_mm : 6.0f,
+                corner = -0.5f * pixel * (float)spec->side;
+    const float numbers[6] = {
+        pixel, corner, corner, 1e-3f, (float)(factor * greatest_eigenvalue(s, spec->rank, n)),
+        1.0f};
     for (uint32_t i = 0; i < 6; ++i)
         small_put_f32(at[DIMS] + 40 + 4 * i, numbers[i]);
     store_s(spec, s, n, stride, at[SENS], at[SCAL]);
@@ -263,7 +288,8 @@ static void fill_sections(const small_spec *spec, uint32_t stride, uint8_t *cons
     }
     small_put_u32(at[DEFS], 60);
     small_put_u32(at[DEFS] + 4, 8);
-    const float defaults[12] = {0.03f, 0.3f, 1.2f, 0.3f, 0.2f, 0.003f, 3.0f, 40.0f, 9.0f, 0.0f, 25.0f, 1e-3f};
+    const float defaults[12] = {0.03f, 0.3f,  1.2f, 0.3f, 0.2f,  0.003f,
+                                3.0f,  40.0f, 9.0f, 0.0f, 25.0f, 1e-3f};
     for (uint32_t i = 0; i < 12; ++i)
         small_put_f32(at[DEFS] + 8 + 4 * i, defaults[i]);
     for (uint32_t i = 0; i < 2 * SMALL_ROWS; ++i)
@@ -280,9 +306,20 @@ small_model small_model_make(small_spec spec)
     if (spec.side > 64)
         abort();
     const uint32_t sections = SMALL_SECTIONS + (spec.fields != 0);
-    const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u, table = 64 + 16 * sections;
-    const uint32_t sizes[SMALL_SECTIONS + 1] = {64, SMALL_ROWS * 4, SMALL_FOLDED * 8, SMALL_FOLDED * 4, SMALL_FOLDED * stride * 4,
-                                            n * stride * item[spec.storage], n * 4, n * 4, 64, (2 * SMALL_ROWS + n) * 4, n * 4, 2,
+    const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u,
+                   table = 64 + 16 * sections;
+    const uint32_t sizes[SMALL_SECTIONS + 1] = {64,
+                                                SMALL_ROWS * 4,
+                                                SMALL_FOLDED * 8,
+                                                SMALL_FOLDED * 4,
+                                                SMALL_FOLDED * stride * 4,
+                                                n * stride * item[spec.storage],
+                                                n * 4,
+                                                n * 4,
+                                                64,
+                                                (2 * SMALL_ROWS + n) * 4,
+                                                n * 4,
+                                                2,
                                                 16 + n * SMALL_FIELDS_STRIDE * 2};
     const int integer = spec.storage == EITS_STORAGE_I16 || spec.storage == EITS_STORAGE_I8;
     uint32_t total = table, offset = table;
@@ -393,6 +430,7 @@ void small_new_data(eits_context *ctx, uint64_t state)
 
 int small_same_touch(const eits_touch *a, const eits_touch *b)
 {
-    return a->id == b->id && a->x_mm == b->x_mm && a->y_mm == b->y_mm && a->radius_mm == b->radius_mm &&
-           a->strength_s_per_m_mm2 == b->strength_s_per_m_mm2 && a->confidence == b->confidence && a->load_n == b->load_n;
+    return a->id == b->id && a->x_mm == b->x_mm && a->y_mm == b->y_mm &&
+           a->radius_mm == b->radius_mm && a->strength_s_per_m_mm2 == b->strength_s_per_m_mm2 &&
+           a->confidence == b->confidence && a->load_n == b->load_n;
 }

@@ -1,19 +1,34 @@
-/* Small .eitm models made in memory, for tests. Bytes are written here field by field, apart from the core's reader. */
+/* Small .eitm models made in memory, for tests. Bytes are written here field by field, apart from
+ * the core's reader. */
 #ifndef EITSKIN_TEST_SMALL_MODEL_H
 #define EITSKIN_TEST_SMALL_MODEL_H
 
 #include "eitskin/eitskin.h"
 
-/* 8 electrodes, adjacent: 40 rows in 19 reciprocal pairs, every fifth measured the other way round, and 2 single rows. */
+/* 8 electrodes, adjacent: 40 rows in 19 reciprocal pairs, every fifth measured the other way round,
+ * and 2 single rows. */
 #define SMALL_DECAY 0.75
 #define SMALL_FLOOR 0.01
-enum { SMALL_ELECTRODES = 8, SMALL_ROWS = 40, SMALL_PAIRS = 19, SMALL_FOLDED = 21, SMALL_SECTIONS = 12, SMALL_FIELDS_STRIDE = 24 };
+enum {
+    SMALL_ELECTRODES = 8,
+    SMALL_ROWS = 40,
+    SMALL_PAIRS = 19,
+    SMALL_FOLDED = 21,
+    SMALL_SECTIONS = 12,
+    SMALL_FIELDS_STRIDE = 24
+};
 
 typedef enum small_shape {
     SMALL_RANDOM = 0,
-    SMALL_IDENTITY, /* P and S are (as far as shapes go) identities and weights are 1, so that results can be said beforehand */
-    SMALL_WAVES,    /* the rows of S are orthonormal cosines over the image, the lowest first: discs can be fitted */
-    SMALL_WHITENED  /* as the builder whitens: the same, singular values SMALL_DECAY^i, floor SMALL_FLOOR, and P's rows likewise */
+    /* P and S are (as far as shapes go) identities and weights are 1, so that results can be
+     * said beforehand */
+    SMALL_IDENTITY,
+    /* the rows of S are orthonormal cosines over the image, the lowest first: discs can be
+     * fitted */
+    SMALL_WAVES,
+    /* as the builder whitens: the same, singular values SMALL_DECAY^i, floor SMALL_FLOOR, and
+     * P's rows likewise */
+    SMALL_WHITENED
 } small_shape;
 
 typedef struct small_spec {
@@ -22,9 +37,11 @@ typedef struct small_spec {
     eits_storage storage;
     eits_data_kind kind;
     small_shape shape;
-    double lipschitz_factor; /* the stated constant over the true greatest eigenvalue of S S'; 0: 1.02 */
-    float pixel_mm;          /* 0: 6 mm */
-    int fields;              /* with section FLDS: currents at points on a circle around the image, whose mirror it is */
+    /* the stated constant over the true greatest eigenvalue of S S'; 0: 1.02 */
+    double lipschitz_factor;
+    float pixel_mm; /* 0: 6 mm */
+    /* with section FLDS: currents at points on a circle around the image, whose mirror it is */
+    int fields;
 } small_spec;
 
 typedef struct small_model {
@@ -43,7 +60,8 @@ small_model small_model_with_load(const small_model *model, const void *section,
 /* Write the checksum anew after bytes were changed. */
 void small_model_seal(small_model *model);
 
-/* Where the section with this tag starts, and its 16-byte entry in the table; both abort if it is absent. */
+/* Where the section with this tag starts, and its 16-byte entry in the table; both abort if it is
+ * absent. */
 uint8_t *small_model_section(const small_model *model, const char *tag, uint32_t *size);
 uint8_t *small_model_entry(const small_model *model, const char *tag);
 

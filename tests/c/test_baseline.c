@@ -3,7 +3,7 @@
 #include "dense.h"
 #include "small_model.h"
 
-#include "vec.h"
+#include "base/vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -30,13 +30,15 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-/* Frames around `gain` times the model's reference: relative noise `noise`, each channel with an own error of 1 %. */
+/* Frames around `gain` times the model's reference: relative noise `noise`, each channel with an
+ * own error of 1 %. */
 static void quiet_frame(bench *b, double gain, double noise, uint64_t *state)
 {
     uint64_t channels = 4;
     small_reference(&b->c.model, gain, b->frame);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-        b->frame[i] *= (eits_real)((1 + 0.01 * small_random(&channels)) * (1 + noise * small_random(state)));
+        b->frame[i] *=
+            (eits_real)((1 + 0.01 * small_random(&channels)) * (1 + noise * small_random(state)));
 }
 
 static void gain_and_correlation(void)
@@ -52,7 +54,8 @@ static void gain_and_correlation(void)
             squares += pow((double)b.c.model.v_ref[k], 2);
         CHECK_NEAR(ctx->baseline.gain * (eits_real)gains[g], 1, 8 * EPS);
         CHECK_NEAR(ctx->baseline.correlation, gains[g] > 0 ? 1 : -1, 8 * EPS);
-        CHECK_NEAR(ctx->baseline.v0_rms / (eits_real)fabs(gains[g]), sqrt(squares / SMALL_FOLDED), 8 * EPS);
+        CHECK_NEAR(ctx->baseline.v0_rms / (eits_real)fabs(gains[g]), sqrt(squares / SMALL_FOLDED),
+                   8 * EPS);
         CHECK(ctx->baseline.noise_v == 0 && ctx->baseline.lambda_noise == 0);
         CHECK(ctx->baseline.ready == 1 && ctx->baseline.count == 1);
     }
@@ -64,7 +67,9 @@ static void gain_and_correlation(void)
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         const eits_fold fold = b.c.model.fold[k];
         const double first = (double)b.frame[fold.first], r = (double)b.c.model.v_ref[k];
-        const double v = fold.second == EITS_FOLD_NONE ? first : 0.5 * (first + fold.sign * (double)b.frame[fold.second]);
+        const double v = fold.second == EITS_FOLD_NONE
+                             ? first
+                             : 0.5 * (first + fold.sign * (double)b.frame[fold.second]);
         vv += v * v, rr += r * r, vr += v * r;
     }
     CHECK_NEAR(ctx->baseline.correlation, vr / sqrt(vv * rr), 20 * EPS);
@@ -93,7 +98,8 @@ static void refused_frames(void)
     b.frame[7] = (eits_real)INFINITY;
     CHECK(!ctx->baseline.ready);
     CHECK_EQUAL(eits_mask_row(ctx, 7, 1), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK); /* masked, it does not matter */
+    /* masked, it does not matter */
+    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     CHECK_NEAR(ctx->baseline.gain, 1, 8 * EPS);
     CHECK_EQUAL(eits_mask_row(ctx, 7, 0), EITS_OK);
     eits_options o = ctx->options;
@@ -131,7 +137,8 @@ static void all_zero_keeps_the_old(void)
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, before, NULL), EITS_OK);
     memcpy(v0, ctx->baseline.v0, sizeof v0);
     const eits_baseline kept = ctx->baseline;
-    static const double sizes[] = {0, BOTH_WIDTHS(1e-40, 1e-310)}; /* nothing, and so little that it cannot be divided by */
+    /* nothing, and so little that it cannot be divided by */
+    static const double sizes[] = {0, BOTH_WIDTHS(1e-40, 1e-310)};
     for (int s = 0; s < 2; ++s) {
         small_reference(&b.c.model, sizes[s], wrong);
         CHECK_EQUAL(eits_baseline_set(ctx, wrong, SMALL_ROWS), EITS_E_FRAME_ZERO);
@@ -157,16 +164,19 @@ static void order_of_learning(void)
     for (uint32_t few = 0; few < 4; ++few)
         CHECK_EQUAL(eits_baseline_begin(ctx, few), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT); /* a single reference is not learned further */
+    /* a single reference is not learned further */
+    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_baseline_begin(ctx, 6), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_NO_BASELINE); /* the old one is gone */
+    /* the old one is gone */
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_NO_BASELINE);
     CHECK_EQUAL(eits_baseline_add(NULL, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_baseline_add(ctx, NULL, SMALL_ROWS), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_baseline_finish(NULL), EITS_E_ARGUMENT);
     for (uint32_t k = 0; k < 6; ++k) {
         CHECK_EQUAL(ctx->baseline.count, k);
         CHECK_EQUAL(eits_baseline_finish(ctx), EITS_E_BASELINE_SHORT);
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS - 1), EITS_E_FRAME_LENGTH); /* refused frames do not count */
+        /* refused frames do not count */
+        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS - 1), EITS_E_FRAME_LENGTH);
         quiet_frame(&b, 1, 1e-3, &state);
         const eits_real good = b.frame[5];
         b.frame[5] = (eits_real)NAN;
@@ -178,7 +188,8 @@ static void order_of_learning(void)
     CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT); /* nor after a learned one was replaced */
+    /* nor after a learned one was replaced */
+    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_baseline_begin(ctx, 8), EITS_OK);
     CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK); /* in place of learning */
     CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
@@ -187,13 +198,15 @@ static void order_of_learning(void)
     CHECK_EQUAL(eits_baseline_begin(ctx, 4), EITS_OK);
     CHECK_EQUAL(eits_baseline_add(ctx, zero, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_baseline_add(ctx, zero, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_baseline_add(ctx, zero, SMALL_ROWS), EITS_E_FRAME_ZERO); /* the first half must be a reference */
+    /* the first half must be a reference */
+    CHECK_EQUAL(eits_baseline_add(ctx, zero, SMALL_ROWS), EITS_E_FRAME_ZERO);
     CHECK_EQUAL(eits_baseline_finish(ctx), EITS_E_BASELINE_SHORT);
     CHECK(!ctx->baseline.ready);
     tear_down(&b);
 }
 
-/* Mean, noise and lambda_noise against two passes in double. Row 11 is masked, and both rows of the first fold. */
+/* Mean, noise and lambda_noise against two passes in double. Row 11 is masked, and both rows of the
+ * first fold. */
 static void learned_numbers(int project)
 {
     bench b;
@@ -217,7 +230,8 @@ static void learned_numbers(int project)
     for (uint32_t k = 0; k < QUIET; ++k) {
         quiet_frame(&b, -2, 2e-3, &state);
         memcpy(frames[k], b.frame, sizeof frames[k]);
-        frames[k][11] = frames[k][whole.first] = frames[k][whole.second] = (eits_real)(k % 2 == 0 ? NAN : 1e9);
+        frames[k][11] = frames[k][whole.first] = frames[k][whole.second] =
+            (eits_real)(k % 2 == 0 ? NAN : 1e9);
         if (k == QUIET / 2) {
             double vv = 0, rr = 0;
             memcpy(half, mean, sizeof half);
@@ -265,7 +279,8 @@ static void learned_numbers(int project)
     tear_down(&b);
 }
 
-/* A row masked in any of the quiet frames has no reference, and does not disturb the others' noise. */
+/* A row masked in any of the quiet frames has no reference, and does not disturb the others' noise.
+ */
 static void masked_while_learning(void)
 {
     double noise[2];
@@ -287,7 +302,8 @@ static void masked_while_learning(void)
         CHECK_EQUAL(ctx->info.masked, masked);
         CHECK(ctx->unusable[4] == masked && isnan((double)ctx->baseline.v0[4]) == masked);
         CHECK_NEAR(ctx->baseline.correlation, 1, 1e-3);
-        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK); /* until the next reference */
+        /* until the next reference */
+        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(ctx->info.masked, 0);
         tear_down(&b);
@@ -307,9 +323,11 @@ static void nothing_to_compare(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_mask_row(ctx, 2, 1), EITS_OK);
     CHECK_EQUAL(eits_baseline_begin(ctx, 4), EITS_OK);
-    for (int k = 0; k < 4; ++k) { /* the second half runs the frame stage, which allows no masked row */
+    /* the second half runs the frame stage, which allows no masked row */
+    for (int k = 0; k < 4; ++k) {
         quiet_frame(&b, 1, 1e-3, &state);
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), k < 2 ? EITS_OK : EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS),
+                    k < 2 ? EITS_OK : EITS_E_FRAME_CHANNELS);
     }
     CHECK_EQUAL(ctx->baseline.count, 2);
     o.max_masked = 1;
@@ -325,7 +343,8 @@ static void nothing_to_compare(void)
         CHECK_EQUAL(eits_mask_row(ctx, i, 0), EITS_OK);
     CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     tear_down(&b);
-    small_model made = small_model_make((small_spec){.rank = 12, .side = 4}); /* a model that is zero on all rows but one fold's */
+    /* a model that is zero on all rows but one fold's */
+    small_model made = small_model_make((small_spec){.rank = 12, .side = 4});
     for (uint32_t k = 1; k < SMALL_FOLDED; ++k)
         small_put_f32(small_model_section(&made, "VREF", NULL) + 4 * k, 0);
     small_model_seal(&made);
@@ -336,7 +355,8 @@ static void nothing_to_compare(void)
     CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
     CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].first, 0), EITS_OK);
     CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_OK);
-    small_put_f32(small_model_section(&made, "VREF", NULL), 0); /* and one that is zero throughout, read in place */
+    /* and one that is zero throughout, read in place */
+    small_put_f32(small_model_section(&made, "VREF", NULL), 0);
     CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
     small_context_close(&c);
     small_model_free(&made);

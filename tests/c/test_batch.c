@@ -2,11 +2,11 @@
 #include "check.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/batch.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -31,7 +31,8 @@ static eits_context *set_up(bench *b)
     CHECK_EQUAL(eits_baseline_set(&b->c.ctx, reference, SMALL_ROWS), EITS_OK);
     for (int k = 0; k < FRAMES; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
-            b->frames[k][i] = k == REFUSED ? R(NAN) : reference[i] * (eits_real)(1 + 0.1 * small_random(&state));
+            b->frames[k][i] =
+                k == REFUSED ? R(NAN) : reference[i] * (eits_real)(1 + 0.1 * small_random(&state));
     }
     return &b->c.ctx;
 }
@@ -50,10 +51,13 @@ static void each_as_if_alone(void)
     eits_touch touches[FRAMES][EITS_MAX_TOUCHES], found[EITS_MAX_TOUCHES];
     eits_result results[FRAMES];
     uint32_t touches_seen = 0;
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, FRAMES, images[0], coefficients[0], touches[0], results), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, FRAMES, images[0],
+                                       coefficients[0], touches[0], results),
+                EITS_OK);
     for (int k = 0; k < FRAMES; ++k) {
         eits_forget(other);
-        const eits_status status = eits_reconstruct(other, alone.frames[k], SMALL_ROWS, image, NULL);
+        const eits_status status =
+            eits_reconstruct(other, alone.frames[k], SMALL_ROWS, image, NULL);
         CHECK_EQUAL(results[k].status, status);
         CHECK_EQUAL(status, k == REFUSED ? EITS_E_FRAME_CHANNELS : EITS_OK);
         uint32_t count = 0;
@@ -80,14 +84,23 @@ static void without_outputs(void)
     bench b;
     eits_context *ctx = set_up(&b);
     eits_result results[FRAMES];
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, SHORT, NULL, NULL, NULL, results), EITS_OK);
-    CHECK(results[0].status == EITS_OK && results[0].count == 0 && results[0].info.touch_macs == 0 && results[0].info.macs > 0);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS - 1, SHORT, NULL, NULL, NULL, results), EITS_OK);
+    CHECK_EQUAL(
+        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, SHORT, NULL, NULL, NULL, results),
+        EITS_OK);
+    CHECK(results[0].status == EITS_OK && results[0].count == 0 &&
+          results[0].info.touch_macs == 0 && results[0].info.macs > 0);
+    CHECK_EQUAL(
+        eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS - 1, SHORT, NULL, NULL, NULL, results),
+        EITS_OK);
     CHECK_EQUAL(results[0].status, EITS_E_FRAME_LENGTH);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 0, NULL, NULL, NULL, results), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct_batch(NULL, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, results), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, NULL, SMALL_ROWS, 1, NULL, NULL, NULL, results), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 0, NULL, NULL, NULL, results),
+                EITS_OK);
+    CHECK_EQUAL(eits_reconstruct_batch(NULL, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, results),
+                EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reconstruct_batch(ctx, NULL, SMALL_ROWS, 1, NULL, NULL, NULL, results),
+                EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reconstruct_batch(ctx, b.frames[0], SMALL_ROWS, 1, NULL, NULL, NULL, NULL),
+                EITS_E_ARGUMENT);
     tear_down(&b);
 }
 

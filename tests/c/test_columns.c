@@ -1,11 +1,11 @@
-/* Columns held in the workspace: the right numbers wherever they stand, each unpacked once while it is held, products with the
- * same bits as from S itself. */
+/* Columns held in the workspace: the right numbers wherever they stand, each unpacked once while it
+ * is held, products with the same bits as from S itself. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
-#include "columns.h"
-#include "kernels.h"
+#include "context/column_cache.h"
+#include "kernels/kernels.h"
 
 #include <string.h>
 
@@ -56,7 +56,8 @@ static void check_held(const eits_context *ctx, const uint32_t *index, uint32_t 
 {
     uint32_t slot[ROOM];
     const eits_matrix held = eits_held_columns(ctx), *s = &ctx->model->sensitivity;
-    CHECK(held.scale == NULL && held.storage == EITS_STORAGE_F32 && held.rows == RANK && held.cols == ROOM);
+    CHECK(held.scale == NULL && held.storage == EITS_STORAGE_F32 && held.rows == RANK &&
+          held.cols == ROOM);
     eits_slots_of(ctx, index, count, slot);
     for (uint32_t k = 0; k < count; ++k) {
         CHECK(slot[k] < ROOM);
@@ -115,7 +116,8 @@ static void same_products(eits_storage storage, int prepared)
         ctx->working_count = count;
         eits_pack_panels(ctx);
         CHECK_EQUAL(ctx->working_held, count <= ROOM);
-        eits_real v[EITS_STRIDE(RANK)] = {0}, x[N], by_held[N], by_s[N], sum_held[EITS_STRIDE(RANK)], sum_s[EITS_STRIDE(RANK)];
+        eits_real v[EITS_STRIDE(RANK)] = {0}, x[N], by_held[N], by_s[N],
+                  sum_held[EITS_STRIDE(RANK)], sum_s[EITS_STRIDE(RANK)];
         for (uint32_t i = 0; i < RANK; ++i)
             v[i] = (eits_real)small_random(&state);
         for (uint32_t k = 0; k < count; ++k)

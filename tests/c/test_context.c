@@ -3,10 +3,10 @@
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -23,25 +23,36 @@ static void sizes_agree(void)
     for (size_t r = 0; r < 5; ++r) {
         for (size_t s = 0; s < 4; ++s) {
             for (int round = 0; round < 2; ++round) {
-                small_model made = small_model_make((small_spec){.rank = ranks[r], .side = sides[s], .round = round});
+                small_model made = small_model_make(
+                    (small_spec){.rank = ranks[r], .side = sides[s], .round = round});
                 eits_model m;
                 CHECK_EQUAL(eits_model_open(&m, made.blob, made.size), EITS_OK);
                 for (int prepared = 0; prepared < 2; ++prepared) {
                     const size_t size = eits_workspace_size(&m, prepared);
-                    CHECK_EQUAL(size, EITS_WORKSPACE_SIZE(m.n_rows, m.n_folded, m.rank, m.n_pixels, (size_t)m.nx * m.ny, prepared));
+                    CHECK_EQUAL(size, EITS_WORKSPACE_SIZE(m.n_rows, m.n_folded, m.rank, m.n_pixels,
+                                                          (size_t)m.nx * m.ny, prepared));
                     CHECK_EQUAL(size % 16, 0);
                     void *memory;
                     eits_context ctx;
                     uint8_t *workspace = small_aligned(&memory, size);
                     CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
-                    const uint8_t *held_end = (uint8_t *)ctx.working_slot + EITS_ALIGN16(EITS_HELD(m.n_pixels) * 4);
-                    const uint8_t *end = prepared ? (uint8_t *)ctx.working_panels + EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank) : held_end;
-                    const size_t spare = (size_t)(workspace + size - end); /* nothing is missing; panels may need room to be aligned */
+                    const uint8_t *held_end =
+                        (uint8_t *)ctx.working_slot + EITS_ALIGN16(EITS_HELD(m.n_pixels) * 4);
+                    const uint8_t *end =
+                        prepared ? (uint8_t *)ctx.working_panels +
+                                       EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank)
+                                 : held_end;
+                    /* nothing is missing; panels may need room to be aligned */
+                    const size_t spare = (size_t)(workspace + size - end);
                     CHECK(prepared ? spare <= EITS_LINE - 16 : spare == 0);
                     CHECK((uintptr_t)ctx.panels % EITS_LINE == 0);
-                    CHECK((ctx.panels != NULL) == prepared && (ctx.working_panels != NULL) == prepared);
+                    CHECK((ctx.panels != NULL) == prepared &&
+                          (ctx.working_panels != NULL) == prepared);
                     CHECK((uint8_t *)ctx.baseline.v0 == workspace);
-                    CHECK(((uintptr_t)ctx.y | (uintptr_t)ctx.basis | (uintptr_t)ctx.x | (uintptr_t)ctx.list_index) % 16 == 0);
+                    CHECK(((uintptr_t)ctx.y | (uintptr_t)ctx.basis | (uintptr_t)ctx.x |
+                           (uintptr_t)ctx.list_index) %
+                              16 ==
+                          0);
                     free(memory);
                 }
                 small_model_free(&made);
@@ -105,7 +116,9 @@ static void exercise(eits_context *ctx, uint64_t *state)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     for (int k = 0; k < 6; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
-            frame[i] = small_random(state) < -0.9 + 0.2 * k ? R(NAN) : reference[i] * (eits_real)(1 + 0.2 * small_random(state));
+            frame[i] = small_random(state) < -0.9 + 0.2 * k
+                           ? R(NAN)
+                           : reference[i] * (eits_real)(1 + 0.2 * small_random(state));
         const eits_status status = eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL);
         CHECK(status == EITS_OK || status == EITS_E_FRAME_CHANNELS);
         CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
@@ -123,7 +136,8 @@ static void nothing_is_written_beside_the_workspace(void)
             CHECK_EQUAL(eits_model_open(&m, made.blob, made.size), EITS_OK);
             const size_t size = eits_workspace_size(&m, prepared);
             void *memory, *copy_memory;
-            uint8_t *whole = small_aligned(&memory, size + 2 * GUARD), *copy = small_aligned(&copy_memory, made.size);
+            uint8_t *whole = small_aligned(&memory, size + 2 * GUARD),
+                    *copy = small_aligned(&copy_memory, made.size);
             memset(whole, 0xC3, size + 2 * GUARD);
             memcpy(copy, made.blob, made.size);
             eits_context ctx;
@@ -140,7 +154,8 @@ static void nothing_is_written_beside_the_workspace(void)
     }
 }
 
-/* Two contexts on one model, used in turn, give what each gives alone; whatever the workspace held before. */
+/* Two contexts on one model, used in turn, give what each gives alone; whatever the workspace held
+ * before. */
 static void contexts_are_independent(void)
 {
     small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
@@ -158,7 +173,8 @@ static void contexts_are_independent(void)
     }
     CHECK(memcmp(alone[0], alone[1], sizeof image) != 0);
     for (int round = 0; round < 6; ++round) {
-        CHECK_EQUAL(eits_reconstruct(&c[round % 2].ctx, frames[round % 2], SMALL_ROWS, image, NULL), EITS_OK);
+        CHECK_EQUAL(eits_reconstruct(&c[round % 2].ctx, frames[round % 2], SMALL_ROWS, image, NULL),
+                    EITS_OK);
         CHECK(memcmp(image, alone[round % 2], sizeof image) == 0);
     }
     const size_t size = eits_workspace_size(&c[0].model, 0);
@@ -176,7 +192,8 @@ static void contexts_are_independent(void)
 static void default_options(void)
 {
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
-    small_put_u32(small_model_section(&made, "DEFS", NULL) + 4, 99); /* more touches than a context holds */
+    /* more touches than a context holds */
+    small_put_u32(small_model_section(&made, "DEFS", NULL) + 4, 99);
     small_model_seal(&made);
     eits_model m;
     eits_options o;
@@ -184,8 +201,10 @@ static void default_options(void)
     CHECK_EQUAL(eits_options_default(NULL, &o), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_options_default(&m, NULL), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_options_default(&m, &o), EITS_OK);
-    CHECK(o.iterations == 60 && o.max_touches == EITS_MAX_TOUCHES && o.max_masked == SMALL_ROWS / 2);
-    CHECK(o.gap_every >= 1 && o.sign == EITS_SIGN_INCREASE && o.warm_start == 0 && o.project_baseline == 1);
+    CHECK(o.iterations == 60 && o.max_touches == EITS_MAX_TOUCHES &&
+          o.max_masked == SMALL_ROWS / 2);
+    CHECK(o.gap_every >= 1 && o.sign == EITS_SIGN_INCREASE && o.warm_start == 0 &&
+          o.project_baseline == 1);
     CHECK(o.lambda_abs == 0 && o.gap_rel == 0 && o.saturation_v == 0 && o.touch_sweeps >= 1);
     CHECK_NEAR(o.lambda_rel, 0.03f, 0);
     CHECK_NEAR(o.lambda_noise_factor, 0.3f, 0);
@@ -207,14 +226,18 @@ static void default_options(void)
     o.gate_factor = usual.gate_factor; /* and nothing else */
     o.track_confirm = o.track_hold = 0;
     o.track_smooth = 0;
-    const size_t padded = offsetof(eits_options, touch_sweeps) + sizeof o.touch_sweeps, on = offsetof(eits_options, follow_mm);
-    CHECK(memcmp(&o, &usual, padded) == 0 && memcmp((char *)&o + on, (const char *)&usual + on, sizeof o - on) == 0);
+    const size_t padded = offsetof(eits_options, touch_sweeps) + sizeof o.touch_sweeps,
+                 on = offsetof(eits_options, follow_mm);
+    CHECK(memcmp(&o, &usual, padded) == 0 &&
+          memcmp((char *)&o + on, (const char *)&usual + on, sizeof o - on) == 0);
     small_model_free(&made);
 }
 
 #define WORD(field, value) {offsetof(eits_options, field), 1, (value)}
 #define REAL(field, value) {offsetof(eits_options, field), 0, (value)}
-#define REAL_WRONG(field) REAL(field, NAN), REAL(field, INFINITY), REAL(field, -INFINITY), REAL(field, -1e-3), REAL(field, 1.1e30)
+#define REAL_WRONG(field)                                                                \
+    REAL(field, NAN), REAL(field, INFINITY), REAL(field, -INFINITY), REAL(field, -1e-3), \
+        REAL(field, 1.1e30)
 
 static void options_out_of_range(void)
 {
@@ -223,15 +246,41 @@ static void options_out_of_range(void)
         int whole;
         double value;
     } wrong[] = {
-        WORD(iterations, 0), WORD(gap_every, 0), WORD(max_touches, EITS_MAX_TOUCHES + 1), WORD(sign, 3), WORD(sign, 4294967295.0),
-        WORD(warm_start, 2), WORD(project_baseline, 2), WORD(touch_sweeps, 1001),
-        REAL_WRONG(lambda_abs), REAL_WRONG(lambda_rel), REAL(lambda_rel, 1.001), REAL_WRONG(lambda_noise_factor),
-        REAL_WRONG(gate_factor), REAL_WRONG(gap_rel), REAL(gap_rel, 1.001), REAL_WRONG(saturation_v), REAL_WRONG(touch_threshold),
-        REAL(touch_threshold, 1.001), REAL_WRONG(touch_share), REAL(touch_share, 1.001), REAL_WRONG(touch_min_radius_mm),
-        REAL(touch_min_radius_mm, 0), REAL(touch_min_radius_mm, 9.1), REAL_WRONG(touch_max_radius_mm), REAL(touch_max_radius_mm, 8.9),
-        REAL_WRONG(touch_seed_radius_mm), REAL(touch_seed_radius_mm, 2.9), REAL(touch_seed_radius_mm, 40.1),
-        REAL_WRONG(touch_change_s_per_m), REAL_WRONG(touch_radius_weight), REAL_WRONG(follow_mm), REAL_WRONG(floor_noise_factor),
-        WORD(track_confirm, 1001), WORD(track_hold, 1001), REAL_WRONG(track_smooth),
+        WORD(iterations, 0),
+        WORD(gap_every, 0),
+        WORD(max_touches, EITS_MAX_TOUCHES + 1),
+        WORD(sign, 3),
+        WORD(sign, 4294967295.0),
+        WORD(warm_start, 2),
+        WORD(project_baseline, 2),
+        WORD(touch_sweeps, 1001),
+        REAL_WRONG(lambda_abs),
+        REAL_WRONG(lambda_rel),
+        REAL(lambda_rel, 1.001),
+        REAL_WRONG(lambda_noise_factor),
+        REAL_WRONG(gate_factor),
+        REAL_WRONG(gap_rel),
+        REAL(gap_rel, 1.001),
+        REAL_WRONG(saturation_v),
+        REAL_WRONG(touch_threshold),
+        REAL(touch_threshold, 1.001),
+        REAL_WRONG(touch_share),
+        REAL(touch_share, 1.001),
+        REAL_WRONG(touch_min_radius_mm),
+        REAL(touch_min_radius_mm, 0),
+        REAL(touch_min_radius_mm, 9.1),
+        REAL_WRONG(touch_max_radius_mm),
+        REAL(touch_max_radius_mm, 8.9),
+        REAL_WRONG(touch_seed_radius_mm),
+        REAL(touch_seed_radius_mm, 2.9),
+        REAL(touch_seed_radius_mm, 40.1),
+        REAL_WRONG(touch_change_s_per_m),
+        REAL_WRONG(touch_radius_weight),
+        REAL_WRONG(follow_mm),
+        REAL_WRONG(floor_noise_factor),
+        WORD(track_confirm, 1001),
+        WORD(track_hold, 1001),
+        REAL_WRONG(track_smooth),
     };
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
     small_context c;
@@ -243,7 +292,8 @@ static void options_out_of_range(void)
         eits_options o = before;
         const uint32_t whole = wrong[k].whole ? (uint32_t)wrong[k].value : 0;
         const eits_real real = (eits_real)wrong[k].value;
-        memcpy((uint8_t *)&o + wrong[k].offset, wrong[k].whole ? (const void *)&whole : &real, wrong[k].whole ? 4 : sizeof real);
+        memcpy((uint8_t *)&o + wrong[k].offset, wrong[k].whole ? (const void *)&whole : &real,
+               wrong[k].whole ? 4 : sizeof real);
         CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_E_ARGUMENT);
         CHECK(memcmp(&c.ctx.options, &before, sizeof before) == 0);
     }
@@ -255,7 +305,8 @@ static void options_out_of_range(void)
     o.track_confirm = o.track_hold = EITS_MOST_TRACK_FRAMES;
     o.track_smooth = R(1e30);
     o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_share = 1;
-    o.lambda_abs = o.gate_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm = o.touch_change_s_per_m = R(1e30);
+    o.lambda_abs = o.gate_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm =
+        o.touch_change_s_per_m = R(1e30);
     o.floor_noise_factor = R(1e30);
     o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);
     CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
@@ -264,7 +315,8 @@ static void options_out_of_range(void)
     small_model_free(&made);
 }
 
-/* A golden image that is what this build gives: no difference. One pixel changed: just that difference is told. */
+/* A golden image that is what this build gives: no difference. One pixel changed: just that
+ * difference is told. */
 static void self_test(void)
 {
     small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
@@ -279,7 +331,8 @@ static void self_test(void)
     for (int j = 0; j < 36; ++j)
         peak = fmax(peak, fabs((double)c.ctx.image[j]));
     CHECK(peak > 0);
-    CHECK_NEAR(difference, peak, 2 * EPS * peak); /* against an image of zeros: the absolute difference */
+    /* against an image of zeros: the absolute difference */
+    CHECK_NEAR(difference, peak, 2 * EPS * peak);
     memcpy(image, c.ctx.image, sizeof image);
     small_context_close(&c);
     for (int j = 0; j < 36; ++j)
@@ -288,10 +341,12 @@ static void self_test(void)
     for (int prepared = 0; prepared < 2; ++prepared) {
         small_context_open(&c, &made, prepared);
         CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
-        CHECK_NEAR(difference, 0, BOTH_WIDTHS(0, 1e-7)); /* the very bits; in double, the rounding of the stored image */
+        /* the very bits; in double, the rounding of the stored image */
+        CHECK_NEAR(difference, 0, BOTH_WIDTHS(0, 1e-7));
         CHECK(c.ctx.baseline.ready);
         CHECK_NEAR(c.ctx.baseline.v0[3], c.model.golden.reference[3], 0);
-        CHECK_EQUAL(eits_baseline_begin(&c.ctx, 4), EITS_OK); /* a context as before: learning starts from nothing */
+        /* a context as before: learning starts from nothing */
+        CHECK_EQUAL(eits_baseline_begin(&c.ctx, 4), EITS_OK);
         for (int k = 0; k < 4; ++k) {
             eits_real frame[SMALL_ROWS];
             small_reference(&c.model, 1, frame);

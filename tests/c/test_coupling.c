@@ -1,14 +1,15 @@
-/* What touches do to each other, against a dense computation with complex numbers; when it is left alone; and v0 log(v / v0). */
+/* What touches do to each other, against a dense computation with complex numbers; when it is left
+ * alone; and v0 log(v / v0). */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
-#include "coupling.h"
+#include "base/vec.h"
+#include "diagnostics/diagnostics.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
-#include "examine.h"
-#include "kernels.h"
-#include "vec.h"
+#include "kernels/kernels.h"
+#include "touch/interaction.h"
 
 #include <complex.h>
 #include <math.h>
@@ -18,7 +19,8 @@
 enum { RANK = 16, SIDE = 12, L = SMALL_ELECTRODES };
 static const double PIXEL = 6, PI = 3.14159265358979323846;
 static const small_spec WITH_FIELDS = {.rank = RANK, .side = SIDE, .fields = 1};
-static const eits_disc THREE[] = {{-14, 3, 8, R(0.02), 1}, {9, 11, 6, R(-0.01), -1}, {5, -17, 10, R(0.03), 1}};
+static const eits_disc THREE[] = {
+    {-14, 3, 8, R(0.02), 1}, {9, 11, 6, R(-0.01), -1}, {5, -17, 10, R(0.03), 1}};
 
 /* A context with a frame's data, where rows of fold `left_out` (below 0: none) are not in use. */
 static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out, eits_real *frame)
@@ -56,7 +58,8 @@ static seen look(const eits_model *m, const eits_disc *disc)
     seen s = {.place = (double)disc->x_mm + I * (double)disc->y_mm};
     double whole = 0, rows[2 * L + 4] = {0};
     for (uint32_t j = 0; j < m->n_pixels; ++j) {
-        const double x = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * PIXEL, y = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * PIXEL;
+        const double x = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * PIXEL,
+                     y = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * PIXEL;
         const double share = 0.5 + ((double)disc->radius_mm - cabs(x + I * y - s.place)) / PIXEL;
         const double cover = share < 0 ? 0 : share > 1 ? 1 : share;
         whole += cover;
@@ -67,12 +70,15 @@ static seen look(const eits_model *m, const eits_disc *disc)
         s.field[e] = (rows[e] + I * rows[L + e]) / whole;
     s.a = (rows[2 * L] + I * rows[2 * L + 1]) / whole;
     s.b = (rows[2 * L + 2] + I * rows[2 * L + 3]) / whole;
-    s.moment = (double)disc->change * PI * ((double)(disc->radius_mm * disc->radius_mm) + PIXEL * PIXEL / 12);
+    s.moment = (double)disc->change * PI *
+               ((double)(disc->radius_mm * disc->radius_mm) + PIXEL * PIXEL / 12);
     return s;
 }
 
-/* The field that a dipole of `moment` times the vector e, at `from`, has at `at`, by vectors: s (2 (e.u) u - e) / r^2. */
-static double complex direct(double complex e, double complex at, double complex from, double s, double touching)
+/* The field that a dipole of `moment` times the vector e, at `from`, has at `at`, by vectors: s (2
+ * (e.u) u - e) / r^2. */
+static double complex direct(double complex e, double complex at, double complex from, double s,
+                             double touching)
 {
     const double r = cabs(at - from), reach = r > touching ? r : touching;
     if (r == 0)
@@ -82,7 +88,8 @@ static double complex direct(double complex e, double complex at, double complex
 }
 
 /* P of the interplay, rows of folds that are left out ignored; folds' second rows give the same. */
-static void dense_interplay(const eits_context *ctx, const dense *d, const eits_disc *disc, uint32_t count, double *added)
+static void dense_interplay(const eits_context *ctx, const dense *d, const eits_disc *disc,
+                            uint32_t count, double *added)
 {
     const eits_model *m = ctx->model;
     seen s[4];
@@ -97,13 +104,17 @@ static void dense_interplay(const eits_context *ctx, const dense *d, const eits_
         for (uint32_t i = 0; i < count; ++i) {
             double complex bent = 0;
             for (uint32_t j = 0; j < count; ++j) {
-                const double complex e = s[j].field[row[0]] - s[j].field[row[1]], far = s[j].a - s[j].b * s[i].place;
+                const double complex e = s[j].field[row[0]] - s[j].field[row[1]],
+                                     far = s[j].a - s[j].b * s[i].place;
                 const double per = s[j].moment * (double)m->fields.per_sheet;
                 if (i != j)
-                    bent += direct(e, s[i].place, s[j].place, per, (double)(disc[i].radius_mm + disc[j].radius_mm)) - conj(per * conj(e) / (far * far));
+                    bent += direct(e, s[i].place, s[j].place, per,
+                                   (double)(disc[i].radius_mm + disc[j].radius_mm)) -
+                            conj(per * conj(e) / (far * far));
             }
             const double complex measured = s[i].field[row[2]] - s[i].field[row[3]];
-            datum -= (double)m->fields.volts * s[i].moment * (creal(bent) * creal(measured) + cimag(bent) * cimag(measured));
+            datum -= (double)m->fields.volts * s[i].moment *
+                     (creal(bent) * creal(measured) + cimag(bent) * cimag(measured));
         }
         const int used = ctx->basis_for[k] != EITS_SIDE_NONE;
         for (uint32_t i = 0; i < d->rank; ++i) {
@@ -117,7 +128,8 @@ static void dense_interplay(const eits_context *ctx, const dense *d, const eits_
 }
 
 /* ctx->y less what eits_couple leaves of it, |y| made so great that no limit is reached. */
-static void interplay(eits_context *ctx, const eits_disc *disc, uint32_t count, double *added, uint64_t *macs)
+static void interplay(eits_context *ctx, const eits_disc *disc, uint32_t count, double *added,
+                      uint64_t *macs)
 {
     eits_real data[RANK + 8];
     *macs = eits_couple(ctx, disc, count, data);
@@ -143,14 +155,17 @@ static void as_computed_densely(void)
             interplay(ctx, THREE, count, added, &macs);
             CHECK(size_of(expected) > 1e-3);
             for (int i = 0; i < RANK; ++i)
-                CHECK_NEAR(added[i], expected[i], BOTH_WIDTHS(2e-5, 1e-12) * (size_of(expected) + size_of(added)) + 4 * EPS * fabs((double)ctx->y[i]));
+                CHECK_NEAR(added[i], expected[i],
+                           BOTH_WIDTHS(2e-5, 1e-12) * (size_of(expected) + size_of(added)) +
+                               4 * EPS * fabs((double)ctx->y[i]));
         }
         CHECK(left_out < 0 || ctx->basis_for[left_out] == EITS_SIDE_NONE);
         dense_bench_close(&b);
     }
 }
 
-/* Products counted one by one: fields over covers, what bends them, what answers, P of the folds in use, two norms. */
+/* Products counted one by one: fields over covers, what bends them, what answers, P of the folds in
+ * use, two norms. */
 static void work_is_counted(void)
 {
     dense_bench b;
@@ -162,7 +177,8 @@ static void work_is_counted(void)
         expected += eits_disc_field(ctx, &THREE[k], field);
     CHECK_EQUAL(expected % (2 * L + 4), 0);
     interplay(ctx, THREE, 3, added, &macs);
-    CHECK_EQUAL(macs, expected + 3 * (2 * 4 * L + 3 * SMALL_FOLDED) + SMALL_FOLDED * RANK + 2 * RANK);
+    CHECK_EQUAL(macs,
+                expected + 3 * (2 * 4 * L + 3 * SMALL_FOLDED) + SMALL_FOLDED * RANK + 2 * RANK);
     dense_bench_close(&b);
 }
 
@@ -197,7 +213,8 @@ static void reciprocals_give_the_same(void)
     dense_bench_close(&b);
 }
 
-/* A field that is the same everywhere, and no mirror: 1 / r^2 beyond touching, nothing more within, nothing at all in one place. */
+/* A field that is the same everywhere, and no mirror: 1 / r^2 beyond touching, nothing more within,
+ * nothing at all in one place. */
 static void distance_and_overlap(void)
 {
     dense_bench b;
@@ -208,7 +225,10 @@ static void distance_and_overlap(void)
     uint8_t *halves = small_model_section(&b.made, "FLDS", NULL) + 16;
     for (uint32_t j = 0; j < b.c.model.n_pixels; ++j, halves += 2 * SMALL_FIELDS_STRIDE) {
         for (uint32_t r = 0; r < 2 * L + 4; ++r)
-            small_put_u16(halves + 2 * r, r == 2 * L ? 0x7BFFu : r > 2 * L ? 0 : 0x3800u + (r < L ? 37 * r : 5 * (r - L) * (r - L)));
+            small_put_u16(halves + 2 * r, r == 2 * L ? 0x7BFFu
+                                          : r > 2 * L
+                                              ? 0
+                                              : 0x3800u + (r < L ? 37 * r : 5 * (r - L) * (r - L)));
     }
     eits_disc two[2] = {{-18, 0, 6, R(0.03), 1}, {-6, 0, 6, R(0.03), 1}}; /* where they touch */
     interplay(ctx, two, 2, near, &macs);
@@ -254,7 +274,8 @@ static void when_it_is_left_alone(void)
     interplay(ctx, strong, 2, added, &macs);
     for (int i = 0; i < RANK; ++i)
         y[i] = (double)ctx->y[i];
-    const double most = 0.5 * size_of(y) / size_of(added); /* a quarter of |y|^2; it grows as the product of the changes */
+    /* a quarter of |y|^2; it grows as the product of the changes */
+    const double most = 0.5 * size_of(y) / size_of(added);
     CHECK(most > 1);
     strong[0].change *= (eits_real)(0.99 * most);
     CHECK(!left_alone(ctx, strong, 2));
@@ -265,31 +286,41 @@ static void when_it_is_left_alone(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK(!eits_couples(ctx) && left_alone(ctx, THREE, 2));
     dense_bench_close(&b);
-    static const small_spec others[] = {{.rank = RANK, .side = SIDE},
-                                        {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO},
-                                        {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_NORMALISED}};
+    static const small_spec others[] = {
+        {.rank = RANK, .side = SIDE},
+        {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO},
+        {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_NORMALISED}};
     for (int k = 0; k < 3; ++k) {
         ctx = open_bench(&b, others[k], -1, frame);
-        CHECK(!eits_couples(ctx) && left_alone(ctx, THREE, 3) && ctx->straight == (k == 0)); /* differences need no fields */
+        /* differences need no fields */
+        CHECK(!eits_couples(ctx) && left_alone(ctx, THREE, 3) && ctx->straight == (k == 0));
         dense_bench_close(&b);
     }
-    /* fields of three discs and one more do not fit into the factor of rank 9: 9 x 16 numbers hold six of 24 */
+    /* fields of three discs and one more do not fit into the factor of rank 9: 9 x 16 numbers hold
+     * six of 24 */
     const small_spec low = {.rank = 9, .side = SIDE, .fields = 1};
-    eits_disc many[6] = {THREE[0], THREE[1], THREE[2], {-20, -20, 5, R(0.01), 1}, {20, 20, 5, R(0.01), 1}, {20, -4, 5, R(0.01), 1}};
+    eits_disc many[6] = {THREE[0],
+                         THREE[1],
+                         THREE[2],
+                         {-20, -20, 5, R(0.01), 1},
+                         {20, 20, 5, R(0.01), 1},
+                         {20, -4, 5, R(0.01), 1}};
     ctx = open_bench(&b, low, -1, frame);
     CHECK(!left_alone(ctx, many, 5));
     CHECK(left_alone(ctx, many, 6));
     dense_bench_close(&b);
 }
 
-/* The straight data of a model of differences are the data of the same matrices' model of log ratios. */
+/* The straight data of a model of differences are the data of the same matrices' model of log
+ * ratios. */
 static void straight_data(void)
 {
     for (int left_out = -1; left_out < 9; left_out += 3) {
         dense_bench b, log_bench;
         eits_real frame[SMALL_ROWS];
         eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out, frame);
-        const small_spec spec = {.rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO};
+        const small_spec spec = {
+            .rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO};
         eits_context *log_ctx = open_bench(&log_bench, spec, left_out, frame);
         CHECK_EQUAL(ctx->straight, 1);
         CHECK(memcmp(ctx->y_straight, log_ctx->y, RANK * sizeof *ctx->y) == 0);
@@ -309,7 +340,8 @@ static void straight_data(void)
     }
 }
 
-/* Where the reference is all but zero there is no ratio: differences stay, halved over both sides. */
+/* Where the reference is all but zero there is no ratio: differences stay, halved over both sides.
+ */
 static void straight_data_without_a_ratio(void)
 {
     dense_bench b;

@@ -3,8 +3,8 @@
 #include "dense.h"
 #include "small_model.h"
 
-#include "disc.h"
-#include "vec.h"
+#include "base/vec.h"
+#include "touch/disc.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,10 +16,15 @@ typedef dense_bench bench;
 
 static eits_context *set_up(bench *b, eits_storage storage)
 {
-    return dense_bench_open(b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .round = 1, .storage = storage}, 0);
+    return dense_bench_open(
+        b,
+        (small_spec){
+            .rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .round = 1, .storage = storage},
+        0);
 }
 
-/* The documented cover, over all pixels; with the gradient's basis taken out. Returns the number of covered pixels. */
+/* The documented cover, over all pixels; with the gradient's basis taken out. Returns the number of
+ * covered pixels. */
 static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *atom)
 {
     const eits_model *m = &b->c.model;
@@ -27,8 +32,10 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
     uint32_t covered = 0;
     memset(atom, 0, RANK * sizeof *atom);
     for (uint32_t j = 0; j < m->n_pixels; ++j) {
-        const double dx = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
-        const double dy = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
+        const double dx =
+            (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
+        const double dy =
+            (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
         const double share = 0.5 + ((double)disc->radius_mm - sqrt(dx * dx + dy * dy)) / pixel;
         const double cover = fmin(1, fmax(0, share)) / (double)m->column_weight[j];
         covered += cover > 0;
@@ -45,7 +52,8 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
     return covered;
 }
 
-/* What a touch's strength is made of: the covers' sum at its very place; averaged over places, pi (radius^2 + pixel^2 / 12). */
+/* What a touch's strength is made of: the covers' sum at its very place; averaged over places, pi
+ * (radius^2 + pixel^2 / 12). */
 static void area(void)
 {
     bench b;
@@ -53,15 +61,20 @@ static void area(void)
     const double pixel = (double)b.c.model.pixel_mm, span = SIDE * pixel;
     for (double radius = 3; radius <= 15; radius += 4) {
         double mean = 0;
-        for (int place = 0; place < 24 * 24 + 60; ++place) { /* within a pixel, then all over and beyond the image */
+        /* within a pixel, then all over and beyond the image */
+        for (int place = 0; place < 24 * 24 + 60; ++place) {
             const int inside = place < 24 * 24;
-            const eits_disc disc = {.x_mm = (eits_real)(inside ? place % 24 * pixel / 24 : 0.7 * span * sin(place)),
-                                    .y_mm = (eits_real)(inside ? place / 24 * pixel / 24 : 0.7 * span * cos(1.3 * place)),
-                                    .radius_mm = (eits_real)radius};
+            const eits_disc disc = {
+                .x_mm = (eits_real)(inside ? place % 24 * pixel / 24 : 0.7 * span * sin(place)),
+                .y_mm =
+                    (eits_real)(inside ? place / 24 * pixel / 24 : 0.7 * span * cos(1.3 * place)),
+                .radius_mm = (eits_real)radius};
             double sum = 0;
             for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) {
-                const double dx = ((double)b.c.model.pixel[j].ix + 0.5 - SIDE / 2.0) * pixel - (double)disc.x_mm;
-                const double dy = ((double)b.c.model.pixel[j].iy + 0.5 - SIDE / 2.0) * pixel - (double)disc.y_mm;
+                const double dx =
+                    ((double)b.c.model.pixel[j].ix + 0.5 - SIDE / 2.0) * pixel - (double)disc.x_mm;
+                const double dy =
+                    ((double)b.c.model.pixel[j].iy + 0.5 - SIDE / 2.0) * pixel - (double)disc.y_mm;
                 sum += fmin(1, fmax(0, 0.5 + (radius - hypot(dx, dy)) / pixel)) * pixel * pixel;
             }
             const double got = (double)eits_disc_area(ctx, &disc);
@@ -77,7 +90,8 @@ static void area(void)
 
 static eits_disc random_disc(uint64_t *state)
 {
-    const eits_disc disc = {.x_mm = (eits_real)(45 * small_random(state)), /* the image ends at 36 mm */
+    /* the image ends at 36 mm */
+    const eits_disc disc = {.x_mm = (eits_real)(45 * small_random(state)),
                             .y_mm = (eits_real)(45 * small_random(state)),
                             .radius_mm = (eits_real)(11 + 9 * small_random(state)),
                             .change = 1,
@@ -125,22 +139,27 @@ static void far_away_there_is_nothing(void)
             eits_real atom[EITS_STRIDE(RANK)];
             CHECK_EQUAL(eits_disc_atom(ctx, &disc, atom, ctx->slope), 0);
             for (int i = 0; i < RANK; ++i)
-                CHECK(atom[i] == 0 && ctx->slope[0][i] == 0 && ctx->slope[1][i] == 0 && ctx->slope[2][i] == 0);
+                CHECK(atom[i] == 0 && ctx->slope[0][i] == 0 && ctx->slope[1][i] == 0 &&
+                      ctx->slope[2][i] == 0);
         }
     }
     dense_bench_close(&b);
 }
 
-/* Derivatives by x, y and radius against central differences of the response written out in double. Where a pixel's cover
- * has its corner (0 or 1) within the step, the derivative jumps: such discs are passed over. */
+/* Derivatives by x, y and radius against central differences of the response written out in double.
+ * Where a pixel's cover has its corner (0 or 1) within the step, the derivative jumps: such discs
+ * are passed over. */
 static int smooth_around(const bench *b, const eits_disc *disc, double step)
 {
     const eits_model *m = &b->c.model;
     const double pixel = (double)m->pixel_mm;
     for (uint32_t j = 0; j < m->n_pixels; ++j) {
-        const double dx = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
-        const double dy = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
-        const double from = sqrt(dx * dx + dy * dy), share = 0.5 + ((double)disc->radius_mm - from) / pixel;
+        const double dx =
+            (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
+        const double dy =
+            (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
+        const double from = sqrt(dx * dx + dy * dy),
+                     share = 0.5 + ((double)disc->radius_mm - from) / pixel;
         if (fabs(share) < 2 * step / pixel || fabs(share - 1) < 2 * step / pixel || from < 0.1)
             return 0;
     }
@@ -162,7 +181,8 @@ static void derivatives(void)
         ++tried;
         (void)eits_disc_atom(ctx, &disc, atom, ctx->slope);
         if (sizeof(eits_real) == 4)
-            continue; /* the difference itself needs doubles; that both widths agree is seen below */
+            /* the difference itself needs doubles; that both widths agree is seen below */
+            continue;
         for (int k = 0; k < 3; ++k) {
             double up[RANK], down[RANK], size = 0;
             eits_disc moved = disc;
@@ -206,11 +226,13 @@ static void on_the_skin(void)
     uint32_t off = 0;
     for (int iy = -3; iy < SIDE + 3; ++iy) {
         for (int ix = -3; ix < SIDE + 3; ++ix) {
-            const double x = (double)ctx->model->origin_x_mm + (ix + 0.4) * pixel, y = (double)ctx->model->origin_y_mm + (iy + 0.6) * pixel;
+            const double x = (double)ctx->model->origin_x_mm + (ix + 0.4) * pixel,
+                         y = (double)ctx->model->origin_y_mm + (iy + 0.6) * pixel;
             const eits_disc disc = {.x_mm = (eits_real)x, .y_mm = (eits_real)y, .radius_mm = 3};
             int near = 0;
             for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
-                near |= abs((int)ctx->model->pixel[j].ix - ix) <= 1 && abs((int)ctx->model->pixel[j].iy - iy) <= 1;
+                near |= abs((int)ctx->model->pixel[j].ix - ix) <= 1 &&
+                        abs((int)ctx->model->pixel[j].iy - iy) <= 1;
             CHECK_EQUAL(eits_disc_on_skin(ctx, &disc), near);
             off += !near && ix >= 0 && iy >= 0 && ix < SIDE && iy < SIDE;
         }

@@ -1,7 +1,8 @@
 /* Open electrodes, bridged pairs, dead front ends, and rows that no sheet gives. */
 #include "findings_bench.h"
 
-/* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that lives, and it is not. */
+/* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that
+ * lives, and it is not. */
 static void open_electrodes(void)
 {
     for (int kind = 0; kind < 3; ++kind) {
@@ -23,7 +24,8 @@ static void open_electrodes(void)
             reconstruct(&b);
             CHECK_EQUAL(ctx->info.masked, count);
             CHECK_EQUAL(ctx->info.open_electrodes, 1u << e);
-            CHECK_EQUAL(ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED), EITS_FINDING_ELECTRODE_OPEN);
+            CHECK_EQUAL(ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED),
+                        EITS_FINDING_ELECTRODE_OPEN);
             CHECK_EQUAL(ctx->info.saturated, kind == 2 ? count : 0);
             CHECK((ctx->info.findings & EITS_FINDING_SATURATED) != 0 || kind != 2);
             for (uint32_t k = 0; k < SMALL_ELECTRODES; ++k)
@@ -65,33 +67,40 @@ static void noise_alone(void)
     for (int open = 0; open < 2; ++open) {
         bench b;
         eits_context *ctx = set_up(&b, 1);
-        look_for(ctx, open ? EITS_FINDINGS_ALL : EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN);
+        look_for(ctx, open ? EITS_FINDINGS_ALL
+                           : EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN);
         memset(b.frame, 0, sizeof b.frame);
         add_noise(&b, b.frame);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
         CHECK(ctx->info.findings == 0 && ctx->info.open_electrodes == 0);
         b.frame[7] = ctx->baseline.v0[7]; /* one row that lives, and it is not the front end */
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(ctx->info.findings & EITS_FINDING_ELECTRODE_OPEN, open ? EITS_FINDING_ELECTRODE_OPEN : 0);
+        CHECK_EQUAL(ctx->info.findings & EITS_FINDING_ELECTRODE_OPEN,
+                    open ? EITS_FINDING_ELECTRODE_OPEN : 0);
         tear_down(&b);
     }
 }
 
-/* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small tells nothing either way. */
+/* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small tells
+ * nothing either way. */
 static void what_a_dead_row_is(void)
 {
     for (int way = 0; way < 6; ++way) {
         bench b;
         eits_context *ctx = set_up(&b, 0);
-        const eits_real share = way < 2 ? (way ? R(0.025) : R(0.015)) : 0, small = way == 4 ? R(0.4) : R(0.2);
+        const eits_real share = way < 2 ? (way ? R(0.025) : R(0.015)) : 0,
+                        small = way == 4 ? R(0.4) : R(0.2);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) * (b.frame[i] < 0 ? R(-1) : R(1));
+            b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) *
+                         (b.frame[i] < 0 ? R(-1) : R(1));
         CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         look_for(ctx, EITS_FINDING_ELECTRODE_OPEN);
-        ctx->baseline.noise_v = way == 2 || way == 3 ? R(0.006) : 0; /* as though it had been learned */
+        /* as though it had been learned */
+        ctx->baseline.noise_v = way == 2 || way == 3 ? R(0.006) : 0;
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
             if (row_uses(ctx, i, 6) && (way < 4 || !row_uses(ctx, i, 2)))
-                b.frame[i] = way == 2 || way == 3 ? (way == 2 ? R(0.028) : R(0.033)) * b.frame[i] : share * b.frame[i];
+                b.frame[i] = way == 2 || way == 3 ? (way == 2 ? R(0.028) : R(0.033)) * b.frame[i]
+                                                  : share * b.frame[i];
         }
         reconstruct(&b);
         CHECK_EQUAL(ctx->info.open_electrodes, way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);
@@ -128,7 +137,8 @@ static void bridged_pairs(void)
         CHECK_EQUAL(ctx->info.findings, EITS_FINDING_BRIDGED);
         CHECK_EQUAL(ctx->info.bridged_electrodes, (1u << e) | (1u << f));
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            CHECK_EQUAL(ctx->unusable[i], row_uses(ctx, i, e) || row_uses(ctx, i, f) ? EITS_ROW_BRIDGED : 0);
+            CHECK_EQUAL(ctx->unusable[i],
+                        row_uses(ctx, i, e) || row_uses(ctx, i, f) ? EITS_ROW_BRIDGED : 0);
         look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_BRIDGED);
         reconstruct(&b);
         CHECK_EQUAL(ctx->info.bridged_electrodes, 0);
@@ -172,7 +182,8 @@ static void pairs_that_live(void)
     }
 }
 
-/* Rows that the user masked are no sign of an open electrode, nor saturated; and a frame's findings end with it. */
+/* Rows that the user masked are no sign of an open electrode, nor saturated; and a frame's findings
+ * end with it. */
 static void masked_and_forgotten(void)
 {
     bench b;
@@ -207,7 +218,8 @@ static void masked_and_forgotten(void)
     tear_down(&b);
 }
 
-/* A row whose reference is next to nothing has not grown before it is eight times 5 % of the rms. */
+/* A row whose reference is next to nothing has not grown before it is eight times 5 % of the rms.
+ */
 static void small_rows(void)
 {
     bench b;
@@ -216,7 +228,8 @@ static void small_rows(void)
     b.frame[fold.first] = R(0.01), b.frame[fold.second] = (eits_real)fold.sign * R(0.01);
     CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     for (int grown = 0; grown < 2; ++grown) {
-        b.frame[fold.first] = grown ? R(0.42) : R(0.36), b.frame[fold.second] = (eits_real)fold.sign * b.frame[fold.first];
+        b.frame[fold.first] = grown ? R(0.42) : R(0.36),
+        b.frame[fold.second] = (eits_real)fold.sign * b.frame[fold.first];
         reconstruct(&b);
         CHECK_EQUAL(ctx->info.findings, grown ? EITS_FINDING_GLITCH : 0);
         CHECK_EQUAL(ctx->info.masked, grown ? 2 : 0);
@@ -224,7 +237,8 @@ static void small_rows(void)
     tear_down(&b);
 }
 
-/* A sign that turned, and a row that grew eightfold, are no touch's doing; three turned ones are another order of the channels. */
+/* A sign that turned, and a row that grew eightfold, are no touch's doing; three turned ones are
+ * another order of the channels. */
 static void impossible_rows(void)
 {
     bench b;

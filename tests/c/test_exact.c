@@ -1,12 +1,12 @@
-/* Coordinate descent and active set: the optimum as a certificate written apart from the core sees it, whatever the columns are
- * like; the same bits in every layout; whatever they start from. */
+/* Coordinate descent and active set: the optimum as a certificate written apart from the core sees
+ * it, whatever the columns are like; the same bits in every layout; whatever they start from. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -43,7 +43,8 @@ static void tear_down(bench *b)
 }
 
 /* lambda: a share of the greatest correlation. */
-static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign, double lambda, double gap)
+static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign,
+                       double lambda, double gap)
 {
     eits_options o = ctx->options;
     o.solver = solver;
@@ -64,11 +65,13 @@ static void check_gap(const eits_context *ctx, double most_rel)
     dense d = dense_of(ctx->model);
     const uint32_t n = ctx->model->n_pixels, rank = ctx->model->rank;
     double *x = dense_copy(ctx->x, n), *y = dense_copy(ctx->y, rank);
-    const double gap = dense_gap(&d, y, x, (double)ctx->info.lambda, ctx->options.sign), scale = 0.5 * dense_dot(y, y, rank);
+    const double gap = dense_gap(&d, y, x, (double)ctx->info.lambda, ctx->options.sign),
+                 scale = 0.5 * dense_dot(y, y, rank);
     CHECK_NEAR(gap, ctx->info.gap, 300 * EPS * scale);
     CHECK(gap <= most_rel * scale);
     for (uint32_t j = 0; j < n; ++j)
-        CHECK(ctx->options.sign == EITS_SIGN_BOTH || (ctx->options.sign == EITS_SIGN_INCREASE ? x[j] >= 0 : x[j] <= 0));
+        CHECK(ctx->options.sign == EITS_SIGN_BOTH ||
+              (ctx->options.sign == EITS_SIGN_INCREASE ? x[j] >= 0 : x[j] <= 0));
     dense_free(&d);
     free(x), free(y);
 }
@@ -81,8 +84,12 @@ static void the_optimum(void)
             for (int sign = 0; sign < 3; ++sign) {
                 for (int l = 0; l < 4; ++l) {
                     bench b;
-                    eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, l % 2);
-                    const eits_info info = solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, lambdas[l], 0);
+                    eits_context *ctx = set_up(
+                        &b,
+                        (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
+                        l % 2);
+                    const eits_info info =
+                        solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, lambdas[l], 0);
                     CHECK_EQUAL(info.stop, EITS_STOP_OPTIMUM);
                     CHECK(info.nonzeros >= 1 && info.nonzeros <= RANK);
                     check_gap(ctx, s == 1 ? BOTH_WIDTHS(2e-6, 1e-14) : BOTH_WIDTHS(2e-4, 1e-10));
@@ -113,7 +120,8 @@ static void the_support_reaches_the_rank(void)
         for (int sign = 0; sign < 3; ++sign) {
             bench b;
             eits_context *ctx = set_up(&b, RANDOM, 1);
-            const eits_info info = solve(ctx, SOLVERS[s], s == 1 ? 200 : 2000, (eits_sign)sign, 0, 0);
+            const eits_info info =
+                solve(ctx, SOLVERS[s], s == 1 ? 200 : 2000, (eits_sign)sign, 0, 0);
             CHECK(info.stop != EITS_STOP_DIVERGED);
             CHECK(s == 0 || info.nonzeros <= RANK);
             if (sign == EITS_SIGN_BOTH)
@@ -125,7 +133,8 @@ static void the_support_reaches_the_rank(void)
     }
 }
 
-/* Every third column the one before, every seventh zero; and columns that nearly depend on their neighbours. */
+/* Every third column the one before, every seventh zero; and columns that nearly depend on their
+ * neighbours. */
 static void columns_that_depend(void)
 {
     for (int s = 0; s < 2; ++s) {
@@ -134,7 +143,8 @@ static void columns_that_depend(void)
                 for (int l = 0; l < 3; ++l) {
                     bench b;
                     memset(&b, 0, sizeof b);
-                    b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
+                    b.made = small_model_make(
+                        (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
                     uint32_t size;
                     uint8_t *sens = small_model_section(&b.made, "SENS", &size);
                     const size_t column = size / N;
@@ -148,10 +158,15 @@ static void columns_that_depend(void)
                     }
                     small_model_seal(&b.made);
                     eits_context *ctx = open_made(&b, l % 2);
-                    const eits_info info = solve(ctx, SOLVERS[s], 50000, (eits_sign)sign, l == 0 ? 1e-4 : l == 1 ? 0.02 : 0.3, 0);
+                    const eits_info info = solve(ctx, SOLVERS[s], 50000, (eits_sign)sign,
+                                                 l == 0   ? 1e-4
+                                                 : l == 1 ? 0.02
+                                                          : 0.3,
+                                                 0);
                     CHECK(info.stop != EITS_STOP_DIVERGED && info.nonzeros >= 1);
                     /* descent by single coordinates hardly moves along what nearly cancels */
-                    check_gap(ctx, s == 0 && near ? BOTH_WIDTHS(0.5, 0.05) : BOTH_WIDTHS(1e-3, 1e-4));
+                    check_gap(ctx,
+                              s == 0 && near ? BOTH_WIDTHS(0.5, 0.05) : BOTH_WIDTHS(1e-3, 1e-4));
                     tear_down(&b);
                 }
             }
@@ -166,7 +181,8 @@ static void few_pixels(void)
         for (uint32_t side = 1; side <= 3; ++side) {
             bench b;
             eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = side}, 1);
-            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, EITS_SIGN_BOTH, 0.02, 0).stop, EITS_STOP_OPTIMUM);
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, EITS_SIGN_BOTH, 0.02, 0).stop,
+                        EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-5, 1e-12));
             tear_down(&b);
         }
@@ -179,7 +195,10 @@ static void same_bits_in_every_layout(void)
         for (int storage = 0; storage < 4; ++storage) {
             bench b[4];
             for (int way = 0; way < 4; ++way) {
-                eits_context *ctx = set_up(&b[way], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, way % 2);
+                eits_context *ctx = set_up(
+                    &b[way],
+                    (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
+                    way % 2);
                 CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
                 (void)solve(ctx, SOLVERS[s], 30, EITS_SIGN_BOTH, 0.005, 0);
                 CHECK(memcmp(ctx->x, b[0].c.ctx.x, N * sizeof *ctx->x) == 0);
@@ -191,7 +210,8 @@ static void same_bits_in_every_layout(void)
     }
 }
 
-/* From FISTA's many coefficients, from other data's, from the optimum, each solver comes to the same one. */
+/* From FISTA's many coefficients, from other data's, from the optimum, each solver comes to the
+ * same one. */
 static void warm_starts(void)
 {
     for (int s = 0; s < 2; ++s) {
@@ -202,10 +222,12 @@ static void warm_starts(void)
             (void)solve(ctx, EITS_SOLVER_FISTA, 2, (eits_sign)sign, 0.001, 0);
             const uint32_t many = ctx->info.nonzeros;
             CHECK(many > RANK);
-            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop,
+                        EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
             small_new_data(ctx, 62);
-            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop,
+                        EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
             const eits_info again = solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0);
             CHECK_EQUAL(again.stop, EITS_STOP_OPTIMUM);
@@ -213,7 +235,8 @@ static void warm_starts(void)
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
             for (uint32_t i = 0; i < RANK; ++i)
                 ctx->y[i] = -ctx->y[i]; /* where zero is the better start */
-            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop, EITS_STOP_OPTIMUM);
+            CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop,
+                        EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
             tear_down(&b);
         }
@@ -262,7 +285,10 @@ static void beside_a_basis(void)
             for (int i = 0; i < SMALL_ROWS; ++i)
                 frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
             for (int i = 0; i < lost[k]; ++i)
-                frame[b.c.model.fold[i].first] = frame[b.c.model.fold[i].second > SMALL_ROWS ? b.c.model.fold[i].first : b.c.model.fold[i].second] = R(NAN);
+                frame[b.c.model.fold[i].first] =
+                    frame[b.c.model.fold[i].second > SMALL_ROWS ? b.c.model.fold[i].first
+                                                                : b.c.model.fold[i].second] =
+                        R(NAN);
             CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
             eits_options o = ctx->options;
             o.solver = SOLVERS[s];
@@ -283,7 +309,8 @@ static void beside_a_basis(void)
 
 static void numbers_that_cannot_be(void)
 {
-    static const double wild[] = {NAN, INFINITY, BOTH_WIDTHS(1e25, 1e200), BOTH_WIDTHS(1e-25, 1e-200), 0};
+    static const double wild[] = {NAN, INFINITY, BOTH_WIDTHS(1e25, 1e200),
+                                  BOTH_WIDTHS(1e-25, 1e-200), 0};
     for (int s = 0; s < 2; ++s) {
         for (size_t k = 0; k < sizeof wild / sizeof wild[0]; ++k) {
             for (int whole = 0; whole < 2; ++whole) {
@@ -297,8 +324,10 @@ static void numbers_that_cannot_be(void)
                 const eits_status status = eits_solve(ctx);
                 CHECK(k > 1 || status == EITS_E_NOT_FINITE);
                 for (int j = 0; j < N; ++j)
-                    CHECK(isfinite((double)ctx->image[j]) && isfinite((double)ctx->x[j]) && (k > 1 || ctx->image[j] == 0));
-                CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.gap_rel) && isfinite((double)ctx->info.residual));
+                    CHECK(isfinite((double)ctx->image[j]) && isfinite((double)ctx->x[j]) &&
+                          (k > 1 || ctx->image[j] == 0));
+                CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.gap_rel) &&
+                      isfinite((double)ctx->info.residual));
                 tear_down(&b);
             }
         }

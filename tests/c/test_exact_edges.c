@@ -1,11 +1,11 @@
-/* The exact solvers where columns depend on each other and MACs run out, at whatever place: the image is finite, and never worse
- * than zero. */
+/* The exact solvers where columns depend on each other and MACs run out, at whatever place: the
+ * image is finite, and never worse than zero. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/solve.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +13,8 @@
 
 enum { SIDE = 7, N = SIDE * SIDE, RANK = 6 };
 
-/* Columns in groups of three that are alike but for `off` of one number each, every seventh zero. */
+/* Columns in groups of three that are alike but for `off` of one number each, every seventh zero.
+ */
 static eits_context *set_up(dense_bench *b, double off)
 {
     memset(b, 0, sizeof *b);
@@ -77,14 +78,16 @@ static void every_limit_beside_columns_that_depend(void)
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
             CHECK_EQUAL(eits_solve(ctx), EITS_OK);
             CHECK(ctx->info.macs <= limit);
-            CHECK(ctx->info.stop == EITS_STOP_MACS || ctx->info.stop == EITS_STOP_OPTIMUM || ctx->info.stop == EITS_STOP_ITERATIONS);
+            CHECK(ctx->info.stop == EITS_STOP_MACS || ctx->info.stop == EITS_STOP_OPTIMUM ||
+                  ctx->info.stop == EITS_STOP_ITERATIONS);
             check_result(&b, at_zero * (1 + 1e-3));
         }
         dense_bench_close(&b);
     }
 }
 
-/* A start whose great coefficients cancel, on columns that are alike: without those that depend it is far worse than zero. */
+/* A start whose great coefficients cancel, on columns that are alike: without those that depend it
+ * is far worse than zero. */
 static void starts_that_cancel(void)
 {
     dense_bench b;
@@ -130,8 +133,10 @@ static void project_columns(dense *d, const double *direction)
     }
 }
 
-/* Sweeps over the columns that may move at zero, less those that stay there; `square`: each column's before the projection. */
-static void dense_sweeps(const dense *d, const double *square, double *r, double lambda, int sweeps, double *x)
+/* Sweeps over the columns that may move at zero, less those that stay there; `square`: each
+ * column's before the projection. */
+static void dense_sweeps(const dense *d, const double *square, double *r, double lambda, int sweeps,
+                         double *x)
 {
     uint32_t list[N], count = 0;
     for (uint32_t j = 0; j < N; ++j) {
@@ -142,8 +147,10 @@ static void dense_sweeps(const dense *d, const double *square, double *r, double
         uint32_t left = 0;
         for (uint32_t k = 0; k < count; ++k) {
             const uint32_t j = list[k];
-            const double *column = d->s + (size_t)j * d->rank, v = square[j] * x[j] + dense_dot(column, r, d->rank);
-            const double after = copysign(fmax(fabs(v) - lambda, 0), v) / square[j], step = after - x[j];
+            const double *column = d->s + (size_t)j * d->rank,
+                         v = square[j] * x[j] + dense_dot(column, r, d->rank);
+            const double after = copysign(fmax(fabs(v) - lambda, 0), v) / square[j],
+                         step = after - x[j];
             for (uint32_t i = 0; i < d->rank; ++i)
                 r[i] -= step * column[i];
             x[j] = after;
@@ -161,7 +168,9 @@ static void sweeps_as_written_apart(void)
     for (uint32_t ignored = 0; ignored < 2; ++ignored) {
         for (int storage = 0; storage < 4; ++storage) {
             dense_bench b;
-            eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = RANK_HERE, .side = SIDE, .storage = (eits_storage)storage}, 0);
+            eits_context *ctx = dense_bench_open(
+                &b, (small_spec){.rank = RANK_HERE, .side = SIDE, .storage = (eits_storage)storage},
+                0);
             double square[N], direction[RANK_HERE], *x = dense_numbers(N);
             for (uint32_t j = 0; j < N; ++j)
                 square[j] = dense_dot(b.d.s + j * RANK_HERE, b.d.s + j * RANK_HERE, RANK_HERE);
@@ -201,7 +210,9 @@ static void the_active_set_ends_soon(void)
     static const double lambdas[] = {0.003, 0.03, 0.3};
     for (int way = 0; way < 36; ++way) {
         dense_bench b;
-        eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)}, way % 2);
+        eits_context *ctx = dense_bench_open(
+            &b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)},
+            way % 2);
         small_new_data(ctx, 85 + (uint64_t)way);
         eits_options o = ctx->options;
         o.solver = EITS_SOLVER_ACTIVE_SET;
@@ -220,7 +231,8 @@ static void the_active_set_ends_soon(void)
     }
 }
 
-/* Columns of which a row left out hides all but rounding are not taken in, and no reason to go on for ever. */
+/* Columns of which a row left out hides all but rounding are not taken in, and no reason to go on
+ * for ever. */
 static void hidden_columns(void)
 {
     dense_bench b;
@@ -230,9 +242,12 @@ static void hidden_columns(void)
     uint8_t *sens = small_model_section(&b.made, "SENS", &size);
     uint64_t state = 3;
     for (size_t j = 0; j < N; ++j) {
-        const float *hidden = (const float *)(const void *)small_model_section(&b.made, "REDU", NULL) + EITS_STRIDE(RANK) * k;
+        const float *hidden =
+            (const float *)(const void *)small_model_section(&b.made, "REDU", NULL) +
+            EITS_STRIDE(RANK) * k;
         for (size_t i = 0; i < RANK; ++i)
-            small_put_f32(sens + size / N * j + 4 * i, hidden[i] * (float)(1 + BOTH_WIDTHS(1e-3, 2e-6) * small_random(&state)));
+            small_put_f32(sens + size / N * j + 4 * i,
+                          hidden[i] * (float)(1 + BOTH_WIDTHS(1e-3, 2e-6) * small_random(&state)));
     }
     small_model_seal(&b.made);
     small_context_open(&b.c, &b.made, 0);

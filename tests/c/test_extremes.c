@@ -1,10 +1,11 @@
-/* Numbers at the ends of the width: what overflows or vanishes on the way is refused or answered with zero, never NaN. */
+/* Numbers at the ends of the width: what overflows or vanishes on the way is refused or answered
+ * with zero, never NaN. */
 #include "check.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
-#include "vec.h"
 
 #include <math.h>
 #include <string.h>
@@ -45,7 +46,8 @@ static void set_v_ref(bench *b, float value)
         small_put_f32(at + 4 * k, value);
 }
 
-/* The reference of a model of equal voltages, `volts` each, and what becomes of a frame of `measured` volts. */
+/* The reference of a model of equal voltages, `volts` each, and what becomes of a frame of
+ * `measured` volts. */
 static void reference(float volts, double measured, eits_status expected)
 {
     bench b;
@@ -65,7 +67,8 @@ static void references_out_of_proportion(void)
     const eits_status narrow_only = BOTH_WIDTHS(EITS_E_FRAME_ZERO, EITS_OK);
     reference(1, 1, EITS_OK);
     reference(0, 1, EITS_E_FRAME_ZERO);
-    reference(1e-40f, 1, narrow_only);                                 /* one over the model's volts overflows */
+    /* one over the model's volts overflows */
+    reference(1e-40f, 1, narrow_only);
     reference(1, GREATEST, EITS_E_FRAME_ZERO);                         /* the fold's sum does */
     reference(FLT_MAX, BOTH_WIDTHS(1e-30, 1e-300), EITS_E_FRAME_ZERO); /* the gain does */
     reference(1e-30f, BOTH_WIDTHS(1e25, 1e300), EITS_E_FRAME_ZERO);    /* the gain vanishes */
@@ -87,7 +90,8 @@ static void check_cleared(const eits_context *ctx)
 {
     for (int j = 0; j < N; ++j)
         CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
-    CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.residual) && isfinite((double)ctx->info.lambda));
+    CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.residual) &&
+          isfinite((double)ctx->info.lambda));
 }
 
 static void correlations_that_overflow(void)
@@ -101,22 +105,25 @@ static void correlations_that_overflow(void)
             ctx->y[i] = R(BOTH_WIDTHS(1e5, 1e150));
         ctx->options.solver = (eits_solver)solver;
         CHECK_EQUAL(eits_solve(ctx), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
-        CHECK(BOTH_WIDTHS(1, 0) == (ctx->info.stop == EITS_STOP_DIVERGED && ctx->info.lambda_max == 0));
+        CHECK(BOTH_WIDTHS(1, 0) ==
+              (ctx->info.stop == EITS_STOP_DIVERGED && ctx->info.lambda_max == 0));
         if (sizeof(eits_real) == 4)
             check_cleared(ctx);
         tear_down(&b);
     }
 }
 
-/* Columns so small that their squares are sums of the least numbers there are, and come out too small by more than half: the
- * steps of coordinate descent, and those of the active set, are then too long, and the objective says so, whatever there is to
- * spend. So are the numbers that the factor gives where the data are great. */
+/* Columns so small that their squares are sums of the least numbers there are, and come out too
+ * small by more than half: the steps of coordinate descent, and those of the active set, are then
+ * too long, and the objective says so, whatever there is to spend. So are the numbers that the
+ * factor gives where the data are great. */
 static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_limit)
 {
     bench b;
     make(&b, MOST_RANK);
     set_columns(&b, MOST_RANK, 3.75e-23f, 2.6e-23f);
-    small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 1.2e-38f); /* the least that a model may state */
+    /* the least that a model may state */
+    small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 1.2e-38f);
     eits_context *ctx = open_made(&b);
     for (int i = 0; i < MOST_RANK; ++i)
         ctx->y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
@@ -143,9 +150,11 @@ static void columns_whose_squares_vanish(void)
             const eits_info info = solve_vanishing((eits_solver)solver, sizes[s], 0);
             CHECK_EQUAL(info.stop, BOTH_WIDTHS(EITS_STOP_DIVERGED, EITS_STOP_OPTIMUM));
             CHECK(sizeof(eits_real) == 4 || info.residual < R(0.02) * info.data_norm);
-            for (uint32_t limit = MOST_RANK; sizeof(eits_real) == 4 && limit < info.macs; limit += limit < 2000 ? MOST_RANK : limit / 3) {
+            for (uint32_t limit = MOST_RANK; sizeof(eits_real) == 4 && limit < info.macs;
+                 limit += limit < 2000 ? MOST_RANK : limit / 3) {
                 const eits_info limited = solve_vanishing((eits_solver)solver, sizes[s], limit);
-                CHECK(limited.macs <= limit && (limited.stop == EITS_STOP_MACS || limited.stop == EITS_STOP_DIVERGED));
+                CHECK(limited.macs <= limit &&
+                      (limited.stop == EITS_STOP_MACS || limited.stop == EITS_STOP_DIVERGED));
             }
         }
     }

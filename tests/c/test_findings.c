@@ -1,4 +1,5 @@
-/* What is found wrong with a frame, and what is left out because of it; glitches in quiet frames. */
+/* What is found wrong with a frame, and what is left out because of it; glitches in quiet frames.
+ */
 #include "findings_bench.h"
 
 static void nothing_wrong(void)
@@ -14,7 +15,8 @@ static void nothing_wrong(void)
     }
 }
 
-/* The small model's P is arbitrary: nothing predicts, so both sides of a fold go; the noise is known or told by all folds. */
+/* The small model's P is arbitrary: nothing predicts, so both sides of a fold go; the noise is
+ * known or told by all folds. */
 static void one_glitch(void)
 {
     for (int known = 0; known < 2; ++known) {
@@ -31,7 +33,8 @@ static void one_glitch(void)
                 CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
                 CHECK_EQUAL(ctx->info.glitches, 2);
                 CHECK_EQUAL(ctx->info.masked, 2);
-                CHECK(ctx->unusable[fold.first] == EITS_ROW_GLITCH && ctx->unusable[fold.second] == EITS_ROW_GLITCH);
+                CHECK(ctx->unusable[fold.first] == EITS_ROW_GLITCH &&
+                      ctx->unusable[fold.second] == EITS_ROW_GLITCH);
             }
             look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_GLITCH);
             reconstruct(&b);
@@ -41,7 +44,8 @@ static void one_glitch(void)
     }
 }
 
-/* Many folds whose sides disagree: those that share an electrode leave with it; those that share none are no network's. */
+/* Many folds whose sides disagree: those that share an electrode leave with it; those that share
+ * none are no network's. */
 static void many_glitches(void)
 {
     bench b;

@@ -1,10 +1,10 @@
-/* The floor of the whitening, raised with the noise of the reference: the map against the formula in double, the noise that it lets
- * through, and when nothing is raised. */
+/* The floor of the whitening, raised with the noise of the reference: the map against the formula
+ * in double, the noise that it lets through, and when nothing is raised. */
 #include "observed_bench.h"
 
 #include "eitskin/frame.h"
 #include "eitskin/touch.h"
-#include "floor.h"
+#include "frame/regularisation.h"
 
 static const double FACTOR = 5, MOST = 1;
 
@@ -27,7 +27,8 @@ static void the_formula(void)
 {
     const double noises[] = {2.1e-3, 0.01, 0.1, 0.9};
     for (size_t n = 0; n < sizeof noises / sizeof noises[0]; ++n) {
-        const double mu = fmin(FACTOR * noises[n], MOST), bound = BOTH_WIDTHS(1e-5, 1e-6); /* P and S are stored as float */
+        /* P and S are stored as float */
+        const double mu = fmin(FACTOR * noises[n], MOST), bound = BOTH_WIDTHS(1e-5, 1e-6);
         bench b;
         eits_context *ctx = set_up(&b, WHITENED, 0);
         (void)stage(&b);
@@ -57,7 +58,8 @@ static void the_formula(void)
     }
 }
 
-/* White noise on all rows: in the correlations, as a root mean square over S's columns, and in |y|^2. */
+/* White noise on all rows: in the correlations, as a root mean square over S's columns, and in
+ * |y|^2. */
 static void noise_through_it(void)
 {
     bench b;
@@ -106,8 +108,8 @@ static void reconstruct(bench *b, eits_real image[N])
     CHECK_EQUAL(eits_reconstruct(&b->b.c.ctx, b->frame, SMALL_ROWS, image, NULL), EITS_OK);
 }
 
-/* The model's own bits where nothing is known of the noise, or nothing asked for, or hardly more than there is; raised ones are the
- * same from all kernels, and go with the option. */
+/* The model's own bits where nothing is known of the noise, or nothing asked for, or hardly more
+ * than there is; raised ones are the same from all kernels, and go with the option. */
 static void only_where_asked_for(void)
 {
     bench b, other;
@@ -120,7 +122,8 @@ static void only_where_asked_for(void)
     for (size_t k = 0; k < sizeof little / sizeof little[0]; ++k) {
         pretend_noise(ctx, little[k]);
         reconstruct(&b, image);
-        CHECK(!ctx->rewhitened && ctx->info.floor == ctx->floor && memcmp(image, plain, sizeof image) == 0);
+        CHECK(!ctx->rewhitened && ctx->info.floor == ctx->floor &&
+              memcmp(image, plain, sizeof image) == 0);
     }
     pretend_noise(ctx, 1.012 * SMALL_FLOOR / FACTOR);
     reconstruct(&b, image);
@@ -143,14 +146,16 @@ static void only_where_asked_for(void)
     CHECK_EQUAL(eits_use_portable_kernels(portable, 1), EITS_OK);
     reconstruct(&other, image);
     CHECK(memcmp(image, raised, sizeof image) == 0);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK); /* of one frame nothing is known of the noise */
+    /* of one frame nothing is known of the noise */
+    CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
     reconstruct(&b, image);
     CHECK(memcmp(image, plain, sizeof image) == 0);
     dense_bench_close(&other.b);
     dense_bench_close(&b.b);
 }
 
-/* Models of another form stay as they are, and so do those whose numbers overflow; one without a floor gets one. */
+/* Models of another form stay as they are, and so do those whose numbers overflow; one without a
+ * floor gets one. */
 static void models_of_other_forms(void)
 {
     bench b;
@@ -170,14 +175,16 @@ static void models_of_other_forms(void)
     CHECK_NEAR(ctx->info.floor, 0.5, 1e-6);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->y[i], ctx->d[i], 1e-5);
-    ctx->row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160)); /* as of a row of P that is far greater than the others */
+    /* as of a row of P that is far greater than the others */
+    ctx->row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160));
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
     CHECK(!ctx->rewhitened && ctx->noise_ratio == 1 && ctx->info.floor == 0);
     dense_bench_close(&b.b);
 }
 
-/* The quiet frames' own noise raises the floor for the second half of them already, and lambda_noise is as with the model's. */
+/* The quiet frames' own noise raises the floor for the second half of them already, and
+ * lambda_noise is as with the model's. */
 static void learned_with_it(void)
 {
     enum { QUIET = 4 };
@@ -193,7 +200,8 @@ static void learned_with_it(void)
     for (int i = 0; i < SMALL_ROWS; ++i) {
         mean[i] = R(0.5) * (quiet[0][i] + quiet[1][i]);
         square += pow((double)(quiet[1][i] - quiet[0][i]), 2) / 2;
-        quiet[3][i] = (mean[i] + mean[i] + quiet[2][i]) / 3; /* says nothing: the third alone tells */
+        /* says nothing: the third alone tells */
+        quiet[3][i] = (mean[i] + mean[i] + quiet[2][i]) / 3;
     }
     CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
     for (int k = 0; k < QUIET; ++k)

@@ -1,10 +1,11 @@
-/* The frame stage: difference, fold, reduction, rows left out, drift; against the dense computation. */
+/* The frame stage: difference, fold, reduction, rows left out, drift; against the dense
+ * computation. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/solve.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -20,8 +21,8 @@ typedef struct bench {
     uint8_t out[SMALL_ROWS];
 } bench;
 
-/* A context with a reference of `gain` times the model's, each channel off by up to 3 %, so that no two reciprocal rows agree;
- * and a frame that differs from it by up to 20 %. */
+/* A context with a reference of `gain` times the model's, each channel off by up to 3 %, so that no
+ * two reciprocal rows agree; and a frame that differs from it by up to 20 %. */
 static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int project)
 {
     uint64_t state = 31;
@@ -63,13 +64,15 @@ static void check_stage(bench *b, uint32_t masked_expected)
     uint32_t masked = 99;
     CHECK_EQUAL(stage(b, &masked), EITS_OK);
     CHECK_EQUAL(masked, masked_expected);
-    dense_frame(&b->c.model, &b->d, v0, (double)ctx->baseline.gain, ctx->options.project_baseline ? v0 : NULL, b->frame, b->out, y);
+    dense_frame(&b->c.model, &b->d, v0, (double)ctx->baseline.gain,
+                ctx->options.project_baseline ? v0 : NULL, b->frame, b->out, y);
     CHECK(sqrt(dense_dot(y, y, RANK)) > 0.01);
     CHECK_NEAR(dense_greatest_difference(y, ctx->y, RANK), 0, 60 * EPS);
     for (uint32_t i = RANK; i < EITS_STRIDE(RANK); ++i)
         CHECK(ctx->y[i] == 0);
     for (uint32_t k = 0; k < ctx->basis_count; ++k) { /* orthonormal, and y is orthogonal to it */
-        double *a = dense_copy(ctx->basis + EITS_STRIDE(RANK) * k, RANK), *yy = dense_copy(ctx->y, RANK);
+        double *a = dense_copy(ctx->basis + EITS_STRIDE(RANK) * k, RANK),
+               *yy = dense_copy(ctx->y, RANK);
         for (uint32_t l = 0; l <= k; ++l) {
             double *other = dense_copy(ctx->basis + EITS_STRIDE(RANK) * l, RANK);
             CHECK_NEAR(dense_dot(a, other, RANK), k == l, 10 * EPS);
@@ -100,7 +103,8 @@ static void data_of_each_kind(void)
                         if (row == EITS_FOLD_NONE)
                             continue;
                         const double v = (double)b.frame[row], v0 = (double)b.reference[row];
-                        const double sign = side == 1 && kind != EITS_DATA_NORMALISED ? fold.sign : 1;
+                        const double sign =
+                            side == 1 && kind != EITS_DATA_NORMALISED ? fold.sign : 1;
                         sum += sign * (kind == EITS_DATA_DIFFERENCE   ? gain * (v - v0)
                                        : kind == EITS_DATA_NORMALISED ? (v - v0) / v0
                                                                       : gain * v0 * log(v / v0));
@@ -151,7 +155,8 @@ static void unusable_channels(void)
         for (int project = 0; project < 2; ++project) {
             bench b;
             eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, project);
-            const eits_fold pair = b.c.model.fold[2], other = b.c.model.fold[6], single = b.c.model.fold[20];
+            const eits_fold pair = b.c.model.fold[2], other = b.c.model.fold[6],
+                            single = b.c.model.fold[20];
             b.frame[pair.first] = (eits_real)NAN; /* the reciprocal stands in, sign turned */
             b.out[pair.first] = 1;
             check_stage(&b, 1);
@@ -159,7 +164,8 @@ static void unusable_channels(void)
             b.frame[other.second] = (eits_real)-INFINITY;
             b.out[other.second] = 1;
             check_stage(&b, 2);
-            CHECK(ctx->unusable[pair.first] && ctx->unusable[other.second] && !ctx->unusable[pair.second]);
+            CHECK(ctx->unusable[pair.first] && ctx->unusable[other.second] &&
+                  !ctx->unusable[pair.second]);
             b.frame[single.first] = (eits_real)INFINITY; /* a row without reciprocal */
             b.out[single.first] = 1;
             check_stage(&b, 3);
@@ -209,7 +215,8 @@ static void changing_masks(void)
     }
 }
 
-/* Rows left out on both sides: the answer does not depend on their values, and is the one that minimises over them. */
+/* Rows left out on both sides: the answer does not depend on their values, and is the one that
+ * minimises over them. */
 static void left_out_is_minimised_over(void)
 {
     bench b;
@@ -228,7 +235,8 @@ static void left_out_is_minimised_over(void)
         memcpy(seen[round], ctx->y, sizeof seen[round]);
     }
     CHECK(memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
-    /* min over a of |y + a p|^2, p the row's column of P, is |projected y|^2, and any start gives the same */
+    /* min over a of |y + a p|^2, p the row's column of P, is |projected y|^2, and any start gives
+     * the same */
     dense_frame(&b.c.model, &b.d, v0, (double)ctx->baseline.gain, NULL, b.frame, b.out, y_with);
     const double *p = b.d.p + k * RANK;
     const double a = -dense_dot(y_with, p, RANK) / dense_dot(p, p, RANK);
@@ -258,7 +266,8 @@ static void nothing_left(void)
         if (ctx->basis_count < RANK)
             CHECK(ctx->info.data_norm > R(1e-3));
         else
-            CHECK(ctx->info.data_norm == 0 && ctx->info.stop == EITS_STOP_ZERO && ctx->info.nonzeros == 0);
+            CHECK(ctx->info.data_norm == 0 && ctx->info.stop == EITS_STOP_ZERO &&
+                  ctx->info.nonzeros == 0);
     }
     CHECK_EQUAL(ctx->info.masked, SMALL_ROWS);
     tear_down(&b);
@@ -274,9 +283,11 @@ static void refused_frames_clear_the_image(void)
     o.max_masked = 3;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     memcpy(good, b.frame, sizeof good);
-    static const eits_status expected[] = {EITS_E_FRAME_CHANNELS, EITS_E_FRAME_LENGTH, EITS_E_FRAME_LENGTH,
-                                           EITS_E_FRAME_LENGTH,   EITS_E_NOT_FINITE,   EITS_E_FRAME_ZERO};
-    static const size_t length[] = {SMALL_ROWS, 0, SMALL_ROWS - 1, SMALL_ROWS + 1, SMALL_ROWS, SMALL_ROWS};
+    static const eits_status expected[] = {EITS_E_FRAME_CHANNELS, EITS_E_FRAME_LENGTH,
+                                           EITS_E_FRAME_LENGTH,   EITS_E_FRAME_LENGTH,
+                                           EITS_E_NOT_FINITE,     EITS_E_FRAME_ZERO};
+    static const size_t length[] = {SMALL_ROWS,     0,          SMALL_ROWS - 1,
+                                    SMALL_ROWS + 1, SMALL_ROWS, SMALL_ROWS};
     for (int wrong = 0; wrong < 6; ++wrong) {
         memcpy(b.frame, good, sizeof good);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, &info), EITS_OK);
@@ -303,7 +314,8 @@ static void refused_frames_clear_the_image(void)
     }
     for (int i = 0; i < 3; ++i)
         b.frame[i] = (eits_real)NAN;
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, &info), EITS_OK); /* three may be missing */
+    /* three may be missing */
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, &info), EITS_OK);
     CHECK_EQUAL(info.masked, 3);
     CHECK_EQUAL(eits_reconstruct(NULL, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_reconstruct(ctx, NULL, SMALL_ROWS, NULL, NULL), EITS_E_ARGUMENT);
@@ -335,7 +347,8 @@ static void masked_rows(void)
     tear_down(&b);
 }
 
-/* A row that was left out while the reference was taken has none: it stays out until the next reference. */
+/* A row that was left out while the reference was taken has none: it stays out until the next
+ * reference. */
 static void row_without_reference(void)
 {
     for (int learned = 0; learned < 2; ++learned) {
@@ -385,7 +398,9 @@ static void ratios_at_their_limits(void)
         b.frame[row] = b.reference[row] * (eits_real)factors[f];
         uint32_t masked;
         CHECK_EQUAL(stage(&b, &masked), EITS_OK);
-        CHECK_NEAR(ctx->d[20], (double)ctx->baseline.gain * (double)b.reference[row] * log(ratios[f]), 20 * EPS);
+        CHECK_NEAR(ctx->d[20],
+                   (double)ctx->baseline.gain * (double)b.reference[row] * log(ratios[f]),
+                   20 * EPS);
     }
     tear_down(&b);
 }
@@ -399,7 +414,8 @@ static void directions_that_nearly_agree(void)
     for (uint32_t i = 0; i < RANK; ++i) {
         float value;
         memcpy(&value, p + 4 * (EITS_STRIDE(RANK) * 4 + i), 4);
-        small_put_f32(p + 4 * (EITS_STRIDE(RANK) * 5 + i), value * (float)(1 + 3e-3 * small_random(&state)));
+        small_put_f32(p + 4 * (EITS_STRIDE(RANK) * 5 + i),
+                      value * (float)(1 + 3e-3 * small_random(&state)));
     }
     small_model_seal(&made);
     small_context c;
@@ -420,7 +436,8 @@ static void directions_that_nearly_agree(void)
     uint64_t macs;
     CHECK_EQUAL(eits_frame_stage(&c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
     CHECK_EQUAL(c.ctx.basis_count, 2);
-    double *a = dense_copy(c.ctx.basis, RANK), *b = dense_copy(c.ctx.basis + EITS_STRIDE(RANK), RANK);
+    double *a = dense_copy(c.ctx.basis, RANK),
+           *b = dense_copy(c.ctx.basis + EITS_STRIDE(RANK), RANK);
     CHECK_NEAR(dense_dot(a, b, RANK), 0, 4 * EPS);
     free(a), free(b);
     small_context_close(&c);

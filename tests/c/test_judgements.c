@@ -1,13 +1,13 @@
-/* What is said of a frame that is imaged as it is - misfit, a stale reference, crowds - and which readings of quiet frames are odd:
- * from numbers set by hand, on both sides of each limit. */
+/* What is said of a frame that is imaged as it is - misfit, a stale reference, crowds - and which
+ * readings of quiet frames are odd: from numbers set by hand, on both sides of each limit. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
+#include "diagnostics/diagnostics.h"
 #include "eitskin/solve.h"
-#include "examine.h"
-#include "kernels.h"
-#include "vec.h"
+#include "kernels/kernels.h"
 
 #include <math.h>
 #include <string.h>
@@ -17,7 +17,8 @@ enum { RANK = 13, SIDE = 6, N = SIDE * SIDE };
 static eits_context *set_up(dense_bench *b, eits_data_kind kind)
 {
     memset(b, 0, sizeof *b);
-    eits_context *ctx = dense_bench_open(b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind}, 0);
+    eits_context *ctx = dense_bench_open(
+        b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind}, 0);
     eits_real reference[SMALL_ROWS];
     small_reference(ctx->model, 1, reference);
     CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
@@ -34,13 +35,17 @@ static int crowded(eits_context *ctx, const eits_touch *touches, uint32_t count)
 }
 
 /* The score of crowded.c, in double, from its features. */
-static double score_of(double found, double electrodes, double near, double wide, double left, double above, double clear)
+static double score_of(double found, double electrodes, double near, double wide, double left,
+                       double above, double clear)
 {
-    return -0.3583 - 0.2429 * found * 16 / electrodes + 3.645 * near - 4.607 * wide - 3.659 * sqrt(left) + 0.1329 * above + 0.7892 * clear;
+    return -0.3583 - 0.2429 * found * 16 / electrodes + 3.645 * near - 4.607 * wide -
+           3.659 * sqrt(left) + 0.1329 * above + 0.7892 * clear;
 }
 
-/* Whether the frame is said to be crowded just as its score asks; a score too near the limit would test rounding. */
-static void said_as(eits_context *ctx, const eits_touch *touches, uint32_t count, double score, int expected)
+/* Whether the frame is said to be crowded just as its score asks; a score too near the limit would
+ * test rounding. */
+static void said_as(eits_context *ctx, const eits_touch *touches, uint32_t count, double score,
+                    int expected)
 {
     CHECK(fabs(score - 1.078) > 0.01);
     CHECK_EQUAL(score < 1.078, expected);
@@ -57,11 +62,13 @@ static void crowds(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_zero(ctx->y, EITS_STRIDE(RANK));
     eits_zero(ctx->residual, EITS_STRIDE(RANK));
-    memset(ctx->basis_for, EITS_SIDE_FIRST, ctx->model->n_folded); /* all folds are in use, of one row each */
+    /* all folds are in use, of one row each */
+    memset(ctx->basis_for, EITS_SIDE_FIRST, ctx->model->n_folded);
     ctx->y[0] = ctx->info.data_norm = 10;
     ctx->residual[0] = 1; /* 0.01 of |y|^2 */
     ctx->info.lambda_max = 20, ctx->info.lambda_noise = 2;
-    eits_touch t[4] = {{.radius_mm = 9, .confidence = 1}, {.x_mm = 18, .y_mm = 24, .radius_mm = 9, .confidence = R(0.04)}};
+    eits_touch t[4] = {{.radius_mm = 9, .confidence = 1},
+                       {.x_mm = 18, .y_mm = 24, .radius_mm = 9, .confidence = R(0.04)}};
     said_as(ctx, t, 2, score_of(2, 8, 30.0 / 18, 1, 0.01, 2, 2), 0);
     CHECK_NEAR(ctx->info.unexplained, 0.01, 1e-6);
     t[1].x_mm = 12, t[1].y_mm = 16; /* nearer */
@@ -113,8 +120,9 @@ static void stale_references(void)
         double up, down, noise; /* the greatest correlations either way; lambda_noise */
         int stale;
     } CASES[] = {
-        {EITS_SIGN_INCREASE, 1, 1.8, 0.1, 1}, {EITS_SIGN_INCREASE, 1, 1.6, 0.1, 0}, {EITS_SIGN_DECREASE, 1.8, 1, 0.1, 1},
-        {EITS_SIGN_DECREASE, 1, 1.8, 0.1, 0}, {EITS_SIGN_INCREASE, 1, 1.8, 0.4, 0}, {EITS_SIGN_INCREASE, 1, 1.8, 0.35, 1},
+        {EITS_SIGN_INCREASE, 1, 1.8, 0.1, 1}, {EITS_SIGN_INCREASE, 1, 1.6, 0.1, 0},
+        {EITS_SIGN_DECREASE, 1.8, 1, 0.1, 1}, {EITS_SIGN_DECREASE, 1, 1.8, 0.1, 0},
+        {EITS_SIGN_INCREASE, 1, 1.8, 0.4, 0}, {EITS_SIGN_INCREASE, 1, 1.8, 0.35, 1},
         {EITS_SIGN_INCREASE, 1, 9, 0, 0},     {EITS_SIGN_BOTH, 1, 9, 0.1, 0},
     };
     dense_bench b;
@@ -126,7 +134,8 @@ static void stale_references(void)
         eits_zero(ctx->gradient, N);
         ctx->gradient[5] = (eits_real)CASES[k].up;
         ctx->gradient[N - 1] = (eits_real)-CASES[k].down;
-        ctx->info.lambda_max = (eits_real)(o.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
+        ctx->info.lambda_max =
+            (eits_real)(o.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
         ctx->info.lambda_noise = (eits_real)CASES[k].noise;
         ctx->info.findings = 0;
         eits_judge_reference(ctx);
@@ -145,7 +154,8 @@ static int misfit(eits_context *ctx, double off)
     uint64_t macs = 0;
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         index[k] = k;
-        ctx->d[k] = (eits_real)(cos(pi * 2 * (k + 0.5) / SMALL_FOLDED) + off * cos(pi * (RANK + 2) * (k + 0.5) / SMALL_FOLDED));
+        ctx->d[k] = (eits_real)(cos(pi * 2 * (k + 0.5) / SMALL_FOLDED) +
+                                off * cos(pi * (RANK + 2) * (k + 0.5) / SMALL_FOLDED));
         ctx->basis_for[k] = EITS_SIDE_BOTH;
         ctx->apart[k] = 0;
     }
@@ -183,7 +193,8 @@ static void misfits(void)
     dense_bench_close(&b);
 }
 
-/* Two measurements of a fold have half the variance of one; a copy is none. Ratios have that of the voltage over the reference. */
+/* Two measurements of a fold have half the variance of one; a copy is none. Ratios have that of the
+ * voltage over the reference. */
 static void noise_of_the_data(void)
 {
     for (int kind = 0; kind < 2; ++kind) {
@@ -193,9 +204,11 @@ static void noise_of_the_data(void)
         double sum = 0;
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
             const int two = k % 3 == 0 && k < SMALL_PAIRS;
-            ctx->basis_for[k] = k < SMALL_PAIRS ? (k % 3 == 1 ? EITS_SIDE_SECOND : EITS_SIDE_BOTH) : EITS_SIDE_FIRST;
+            ctx->basis_for[k] = k < SMALL_PAIRS ? (k % 3 == 1 ? EITS_SIDE_SECOND : EITS_SIDE_BOTH)
+                                                : EITS_SIDE_FIRST;
             ctx->apart[k] = two ? R(0.1) : 0;
-            const double one = kind ? 0.25 / (double)ctx->model->v_ref[k] : 0.25 * (double)ctx->baseline.gain;
+            const double one =
+                kind ? 0.25 / (double)ctx->model->v_ref[k] : 0.25 * (double)ctx->baseline.gain;
             sum += one * one / (two ? 2 : 1);
         }
         CHECK_NEAR(eits_noise_energy(ctx), sum, 1e-5 * sum);
@@ -205,7 +218,8 @@ static void noise_of_the_data(void)
 
 /* ---- readings of quiet frames ---- */
 
-static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_real *older, uint32_t marked[SMALL_FOLDED])
+static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_real *older,
+                          uint32_t marked[SMALL_FOLDED])
 {
     memset(ctx->list_index, 0xFF, SMALL_FOLDED * sizeof *ctx->list_index);
     const uint32_t count = eits_quiet_odd(ctx, newer, older, 4);
@@ -219,7 +233,8 @@ static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_
     return count;
 }
 
-/* All rows change by 0.04, each pair alike but for 0.1 %: then a reading is odd beyond 12 robust deviations and 5 % of its own. */
+/* All rows change by 0.04, each pair alike but for 0.1 %: then a reading is odd beyond 12 robust
+ * deviations and 5 % of its own. */
 static void odd_readings(void)
 {
     dense_bench b;
@@ -228,7 +243,8 @@ static void odd_readings(void)
     uint32_t marked[SMALL_FOLDED];
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         const eits_fold fold = ctx->model->fold[k];
-        const eits_real sign = fold.sign, size = k == 4 ? R(0.01) : (k == 5 ? R(0.5) : 1), spread = k % 2 ? R(1e-3) : R(-1e-3);
+        const eits_real sign = fold.sign, size = k == 4 ? R(0.01) : (k == 5 ? R(0.5) : 1),
+                        spread = k % 2 ? R(1e-3) : R(-1e-3);
         older[fold.first] = size, newer[fold.first] = size + R(0.04);
         if (fold.second != EITS_FOLD_NONE)
             older[fold.second] = sign * size, newer[fold.second] = sign * (size + R(0.04) + spread);
@@ -238,7 +254,8 @@ static void odd_readings(void)
         uint32_t fold;
         double off;
         int odd;
-    } CASES[] = {{4, 0.022, 1}, {4, 0.015, 0}, {5, 0.03, 1}, {5, 0.022, 0}, {6, 0.06, 1}, {6, 0.045, 0}};
+    } CASES[] = {{4, 0.022, 1}, {4, 0.015, 0}, {5, 0.03, 1},
+                 {5, 0.022, 0}, {6, 0.06, 1},  {6, 0.045, 0}};
     for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
         memcpy(spoilt, newer, sizeof spoilt);
         spoilt[ctx->model->fold[CASES[n].fold].first] += (eits_real)CASES[n].off;
@@ -246,7 +263,8 @@ static void odd_readings(void)
         CHECK_EQUAL(marked[CASES[n].fold], CASES[n].odd);
     }
     memcpy(spoilt, newer, sizeof spoilt);
-    for (uint32_t count = 1; count <= EITS_GLITCH_MOST + 1; ++count) { /* as many are no glitches */
+    /* as many are no glitches */
+    for (uint32_t count = 1; count <= EITS_GLITCH_MOST + 1; ++count) {
         spoilt[ctx->model->fold[count].first] += R(0.2);
         CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), count <= EITS_GLITCH_MOST ? count : 0);
     }
@@ -255,7 +273,8 @@ static void odd_readings(void)
 
 /* ---- noise that is learned ---- */
 
-/* The noise of voltages of any size, whose squares are out of range; and what lambda makes of it. */
+/* The noise of voltages of any size, whose squares are out of range; and what lambda makes of it.
+ */
 static void noise_of_any_size(void)
 {
     static const double sizes[] = {1, BOTH_WIDTHS(1e-24, 1e-170), BOTH_WIDTHS(1e24, 1e170)};
@@ -287,7 +306,8 @@ static void noise_of_any_size(void)
         for (int k = 0; k < FRAMES; ++k) {
             for (int i = 0; i < SMALL_ROWS; ++i)
                 frame[i] = k < FRAMES / 2 ? reference[i] : 0;
-            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), k < FRAMES / 2 ? EITS_OK : EITS_E_FRAME_ZERO);
+            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS),
+                        k < FRAMES / 2 ? EITS_OK : EITS_E_FRAME_ZERO);
         }
         dense_bench_close(&b);
     }

@@ -1,10 +1,11 @@
-/* The matrix products: against naive sums within a bound, and to the bit between builds and layouts. */
+/* The matrix products: against naive sums within a bound, and to the bit between builds and
+ * layouts. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
-#include "kernels.h"
-#include "vec.h"
+#include "base/vec.h"
+#include "kernels/kernels.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -24,7 +25,8 @@ static void find_builds(void)
     builds[build_count++] = &eits_kernels_portable;
     CHECK(strcmp(eits_kernels_portable.name, "portable") == 0);
 #ifdef EITS_BUILD_AVX2
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c")) {
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+        __builtin_cpu_supports("f16c")) {
         builds[build_count++] = &eits_kernels_avx2;
         CHECK(best == &eits_kernels_avx2 && strcmp(best->name, "avx2") == 0);
         return;
@@ -48,7 +50,8 @@ static void *memory_of(size_t size)
     return made;
 }
 
-/* Random columns, a fifth of the numbers zero, padding zero; exactly as large as stated, so that reads beyond are seen. */
+/* Random columns, a fifth of the numbers zero, padding zero; exactly as large as stated, so that
+ * reads beyond are seen. */
 static sample make_sample(eits_storage storage, uint32_t rows, uint32_t cols, uint64_t *state)
 {
     static const size_t item[] = {4, 2, 2, 1};
@@ -63,17 +66,26 @@ static sample make_sample(eits_storage storage, uint32_t rows, uint32_t cols, ui
             const double value = small_random(state) < -0.6 ? 0 : small_random(state);
             const size_t at = (size_t)stride * j + i;
             switch (storage) {
-            case EITS_STORAGE_F32: ((float *)s.data)[at] = (float)value; break;
-            case EITS_STORAGE_F16: ((uint16_t *)s.data)[at] = (uint16_t)(0xBBFF & (int)(32768 + 32767 * value)); break;
-            case EITS_STORAGE_I16: ((int16_t *)s.data)[at] = (int16_t)(32767 * value); break;
-            case EITS_STORAGE_I8: ((int8_t *)s.data)[at] = (int8_t)(127 * value); break;
+            case EITS_STORAGE_F32:
+                ((float *)s.data)[at] = (float)value;
+                break;
+            case EITS_STORAGE_F16:
+                ((uint16_t *)s.data)[at] = (uint16_t)(0xBBFF & (int)(32768 + 32767 * value));
+                break;
+            case EITS_STORAGE_I16:
+                ((int16_t *)s.data)[at] = (int16_t)(32767 * value);
+                break;
+            case EITS_STORAGE_I8:
+                ((int8_t *)s.data)[at] = (int8_t)(127 * value);
+                break;
             }
         }
     }
     if (integer) {
         s.scale = memory_of(cols * sizeof(float));
         for (uint32_t j = 0; j < cols; ++j)
-            s.scale[j] = (float)((1.2 + small_random(state)) / (storage == EITS_STORAGE_I8 ? 127 : 32767));
+            s.scale[j] =
+                (float)((1.2 + small_random(state)) / (storage == EITS_STORAGE_I8 ? 127 : 32767));
     }
     s.matrix = (eits_matrix){s.data, s.scale, rows, cols, stride, storage};
     return s;
@@ -101,11 +113,13 @@ static int same_bits(const eits_real *a, const eits_real *b, size_t count)
     return memcmp(a, b, count * sizeof *a) == 0;
 }
 
-/* S x for a list of columns: the exact sum in long double, and the documented chain of fused multiply-adds. */
+/* S x for a list of columns: the exact sum in long double, and the documented chain of fused
+ * multiply-adds. */
 static void check_mul(const sample *s, uint64_t *state)
 {
     const eits_matrix *m = &s->matrix;
-    eits_real *x = reals(m->cols), *value = reals(m->cols), *out[2] = {reals(m->stride), reals(m->stride)};
+    eits_real *x = reals(m->cols), *value = reals(m->cols),
+              *out[2] = {reals(m->stride), reals(m->stride)};
     uint32_t *index = memory_of(m->cols * sizeof *index);
     for (int share = 0; share <= 4; ++share) { /* of zeros: all, three quarters, ... none */
         fill(x, m->cols, 1 - 0.25 * share, state);
@@ -162,7 +176,8 @@ static void check_mul_t(const sample *s, uint64_t *state)
             chain = eits_fma((eits_real)entry, v[i], chain);
         }
         expected[j] = m->scale != NULL ? chain * scale : chain;
-        CHECK_NEAR(expected[j], exact * (long double)scale, (m->rows + 3.0) * EPS / 2 * (double)(sizes * (long double)scale));
+        CHECK_NEAR(expected[j], exact * (long double)scale,
+                   (m->rows + 3.0) * EPS / 2 * (double)(sizes * (long double)scale));
     }
     for (int b = 0; b < build_count; ++b) {
         memset(out, 0xFF, m->cols * sizeof *out);
@@ -171,7 +186,8 @@ static void check_mul_t(const sample *s, uint64_t *state)
         memset(out, 0xFF, m->cols * sizeof *out);
         builds[b]->mul_t_panels(m, panels, NULL, m->cols, v, out);
         CHECK(same_bits(out, expected, m->cols));
-        uint32_t *index = memory_of(m->cols * sizeof *index), count = 0; /* every column but each third, then none */
+        /* every column but each third, then none */
+        uint32_t *index = memory_of(m->cols * sizeof *index), count = 0;
         for (uint32_t j = 0; j < m->cols; ++j) {
             index[count] = j;
             count += j % 3 != 2;
@@ -187,11 +203,13 @@ static void check_mul_t(const sample *s, uint64_t *state)
     free(v), free(expected), free(out), free(panels), free(column);
 }
 
-/* S' v by eight lanes and a tree, in each build: one result, to the bit; numbers beside a column do not count. */
+/* S' v by eight lanes and a tree, in each build: one result, to the bit; numbers beside a column do
+ * not count. */
 static void check_dots(const sample *s, uint64_t *state)
 {
     const eits_matrix *m = &s->matrix;
-    eits_real *v = reals(m->rows), *expected = reals(m->cols), *out = reals(m->cols + 1), *column = reals(m->rows);
+    eits_real *v = reals(m->rows), *expected = reals(m->cols), *out = reals(m->cols + 1),
+              *column = reals(m->rows);
     uint32_t *index = memory_of(m->cols * sizeof *index);
     fill(v, m->rows, 0.1, state);
     for (uint32_t j = 0; j < m->cols; ++j) {
@@ -215,7 +233,8 @@ static void check_dots(const sample *s, uint64_t *state)
     free(v), free(expected), free(out), free(column), free(index);
 }
 
-/* Stored numbers as floats, from any block of eight on: the numbers themselves, padding included, and nothing beside them. */
+/* Stored numbers as floats, from any block of eight on: the numbers themselves, padding included,
+ * and nothing beside them. */
 static void check_unpack(const sample *s)
 {
     const eits_matrix *m = &s->matrix;
@@ -227,7 +246,8 @@ static void check_unpack(const sample *s)
             builds[b]->unpack(m, first, whole - first, out);
             for (size_t i = 0; i < whole - first; ++i) {
                 const size_t row = (first + i) % m->stride, column = (first + i) / m->stride;
-                CHECK(out[i] == (float)(row < m->rows ? dense_entry(m, (uint32_t)column, (uint32_t)row) : 0));
+                CHECK(out[i] ==
+                      (float)(row < m->rows ? dense_entry(m, (uint32_t)column, (uint32_t)row) : 0));
             }
             CHECK(isnan(out[whole - first]));
         }
@@ -237,7 +257,8 @@ static void check_unpack(const sample *s)
 
 static void products_of_all_storages_and_sizes(void)
 {
-    static const uint32_t rows[] = {1, 3, 7, 8, 9, 13, 24, 33}, cols[] = {1, 2, 3, 4, 5, 7, 31, 32, 33, 64, 99};
+    static const uint32_t rows[] = {1, 3, 7, 8, 9, 13, 24, 33},
+                          cols[] = {1, 2, 3, 4, 5, 7, 31, 32, 33, 64, 99};
     uint64_t state = 11;
     for (int storage = 0; storage < 4; ++storage) {
         for (size_t r = 0; r < sizeof rows / sizeof rows[0]; ++r) {
@@ -267,7 +288,8 @@ static void dots_and_axpys(void)
             sizes += fabsl((long double)a[i] * (long double)b[i]);
             lane[i % 8] = eits_fma(a[i], b[i], lane[i % 8]);
         }
-        const eits_real tree = ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
+        const eits_real tree = ((lane[0] + lane[4]) + (lane[2] + lane[6])) +
+                               ((lane[1] + lane[5]) + (lane[3] + lane[7]));
         for (int k = 0; k < build_count; ++k) {
             const eits_real got = builds[k]->dot(a, b, count);
             CHECK_NEAR(got, exact, ((double)count / 8 + 5) * EPS / 2 * (double)sizes);
@@ -290,7 +312,8 @@ static void products_with_few_rows(void)
     uint64_t state = 15;
     for (uint32_t count = 0; count <= 18; ++count) {
         for (size_t length = 0; length <= STRIDE; length += 8) {
-            eits_real *rows = reals((size_t)STRIDE * count), *v = reals(STRIDE + 18), dots[20], sums[STRIDE + 1];
+            eits_real *rows = reals((size_t)STRIDE * count), *v = reals(STRIDE + 18), dots[20],
+                      sums[STRIDE + 1];
             fill(rows, (size_t)STRIDE * count, 0.2, &state);
             fill(v, STRIDE + 18, 0.2, &state);
             for (int b = 0; b < build_count; ++b) {
@@ -369,8 +392,10 @@ static void proximal_steps(void)
     const double step = 0.7, threshold = 0.3, beta = 0.4;
     for (int sign = 0; sign < 3; ++sign) {
         for (uint32_t n = 0; n <= 40; ++n) {
-            eits_real *g = reals(n), *x = reals(n), *start = reals(n), *z[2] = {reals(n), reals(n)}, *next[2] = {reals(n), reals(n)};
-            const eits_prox how = {(eits_real)step, (eits_real)threshold, (eits_real)beta, (eits_sign)sign};
+            eits_real *g = reals(n), *x = reals(n), *start = reals(n), *z[2] = {reals(n), reals(n)},
+                      *next[2] = {reals(n), reals(n)};
+            const eits_prox how = {(eits_real)step, (eits_real)threshold, (eits_real)beta,
+                                   (eits_sign)sign};
             fill(g, n, 0.1, &state);
             fill(x, n, 0.3, &state);
             fill(start, n, 0.2, &state);
@@ -422,7 +447,8 @@ static void zeros_are_skipped(void)
     eits_real x[9] = {0, R(-0.0), 2, 0, 0, R(-1e-30), 0, 0, 3}, value[9], out[8];
     uint32_t index[9];
     for (int b = 0; b < build_count; ++b) {
-        CHECK_EQUAL(eits_list_nonzeros(builds[b], &s.matrix, x, index, value), 3); /* minus zero is zero, however small is not */
+        /* minus zero is zero, however small is not */
+        CHECK_EQUAL(eits_list_nonzeros(builds[b], &s.matrix, x, index, value), 3);
         CHECK(index[0] == 2 && index[1] == 5 && index[2] == 8);
     }
     for (uint32_t i = 0; i < 5; ++i)

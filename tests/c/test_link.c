@@ -29,7 +29,8 @@ static eits_link_decoder fresh(void)
     return d;
 }
 
-/* Feed all; the number of packets, the last of them in `last` (its payload is only valid until the next byte). */
+/* Feed all; the number of packets, the last of them in `last` (its payload is only valid until the
+ * next byte). */
 static int feed_all(eits_link_decoder *d, const uint8_t *bytes, size_t size, eits_link_packet *last)
 {
     int found = 0;
@@ -53,11 +54,18 @@ static uint32_t errors(const eits_link_decoder *d)
 }
 
 /* The wire's bytes by a second, plain implementation: build the packet, stuff it block by block. */
-static size_t plainly(uint8_t *out, uint8_t version, uint8_t type, uint32_t sequence, const uint8_t *bytes, size_t size)
+static size_t plainly(uint8_t *out, uint8_t version, uint8_t type, uint32_t sequence,
+                      const uint8_t *bytes, size_t size)
 {
     static uint8_t packet[EITS_LINK_MAX_PACKET];
-    const uint8_t head[8] = {version, type, (uint8_t)size, (uint8_t)(size >> 8), (uint8_t)sequence, (uint8_t)(sequence >> 8),
-                             (uint8_t)(sequence >> 16), (uint8_t)(sequence >> 24)};
+    const uint8_t head[8] = {version,
+                             type,
+                             (uint8_t)size,
+                             (uint8_t)(size >> 8),
+                             (uint8_t)sequence,
+                             (uint8_t)(sequence >> 8),
+                             (uint8_t)(sequence >> 16),
+                             (uint8_t)(sequence >> 24)};
     memcpy(packet, head, 8);
     memcpy(packet + 8, bytes, size);
     const uint32_t crc = eits_crc32(0, packet, size + 8);
@@ -86,14 +94,18 @@ static size_t plainly(uint8_t *out, uint8_t version, uint8_t type, uint32_t sequ
 static void fill(size_t size, int kind)
 {
     for (size_t i = 0; i < size; ++i)
-        payload[i] = kind == 0 ? 0 : kind == 1 ? (uint8_t)(1 + i % 255) : kind == 2 ? 0xFF : (uint8_t)(next_random() >> 24);
+        payload[i] = kind == 0   ? 0
+                     : kind == 1 ? (uint8_t)(1 + i % 255)
+                     : kind == 2 ? 0xFF
+                                 : (uint8_t)(next_random() >> 24);
 }
 
 static void one_round_trip(size_t size, size_t head_size)
 {
     const uint8_t type = (uint8_t)next_random();
     const uint32_t sequence = next_random();
-    const size_t made = eits_link_encode(wire, sizeof wire, type, sequence, payload, head_size, payload + head_size, size - head_size);
+    const size_t made = eits_link_encode(wire, sizeof wire, type, sequence, payload, head_size,
+                                         payload + head_size, size - head_size);
     CHECK(made > 0 && made <= EITS_LINK_ENCODED(size));
     CHECK_EQUAL(made, plainly(other, EITS_LINK_VERSION, type, sequence, payload, size));
     CHECK(memcmp(wire, other, made) == 0);
@@ -155,7 +167,8 @@ static void bad_decoders(void)
     CHECK_EQUAL(eits_link_decoder_init(&d, buffer, EITS_LINK_HEAD + 4), EITS_OK);
 }
 
-/* Whatever happens to one byte of a packet: no packet, one error counted, and the next packet is there. */
+/* Whatever happens to one byte of a packet: no packet, one error counted, and the next packet is
+ * there. */
 static void one_damage(const uint8_t *damaged, size_t size, const uint8_t *good, size_t good_size)
 {
     eits_link_decoder d = fresh();
@@ -174,7 +187,8 @@ static void every_byte_damaged(void)
     static const size_t sizes[] = {0, 4, 36, 253, 300};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         fill(sizes[s], 3);
-        const size_t made = eits_link_encode(wire, sizeof wire, EITS_PACKET_RAW, 5, payload, sizes[s], NULL, 0);
+        const size_t made =
+            eits_link_encode(wire, sizeof wire, EITS_PACKET_RAW, 5, payload, sizes[s], NULL, 0);
         for (size_t at = 1; at + 1 < made; ++at) { /* the zeros at both ends: see delimiters() */
             for (unsigned value = 0; value < 256; ++value) {
                 if (value == wire[at])
@@ -185,7 +199,8 @@ static void every_byte_damaged(void)
             }
             memcpy(damaged, wire, at); /* byte lost */
             memcpy(damaged + at, wire + at + 1, made - at - 1);
-            if (memcmp(damaged, wire, made - 1) != 0) /* or one of a run of equals: then it is another's loss */
+            /* or one of a run of equals: then it is another's loss */
+            if (memcmp(damaged, wire, made - 1) != 0)
                 one_damage(damaged, made - 1, good, good_size);
             if (at + 2 < made) /* cut: the next packet's leading zero ends it */
                 one_damage(wire, at + 1, good, good_size);
@@ -202,12 +217,14 @@ static void delimiters(void)
     memset(bytes, 0, sizeof bytes); /* any number of zeros between packets */
     memcpy(bytes + 7, wire, made);
     CHECK_EQUAL(feed_all(&d, bytes, 7 + made + 20, &packet), 1);
-    CHECK_EQUAL(feed_all(&d, wire + 1, made - 1, &packet), 1); /* one zero between two packets is enough */
+    /* one zero between two packets is enough */
+    CHECK_EQUAL(feed_all(&d, wire + 1, made - 1, &packet), 1);
     CHECK_EQUAL(feed_all(&d, wire + 1, made - 2, &packet), 0);
     CHECK_EQUAL(feed_all(&d, wire, made, &packet), 2); /* its leading zero ends the one before */
     CHECK_EQUAL(d.packets, 4);
     CHECK_EQUAL(errors(&d), 0);
-    memcpy(bytes, wire, made - 1); /* the zero between two packets lost: both are, and counted once */
+    /* the zero between two packets lost: both are, and counted once */
+    memcpy(bytes, wire, made - 1);
     memcpy(bytes + made - 1, wire + 1, made - 1);
     CHECK_EQUAL(feed_all(&d, bytes, 2 * made - 2, &packet), 0);
     CHECK_EQUAL(errors(&d), 1);
@@ -320,7 +337,8 @@ static void by_bytes_and_by_blocks(void)
     while (length + 1200 < sizeof line) {
         const size_t size = next_random() % 900;
         fill(size, 3);
-        length += eits_link_encode(line + length, sizeof line - length, (uint8_t)size, next_random(), payload, size, NULL, 0);
+        length += eits_link_encode(line + length, sizeof line - length, (uint8_t)size,
+                                   next_random(), payload, size, NULL, 0);
         if (next_random() % 4 == 0)
             line[length - 2 - next_random() % 10] ^= (uint8_t)(1 + next_random() % 255);
     }
@@ -331,7 +349,8 @@ static void by_bytes_and_by_blocks(void)
     while (at < length) {
         eits_link_packet packet, single = {.payload = NULL};
         const size_t most = 1 + next_random() % 700;
-        const size_t taken = eits_link_feed(&blocks, line + at, at + most < length ? most : length - at, &packet);
+        const size_t taken =
+            eits_link_feed(&blocks, line + at, at + most < length ? most : length - at, &packet);
         for (size_t k = 0; k < taken; ++k) {
             CHECK_EQUAL(eits_link_feed(&bytes, line + at + k, 1, &single), 1);
             CHECK(k + 1 == taken || !single.payload);
@@ -340,7 +359,8 @@ static void by_bytes_and_by_blocks(void)
         CHECK((packet.payload != NULL) == (single.payload != NULL));
         if (packet.payload && single.payload) {
             ++by_bytes;
-            CHECK(packet.type == single.type && packet.sequence == single.sequence && packet.size == single.size);
+            CHECK(packet.type == single.type && packet.sequence == single.sequence &&
+                  packet.size == single.size);
             CHECK(memcmp(packet.payload, single.payload, packet.size) == 0);
         }
     }

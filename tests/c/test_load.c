@@ -1,7 +1,8 @@
-/* The section LOAD: what it says of a touch, by hand in double, and everything that a reader refuses. */
+/* The section LOAD: what it says of a touch, by hand in double, and everything that a reader
+ * refuses. */
+#include "base/vec.h"
 #include "check.h"
 #include "small_model.h"
-#include "vec.h"
 
 #include <math.h>
 #include <string.h>
@@ -13,7 +14,8 @@ enum { HEAD = 32, MOST = 1024 };
 static uint32_t section_of(uint8_t *bytes, uint32_t order)
 {
     static const float table[] = {0, 2, 3, 0, 1, 5};
-    static const float gain[] = {0.9f, 0.25f, -0.125f, 3.5f, -0.3f, 0.2f, 0.05f, 0.1f, -0.15f, 0.35f, 0.4f, -0.45f, 0.11f, 0.21f, -0.31f};
+    static const float gain[] = {0.9f,   0.25f, -0.125f, 3.5f,   -0.3f, 0.2f,  0.05f, 0.1f,
+                                 -0.15f, 0.35f, 0.4f,    -0.45f, 0.11f, 0.21f, -0.31f};
     const uint32_t terms = (order + 1) * (order + 2) / 2;
     memset(bytes, 0, MOST);
     small_put_u32(bytes, 3);
@@ -26,7 +28,8 @@ static uint32_t section_of(uint8_t *bytes, uint32_t order)
     return HEAD + (uint32_t)sizeof table + 4 * terms;
 }
 
-static eits_status open_with(const uint8_t *bytes, uint32_t size, eits_model *model, small_model *kept)
+static eits_status open_with(const uint8_t *bytes, uint32_t size, eits_model *model,
+                             small_model *kept)
 {
     small_model bare = small_model_make(TINY);
     *kept = small_model_with_load(&bare, bytes, size);
@@ -76,11 +79,14 @@ static void loads_are_those_of_the_table(void)
         small_model kept;
         CHECK_EQUAL(open_with(bytes, section_of(bytes, order), &model, &kept), EITS_OK);
         for (int i = 0; i < 500; ++i) {
-            const double x = -16 + 0.064 * i, y = 12 * sin(i), strength = 6 * cos(0.37 * i); /* of either sign */
+            /* of either sign */
+            const double x = -16 + 0.064 * i, y = 12 * sin(i), strength = 6 * cos(0.37 * i);
             const double away = hypot(x, y) / 10, inward = away > 1.5 ? 1.5 / away : 1;
-            const double s = fabs(strength) * gain_by_hand(model.load.gain, order, x / 10 * inward, y / 10 * inward);
+            const double s = fabs(strength) *
+                             gain_by_hand(model.load.gain, order, x / 10 * inward, y / 10 * inward);
             const double load = fmin(s <= 2 ? s / 2 : 1 + 4 * (s - 2), 10);
-            const double got = (double)eits_load_n(&model, (eits_real)x, (eits_real)y, (eits_real)strength);
+            const double got =
+                (double)eits_load_n(&model, (eits_real)x, (eits_real)y, (eits_real)strength);
             CHECK_NEAR(got, load, 200 * EPS * fmax(load, 1));
         }
         CHECK(eits_load_n(&model, 3, 4, 0) == 0);
@@ -139,7 +145,8 @@ static void numbers_out_of_range(void)
                 CHECK_EQUAL(with_number(at, wrong[w]), EITS_E_MODEL_VALUE);
         }
     }
-    CHECK_EQUAL(with_number(HEAD + 4, 3.0f), EITS_E_MODEL_VALUE); /* as much as the next: no way back */
+    /* as much as the next: no way back */
+    CHECK_EQUAL(with_number(HEAD + 4, 3.0f), EITS_E_MODEL_VALUE);
     for (uint32_t k = 0; k < 3; ++k) {
         const float wrong[] = {NAN, -INFINITY, 2e6f, -2e6f};
         for (size_t w = 0; w < sizeof wrong / sizeof wrong[0]; ++w)
@@ -152,7 +159,8 @@ static void touches_have_loads(void)
 {
     uint8_t bytes[MOST];
     const small_spec spec = {.rank = 24, .side = 12, .shape = SMALL_WAVES};
-    small_model bare = small_model_make(spec), made = small_model_with_load(&bare, bytes, section_of(bytes, 2));
+    small_model bare = small_model_make(spec),
+                made = small_model_with_load(&bare, bytes, section_of(bytes, 2));
     small_context c;
     eits_touch touches[EITS_MAX_TOUCHES];
     eits_real frame[SMALL_ROWS];
@@ -171,7 +179,8 @@ static void touches_have_loads(void)
     CHECK(count > 0);
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = &touches[k];
-        CHECK(t->load_n > 0 && t->load_n == eits_load_n(&c.model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
+        CHECK(t->load_n > 0 &&
+              t->load_n == eits_load_n(&c.model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
     }
     small_context_close(&c);
     small_model_free(&made);

@@ -1,11 +1,12 @@
-/* The limit of multiply-accumulates: whatever it is, it holds, and the image is finite and no worse than zero. */
+/* The limit of multiply-accumulates: whatever it is, it holds, and the image is finite and no worse
+ * than zero. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -70,7 +71,8 @@ static void check_result(const bench *b, const eits_info *info)
     CHECK_EQUAL(nonzeros, info->nonzeros);
     if (info->lambda > 0) {
         const double scale = 0.5 * dense_dot(y, y, RANK);
-        CHECK_NEAR(dense_gap(&b->d, y, x, (double)info->lambda, ctx->options.sign), info->gap, 300 * EPS * scale);
+        CHECK_NEAR(dense_gap(&b->d, y, x, (double)info->lambda, ctx->options.sign), info->gap,
+                   300 * EPS * scale);
         CHECK(dense_objective(&b->d, y, x, (double)info->lambda) <= scale * (1 + 1e-3));
     }
     free(x), free(y);
@@ -83,14 +85,16 @@ static void every_limit_holds(void)
             for (int gap = 0; gap < 2; ++gap) {
                 bench b;
                 eits_context *ctx = set_up(&b);
-                const way w = {(eits_solver)solver, warm ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH, warm, gap ? 1e-6 : 0};
+                const way w = {(eits_solver)solver, warm ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH,
+                               warm, gap ? 1e-6 : 0};
                 const eits_info free_run = solve(ctx, w, 0);
                 CHECK(free_run.stop != EITS_STOP_MACS);
                 uint64_t spent = 0;
                 for (uint32_t limit = 1; limit <= 2 * free_run.macs + 1; limit += 1 + limit / 97) {
                     const eits_info info = solve(ctx, w, limit);
                     CHECK(info.macs <= limit);
-                    CHECK(info.stop == EITS_STOP_MACS || info.stop == free_run.stop || info.stop == EITS_STOP_OPTIMUM);
+                    CHECK(info.stop == EITS_STOP_MACS || info.stop == free_run.stop ||
+                          info.stop == EITS_STOP_OPTIMUM);
                     CHECK(info.stop != EITS_STOP_MACS || limit < 2 * free_run.macs);
                     if (limit < N * RANK)
                         CHECK(info.macs == 0 && info.stop == EITS_STOP_MACS && info.nonzeros == 0);
@@ -99,14 +103,16 @@ static void every_limit_holds(void)
                 }
                 CHECK(spent == free_run.macs || warm);
                 const eits_info enough = solve(ctx, w, (uint32_t)(2 * free_run.macs));
-                CHECK(enough.macs == free_run.macs && enough.gap == free_run.gap && enough.stop == free_run.stop);
+                CHECK(enough.macs == free_run.macs && enough.gap == free_run.gap &&
+                      enough.stop == free_run.stop);
                 dense_bench_close(&b);
             }
         }
     }
 }
 
-/* Cold FISTA needs just what it spends; and more MACs give no worse an image, so far as FISTA goes down at all. */
+/* Cold FISTA needs just what it spends; and more MACs give no worse an image, so far as FISTA goes
+ * down at all. */
 static void to_the_last_mac(void)
 {
     for (int solver = 0; solver < 2; ++solver) {
@@ -127,7 +133,8 @@ static void beside_step_halvings(void)
 {
     bench b;
     memset(&b, 0, sizeof b);
-    b.made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 1.0 / 16});
+    b.made =
+        small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 1.0 / 16});
     small_context_open(&b.c, &b.made, 0);
     b.d = dense_of(&b.c.model);
     for (int solver = 0; solver < 2; ++solver) {
@@ -137,13 +144,15 @@ static void beside_step_halvings(void)
             CHECK(info.macs <= limit);
             for (int j = 0; j < N; ++j)
                 CHECK(isfinite((double)b.c.ctx.image[j]));
-            CHECK(info.stop == EITS_STOP_DIVERGED || info.stop == EITS_STOP_MACS || info.stop == EITS_STOP_ITERATIONS);
+            CHECK(info.stop == EITS_STOP_DIVERGED || info.stop == EITS_STOP_MACS ||
+                  info.stop == EITS_STOP_ITERATIONS);
         }
     }
     dense_bench_close(&b);
 }
 
-/* A frame's own multiply-accumulates are always spent; what is left of the limit is the solver's. */
+/* A frame's own multiply-accumulates are always spent; what is left of the limit is the solver's.
+ */
 static void of_a_whole_frame(void)
 {
     for (int solver = 0; solver < SOLVERS; ++solver) {

@@ -1,4 +1,5 @@
-/* Opening models: good ones, and each way in which the header, the checksum or the section table can be wrong. */
+/* Opening models: good ones, and each way in which the header, the checksum or the section table
+ * can be wrong. */
 #include "check.h"
 #include "small_model.h"
 
@@ -29,7 +30,8 @@ static void good_models_open(void)
 {
     for (int storage = 0; storage < 4; ++storage) {
         const int integer = storage >= EITS_STORAGE_I16;
-        const small_spec spec = {.rank = 10, .side = 5, .storage = (eits_storage)storage, .kind = EITS_DATA_LOG_RATIO};
+        const small_spec spec = {
+            .rank = 10, .side = 5, .storage = (eits_storage)storage, .kind = EITS_DATA_LOG_RATIO};
         small_model made = small_model_make(spec);
         eits_model model;
         CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
@@ -54,18 +56,23 @@ static void good_models_open(void)
         CHECK((const uint8_t *)model.pixel == small_model_section(&made, "GRID", NULL));
         CHECK((const uint8_t *)model.defaults == small_model_section(&made, "DEFS", NULL));
         CHECK((const uint8_t *)model.golden.reference == small_model_section(&made, "GOLD", NULL));
-        CHECK(model.golden.frame == model.golden.reference + 40 && model.golden.image == model.golden.frame + 40);
-        CHECK(model.reduction.data == small_model_section(&made, "REDU", NULL) && model.reduction.scale == NULL);
-        CHECK(model.reduction.rows == 10 && model.reduction.cols == 21 && model.reduction.stride == 16);
+        CHECK(model.golden.frame == model.golden.reference + 40 &&
+              model.golden.image == model.golden.frame + 40);
+        CHECK(model.reduction.data == small_model_section(&made, "REDU", NULL) &&
+              model.reduction.scale == NULL);
+        CHECK(model.reduction.rows == 10 && model.reduction.cols == 21 &&
+              model.reduction.stride == 16);
         CHECK_EQUAL(model.reduction.storage, EITS_STORAGE_F32);
         CHECK(model.sensitivity.data == small_model_section(&made, "SENS", NULL));
-        CHECK(model.sensitivity.rows == 10 && model.sensitivity.cols == 25 && model.sensitivity.stride == 16);
+        CHECK(model.sensitivity.rows == 10 && model.sensitivity.cols == 25 &&
+              model.sensitivity.stride == 16);
         CHECK_EQUAL(model.sensitivity.storage, storage);
         CHECK((model.sensitivity.scale != NULL) == integer);
         CHECK(model.meta_size == 2 && memcmp(model.meta, "{}", 2) == 0);
         CHECK_EQUAL(model.defaults->iterations, 60);
         CHECK_NEAR(model.defaults->touch_seed_radius_mm, 9, 0);
-        CHECK(model.fold[2].sign == -1 && model.fold[0].sign == 1 && model.fold[20].second == EITS_FOLD_NONE);
+        CHECK(model.fold[2].sign == -1 && model.fold[0].sign == 1 &&
+              model.fold[20].second == EITS_FOLD_NONE);
         small_model_free(&made);
     }
 }
@@ -80,13 +87,15 @@ static void null_and_misaligned(void)
     uint8_t *room = small_aligned(&memory, made.size + 16);
     for (size_t shift = 0; shift <= 16; ++shift) {
         memcpy(room + shift, made.blob, made.size);
-        CHECK_EQUAL(open_untouched(room + shift, made.size), shift % 16 == 0 ? EITS_OK : EITS_E_MODEL_ALIGNMENT);
+        CHECK_EQUAL(open_untouched(room + shift, made.size),
+                    shift % 16 == 0 ? EITS_OK : EITS_E_MODEL_ALIGNMENT);
     }
     free(memory);
     small_model_free(&made);
 }
 
-/* Each shorter blob lies in memory of just its size, so that the address sanitizer sees a read beyond it. */
+/* Each shorter blob lies in memory of just its size, so that the address sanitizer sees a read
+ * beyond it. */
 static void truncated_at_every_length(void)
 {
     small_model made = small_model_make(TINY);
@@ -95,14 +104,16 @@ static void truncated_at_every_length(void)
         if (blob == NULL)
             abort();
         memcpy(blob, made.blob, length);
-        CHECK_EQUAL(open_untouched(blob, length), length < 4 ? EITS_E_MODEL_MAGIC : EITS_E_MODEL_TRUNCATED);
+        CHECK_EQUAL(open_untouched(blob, length),
+                    length < 4 ? EITS_E_MODEL_MAGIC : EITS_E_MODEL_TRUNCATED);
         free(blob);
     }
     void *memory;
     uint8_t *longer = small_aligned(&memory, made.size + 100);
     memset(longer, 0xEE, made.size + 100);
     memcpy(longer, made.blob, made.size);
-    CHECK_EQUAL(open_untouched(longer, made.size + 100), EITS_OK); /* what follows does not belong to the model */
+    /* what follows does not belong to the model */
+    CHECK_EQUAL(open_untouched(longer, made.size + 100), EITS_OK);
     free(memory);
     small_model_free(&made);
 }
@@ -122,7 +133,8 @@ static void every_byte_flipped_in_turn(void)
             else if (at < 8)
                 CHECK_EQUAL(status, EITS_OK); /* another minor version */
             else if (at < 12)
-                CHECK(status == EITS_E_MODEL_TRUNCATED || status == EITS_E_MODEL_VALUE || status == EITS_E_MODEL_CRC);
+                CHECK(status == EITS_E_MODEL_TRUNCATED || status == EITS_E_MODEL_VALUE ||
+                      status == EITS_E_MODEL_CRC);
             else
                 CHECK_EQUAL(status, EITS_E_MODEL_CRC);
             made.blob[at] ^= change;
@@ -182,7 +194,8 @@ static uint32_t tag_of(const char *text)
 
 static void missing_wrong_sized_and_misplaced_sections(void)
 {
-    static const char *const tags[] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD", "SCAL"};
+    static const char *const tags[] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
+                                       "COLW", "GRID", "DEFS", "GOLD", "SCAL"};
     const small_spec spec = {.rank = 3, .side = 3, .storage = EITS_STORAGE_I8};
     small_model made = small_model_make(spec);
     const uint32_t total = (uint32_t)made.size, table_end = 64 + 16 * SMALL_SECTIONS;
@@ -200,16 +213,20 @@ static void missing_wrong_sized_and_misplaced_sections(void)
         CHECK_EQUAL(with_entry(spec, tag, 8, size + 4), EITS_E_MODEL_SECTION);
         CHECK_EQUAL(with_entry(spec, tag, 8, 0), EITS_E_MODEL_SECTION);
         CHECK_EQUAL(with_entry(spec, tag, 8, total), EITS_E_MODEL_SECTION);
-        CHECK_EQUAL(with_entry(spec, tag, 8, 0xFFFFFFF0u), EITS_E_MODEL_SECTION); /* offset + size wraps */
-        CHECK_EQUAL(with_entry(spec, tag, 4, offset + 4), EITS_E_MODEL_SECTION);  /* no multiple of 16 */
+        /* offset + size wraps */
+        CHECK_EQUAL(with_entry(spec, tag, 8, 0xFFFFFFF0u), EITS_E_MODEL_SECTION);
+        /* no multiple of 16 */
+        CHECK_EQUAL(with_entry(spec, tag, 4, offset + 4), EITS_E_MODEL_SECTION);
         CHECK_EQUAL(with_entry(spec, tag, 4, 0), EITS_E_MODEL_SECTION);
-        CHECK_EQUAL(with_entry(spec, tag, 4, table_end - 16), EITS_E_MODEL_SECTION); /* over the table's last entry */
+        /* over the table's last entry */
+        CHECK_EQUAL(with_entry(spec, tag, 4, table_end - 16), EITS_E_MODEL_SECTION);
         CHECK_EQUAL(with_entry(spec, tag, 4, total), EITS_E_MODEL_SECTION);
         CHECK_EQUAL(with_entry(spec, tag, 4, total + 16), EITS_E_MODEL_SECTION);
         CHECK_EQUAL(with_entry(spec, tag, 4, 0xFFFFFFF0u), EITS_E_MODEL_SECTION);
     }
     small_model_free(&made);
-    CHECK_EQUAL(with_entry(TINY, "XTRA", 0, tag_of("SCAL")), EITS_E_MODEL_SECTION); /* a scale where none belongs */
+    /* a scale where none belongs */
+    CHECK_EQUAL(with_entry(TINY, "XTRA", 0, tag_of("SCAL")), EITS_E_MODEL_SECTION);
 }
 
 static void unknown_and_repeated_sections(void)
@@ -239,15 +256,18 @@ static void unknown_and_repeated_sections(void)
 
 static void numbers_of_sections(void)
 {
-    static const uint32_t counts[] = {0, 1, SMALL_SECTIONS - 1, 128, 256, 257, 0x10000000u, 0xFFFFFFFFu};
+    static const uint32_t counts[] = {0,   1,   SMALL_SECTIONS - 1, 128,
+                                      256, 257, 0x10000000u,        0xFFFFFFFFu};
     small_model made = small_model_make(TINY);
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
         small_put_u32(made.blob + 16, counts[i]);
         small_model_seal(&made);
-        CHECK_EQUAL(open_small(&made), counts[i] == SMALL_SECTIONS - 1 ? EITS_OK : EITS_E_MODEL_SECTION);
+        CHECK_EQUAL(open_small(&made),
+                    counts[i] == SMALL_SECTIONS - 1 ? EITS_OK : EITS_E_MODEL_SECTION);
     }
     small_model_free(&made);
-    for (uint32_t count = 1; count <= 256; ++count) { /* a table that reaches beyond the blob, whose memory ends there */
+    /* a table that reaches beyond the blob, whose memory ends there */
+    for (uint32_t count = 1; count <= 256; ++count) {
         uint8_t *blob = malloc(64);
         if (blob == NULL)
             abort();

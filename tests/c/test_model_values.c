@@ -1,4 +1,5 @@
-/* Numbers inside a model: out of range, not finite; and models changed at random after which all must still hold. */
+/* Numbers inside a model: out of range, not finite; and models changed at random after which all
+ * must still hold. */
 #include "check.h"
 #include "small_model.h"
 
@@ -32,27 +33,30 @@ static void dimensions(void)
     static const struct {
         uint32_t at, wrong[5], count;
     } fields[] = {
-        {0, {0, 3, 256, 0xFFFFFFFFu}, 4},                  /* electrodes */
-        {4, {0, 65535, 65536, 0xFFFFFFFFu}, 4},            /* rows */
-        {8, {0, 41, 0xFFFFFFFFu}, 3},                      /* folded rows, at most 40 */
-        {12, {0, 1025, 0xFFFFFFFFu}, 3},                   /* rank */
-        {16, {0, 3, 7, 16, 0xFFFFFFFFu}, 5},               /* stride, 8 */
-        {20, {0, 65536, 0xFFFFFFFFu}, 3},                  /* pixels */
-        {24, {0, 2, 4097, 0xFFFFFFFFu}, 4},                /* nx, at least 3 for the pixels there are */
-        {28, {0, 2, 4097, 0xFFFFFFFFu}, 4},                /* ny */
-        {32, {4, 0xFFFFFFFFu}, 2},                         /* storage */
-        {36, {3, 0xFFFFFFFFu}, 2},                         /* kind of data */
+        {0, {0, 3, 256, 0xFFFFFFFFu}, 4},       /* electrodes */
+        {4, {0, 65535, 65536, 0xFFFFFFFFu}, 4}, /* rows */
+        {8, {0, 41, 0xFFFFFFFFu}, 3},           /* folded rows, at most 40 */
+        {12, {0, 1025, 0xFFFFFFFFu}, 3},        /* rank */
+        {16, {0, 3, 7, 16, 0xFFFFFFFFu}, 5},    /* stride, 8 */
+        {20, {0, 65536, 0xFFFFFFFFu}, 3},       /* pixels */
+        /* nx, at least 3 for the pixels there are */
+        {24, {0, 2, 4097, 0xFFFFFFFFu}, 4},
+        {28, {0, 2, 4097, 0xFFFFFFFFu}, 4}, /* ny */
+        {32, {4, 0xFFFFFFFFu}, 2},          /* storage */
+        {36, {3, 0xFFFFFFFFu}, 2},          /* kind of data */
     };
     for (size_t f = 0; f < sizeof fields / sizeof fields[0]; ++f) {
         for (uint32_t i = 0; i < fields[f].count; ++i)
-            CHECK_EQUAL(with_word(TINY, "DIMS", fields[f].at, fields[f].wrong[i]), EITS_E_MODEL_VALUE);
+            CHECK_EQUAL(with_word(TINY, "DIMS", fields[f].at, fields[f].wrong[i]),
+                        EITS_E_MODEL_VALUE);
     }
     /* in range, but not what the sections' sizes say */
     CHECK_EQUAL(with_word(TINY, "DIMS", 4, 41), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(with_word(TINY, "DIMS", 8, 20), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(with_word(TINY, "DIMS", 20, 8), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(with_word(TINY, "DIMS", 32, EITS_STORAGE_F16), EITS_E_MODEL_SECTION);
-    CHECK_EQUAL(with_word(TINY, "DIMS", 8, 40), EITS_E_MODEL_SECTION); /* no row folded: allowed, but not of this size */
+    /* no row folded: allowed, but not of this size */
+    CHECK_EQUAL(with_word(TINY, "DIMS", 8, 40), EITS_E_MODEL_SECTION);
     small_model large = small_model_make(TINY);
     uint8_t *dims = small_model_section(&large, "DIMS", NULL);
     eits_model model;
@@ -78,7 +82,8 @@ static void numbers_of_the_dimensions(void)
         CHECK_EQUAL(with_number(TINY, "DIMS", at, -INFINITY), EITS_E_MODEL_VALUE);
         const int sign_free = at == 44 || at == 48;
         CHECK_EQUAL(with_number(TINY, "DIMS", at, -1.0f), sign_free ? EITS_OK : EITS_E_MODEL_VALUE);
-        CHECK_EQUAL(with_number(TINY, "DIMS", at, 0.0f), sign_free || at == 60 ? EITS_OK : EITS_E_MODEL_VALUE);
+        CHECK_EQUAL(with_number(TINY, "DIMS", at, 0.0f),
+                    sign_free || at == 60 ? EITS_OK : EITS_E_MODEL_VALUE);
     }
 }
 
@@ -99,28 +104,42 @@ static eits_status with_protocol_row(uint32_t row, uint32_t electrodes)
 
 static void electrodes_folds_and_pixels(void)
 {
-    static const uint32_t wrong[] = {0x03020108u, 0x03020800u, 0x03080100u, 0x08020100u, 0xFF020100u, /* electrode 8 of 8 */
-                                     0x03020101u, 0x02020100u};                                       /* twice in a pair */
+    /* electrode 8 of 8 */
+    static const uint32_t wrong[] = {0x03020108u, 0x03020800u, 0x03080100u, 0x08020100u,
+                                     0xFF020100u,
+                                     /* twice in a pair */
+                                     0x03020101u, 0x02020100u};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
         CHECK_EQUAL(with_protocol_row(0, wrong[i]), EITS_E_MODEL_VALUE);
         CHECK_EQUAL(with_protocol_row(39, wrong[i]), EITS_E_MODEL_VALUE);
     }
     CHECK_EQUAL(with_protocol_row(39, 0x07060504u), EITS_OK);
-    CHECK_EQUAL(with_word(TINY, "PROT", 4 * 39, 0x07060504u), EITS_E_MODEL_VALUE); /* the hash is another */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 40u | 1u << 16), EITS_E_MODEL_VALUE);    /* first row 40 of 40 */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 8 * 20, 0xFFFFFFFFu), EITS_E_MODEL_VALUE);  /* no first row */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 0u | 40u << 16), EITS_E_MODEL_VALUE);    /* second row 40 */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 0u | 0xFFFFu << 16), EITS_OK);           /* no second row */
-    CHECK_EQUAL(with_word(TINY, "FOLD", 4, 0xFFFFu), EITS_OK);                      /* sign -1 */
+    /* the hash is another */
+    CHECK_EQUAL(with_word(TINY, "PROT", 4 * 39, 0x07060504u), EITS_E_MODEL_VALUE);
+    /* first row 40 of 40 */
+    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 40u | 1u << 16), EITS_E_MODEL_VALUE);
+    /* no first row */
+    CHECK_EQUAL(with_word(TINY, "FOLD", 8 * 20, 0xFFFFFFFFu), EITS_E_MODEL_VALUE);
+    /* second row 40 */
+    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 0u | 40u << 16), EITS_E_MODEL_VALUE);
+    /* no second row */
+    CHECK_EQUAL(with_word(TINY, "FOLD", 0, 0u | 0xFFFFu << 16), EITS_OK);
+    CHECK_EQUAL(with_word(TINY, "FOLD", 4, 0xFFFFu), EITS_OK); /* sign -1 */
     CHECK_EQUAL(with_word(TINY, "FOLD", 4, 0), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_word(TINY, "FOLD", 8 * 20 + 4, 2), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_word(TINY, "FOLD", 4, 0xFFFEu), EITS_E_MODEL_VALUE);
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 3u | 2u << 16), EITS_E_MODEL_VALUE); /* column 3 of 3 */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 2u | 3u << 16), EITS_E_MODEL_VALUE); /* row 3 of 3 */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 1u | 2u << 16), EITS_E_MODEL_VALUE); /* the pixel before again */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 0u | 2u << 16), EITS_E_MODEL_VALUE); /* not by column */
-    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 2u | 1u << 16), EITS_E_MODEL_VALUE); /* not by row */
-    CHECK_EQUAL(with_word(TINY, "GRID", 0, 1u), EITS_E_MODEL_VALUE);                /* the next one's place */
+    /* column 3 of 3 */
+    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 3u | 2u << 16), EITS_E_MODEL_VALUE);
+    /* row 3 of 3 */
+    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 2u | 3u << 16), EITS_E_MODEL_VALUE);
+    /* the pixel before again */
+    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 1u | 2u << 16), EITS_E_MODEL_VALUE);
+    /* not by column */
+    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 0u | 2u << 16), EITS_E_MODEL_VALUE);
+    /* not by row */
+    CHECK_EQUAL(with_word(TINY, "GRID", 4 * 8, 2u | 1u << 16), EITS_E_MODEL_VALUE);
+    /* the next one's place */
+    CHECK_EQUAL(with_word(TINY, "GRID", 0, 1u), EITS_E_MODEL_VALUE);
     const small_spec single = {.rank = 1, .side = 1};
     CHECK_EQUAL(with_word(single, "GRID", 0, 0), EITS_OK);
     CHECK_EQUAL(with_word(single, "GRID", 0, 1), EITS_E_MODEL_VALUE); /* the only pixel outside */
@@ -136,33 +155,38 @@ static void not_finite_in_each_section(void)
         uint32_t size;
         (void)small_model_section(&made, tags[i], &size);
         for (uint32_t k = 0; k < 4; ++k) {
-            for (uint32_t at = 0; at < size; at += 4) /* each number, the padding of columns too */
+            /* each number, the padding of columns too */
+            for (uint32_t at = 0; at < size; at += 4)
                 CHECK_EQUAL(with_number(TINY, tags[i], at, wrong[k]), EITS_E_MODEL_VALUE);
         }
     }
     small_model_free(&made);
     const small_spec halves = {.rank = 3, .side = 3, .storage = EITS_STORAGE_F16};
     const small_spec bytes = {.rank = 3, .side = 3, .storage = EITS_STORAGE_I8};
-    CHECK_EQUAL(with_word(halves, "SENS", 0, 0x7BFFu), EITS_OK);             /* 65504 */
-    CHECK_EQUAL(with_word(halves, "SENS", 0, 0x7C00u), EITS_E_MODEL_VALUE);  /* infinity */
-    CHECK_EQUAL(with_word(halves, "SENS", 0, 0xFC01u), EITS_E_MODEL_VALUE);  /* NaN */
+    CHECK_EQUAL(with_word(halves, "SENS", 0, 0x7BFFu), EITS_OK);            /* 65504 */
+    CHECK_EQUAL(with_word(halves, "SENS", 0, 0x7C00u), EITS_E_MODEL_VALUE); /* infinity */
+    CHECK_EQUAL(with_word(halves, "SENS", 0, 0xFC01u), EITS_E_MODEL_VALUE); /* NaN */
     CHECK_EQUAL(with_word(halves, "SENS", 9 * 16 - 4, 0x7E000000u), EITS_E_MODEL_VALUE);
-    CHECK_EQUAL(with_word(bytes, "SENS", 0, 0x7F80FF7Fu), EITS_OK); /* whole numbers are all finite */
+    /* whole numbers are all finite */
+    CHECK_EQUAL(with_word(bytes, "SENS", 0, 0x7F80FF7Fu), EITS_OK);
     CHECK_EQUAL(with_number(bytes, "SCAL", 0, NAN), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_number(bytes, "SCAL", 4 * 8, INFINITY), EITS_E_MODEL_VALUE);
 }
 
-/* Section FLDS: of one size, its numbers finite and not negative, each half finite, the padding of columns too. */
+/* Section FLDS: of one size, its numbers finite and not negative, each half finite, the padding of
+ * columns too. */
 static void fields(void)
 {
     const small_spec spec = {.rank = 3, .side = 3, .fields = 1};
-    static const float wrong[] = {-1.0f, NAN, INFINITY, -INFINITY, 1.1e30f}, right[] = {0.0f, 1e-30f, 1.0f, 9e29f};
+    static const float wrong[] = {-1.0f, NAN, INFINITY, -INFINITY, 1.1e30f},
+                       right[] = {0.0f, 1e-30f, 1.0f, 9e29f};
     for (uint32_t at = 0; at < 8; at += 4) {
         for (int k = 0; k < 5; ++k)
             CHECK_EQUAL(with_number(spec, "FLDS", at, wrong[k]), EITS_E_MODEL_VALUE);
         for (int k = 0; k < 4; ++k)
             CHECK_EQUAL(with_number(spec, "FLDS", at, right[k]), EITS_OK);
-        CHECK_EQUAL(with_number(spec, "FLDS", at + 8, NAN), EITS_OK); /* reserved: not looked at */
+        /* reserved: not looked at */
+        CHECK_EQUAL(with_number(spec, "FLDS", at + 8, NAN), EITS_OK);
     }
     uint32_t size;
     small_model made = small_model_make(spec);
@@ -175,7 +199,9 @@ static void fields(void)
     }
     static const uint32_t sizes[] = {0, 4, 16, 2};
     for (int k = 0; k < 8; ++k) {
-        small_put_u32(small_model_entry(&made, "FLDS") + 8, k < 4 ? sizes[k] : k % 2 ? size - sizes[k % 4] : size + sizes[k % 4]);
+        small_put_u32(small_model_entry(&made, "FLDS") + 8, k < 4   ? sizes[k]
+                                                            : k % 2 ? size - sizes[k % 4]
+                                                                    : size + sizes[k % 4]);
         small_model_seal(&made);
         eits_model model;
         const eits_status status = eits_model_open(&model, made.blob, made.size);
@@ -195,9 +221,9 @@ static void defaults(void)
         uint32_t at;
         float low, high; /* the greatest and least number that are just too small or too great */
     } ranges[] = {
-        {8, -0.01f, 1.01f},   {12, -0.01f, 1.1e30f}, {16, -0.01f, 1.1e30f}, {20, -0.01f, 1.01f},  {24, -0.01f, 1.01f},
-        {28, -0.01f, 1.01f},  {32, 0.0f, 9.5f},      {36, 8.5f, 1.1e30f},   {40, 2.9f, 40.5f},    {44, -0.01f, 1.1e30f},
-        {48, -0.01f, 1.1e30f}, {52, -0.01f, 1.1e30f},
+        {8, -0.01f, 1.01f},  {12, -0.01f, 1.1e30f}, {16, -0.01f, 1.1e30f}, {20, -0.01f, 1.01f},
+        {24, -0.01f, 1.01f}, {28, -0.01f, 1.01f},   {32, 0.0f, 9.5f},      {36, 8.5f, 1.1e30f},
+        {40, 2.9f, 40.5f},   {44, -0.01f, 1.1e30f}, {48, -0.01f, 1.1e30f}, {52, -0.01f, 1.1e30f},
     };
     CHECK_EQUAL(with_word(TINY, "DEFS", 0, 0), EITS_E_MODEL_VALUE); /* no iteration */
     CHECK_EQUAL(with_word(TINY, "DEFS", 0, 1), EITS_OK);
@@ -207,14 +233,18 @@ static void defaults(void)
         CHECK_EQUAL(with_number(TINY, "DEFS", ranges[i].at, NAN), EITS_E_MODEL_VALUE);
         CHECK_EQUAL(with_number(TINY, "DEFS", ranges[i].at, INFINITY), EITS_E_MODEL_VALUE);
     }
-    CHECK_EQUAL(with_number(TINY, "DEFS", 32, 1e-7f), EITS_E_MODEL_VALUE); /* less than an option may be */
+    /* less than an option may be */
+    CHECK_EQUAL(with_number(TINY, "DEFS", 32, 1e-7f), EITS_E_MODEL_VALUE);
     for (uint32_t solver = 0; solver < 6; ++solver)
-        CHECK_EQUAL(with_word(TINY, "DEFS", 56, solver), solver <= EITS_SOLVER_ACTIVE_SET ? EITS_OK : EITS_E_MODEL_VALUE);
+        CHECK_EQUAL(with_word(TINY, "DEFS", 56, solver),
+                    solver <= EITS_SOLVER_ACTIVE_SET ? EITS_OK : EITS_E_MODEL_VALUE);
     for (uint32_t bits = 0; bits < 9; ++bits)
-        CHECK_EQUAL(with_word(TINY, "DEFS", 60, bits), bits <= EITS_SEARCH_ALL ? EITS_OK : EITS_E_MODEL_VALUE);
+        CHECK_EQUAL(with_word(TINY, "DEFS", 60, bits),
+                    bits <= EITS_SEARCH_ALL ? EITS_OK : EITS_E_MODEL_VALUE);
 }
 
-/* Whatever opens has defaults that its own context accepts again, runs, and never shows a number that is not finite. */
+/* Whatever opens has defaults that its own context accepts again, runs, and never shows a number
+ * that is not finite. */
 static void use(const small_model *made)
 {
     eits_model model;
@@ -239,8 +269,10 @@ static void use(const small_model *made)
     CHECK_EQUAL(eits_find_touches(&ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
     CHECK(count <= EITS_MAX_TOUCHES);
     for (uint32_t k = 0; k < count && k < EITS_MAX_TOUCHES; ++k) {
-        CHECK(isfinite((double)touches[k].x_mm) && isfinite((double)touches[k].y_mm) && touches[k].radius_mm > 0);
-        CHECK(isfinite((double)touches[k].strength_s_per_m_mm2) && isfinite((double)touches[k].confidence));
+        CHECK(isfinite((double)touches[k].x_mm) && isfinite((double)touches[k].y_mm) &&
+              touches[k].radius_mm > 0);
+        CHECK(isfinite((double)touches[k].strength_s_per_m_mm2) &&
+              isfinite((double)touches[k].confidence));
     }
     free(memory);
 }
@@ -249,7 +281,11 @@ static void every_byte_changed_and_sealed(void)
 {
     static const uint8_t changes[] = {0xFF, 0x80, 0x40, 0x01};
     for (int storage = 0; storage < 4; ++storage) {
-        const small_spec spec = {.rank = 3, .side = 3, .storage = (eits_storage)storage, .kind = (eits_data_kind)(storage % 3), .fields = storage == 0};
+        const small_spec spec = {.rank = 3,
+                                 .side = 3,
+                                 .storage = (eits_storage)storage,
+                                 .kind = (eits_data_kind)(storage % 3),
+                                 .fields = storage == 0};
         small_model made = small_model_make(spec);
         for (size_t at = 16; at < made.size; ++at) {
             for (size_t c = 0; c < sizeof changes; ++c) {
@@ -267,11 +303,13 @@ static void many_bytes_changed_and_sealed(void)
 {
     uint64_t state = 99;
     for (int round = 0; round < 2000; ++round) {
-        const small_spec spec = {.rank = 3, .side = 3, .storage = (eits_storage)(round % 4), .fields = round % 2};
+        const small_spec spec = {
+            .rank = 3, .side = 3, .storage = (eits_storage)(round % 4), .fields = round % 2};
         small_model made = small_model_make(spec);
         const int changes = 1 + round % 7;
         for (int c = 0; c < changes; ++c) {
-            const size_t at = 16 + (size_t)((small_random(&state) + 1) / 2 * (double)(made.size - 16));
+            const size_t at =
+                16 + (size_t)((small_random(&state) + 1) / 2 * (double)(made.size - 16));
             made.blob[at] = (uint8_t)(128 + 127 * small_random(&state));
         }
         small_model_seal(&made);

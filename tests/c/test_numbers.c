@@ -2,9 +2,9 @@
 #include "check.h"
 #include "dense.h"
 
-#include "half.h"
-#include "log.h"
-#include "kernels.h"
+#include "base/half.h"
+#include "base/log.h"
+#include "kernels/kernels.h"
 
 #include <math.h>
 #include <string.h>
@@ -16,10 +16,13 @@ static void halves(void)
         const uint32_t exponent = half >> 10 & 31u, fraction = half & 1023u;
         if (exponent == 31)
             continue; /* infinities and NaN are refused when a model is opened */
-        const double size = exponent == 0 ? ldexp((double)fraction, -24) : ldexp(1 + (double)fraction / 1024, (int)exponent - 15);
-        const float expected = (float)(half & 0x8000u ? -size : size), got = eits_half_to_float(bits);
+        const double size = exponent == 0 ? ldexp((double)fraction, -24)
+                                          : ldexp(1 + (double)fraction / 1024, (int)exponent - 15);
+        const float expected = (float)(half & 0x8000u ? -size : size),
+                    got = eits_half_to_float(bits);
         CHECK(memcmp(&got, &expected, sizeof got) == 0); /* the sign of zero too */
-        const eits_matrix one = {.data = &bits, .rows = 1, .cols = 1, .stride = 1, .storage = EITS_STORAGE_F16};
+        const eits_matrix one = {
+            .data = &bits, .rows = 1, .cols = 1, .stride = 1, .storage = EITS_STORAGE_F16};
         CHECK(dense_entry(&one, 0, 0) == (double)expected); /* what other tests take it for */
     }
 }
@@ -43,8 +46,8 @@ static double log_error(eits_real q)
     return (double)(fabsl((long double)eits_log(q) - exact) / unit);
 }
 
-/* Four roundings of half a unit each, of numbers up to twice as large relative to their last place: 3 units hold; over all
- * 67 million floats from 1/16 to 16 the worst is 2.85, near 1.13. */
+/* Four roundings of half a unit each, of numbers up to twice as large relative to their last place:
+ * 3 units hold; over all 67 million floats from 1/16 to 16 the worst is 2.85, near 1.13. */
 static void logarithm_is_accurate(void)
 {
     const double most = 3;

@@ -1,9 +1,11 @@
-/* Rows left out of a frame: the reduction whitened anew, against the formula in double; and what it must never do. */
+/* Rows left out of a frame: the reduction whitened anew, against the formula in double; and what it
+ * must never do. */
 #include "observed_bench.h"
 
 #include "eitskin/touch.h"
 
-/* What the core states of its numbers: the floor's law, how little a lost direction counts, the margin of the step. */
+/* What the core states of its numbers: the floor's law, how little a lost direction counts, the
+ * margin of the step. */
 static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1, NOISE_FACTOR = 5, MOST = 1;
 
 /* In place, by Gauss-Jordan; the matrix is positive definite. */
@@ -25,8 +27,9 @@ static void invert(double a[RANK][RANK])
     }
 }
 
-/* The metric M = D^-1 (I - mu' (T + mu' I)^-1) D^-1 and its right side D^-1 (T + mu' I)^-1 diag(s) U_o' d_o, with
- * T = diag(s) (U_o' U_o + e I) diag(s) and D_i = s_i w_i, so scaled that no step grows. */
+/* The metric M = D^-1 (I - mu' (T + mu' I)^-1) D^-1 and its right side D^-1 (T + mu' I)^-1 diag(s)
+ * U_o' d_o, with T = diag(s) (U_o' U_o + e I) diag(s) and D_i = s_i w_i, so scaled that no step
+ * grows. */
 static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
 {
     const eits_context *ctx = &b->b.c.ctx;
@@ -34,8 +37,10 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
     double k[RANK][RANK], s[RANK], w[RANK], left = 0;
     for (int f = 0; f < SMALL_FOLDED; ++f)
         left += !b->out[f] / (double)SMALL_FOLDED;
-    const double asked = fmin(NOISE_FACTOR * (double)(ctx->baseline.noise_v / ctx->baseline.v0_rms), MOST);
-    const double mu = fmax(SMALL_FLOOR * fmax(left * left * left, LEAST_SHARE), left * asked), lost = LOST * mu;
+    const double asked =
+        fmin(NOISE_FACTOR * (double)(ctx->baseline.noise_v / ctx->baseline.v0_rms), MOST);
+    const double mu = fmax(SMALL_FLOOR * fmax(left * left * left, LEAST_SHARE), left * asked),
+                 lost = LOST * mu;
     const double scale = MARGIN / (1 + SMALL_FLOOR) * (1 + mu) / (1 + lost);
     for (int i = 0; i < RANK; ++i) {
         s[i] = pow(SMALL_DECAY, i);
@@ -55,12 +60,15 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
         for (int j = 0; j < RANK; ++j) {
             m[i][j] = scale * ((i == j) - mu * k[i][j]) / (s[i] * w[i] * s[j] * w[j]);
             for (int f = 0; f < SMALL_FOLDED; ++f)
-                right[i] += b->out[f] ? 0 : scale * k[i][j] * s[j] * p[f * RANK + j] / w[j] * (double)ctx->d[f] / (s[i] * w[i]);
+                right[i] += b->out[f] ? 0
+                                      : scale * k[i][j] * s[j] * p[f * RANK + j] / w[j] *
+                                            (double)ctx->d[f] / (s[i] * w[i]);
         }
     }
 }
 
-/* F'F and F'y are the formula's, whichever rows are out; with none out and little noise there is no map. */
+/* F'F and F'y are the formula's, whichever rows are out; with none out and little noise there is no
+ * map. */
 static void the_reduction_without_those_rows(double noise)
 {
     bench b;
@@ -76,7 +84,8 @@ static void the_reduction_without_those_rows(double noise)
         CHECK_EQUAL(ctx->rewhitened, EITS_BY_TRIANGLE);
         CHECK_EQUAL(ctx->basis_count, 0);
         by_formula(&b, m, right);
-        const double bound = BOTH_WIDTHS(3e-4, 1e-6); /* P is stored as float: orthogonal to its rounding */
+        /* P is stored as float: orthogonal to its rounding */
+        const double bound = BOTH_WIDTHS(3e-4, 1e-6);
         for (int j = 0; j < RANK; ++j) {
             double unit[RANK] = {0}, column[RANK];
             eits_real f_unit[STRIDE] = {0};
@@ -95,8 +104,8 @@ static void the_reduction_without_those_rows(double noise)
     dense_bench_close(&b.b);
 }
 
-/* White noise on the rows that are left, in the correlations: that with all rows and the floor that the noise asks for, times the
- * root mean square over that to the power 1.25. */
+/* White noise on the rows that are left, in the correlations: that with all rows and the floor that
+ * the noise asks for, times the root mean square over that to the power 1.25. */
 static void noise_in_the_correlations(double noise)
 {
     bench b;
@@ -118,7 +127,8 @@ static void noise_in_the_correlations(double noise)
             sum += b.out[k] ? 0 : energy_of_row(&b, k, 0);
         }
         const double expected = 3 * sqrt(all / whole) * pow(sum / all, 0.625);
-        CHECK_NEAR(eits_lambda_noise(ctx), expected, (noise > 0 ? 0.06 : 0.04) * expected); /* it has 8 probes */
+        /* it has 8 probes */
+        CHECK_NEAR(eits_lambda_noise(ctx), expected, (noise > 0 ? 0.06 : 0.04) * expected);
     }
     dense_bench_close(&b.b);
 }
@@ -143,8 +153,9 @@ static void solvers_solve_the_seen_problem(void)
     }
 }
 
-/* Rows drop out one after another until none is left, with and without the drift: finite throughout, zero where nothing is left,
- * the same bits from both kernels and from a fresh context, and the whole frame's own once all are back. */
+/* Rows drop out one after another until none is left, with and without the drift: finite
+ * throughout, zero where nothing is left, the same bits from both kernels and from a fresh context,
+ * and the whole frame's own once all are back. */
 static void until_nothing_is_left(void)
 {
     for (int project = 0; project < 2; ++project) {
@@ -170,7 +181,8 @@ static void until_nothing_is_left(void)
             eits_context *other = set_up(&fresh, WHITENED, project);
             CHECK_EQUAL(eits_use_portable_kernels(other, 1), EITS_OK);
             CHECK_EQUAL(eits_reconstruct(other, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK(memcmp(other->image, image, sizeof image) == 0 && memcmp(other->y, ctx->y, RANK * sizeof *ctx->y) == 0);
+            CHECK(memcmp(other->image, image, sizeof image) == 0 &&
+                  memcmp(other->y, ctx->y, RANK * sizeof *ctx->y) == 0);
             dense_bench_close(&fresh.b);
         }
         memcpy(b.frame, good, sizeof good);
@@ -190,7 +202,8 @@ static void rows_out_do_not_count(void)
         for (uint32_t k = 2; k < 20; k += 4) {
             const eits_fold fold = ctx->model->fold[k];
             b.frame[fold.first] = round ? R(1e6) : R(-2);
-            b.frame[fold.second == EITS_FOLD_NONE ? fold.first : fold.second] = round ? R(3) : R(-1e-9);
+            b.frame[fold.second == EITS_FOLD_NONE ? fold.first : fold.second] =
+                round ? R(3) : R(-1e-9);
             CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
             if (fold.second != EITS_FOLD_NONE)
                 CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
@@ -207,9 +220,10 @@ static void rows_out_do_not_count(void)
     dense_bench_close(&b.b);
 }
 
-/* Change a row of P, or all, and see whether frames with rows left out are whitened anew: where the model counts as the builder's
- * and numbers suffice. */
-static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows, eits_real first_of_map[RANK])
+/* Change a row of P, or all, and see whether frames with rows left out are whitened anew: where the
+ * model counts as the builder's and numbers suffice. */
+static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows,
+                               eits_real first_of_map[RANK])
 {
     bench b;
     memset(&b, 0, sizeof b);
@@ -219,7 +233,8 @@ static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows, eits_r
         for (uint32_t i = 0; i < RANK; ++i) {
             float value;
             memcpy(&value, p + 4 * (STRIDE * k + i), 4);
-            small_put_f32(p + 4 * (STRIDE * k + i), all_rows || i == row ? (float)(value * factor) : value);
+            small_put_f32(p + 4 * (STRIDE * k + i),
+                          all_rows || i == row ? (float)(value * factor) : value);
         }
     }
     small_model_seal(&b.b.made);
@@ -243,7 +258,8 @@ static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows, eits_r
     return rewhitens;
 }
 
-/* Any other P keeps the projection: rows of another size, zero rows, rows that overflow; the unit of the data does not matter. */
+/* Any other P keeps the projection: rows of another size, zero rows, rows that overflow; the unit
+ * of the data does not matter. */
 static void models_of_another_form(void)
 {
     eits_real plain[RANK], scaled[RANK];
@@ -256,7 +272,8 @@ static void models_of_another_form(void)
     CHECK(rewhitens_with(0, 1 / 1099511627776.0, 1, scaled));
     CHECK(memcmp(plain, scaled, sizeof plain) == 0);
     CHECK(!rewhitens_with(0, 1e-31, 1, scaled));
-    CHECK_EQUAL(rewhitens_with(0, 3e-19, 0, scaled), BOTH_WIDTHS(0, 1)); /* the noise overflows there */
+    /* the noise overflows there */
+    CHECK_EQUAL(rewhitens_with(0, 3e-19, 0, scaled), BOTH_WIDTHS(0, 1));
     bench b;
     small_spec other = WHITENED;
     other.shape = SMALL_RANDOM;

@@ -1,4 +1,5 @@
-/* Numbers at the ends of the range: what would not be finite is left out, unknown or zero, and never comes out. Found by fuzzing. */
+/* Numbers at the ends of the range: what would not be finite is left out, unknown or zero, and
+ * never comes out. Found by fuzzing. */
 #include "check.h"
 #include "small_model.h"
 
@@ -14,14 +15,17 @@ static void finite_touches(const eits_context *ctx, const eits_touch *touches, u
 {
     CHECK(count <= EITS_MAX_TOUCHES && count == ctx->info.touches);
     for (uint32_t k = 0; k < count; ++k)
-        CHECK(isfinite(touches[k].x_mm) && isfinite(touches[k].y_mm) && isfinite(touches[k].radius_mm) &&
-              isfinite(touches[k].strength_s_per_m_mm2) && isfinite(touches[k].confidence));
+        CHECK(isfinite(touches[k].x_mm) && isfinite(touches[k].y_mm) &&
+              isfinite(touches[k].radius_mm) && isfinite(touches[k].strength_s_per_m_mm2) &&
+              isfinite(touches[k].confidence));
 }
 
-/* Pixels of 1e38 mm make a touch's strength infinite, and weights may have no inverse: then the disc's response is. */
+/* Pixels of 1e38 mm make a touch's strength infinite, and weights may have no inverse: then the
+ * disc's response is. */
 static void touches_are_finite_whatever_the_units(void)
 {
-    static const float units[][2] = {{1e38f, 0.02f}, {6.0f, 1e-45f}, {6.0f, 1e-39f}, {6.0f, 1e36f}, {1e-38f, 3e38f}};
+    static const float units[][2] = {
+        {1e38f, 0.02f}, {6.0f, 1e-45f}, {6.0f, 1e-39f}, {6.0f, 1e36f}, {1e-38f, 3e38f}};
     for (size_t u = 0; u < sizeof units / sizeof units[0]; ++u) {
         small_spec spec = SPEC;
         spec.pixel_mm = units[u][0];
@@ -54,7 +58,8 @@ static void look_for_nothing(eits_context *ctx)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
 
-/* Six quiet frames, the first `first` times the model's volts, the others `others` times; the noise that was learned. */
+/* Six quiet frames, the first `first` times the model's volts, the others `others` times; the noise
+ * that was learned. */
 static eits_real learn_noise(double first, double others)
 {
     small_model made = small_model_make(SPEC);
@@ -70,20 +75,22 @@ static eits_real learn_noise(double first, double others)
         CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
     }
     CHECK_EQUAL(eits_baseline_finish(&c.ctx), EITS_OK);
-    CHECK(c.ctx.baseline.ready && isfinite(c.ctx.baseline.lambda_noise) && c.ctx.baseline.lambda_noise > 0);
+    CHECK(c.ctx.baseline.ready && isfinite(c.ctx.baseline.lambda_noise) &&
+          c.ctx.baseline.lambda_noise > 0);
     const eits_real noise_v = c.ctx.baseline.noise_v;
     small_context_close(&c);
     small_model_free(&made);
     return noise_v;
 }
 
-/* Deviations whose squares, in the first frame's unit, overflow: the noise is unknown, the reference good all the same. Without
- * that, however great the volts are, it is known. */
+/* Deviations whose squares, in the first frame's unit, overflow: the noise is unknown, the
+ * reference good all the same. Without that, however great the volts are, it is known. */
 static void noise_out_of_range_is_unknown(void)
 {
     const double great = BOTH_WIDTHS(1e28, 1e250);
     CHECK_EQUAL(learn_noise(BOTH_WIDTHS(1e-25, 1e-200), 1), 0);
-    CHECK_NEAR(learn_noise(great, great) / (eits_real)great, learn_noise(1, 1), 1e-5 * (double)learn_noise(1, 1));
+    CHECK_NEAR(learn_noise(great, great) / (eits_real)great, learn_noise(1, 1),
+               1e-5 * (double)learn_noise(1, 1));
 }
 
 /* A quiet frame that leads beyond the range is refused and does not count. */
@@ -112,7 +119,8 @@ static void a_quiet_frame_out_of_range_is_refused(void)
     small_model_free(&made);
 }
 
-/* Data whose squares vanish: nothing can be told by norms and gaps, so the answer is zero, of every solver. */
+/* Data whose squares vanish: nothing can be told by norms and gaps, so the answer is zero, of every
+ * solver. */
 static void data_too_small_to_square_give_zero(void)
 {
     small_model made = small_model_make(SPEC);
@@ -128,7 +136,8 @@ static void data_too_small_to_square_give_zero(void)
         CHECK_EQUAL(eits_solve(&c.ctx), EITS_OK);
         CHECK_EQUAL(c.ctx.info.stop, EITS_STOP_ZERO);
         CHECK(c.ctx.info.lambda_max > c.ctx.info.lambda);
-        CHECK(c.ctx.info.residual <= c.ctx.info.data_norm && c.ctx.info.gap == 0 && c.ctx.info.nonzeros == 0);
+        CHECK(c.ctx.info.residual <= c.ctx.info.data_norm && c.ctx.info.gap == 0 &&
+              c.ctx.info.nonzeros == 0);
         for (uint32_t j = 0; j < 16; ++j)
             CHECK(c.ctx.image[j] == 0);
     }

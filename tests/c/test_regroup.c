@@ -1,23 +1,25 @@
-/* Discs that are one touch are joined, those that are two are parted; the image solved again without the touches' interplay. */
+/* Discs that are one touch are joined, those that are two are parted; the image solved again
+ * without the touches' interplay. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
+#include "diagnostics/diagnostics.h"
 #include "eitskin/batch.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "examine.h"
-#include "fit.h"
-#include "kernels.h"
-#include "stages.h"
-#include "vec.h"
+#include "frame/projection.h"
+#include "kernels/kernels.h"
+#include "touch/disc_fit.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { SIDE = 20, RANK = 64 };
 static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES};
-static const small_spec WITH_FIELDS = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1};
+static const small_spec WITH_FIELDS = {
+    .rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1};
 
 /* ctx->y of these discs, each with its change. */
 static void press(eits_context *ctx, const eits_disc *disc, uint32_t count)
@@ -33,7 +35,9 @@ static void press(eits_context *ctx, const eits_disc *disc, uint32_t count)
 /* A fit of ctx->y that begins with these discs. */
 static eits_fit begin(eits_context *ctx, const eits_disc *disc, uint32_t count)
 {
-    eits_fit f = {.data = ctx->y, .whole = eits_dot(ctx, ctx->y, ctx->y, RANK), .radius_weight = ctx->options.touch_radius_weight};
+    eits_fit f = {.data = ctx->y,
+                  .whole = eits_dot(ctx, ctx->y, ctx->y, RANK),
+                  .radius_weight = ctx->options.touch_radius_weight};
     f.count = count;
     memcpy(f.disc, disc, count * sizeof *disc);
     eits_fit_restart(ctx, &f);
@@ -45,8 +49,10 @@ static eits_fit begin(eits_context *ctx, const eits_disc *disc, uint32_t count)
 static int has(const eits_fit *f, const eits_disc *disc, double apart_mm)
 {
     for (uint32_t k = 0; k < f->count; ++k) {
-        const double dx = (double)(f->disc[k].x_mm - disc->x_mm), dy = (double)(f->disc[k].y_mm - disc->y_mm);
-        if (fabs(dx) < apart_mm && fabs(dy) < apart_mm && fabs((double)(f->disc[k].radius_mm - disc->radius_mm)) < apart_mm)
+        const double dx = (double)(f->disc[k].x_mm - disc->x_mm),
+                     dy = (double)(f->disc[k].y_mm - disc->y_mm);
+        if (fabs(dx) < apart_mm && fabs(dy) < apart_mm &&
+            fabs((double)(f->disc[k].radius_mm - disc->radius_mm)) < apart_mm)
             return 1;
     }
     return 0;
@@ -93,14 +99,17 @@ static void two_touches_stay_two(void)
     for (int d = 0; d < 3; ++d) {
         dense_bench b;
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-        const eits_disc truth[2] = {{-distances[d] / 2, 3, 9, R(0.05), 1}, {distances[d] / 2, 3, 9, R(0.04), 1}};
+        const eits_disc truth[2] = {{-distances[d] / 2, 3, 9, R(0.05), 1},
+                                    {distances[d] / 2, 3, 9, R(0.04), 1}};
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 2);
         CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
         CHECK_EQUAL(f.count, 2);
-        CHECK((f.macs > 0) == (d < 2)); /* only those within 0.7 of a radius are tried: 9 x 0.7 + 18 = 24.3 mm */
+        /* only those within 0.7 of a radius are tried: 9 x 0.7 + 18 = 24.3 mm */
+        CHECK((f.macs > 0) == (d < 2));
         for (int k = 0; k < 2; ++k) {
-            CHECK(f.disc[k].x_mm == truth[k].x_mm && f.disc[k].y_mm == truth[k].y_mm && f.disc[k].radius_mm == truth[k].radius_mm);
+            CHECK(f.disc[k].x_mm == truth[k].x_mm && f.disc[k].y_mm == truth[k].y_mm &&
+                  f.disc[k].radius_mm == truth[k].radius_mm);
             CHECK(f.disc[k].change == truth[k].change);
         }
         check_residual(ctx, &f);
@@ -121,7 +130,8 @@ static void opposite_signs_are_never_one(void)
     dense_bench_close(&b);
 }
 
-/* Nearest first: of three in a row whose outer ones are nearer to the middle than to each other, one is left for one touch. */
+/* Nearest first: of three in a row whose outer ones are nearer to the middle than to each other,
+ * one is left for one touch. */
 static void three_thirds_become_one(void)
 {
     dense_bench b;
@@ -140,11 +150,13 @@ static void three_thirds_become_one(void)
 
 static void one_disc_over_two_touches_becomes_two(void)
 {
-    static const eits_real along[4][2] = {{1, 0}, {R(0.70711), R(0.70711)}, {0, 1}, {R(-0.70711), R(0.70711)}};
+    static const eits_real along[4][2] = {
+        {1, 0}, {R(0.70711), R(0.70711)}, {0, 1}, {R(-0.70711), R(0.70711)}};
     for (int d = 0; d < 4; ++d) {
         dense_bench b;
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-        eits_disc truth[3] = {{0, 0, 9, R(0.05), 1}, {0, 0, 9, R(0.05), 1}, {-42, -36, 9, R(0.05), 1}};
+        eits_disc truth[3] = {
+            {0, 0, 9, R(0.05), 1}, {0, 0, 9, R(0.05), 1}, {-42, -36, 9, R(0.05), 1}};
         for (int k = 0; k < 2; ++k) {
             truth[k].x_mm = R(4.0) + (k ? -14 : 14) * along[d][0];
             truth[k].y_mm = R(6.0) + (k ? -14 : 14) * along[d][1];
@@ -177,7 +189,8 @@ static void little_is_gained_by_parting(void)
 {
     dense_bench b;
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-    const eits_disc truth[2] = {{-10, 6, 9, R(0.05), 1}, {18, 6, 9, R(0.05), 1}}, one = {4, 6, 14, R(0.04), 1};
+    const eits_disc truth[2] = {{-10, 6, 9, R(0.05), 1}, {18, 6, 9, R(0.05), 1}},
+                    one = {4, 6, 14, R(0.04), 1};
     eits_real rest[RANK];
     uint64_t state = 8;
     for (int i = 0; i < RANK; ++i)
@@ -188,7 +201,8 @@ static void little_is_gained_by_parting(void)
         eits_fit_move_all(ctx, &f, 5);
         const eits_real left = eits_dot(ctx, ctx->residual, ctx->residual, RANK);
         if (noisy) /* ten times as much that no disc explains */
-            eits_axpy(ctx, ctx->y, eits_sqrt(10 * left / eits_dot(ctx, rest, rest, RANK)), rest, RANK);
+            eits_axpy(ctx, ctx->y, eits_sqrt(10 * left / eits_dot(ctx, rest, rest, RANK)), rest,
+                      RANK);
         f = begin(ctx, f.disc, 1);
         CHECK_EQUAL(eits_fit_part(ctx, &f), !noisy);
         CHECK_EQUAL(f.count, noisy ? 1 : 2);
@@ -241,8 +255,10 @@ static void one_peak_two_touches(void)
     press(ctx, truth, 2);
     CHECK_EQUAL(eits_solve(ctx), EITS_OK);
     for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) /* one peak */
-        ctx->image[j] = b.c.model.pixel[j].ix == SIDE / 2 && b.c.model.pixel[j].iy == SIDE / 2 ? 1 : 0;
-    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 1); /* of bent data, as far as it knows: two peaks' worth of bend is no touch */
+        ctx->image[j] =
+            b.c.model.pixel[j].ix == SIDE / 2 && b.c.model.pixel[j].iy == SIDE / 2 ? 1 : 0;
+    /* of bent data, as far as it knows: two peaks' worth of bend is no touch */
+    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 1);
     eits_copy(ctx->y_straight, ctx->y, EITS_STRIDE(RANK));
     ctx->straight = 1;
     CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL - EITS_SEARCH_REGROUP, touch), 1);
@@ -276,7 +292,8 @@ static void the_refined_image_is_that_of_coupled_data(void)
 {
     dense_bench b, plain;
     eits_touch touch[EITS_MAX_TOUCHES];
-    eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0), *other = open_pair(&plain, WITH_FIELDS, 0, 0);
+    eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0),
+                 *other = open_pair(&plain, WITH_FIELDS, 0, 0);
     CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 2);
     CHECK_EQUAL(found(other, EITS_SEARCH_ALL, touch), 2);
     const eits_info first = other->info;
@@ -292,21 +309,30 @@ static void the_refined_image_is_that_of_coupled_data(void)
     CHECK_EQUAL(ctx->info.step_halvings, first.step_halvings + other->info.step_halvings);
     CHECK_EQUAL(ctx->info.touches, 2);
     CHECK_EQUAL(ctx->info.findings, first.findings);
-    CHECK(ctx->info.data_norm == other->info.data_norm && ctx->info.stop == other->info.stop && ctx->info.lambda == other->info.lambda);
+    CHECK(ctx->info.data_norm == other->info.data_norm && ctx->info.stop == other->info.stop &&
+          ctx->info.lambda == other->info.lambda);
     dense_bench_close(&plain);
     dense_bench_close(&b);
 }
 
-/* One solve more than without: not for one touch, without fields, uncoupled, or with a limit of multiply-accumulates. */
+/* One solve more than without: not for one touch, without fields, uncoupled, or with a limit of
+ * multiply-accumulates. */
 static void when_it_is_not_refined(void)
 {
     static const struct {
         small_spec spec;
         uint32_t bits, mac_limit, touches;
-    } cases[] = {{{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES}, EITS_SEARCH_ALL, 0, 2},
-                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL - EITS_SEARCH_COUPLED, 0, 2},
-                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL, 2000000000u, 2},
-                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL, 0, 1}};
+    } cases[] = {
+        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES}, EITS_SEARCH_ALL, 0, 2},
+        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1},
+         EITS_SEARCH_ALL - EITS_SEARCH_COUPLED,
+         0,
+         2},
+        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1},
+         EITS_SEARCH_ALL,
+         2000000000u,
+         2},
+        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL, 0, 1}};
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
         dense_bench b;
         eits_touch touch[EITS_MAX_TOUCHES];
@@ -336,7 +362,8 @@ static void nothing_comes_of_it(void)
     CHECK(memcmp(y, ctx->y, sizeof y) == 0);
     for (int j = 0; j < SIDE * SIDE; ++j)
         CHECK(ctx->image[j] == image[j]);
-    CHECK(ctx->info.stop == before.stop && ctx->info.data_norm == before.data_norm && ctx->info.findings == 4);
+    CHECK(ctx->info.stop == before.stop && ctx->info.data_norm == before.data_norm &&
+          ctx->info.findings == 4);
     CHECK_EQUAL(ctx->info.iterations, 2 * before.iterations);
     CHECK_EQUAL(ctx->straight, 0);
     eits_solve_again(ctx, infinite);
@@ -360,8 +387,11 @@ static void images_of_a_batch(void)
         frame[1][i] = frame[0][i] * (eits_real)(1 + 0.1 * small_random(&state));
         frame[0][i] *= (eits_real)(1 + 0.05 * small_random(&state));
     }
-    CHECK_EQUAL(eits_reconstruct(ctx, frame[0], SMALL_ROWS, NULL, NULL), EITS_OK); /* the drift's direction is known from now on */
-    CHECK_EQUAL(eits_reconstruct_batch(ctx, frame[0], SMALL_ROWS, 2, image[0], NULL, touch[0], result), EITS_OK);
+    /* the drift's direction is known from now on */
+    CHECK_EQUAL(eits_reconstruct(ctx, frame[0], SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_EQUAL(
+        eits_reconstruct_batch(ctx, frame[0], SMALL_ROWS, 2, image[0], NULL, touch[0], result),
+        EITS_OK);
     for (int k = 0; k < 2; ++k) {
         eits_forget(ctx);
         CHECK_EQUAL(eits_reconstruct(ctx, frame[k], SMALL_ROWS, NULL, NULL), EITS_OK);

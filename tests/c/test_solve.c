@@ -1,11 +1,12 @@
-/* The solver on given reduced data: against the closed form, a textbook FISTA, and the conditions of an optimum. */
+/* The solver on given reduced data: against the closed form, a textbook FISTA, and the conditions
+ * of an optimum. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -68,9 +69,11 @@ static void identity_gives_the_soft_threshold(void)
             double squares = 0;
             for (int j = 0; j < 16; ++j) {
                 const double size = fabs(b.y[j]) - 0.25;
-                const int allowed = b.y[j] > 0 ? sign != EITS_SIGN_DECREASE : sign != EITS_SIGN_INCREASE;
+                const int allowed =
+                    b.y[j] > 0 ? sign != EITS_SIGN_DECREASE : sign != EITS_SIGN_INCREASE;
                 const double expected = size > 0 && allowed ? copysign(size, b.y[j]) : 0;
-                CHECK_NEAR(ctx->x[j], expected, iterations == 1 ? 0 : 2 * EPS); /* one step is exact: 1/4 is a round number */
+                /* one step is exact: 1/4 is a round number */
+                CHECK_NEAR(ctx->x[j], expected, iterations == 1 ? 0 : 2 * EPS);
                 CHECK(ctx->image[j] == ctx->x[j]);
                 nonzeros += expected != 0;
                 squares += pow(b.y[j] - expected, 2);
@@ -92,12 +95,14 @@ static void same_as_the_textbook(void)
     for (int storage = 0; storage < 4; ++storage) {
         for (int sign = 0; sign < 3; ++sign) {
             for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
-                const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
+                const small_spec spec = {
+                    .rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
                 bench b;
                 eits_context *ctx = set_up(&b, spec, (int)(k % 2));
                 double x[N] = {0}, largest = 0;
                 const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
-                dense_fista(&b.d, b.y, (double)ctx->info.lambda, (double)b.c.model.lipschitz, counts[k], (eits_sign)sign, x);
+                dense_fista(&b.d, b.y, (double)ctx->info.lambda, (double)b.c.model.lipschitz,
+                            counts[k], (eits_sign)sign, x);
                 for (int j = 0; j < N; ++j)
                     largest = fmax(largest, fabs(x[j]));
                 CHECK(largest > 0.1);
@@ -130,7 +135,8 @@ static void same_bits_in_every_layout(void)
                 first_info = info;
             }
             CHECK(memcmp(first, ctx->image, sizeof first) == 0);
-            CHECK(info.gap == first_info.gap && info.residual == first_info.residual && info.macs == first_info.macs);
+            CHECK(info.gap == first_info.gap && info.residual == first_info.residual &&
+                  info.macs == first_info.macs);
             tear_down(&b);
         }
     }
@@ -151,7 +157,8 @@ static void optimum_has_its_marks(void)
         dense_residual(&b.d, b.y, x, r);
         dense_correlate(&b.d, r, c);
         const double lambda = (double)info.lambda;
-        const double slack = sqrt(2 * (double)b.c.model.lipschitz * (double)info.gap) + 20 * EPS; /* |S (x - optimum)| sqrt L */
+        /* |S (x - optimum)| sqrt L */
+        const double slack = sqrt(2 * (double)b.c.model.lipschitz * (double)info.gap) + 20 * EPS;
         for (int j = 0; j < N; ++j)
             largest = fmax(largest, fabs(x[j]));
         uint32_t on = 0, off = 0;
@@ -185,8 +192,10 @@ static void gap_bounds_the_suboptimality(void)
             const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
             double *x = dense_copy(ctx->x, N), best_x[N] = {0}, r[RANK];
             const double lambda = (double)info.lambda, gap = (double)info.gap;
-            dense_fista(&b.d, b.y, lambda, (double)b.c.model.lipschitz, 30000, (eits_sign)sign, best_x);
-            const double best = dense_objective(&b.d, b.y, best_x, lambda), own = dense_objective(&b.d, b.y, x, lambda);
+            dense_fista(&b.d, b.y, lambda, (double)b.c.model.lipschitz, 30000, (eits_sign)sign,
+                        best_x);
+            const double best = dense_objective(&b.d, b.y, best_x, lambda),
+                         own = dense_objective(&b.d, b.y, x, lambda);
             const double rounding = 40 * EPS * dense_dot(b.y, b.y, RANK);
             CHECK(own - best >= -1e-12);
             CHECK(own - best <= gap + rounding);
@@ -215,8 +224,10 @@ static void stopping_by_the_gap(void)
     CHECK(info.gap_rel <= R(1e-3) && info.gap_rel > 0);
     CHECK(info.iterations % 7 == 0 && info.iterations < 2000);
     const uint32_t needed = info.iterations;
-    info = solve(ctx, needed - 7, EITS_SIGN_INCREASE, 0.05); /* one check earlier it was not small enough */
-    CHECK(info.stop == EITS_STOP_ITERATIONS && info.iterations == needed - 7 && info.gap_rel > R(1e-3));
+    /* one check earlier it was not small enough */
+    info = solve(ctx, needed - 7, EITS_SIGN_INCREASE, 0.05);
+    CHECK(info.stop == EITS_STOP_ITERATIONS && info.iterations == needed - 7 &&
+          info.gap_rel > R(1e-3));
     info = solve(ctx, 5, EITS_SIGN_INCREASE, 0.05);
     CHECK(info.stop == EITS_STOP_ITERATIONS && info.iterations == 5 && info.gap_rel > 0);
     o.gap_rel = R(0.9);
@@ -235,16 +246,20 @@ static void zero_is_the_optimum(void)
         double c[N], greatest = 0;
         dense_correlate(&b.d, b.y, c);
         for (int j = 0; j < N; ++j)
-            greatest = fmax(greatest, sign == EITS_SIGN_INCREASE ? c[j] : (sign == EITS_SIGN_DECREASE ? -c[j] : fabs(c[j])));
+            greatest = fmax(greatest, sign == EITS_SIGN_INCREASE
+                                          ? c[j]
+                                          : (sign == EITS_SIGN_DECREASE ? -c[j] : fabs(c[j])));
         eits_info info = solve(ctx, 20, (eits_sign)sign, greatest * (1 + 1e-5));
         CHECK_NEAR(info.lambda_max, greatest, 10 * EPS);
         CHECK_EQUAL(info.stop, EITS_STOP_ZERO);
-        CHECK(info.iterations == 0 && info.nonzeros == 0 && info.gap == 0 && info.residual == info.data_norm);
+        CHECK(info.iterations == 0 && info.nonzeros == 0 && info.gap == 0 &&
+              info.residual == info.data_norm);
         for (int j = 0; j < N; ++j)
             CHECK(ctx->x[j] == 0 && ctx->image[j] == 0);
         info = solve(ctx, 20, (eits_sign)sign, greatest * (1 - 1e-3));
         CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros == 1);
-        info = solve(ctx, 20, (eits_sign)sign, (double)info.lambda_max); /* lambda just at lambda_max */
+        /* lambda just at lambda_max */
+        info = solve(ctx, 20, (eits_sign)sign, (double)info.lambda_max);
         CHECK_EQUAL(info.stop, EITS_STOP_ZERO);
         tear_down(&b);
     }
@@ -263,7 +278,8 @@ static void zero_is_the_optimum(void)
     tear_down(&b);
 }
 
-/* Rows that are left out: the same as the dense problem with their directions taken out of S and y. */
+/* Rows that are left out: the same as the dense problem with their directions taken out of S and y.
+ */
 static void solving_beside_a_basis(void)
 {
     bench b;
@@ -274,7 +290,8 @@ static void solving_beside_a_basis(void)
     small_reference(&b.c.model, 1, reference);
     for (int i = 0; i < SMALL_ROWS; ++i)
         frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
-    frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] = frame[b.c.model.fold[20].first] = R(NAN);
+    frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] =
+        frame[b.c.model.fold[20].first] = R(NAN);
     CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
     CHECK_EQUAL(ctx->basis_count, 3);
@@ -286,7 +303,8 @@ static void solving_beside_a_basis(void)
     }
     for (int j = 0; j < N; ++j)
         dense_project_out(b.d.s + j * RANK, basis, 3, RANK);
-    dense_fista(&b.d, y, (double)info.lambda, (double)b.c.model.lipschitz, 40, EITS_SIGN_INCREASE, x);
+    dense_fista(&b.d, y, (double)info.lambda, (double)b.c.model.lipschitz, 40, EITS_SIGN_INCREASE,
+                x);
     CHECK(info.nonzeros >= 3);
     CHECK_NEAR(dense_greatest_difference(x, ctx->x, N), 0, 400 * EPS);
     CHECK_NEAR(info.gap, dense_gap(&b.d, y, x, (double)info.lambda, EITS_SIGN_INCREASE), 400 * EPS);
@@ -297,7 +315,8 @@ static void solving_beside_a_basis(void)
     tear_down(&b);
 }
 
-/* On the identity with one positive datum each iterate has one non-zero, so that each product can be counted by hand. */
+/* On the identity with one positive datum each iterate has one non-zero, so that each product can
+ * be counted by hand. */
 static void work_is_counted(void)
 {
     const small_spec spec = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
@@ -308,7 +327,8 @@ static void work_is_counted(void)
     ctx->y[3] = 1;
     for (uint32_t iterations = 1; iterations <= 25; iterations += 8) {
         const eits_info info = solve(ctx, iterations, EITS_SIGN_INCREASE, 0.25);
-        /* S'y once, which the first iteration uses again; S'r in each later one and for the last gap; S x in each */
+        /* S'y once, which the first iteration uses again; S'r in each later one and for the last
+         * gap; S x in each */
         CHECK_EQUAL(info.macs, whole + (iterations - 1) * whole + whole + iterations * column);
     }
     eits_options o = ctx->options;
@@ -317,7 +337,8 @@ static void work_is_counted(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_info info = solve(ctx, 4, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + 3 * whole + whole + 4 * column);
-    o = ctx->options; /* from the last coefficients: S x once more, and the first iteration's S'r */
+    /* from the last coefficients: S x once more, and the first iteration's S'r */
+    o = ctx->options;
     o.gap_rel = 0;
     o.warm_start = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -326,27 +347,32 @@ static void work_is_counted(void)
     ctx->y[3] = 0;
     info = solve(ctx, 20, EITS_SIGN_INCREASE, 0.25); /* no more than S'y where there is nothing */
     CHECK_EQUAL(info.macs, whole);
-    /* with the frame stage: P d over all folded rows, of differences and of logarithms, and two projections' passes for the drift
-     * direction at first */
+    /* with the frame stage: P d over all folded rows, of differences and of logarithms, and two
+     * projections' passes for the drift direction at first */
     eits_real frame[SMALL_ROWS];
     small_reference(&b.c.model, 1, frame);
     CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     const uint64_t reduce = SMALL_FOLDED * 16, project = 2 * 16;
-    CHECK_EQUAL(ctx->info.macs, reduce + 2 * 16 /* direction, normalised */ + 2 * (reduce + project) + whole);
+    CHECK_EQUAL(ctx->info.macs,
+                reduce + 2 * 16 /* direction, normalised */ + 2 * (reduce + project) + whole);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     CHECK_EQUAL(ctx->info.macs, 2 * (reduce + project) + whole); /* the basis is kept */
-    /* one column of P less, and its rows whitened anew: the rows left out once into the products, three factors, eight probes of
-     * the noise; the data and the drift's direction by three triangles; F' y */
+    /* one column of P less, and its rows whitened anew: the rows left out once into the products,
+     * three factors, eight probes of the noise; the data and the drift's direction by three
+     * triangles; F' y */
     const uint64_t triangle = 16 * 17 / 2, cubic = 15 * 16 * 17 / 6;
     frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] = R(NAN);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    const uint64_t built = triangle + cubic + (2 * cubic + 2 * triangle - triangle) + cubic + 8 * 2 * triangle;
+    const uint64_t built =
+        triangle + cubic + (2 * cubic + 2 * triangle - triangle) + cubic + 8 * 2 * triangle;
     CHECK(ctx->rewhitened);
     CHECK_EQUAL(ctx->basis_count, 1);
-    CHECK_EQUAL(ctx->info.macs, built + (reduce + 3 * triangle + 2 * 16) + 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
+    CHECK_EQUAL(ctx->info.macs, built + (reduce + 3 * triangle + 2 * 16) +
+                                    2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(ctx->info.macs, 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole); /* the map is kept */
+    /* the map is kept */
+    CHECK_EQUAL(ctx->info.macs, 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
     o.project_baseline = 0; /* each residual is mapped, there and back */
     o.warm_start = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -355,7 +381,8 @@ static void work_is_counted(void)
     ctx->y[7] = 1;
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.nonzeros, 1);
-    CHECK_EQUAL(info.macs, whole + triangle + 2 * (whole + 2 * triangle) + 3 * column + (whole + 2 * triangle));
+    CHECK_EQUAL(info.macs, whole + triangle + 2 * (whole + 2 * triangle) + 3 * column +
+                               (whole + 2 * triangle));
     tear_down(&b);
 }
 

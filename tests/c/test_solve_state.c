@@ -1,12 +1,13 @@
-/* What the solver takes from outside one frame: gate and lambda rule, warm start, a wrong step, units. */
+/* What the solver takes from outside one frame: gate and lambda rule, warm start, a wrong step,
+ * units. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -74,7 +75,8 @@ static void gate_and_lambda_rule(void)
     info = solve(ctx);
     CHECK_NEAR(info.lambda, 0.6 * top, 2 * EPS * top);
     CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
-    ctx->baseline.lambda_noise = (eits_real)(top / 1.49); /* just below the gate, then just above */
+    /* just below the gate, then just above */
+    ctx->baseline.lambda_noise = (eits_real)(top / 1.49);
     info = solve(ctx);
     CHECK(info.stop == EITS_STOP_GATE && info.iterations == 0 && info.nonzeros == 0);
     for (int j = 0; j < N; ++j)
@@ -85,7 +87,8 @@ static void gate_and_lambda_rule(void)
     o.gate_factor = 0;
     set_options(ctx, o);
     ctx->baseline.lambda_noise = (eits_real)(100 * top);
-    CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS); /* no gate, and lambda_abs does not look at the noise */
+    /* no gate, and lambda_abs does not look at the noise */
+    CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS);
     dense_bench_close(&b);
 }
 
@@ -114,7 +117,8 @@ static void warm_start_saves_iterations(void)
     CHECK(2 * needed[1] <= needed[0]);
 }
 
-/* After lift-off, a frame of noise with the touch's coefficients as its start: what is left is what a cold start gives. */
+/* After lift-off, a frame of noise with the touch's coefficients as its start: what is left is what
+ * a cold start gives. */
 static void no_ghost_after_lift_off(void)
 {
     bench b;
@@ -135,7 +139,8 @@ static void no_ghost_after_lift_off(void)
     double *after = dense_copy(ctx->x, N);
     eits_forget(ctx);
     (void)solve(ctx);
-    CHECK(dense_greatest_difference(after, ctx->x, N) == 0); /* zero is the better start: the very cold result */
+    /* zero is the better start: the very cold result */
+    CHECK(dense_greatest_difference(after, ctx->x, N) == 0);
     for (int j = 0; j < N; ++j)
         CHECK(fabs(after[j]) < 0.1 * peak);
     free(after);
@@ -167,7 +172,8 @@ static void warm_start_is_forgotten(void)
     (void)solve(ctx);
     CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
     small_reference(&b.c.model, 1, reference);
-    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK); /* nor are those against another reference */
+    /* nor are those against another reference */
+    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
     (void)solve(ctx);
     CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
     o.warm_start = 0;
@@ -184,7 +190,8 @@ static void step_too_large(void)
     static const double factors[] = {0.3, 0.125, 0.02};
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
         bench b;
-        eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
+        eits_context *ctx =
+            set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
         eits_options o = ctx->options;
         o.iterations = 400;
         set_options(ctx, o);
@@ -195,19 +202,23 @@ static void step_too_large(void)
         CHECK(ldexp(factors[f], (int)info.step_halvings) > 0.4); /* enough of them */
         double *y = dense_copy(ctx->y, RANK), *x = dense_copy(ctx->x, N), good[N] = {0};
         const double lambda = (double)info.lambda, at_zero = 0.5 * dense_dot(y, y, RANK);
-        dense_fista(&b.d, y, lambda, (double)b.c.model.lipschitz / factors[f], 20000, EITS_SIGN_INCREASE, good);
-        const double best = dense_objective(&b.d, y, good, lambda), own = dense_objective(&b.d, y, x, lambda);
+        dense_fista(&b.d, y, lambda, (double)b.c.model.lipschitz / factors[f], 20000,
+                    EITS_SIGN_INCREASE, good);
+        const double best = dense_objective(&b.d, y, good, lambda),
+                     own = dense_objective(&b.d, y, x, lambda);
         CHECK(own < 0.1 * at_zero && own - best < 0.02 * at_zero);
         CHECK_NEAR(info.gap, dense_gap(&b.d, y, x, lambda, EITS_SIGN_INCREASE), 1e-4 * at_zero);
         for (int again = 0; again < 12; ++again) { /* no count runs on from call to call */
             const eits_info next = solve(ctx);
-            CHECK(next.step_halvings == info.step_halvings && next.stop == info.stop && next.macs == info.macs);
+            CHECK(next.step_halvings == info.step_halvings && next.stop == info.stop &&
+                  next.macs == info.macs);
         }
         for (int power = -10; power <= 10; power += 20) { /* nor does the unit matter */
             for (int i = 0; i < RANK; ++i)
                 ctx->y[i] = (eits_real)ldexp(y[i], power);
             const eits_info scaled = solve(ctx);
-            CHECK(scaled.step_halvings == info.step_halvings && scaled.macs == info.macs && scaled.gap_rel == info.gap_rel);
+            CHECK(scaled.step_halvings == info.step_halvings && scaled.macs == info.macs &&
+                  scaled.gap_rel == info.gap_rel);
         }
         free(y);
         free(x);
@@ -215,15 +226,18 @@ static void step_too_large(void)
     }
 }
 
-/* On the identity one step of s takes the objective, for any lambda, to its start's value just where s = 2: a run that ends
- * above it has won nothing. */
+/* On the identity one step of s takes the objective, for any lambda, to its start's value just
+ * where s = 2: a run that ends above it has won nothing. */
 static void ending_above_the_start(void)
 {
     for (int k = 0; k < 4; ++k) {
         bench b;
         const int above = k % 2;
         const double step = above ? 2.02 : 1.98, lambda = k < 2 ? 1e-4 : 0.5;
-        eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 1 / step});
+        eits_context *ctx = set_up(&b, (small_spec){.rank = RANK,
+                                                    .side = 4,
+                                                    .shape = SMALL_IDENTITY,
+                                                    .lipschitz_factor = 1 / step});
         eits_options o = ctx->options;
         o.iterations = 1;
         o.lambda_abs = (eits_real)lambda;
@@ -244,7 +258,8 @@ static void step_absurdly_large(void)
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
         for (int sign = 0; sign < 3; ++sign) {
             bench b;
-            eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
+            eits_context *ctx = set_up(
+                &b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
             eits_options o = ctx->options;
             o.iterations = 1000;
             o.sign = (eits_sign)sign;
@@ -255,7 +270,8 @@ static void step_absurdly_large(void)
                 const eits_info info = solve(ctx);
                 CHECK_EQUAL(info.stop, EITS_STOP_DIVERGED);
                 CHECK(info.nonzeros == 0 && info.step_halvings == 8 && info.iterations < 1000);
-                CHECK(info.residual == info.data_norm && info.gap == 0 && info.gap_rel == 0); /* no number of the wild run stays */
+                /* no number of the wild run stays */
+                CHECK(info.residual == info.data_norm && info.gap == 0 && info.gap_rel == 0);
                 for (int j = 0; j < N; ++j)
                     CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
                 uint32_t count = 9;
@@ -279,7 +295,8 @@ static void data_that_are_not_finite(void)
         CHECK(ctx->info.nonzeros > 0);
         ctx->y[5] = (eits_real)wrong[k];
         CHECK_EQUAL(eits_solve(ctx), EITS_E_NOT_FINITE);
-        CHECK(ctx->info.nonzeros == 0 && ctx->info.data_norm == 0 && ctx->info.residual == 0 && ctx->info.lambda == 0);
+        CHECK(ctx->info.nonzeros == 0 && ctx->info.data_norm == 0 && ctx->info.residual == 0 &&
+              ctx->info.lambda == 0);
         for (int j = 0; j < N; ++j)
             CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
     }
@@ -295,11 +312,13 @@ static void data_that_are_not_finite(void)
     fill_y(&w, 1000, 0, 0);
     CHECK_EQUAL(eits_solve(&w.c.ctx), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
     for (int j = 0; j < N; ++j)
-        CHECK(isfinite((double)w.c.ctx.image[j]) && (sizeof(eits_real) == 8 || w.c.ctx.image[j] == 0));
+        CHECK(isfinite((double)w.c.ctx.image[j]) &&
+              (sizeof(eits_real) == 8 || w.c.ctx.image[j] == 0));
     dense_bench_close(&w);
 }
 
-/* Frames in other units: the gain takes them up. By powers of two to the bit, by others within rounding. */
+/* Frames in other units: the gain takes them up. By powers of two to the bit, by others within
+ * rounding. */
 static void units_do_not_matter(void)
 {
     static const double units[] = {1, 0x1p-20, 0x1p20, 0x1p-60, 1e-6, 1e-3, 3.7, 1e6, -1, -1e-6};
@@ -327,7 +346,8 @@ static void units_do_not_matter(void)
             CHECK(ctx->info.nonzeros >= 3);
         }
         double *as_doubles = dense_copy(first, N);
-        CHECK_NEAR(dense_greatest_difference(as_doubles, ctx->image, N), 0, u < 4 ? 0 : 200 * EPS * peak);
+        CHECK_NEAR(dense_greatest_difference(as_doubles, ctx->image, N), 0,
+                   u < 4 ? 0 : 200 * EPS * peak);
         CHECK_NEAR(ctx->info.lambda, first_info.lambda, 100 * EPS * (double)first_info.lambda);
         free(as_doubles);
         dense_bench_close(&b);

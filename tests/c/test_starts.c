@@ -1,13 +1,13 @@
-/* Where a solve starts from, and what it may not take over: after a halved step, from a start worse than zero, over another
- * stage's scratch, after a frame that was refused or empty. */
+/* Where a solve starts from, and what it may not take over: after a halved step, from a start worse
+ * than zero, over another stage's scratch, after a frame that was refused or empty. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -50,18 +50,21 @@ static void a_halved_step_starts_afresh(void)
     CHECK(info.step_halvings >= 1 && info.step_halvings <= 3);
     const double lipschitz = (double)b.c.model.lipschitz * pow(2, info.step_halvings);
     double *y = dense_copy(ctx->y, RANK), *x = dense_numbers(N);
-    dense_fista(&b.d, y, (double)info.lambda, lipschitz, 60 - 10 * info.step_halvings, EITS_SIGN_INCREASE, x);
+    dense_fista(&b.d, y, (double)info.lambda, lipschitz, 60 - 10 * info.step_halvings,
+                EITS_SIGN_INCREASE, x);
     CHECK(dense_greatest_difference(x, ctx->x, N) < 2000 * EPS);
     free(y), free(x);
     dense_bench_close(&b);
 }
 
-/* The residual is small at the start, but the penalty is not: zero is the better start, to the bit. */
+/* The residual is small at the start, but the penalty is not: zero is the better start, to the bit.
+ */
 static void a_start_worse_than_zero(void)
 {
     for (int solver = 0; solver < 4; ++solver) {
         bench warm, cold;
-        eits_context *ctx = dense_bench_open(&warm, RANDOM, 0), *other = dense_bench_open(&cold, RANDOM, 0);
+        eits_context *ctx = dense_bench_open(&warm, RANDOM, 0),
+                     *other = dense_bench_open(&cold, RANDOM, 0);
         small_new_data(ctx, 92);
         small_new_data(other, 92);
         eits_options o = ctx->options;
@@ -129,12 +132,14 @@ static void touches_leave_no_trace(void)
     }
 }
 
-/* A frame after one that was refused, or showed nothing, starts cold: the same bits for the same MACs as in a fresh context. */
+/* A frame after one that was refused, or showed nothing, starts cold: the same bits for the same
+ * MACs as in a fresh context. */
 static void cold_after_nothing(void)
 {
     for (int why = 0; why < 3; ++why) {
         bench b, fresh;
-        eits_context *ctx = open_warm(&b, EITS_SOLVER_WORKING_SET), *other = open_warm(&fresh, EITS_SOLVER_WORKING_SET);
+        eits_context *ctx = open_warm(&b, EITS_SOLVER_WORKING_SET),
+                     *other = open_warm(&fresh, EITS_SOLVER_WORKING_SET);
         eits_real frame[SMALL_ROWS], nothing[SMALL_ROWS];
         small_reference(&b.c.model, 1, nothing); /* the reference itself: zero is the answer */
         for (int i = 0; why == 1 && i < SMALL_ROWS; ++i)
@@ -144,8 +149,11 @@ static void cold_after_nothing(void)
         wandering_frame(&b, 0, frame);
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, nothing, SMALL_ROWS, NULL, NULL),
-                    why == 0 ? EITS_OK : why == 1 ? EITS_E_FRAME_CHANNELS : EITS_E_FRAME_ZERO);
-        CHECK_EQUAL(eits_reconstruct(other, nothing, SMALL_ROWS, NULL, NULL) == EITS_OK, why == 0); /* makes the basis */
+                    why == 0   ? EITS_OK
+                    : why == 1 ? EITS_E_FRAME_CHANNELS
+                               : EITS_E_FRAME_ZERO);
+        /* makes the basis */
+        CHECK_EQUAL(eits_reconstruct(other, nothing, SMALL_ROWS, NULL, NULL) == EITS_OK, why == 0);
         wandering_frame(&b, 4, frame);
         CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
@@ -179,7 +187,8 @@ static void the_longest_intervals(void)
     CHECK_EQUAL(macs[2], macs[0]);
 }
 
-/* A hundred thousand iterations end where the gap cannot fall any further, and nothing grows on the way. */
+/* A hundred thousand iterations end where the gap cannot fall any further, and nothing grows on the
+ * way. */
 static void iterations_without_number(void)
 {
     for (int solver = 0; solver < 4; ++solver) {
@@ -192,22 +201,29 @@ static void iterations_without_number(void)
         o.lambda_rel = R(0.05);
         set_options(ctx, o);
         const eits_info info = solve(ctx);
-        CHECK(solver < 2 ? info.stop == EITS_STOP_ITERATIONS && info.iterations == 100000 : info.stop == EITS_STOP_OPTIMUM);
-        CHECK(info.gap_rel >= 0 && info.gap_rel < R(BOTH_WIDTHS(1e-5, 1e-12)) && info.step_halvings == 0);
+        CHECK(solver < 2 ? info.stop == EITS_STOP_ITERATIONS && info.iterations == 100000
+                         : info.stop == EITS_STOP_OPTIMUM);
+        CHECK(info.gap_rel >= 0 && info.gap_rel < R(BOTH_WIDTHS(1e-5, 1e-12)) &&
+              info.step_halvings == 0);
         for (int j = 0; j < N; ++j)
             CHECK(isfinite((double)ctx->x[j]) && ctx->x[j] >= 0);
         dense_bench_close(&b);
     }
 }
 
-/* Steps more than twice too long that throw every coefficient beyond its sign, to zero, whenever one looks. */
+/* Steps more than twice too long that throw every coefficient beyond its sign, to zero, whenever
+ * one looks. */
 static void steps_that_end_at_zero(void)
 {
     for (int factor = 40; factor < 50; factor += 3) {
         for (uint32_t every = 1; every < 6; ++every) {
             dense_bench b;
-            eits_context *ctx = dense_bench_open(
-                &b, (small_spec){.rank = 6, .side = 4, .shape = SMALL_IDENTITY, .lipschitz_factor = 0.01 * factor}, 0);
+            eits_context *ctx = dense_bench_open(&b,
+                                                 (small_spec){.rank = 6,
+                                                              .side = 4,
+                                                              .shape = SMALL_IDENTITY,
+                                                              .lipschitz_factor = 0.01 * factor},
+                                                 0);
             for (uint32_t i = 0; i < 6; ++i)
                 ctx->y[i] = (eits_real)(1 + 0.1 * i);
             eits_options o = ctx->options;

@@ -3,9 +3,9 @@
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -28,7 +28,8 @@ typedef struct finger {
 
 static eits_context *set_up(bench *b, eits_storage storage, int round)
 {
-    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .storage = storage, .round = round});
+    b->made = small_model_make((small_spec){
+        .rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .storage = storage, .round = round});
     small_context_open(&b->c, &b->made, 1);
     b->d = dense_of(&b->c.model);
     return &b->c.ctx;
@@ -41,7 +42,8 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-/* y of these discs, pixels covered by area (12 x 12 points each), not by the core's own rule; solved, and touches found. */
+/* y of these discs, pixels covered by area (12 x 12 points each), not by the core's own rule;
+ * solved, and touches found. */
 static void press(bench *b, const finger *fingers, uint32_t count, double noise)
 {
     const eits_model *m = &b->c.model;
@@ -51,9 +53,13 @@ static void press(bench *b, const finger *fingers, uint32_t count, double noise)
         double change = 0;
         for (uint32_t f = 0; f < count; ++f) {
             for (int p = 0; p < 144; ++p) {
-                const double x = (double)m->origin_x_mm + (m->pixel[j].ix + (p % 12 + 0.5) / 12) * PIXEL - fingers[f].x;
-                const double yy = (double)m->origin_y_mm + (m->pixel[j].iy + (p / 12 + 0.5) / 12) * PIXEL - fingers[f].y;
-                change += x * x + yy * yy < fingers[f].radius * fingers[f].radius ? fingers[f].change / 144 : 0;
+                const double x = (double)m->origin_x_mm +
+                                 (m->pixel[j].ix + (p % 12 + 0.5) / 12) * PIXEL - fingers[f].x;
+                const double yy = (double)m->origin_y_mm +
+                                  (m->pixel[j].iy + (p / 12 + 0.5) / 12) * PIXEL - fingers[f].y;
+                change += x * x + yy * yy < fingers[f].radius * fingers[f].radius
+                              ? fingers[f].change / 144
+                              : 0;
             }
         }
         for (uint32_t i = 0; i < RANK; ++i)
@@ -71,7 +77,8 @@ static double strength(finger f)
     return f.change * PI * f.radius * f.radius;
 }
 
-/* The touch nearest to the finger must lie within `apart` mm and have its strength within `share`. */
+/* The touch nearest to the finger must lie within `apart` mm and have its strength within `share`.
+ */
 static const eits_touch *check_found(const bench *b, finger f, double apart, double share)
 {
     const eits_touch *best = NULL;
@@ -97,12 +104,14 @@ static void one_touch_anywhere(void)
         bench b;
         eits_context *ctx = set_up(&b, (eits_storage)storage, 0);
         eits_options o = ctx->options;
-        o.touch_radius_weight = R(1e-4); /* the radius by the data: held at the seed's, it would bend the strength by some 5 % */
+        /* the radius by the data: held at the seed's, it would bend the strength by some 5 % */
+        o.touch_radius_weight = R(1e-4);
         o.touch_sweeps = 40;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         double bias = 0;
         for (int round = 0; round < 15; ++round) {
-            const finger f = {44 * small_random(&state), 44 * small_random(&state), 9 + 2 * small_random(&state), 0.05};
+            const finger f = {44 * small_random(&state), 44 * small_random(&state),
+                              9 + 2 * small_random(&state), 0.05};
             press(&b, &f, 1, 0);
             CHECK_EQUAL(b.count, 1);
             const eits_touch *t = check_found(&b, f, 0.1 * PIXEL, 0.05);
@@ -127,7 +136,8 @@ static void both_signs(void)
     CHECK_EQUAL(b.count, 2);
     (void)check_found(&b, pair[0], 1, 0.05);
     (void)check_found(&b, pair[1], 1, 0.05);
-    CHECK(b.found[0].strength_s_per_m_mm2 > 0 && b.found[1].strength_s_per_m_mm2 < 0); /* the strongest first, by size */
+    /* the strongest first, by size */
+    CHECK(b.found[0].strength_s_per_m_mm2 > 0 && b.found[1].strength_s_per_m_mm2 < 0);
     o.sign = EITS_SIGN_DECREASE;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, pair + 1, 1, 0);
@@ -137,7 +147,8 @@ static void both_signs(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, pair + 1, 1, 0); /* what is only weaker elsewhere is no touch of this sign */
     for (uint32_t k = 0; k < b.count; ++k)
-        CHECK(b.found[k].strength_s_per_m_mm2 >= 0 && (double)b.found[k].strength_s_per_m_mm2 < 0.5 * fabs(strength(pair[1])));
+        CHECK(b.found[k].strength_s_per_m_mm2 >= 0 &&
+              (double)b.found[k].strength_s_per_m_mm2 < 0.5 * fabs(strength(pair[1])));
     tear_down(&b);
 }
 
@@ -207,7 +218,8 @@ static void dropped_and_limited(void)
     tear_down(&b);
 }
 
-/* More peaks than there is room for: the highest are kept, in order, and no memory beyond is touched. */
+/* More peaks than there is room for: the highest are kept, in order, and no memory beyond is
+ * touched. */
 static void many_peaks(void)
 {
     bench b;
@@ -224,12 +236,15 @@ static void many_peaks(void)
         memset(ctx->y, 0, RANK * sizeof *ctx->y);
         CHECK_EQUAL(eits_solve(ctx), EITS_OK);
         ctx->info.stop = EITS_STOP_ITERATIONS;
-        for (uint32_t iy = 0; iy < 10; ++iy) { /* 100 peaks, the height rising with the number in a scrambled order */
+        /* 100 peaks, the height rising with the number in a scrambled order */
+        for (uint32_t iy = 0; iy < 10; ++iy) {
             for (uint32_t ix = 0; ix < 10; ++ix) {
                 const uint32_t number = (37 * (10 * iy + ix)) % 100;
                 ctx->image[(2 * iy) * SIDE + 2 * ix] = (eits_real)(0.01 * (1 + number));
-                for (uint32_t i = 0; i < RANK; ++i) /* data that agree, so that each keeps a strength */
-                    ctx->y[i] += (eits_real)(0.01 * (1 + number) * b.d.s[((2 * iy) * SIDE + 2 * ix) * RANK + i]);
+                /* data that agree, so that each keeps a strength */
+                for (uint32_t i = 0; i < RANK; ++i)
+                    ctx->y[i] += (eits_real)(0.01 * (1 + number) *
+                                             b.d.s[((2 * iy) * SIDE + 2 * ix) * RANK + i]);
             }
         }
         eits_touch found[EITS_MAX_TOUCHES];
@@ -237,7 +252,8 @@ static void many_peaks(void)
         CHECK_EQUAL(eits_find_touches(ctx, found, EITS_MAX_TOUCHES, &count), EITS_OK);
         CHECK(count >= 1 && count <= most);
         for (uint32_t k = 0; k < count; ++k) { /* each at one of the `most` highest peaks */
-            const uint32_t ix = (uint32_t)lround(((double)found[k].x_mm + 57) / PIXEL), iy = (uint32_t)lround(((double)found[k].y_mm + 57) / PIXEL);
+            const uint32_t ix = (uint32_t)lround(((double)found[k].x_mm + 57) / PIXEL),
+                           iy = (uint32_t)lround(((double)found[k].y_mm + 57) / PIXEL);
             CHECK_NEAR(found[k].x_mm, -57 + PIXEL * ix, 1e-4);
             CHECK(ix % 2 == 0 && iy % 2 == 0);
             CHECK((37 * (10 * (iy / 2) + ix / 2)) % 100 >= 100 - most);
@@ -262,7 +278,8 @@ static void gate_by_noise(void)
     ctx->baseline.lambda_noise = R(0.8) * weak; /* the weaker one stands out of such noise */
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
-    ctx->baseline.lambda_noise = R(1.25) * weak; /* of this it does not, though the frame as a whole does */
+    /* of this it does not, though the frame as a whole does */
+    ctx->baseline.lambda_noise = R(1.25) * weak;
     press(&b, two, 2, 0);
     CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
     CHECK_EQUAL(b.count, 1);
@@ -301,13 +318,15 @@ static void radius_by_strength(void)
         const finger f = {5.5, -13, radius, 0.05};
         o = defaults;
         o.touch_sweeps = 30;
-        o.touch_change_s_per_m = R(0.05); /* the change under a touch is known: strength tells the area */
+        /* the change under a touch is known: strength tells the area */
+        o.touch_change_s_per_m = R(0.05);
         o.touch_radius_weight = R(0.1);
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         press(&b, &f, 1, 0);
         CHECK_EQUAL(b.count, 1);
         CHECK_NEAR(b.found[0].radius_mm, radius, 0.05 * radius);
-        o.touch_change_s_per_m = 0; /* it is not known, and data count for little: the seed's radius */
+        /* it is not known, and data count for little: the seed's radius */
+        o.touch_change_s_per_m = 0;
         o.touch_radius_weight = R(1e4);
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         press(&b, &f, 1, 0);
@@ -317,21 +336,24 @@ static void radius_by_strength(void)
         o.touch_max_radius_mm = R(9.5);
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         press(&b, &f, 1, 0);
-        CHECK(b.count >= 1 && b.found[0].radius_mm <= R(9.5) && b.found[0].radius_mm >= o.touch_min_radius_mm);
+        CHECK(b.count >= 1 && b.found[0].radius_mm <= R(9.5) &&
+              b.found[0].radius_mm >= o.touch_min_radius_mm);
     }
     tear_down(&b);
 }
 
 static void at_rim_and_corner(void)
 {
-    static const finger edges[] = {{-57, -57, 9, 0.05}, {57, 57, 9, 0.05},  {60, 0, 9, 0.05}, {-60, 10, 9, 0.05},
-                                   {-57, 57, 9, 0.05},  {7, -58, 9, 0.05}, {59, -59, 9, 0.05}};
+    static const finger edges[] = {{-57, -57, 9, 0.05}, {57, 57, 9, 0.05},  {60, 0, 9, 0.05},
+                                   {-60, 10, 9, 0.05},  {-57, 57, 9, 0.05}, {7, -58, 9, 0.05},
+                                   {59, -59, 9, 0.05}};
     bench b;
     (void)set_up(&b, EITS_STORAGE_F32, 0);
     for (size_t k = 0; k < sizeof edges / sizeof edges[0]; ++k) {
         press(&b, &edges[k], 1, 0);
         CHECK(b.count >= 1);
-        const double off = hypot((double)b.found[0].x_mm - edges[k].x, (double)b.found[0].y_mm - edges[k].y);
+        const double off =
+            hypot((double)b.found[0].x_mm - edges[k].x, (double)b.found[0].y_mm - edges[k].y);
         CHECK_NEAR(off, 0, 0.5 * PIXEL);
         CHECK(b.found[0].strength_s_per_m_mm2 > 0 && b.found[0].confidence > R(0.9));
     }
@@ -341,7 +363,8 @@ static void at_rim_and_corner(void)
         const finger f = {55 * cos(k * PI / 6), 55 * sin(k * PI / 6), 8, 0.05};
         press(&b, &f, 1, 0);
         CHECK(b.count >= 1);
-        CHECK_NEAR(hypot((double)b.found[0].x_mm - f.x, (double)b.found[0].y_mm - f.y), 0, 0.5 * PIXEL);
+        CHECK_NEAR(hypot((double)b.found[0].x_mm - f.x, (double)b.found[0].y_mm - f.y), 0,
+                   0.5 * PIXEL);
     }
     tear_down(&b);
 }
@@ -353,7 +376,8 @@ static void nothing_to_find(void)
     const finger f = {10, 10, 9, 0.05}, two[2] = {{-25, 0, 9, 0.05}, {25, 5, 9, 0.03}};
     uint32_t count = 9;
     eits_touch one;
-    CHECK_EQUAL(eits_find_touches(ctx, b.found, EITS_MAX_TOUCHES, &count), EITS_OK); /* before any frame */
+    /* before any frame */
+    CHECK_EQUAL(eits_find_touches(ctx, b.found, EITS_MAX_TOUCHES, &count), EITS_OK);
     CHECK_EQUAL(count, 0);
     press(&b, &f, 0, 0); /* y = 0 */
     CHECK(b.count == 0 && ctx->info.touches == 0 && ctx->info.touch_macs == 0);
@@ -362,12 +386,14 @@ static void nothing_to_find(void)
     press(&b, two, 2, 0);
     eits_real image[SIDE * SIDE];
     memcpy(image, ctx->image, sizeof image);
-    CHECK_EQUAL(eits_find_touches(ctx, &one, 1, &count), EITS_OK); /* room for one: the strongest, both counted */
+    /* room for one: the strongest, both counted */
+    CHECK_EQUAL(eits_find_touches(ctx, &one, 1, &count), EITS_OK);
     CHECK_EQUAL(count, 2);
     CHECK(small_same_touch(&one, &b.found[0])); /* asked again, the same with the same id */
     CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, NULL), EITS_OK);
     CHECK_EQUAL(ctx->info.touches, 2);
-    CHECK(memcmp(image, ctx->image, sizeof image) == 0); /* the image is not changed by looking for touches */
+    /* the image is not changed by looking for touches */
+    CHECK(memcmp(image, ctx->image, sizeof image) == 0);
     tear_down(&b);
 }
 

@@ -3,10 +3,10 @@
 #include "dense.h"
 #include "small_model.h"
 
-#include "disc.h"
+#include "base/vec.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "vec.h"
+#include "touch/disc.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,7 +21,8 @@ static eits_context *set_up(small_model *made, small_context *c)
     return &c->ctx;
 }
 
-/* y of two discs at pixel centres, far from each other, or of the first alone; returns the pixels that the first covers. */
+/* y of two discs at pixel centres, far from each other, or of the first alone; returns the pixels
+ * that the first covers. */
 static uint64_t press(eits_context *ctx, int both)
 {
     const eits_disc discs[2] = {{-27, 3, 9, R(0.05), 1}, {33, -3, 9, R(0.02), 1}};
@@ -57,16 +58,22 @@ static void work_is_counted(void)
     o.touch_threshold = R(0.2);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     const uint64_t covered = press(ctx, 0);
-    CHECK_EQUAL(covered, 9); /* within 2 pixels of the centre of one: itself, 4 + 4 neighbours; the next ones lie on the edge */
+    /* within 2 pixels of the centre of one: itself, 4 + 4 neighbours; the next ones lie on the
+     * edge */
+    CHECK_EQUAL(covered, 9);
     const uint64_t strengths = covered * RANK + 10 * 4 * RANK; /* its response, ten passes */
-    CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK);         /* and one product of the Gram matrix */
+    /* and one product of the Gram matrix */
+    CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK);
     (void)press(ctx, 1);
     CHECK_EQUAL(touch_macs(ctx, 2), 2 * strengths + 3 * RANK);
     (void)press(ctx, 0);
-    ctx->baseline.lambda_noise = R(1e-6); /* a gate: the 3 x 3 pixels around it, two products each */
+    /* a gate: the 3 x 3 pixels around it, two products each */
+    ctx->baseline.lambda_noise = R(1e-6);
     CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK + 9 * 2 * RANK);
     ctx->baseline.lambda_noise = 0;
-    o.touch_sweeps = 1; /* a response with three slopes, 17 products, and each attempted step's response with 3 products */
+    /* a response with three slopes, 17 products, and each attempted step's response with 3
+     * products */
+    o.touch_sweeps = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     (void)press(ctx, 0);
     const uint64_t moved = touch_macs(ctx, 1) - strengths - RANK - (4 * covered * RANK + 17 * RANK);
@@ -84,7 +91,8 @@ static void units_do_not_matter(void)
     eits_touch first[2], found[2];
     uint32_t count;
     eits_options o = ctx->options;
-    o.touch_seed_radius_mm = 8; /* not the discs' own: the radius is a compromise of data and expectation */
+    /* not the discs' own: the radius is a compromise of data and expectation */
+    o.touch_seed_radius_mm = 8;
     o.touch_radius_weight = R(3e-4);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     (void)press(ctx, 1);
@@ -92,7 +100,8 @@ static void units_do_not_matter(void)
     CHECK_EQUAL(count, 2);
     CHECK(first[0].radius_mm > R(8.02) && first[0].radius_mm < R(8.98));
     for (int power = -24; power <= 24; power += 12) {
-        const eits_real unit = (eits_real)(power < 0 ? 1.0 / (double)(1 << -power) : (double)(1 << power));
+        const eits_real unit =
+            (eits_real)(power < 0 ? 1.0 / (double)(1 << -power) : (double)(1 << power));
         (void)press(ctx, 1);
         for (int i = 0; i < RANK; ++i)
             ctx->y[i] *= unit;
@@ -100,7 +109,8 @@ static void units_do_not_matter(void)
         CHECK_EQUAL(eits_find_touches(ctx, found, 2, &count), EITS_OK);
         CHECK_EQUAL(count, 2);
         for (int k = 0; k < 2; ++k) { /* powers of two: the same bits */
-            CHECK(found[k].x_mm == first[k].x_mm && found[k].y_mm == first[k].y_mm && found[k].radius_mm == first[k].radius_mm);
+            CHECK(found[k].x_mm == first[k].x_mm && found[k].y_mm == first[k].y_mm &&
+                  found[k].radius_mm == first[k].radius_mm);
             CHECK(found[k].confidence == first[k].confidence && found[k].id == first[k].id);
             CHECK(found[k].strength_s_per_m_mm2 == first[k].strength_s_per_m_mm2 * unit);
         }
@@ -123,11 +133,13 @@ static double unexplained(const double *y, const double *atoms, uint32_t count, 
     return dense_dot(rest, rest, RANK);
 }
 
-/* Confidence is the share of |y|^2 that leaving the touch out leaves unexplained, the others taking up what they can: for
- * discs that overlap, at pixel centres, with their strengths alone fitted. One peak of the image has nothing behind it. */
+/* Confidence is the share of |y|^2 that leaving the touch out leaves unexplained, the others taking
+ * up what they can: for discs that overlap, at pixel centres, with their strengths alone fitted.
+ * One peak of the image has nothing behind it. */
 static void confidence_is_what_leaving_out_costs(void)
 {
-    static const double places[4][3] = {{-27, -27, 0}, {-3, 3, 0.05}, {15, 9, 0.04}, {3, 21, 0.03}}; /* x, y mm, change */
+    /* x, y mm, change */
+    static const double places[4][3] = {{-27, -27, 0}, {-3, 3, 0.05}, {15, 9, 0.04}, {3, 21, 0.03}};
     small_model made;
     small_context c;
     eits_context *ctx = set_up(&made, &c);
@@ -148,7 +160,8 @@ static void confidence_is_what_leaving_out_costs(void)
             atoms[k * RANK + i] = (double)atom[i];
             ctx->y[i] += (eits_real)places[k][2] * atom[i] + (k == 0 ? R(-0.02) * atom[i] : 0);
         }
-        ctx->image[lround((places[k][1] + 57) / 6) * SIDE + lround((places[k][0] + 57) / 6)] = (eits_real)(4 - k);
+        ctx->image[lround((places[k][1] + 57) / 6) * SIDE + lround((places[k][0] + 57) / 6)] =
+            (eits_real)(4 - k);
     }
     for (int i = 0; i < RANK; ++i)
         y[i] = (double)ctx->y[i];
@@ -159,17 +172,20 @@ static void confidence_is_what_leaving_out_costs(void)
     const double all = unexplained(y, atoms + RANK, 3, -1), whole = dense_dot(y, y, RANK);
     for (uint32_t t = 0; t < count && t < 4; ++t) {
         int k = 1;
-        while (k < 3 && hypot(places[k][0] - (double)found[t].x_mm, places[k][1] - (double)found[t].y_mm) > 0.1)
+        while (k < 3 && hypot(places[k][0] - (double)found[t].x_mm,
+                              places[k][1] - (double)found[t].y_mm) > 0.1)
             ++k;
         const double share = (unexplained(y, atoms + RANK, 3, k - 1) - all) / whole;
         CHECK(share > 0.03 && share < 0.6);
-        CHECK_NEAR(found[t].confidence, share, 0.01 * share); /* strengths come by ten passes, not exactly */
+        /* strengths come by ten passes, not exactly */
+        CHECK_NEAR(found[t].confidence, share, 0.01 * share);
     }
     small_context_close(&c);
     small_model_free(&made);
 }
 
-/* A touch must stand out of the noise at its own place: at the greatest S_j'(its part) of the 3 x 3 pixels around it. */
+/* A touch must stand out of the noise at its own place: at the greatest S_j'(its part) of the 3 x 3
+ * pixels around it. */
 static void gate_of_one_touch(void)
 {
     small_model made;

@@ -2,11 +2,11 @@
 #include "check.h"
 #include "small_model.h"
 
-#include "disc.h"
+#include "base/vec.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "track.h"
-#include "vec.h"
+#include "touch/disc.h"
+#include "touch/tracker.h"
 
 #include <math.h>
 #include <string.h>
@@ -65,7 +65,8 @@ static void follows_and_jumps(void)
     tear_down(&b);
 }
 
-/* Two that pass each other: which is which is told by nearness, whatever the order in which they are listed. */
+/* Two that pass each other: which is which is told by nearness, whatever the order in which they
+ * are listed. */
 static void crossing(void)
 {
     bench b;
@@ -80,7 +81,8 @@ static void crossing(void)
     tear_down(&b);
 }
 
-/* The nearest pairs first: the one that moved little keeps its id, though another is within reach as well. */
+/* The nearest pairs first: the one that moved little keeps its id, though another is within reach
+ * as well. */
 static void nearest_first(void)
 {
     bench b;
@@ -110,7 +112,8 @@ static void all_of_a_full_house(void)
     for (int round = 0; round < 5; ++round) {
         eits_touch t[EITS_MAX_TOUCHES];
         for (int k = 0; k < EITS_MAX_TOUCHES; ++k) {
-            const int which = (k * 7 + round * 3) % EITS_MAX_TOUCHES; /* listed in another order each time */
+            /* listed in another order each time */
+            const int which = (k * 7 + round * 3) % EITS_MAX_TOUCHES;
             t[k] = at(20.0 * (which % 4) + 2 * round, 20.0 * (which / 4) - round);
         }
         eits_track(ctx, t, EITS_MAX_TOUCHES);
@@ -152,7 +155,8 @@ static void zero_is_never_an_id(void)
     tear_down(&b);
 }
 
-/* From data to ids: a disc that moves keeps its id, is lifted and comes back with a new one, jumps and is another. */
+/* From data to ids: a disc that moves keeps its id, is lifted and comes back with a new one, jumps
+ * and is another. */
 static void through_the_whole_core(void)
 {
     bench b;
@@ -162,10 +166,12 @@ static void through_the_whole_core(void)
     static const struct {
         double x, y, change;
         uint32_t id;
-    } frames[] = {{-40, 0, 0.05, 1}, {-25, 5, 0.05, 1}, {-10, 12, 0.05, 1}, {5, 10, 0.05, 1}, {20, -5, 0.05, 1},
-                  {20, -5, 0, 0},    {20, -5, 0.05, 2}, {22, -6, 0.05, 2},  {-30, 30, 0.05, 3}};
+    } frames[] = {{-40, 0, 0.05, 1}, {-25, 5, 0.05, 1}, {-10, 12, 0.05, 1},
+                  {5, 10, 0.05, 1},  {20, -5, 0.05, 1}, {20, -5, 0, 0},
+                  {20, -5, 0.05, 2}, {22, -6, 0.05, 2}, {-30, 30, 0.05, 3}};
     for (size_t k = 0; k < sizeof frames / sizeof frames[0]; ++k) {
-        const eits_disc disc = {.x_mm = (eits_real)frames[k].x, .y_mm = (eits_real)frames[k].y, .radius_mm = 9};
+        const eits_disc disc = {
+            .x_mm = (eits_real)frames[k].x, .y_mm = (eits_real)frames[k].y, .radius_mm = 9};
         eits_real atom[64];
         eits_touch touch;
         uint32_t count;
@@ -178,7 +184,8 @@ static void through_the_whole_core(void)
         if (count == 0)
             continue;
         CHECK_EQUAL(touch.id, frames[k].id);
-        CHECK_NEAR(hypot((double)touch.x_mm - frames[k].x, (double)touch.y_mm - frames[k].y), 0, 0.1);
+        CHECK_NEAR(hypot((double)touch.x_mm - frames[k].x, (double)touch.y_mm - frames[k].y), 0,
+                   0.1);
     }
     tear_down(&b);
 }

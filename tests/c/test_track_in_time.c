@@ -1,10 +1,11 @@
-/* Touches followed in time: births that are confirmed, deaths that are waited for, places smoothed. */
+/* Touches followed in time: births that are confirmed, deaths that are waited for, places smoothed.
+ */
 #include "check.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/touch.h"
-#include "track.h"
-#include "vec.h"
+#include "touch/tracker.h"
 
 #include <math.h>
 
@@ -35,10 +36,14 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-/* Its own S'y is 10 sqrt(confidence) times the noise's: faint from 0.009 down; above 0.05 a birth is sure. */
+/* Its own S'y is 10 sqrt(confidence) times the noise's: faint from 0.009 down; above 0.05 a birth
+ * is sure. */
 static eits_touch at(double x, double y, double confidence)
 {
-    return (eits_touch){.x_mm = (eits_real)x, .y_mm = (eits_real)y, .radius_mm = 9, .strength_s_per_m_mm2 = 1,
+    return (eits_touch){.x_mm = (eits_real)x,
+                        .y_mm = (eits_real)y,
+                        .radius_mm = 9,
+                        .strength_s_per_m_mm2 = 1,
                         .confidence = (eits_real)confidence};
 }
 
@@ -99,7 +104,8 @@ static void reach(void)
     CHECK_EQUAL(one(ctx, t, 0.2, 0.005), 1);
     CHECK_EQUAL(one(ctx, t, 25.1, 0.005), 1);
     CHECK_EQUAL(t[0].id, 1);
-    t[0] = at(27, 0, 0.005); /* nearer to the known touch than its own finger: the known one chooses first */
+    /* nearer to the known touch than its own finger: the known one chooses first */
+    t[0] = at(27, 0, 0.005);
     t[1] = at(0, 30, 0.005);
     CHECK_EQUAL(eits_track(ctx, t, 2), 1);
     t[0] = at(0, 30, 0.005);
@@ -109,7 +115,8 @@ static void reach(void)
     tear_down(&b);
 }
 
-/* A clear touch that is lifted is gone at once, though its id is kept for a while; a faint one is told of meanwhile. */
+/* A clear touch that is lifted is gone at once, though its id is kept for a while; a faint one is
+ * told of meanwhile. */
 static void deaths(void)
 {
     bench b;
@@ -122,13 +129,15 @@ static void deaths(void)
     CHECK_EQUAL(one(ctx, t, 5, 0.005), 1); /* known, so that there is no doubt */
     CHECK_EQUAL(t[0].id, 1);
     CHECK_EQUAL(none(ctx, t), 1);
-    CHECK(t[0].id == 1 && t[0].x_mm == 5 && t[0].confidence == 0 && t[0].strength_s_per_m_mm2 == 1 && t[0].radius_mm == 9);
+    CHECK(t[0].id == 1 && t[0].x_mm == 5 && t[0].confidence == 0 &&
+          t[0].strength_s_per_m_mm2 == 1 && t[0].radius_mm == 9);
     CHECK_EQUAL(none(ctx, t), 1);
     CHECK_EQUAL(none(ctx, t), 0);
     CHECK_EQUAL(one(ctx, t, 5, 0.5), 1); /* too late: another */
     CHECK_EQUAL(t[0].id, 2);
     eits_forget(ctx);
-    for (int k = 0; k < 4; ++k) /* told of in the second, third and fourth: not known long enough before that */
+    /* told of in the second, third and fourth: not known long enough before that */
+    for (int k = 0; k < 4; ++k)
         CHECK_EQUAL(one(ctx, t, 0, 0.005), k > 0);
     CHECK_EQUAL(t[0].id, 3);
     CHECK_EQUAL(none(ctx, t), 1);
@@ -155,7 +164,7 @@ static void a_full_house(void)
     }
     ctx->options.max_touches = 3;
     t[0] = at(-45, -45, 0.005);
-    CHECK_EQUAL(eits_track(ctx, t, 1), 3); /* the found one and two of those held */
+    CHECK_EQUAL(eits_track(ctx, t, 1), 3);     /* the found one and two of those held */
     for (int k = 0; k < EITS_MAX_TOUCHES; ++k) /* all others */
         t[k] = at(30.0 * (k % 4) - 1000, 30.0 * (k / 4), 0.5);
     CHECK_EQUAL(eits_track(ctx, t, EITS_MAX_TOUCHES), EITS_MAX_TOUCHES);
@@ -165,7 +174,8 @@ static void a_full_house(void)
 }
 
 /* Noise of the place that the filter expects; how far it is off on average, found and told. */
-static void jitter(eits_context *ctx, double speed, double confidence, double *found_mm, double *told_mm)
+static void jitter(eits_context *ctx, double speed, double confidence, double *found_mm,
+                   double *told_mm)
 {
     uint64_t random = 9;
     eits_touch t[EITS_MAX_TOUCHES];
@@ -192,13 +202,15 @@ static void smoothing(void)
     jitter(ctx, 0, 0.02, &found, &still);
     CHECK(still < 0.8 * found);
     const double share = still / found;
-    jitter(ctx, 1.7, 0.02, &found, &moving); /* 80 mm/s at 48 frames a second: no lag once it goes at a constant speed */
+    /* 80 mm/s at 48 frames a second: no lag once it goes at a constant speed */
+    jitter(ctx, 1.7, 0.02, &found, &moving);
     CHECK(moving < 0.8 * found);
     jitter(ctx, 0, 1, &found, &clear); /* the surer a place, the less it is smoothed */
     CHECK(clear / found > share);
     eits_touch t[EITS_MAX_TOUCHES];
     eits_forget(ctx);
-    ctx->info.lambda_noise = 0; /* no noise: places are as found, but for the hundredth of a pixel that none is surer than */
+    /* no noise: places are as found, but for the hundredth of a pixel that none is surer than */
+    ctx->info.lambda_noise = 0;
     for (int k = 0; k < 5; ++k) {
         CHECK_EQUAL(one(ctx, t, 3 * (k % 2), 0.5), 1);
         CHECK_NEAR(t[0].x_mm, 3 * (k % 2), 0.2);
@@ -214,7 +226,8 @@ static void smooth_strengths(void)
     eits_context *ctx = set_up(&b, 0, 2, 0.66);
     for (int k = 0; k < 20; ++k)
         CHECK_EQUAL(one(ctx, t, 0, 0.01), 1);
-    t[0] = (eits_touch){.x_mm = 2, .y_mm = -4, .radius_mm = 11, .strength_s_per_m_mm2 = 3, .confidence = R(0.02)};
+    t[0] = (eits_touch){
+        .x_mm = 2, .y_mm = -4, .radius_mm = 11, .strength_s_per_m_mm2 = 3, .confidence = R(0.02)};
     CHECK_EQUAL(eits_track(ctx, t, 1), 1);
     const double gain = (double)t[0].x_mm / 2;
     CHECK(gain > 0.1 && gain < 0.9);
@@ -225,7 +238,8 @@ static void smooth_strengths(void)
     tear_down(&b);
 }
 
-/* Two fingers that pass one another keep their ids by where they are going; without that the nearest place is another's. */
+/* Two fingers that pass one another keep their ids by where they are going; without that the
+ * nearest place is another's. */
 static void passing(void)
 {
     for (int smooth = 0; smooth < 2; ++smooth) {
@@ -276,10 +290,12 @@ static void extremes(void)
         ctx->options.follow_mm = (eits_real)huge[k / 3 % 3];
         ctx->info.lambda_noise = (eits_real)huge[k / 9];
         for (int frame = 0; frame < 6; ++frame) {
-            const uint32_t count = frame == 3 ? none(ctx, t) : one(ctx, t, frame, frame == 2 ? 0 : 0.5);
+            const uint32_t count =
+                frame == 3 ? none(ctx, t) : one(ctx, t, frame, frame == 2 ? 0 : 0.5);
             for (uint32_t l = 0; l < count; ++l)
-                CHECK(eits_is_finite(t[l].x_mm) && eits_is_finite(t[l].y_mm) && eits_is_finite(t[l].radius_mm) &&
-                      eits_is_finite(t[l].strength_s_per_m_mm2) && t[l].id != 0);
+                CHECK(eits_is_finite(t[l].x_mm) && eits_is_finite(t[l].y_mm) &&
+                      eits_is_finite(t[l].radius_mm) && eits_is_finite(t[l].strength_s_per_m_mm2) &&
+                      t[l].id != 0);
         }
         tear_down(&b);
     }

@@ -31,7 +31,8 @@ static void status_texts(void)
     const int count = (int)(sizeof known / sizeof known[0]);
     for (int i = 0; i < count; ++i) {
         const char *text = eits_status_text(known[i].status);
-        CHECK_EQUAL(known[i].status, -i); /* the numbers are part of the interface: errors are negative */
+        /* the numbers are part of the interface: errors are negative */
+        CHECK_EQUAL(known[i].status, -i);
         CHECK(strstr(text, known[i].word) != NULL);
         CHECK(strchr(text, '\n') == NULL);
         for (int j = 0; j < i; ++j)
@@ -44,7 +45,8 @@ static void status_texts(void)
 static void version_and_width(void)
 {
     char text[32];
-    (void)snprintf(text, sizeof text, "%d.%d.%d", EITS_VERSION_MAJOR, EITS_VERSION_MINOR, EITS_VERSION_PATCH);
+    (void)snprintf(text, sizeof text, "%d.%d.%d", EITS_VERSION_MAJOR, EITS_VERSION_MINOR,
+                   EITS_VERSION_PATCH);
     CHECK(strcmp(eits_version_text(), text) == 0);
     CHECK_EQUAL(eits_real_size(), BOTH_WIDTHS(4, 8));
     CHECK_EQUAL(sizeof(eits_real), BOTH_WIDTHS(4, 8));
@@ -56,7 +58,8 @@ static void crc32_of_known_texts(void)
     uint8_t zeros[32] = {0}, ones[32];
     memset(ones, 0xFF, sizeof ones);
     CHECK_EQUAL(eits_crc32(0, "", 0), 0);
-    CHECK_EQUAL(eits_crc32(0, "123456789", 9), 0xCBF43926u); /* the check value of CRC-32/ISO-HDLC */
+    /* the check value of CRC-32/ISO-HDLC */
+    CHECK_EQUAL(eits_crc32(0, "123456789", 9), 0xCBF43926u);
     CHECK_EQUAL(eits_crc32(0, fox, sizeof fox - 1), 0x414FA339u);
     CHECK_EQUAL(eits_crc32(0, zeros, 32), 0x190A55ADu);
     CHECK_EQUAL(eits_crc32(0, ones, 32), 0xFF6CAB0Bu);
@@ -68,9 +71,10 @@ static void crc32_of_known_texts(void)
 
 static void protocol_hash_of_known_tables(void)
 {
-    static const uint8_t row[4] = {0, 1, 2, 3}, letters[8] = {'a', 'b', 'c', 'd', 'e', 'f', 'g', 'h'};
-    /* FNV-1a, 64 bits, of 66 6F 00 00; of 08 00 01 00 00 01 02 03; of 34 12 02 00 "abcdefgh": from an implementation in
-     * another language that gives 85944171F73967E8 for "foobar" */
+    static const uint8_t row[4] = {0, 1, 2, 3},
+                         letters[8] = {'a', 'b', 'c', 'd', 'e', 'f', 'g', 'h'};
+    /* FNV-1a, 64 bits, of 66 6F 00 00; of 08 00 01 00 00 01 02 03; of 34 12 02 00 "abcdefgh": from
+     * an implementation in another language that gives 85944171F73967E8 for "foobar" */
     CHECK(eits_protocol_hash(0x6F66, 0, row) == 0xDD59CE790C625B92u);
     CHECK(eits_protocol_hash(8, 1, row) == 0xCCAA78479684F7D4u);
     CHECK(eits_protocol_hash(0x1234, 2, letters) == 0x90FF0487B130CAC1u);

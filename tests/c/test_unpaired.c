@@ -1,18 +1,26 @@
-/* Glitches where the other folds tell what is right: half scans, whose second rows are copies, and which side of a fold is wrong;
- * and channels: many folds that share a pair. */
+/* Glitches where the other folds tell what is right: half scans, whose second rows are copies, and
+ * which side of a fold is wrong; and channels: many folds that share a pair. */
 #include "check.h"
 #include "small_model.h"
 
-#include "examine.h"
-#include "vec.h"
+#include "base/vec.h"
+#include "diagnostics/diagnostics.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { RANK = 8, SIDE = 4, QUIET = 16, BLOCKS = 6, ALONE = RANK - 1, UNSEEN = SMALL_PAIRS, PAIR_FOLDS = 12 };
+enum {
+    RANK = 8,
+    SIDE = 4,
+    QUIET = 16,
+    BLOCKS = 6,
+    ALONE = RANK - 1,
+    UNSEEN = SMALL_PAIRS,
+    PAIR_FOLDS = 12
+};
 
-/* A sheet in which folds 0 to 14 agree by threes, the single row 20 with folds 16 and 17, and folds 15 and 18 with none. Of the
- * single row 19 the model sees nothing. */
+/* A sheet in which folds 0 to 14 agree by threes, the single row 20 with folds 16 and 17, and folds
+ * 15 and 18 with none. Of the single row 19 the model sees nothing. */
 static uint32_t block_of(uint32_t k)
 {
     if (k == UNSEEN)
@@ -36,20 +44,25 @@ static void shape_reduction(small_model *made)
     for (uint32_t i = 0; i < RANK; ++i) {
         const double weight = 1 / sqrt(pow(SMALL_DECAY, 2.0 * i) + SMALL_FLOOR);
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
-            small_put_f32(p + 4 * (RANK * k + i), block_of(k) == i ? (float)(i < BLOCKS ? weight / sqrt(3) : weight) : 0.0f);
+            small_put_f32(p + 4 * (RANK * k + i),
+                          block_of(k) == i ? (float)(i < BLOCKS ? weight / sqrt(3) : weight)
+                                           : 0.0f);
     }
     small_model_seal(made);
 }
 
-/* The first folds all drive across the pair (0, 1) and measure across another, or the other way round; `crossed`: across (0, x) and
- * (1, y) instead. */
+/* The first folds all drive across the pair (0, 1) and measure across another, or the other way
+ * round; `crossed`: across (0, x) and (1, y) instead. */
 static void shape_protocol(small_model *made, int crossed)
 {
-    uint8_t *rows = small_model_section(made, "PROT", NULL), *folds = small_model_section(made, "FOLD", NULL);
+    uint8_t *rows = small_model_section(made, "PROT", NULL),
+            *folds = small_model_section(made, "FOLD", NULL);
     for (uint32_t k = 0; k < PAIR_FOLDS; ++k) {
         const uint8_t from = (uint8_t)(2 + k % 5), to = (uint8_t)(from + 1), zero = k % 4 == 3;
-        const uint8_t one[2] = {zero, crossed ? from : !zero}, other[2] = {crossed ? !zero : from, to};
-        uint8_t *fold = folds + 8 * k, *first = rows + 4 * (fold[0] | fold[1] << 8), *second = rows + 4 * (fold[2] | fold[3] << 8);
+        const uint8_t one[2] = {zero, crossed ? from : !zero},
+                      other[2] = {crossed ? !zero : from, to};
+        uint8_t *fold = folds + 8 * k, *first = rows + 4 * (fold[0] | fold[1] << 8),
+                *second = rows + 4 * (fold[2] | fold[3] << 8);
         memcpy(first, k % 3 == 1 ? one : other, 2);
         memcpy(first + 2, k % 3 == 1 ? other : one, 2);
         memcpy(second, first + 2, 2);
@@ -85,7 +98,8 @@ static void clean_frame(bench *b, double size)
         const eits_fold fold = b->c.model.fold[k];
         b->frame[fold.first] = b->reference[fold.first] + (eits_real)change[block_of(k)];
         if (fold.second != EITS_FOLD_NONE)
-            b->frame[fold.second] = b->reference[fold.second] + (eits_real)fold.sign * (eits_real)change[block_of(k)];
+            b->frame[fold.second] =
+                b->reference[fold.second] + (eits_real)fold.sign * (eits_real)change[block_of(k)];
     }
     add_noise(b, b->frame);
 }
@@ -95,7 +109,8 @@ enum { PLAIN, PAIR, CROSSED };
 static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kind kind)
 {
     memset(b, 0, sizeof *b);
-    b->made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind});
+    b->made = small_model_make(
+        (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind});
     shape_reduction(&b->made);
     if (protocol != PLAIN)
         shape_protocol(&b->made, protocol == CROSSED);
@@ -142,11 +157,13 @@ static void look_for(eits_context *ctx, uint32_t findings, uint32_t max_masked)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
 
-/* What was wrong with the rows themselves; the small model's touches are nothing to tell crowds by. */
+/* What was wrong with the rows themselves; the small model's touches are nothing to tell crowds by.
+ */
 static uint32_t reconstruct(bench *b)
 {
     CHECK_EQUAL(eits_reconstruct(&b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    return b->c.ctx.info.findings & ~(uint32_t)(EITS_FINDING_CROWDED | EITS_FINDING_STALE_REFERENCE);
+    return b->c.ctx.info.findings &
+           ~(uint32_t)(EITS_FINDING_CROWDED | EITS_FINDING_STALE_REFERENCE);
 }
 
 /* Row and copy of fold k are off by `off`. */
@@ -175,7 +192,8 @@ static void clean_half_scans(void)
     }
 }
 
-/* Left out with its copy, and counted; the image is that of a frame whose rows were known to be bad. */
+/* Left out with its copy, and counted; the image is that of a frame whose rows were known to be
+ * bad. */
 static void one_glitch_of_a_half_scan(void)
 {
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -203,7 +221,8 @@ static void one_glitch_of_a_half_scan(void)
         CHECK_EQUAL(ctx->info.glitches, rows);
         look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_GLITCH, SMALL_ROWS);
         CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
-        CHECK(ctx->info.misfit > EITS_MISFIT_SHARE && ctx->info.misfit <= 1 && ctx->info.masked == 0);
+        CHECK(ctx->info.misfit > EITS_MISFIT_SHARE && ctx->info.misfit <= 1 &&
+              ctx->info.masked == 0);
         look_for(ctx, 0, SMALL_ROWS);
         CHECK_EQUAL(reconstruct(&b), 0);
         CHECK_EQUAL(ctx->info.masked, 0);
@@ -217,7 +236,8 @@ static void one_glitch_of_a_half_scan(void)
     }
 }
 
-/* Which of several it is cannot be told without reciprocals; and reciprocals that differ by noise bear each other out. */
+/* Which of several it is cannot be told without reciprocals; and reciprocals that differ by noise
+ * bear each other out. */
 static void misfits_that_are_no_glitch(void)
 {
     bench b;
@@ -304,7 +324,8 @@ static void the_wrong_side_goes(void)
             eits_context *ctx = open_shaped(&b, PLAIN, 0, (eits_data_kind)kind);
             const eits_fold fold = b.c.model.fold[k];
             for (int side = 0; side < 2; ++side) {
-                const uint32_t wrong = side ? fold.second : fold.first, right = side ? fold.first : fold.second;
+                const uint32_t wrong = side ? fold.second : fold.first,
+                               right = side ? fold.first : fold.second;
                 clean_frame(&b, 0.15);
                 b.frame[wrong] *= R(1.5);
                 CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
@@ -343,13 +364,14 @@ static void several_wrong_sides(void)
     tear_down(&b);
 }
 
-/* The thresholds, from both sides: noise, the share of the largest datum, the share of their own. */
+/* The thresholds, from both sides: noise, the share of the largest datum, the share of their own.
+ */
 static void what_sides_may_differ_by(void)
 {
     static const struct {
         double change, off, largest; /* of fold 4, of its second side, of fold 0 */
         int found;
-    } CASES[] = {{0, 6e-4, 0, 1},   {0, 3e-4, 0, 0},    {0, 0.02, 0.5, 1},  {0, 0.01, 0.5, 0},
+    } CASES[] = {{0, 6e-4, 0, 1},   {0, 3e-4, 0, 0},   {0, 0.02, 0.5, 1},   {0, 0.01, 0.5, 0},
                  {0.3, 0.12, 0, 1}, {0.3, 0.08, 0, 0}, {-0.3, -0.08, 0, 0}, {-0.3, -0.12, 0, 1}};
     for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
         bench b;
@@ -361,9 +383,11 @@ static void what_sides_may_differ_by(void)
             const eits_fold fold = b.c.model.fold[k];
             const eits_real change = (eits_real)(k < 3 ? CASES[n].largest : CASES[n].change);
             b.frame[fold.first] += change;
-            b.frame[fold.second] += (eits_real)fold.sign * (change + (k == 4 ? (eits_real)CASES[n].off : 0));
+            b.frame[fold.second] +=
+                (eits_real)fold.sign * (change + (k == 4 ? (eits_real)CASES[n].off : 0));
         }
-        for (uint32_t i = 0; i < SMALL_ROWS; ++i) /* the frame against its own reference's noise */
+        /* the frame against its own reference's noise */
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] += ctx->baseline.v0[i] - b.reference[i];
         CHECK_EQUAL(reconstruct(&b), CASES[n].found ? EITS_FINDING_GLITCH : 0);
         tear_down(&b);
@@ -384,7 +408,8 @@ static int uses_either(const eits_context *ctx, uint32_t i)
     return uses;
 }
 
-/* The channel of one pair: the rows measured across it go, their reciprocals stay. Of two electrodes that share no channel, all. */
+/* The channel of one pair: the rows measured across it go, their reciprocals stay. Of two
+ * electrodes that share no channel, all. */
 static void noisy_channel(void)
 {
     for (int crossed = 0; crossed < 2; ++crossed) {

@@ -1,13 +1,13 @@
-/* FISTA on a working set: with a look at every column in each iteration the bits of FISTA; with fewer, the same optimum for
- * less work. */
+/* FISTA on a working set: with a look at every column in each iteration the bits of FISTA; with
+ * fewer, the same optimum for less work. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
 
+#include "base/vec.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "vec.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -37,7 +37,8 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-static eits_options with(const eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign, double lambda)
+static eits_options with(const eits_context *ctx, eits_solver solver, uint32_t iterations,
+                         eits_sign sign, double lambda)
 {
     eits_options o = ctx->options;
     o.solver = solver;
@@ -82,8 +83,13 @@ static void looking_always_gives_the_bits_of_fista(void)
                 for (size_t k = 0; k < sizeof counts / sizeof counts[0]; ++k) {
                     bench b[2];
                     for (int solver = 0; solver < 2; ++solver) {
-                        eits_context *ctx = set_up(&b[solver], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, prepared);
-                        eits_options o = with(ctx, (eits_solver)solver, counts[k], (eits_sign)sign, 0.05);
+                        eits_context *ctx = set_up(&b[solver],
+                                                   (small_spec){.rank = RANK,
+                                                                .side = SIDE,
+                                                                .storage = (eits_storage)storage},
+                                                   prepared);
+                        eits_options o =
+                            with(ctx, (eits_solver)solver, counts[k], (eits_sign)sign, 0.05);
                         look_always(&o);
                         o.warm_start = 1;
                         (void)solve(ctx, o);
@@ -107,7 +113,9 @@ static void looking_always_recovers_like_fista(void)
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
         bench b[2];
         for (int solver = 0; solver < 2; ++solver) {
-            eits_context *ctx = set_up(&b[solver], (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]}, solver);
+            eits_context *ctx = set_up(
+                &b[solver],
+                (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]}, solver);
             eits_options o = with(ctx, (eits_solver)solver, 200, EITS_SIGN_BOTH, 0.05);
             look_always(&o);
             (void)solve(ctx, o);
@@ -125,8 +133,10 @@ static void a_wild_run_ends_as_zero(void)
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
         for (int sign = 0; sign < 3; ++sign) {
             bench b;
-            eits_context *ctx = set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]}, 0);
-            const eits_info info = solve(ctx, with(ctx, EITS_SOLVER_WORKING_SET, 1000, (eits_sign)sign, 0.01));
+            eits_context *ctx = set_up(
+                &b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]}, 0);
+            const eits_info info =
+                solve(ctx, with(ctx, EITS_SOLVER_WORKING_SET, 1000, (eits_sign)sign, 0.01));
             CHECK_EQUAL(info.stop, EITS_STOP_DIVERGED);
             CHECK(info.nonzeros == 0 && info.step_halvings == 8 && info.residual == info.data_norm);
             for (int j = 0; j < N; ++j)
@@ -136,7 +146,8 @@ static void a_wild_run_ends_as_zero(void)
     }
 }
 
-/* Asked for a gap, or given time: the certificate holds over all columns, also those that no iteration touched. */
+/* Asked for a gap, or given time: the certificate holds over all columns, also those that no
+ * iteration touched. */
 static void the_optimum_is_that_of_all_columns(void)
 {
     for (int sign = 0; sign < 3; ++sign) {
@@ -144,14 +155,16 @@ static void the_optimum_is_that_of_all_columns(void)
             for (uint32_t every = 1; every <= 50; every += 7) {
                 bench b;
                 eits_context *ctx = set_up(&b, RANDOM, (int)(every % 2));
-                eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, asked ? 50000 : 20000, (eits_sign)sign, 0.03);
+                eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, asked ? 50000 : 20000,
+                                      (eits_sign)sign, 0.03);
                 o.gap_every = every;
                 o.gap_rel = asked ? R(BOTH_WIDTHS(1e-5, 1e-11)) : 0;
                 const eits_info info = solve(ctx, o);
                 CHECK_EQUAL(info.stop, asked ? EITS_STOP_GAP : EITS_STOP_ITERATIONS);
                 dense d = dense_of(&b.c.model);
                 double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
-                const double gap = dense_gap(&d, y, x, (double)info.lambda, (eits_sign)sign), scale = 0.5 * dense_dot(y, y, RANK);
+                const double gap = dense_gap(&d, y, x, (double)info.lambda, (eits_sign)sign),
+                             scale = 0.5 * dense_dot(y, y, RANK);
                 CHECK_NEAR(gap, info.gap, 100 * EPS * scale);
                 CHECK(gap <= BOTH_WIDTHS(1e-5, 1e-11) * scale * (1 + 1e-3) + 100 * EPS * scale);
                 CHECK(info.nonzeros >= 3);
@@ -169,7 +182,9 @@ static void same_bits_in_every_layout(void)
     for (int storage = 0; storage < 4; ++storage) {
         bench b[4];
         for (int way = 0; way < 4; ++way) {
-            eits_context *ctx = set_up(&b[way], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, way % 2);
+            eits_context *ctx = set_up(
+                &b[way], (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
+                way % 2);
             CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
             (void)solve(ctx, with(ctx, EITS_SOLVER_WORKING_SET, 60, EITS_SIGN_BOTH, 0.02));
             check_same(&b[0].c.ctx, ctx);
@@ -205,7 +220,8 @@ static void beside_a_basis(void)
     tear_down(&b[1]);
 }
 
-/* From the optimum a warm start stays there; what it starts from is all of the last frame's coefficients. */
+/* From the optimum a warm start stays there; what it starts from is all of the last frame's
+ * coefficients. */
 static void warm_starts(void)
 {
     bench b;
@@ -232,7 +248,8 @@ static void work_is_counted(void)
     eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, 1, EITS_SIGN_INCREASE, 0.25);
     o.gap_every = 5;
     CHECK_EQUAL(solve(ctx, o).macs, whole + column + whole);
-    o.iterations = 5; /* S'y serves the first iteration; then a column each for S'r and S x; S'r for the gap */
+    /* S'y serves the first iteration; then a column each for S'r and S x; S'r for the gap */
+    o.iterations = 5;
     CHECK_EQUAL(solve(ctx, o).macs, whole + 4 * column + 5 * column + whole);
     o.iterations = 35; /* a look at 6 */
     CHECK_EQUAL(solve(ctx, o).macs, whole + whole + 33 * column + 35 * column + whole);

@@ -1,5 +1,6 @@
-/* Does what "script.txt" in the host's folder says, a word and its values a line, as a board would, and prints a line for each
- * that can fail and for each frame. Numbers of frames come one after another from "frames.f32".
+/* Does what "script.txt" in the host's folder says, a word and its values a line, as a board would,
+ * and prints a line for each that can fail and for each frame. Numbers of frames come one after
+ * another from "frames.f32".
  *
  *     portable 0|1    plain C or the processor's own kernels, from the next model on
  *     model FILE      open a model and start a context: no options, masks or reference stay
@@ -11,8 +12,9 @@
  *     solve COUNT     as many vectors of reduced data, by the solver alone
  *     forget
  *
- * A frame's line says why the solve stopped, iterations, MACs and instructions of the solve and of the touches, the stack that
- * they took, the image's CRC-32, info and touches. Floats are printed as bits: there is nothing to round. */
+ * A frame's line says why the solve stopped, iterations, MACs and instructions of the solve and of
+ * the touches, the stack that they took, the image's CRC-32, info and touches. Floats are printed
+ * as bits: there is nothing to round. */
 #include "eitskin/eitskin.h"
 
 #include <stddef.h>
@@ -31,8 +33,8 @@ static unsigned portable;
 static FILE *numbers;
 
 /* CMSDK timer 0 at 25 MHz counts down; QEMU's -icount shift=6 makes it 1.6 ticks an instruction. */
-#define TIMER_CTRL (*(volatile uint32_t *)0x40000000u)
-#define TIMER_VALUE (*(volatile uint32_t *)0x40000004u)
+#define TIMER_CTRL   (*(volatile uint32_t *)0x40000000u)
+#define TIMER_VALUE  (*(volatile uint32_t *)0x40000004u)
 #define TIMER_RELOAD (*(volatile uint32_t *)0x40000008u)
 
 /* Anew for every count, so that none depends on where between two ticks it began. */
@@ -92,15 +94,40 @@ typedef struct option {
 } option;
 
 #define WHOLE(name) {#name, offsetof(eits_options, name), 1}
-#define REAL(name) {#name, offsetof(eits_options, name), 0}
+#define REAL(name)  {#name, offsetof(eits_options, name), 0}
 
 static const option option_table[] = {
-    WHOLE(iterations), WHOLE(gap_every), WHOLE(max_touches), WHOLE(max_masked), WHOLE(warm_start), WHOLE(project_baseline),
-    WHOLE(touch_sweeps), WHOLE(mac_limit), WHOLE(findings), WHOLE(touch_search), WHOLE(refine),
-    REAL(lambda_abs), REAL(lambda_rel), REAL(lambda_noise_factor), REAL(gate_factor),
-    REAL(gap_rel), REAL(saturation_v), REAL(touch_threshold), REAL(touch_share), REAL(touch_min_radius_mm),
-    REAL(touch_max_radius_mm), REAL(touch_seed_radius_mm), REAL(touch_change_s_per_m), REAL(touch_radius_weight), REAL(follow_mm),
-    WHOLE(touch_search), WHOLE(refine), WHOLE(track_confirm), WHOLE(track_hold), REAL(track_smooth), REAL(floor_noise_factor),
+    WHOLE(iterations),
+    WHOLE(gap_every),
+    WHOLE(max_touches),
+    WHOLE(max_masked),
+    WHOLE(warm_start),
+    WHOLE(project_baseline),
+    WHOLE(touch_sweeps),
+    WHOLE(mac_limit),
+    WHOLE(findings),
+    WHOLE(touch_search),
+    WHOLE(refine),
+    REAL(lambda_abs),
+    REAL(lambda_rel),
+    REAL(lambda_noise_factor),
+    REAL(gate_factor),
+    REAL(gap_rel),
+    REAL(saturation_v),
+    REAL(touch_threshold),
+    REAL(touch_share),
+    REAL(touch_min_radius_mm),
+    REAL(touch_max_radius_mm),
+    REAL(touch_seed_radius_mm),
+    REAL(touch_change_s_per_m),
+    REAL(touch_radius_weight),
+    REAL(follow_mm),
+    WHOLE(touch_search),
+    WHOLE(refine),
+    WHOLE(track_confirm),
+    WHOLE(track_hold),
+    REAL(track_smooth),
+    REAL(floor_noise_factor),
 };
 
 /* An option by its name; 0 for one that is none. */
@@ -120,7 +147,8 @@ static int set_option(const char *name, double value)
         uint8_t *const field = (uint8_t *)&options + option_table[k].offset;
         const uint32_t whole = option_table[k].whole ? (uint32_t)value : 0;
         const float real = (float)value;
-        memcpy(field, option_table[k].whole ? (const void *)&whole : (const void *)&real, sizeof real);
+        memcpy(field, option_table[k].whole ? (const void *)&whole : (const void *)&real,
+               sizeof real);
         return 1;
     }
     return 0;
@@ -136,19 +164,23 @@ static int load(const char *name)
     eits_status status = eits_model_open(&model, model_bytes, size);
     if (status == EITS_OK) {
         need = eits_workspace_size(&model, 0);
-        status = need <= sizeof workspace && model.n_rows <= MOST_ROWS ? eits_init(&ctx, &model, workspace, need) : EITS_E_WORKSPACE;
+        status = need <= sizeof workspace && model.n_rows <= MOST_ROWS
+                     ? eits_init(&ctx, &model, workspace, need)
+                     : EITS_E_WORKSPACE;
     }
     if (status == EITS_OK)
         status = eits_use_portable_kernels(&ctx, (int)portable);
     if (status == EITS_OK)
         options = ctx.options;
-    printf("model status %d workspace %lu kernels %s\n", (int)status, (unsigned long)need, status == EITS_OK ? eits_kernels_name(&ctx) : "none");
+    printf("model status %d workspace %lu kernels %s\n", (int)status, (unsigned long)need,
+           status == EITS_OK ? eits_kernels_name(&ctx) : "none");
     return status == EITS_OK;
 }
 
 static int read_numbers(float *to, uint32_t count)
 {
-    return numbers != NULL && count <= MOST_ROWS && fread(to, sizeof to[0], count, numbers) == count;
+    return numbers != NULL && count <= MOST_ROWS &&
+           fread(to, sizeof to[0], count, numbers) == count;
 }
 
 /* All of `count` frames are read, also where one is refused. */
@@ -159,7 +191,8 @@ static int tare(unsigned count)
         if (!read_numbers(frame, model.n_rows))
             return fail("frames.f32 is short");
         if (status == EITS_OK)
-            status = count >= 4 ? eits_baseline_add(&ctx, frame, model.n_rows) : eits_baseline_set(&ctx, frame, model.n_rows);
+            status = count >= 4 ? eits_baseline_add(&ctx, frame, model.n_rows)
+                                : eits_baseline_set(&ctx, frame, model.n_rows);
     }
     if (status == EITS_OK && count >= 4)
         status = eits_baseline_finish(&ctx);
@@ -171,23 +204,29 @@ static void print_touches(const eits_touch *touches, uint32_t found)
 {
     printf(" touches %lu", (unsigned long)found);
     for (uint32_t t = 0; t < found; ++t)
-        printf(" %lu:%08lx:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)touches[t].id, bits_of(touches[t].x_mm), bits_of(touches[t].y_mm),
-               bits_of(touches[t].radius_mm), bits_of(touches[t].strength_s_per_m_mm2), bits_of(touches[t].confidence),
+        printf(" %lu:%08lx:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)touches[t].id,
+               bits_of(touches[t].x_mm), bits_of(touches[t].y_mm), bits_of(touches[t].radius_mm),
+               bits_of(touches[t].strength_s_per_m_mm2), bits_of(touches[t].confidence),
                bits_of(touches[t].load_n));
     printf("\n");
 }
 
 static void print_info(const eits_info *info)
 {
-    printf(" info %lu:%lu:%lu", (unsigned long)info->nonzeros, (unsigned long)info->masked, (unsigned long)info->step_halvings);
-    const float reals[] = {info->lambda, info->lambda_max, info->lambda_noise, info->gap, info->gap_rel, info->residual, info->data_norm};
+    printf(" info %lu:%lu:%lu", (unsigned long)info->nonzeros, (unsigned long)info->masked,
+           (unsigned long)info->step_halvings);
+    const float reals[] = {info->lambda,  info->lambda_max, info->lambda_noise, info->gap,
+                           info->gap_rel, info->residual,   info->data_norm};
     for (size_t k = 0; k < sizeof reals / sizeof reals[0]; ++k)
         printf(":%08lx", bits_of(reals[k]));
-    printf(":%lu:%lu:%lu:%08lx:%08lx", (unsigned long)info->findings, (unsigned long)info->saturated, (unsigned long)info->glitches,
-           bits_of(info->misfit), bits_of(info->unexplained));
-    const uint64_t electrodes[] = {info->open_electrodes, info->bridged_electrodes, info->noisy_electrodes};
+    printf(":%lu:%lu:%lu:%08lx:%08lx", (unsigned long)info->findings,
+           (unsigned long)info->saturated, (unsigned long)info->glitches, bits_of(info->misfit),
+           bits_of(info->unexplained));
+    const uint64_t electrodes[] = {info->open_electrodes, info->bridged_electrodes,
+                                   info->noisy_electrodes};
     for (size_t k = 0; k < 3; ++k)
-        printf(":%08lx%08lx", (unsigned long)(electrodes[k] >> 32), (unsigned long)(electrodes[k] & 0xFFFFFFFFu));
+        printf(":%08lx%08lx", (unsigned long)(electrodes[k] >> 32),
+               (unsigned long)(electrodes[k] & 0xFFFFFFFFu));
 }
 
 /* One frame, or one vector of reduced data. */
@@ -198,7 +237,8 @@ static int solve_one(unsigned k, int reduced)
     volatile uint32_t *const painted = lowest_painted();
     paint_stack(painted);
     start_timer();
-    const eits_status status = reduced ? eits_solve(&ctx) : eits_reconstruct(&ctx, frame, model.n_rows, NULL, NULL);
+    const eits_status status =
+        reduced ? eits_solve(&ctx) : eits_reconstruct(&ctx, frame, model.n_rows, NULL, NULL);
     const unsigned long solve = instructions_since_start();
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t found = 0;
@@ -206,9 +246,11 @@ static int solve_one(unsigned k, int reduced)
     (void)eits_find_touches(&ctx, touches, EITS_MAX_TOUCHES, &found);
     const unsigned long touch = instructions_since_start();
     const unsigned long stack = stack_used(painted);
-    printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu stack %lu image %08lx", k, (int)status,
-           (int)ctx.info.stop, (unsigned long)ctx.info.iterations, (unsigned long)ctx.info.macs, (unsigned long)ctx.info.touch_macs,
-           solve, touch, stack, (unsigned long)eits_crc32(0, ctx.image, (size_t)model.n_pixels * sizeof ctx.image[0]));
+    printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu "
+           "stack %lu image %08lx",
+           k, (int)status, (int)ctx.info.stop, (unsigned long)ctx.info.iterations,
+           (unsigned long)ctx.info.macs, (unsigned long)ctx.info.touch_macs, solve, touch, stack,
+           (unsigned long)eits_crc32(0, ctx.image, (size_t)model.n_pixels * sizeof ctx.image[0]));
     print_info(&ctx.info);
     print_touches(touches, found);
     return 1;
@@ -225,13 +267,16 @@ static int obey(const char *word, FILE *script)
     if (strcmp(word, "model") == 0)
         return fscanf(script, "%63s", name) == 1 && load(name);
     if (strcmp(word, "option") == 0)
-        return (fscanf(script, "%63s %lf", name, &value) == 2 && set_option(name, value)) || fail("unknown option");
+        return (fscanf(script, "%63s %lf", name, &value) == 2 && set_option(name, value)) ||
+               fail("unknown option");
     if (strcmp(word, "choose") == 0) {
         printf("choose status %d\n", (int)eits_set_options(&ctx, &options));
         return 1;
     }
     if (strcmp(word, "mask") == 0)
-        return (fscanf(script, "%u %u", &a, &b) == 2 && eits_mask_row(&ctx, a, (int)b) == EITS_OK) || fail("mask");
+        return (fscanf(script, "%u %u", &a, &b) == 2 &&
+                eits_mask_row(&ctx, a, (int)b) == EITS_OK) ||
+               fail("mask");
     if (strcmp(word, "quiet") == 0)
         return fscanf(script, "%u", &a) == 1 && tare(a);
     if (strcmp(word, "forget") == 0) {

@@ -5,7 +5,11 @@
 #include <math.h>
 #include <string.h>
 
-enum { OFF_NS = 140 /* the data sheet's, not the driver's */, MOST_WAIT_NS = 1000000, ERASE_STEPS = 2 };
+enum {
+    OFF_NS = 140 /* the data sheet's, not the driver's */,
+    MOST_WAIT_NS = 1000000,
+    ERASE_STEPS = 2
+};
 
 static void record(fake_board *f, fake_kind kind, uint32_t a, uint32_t b)
 {
@@ -43,8 +47,11 @@ static void decode(fake_board *f, uint16_t word)
         }
         f->dds_half = !f->dds_half;
         break;
-    case 3: f->dds_phase = word & 0xFFFu; break;
-    default: break;
+    case 3:
+        f->dds_phase = word & 0xFFFu;
+        break;
+    default:
+        break;
     }
 }
 
@@ -75,9 +82,11 @@ double fake_generator_hz(const fake_board *f)
 /* Sine of the generator, in turns since it was released; 0 while nothing comes. */
 static double generator(const fake_board *f, double at_ns)
 {
-    if (tuning(f) == 0 || (f->dds_control & 0x002Au) != 0) /* anything but a sine is no use here */
+    /* anything but a sine is no use here */
+    if (tuning(f) == 0 || (f->dds_control & 0x002Au) != 0)
         return 0;
-    const double turns = fake_generator_hz(f) * 1e-9 * (at_ns - (double)f->dds_released_ns) + f->dds_phase / 4096.0 + f->extra_turn;
+    const double turns = fake_generator_hz(f) * 1e-9 * (at_ns - (double)f->dds_released_ns) +
+                         f->dds_phase / 4096.0 + f->extra_turn;
     return sin(2 * acos(-1.0) * (turns - floor(turns)));
 }
 
@@ -89,7 +98,9 @@ static double amplitude_at(const fake_board *f, double at_ns)
         const fake_event *e = &f->event[(f->events - back) % FAKE_EVENTS];
         if ((double)e->at_ns > at_ns)
             continue;
-        return f->tau_ns > 0 ? e->target + (e->amplitude - e->target) * exp(-(at_ns - (double)e->at_ns) / f->tau_ns) : e->target;
+        return f->tau_ns > 0 ? e->target + (e->amplitude - e->target) *
+                                               exp(-(at_ns - (double)e->at_ns) / f->tau_ns)
+                             : e->target;
     }
     return 0;
 }
@@ -119,7 +130,8 @@ static fw_status lines_write(void *ctx, uint32_t mask, uint32_t levels)
     const double amplitude = amplitude_at(f, (double)f->now_ns);
     const bool all = (after & 0xF0000u) == 0xF0000u;
     f->event[f->events++ % FAKE_EVENTS] =
-        (fake_event){f->now_ns, amplitude, all && f->volts != NULL ? f->volts(f->user, electrodes, f->now_ns) : 0};
+        (fake_event){f->now_ns, amplitude,
+                     all && f->volts != NULL ? f->volts(f->user, electrodes, f->now_ns) : 0};
     f->now_ns += 20;
     return FW_OK;
 }
@@ -139,12 +151,14 @@ double fake_lsb_v(const fake_board *f)
 
 static uint16_t code_of(fake_board *f, double volts)
 {
-    const double full = f->board.capture.full_scale_code, noise = f->noise_codes * small_random(&f->random);
+    const double full = f->board.capture.full_scale_code,
+                 noise = f->noise_codes * small_random(&f->random);
     const double code = floor(volts / fake_lsb_v(f) + (full + 1) / 2 + 0.5 + noise);
     return (uint16_t)(code < 0 ? 0 : (code > full ? full : code));
 }
 
-static fw_status capture_configure(void *ctx, const fw_capture_setup *setup, void (*done)(void *, const fw_burst *), void *user)
+static fw_status capture_configure(void *ctx, const fw_capture_setup *setup,
+                                   void (*done)(void *, const fw_burst *), void *user)
 {
     fake_board *f = ctx;
     if (f->configure_status != FW_OK)
@@ -177,7 +191,8 @@ static uint64_t burst_ns(const fake_board *f)
 
 static uint64_t next_interrupt_ns(const fake_board *f)
 {
-    return f->capturing && !f->stalled ? f->slot_ns + burst_ns(f) + f->latency_ns + f->late_once_ns : UINT64_MAX;
+    return f->capturing && !f->stalled ? f->slot_ns + burst_ns(f) + f->latency_ns + f->late_once_ns
+                                       : UINT64_MAX;
 }
 
 static void interrupt(fake_board *f)
@@ -189,7 +204,8 @@ static void interrupt(fake_board *f)
         samples[k] = code_of(f, amplitude_at(f, at_ns) * generator(f, at_ns));
     }
     electrodes_of(f, f->selected[f->bursts++ % FAKE_ROWS]);
-    fw_burst burst = {.samples = samples, .start_us = (uint32_t)(f->slot_ns / 1000u), .lost = f->lose > 0};
+    fw_burst burst = {
+        .samples = samples, .start_us = (uint32_t)(f->slot_ns / 1000u), .lost = f->lose > 0};
     f->slot_ns += (uint64_t)f->setup.slot_us * 1000u;
     burst.next_start_us = (uint32_t)(f->slot_ns / 1000u);
     f->lose -= f->lose > 0;
@@ -214,7 +230,8 @@ void fake_advance(fake_board *f, uint64_t ns)
 void fake_wait(fake_board *f)
 {
     const uint64_t next = next_interrupt_ns(f), limit = f->now_ns + MOST_WAIT_NS;
-    fake_advance(f, next < limit && next > f->now_ns ? next - f->now_ns : (next <= f->now_ns ? 0 : MOST_WAIT_NS));
+    fake_advance(f, next < limit && next > f->now_ns ? next - f->now_ns
+                                                     : (next <= f->now_ns ? 0 : MOST_WAIT_NS));
 }
 
 /* ---- flash ---- */
@@ -234,7 +251,8 @@ static fw_status store_erase(void *ctx, uint32_t bank)
 {
     fake_board *f = ctx;
     ++f->erases;
-    for (uint32_t part = 0; part < ERASE_STEPS; ++part) { /* a sector cut while erasing reads as anything */
+    /* a sector cut while erasing reads as anything */
+    for (uint32_t part = 0; part < ERASE_STEPS; ++part) {
         uint8_t *sector = f->bank[bank] + part * (FAKE_BANK / ERASE_STEPS);
         for (uint32_t k = 0; k < FAKE_BANK / ERASE_STEPS; k += 7)
             sector[k] |= (uint8_t)(k * 37u);
@@ -245,7 +263,8 @@ static fw_status store_erase(void *ctx, uint32_t bank)
     return f->erase_status;
 }
 
-static fw_status store_program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
+static fw_status store_program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes,
+                               size_t size)
 {
     fake_board *f = ctx;
     if (offset % 4u != 0 || size % 4u != 0 || offset + size > FAKE_BANK)
@@ -263,7 +282,8 @@ static fw_status store_program(void *ctx, uint32_t bank, uint32_t offset, const 
     return memcmp(&f->bank[bank][offset], bytes, size) == 0 ? FW_OK : FW_E_FLASH;
 }
 
-void fake_put_model(fake_board *f, uint32_t bank, uint32_t generation, const uint8_t *blob, size_t size)
+void fake_put_model(fake_board *f, uint32_t bank, uint32_t generation, const uint8_t *blob,
+                    size_t size)
 {
     uint32_t record[8] = {0x4B4E4245u, generation, (uint32_t)size, eits_crc32(0, blob, size)};
     record[7] = eits_crc32(0, record, 28);
@@ -356,7 +376,8 @@ static const fw_lines_ops LINES = {lines_write, lines_wait};
 static const fw_capture_ops CAPTURE = {capture_configure, capture_start, capture_stop};
 static const fw_link_ops LINK = {link_write, link_read, link_ended};
 static const fw_store_ops STORE = {store_bank, store_erase, store_program};
-static const fw_system_ops SYSTEM = {time_us, system_wait, system_lock, system_unlock, feed_watchdog, system_reset, stack_used, system_show};
+static const fw_system_ops SYSTEM = {time_us,       system_wait,  system_lock, system_unlock,
+                                     feed_watchdog, system_reset, stack_used,  system_show};
 
 void fake_restart(fake_board *f)
 {

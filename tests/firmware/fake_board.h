@@ -1,8 +1,9 @@
 /* A board without hardware: pins, converter, flash and link in memory, on a clock of its own.
  *
- * The skin's voltages come from a function of the electrodes that the lines select; the generator is decoded from the words that
- * were written to it; the multiplexers' output settles exponentially. Bursts' interrupts come while the application waits, reads
- * the clock or writes. Faults are injected where a field says so. */
+ * The skin's voltages come from a function of the electrodes that the lines select; the generator
+ * is decoded from the words that were written to it; the multiplexers' output settles
+ * exponentially. Bursts' interrupts come while the application waits, reads the clock or writes.
+ * Faults are injected where a field says so. */
 #ifndef FW_FAKE_BOARD_H
 #define FW_FAKE_BOARD_H
 
@@ -10,7 +11,14 @@
 
 #include <setjmp.h>
 
-enum { FAKE_SPI_LOG = 64, FAKE_EVENTS = 256, FAKE_WIRE = 1 << 20, FAKE_BANK = 128 * 1024, FAKE_WORKSPACE = 192 * 1024, FAKE_ROWS = 4096 };
+enum {
+    FAKE_SPI_LOG = 64,
+    FAKE_EVENTS = 256,
+    FAKE_WIRE = 1 << 20,
+    FAKE_BANK = 128 * 1024,
+    FAKE_WORKSPACE = 192 * 1024,
+    FAKE_ROWS = 4096
+};
 
 typedef enum fake_kind { FAKE_SPI, FAKE_LINES } fake_kind;
 
@@ -35,7 +43,8 @@ typedef struct fake_board {
     /* buses */
     fake_write *log; /* the last log_room of `writes`; NULL: none is kept */
     uint32_t log_room, writes;
-    uint32_t spi_calls, spi_fail_from, spi_fails; /* calls from number spi_fail_from on, so many, fail */
+    /* calls from number spi_fail_from on, so many, fail */
+    uint32_t spi_calls, spi_fail_from, spi_fails;
     uint32_t lines_calls, lines_fail_from, lines_fails;
 
     /* generator */
@@ -62,10 +71,10 @@ typedef struct fake_board {
     void (*done)(void *user, const fw_burst *burst);
     void *done_user;
     bool capturing, stalled, in_interrupt;
-    uint64_t slot_ns;     /* start of the next slot */
-    uint64_t latency_ns;  /* from a burst's end to its interrupt */
+    uint64_t slot_ns;      /* start of the next slot */
+    uint64_t latency_ns;   /* from a burst's end to its interrupt */
     uint64_t late_once_ns; /* added to the next one's */
-    uint32_t lose;        /* so many bursts from now are lost */
+    uint32_t lose;         /* so many bursts from now are lost */
     double noise_codes;
     uint64_t random;
     uint16_t samples[2][FW_MAX_SAMPLES];
@@ -95,7 +104,8 @@ void fake_init(fake_board *fake, uint32_t start_us);
 void fake_restart(fake_board *fake);
 
 /* Write a bank with a valid record, as a programmer would. */
-void fake_put_model(fake_board *fake, uint32_t bank, uint32_t generation, const uint8_t *blob, size_t size);
+void fake_put_model(fake_board *fake, uint32_t bank, uint32_t generation, const uint8_t *blob,
+                    size_t size);
 
 /* Time passes; bursts that end meanwhile are told. */
 void fake_advance(fake_board *fake, uint64_t ns);

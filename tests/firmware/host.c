@@ -15,7 +15,8 @@ static void keep(host *h, const eits_link_packet *packet)
     h->known = true;
     h->expected = packet->sequence + 1;
     memcpy(h->bytes + h->used, packet->payload, packet->size);
-    h->packet[h->packets++] = (host_packet){packet->type, packet->sequence, packet->size, h->bytes + h->used};
+    h->packet[h->packets++] =
+        (host_packet){packet->type, packet->sequence, packet->size, h->bytes + h->used};
     h->used += (packet->size + 7u) & ~(size_t)7u;
 }
 
@@ -23,7 +24,8 @@ static void collect(host *h)
 {
     for (size_t at = 0; at < h->board->to_host_size;) {
         eits_link_packet packet;
-        at += eits_link_feed(&h->decoder, h->board->to_host + at, h->board->to_host_size - at, &packet);
+        at += eits_link_feed(&h->decoder, h->board->to_host + at, h->board->to_host_size - at,
+                             &packet);
         if (packet.payload != NULL)
             keep(h, &packet);
     }
@@ -89,8 +91,10 @@ const host_packet *host_last(const host *h, eits_packet_type type)
 const eits_packet_fault *host_fault(const host *h, eits_fault code, bool raised, uint32_t wanted)
 {
     for (uint32_t k = 0; k < h->packets; ++k) {
-        const eits_packet_fault *fault = (const eits_packet_fault *)(const void *)h->packet[k].payload;
-        if (h->packet[k].type == EITS_PACKET_FAULT && fault->code == code && (fault->raised != 0) == raised && wanted-- == 0)
+        const eits_packet_fault *fault =
+            (const eits_packet_fault *)(const void *)h->packet[k].payload;
+        if (h->packet[k].type == EITS_PACKET_FAULT && fault->code == code &&
+            (fault->raised != 0) == raised && wanted-- == 0)
             return fault;
     }
     return NULL;
@@ -100,7 +104,8 @@ void host_send(host *h, uint8_t type, const void *payload, size_t size)
 {
     fake_board *b = h->board;
     const size_t sent =
-        eits_link_encode(b->to_board + b->to_board_size, FAKE_WIRE - b->to_board_size, type, h->sequence++, payload, size, NULL, 0);
+        eits_link_encode(b->to_board + b->to_board_size, FAKE_WIRE - b->to_board_size, type,
+                         h->sequence++, payload, size, NULL, 0);
     if (sent == 0)
         abort();
     b->to_board_size += sent;
@@ -152,11 +157,16 @@ eits_packet_reply host_plain(host *h, eits_packet_type type)
 
 eits_command_scan host_default_scan(void)
 {
-    return (eits_command_scan){.excitation_millihz = 50000000, .sample_rate_hz = 1000000, .samples = 80, .settle_us = 16, .check_every = 1};
+    return (eits_command_scan){.excitation_millihz = 50000000,
+                               .sample_rate_hz = 1000000,
+                               .samples = 80,
+                               .settle_us = 16,
+                               .check_every = 1};
 }
 
 /* The packet that answers GET_INFO or GET_STATS, into `out`. */
-static void ask(host *h, eits_packet_type command, const void *payload, size_t size, eits_packet_type answer, void *out, size_t room)
+static void ask(host *h, eits_packet_type command, const void *payload, size_t size,
+                eits_packet_type answer, void *out, size_t room)
 {
     const uint32_t before = host_count(h, answer);
     host_send(h, (uint8_t)command, payload, size);
@@ -196,7 +206,8 @@ eits_packet_reply host_upload(host *h, const uint8_t *blob, size_t size, uint32_
 {
     eits_command_model_begin begin = {.bytes = (uint32_t)size, .crc = crc};
     eits_packet_reply reply = host_command(h, EITS_PACKET_MODEL_BEGIN, &begin, sizeof begin);
-    for (size_t at = (size_t)reply.detail[0]; reply.status == EITS_REPLY_OK && at < size; at += piece)
+    for (size_t at = (size_t)reply.detail[0]; reply.status == EITS_REPLY_OK && at < size;
+         at += piece)
         reply = host_model_data(h, (uint32_t)at, blob + at, size - at < piece ? size - at : piece);
     return reply.status == EITS_REPLY_OK ? host_plain(h, EITS_PACKET_MODEL_COMMIT) : reply;
 }

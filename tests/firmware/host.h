@@ -1,4 +1,5 @@
-/* The other end of the fake board's link: sends commands, turns the main loop, keeps what the board sent. */
+/* The other end of the fake board's link: sends commands, turns the main loop, keeps what the board
+ * sent. */
 #ifndef FW_TEST_HOST_H
 #define FW_TEST_HOST_H
 
@@ -31,7 +32,8 @@ typedef struct host {
 /* Start the application on the board. */
 void host_start(host *h, fake_board *board);
 
-/* One turn of the main loop, waiting where there is nothing to do; or for so many milliseconds of the board's time. */
+/* One turn of the main loop, waiting where there is nothing to do; or for so many milliseconds of
+ * the board's time. */
 void host_turn(host *h);
 void host_run(host *h, uint32_t ms);
 
@@ -49,8 +51,8 @@ const eits_packet_fault *host_fault(const host *h, eits_fault code, bool raised,
 /* Send a packet as it is. */
 void host_send(host *h, uint8_t type, const void *payload, size_t size);
 
-/* Send a command whose first 4 bytes are the request number (set here, anew), and wait up to 60 s for its reply; status 0xFFFF:
- * none came. */
+/* Send a command whose first 4 bytes are the request number (set here, anew), and wait up to 60 s
+ * for its reply; status 0xFFFF: none came. */
 eits_packet_reply host_command(host *h, eits_packet_type type, void *payload, size_t size);
 
 /* Wait for the reply to a request. */
@@ -64,7 +66,8 @@ eits_packet_info host_info(host *h);
 eits_packet_stats host_stats(host *h, uint32_t reset);
 
 /* Upload a model in pieces of `piece` bytes; the first answer that is not OK, or the last one. */
-eits_packet_reply host_upload(host *h, const uint8_t *blob, size_t size, uint32_t crc, size_t piece);
+eits_packet_reply host_upload(host *h, const uint8_t *blob, size_t size, uint32_t crc,
+                              size_t piece);
 eits_packet_reply host_model_data(host *h, uint32_t offset, const uint8_t *bytes, size_t size);
 
 #endif

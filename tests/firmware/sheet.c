@@ -9,7 +9,8 @@ enum { CELLS = SHEET_SIDE * SHEET_SIDE, NODES = CELLS + SHEET_ELECTRODES };
 static bool inside(int x, int y)
 {
     const double cx = x - (SHEET_SIDE - 1) / 2.0, cy = y - (SHEET_SIDE - 1) / 2.0;
-    return x >= 0 && y >= 0 && x < SHEET_SIDE && y < SHEET_SIDE && cx * cx + cy * cy <= (SHEET_SIDE / 2.0) * (SHEET_SIDE / 2.0);
+    return x >= 0 && y >= 0 && x < SHEET_SIDE && y < SHEET_SIDE &&
+           cx * cx + cy * cy <= (SHEET_SIDE / 2.0) * (SHEET_SIDE / 2.0);
 }
 
 static void join(double *matrix, int a, int b, double conductance)
@@ -23,12 +24,14 @@ static void join(double *matrix, int a, int b, double conductance)
 /* The cell inside the rim nearest to an electrode. */
 static int rim_cell(int electrode)
 {
-    const double angle = 2 * acos(-1.0) * electrode / SHEET_ELECTRODES, middle = (SHEET_SIDE - 1) / 2.0;
+    const double angle = 2 * acos(-1.0) * electrode / SHEET_ELECTRODES,
+                 middle = (SHEET_SIDE - 1) / 2.0;
     int best = -1;
     double nearest = 1e9;
     for (int y = 0; y < SHEET_SIDE; ++y) {
         for (int x = 0; x < SHEET_SIDE; ++x) {
-            const double off = hypot(x - middle - SHEET_SIDE / 2.0 * cos(angle), y - middle - SHEET_SIDE / 2.0 * sin(angle));
+            const double off = hypot(x - middle - SHEET_SIDE / 2.0 * cos(angle),
+                                     y - middle - SHEET_SIDE / 2.0 * sin(angle));
             if (inside(x, y) && off < nearest) {
                 nearest = off;
                 best = y * SHEET_SIDE + x;
@@ -49,7 +52,8 @@ static double *assemble(const sheet *s)
             if (inside(x, y) && inside(x + 1, y))
                 join(matrix, at, at + 1, 0.5 * (s->conductance[y][x] + s->conductance[y][x + 1]));
             if (inside(x, y) && inside(x, y + 1))
-                join(matrix, at, at + SHEET_SIDE, 0.5 * (s->conductance[y][x] + s->conductance[y + 1][x]));
+                join(matrix, at, at + SHEET_SIDE,
+                     0.5 * (s->conductance[y][x] + s->conductance[y + 1][x]));
         }
     }
     for (int e = 0; e < SHEET_ELECTRODES; ++e)
@@ -87,7 +91,8 @@ static void solve_columns(double *a, double *b)
 
 void sheet_solve(sheet *s)
 {
-    double *matrix = assemble(s), *columns = calloc((size_t)SHEET_ELECTRODES * NODES, sizeof *columns);
+    double *matrix = assemble(s),
+           *columns = calloc((size_t)SHEET_ELECTRODES * NODES, sizeof *columns);
     if (columns == NULL)
         abort();
     for (size_t e = 0; e < SHEET_ELECTRODES; ++e)
@@ -95,7 +100,8 @@ void sheet_solve(sheet *s)
     solve_columns(matrix, columns);
     for (size_t e = 0; e < SHEET_ELECTRODES; ++e) {
         for (size_t f = 0; f < SHEET_ELECTRODES; ++f)
-            s->transfer[e][f] = 3.5 * columns[f * NODES + CELLS + e]; /* voltages like the skin's: 0.01 to 0.5 V adjacent, to 1.5 V opposite */
+            /* voltages like the skin's: 0.01 to 0.5 V adjacent, to 1.5 V opposite */
+            s->transfer[e][f] = 3.5 * columns[f * NODES + CELLS + e];
     }
     free(matrix);
     free(columns);
@@ -130,5 +136,6 @@ double sheet_volts(const sheet *s, const uint8_t e[4])
         if (s->detached[e[k]])
             return 0;
     }
-    return s->transfer[e[2]][e[0]] - s->transfer[e[2]][e[1]] - s->transfer[e[3]][e[0]] + s->transfer[e[3]][e[1]];
+    return s->transfer[e[2]][e[0]] - s->transfer[e[2]][e[1]] - s->transfer[e[3]][e[0]] +
+           s->transfer[e[3]][e[1]];
 }

@@ -1,4 +1,5 @@
-/* A conductive sheet as a network of resistors, with 16 electrodes at its rim: voltages that obey reciprocity and touches. */
+/* A conductive sheet as a network of resistors, with 16 electrodes at its rim: voltages that obey
+ * reciprocity and touches. */
 #ifndef FW_TEST_SHEET_H
 #define FW_TEST_SHEET_H
 
@@ -8,16 +9,18 @@
 enum { SHEET_SIDE = 15, SHEET_ELECTRODES = 16 };
 
 typedef struct sheet {
-    double conductance[SHEET_SIDE][SHEET_SIDE];      /* of a cell; 1 untouched */
-    double contact[SHEET_ELECTRODES];                /* of an electrode; 0: detached */
-    double transfer[SHEET_ELECTRODES][SHEET_ELECTRODES]; /* V at one for 1 mA into another; set by sheet_solve */
+    double conductance[SHEET_SIDE][SHEET_SIDE]; /* of a cell; 1 untouched */
+    double contact[SHEET_ELECTRODES];           /* of an electrode; 0: detached */
+    /* V at one for 1 mA into another; set by sheet_solve */
+    double transfer[SHEET_ELECTRODES][SHEET_ELECTRODES];
     bool detached[SHEET_ELECTRODES];
 } sheet;
 
 /* Untouched and solved. */
 void sheet_init(sheet *s);
 
-/* Multiply the conductance of the cells within `radius` of (x, y), in cells from the centre; then sheet_solve. */
+/* Multiply the conductance of the cells within `radius` of (x, y), in cells from the centre; then
+ * sheet_solve. */
 void sheet_touch(sheet *s, double x, double y, double radius, double factor);
 void sheet_solve(sheet *s);
 

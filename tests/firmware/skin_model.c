@@ -6,11 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-const skin_spec SKIN_ADJACENT = {.electrodes = 16, .drive_step = 1, .measure_step = 1, .rank = 24, .side = 8};
-const skin_spec SKIN_OPPOSITE = {.electrodes = 16, .drive_step = 8, .measure_step = 1, .rank = 20, .side = 8};
+const skin_spec SKIN_ADJACENT = {
+    .electrodes = 16, .drive_step = 1, .measure_step = 1, .rank = 24, .side = 8};
+const skin_spec SKIN_OPPOSITE = {
+    .electrodes = 16, .drive_step = 8, .measure_step = 1, .rank = 20, .side = 8};
 
 enum { MOST_ROWS = 4096, SECTIONS = 11 };
-static const char TAGS[SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD", "META"};
+static const char TAGS[SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
+                                       "COLW", "GRID", "DEFS", "GOLD", "META"};
 enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, META };
 
 typedef struct draft {
@@ -30,8 +33,10 @@ static void draft_rows(draft *d, const skin_spec *spec)
     const uint32_t n = spec->electrodes;
     for (uint32_t i = 0; i < n; ++i) {
         for (uint32_t k = 0; k < n; ++k) {
-            uint8_t row[4] = {(uint8_t)i, (uint8_t)((i + spec->drive_step) % n), (uint8_t)k, (uint8_t)((k + spec->measure_step) % n)};
-            if (row[0] == row[2] || row[0] == row[3] || row[1] == row[2] || row[1] == row[3] || d->n_rows == MOST_ROWS)
+            uint8_t row[4] = {(uint8_t)i, (uint8_t)((i + spec->drive_step) % n), (uint8_t)k,
+                              (uint8_t)((k + spec->measure_step) % n)};
+            if (row[0] == row[2] || row[0] == row[3] || row[1] == row[2] || row[1] == row[3] ||
+                d->n_rows == MOST_ROWS)
                 continue;
             if (spec->turned != 0 && d->n_rows % spec->turned == spec->turned - 1) {
                 row[2] = row[3];
@@ -46,8 +51,10 @@ static void draft_rows(draft *d, const skin_spec *spec)
             continue;
         eits_fold fold = {.first = (uint16_t)i, .second = EITS_FOLD_NONE, .sign = 1};
         for (uint32_t j = i + 1; j < d->n_rows && fold.second == EITS_FOLD_NONE; ++j) {
-            const int straight = same_pair(d->rows[i], d->rows[j]) * same_pair(d->rows[i] + 2, d->rows[j] + 2);
-            const int crossed = same_pair(d->rows[i], d->rows[j] + 2) * same_pair(d->rows[i] + 2, d->rows[j]);
+            const int straight =
+                same_pair(d->rows[i], d->rows[j]) * same_pair(d->rows[i] + 2, d->rows[j] + 2);
+            const int crossed =
+                same_pair(d->rows[i], d->rows[j] + 2) * same_pair(d->rows[i] + 2, d->rows[j]);
             const int sign = straight != 0 ? straight : crossed;
             if (sign == 0 || taken[j])
                 continue;
@@ -80,14 +87,17 @@ static double wave(uint32_t order, uint32_t place, uint32_t side)
     return sqrt((order == 0 ? 1.0 : 2.0) / side) * cos(acos(-1.0) * order * (place + 0.5) / side);
 }
 
-static void fill(const skin_spec *spec, const draft *d, uint32_t stride, uint8_t *const at[SECTIONS])
+static void fill(const skin_spec *spec, const draft *d, uint32_t stride,
+                 uint8_t *const at[SECTIONS])
 {
     const uint32_t n = spec->side * spec->side;
-    const uint32_t whole[10] = {spec->electrodes, d->n_rows, d->n_folded, spec->rank, stride, n, spec->side, spec->side,
-                                EITS_STORAGE_F32, EITS_DATA_DIFFERENCE};
+    const uint32_t whole[10] = {
+        spec->electrodes, d->n_rows,  d->n_folded,      spec->rank,          stride, n,
+        spec->side,       spec->side, EITS_STORAGE_F32, EITS_DATA_DIFFERENCE};
     for (uint32_t i = 0; i < 10; ++i)
         small_put_u32(at[DIMS] + 4 * i, whole[i]);
-    const float corner = -3.0f * (float)spec->side, numbers[6] = {6, corner, corner, 1e-3f, 1.02f, 1};
+    const float corner = -3.0f * (float)spec->side,
+                numbers[6] = {6, corner, corner, 1e-3f, 1.02f, 1};
     for (uint32_t i = 0; i < 6; ++i)
         small_put_f32(at[DIMS] + 40 + 4 * i, numbers[i]);
     uint64_t state = 7;
@@ -103,19 +113,22 @@ static void fill(const skin_spec *spec, const draft *d, uint32_t stride, uint8_t
         memcpy(at[FOLD] + 8 * k, &d->fold[k], 8);
         small_put_f32(at[VREF] + 4 * k, d->volts[d->fold[k].first]);
         for (uint32_t i = 0; i < spec->rank; ++i)
-            small_put_f32(at[REDU] + 4 * ((size_t)k * stride + i), 0.3f * (float)small_random(&state));
+            small_put_f32(at[REDU] + 4 * ((size_t)k * stride + i),
+                          0.3f * (float)small_random(&state));
     }
     for (uint32_t j = 0; j < n; ++j) {
         for (uint32_t i = 0; i < spec->rank; ++i)
             small_put_f32(at[SENS] + 4 * ((size_t)j * stride + i),
-                          (float)(wave(i % across, j % spec->side, spec->side) * wave(i / across, j / spec->side, spec->side)));
+                          (float)(wave(i % across, j % spec->side, spec->side) *
+                                  wave(i / across, j / spec->side, spec->side)));
         small_put_f32(at[COLW] + 4 * j, 0.02f);
         small_put_u16(at[GRID] + 4 * j, j % spec->side);
         small_put_u16(at[GRID] + 4 * j + 2, j / spec->side);
     }
     small_put_u32(at[DEFS], 30);
     small_put_u32(at[DEFS] + 4, 4);
-    const float defaults[12] = {0.03f, 0.3f, 1.2f, 0.3f, 0.2f, 0.003f, 3.0f, 20.0f, 9.0f, 0.0f, 25.0f, 1e-3f};
+    const float defaults[12] = {0.03f, 0.3f,  1.2f, 0.3f, 0.2f,  0.003f,
+                                3.0f,  20.0f, 9.0f, 0.0f, 25.0f, 1e-3f};
     for (uint32_t i = 0; i < 12; ++i)
         small_put_f32(at[DEFS] + 8 + 4 * i, defaults[i]);
     memcpy(at[META], "{}", 2);
@@ -148,9 +161,19 @@ skin_model skin_model_make(const skin_spec *spec)
     memset(&d, 0, sizeof d);
     draft_rows(&d, spec);
     draft_volts(&d);
-    const uint32_t n = spec->side * spec->side, stride = (spec->rank + 7u) & ~7u, table = 64 + 16 * SECTIONS;
-    const uint32_t sizes[SECTIONS] = {64, 4 * d.n_rows, 8 * d.n_folded, 4 * d.n_folded, 4 * d.n_folded * stride, 4 * n * stride,
-                                      4 * n, 4 * n, 64, 4 * (2 * d.n_rows + n), 2};
+    const uint32_t n = spec->side * spec->side, stride = (spec->rank + 7u) & ~7u,
+                   table = 64 + 16 * SECTIONS;
+    const uint32_t sizes[SECTIONS] = {64,
+                                      4 * d.n_rows,
+                                      8 * d.n_folded,
+                                      4 * d.n_folded,
+                                      4 * d.n_folded * stride,
+                                      4 * n * stride,
+                                      4 * n,
+                                      4 * n,
+                                      64,
+                                      4 * (2 * d.n_rows + n),
+                                      2};
     skin_model made = {.size = table};
     for (uint32_t p = 0; p < SECTIONS; ++p)
         made.size += (sizes[p] + 15u) & ~15u;

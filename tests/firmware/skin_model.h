@@ -1,4 +1,5 @@
-/* .eitm models of the sheet in sheet.h, for the firmware's tests: any protocol of up to 255 electrodes. */
+/* .eitm models of the sheet in sheet.h, for the firmware's tests: any protocol of up to 255
+ * electrodes. */
 #ifndef FW_TEST_SKIN_MODEL_H
 #define FW_TEST_SKIN_MODEL_H
 
@@ -6,11 +7,13 @@
 #include "sheet.h"
 
 typedef struct skin_spec {
-    uint32_t electrodes;             /* of the protocol; the sheet's are 16 */
-    uint32_t drive_step, measure_step; /* pairs (d, d + step); 1, 1 is adjacent and 8, 1 opposite */
-    uint32_t rank, side;             /* side x side pixels, at least rank of them */
-    uint32_t turned;                 /* every so many-th row measures the other way round; 0: none */
-    int wrong_golden;                /* the golden image is another than the core gives */
+    uint32_t electrodes; /* of the protocol; the sheet's are 16 */
+    /* pairs (d, d + step); 1, 1 is adjacent and 8, 1 opposite */
+    uint32_t drive_step, measure_step;
+    uint32_t rank, side; /* side x side pixels, at least rank of them */
+    /* every so many-th row measures the other way round; 0: none */
+    uint32_t turned;
+    int wrong_golden; /* the golden image is another than the core gives */
 } skin_spec;
 
 typedef struct skin_model {

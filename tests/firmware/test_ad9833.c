@@ -1,4 +1,5 @@
-/* AD9833: words against the data sheet's and AN-1070's worked examples, the sequence, and buses that fail. */
+/* AD9833: words against the data sheet's and AN-1070's worked examples, the sequence, and buses
+ * that fail. */
 #include "check.h"
 #include "fake_board.h"
 
@@ -114,7 +115,8 @@ static void test_bus_fails_at_each_word(void)
         board.spi_fail_from = FW_AD9833_WORDS + at;
         board.spi_fails = 1;
         CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
-        CHECK_EQUAL(generator.state, FW_AD9833_RESET); /* the write after the failure got through */
+        /* the write after the failure got through */
+        CHECK_EQUAL(generator.state, FW_AD9833_RESET);
         CHECK_EQUAL(board.dds_control, 0x2100);
         CHECK_NEAR(fake_generator_hz(&board), 0, 0);
         board.spi_fails = 100; /* from here on nothing gets through */

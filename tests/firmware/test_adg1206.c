@@ -41,7 +41,8 @@ static void test_every_electrode(void)
     const fw_adg1206 bank = fresh();
     for (uint32_t place = 0; place < 4; ++place) {
         for (uint8_t e = 0; e < FW_ELECTRODES; ++e) {
-            uint8_t electrodes[4] = {(uint8_t)((e + 1) % 16), (uint8_t)((e + 2) % 16), (uint8_t)((e + 3) % 16), (uint8_t)((e + 4) % 16)};
+            uint8_t electrodes[4] = {(uint8_t)((e + 1) % 16), (uint8_t)((e + 2) % 16),
+                                     (uint8_t)((e + 3) % 16), (uint8_t)((e + 4) % 16)};
             electrodes[place] = e;
             CHECK_EQUAL(fw_adg1206_select(&bank, electrodes), FW_OK);
             for (uint32_t k = 0; k < 4; ++k)
@@ -55,7 +56,8 @@ static void test_every_electrode(void)
 static void test_range(void)
 {
     const fw_adg1206 bank = fresh();
-    const uint8_t good[4] = {1, 2, 3, 4}, bad[][4] = {{16, 2, 3, 4}, {1, 255, 3, 4}, {1, 2, 16, 4}, {1, 2, 3, 16}, {5, 5, 1, 2}, {1, 2, 7, 7}};
+    const uint8_t good[4] = {1, 2, 3, 4}, bad[][4] = {{16, 2, 3, 4}, {1, 255, 3, 4}, {1, 2, 16, 4},
+                                                      {1, 2, 3, 16}, {5, 5, 1, 2},   {1, 2, 7, 7}};
     CHECK_EQUAL(fw_adg1206_select(&bank, good), FW_OK);
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; ++k)
         CHECK_EQUAL(fw_adg1206_select(&bank, bad[k]), FW_E_ARGUMENT);

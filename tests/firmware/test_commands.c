@@ -1,4 +1,5 @@
-/* Commands: each status can be had, ranges and lengths hold, what is sent again is answered again and not run again. */
+/* Commands: each status can be had, ranges and lengths hold, what is sent again is answered again
+ * and not run again. */
 #include "bench.h"
 #include "check.h"
 #include "small_model.h"
@@ -8,7 +9,8 @@
 
 static bench b;
 
-static void check_reply(eits_packet_reply reply, eits_reply_status status, int32_t a, int32_t c, int line)
+static void check_reply(eits_packet_reply reply, eits_reply_status status, int32_t a, int32_t c,
+                        int line)
 {
     check_equal(reply.status, status, __FILE__, line, "status");
     check_equal(reply.detail[0], a, __FILE__, line, "detail[0]");
@@ -23,15 +25,20 @@ static eits_packet_reply scan_with(eits_command_scan scan)
 
 static void test_lengths(void)
 {
-    const struct { eits_packet_type type; uint32_t size; } expected[] = {
-        {EITS_PACKET_GET_INFO, 4},      {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},      {EITS_PACKET_SCAN, 24},
-        {EITS_PACKET_SOLVER, 44},       {EITS_PACKET_MODEL_BEGIN, 12}, {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8},
-        {EITS_PACKET_MASK_ROW, 8},      {EITS_PACKET_RESET, 4},     {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
+    const struct {
+        eits_packet_type type;
+        uint32_t size;
+    } expected[] = {
+        {EITS_PACKET_GET_INFO, 4},     {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},
+        {EITS_PACKET_SCAN, 24},        {EITS_PACKET_SOLVER, 44},   {EITS_PACKET_MODEL_BEGIN, 12},
+        {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8}, {EITS_PACKET_MASK_ROW, 8},
+        {EITS_PACKET_RESET, 4},        {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
     for (size_t k = 0; k < sizeof expected / sizeof expected[0]; ++k) {
         uint8_t payload[64] = {0};
         for (uint32_t size = 4; size <= 44; ++size) {
             if (size != expected[k].size)
-                REPLY(host_command(&b.host, expected[k].type, payload, size), EITS_REPLY_LENGTH, (int32_t)expected[k].size, 0);
+                REPLY(host_command(&b.host, expected[k].type, payload, size), EITS_REPLY_LENGTH,
+                      (int32_t)expected[k].size, 0);
         }
     }
     uint8_t payload[16] = {0};
@@ -48,8 +55,10 @@ static void test_lengths(void)
 static void test_unknown(void)
 {
     eits_command_plain c = {0};
-    REPLY(host_command(&b.host, (eits_packet_type)0x8D, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
-    REPLY(host_command(&b.host, (eits_packet_type)0xFF, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
+    REPLY(host_command(&b.host, (eits_packet_type)0x8D, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
+          0, 0);
+    REPLY(host_command(&b.host, (eits_packet_type)0xFF, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
+          0, 0);
     host_forget(&b.host);
     host_send(&b.host, EITS_PACKET_REPLY, &c, sizeof c); /* a board's own packet, echoed */
     host_send(&b.host, EITS_PACKET_INFO, &c, sizeof c);
@@ -122,7 +131,8 @@ static void test_scan_ranges(void)
     REPLY(scan_with(host_default_scan()), EITS_REPLY_OK, 0, 0);
 }
 
-/* What is refused changes nothing: tare, settings and frames go on. What is taken forgets the tare. */
+/* What is refused changes nothing: tare, settings and frames go on. What is taken forgets the tare.
+ */
 static void test_scan_and_tare(void)
 {
     REPLY(host_tare(&b.host, 4), EITS_REPLY_OK, 0, 0);
@@ -154,8 +164,15 @@ static eits_packet_reply solver_with(eits_command_solver c)
 
 static void test_solver(void)
 {
-    const eits_command_solver good = {.iterations = 7, .max_touches = 3, .warm_start = 1, .sign = 2, .lambda_rel = 0.05f, .gap_rel = 0.01f,
-                                      .solver = EITS_SOLVER_COORDINATE, .mac_limit = 123456, .findings = EITS_FINDING_GLITCH};
+    const eits_command_solver good = {.iterations = 7,
+                                      .max_touches = 3,
+                                      .warm_start = 1,
+                                      .sign = 2,
+                                      .lambda_rel = 0.05f,
+                                      .gap_rel = 0.01f,
+                                      .solver = EITS_SOLVER_COORDINATE,
+                                      .mac_limit = 123456,
+                                      .findings = EITS_FINDING_GLITCH};
     eits_command_solver c = good;
     c.iterations = 0;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1);
@@ -247,10 +264,12 @@ static void test_sent_again(void)
     host_run(&b.host, 120);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_RAW), 3);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_REPLY), 2);
-    const host_packet *first = host_packet_of(&b.host, EITS_PACKET_REPLY, 0), *second = host_packet_of(&b.host, EITS_PACKET_REPLY, 1);
+    const host_packet *first = host_packet_of(&b.host, EITS_PACKET_REPLY, 0),
+                      *second = host_packet_of(&b.host, EITS_PACKET_REPLY, 1);
     CHECK(memcmp(first->payload, second->payload, sizeof(eits_packet_reply)) == 0);
     CHECK_EQUAL(second->sequence, first->sequence + 4); /* but it is another packet */
-    eits_command_plain other = {5000}; /* the same number with another command is another command */
+    /* the same number with another command is another command */
+    eits_command_plain other = {5000};
     host_send(&b.host, EITS_PACKET_CLEAR_FAULTS, &other, sizeof other);
     host_run(&b.host, 5);
     const eits_packet_reply *last = (const void *)host_last(&b.host, EITS_PACKET_REPLY)->payload;
@@ -285,7 +304,8 @@ static void test_stats_again(void)
     host_send(&b.host, EITS_PACKET_GET_STATS, &c, sizeof c);
     host_run(&b.host, 5);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_STATS), 2);
-    const host_packet *first = host_packet_of(&b.host, EITS_PACKET_STATS, 0), *second = host_packet_of(&b.host, EITS_PACKET_STATS, 1);
+    const host_packet *first = host_packet_of(&b.host, EITS_PACKET_STATS, 0),
+                      *second = host_packet_of(&b.host, EITS_PACKET_STATS, 1);
     CHECK(memcmp(first->payload, second->payload, sizeof(eits_packet_stats)) == 0);
     const eits_packet_stats *stats = (const void *)first->payload;
     CHECK(stats->stage[EITS_STAGE_SCAN].count > 4);
@@ -296,11 +316,13 @@ static void test_stats_again(void)
     CHECK_EQUAL(stats->workspace_bytes, FAKE_WORKSPACE);
     CHECK(stats->workspace_used > 10000 && stats->workspace_used <= FAKE_WORKSPACE);
     const eits_packet_stats after = host_stats(&b.host, 0);
-    CHECK(after.stage[EITS_STAGE_SCAN].count >= 1 && after.stage[EITS_STAGE_SCAN].count <= 5); /* forgotten at the first */
+    /* forgotten at the first */
+    CHECK(after.stage[EITS_STAGE_SCAN].count >= 1 && after.stage[EITS_STAGE_SCAN].count <= 5);
     CHECK(after.uptime_ms > stats->uptime_ms + 50);
     CHECK(after.frames_scanned > 20);
     eits_command_get_stats wrong = {.reset = 2};
-    REPLY(host_command(&b.host, EITS_PACKET_GET_STATS, &wrong, sizeof wrong), EITS_REPLY_RANGE, 4, 1);
+    REPLY(host_command(&b.host, EITS_PACKET_GET_STATS, &wrong, sizeof wrong), EITS_REPLY_RANGE, 4,
+          1);
 }
 
 /* While a tare is under way. */
@@ -313,7 +335,8 @@ static void test_busy(void)
     REPLY(scan_with(host_default_scan()), EITS_REPLY_BUSY, EITS_PACKET_TARE, 0);
     REPLY(host_plain(&b.host, EITS_PACKET_SELF_TEST), EITS_REPLY_BUSY, EITS_PACKET_TARE, 0);
     eits_command_model_begin begin = {.bytes = 1000};
-    REPLY(host_command(&b.host, EITS_PACKET_MODEL_BEGIN, &begin, sizeof begin), EITS_REPLY_BUSY, EITS_PACKET_TARE, 0);
+    REPLY(host_command(&b.host, EITS_PACKET_MODEL_BEGIN, &begin, sizeof begin), EITS_REPLY_BUSY,
+          EITS_PACKET_TARE, 0);
     REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 0), EITS_REPLY_OK, 0, 0);
     REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
     REPLY(host_reply(&b.host, 8000), EITS_REPLY_OK, 0, 0);
@@ -333,19 +356,22 @@ static void test_bad_bytes(void)
     f->to_board_size -= 6; /* cut short by the next packet */
     REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
     static uint8_t long_one[EITS_LINK_MAX_PAYLOAD];
-    host_send(&b.host, EITS_PACKET_MODEL_DATA, long_one, sizeof long_one); /* longer than the board ever takes */
+    /* longer than the board ever takes */
+    host_send(&b.host, EITS_PACKET_MODEL_DATA, long_one, sizeof long_one);
     for (uint32_t k = 0; k < 20000; ++k)
         f->to_board[f->to_board_size++] = (uint8_t)(k * 2654435761u >> 24);
     REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
     const eits_packet_stats after = host_stats(&b.host, 0);
-    CHECK(after.link_crc_errors + after.link_framing_errors > before.link_crc_errors + before.link_framing_errors + 1);
+    CHECK(after.link_crc_errors + after.link_framing_errors >
+          before.link_crc_errors + before.link_framing_errors + 1);
     CHECK(after.link_overruns > before.link_overruns);
     CHECK(after.link_packets >= before.link_packets + 3);
     CHECK_EQUAL(f->resets, 0);
     CHECK(!b.host.instrument.reset_wanted);
 }
 
-/* Any command with anything in it: each is answered, and afterwards the board is as good as before. */
+/* Any command with anything in it: each is answered, and afterwards the board is as good as before.
+ */
 static void test_random_commands(void)
 {
     uint64_t state = 20240918;
@@ -357,12 +383,16 @@ static void test_random_commands(void)
         const size_t sizes[] = {4, 12, 8, 24, 36, 12, 16, 4, 8, 8, 4, 4, 4, 4, 4};
         for (size_t k = 4; k < sizeof payload; ++k) { /* small numbers, great ones, zeros */
             const double value = small_random(&state);
-            payload[k] = (uint8_t)(k % 4u < 2 ? 127 * (1 + value) * (value > 0) : (value > 0.9 ? 255 : 0));
+            payload[k] =
+                (uint8_t)(k % 4u < 2 ? 127 * (1 + value) * (value > 0) : (value > 0.9 ? 255 : 0));
         }
-        if (type == EITS_PACKET_GET_INFO || type == EITS_PACKET_GET_STATS || type == EITS_PACKET_TARE || type == EITS_PACKET_RESET)
-            host_send(&b.host, (uint8_t)type, payload, n % 7 == 0 ? 6 : (type == EITS_PACKET_RESET ? 5 : sizes[pick % 15u]));
+        if (type == EITS_PACKET_GET_INFO || type == EITS_PACKET_GET_STATS ||
+            type == EITS_PACKET_TARE || type == EITS_PACKET_RESET)
+            host_send(&b.host, (uint8_t)type, payload,
+                      n % 7 == 0 ? 6 : (type == EITS_PACKET_RESET ? 5 : sizes[pick % 15u]));
         else {
-            const eits_packet_reply reply = host_command(&b.host, type, payload, n % 5 == 0 ? pick % 40u + 4 : sizes[pick % 15u]);
+            const eits_packet_reply reply = host_command(
+                &b.host, type, payload, n % 5 == 0 ? pick % 40u + 4 : sizes[pick % 15u]);
             silent += reply.status == 0xFFFF;
             taken += reply.status == EITS_REPLY_OK;
         }
@@ -372,12 +402,14 @@ static void test_random_commands(void)
     CHECK_EQUAL(silent, 0);
     CHECK(taken > 300);
     host_forget(&b.host);
-    host_run(&b.host, 11000); /* an upload that was left, if any, is given up; a tare fails or is done */
+    /* an upload that was left, if any, is given up; a tare fails or is done */
+    host_run(&b.host, 11000);
     for (int wait = 0; wait < 200 && b.host.instrument.tare.active; ++wait)
         host_run(&b.host, 1000);
     for (uint16_t i = 0; i < 208; ++i) {
         eits_command_mask_row mask = {.row = i};
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
+                    EITS_REPLY_OK);
     }
     REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
     REPLY(scan_with(host_default_scan()), EITS_REPLY_OK, 0, 0);

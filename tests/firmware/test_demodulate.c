@@ -1,6 +1,7 @@
-/* Demodulation: amplitudes and phases against the formula, the generator's own phase followed across wraps, ends of range. */
-#include "app/angle.h"
-#include "app/turn.h"
+/* Demodulation: amplitudes and phases against the formula, the generator's own phase followed
+ * across wraps, ends of range. */
+#include "app/phase.h"
+#include "app/sincos.h"
 #include "check.h"
 #include "fake_board.h"
 
@@ -13,10 +14,12 @@ static const fw_capture CAPTURE = {NULL, NULL, 4095, 3300000, 1000000};
 static uint16_t burst[FW_MAX_SAMPLES];
 
 /* Codes of `amplitude_v` cos(2 pi (turns + hz t)), as a converter rounds them. */
-static void make_burst(uint32_t samples, double rate_hz, double hz, double amplitude_v, double turns, double lsb_v, double middle)
+static void make_burst(uint32_t samples, double rate_hz, double hz, double amplitude_v,
+                       double turns, double lsb_v, double middle)
 {
     for (uint32_t k = 0; k < samples; ++k)
-        burst[k] = (uint16_t)floor(amplitude_v / lsb_v * cos(TURN * (turns + hz * k / rate_hz)) + middle + 0.5);
+        burst[k] = (uint16_t)floor(amplitude_v / lsb_v * cos(TURN * (turns + hz * k / rate_hz)) +
+                                   middle + 0.5);
 }
 
 static void test_turns(void)
@@ -61,23 +64,27 @@ static void test_scale(void)
     CHECK_NEAR(z.i, 0.5, 0.3 * 322e-6);
 }
 
-/* Amplitudes and phases within what rounding to whole codes leaves: 4 / pi times half a step at worst, less where the samples
- * of a burst fall on many places of the period. */
+/* Amplitudes and phases within what rounding to whole codes leaves: 4 / pi times half a step at
+ * worst, less where the samples of a burst fall on many places of the period. */
 static void test_amplitudes(void)
 {
     const struct {
         uint32_t millihertz, rate, samples;
         double steps;
-    } cases[] = {{50000000, 1000000, 80, 0.45},  {50000000, 1000000, 20, 0.45},   {30000000, 1000000, 100, 0.3},
-                 {250000000, 1000000, 64, 0.64}, {125000000, 2000000, 1024, 0.5}, {1000000, 27000, 27, 0.3}};
+    } cases[] = {{50000000, 1000000, 80, 0.45},   {50000000, 1000000, 20, 0.45},
+                 {30000000, 1000000, 100, 0.3},   {250000000, 1000000, 64, 0.64},
+                 {125000000, 2000000, 1024, 0.5}, {1000000, 27000, 27, 0.3}};
     const double lsb_v = 3.3 / 4096;
     for (size_t n = 0; n < sizeof cases / sizeof cases[0]; ++n) {
         const uint32_t tuning = fw_ad9833_tuning(8000000, cases[n].millihertz);
-        CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, tuning, cases[n].millihertz, cases[n].rate, cases[n].samples), FW_OK);
+        CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, tuning, cases[n].millihertz,
+                                        cases[n].rate, cases[n].samples),
+                    FW_OK);
         for (int k = 0; k < 40; ++k) {
             const double amplitude = k == 0 ? 0 : 1.6 / k, turns = 0.31 * k, middle = 2048 + k % 3;
             fw_iq z;
-            make_burst(cases[n].samples, cases[n].rate, cases[n].millihertz * 1e-3, amplitude, turns, lsb_v, middle);
+            make_burst(cases[n].samples, cases[n].rate, cases[n].millihertz * 1e-3, amplitude,
+                       turns, lsb_v, middle);
             CHECK(!fw_demodulate(&d, burst, 0, &z));
             CHECK_NEAR(z.i, amplitude * cos(TURN * turns), cases[n].steps * lsb_v);
             CHECK_NEAR(z.q, amplitude * sin(TURN * turns), cases[n].steps * lsb_v);
@@ -85,15 +92,24 @@ static void test_amplitudes(void)
     }
 }
 
-/* The generator's frequency is not quite the nominal one; the phase stays where it is, over hours and the clock's wrap. */
+/* The generator's frequency is not quite the nominal one; the phase stays where it is, over hours
+ * and the clock's wrap. */
 static void test_phase_followed(void)
 {
     const uint32_t tuning = fw_ad9833_tuning(8000000, 50000000);
     const double turn_per_us = tuning * 8.0 / 268435456.0;
     CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, tuning, 50000000, 1000000, 80), FW_OK);
-    const uint64_t when[] = {0, 100, 20800, 999900, 3600000000u, 4294967200u, 4294967296u + 100u, 5 * 4294967296u + 12345u};
+    const uint64_t when[] = {0,
+                             100,
+                             20800,
+                             999900,
+                             3600000000u,
+                             4294967200u,
+                             4294967296u + 100u,
+                             5 * 4294967296u + 12345u};
     for (size_t k = 0; k < sizeof when / sizeof when[0]; ++k) {
-        const double turns = (double)((unsigned __int128)when[k] * tuning * 8u % 268435456u) / 268435456.0;
+        const double turns =
+            (double)((unsigned __int128)when[k] * tuning * 8u % 268435456u) / 268435456.0;
         fw_iq z;
         make_burst(80, 1e6, turn_per_us * 1e6, 1, turns + 0.2, 3.3 / 4096, 2048);
         CHECK(!fw_demodulate(&d, burst, (uint32_t)when[k], &z));
@@ -114,9 +130,12 @@ static void test_ends_of_range(void)
     burst[79] = 4094;
     burst[0] = 0;
     CHECK(fw_demodulate(&d, burst, 0, &z));
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 81), FW_E_ARGUMENT);
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 2000), FW_E_ARGUMENT);
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8388608, 1677722, 50000000, 1000000, 80), FW_E_ARGUMENT);
+    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 81),
+                FW_E_ARGUMENT);
+    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 2000),
+                FW_E_ARGUMENT);
+    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8388608, 1677722, 50000000, 1000000, 80),
+                FW_E_ARGUMENT);
 }
 
 /* The greatest sum of 16-bit codes over the longest burst does not overflow. */

@@ -1,4 +1,5 @@
-/* Faults: told once when they rise and once when they go; buses that fail and recover; what the board says of its last end. */
+/* Faults: told once when they rise and once when they go; buses that fail and recover; what the
+ * board says of its last end. */
 #include "bench.h"
 #include "check.h"
 
@@ -16,7 +17,8 @@ static void test_last_reset(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
     fake_restart(&b.board);
-    b.board.board.last_reset = (fw_last_reset){.crash = 1, .watchdog = 1, .words = {0x08001234, 0x08005679, 0x400, 0x40000000, 0x20}};
+    b.board.board.last_reset = (fw_last_reset){
+        .crash = 1, .watchdog = 1, .words = {0x08001234, 0x08005679, 0x400, 0x40000000, 0x20}};
     host_start(&b.host, &b.board);
     const eits_packet_fault *crash = host_fault(&b.host, EITS_FAULT_CRASH, true, 0);
     CHECK(crash != NULL);
@@ -24,7 +26,8 @@ static void test_last_reset(void)
         CHECK_EQUAL(crash->words[k], b.board.board.last_reset.words[k]);
     CHECK_EQUAL(told(EITS_FAULT_WATCHDOG, true), 1);
     host_run(&b.host, 100);
-    CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_CRASH | 1u << EITS_FAULT_WATCHDOG); /* until they are cleared */
+    /* until they are cleared */
+    CHECK_EQUAL(host_info(&b.host).faults, 1u << EITS_FAULT_CRASH | 1u << EITS_FAULT_WATCHDOG);
     CHECK((b.board.leds & 4u) != 0);
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS).status, EITS_REPLY_OK);
     CHECK_EQUAL(told(EITS_FAULT_CRASH, false), 1);
@@ -56,7 +59,8 @@ static void test_cleared_but_there(void)
     bench_stop(&b);
 }
 
-/* The generator cannot be written at start-up: told, tried again, and the scan begins when it can. */
+/* The generator cannot be written at start-up: told, tried again, and the scan begins when it can.
+ */
 static void test_generator_bus(void)
 {
     for (uint32_t at = 0; at < 5; ++at) {
@@ -81,7 +85,8 @@ static void test_generator_bus(void)
     }
 }
 
-/* Multiplexers that cannot be switched: once is measured again, always is told; then rows are no numbers. */
+/* Multiplexers that cannot be switched: once is measured again, always is told; then rows are no
+ * numbers. */
 static void test_multiplexer_bus(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -118,13 +123,16 @@ static void test_multiplexer_bus(void)
     bench_stop(&b);
 }
 
-/* So many frames with a fault and then without it: when it rises and goes, each electrode by itself; a frame in between begins
- * the count anew. */
+/* So many frames with a fault and then without it: when it rises and goes, each electrode by
+ * itself; a frame in between begins the count anew. */
 static void test_hysteresis(void)
 {
-    const struct { eits_fault code; uint32_t shown; } kinds[] = {
-        {EITS_FAULT_ELECTRODE_OPEN, 1}, {EITS_FAULT_SATURATED, 1}, {EITS_FAULT_BRIDGED, 1},
-        {EITS_FAULT_ELECTRODE_NOISY, 3}, {EITS_FAULT_MISFIT, 3}, {EITS_FAULT_STALE_REFERENCE, 3}};
+    const struct {
+        eits_fault code;
+        uint32_t shown;
+    } kinds[] = {{EITS_FAULT_ELECTRODE_OPEN, 1}, {EITS_FAULT_SATURATED, 1},
+                 {EITS_FAULT_BRIDGED, 1},        {EITS_FAULT_ELECTRODE_NOISY, 3},
+                 {EITS_FAULT_MISFIT, 3},         {EITS_FAULT_STALE_REFERENCE, 3}};
     bench_start(&b, NULL);
     fw_faults *faults = &b.host.instrument.faults;
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; ++k) {

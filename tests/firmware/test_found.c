@@ -1,4 +1,5 @@
-/* What the core finds reaches the host by name: in the frame's head, and what persists as faults; on frames of the sheet. */
+/* What the core finds reaches the host by name: in the frame's head, and what persists as faults;
+ * on frames of the sheet. */
 #include "bench.h"
 #include "check.h"
 
@@ -18,11 +19,14 @@ static const eits_packet_solved *head_of(const host_packet *packet)
     return (const void *)packet->payload;
 }
 
-/* Nothing is streamed, or every fifth frame: it is told all the same, in the frame that shows it. */
+/* Nothing is streamed, or every fifth frame: it is told all the same, in the frame that shows it.
+ */
 static void test_open_while_nobody_looks(uint16_t every)
 {
     start();
-    CHECK_EQUAL(host_stream(&b.host, every > 0 ? EITS_STREAM_TOUCHES : 0, every > 0 ? every : 1, 0).status, EITS_REPLY_OK);
+    CHECK_EQUAL(
+        host_stream(&b.host, every > 0 ? EITS_STREAM_TOUCHES : 0, every > 0 ? every : 1, 0).status,
+        EITS_REPLY_OK);
     host_run(&b.host, 50);
     for (uint32_t e = 2; e < 16; e += 6) {
         host_forget(&b.host);
@@ -44,7 +48,8 @@ static void test_open_while_nobody_looks(uint16_t every)
 static double bridged(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
-    double volts = 0; /* of the sheet with 6 and 7 as one: the pair's transfer impedances are their mean */
+    /* of the sheet with 6 and 7 as one: the pair's transfer impedances are their mean */
+    double volts = 0;
     for (int k = 0; k < 16; ++k) {
         uint8_t row[4];
         for (int p = 0; p < 4; ++p)
@@ -63,7 +68,8 @@ static void test_bridged(void)
     host_run(&b.host, 60);
     for (int32_t k = 0; k < 2; ++k) {
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_BRIDGED, true, (uint32_t)k);
-        CHECK(fault != NULL && fault->index == 6 + k && fault->value == 7 - k && fault->words[0] == 0xC0 && fault->words[1] == 0);
+        CHECK(fault != NULL && fault->index == 6 + k && fault->value == 7 - k &&
+              fault->words[0] == 0xC0 && fault->words[1] == 0);
     }
     CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, true, 2) == NULL);
     const eits_packet_solved *head = head_of(host_last(&b.host, EITS_PACKET_TOUCHES));
@@ -98,7 +104,8 @@ static void test_glitch(void)
     uint32_t rows = 0;
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_TOUCHES); ++k) {
         const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_TOUCHES, k));
-        const uint32_t crowded = EITS_FINDING_CROWDED; /* noise that passed for a touch may be said to be a guess */
+        /* noise that passed for a touch may be said to be a guess */
+        const uint32_t crowded = EITS_FINDING_CROWDED;
         CHECK_EQUAL(head->findings & ~crowded, head->glitches > 0 ? EITS_FINDING_GLITCH : 0);
         CHECK(head->glitches <= 2 && head->masked == head->glitches);
         rows += head->glitches;
@@ -114,10 +121,15 @@ static void test_switched_off(void)
 {
     start();
     const eits_options *o = &b.host.instrument.engine.ctx.options;
-    eits_command_solver solver = {.iterations = o->iterations, .max_touches = o->max_touches, .lambda_rel = o->lambda_rel,
-                                  .gap_rel = o->gap_rel, .solver = o->solver,
-                                  .findings = EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver).status, EITS_REPLY_OK);
+    eits_command_solver solver = {.iterations = o->iterations,
+                                  .max_touches = o->max_touches,
+                                  .lambda_rel = o->lambda_rel,
+                                  .gap_rel = o->gap_rel,
+                                  .solver = o->solver,
+                                  .findings =
+                                      EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN};
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver).status,
+                EITS_REPLY_OK);
     b.sheet.detached[5] = true;
     sheet_solve(&b.sheet);
     host_run(&b.host, 60);

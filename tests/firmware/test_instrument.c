@@ -1,4 +1,5 @@
-/* From tare to stream: the reference, images with the core's own bits, streaming every n-th frame, back-pressure. */
+/* From tare to stream: the reference, images with the core's own bits, streaming every n-th frame,
+ * back-pressure. */
 #include "bench.h"
 #include "check.h"
 
@@ -19,7 +20,8 @@ static struct mirror {
 static void mirror_start(uint32_t quiet)
 {
     memset(&mirror, 0, sizeof mirror);
-    CHECK_EQUAL(eits_init(&mirror.ctx, &b.open, mirror.workspace, eits_workspace_size(&b.open, 0)), EITS_OK);
+    CHECK_EQUAL(eits_init(&mirror.ctx, &b.open, mirror.workspace, eits_workspace_size(&b.open, 0)),
+                EITS_OK);
     eits_options options = mirror.ctx.options;
     CHECK_EQUAL(eits_options_track(&options), EITS_OK); /* as the firmware does */
     options.warm_start = 1; /* of both, so that a frame depends on those before it */
@@ -39,13 +41,17 @@ static void mirror_image(const host_packet *packet)
     const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
     const eits_info *info = &mirror.ctx.info;
     CHECK_EQUAL(head->frame, mirror.frame);
-    const eits_status status = eits_reconstruct(&mirror.ctx, mirror.volts, b.open.n_rows, NULL, NULL);
+    const eits_status status =
+        eits_reconstruct(&mirror.ctx, mirror.volts, b.open.n_rows, NULL, NULL);
     ++mirror.images;
-    mirror.different += head->status != (uint16_t)-status || head->count != b.open.n_pixels ||
-                        !same_bits(packet->payload + sizeof *head, mirror.ctx.image, 4 * b.open.n_pixels) ||
-                        head->iterations != info->iterations || head->macs != info->macs || head->stop != (uint16_t)info->stop ||
-                        head->masked != info->masked || !same_bits(&head->residual, &info->residual, 4) ||
-                        !same_bits(&head->lambda, &info->lambda, 4) || !same_bits(&head->data_norm, &info->data_norm, 4);
+    mirror.different +=
+        head->status != (uint16_t)-status || head->count != b.open.n_pixels ||
+        !same_bits(packet->payload + sizeof *head, mirror.ctx.image, 4 * b.open.n_pixels) ||
+        head->iterations != info->iterations || head->macs != info->macs ||
+        head->stop != (uint16_t)info->stop || head->masked != info->masked ||
+        !same_bits(&head->residual, &info->residual, 4) ||
+        !same_bits(&head->lambda, &info->lambda, 4) ||
+        !same_bits(&head->data_norm, &info->data_norm, 4);
 }
 
 static void mirror_touches(const host_packet *packet)
@@ -56,8 +62,9 @@ static void mirror_touches(const host_packet *packet)
     if (mirror.ctx.info.stop != EITS_STOP_GATE || head->status == 0)
         CHECK_EQUAL(eits_find_touches(&mirror.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
     ++mirror.touches;
-    mirror.different += head->count != count || packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
-                        !same_bits(packet->payload + sizeof *head, touches, count * sizeof(eits_packet_touch));
+    mirror.different +=
+        head->count != count || packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
+        !same_bits(packet->payload + sizeof *head, touches, count * sizeof(eits_packet_touch));
 }
 
 /* Take the packets that have come since the last call. */
@@ -70,10 +77,12 @@ static void mirror_follow(void)
             memcpy(mirror.volts, packet->payload + sizeof *head, 4 * b.open.n_rows);
             mirror.frame = head->frame;
             if ((head->flags & EITS_RAW_QUIET) != 0)
-                CHECK_EQUAL(mirror.ctx.baseline.wanted > 0 ? eits_baseline_add(&mirror.ctx, mirror.volts, b.open.n_rows)
-                                                          : eits_baseline_set(&mirror.ctx, mirror.volts, b.open.n_rows),
+                CHECK_EQUAL(mirror.ctx.baseline.wanted > 0
+                                ? eits_baseline_add(&mirror.ctx, mirror.volts, b.open.n_rows)
+                                : eits_baseline_set(&mirror.ctx, mirror.volts, b.open.n_rows),
                             EITS_OK);
-        } else if (packet->type == EITS_PACKET_REPLY && ((const eits_packet_reply *)(const void *)head)->command == EITS_PACKET_TARE) {
+        } else if (packet->type == EITS_PACKET_REPLY &&
+                   ((const eits_packet_reply *)(const void *)head)->command == EITS_PACKET_TARE) {
             if (mirror.ctx.baseline.wanted > 0)
                 CHECK_EQUAL(eits_baseline_finish(&mirror.ctx), EITS_OK);
             eits_forget(&mirror.ctx);
@@ -91,8 +100,10 @@ static void touch(double x, double y, double factor)
     sheet_solve(&b.sheet);
 }
 
-/* Images and touches have the bits of the core run on the frames that were sent; warm starts included, whatever is masked. */
-static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every, uint16_t check_every, uint32_t busy_ms)
+/* Images and touches have the bits of the core run on the frames that were sent; warm starts
+ * included, whatever is masked. */
+static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every,
+                           uint16_t check_every, uint32_t busy_ms)
 {
     bench_start(&b, spec);
     b.board.noise_codes = 2;
@@ -100,7 +111,8 @@ static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every
     if (check_every != 1) {
         eits_command_scan scan = host_default_scan();
         scan.check_every = check_every;
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status,
+                    EITS_REPLY_OK);
     }
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
     host_forget(&b.host);
@@ -109,8 +121,10 @@ static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every
     CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
     mirror_follow();
     CHECK(b.host.instrument.engine.ctx.baseline.correlation > 0.99f);
-    CHECK(same_bits(mirror.ctx.baseline.v0, b.host.instrument.engine.ctx.baseline.v0, 4 * b.open.n_rows));
-    CHECK(same_bits(&mirror.ctx.baseline.lambda_noise, &b.host.instrument.engine.ctx.baseline.lambda_noise, 4));
+    CHECK(same_bits(mirror.ctx.baseline.v0, b.host.instrument.engine.ctx.baseline.v0,
+                    4 * b.open.n_rows));
+    CHECK(same_bits(&mirror.ctx.baseline.lambda_noise,
+                    &b.host.instrument.engine.ctx.baseline.lambda_noise, 4));
     const uint32_t ms = busy_ms > 0 ? 1500 : 150;
     touch(2, -3, 4);
     host_run(&b.host, ms);
@@ -120,13 +134,15 @@ static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
     if (quiet > 1)
         CHECK_EQUAL(eits_baseline_begin(&mirror.ctx, quiet), EITS_OK);
-    CHECK_EQUAL(host_tare(&b.host, quiet).status, EITS_REPLY_OK); /* with the touches: they are gone, and their ids */
+    /* with the touches: they are gone, and their ids */
+    CHECK_EQUAL(host_tare(&b.host, quiet).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
     touch(4, -2, 3);
     host_run(&b.host, ms);
     mirror_follow();
     eits_command_mask_row mask = {.row = 17, .bad = 1};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
+                EITS_REPLY_OK);
     host_run(&b.host, ms);
     mirror_follow(); /* the row comes as not a number: nothing else is to be told */
     sheet_init(&b.sheet);
@@ -140,7 +156,8 @@ static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every
     bench_stop(&b);
 }
 
-/* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the angle. */
+/* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the
+ * angle. */
 static void test_angle(void)
 {
     for (int k = 0; k < 9; ++k) {
@@ -152,12 +169,15 @@ static void test_angle(void)
         CHECK(b.host.instrument.engine.ctx.baseline.correlation > 0.9999f);
         host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
         float volts[256];
-        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw), sizeof(float) * 208);
+        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
+               sizeof(float) * 208);
         for (uint32_t i = 0; i < 208; ++i)
             CHECK_NEAR(volts[i], bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
-        b.board.extra_turn += 1 / 6.0; /* what turns after the tare is not followed: half of a voltage is left */
+        /* what turns after the tare is not followed: half of a voltage is left */
+        b.board.extra_turn += 1 / 6.0;
         host_run(&b.host, 60);
-        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw), sizeof(float) * 208);
+        memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
+               sizeof(float) * 208);
         for (uint32_t i = 0; i < 208; ++i)
             CHECK_NEAR(volts[i], 0.5 * bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
         bench_stop(&b);
@@ -174,8 +194,10 @@ static void test_streaming(void)
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_TOUCHES), 5);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_IMAGE) + host_count(&b.host, EITS_PACKET_RAW), 0);
     for (uint32_t k = 1; k < 5; ++k) {
-        const eits_packet_solved *now = (const void *)host_packet_of(&b.host, EITS_PACKET_TOUCHES, k)->payload;
-        const eits_packet_solved *last = (const void *)host_packet_of(&b.host, EITS_PACKET_TOUCHES, k - 1)->payload;
+        const eits_packet_solved *now =
+            (const void *)host_packet_of(&b.host, EITS_PACKET_TOUCHES, k)->payload;
+        const eits_packet_solved *last =
+            (const void *)host_packet_of(&b.host, EITS_PACKET_TOUCHES, k - 1)->payload;
         CHECK_EQUAL(now->frame - last->frame, 3);
         CHECK(now->age_us < 1000);
     }
@@ -219,7 +241,8 @@ static void test_failed_tare(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_tare(&b.host, 16).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0).status,
+                EITS_REPLY_OK);
     mirror_start(0);
     const fw_engine *engine = &b.host.instrument.engine;
     static float v0[256];
@@ -258,7 +281,8 @@ static void test_failed_tare(void)
     bench_stop(&b);
 }
 
-/* Frames whose scan began before the command are not quiet ones; frames of a tare are all sent, whatever `every` is. */
+/* Frames whose scan began before the command are not quiet ones; frames of a tare are all sent,
+ * whatever `every` is. */
 static void test_quiet_frames(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -297,7 +321,7 @@ static void test_self_test_keeps_the_tare(void)
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
     mirror_follow();
-    eits_forget(&mirror.ctx);     /* a self-test forgets the warm start */
+    eits_forget(&mirror.ctx);   /* a self-test forgets the warm start */
     mirror.ctx.basis_stale = 1; /* and the basis, which costs MACs to build anew */
     host_run(&b.host, 100);
     mirror_follow();

@@ -1,4 +1,5 @@
-/* Quality: open electrodes by name within one frame and never for touches, saturation, reciprocity, on frames of the sheet. */
+/* Quality: open electrodes by name within one frame and never for touches, saturation, reciprocity,
+ * on frames of the sheet. */
 #include "bench.h"
 #include "check.h"
 
@@ -33,12 +34,14 @@ static const eits_packet_solved *head_of(const host_packet *packet)
     return (const void *)packet->payload;
 }
 
-/* The first frame that RAW (without a reference: by its quality) or the head (with one) says electrode e is open in; 0: none. */
+/* The first frame that RAW (without a reference: by its quality) or the head (with one) says
+ * electrode e is open in; 0: none. */
 static uint32_t first_named(uint32_t e, bool tared)
 {
     for (uint32_t k = 0; tared && k < host_count(&b.host, EITS_PACKET_IMAGE); ++k) {
         const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_IMAGE, k));
-        if (head->open_electrodes == (uint64_t)1 << e && (head->findings & EITS_FINDING_ELECTRODE_OPEN) != 0)
+        if (head->open_electrodes == (uint64_t)1 << e &&
+            (head->findings & EITS_FINDING_ELECTRODE_OPEN) != 0)
             return head->frame;
     }
     for (uint32_t k = 0; !tared && k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
@@ -52,8 +55,8 @@ static uint32_t first_named(uint32_t e, bool tared)
     return 0;
 }
 
-/* Rows of a frame that is wholly without electrode e: without a reference they are marked and no numbers; with one the core gets
- * them as they are. */
+/* Rows of a frame that is wholly without electrode e: without a reference they are marked and no
+ * numbers; with one the core gets them as they are. */
 static void check_rows(const host_packet *packet, uint32_t e, bool tared)
 {
     const uint8_t *volts = packet->payload + sizeof(eits_packet_raw), *quality = volts + 4 * 208;
@@ -65,8 +68,8 @@ static void check_rows(const host_packet *packet, uint32_t e, bool tared)
     }
 }
 
-/* An electrode comes off, with and without a tare, in full and reciprocal scans: named in the first frame that is wholly so, by a
- * fault and in the frame; gone eight frames after it is back. */
+/* An electrode comes off, with and without a tare, in full and reciprocal scans: named in the first
+ * frame that is wholly so, by a fault and in the frame; gone eight frames after it is back. */
 static void test_open(bool tared, uint16_t check_every)
 {
     start(check_every);
@@ -81,7 +84,8 @@ static void test_open(bool tared, uint16_t check_every)
         host_run(&b.host, 60);
         const eits_packet_fault *fault = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 0);
         CHECK(fault != NULL && fault->index == (int32_t)e);
-        CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 1) == NULL); /* that one alone, and once */
+        /* that one alone, and once */
+        CHECK(host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, true, 1) == NULL);
         CHECK(fault != NULL && fault->frame == first_named(e, tared));
         uint32_t whole = 0;
         for (uint32_t k = 0; fault != NULL && k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
@@ -105,11 +109,13 @@ static void test_open(bool tared, uint16_t check_every)
         }
         b.sheet.detached[e] = false;
         sheet_solve(&b.sheet);
-        const uint32_t back = b.host.instrument.last_frame + 1; /* the frame under way may still be without it */
+        /* the frame under way may still be without it */
+        const uint32_t back = b.host.instrument.last_frame + 1;
         host_run(&b.host, 300);
         const eits_packet_fault *gone = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0);
         CHECK(gone != NULL && gone->index == (int32_t)e);
-        CHECK(gone != NULL && gone->frame + 2 >= back + EITS_FAULT_CLEAN_FRAMES && gone->frame <= back + EITS_FAULT_CLEAN_FRAMES);
+        CHECK(gone != NULL && gone->frame + 2 >= back + EITS_FAULT_CLEAN_FRAMES &&
+              gone->frame <= back + EITS_FAULT_CLEAN_FRAMES);
         CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_ELECTRODE_OPEN, 0);
     }
     bench_stop(&b);
@@ -124,7 +130,8 @@ static void test_two_open(void)
         b.sheet.detached[3] = b.sheet.detached[other] = true;
         sheet_solve(&b.sheet);
         host_run(&b.host, 60);
-        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 1u << 3 | 1u << other);
+        CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN],
+                    1u << 3 | 1u << other);
         b.sheet.detached[3] = b.sheet.detached[other] = false;
         sheet_solve(&b.sheet);
         host_run(&b.host, 300);
@@ -171,7 +178,8 @@ static void test_faint_skin(void)
     bench_stop(&b);
 }
 
-/* One row that reads something whatever is connected, and is masked for that: it does not speak for its electrodes. */
+/* One row that reads something whatever is connected, and is masked for that: it does not speak for
+ * its electrodes. */
 static double stuck_row(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;
@@ -187,7 +195,8 @@ static void test_masked_row_is_not_judged(void)
         const uint8_t *row = b.open.protocol + 4 * (size_t)i;
         eits_command_mask_row mask = {.row = i, .bad = 1};
         if (row[0] == 5 && row[2] == 8)
-            CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+            CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
+                        EITS_REPLY_OK);
     }
     b.sheet.detached[5] = true;
     sheet_solve(&b.sheet);
@@ -196,7 +205,8 @@ static void test_masked_row_is_not_judged(void)
     bench_stop(&b);
 }
 
-/* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half the skin. Nothing is open. */
+/* Touches: light and strong, near the rim and over electrodes, insulating ones, wet ones over half
+ * the skin. Nothing is open. */
 static void test_touches_are_not_open(bool tared)
 {
     start(1);
@@ -206,7 +216,8 @@ static void test_touches_are_not_open(bool tared)
     for (size_t f = 0; f < sizeof factors / sizeof factors[0]; ++f) {
         for (int place = 0; place < 5; ++place) {
             sheet_init(&b.sheet);
-            sheet_touch(&b.sheet, 1.7 * place, -0.4 * place, place == 4 ? 2.5 : 1 + place, factors[f]);
+            sheet_touch(&b.sheet, 1.7 * place, -0.4 * place, place == 4 ? 2.5 : 1 + place,
+                        factors[f]);
             sheet_solve(&b.sheet);
             host_run(&b.host, 45);
             CHECK_EQUAL(b.host.instrument.faults.there[EITS_FAULT_ELECTRODE_OPEN], 0);
@@ -313,7 +324,8 @@ static void test_dead(void)
     tare();
     b.board.volts = nothing;
     host_run(&b.host, 60);
-    CHECK(host_fault(&b.host, EITS_FAULT_SOLVER, true, 0) != NULL); /* a cable unplugged looks like this */
+    /* a cable unplugged looks like this */
+    CHECK(host_fault(&b.host, EITS_FAULT_SOLVER, true, 0) != NULL);
     const host_packet *image = host_last(&b.host, EITS_PACKET_IMAGE);
     const eits_packet_solved *head = (const void *)image->payload;
     CHECK_EQUAL((int16_t)head->status, -EITS_E_FRAME_ZERO);
@@ -323,7 +335,8 @@ static void test_dead(void)
         memcpy(&value, image->payload + sizeof *head + 4 * j, 4);
         CHECK(value == 0);
     }
-    const eits_packet_solved *touches = (const void *)host_last(&b.host, EITS_PACKET_TOUCHES)->payload;
+    const eits_packet_solved *touches =
+        (const void *)host_last(&b.host, EITS_PACKET_TOUCHES)->payload;
     CHECK_EQUAL(touches->count, 0);
     bench_stop(&b);
 }

@@ -1,4 +1,5 @@
-/* The scan: order of rows, break before make, settling, repeated slots, reciprocal scans, periods, two buffers, stalls. */
+/* The scan: order of rows, break before make, settling, repeated slots, reciprocal scans, periods,
+ * two buffers, stalls. */
 #include "bench.h"
 #include "check.h"
 
@@ -12,7 +13,8 @@ static const eits_packet_raw *raw_head(uint32_t k)
     return packet == NULL ? NULL : (const eits_packet_raw *)(const void *)packet->payload;
 }
 
-/* Rows are measured in the table's order, each with its own four electrodes, and never is one made before another broke. */
+/* Rows are measured in the table's order, each with its own four electrodes, and never is one made
+ * before another broke. */
 static void test_order(const skin_spec *spec, uint32_t rows)
 {
     bench_start(&b, spec);
@@ -20,7 +22,8 @@ static void test_order(const skin_spec *spec, uint32_t rows)
     host_run(&b.host, 60);
     CHECK(b.board.bursts > rows);
     uint32_t wrong = 0;
-    for (uint32_t k = 0; k < b.board.bursts; ++k) /* at its interrupt, a burst's own electrodes are still selected */
+    /* at its interrupt, a burst's own electrodes are still selected */
+    for (uint32_t k = 0; k < b.board.bursts; ++k)
         wrong += memcmp(b.board.selected[k], b.open.protocol + 4 * (size_t)(k % rows), 4) != 0;
     CHECK_EQUAL(wrong, 0);
     CHECK_EQUAL(b.board.address_while_enabled, 0);
@@ -59,7 +62,8 @@ static void test_voltages(const skin_spec *spec)
     bench_stop(&b);
 }
 
-/* With settling as long as what the multiplexers take, what was before is not seen; without it, it would be. */
+/* With settling as long as what the multiplexers take, what was before is not seen; without it, it
+ * would be. */
 static void test_settling(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -69,7 +73,8 @@ static void test_settling(void)
         eits_command_scan scan = host_default_scan();
         scan.settle_us = settled ? 36 : 1; /* twelve time constants, or a few */
         scan.samples = 20;
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status, EITS_REPLY_OK);
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SCAN, &scan, sizeof scan).status,
+                    EITS_REPLY_OK);
         host_run(&b.host, 60);
         const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
         float volts[256];
@@ -94,7 +99,8 @@ static void test_late_switch(void)
     b.board.late_once_ns = 5000; /* of 20 us from burst to burst, 16 are for settling */
     host_run(&b.host, 2);
     CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 1);
-    b.board.late_once_ns = 3440; /* made 84.3 us after the slot's start: 15.7 us, though the clock says 84 */
+    /* made 84.3 us after the slot's start: 15.7 us, though the clock says 84 */
+    b.board.late_once_ns = 3440;
     host_run(&b.host, 2);
     CHECK_EQUAL(b.host.instrument.scan.slots_repeated, before + 2);
     b.board.late_once_ns = 2900; /* 16.2 us */
@@ -144,7 +150,8 @@ static void test_never_settles(void)
         float volts;
         memcpy(&volts, packet->payload + sizeof(eits_packet_raw) + 4 * i, 4);
         CHECK(volts != volts);
-        CHECK_EQUAL(packet->payload[sizeof(eits_packet_raw) + 4 * b.open.n_rows + i], EITS_QUALITY_UNSETTLED);
+        CHECK_EQUAL(packet->payload[sizeof(eits_packet_raw) + 4 * b.open.n_rows + i],
+                    EITS_QUALITY_UNSETTLED);
     }
     bench_stop(&b);
 }
@@ -189,9 +196,11 @@ static void test_reciprocal(const skin_spec *spec)
             }
         }
         CHECK(every == 0 ? checks == 0 : checks >= 1);
-        const eits_fold masked = b.open.fold[3]; /* a row that is masked has no say and no value; its reciprocal has */
+        /* a row that is masked has no say and no value; its reciprocal has */
+        const eits_fold masked = b.open.fold[3];
         eits_command_mask_row mask = {.row = every == 0 ? masked.second : masked.first, .bad = 1};
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
+                    EITS_REPLY_OK);
         host_run(&b.host, 60);
         const host_packet *packet = host_last(&b.host, EITS_PACKET_RAW);
         float pair[2];
@@ -200,9 +209,11 @@ static void test_reciprocal(const skin_spec *spec)
         const uint8_t *quality = packet->payload + sizeof(eits_packet_raw) + 4 * b.open.n_rows;
         CHECK((pair[0] != pair[0]) == (every != 0) && (pair[1] != pair[1]) == (every == 0));
         CHECK_EQUAL(quality[masked.first], every == 0 ? 0 : EITS_QUALITY_MASKED);
-        CHECK_EQUAL(quality[masked.second], EITS_QUALITY_COPIED | (every == 0 ? EITS_QUALITY_MASKED : 0));
+        CHECK_EQUAL(quality[masked.second],
+                    EITS_QUALITY_COPIED | (every == 0 ? EITS_QUALITY_MASKED : 0));
         mask.bad = 0;
-        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status, EITS_REPLY_OK);
+        CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
+                    EITS_REPLY_OK);
     }
     bench_stop(&b);
 }
@@ -229,7 +240,8 @@ static void test_frame_period(void)
         CHECK_NEAR(raw_head(k)->time_us - raw_head(k - 1)->time_us, 33333, 100);
     }
     /* nothing is lost in the long run: slots are 100 us, periods are not */
-    CHECK_NEAR((double)(raw_head(frames - 1)->time_us - raw_head(0)->time_us), 33333.0 * (frames - 1), 100);
+    CHECK_NEAR((double)(raw_head(frames - 1)->time_us - raw_head(0)->time_us),
+               33333.0 * (frames - 1), 100);
     CHECK_EQUAL(host_stats(&b.host, 0).deadlines_missed, 0);
     b.board.clock_cost_ns = 15000000; /* the solver, as it were */
     CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
@@ -242,7 +254,8 @@ static void test_frame_period(void)
     bench_stop(&b);
 }
 
-/* While the main loop is busy, one frame is filled, then the scan waits; no frame is half old and half new. */
+/* While the main loop is busy, one frame is filled, then the scan waits; no frame is half old and
+ * half new. */
 static void test_two_buffers(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -253,7 +266,8 @@ static void test_two_buffers(void)
     CHECK(frames >= 15 && frames <= 30);
     for (uint32_t k = 0; k < frames; ++k) {
         const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_RAW, k);
-        CHECK(k == 0 || raw_head(k)->frame == raw_head(k - 1)->frame + 1); /* scanned frames are all there */
+        /* scanned frames are all there */
+        CHECK(k == 0 || raw_head(k)->frame == raw_head(k - 1)->frame + 1);
         CHECK_EQUAL(raw_head(k)->scan_us, 20780);
         float volts;
         memcpy(&volts, packet->payload + sizeof(eits_packet_raw) + 4 * 207, 4);
@@ -273,15 +287,18 @@ static void test_stall(void)
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 0) != NULL);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, true, 1) == NULL); /* said once */
     eits_command_tare tare = {.frames = 4};
-    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_TARE, &tare, sizeof tare).status, EITS_REPLY_CORE);
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_TARE, &tare, sizeof tare).status,
+                EITS_REPLY_CORE);
     CHECK_EQUAL(host_info(&b.host).tared, 1); /* by the last one */
     b.board.stalled = false;
     host_forget(&b.host);
     host_run(&b.host, 600);
     CHECK(host_fault(&b.host, EITS_FAULT_SCAN_STALLED, false, 0) != NULL);
     CHECK(host_count(&b.host, EITS_PACKET_RAW) > 10);
-    float volts[256]; /* the generator was not touched: its phase is the one that the tare knows */
-    memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw), sizeof(float) * 208);
+    /* the generator was not touched: its phase is the one that the tare knows */
+    float volts[256];
+    memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
+           sizeof(float) * 208);
     for (uint32_t i = 0; i < 208; ++i)
         CHECK_NEAR(volts[i], bench_volts(&b, i), 0.5 * fake_lsb_v(&b.board));
     b.board.configure_status = FW_E_TIMEOUT; /* the converter does not even start */

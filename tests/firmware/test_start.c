@@ -27,7 +27,8 @@ static void test_no_model(void)
     CHECK_NEAR(fake_generator_hz(&b.board), 50000, 0.02);
     CHECK((b.board.leds & 4u) != 0);
     skin_model model = skin_model_make(&SKIN_ADJACENT);
-    CHECK_EQUAL(host_upload(&b.host, model.blob, model.size, model.crc, 4096).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, model.blob, model.size, model.crc, 4096).status,
+                EITS_REPLY_OK);
     CHECK(host_fault(&b.host, EITS_FAULT_NO_MODEL, false, 0) != NULL);
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
     info = host_info(&b.host);
@@ -40,7 +41,8 @@ static void test_no_model(void)
     bench_stop(&b);
 }
 
-/* After a change of the model the new table is scanned, reciprocals and all, and the old tare is gone. */
+/* After a change of the model the new table is scanned, reciprocals and all, and the old tare is
+ * gone. */
 static void test_model_change(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
@@ -51,7 +53,8 @@ static void test_model_change(void)
     CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
     host_run(&b.host, 70);
     skin_model other = skin_model_make(&SKIN_OPPOSITE);
-    CHECK_EQUAL(host_upload(&b.host, other.blob, other.size, other.crc, 1000).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, other.blob, other.size, other.crc, 1000).status,
+                EITS_REPLY_OK);
     skin_model_free(&b.model);
     b.model = other;
     CHECK_EQUAL(eits_model_open(&b.open, other.blob, other.size), EITS_OK);

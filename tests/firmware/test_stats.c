@@ -15,7 +15,8 @@ static void test_bins(void)
         CHECK(bin == last || bin == last + 1); /* none is left out */
         CHECK(us <= fw_stats_edge(bin));
         CHECK(bin == 0 || us > fw_stats_edge(bin - 1));
-        CHECK(us < 8 || (double)fw_stats_edge(bin) <= us * 1.125); /* an eighth of an octave's lowest eighth */
+        /* an eighth of an octave's lowest eighth */
+        CHECK(us < 8 || (double)fw_stats_edge(bin) <= us * 1.125);
         last = bin;
     }
     CHECK_EQUAL(fw_stats_bin(UINT32_MAX), FW_STATS_BINS - 1);
@@ -43,7 +44,8 @@ static void test_percentile(void)
         for (uint32_t k = 0; k < n; ++k)
             sorted[k] = times[k];
         qsort(sorted, n, sizeof sorted[0], by_size);
-        const uint32_t exact = sorted[(99 * n + 99) / 100 - 1], edge = fw_stats_edge(fw_stats_bin(exact));
+        const uint32_t exact = sorted[(99 * n + 99) / 100 - 1],
+                       edge = fw_stats_edge(fw_stats_bin(exact));
         const eits_stage_stats got = fw_stats_of(&stats, EITS_STAGE_SOLVE);
         CHECK_EQUAL(got.count, n);
         CHECK_EQUAL(got.last_us, times[n - 1]);

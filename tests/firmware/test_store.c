@@ -22,8 +22,15 @@ static void start_with_adjacent(void)
 
 static void test_newest(void)
 {
-    const struct { uint32_t first, second, bank; } cases[] = {
-        {1, 2, 1}, {2, 1, 0}, {0xFFFFFFFFu, 0, 1}, {0, 0xFFFFFFFFu, 0}, {0x80000006u, 5, 1}, {0x80000001u, 5, 0}, {7, 7, 0}};
+    const struct {
+        uint32_t first, second, bank;
+    } cases[] = {{1, 2, 1},
+                 {2, 1, 0},
+                 {0xFFFFFFFFu, 0, 1},
+                 {0, 0xFFFFFFFFu, 0},
+                 {0x80000006u, 5, 1},
+                 {0x80000001u, 5, 0},
+                 {7, 7, 0}};
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
         bench_start(&b, NULL);
         fake_put_model(&b.board, 0, cases[k].first, adjacent.blob, adjacent.size);
@@ -36,7 +43,8 @@ static void test_newest(void)
         bench_restart(&b);
         CHECK_EQUAL(host_info(&b.host).bank, 1 - cases[k].bank);
         CHECK_EQUAL(host_info(&b.host).faults, 0);
-        b.board.bank[1 - cases[k].bank][k % 3 ? 5000 : 6] ^= 1; /* byte 6 is under no other checksum than the record's */
+        /* byte 6 is under no other checksum than the record's */
+        b.board.bank[1 - cases[k].bank][k % 3 ? 5000 : 6] ^= 1;
         bench_restart(&b);
         CHECK_EQUAL(host_info(&b.host).n_rows, 0);
         CHECK(host_fault(&b.host, EITS_FAULT_NO_MODEL, true, 0) != NULL);
@@ -47,12 +55,15 @@ static void test_upload(size_t piece)
 {
     start_with_adjacent();
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_OK);
-    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, piece).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, piece).status,
+                EITS_REPLY_OK);
     CHECK_EQUAL(b.board.rewrites, 0);
     CHECK_EQUAL(b.board.erases, 1);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
-    CHECK(memcmp(b.board.bank[0], adjacent.blob, adjacent.size) == 0); /* the old one is still there */
-    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, piece).status, EITS_REPLY_OK);
+    /* the old one is still there */
+    CHECK(memcmp(b.board.bank[0], adjacent.blob, adjacent.size) == 0);
+    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, piece).status,
+                EITS_REPLY_OK);
     CHECK_EQUAL(host_info(&b.host).bank, 0);
     bench_restart(&b);
     CHECK_EQUAL(host_info(&b.host).n_rows, 208);
@@ -91,13 +102,15 @@ static void test_refused(void)
     CHECK_EQUAL(reply.detail[0], -1);
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_MODEL_COMMIT).status, EITS_REPLY_OFFSET);
     still_adjacent(1);
-    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc + 1, 4096).status, EITS_REPLY_MODEL_CRC);
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc + 1, 4096).status,
+                EITS_REPLY_MODEL_CRC);
     still_adjacent(1);
     /* a model that is damaged, but announced so */
     static uint8_t damaged[FAKE_BANK];
     memcpy(damaged, opposite.blob, opposite.size);
     damaged[1000] ^= 4;
-    reply = host_upload(&b.host, damaged, opposite.size, eits_crc32(0, damaged, opposite.size), 4096);
+    reply =
+        host_upload(&b.host, damaged, opposite.size, eits_crc32(0, damaged, opposite.size), 4096);
     CHECK_EQUAL(reply.status, EITS_REPLY_MODEL_INVALID);
     CHECK_EQUAL(reply.detail[0], EITS_E_MODEL_CRC);
     still_adjacent(1);
@@ -122,7 +135,8 @@ static void test_refused(void)
     CHECK_EQUAL(reply.status, EITS_REPLY_SELF_TEST);
     CHECK(reply.detail[0] > 0);
     still_adjacent(1);
-    fake_put_model(&b.board, 1, 9, bad.blob, bad.size); /* by a programmer: nothing tests it but its own command */
+    /* by a programmer: nothing tests it but its own command */
+    fake_put_model(&b.board, 1, 9, bad.blob, bad.size);
     fake_restart(&b.board);
     host_start(&b.host, &b.board);
     reply = host_plain(&b.host, EITS_PACKET_SELF_TEST);
@@ -145,7 +159,8 @@ static void test_memory(void)
     CHECK_EQUAL(host_upload(&b.host, big.blob, big.size, big.crc, 4096).status, EITS_REPLY_OK);
     const size_t needs = fw_engine_needs(&model);
     CHECK(needs < FAKE_WORKSPACE);
-    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status,
+                EITS_REPLY_OK);
     for (int fits = 1; fits >= 0; --fits) {
         b.board.board.workspace_bytes = (needs + 15) / 16 * 16 - (fits ? 0 : 16);
         bench_restart(&b);
@@ -153,7 +168,9 @@ static void test_memory(void)
         CHECK_EQUAL(reply.status, fits ? EITS_REPLY_OK : EITS_REPLY_MODEL_SIZE);
         CHECK_EQUAL(host_info(&b.host).rank, fits ? 60 : 24);
         if (fits)
-            CHECK_EQUAL(host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status, EITS_REPLY_OK);
+            CHECK_EQUAL(
+                host_upload(&b.host, adjacent.blob, adjacent.size, adjacent.crc, 4096).status,
+                EITS_REPLY_OK);
         else
             CHECK_EQUAL(reply.detail[0], (long long)b.board.board.workspace_bytes);
     }
@@ -180,7 +197,8 @@ static void test_offsets(void)
     CHECK_EQUAL(reply.detail[0], 1000);
     reply = host_model_data(&b.host, 2000, opposite.blob + 2000, 1000);
     CHECK_EQUAL(reply.detail[0], 1000);
-    CHECK_EQUAL(host_model_data(&b.host, 1000, opposite.blob + 1000, 1001).status, EITS_REPLY_LENGTH);
+    CHECK_EQUAL(host_model_data(&b.host, 1000, opposite.blob + 1000, 1001).status,
+                EITS_REPLY_LENGTH);
     reply = host_plain(&b.host, EITS_PACKET_MODEL_COMMIT);
     CHECK_EQUAL(reply.status, EITS_REPLY_OFFSET);
     CHECK_EQUAL(reply.detail[0], 1000);
@@ -188,7 +206,8 @@ static void test_offsets(void)
     reply = host_tare(&b.host, 1);
     CHECK_EQUAL(reply.status, EITS_REPLY_BUSY);
     CHECK_EQUAL(reply.detail[0], EITS_PACKET_MODEL_BEGIN);
-    /* left for ten seconds: the old model goes on; then the host comes back and goes on where it was */
+    /* left for ten seconds: the old model goes on; then the host comes back and goes on where it
+     * was */
     host_run(&b.host, 9000);
     CHECK_EQUAL(b.host.instrument.scan.running, 0);
     host_run(&b.host, 1500);
@@ -198,7 +217,8 @@ static void test_offsets(void)
     CHECK_EQUAL(reply.status, EITS_REPLY_OK);
     CHECK_EQUAL(reply.detail[0], 1000);
     CHECK_EQUAL(b.board.erases, 1);
-    CHECK_EQUAL(host_upload(&b.host, opposite.blob, size, opposite.crc, 3000).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, size, opposite.crc, 3000).status,
+                EITS_REPLY_OK);
     CHECK_EQUAL(b.board.erases, 1);
     CHECK_EQUAL(b.board.rewrites, 0);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
@@ -224,7 +244,8 @@ static void test_odd_end(void)
     memcpy(longer, opposite.blob, opposite.size);
     memset(longer + opposite.size, 0x5A, 3); /* bytes behind the model are not its own */
     const size_t size = opposite.size + 3;
-    CHECK_EQUAL(host_upload(&b.host, longer, size, eits_crc32(0, longer, size), 4096).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, longer, size, eits_crc32(0, longer, size), 4096).status,
+                EITS_REPLY_OK);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
     CHECK_EQUAL(host_info(&b.host).model_bytes, (long long)size);
     CHECK_EQUAL(b.board.bank[1][size], 0xFF);
@@ -249,7 +270,8 @@ static void test_flash_fails(void)
     CHECK_EQUAL(reply.detail[0], 400);
     still_adjacent(1);
     b.board.program_status = FW_OK;
-    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status,
+                EITS_REPLY_OK);
     CHECK_EQUAL(b.board.rewrites, 0);
     CHECK_EQUAL(host_info(&b.host).n_rows, 192);
 }
@@ -261,14 +283,16 @@ static int cut_upload(uint32_t step)
     b.board.flash_steps = 0;
     b.board.cut_at = step;
     if (setjmp(b.board.cut) == 0) {
-        CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status, EITS_REPLY_OK);
+        CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status,
+                    EITS_REPLY_OK);
         return 0;
     }
     bench_restart(&b);
     return 1;
 }
 
-/* At each step of erasing, programming and committing: the old model is there until the record is whole. */
+/* At each step of erasing, programming and committing: the old model is there until the record is
+ * whole. */
 static void test_cut_everywhere(void)
 {
     CHECK_EQUAL(cut_upload(0), 0);
@@ -282,7 +306,9 @@ static void test_cut_everywhere(void)
         new_one += info.model_crc == opposite.crc;
         scanning += b.host.instrument.scan.running;
         if (step % 7 == 0 || step > steps - 9) /* and it can be done again */
-            CHECK_EQUAL(host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status, EITS_REPLY_OK);
+            CHECK_EQUAL(
+                host_upload(&b.host, opposite.blob, opposite.size, opposite.crc, 4096).status,
+                EITS_REPLY_OK);
     }
     CHECK(old_one > 60);
     CHECK_EQUAL(new_one, 0);

@@ -1,6 +1,6 @@
 #include "fuzz.h"
 
-#include "vec.h"
+#include "base/vec.h"
 
 uint8_t fuzz_u8(fuzz_bytes *b)
 {
@@ -32,7 +32,7 @@ void *fuzz_workspace(int which)
 static void check_info(const eits_context *ctx, uint64_t frame_macs)
 {
     const eits_info *info = &ctx->info;
-    const eits_real numbers[] = {info->lambda, info->lambda_max, info->lambda_noise, info->gap,
+    const eits_real numbers[] = {info->lambda,  info->lambda_max, info->lambda_noise, info->gap,
                                  info->gap_rel, info->residual,   info->data_norm};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i)
         MUST(eits_is_finite(numbers[i]) && numbers[i] >= 0);
@@ -40,7 +40,8 @@ static void check_info(const eits_context *ctx, uint64_t frame_macs)
     MUST((uint32_t)info->stop <= (uint32_t)EITS_STOP_OPTIMUM);
     MUST(info->masked <= ctx->model->n_rows);
     MUST(info->residual <= info->data_norm * R(1.001));
-    MUST(ctx->options.mac_limit == 0 || info->macs <= ctx->options.mac_limit || info->macs <= frame_macs);
+    MUST(ctx->options.mac_limit == 0 || info->macs <= ctx->options.mac_limit ||
+         info->macs <= frame_macs);
 }
 
 void fuzz_check_result(const eits_context *ctx, eits_status status, uint64_t frame_macs)
@@ -50,8 +51,10 @@ void fuzz_check_result(const eits_context *ctx, eits_status status, uint64_t fra
         MUST(eits_is_finite(ctx->image[j]));
         MUST(eits_is_finite(ctx->x[j]));
         MUST(status == EITS_OK || ctx->image[j] == 0);
-        MUST(ctx->options.sign == EITS_SIGN_DECREASE || ctx->x[j] >= 0 || ctx->options.sign == EITS_SIGN_BOTH);
-        MUST(ctx->options.sign == EITS_SIGN_INCREASE || ctx->x[j] <= 0 || ctx->options.sign == EITS_SIGN_BOTH);
+        MUST(ctx->options.sign == EITS_SIGN_DECREASE || ctx->x[j] >= 0 ||
+             ctx->options.sign == EITS_SIGN_BOTH);
+        MUST(ctx->options.sign == EITS_SIGN_INCREASE || ctx->x[j] <= 0 ||
+             ctx->options.sign == EITS_SIGN_BOTH);
         nonzeros += ctx->x[j] != 0;
     }
     MUST(ctx->info.nonzeros == nonzeros);
@@ -66,8 +69,10 @@ void fuzz_check_touches(const eits_context *ctx, const eits_touch *touches, uint
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = touches + k;
         MUST(eits_is_finite(t->load_n) && t->load_n >= 0);
-        MUST(eits_is_finite(t->x_mm) && eits_is_finite(t->y_mm) && eits_is_finite(t->strength_s_per_m_mm2));
-        MUST(t->radius_mm >= ctx->options.touch_min_radius_mm && t->radius_mm <= ctx->options.touch_max_radius_mm);
+        MUST(eits_is_finite(t->x_mm) && eits_is_finite(t->y_mm) &&
+             eits_is_finite(t->strength_s_per_m_mm2));
+        MUST(t->radius_mm >= ctx->options.touch_min_radius_mm &&
+             t->radius_mm <= ctx->options.touch_max_radius_mm);
         MUST(t->confidence >= 0 && t->confidence <= 1);
         MUST(t->id != 0);
         for (uint32_t l = 0; l < k; ++l)

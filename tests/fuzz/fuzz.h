@@ -1,5 +1,5 @@
-/* What the fuzz targets share. A target is LLVMFuzzerTestOneInput of its file; clang's libFuzzer calls it with bytes of its own
- * making, replay.c with files, under any compiler. */
+/* What the fuzz targets share. A target is LLVMFuzzerTestOneInput of its file; clang's libFuzzer
+ * calls it with bytes of its own making, replay.c with files, under any compiler. */
 #ifndef EITSKIN_FUZZ_H
 #define EITSKIN_FUZZ_H
 
@@ -10,12 +10,12 @@
 #include <string.h>
 
 /* Ends the run; libFuzzer then keeps the input. */
-#define MUST(holds)                                                        \
-    do {                                                                   \
-        if (!(holds)) {                                                    \
+#define MUST(holds)                                                           \
+    do {                                                                      \
+        if (!(holds)) {                                                       \
             fprintf(stderr, "%s:%d: must: %s\n", __FILE__, __LINE__, #holds); \
-            abort();                                                       \
-        }                                                                  \
+            abort();                                                          \
+        }                                                                     \
     } while (0)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -31,8 +31,9 @@ uint8_t fuzz_u8(fuzz_bytes *b);
 uint32_t fuzz_u32(fuzz_bytes *b);
 float fuzz_f32(fuzz_bytes *b);
 
-/* What must hold after eits_reconstruct on `ctx` returned `status`: all numbers finite, the image zero on an error, certificates
- * not negative, the residual no worse than that of zero, limits kept. `frame_macs`: what the frame stage alone may have cost. */
+/* What must hold after eits_reconstruct on `ctx` returned `status`: all numbers finite, the image
+ * zero on an error, certificates not negative, the residual no worse than that of zero, limits
+ * kept. `frame_macs`: what the frame stage alone may have cost. */
 void fuzz_check_result(const eits_context *ctx, eits_status status, uint64_t frame_macs);
 
 /* What must hold of the touches that eits_find_touches gave. */

@@ -1,10 +1,11 @@
-/* Options, masks, references and frames of any bits, as a short script of steps, into the core on one of a few small models.
- * What fuzz.h says must hold. For a quarter of the inputs two contexts do the same, one with the portable kernels and the least
- * workspace, one with this processor's kernels and panels, and must give the same bits; the others run one context alone. */
+/* Options, masks, references and frames of any bits, as a short script of steps, into the core on
+ * one of a few small models. What fuzz.h says must hold. For a quarter of the inputs two contexts
+ * do the same, one with the portable kernels and the least workspace, one with this processor's
+ * kernels and panels, and must give the same bits; the others run one context alone. */
 #include "fuzz.h"
 
+#include "base/vec.h"
 #include "small_model.h"
-#include "vec.h"
 
 enum { MODELS = 16, STEPS = 8, MOST_ITERATIONS = 24, MOST_SWEEPS = 2 };
 
@@ -21,7 +22,8 @@ static void spoil(small_model *made, uint32_t which)
     if (which == 12) /* columns that are the same, and one of zeros (4 bytes a number) */
         memcpy(sens + 2 * 32, sens + 3 * 32, 32), memset(sens + 5 * 32, 0, 32);
     if (which == 13) /* a pixel that is never shown, one turned round, one almost nothing */
-        small_put_f32(weight, 0.0f), small_put_f32(weight + 4, -0.02f), small_put_f32(weight + 8, 1e-40f);
+        small_put_f32(weight, 0.0f), small_put_f32(weight + 4, -0.02f),
+            small_put_f32(weight + 8, 1e-40f);
     if (which == 14) /* volts that are almost nothing */
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
             small_put_f32(small_model_section(made, "VREF", NULL) + 4 * k, 1e-30f * (float)(k + 1));
@@ -31,10 +33,14 @@ static void spoil(small_model *made, uint32_t which)
 static void make_models(void)
 {
     for (uint32_t k = 0; k < MODELS; ++k) {
-        small_spec spec = {.rank = 6, .side = 4, .storage = (eits_storage)(k % 4), .kind = (eits_data_kind)(k / 4 % 3)};
+        small_spec spec = {.rank = 6,
+                           .side = 4,
+                           .storage = (eits_storage)(k % 4),
+                           .kind = (eits_data_kind)(k / 4 % 3)};
         spec.shape = k % 5 == 4 ? SMALL_WAVES : SMALL_RANDOM;
         if (k >= 12) {
-            spec.storage = EITS_STORAGE_F32, spec.kind = EITS_DATA_DIFFERENCE, spec.shape = SMALL_RANDOM;
+            spec.storage = EITS_STORAGE_F32, spec.kind = EITS_DATA_DIFFERENCE,
+            spec.shape = SMALL_RANDOM;
             spec.lipschitz_factor = k == 15 ? 0.2 : 0; /* a step five times too long */
         }
         spec.round = k % 3 == 1;
@@ -73,7 +79,8 @@ static void open_twins(twins *t, uint32_t which)
 }
 
 /* The status that a call gives for each context. */
-#define BOTH(call) both_gave((call(&t->ctx[0])), t->count < 2 ? EITS_OK : (call(&t->ctx[1])), t->count)
+#define BOTH(call) \
+    both_gave((call(&t->ctx[0])), t->count < 2 ? EITS_OK : (call(&t->ctx[1])), t->count)
 static eits_status both_gave(eits_status one, eits_status other, int count)
 {
     MUST(count < 2 || one == other);
@@ -105,13 +112,16 @@ static void read_frame(twins *t, fuzz_bytes *in)
     float unit;
     memcpy(&unit, &bits, sizeof unit);
     switch (how % 4) {
-    case 0: small_reference(&t->model, (double)unit, t->frame); break;
+    case 0:
+        small_reference(&t->model, (double)unit, t->frame);
+        break;
     case 1: /* a reference with changes of some percent */
         small_reference(&t->model, (double)unit, t->frame);
         for (uint32_t i = 0; i < SMALL_ROWS; i += 3)
             t->frame[i] *= 1 + R(0.001) * (eits_real)(int8_t)fuzz_u8(in);
         break;
-    case 2: break; /* the last frame */
+    case 2:
+        break; /* the last frame */
     case 3:
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             t->frame[i] = (eits_real)fuzz_f32(in);
@@ -131,12 +141,25 @@ static void read_frame(twins *t, fuzz_bytes *in)
 
 static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
 {
-    uint32_t *whole[] = {&o->iterations, &o->gap_every, &o->max_touches, &o->max_masked, &o->warm_start, &o->project_baseline,
-                         &o->touch_sweeps, &o->mac_limit, &o->track_confirm, &o->track_hold};
-    eits_real *real[] = {&o->lambda_abs, &o->lambda_rel, &o->lambda_noise_factor, &o->gate_factor, &o->gap_rel, &o->saturation_v,
-                         &o->touch_threshold, &o->touch_share, &o->touch_min_radius_mm, &o->touch_max_radius_mm,
-                         &o->touch_seed_radius_mm, &o->touch_change_s_per_m, &o->touch_radius_weight, &o->follow_mm,
-                         &o->track_smooth, &o->floor_noise_factor};
+    uint32_t *whole[] = {&o->iterations,    &o->gap_every,        &o->max_touches,  &o->max_masked,
+                         &o->warm_start,    &o->project_baseline, &o->touch_sweeps, &o->mac_limit,
+                         &o->track_confirm, &o->track_hold};
+    eits_real *real[] = {&o->lambda_abs,
+                         &o->lambda_rel,
+                         &o->lambda_noise_factor,
+                         &o->gate_factor,
+                         &o->gap_rel,
+                         &o->saturation_v,
+                         &o->touch_threshold,
+                         &o->touch_share,
+                         &o->touch_min_radius_mm,
+                         &o->touch_max_radius_mm,
+                         &o->touch_seed_radius_mm,
+                         &o->touch_change_s_per_m,
+                         &o->touch_radius_weight,
+                         &o->follow_mm,
+                         &o->track_smooth,
+                         &o->floor_noise_factor};
     enum { WHOLE = sizeof whole / sizeof whole[0], REAL = sizeof real / sizeof real[0] };
     const uint32_t k = which % (WHOLE + REAL + 2);
     if (k < WHOLE)
@@ -152,7 +175,8 @@ static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
         o->solver = (eits_solver)(fuzz_u8(in) % 5);
 }
 
-/* Options that are refused change nothing; those taken are bounded, for time, in iterations and sweeps only. */
+/* Options that are refused change nothing; those taken are bounded, for time, in iterations and
+ * sweeps only. */
 static void change_options(twins *t, fuzz_bytes *in)
 {
     eits_options wanted = t->ctx[0].options;
@@ -175,10 +199,12 @@ static void check_baseline(const twins *t)
     MUST(a->ready == b->ready && a->count == b->count);
     if (!a->ready)
         return;
-    MUST(same_bits(&a->gain, &b->gain, sizeof a->gain) && same_bits(&a->lambda_noise, &b->lambda_noise, sizeof a->lambda_noise));
+    MUST(same_bits(&a->gain, &b->gain, sizeof a->gain) &&
+         same_bits(&a->lambda_noise, &b->lambda_noise, sizeof a->lambda_noise));
     MUST(eits_is_finite(a->gain) && a->gain != 0 && eits_is_finite(a->v0_rms) && a->v0_rms > 0);
     MUST(eits_is_finite(a->correlation) && eits_fabs(a->correlation) <= R(1.0001));
-    MUST(eits_is_finite(a->noise_v) && a->noise_v >= 0 && eits_is_finite(a->lambda_noise) && a->lambda_noise >= 0);
+    MUST(eits_is_finite(a->noise_v) && a->noise_v >= 0 && eits_is_finite(a->lambda_noise) &&
+         a->lambda_noise >= 0);
 }
 
 static void take_reference(twins *t, size_t length)
@@ -194,7 +220,7 @@ static void learn_reference(twins *t, fuzz_bytes *in)
 {
     const uint32_t count = fuzz_u8(in) % 8u;
 #define BEGIN(ctx) eits_baseline_begin(ctx, count)
-#define ADD(ctx) eits_baseline_add(ctx, t->frame, SMALL_ROWS)
+#define ADD(ctx)   eits_baseline_add(ctx, t->frame, SMALL_ROWS)
     MUST((BOTH(BEGIN) == EITS_OK) == (count >= 4));
     for (uint32_t k = 0; k < count; ++k) {
         read_frame(t, in);
@@ -208,7 +234,8 @@ static void reconstruct(twins *t, fuzz_bytes *in, int touches)
     uint64_t frame_macs = 0;
     uint32_t masked = 0;
     read_frame(t, in);
-    if (t->ctx[0].options.mac_limit > 0) /* a basis that is built meanwhile costs no more in what follows */
+    /* a basis that is built meanwhile costs no more in what follows */
+    if (t->ctx[0].options.mac_limit > 0)
         for (int k = 0; k < t->count; ++k)
             (void)eits_frame_stage(&t->ctx[k], t->frame, SMALL_ROWS, &masked, &frame_macs);
 #define RECONSTRUCT(ctx) eits_reconstruct(ctx, t->frame, SMALL_ROWS, NULL, NULL)
@@ -226,7 +253,8 @@ static void reconstruct(twins *t, fuzz_bytes *in, int touches)
         MUST(eits_is_finite(t->ctx[0].image[j]) && eits_is_finite(t->ctx[0].x[j]));
     MUST(t->count < 2 || count[0] == count[1]);
     for (uint32_t k = 0; t->count == 2 && k < count[0]; ++k) /* past the id: it may be padded */
-        MUST(found[0][k].id == found[1][k].id && same_bits(&found[0][k].x_mm, &found[1][k].x_mm, 5 * sizeof(eits_real)));
+        MUST(found[0][k].id == found[1][k].id &&
+             same_bits(&found[0][k].x_mm, &found[1][k].x_mm, 5 * sizeof(eits_real)));
     MUST(status == EITS_OK || count[0] == 0);
     fuzz_check_touches(&t->ctx[0], found[0], count[0]);
 }
@@ -235,21 +263,31 @@ static void step(twins *t, fuzz_bytes *in)
 {
     const uint8_t what = fuzz_u8(in);
     switch (what % 8) {
-    case 0: read_frame(t, in), take_reference(t, what == 0xF8 ? SMALL_ROWS - 1 : SMALL_ROWS); break;
-    case 1: learn_reference(t, in); break;
+    case 0:
+        read_frame(t, in), take_reference(t, what == 0xF8 ? SMALL_ROWS - 1 : SMALL_ROWS);
+        break;
+    case 1:
+        learn_reference(t, in);
+        break;
     case 2: {
         const uint32_t row = fuzz_u8(in) % (SMALL_ROWS + 1);
         for (int k = 0; k < t->count; ++k)
             MUST((eits_mask_row(&t->ctx[k], row, what & 8) == EITS_OK) == (row < SMALL_ROWS));
         break;
     }
-    case 3: change_options(t, in); break;
+    case 3:
+        change_options(t, in);
+        break;
     case 4:
         for (int k = 0; k < t->count; ++k)
             eits_forget(&t->ctx[k]);
         break;
-    case 6: reconstruct(t, in, 1); break;
-    default: reconstruct(t, in, 0); break;
+    case 6:
+        reconstruct(t, in, 1);
+        break;
+    default:
+        reconstruct(t, in, 0);
+        break;
     }
     check_baseline(t);
 }

@@ -1,6 +1,6 @@
-/* Any bytes, in any pieces, into the wire decoder. The first byte says how large its buffer is, the second in which pieces the
- * rest arrives. Pieces must not matter, what is decoded must be what its encoding gives, and every stretch between zeros must be
- * counted once. */
+/* Any bytes, in any pieces, into the wire decoder. The first byte says how large its buffer is, the
+ * second in which pieces the rest arrives. Pieces must not matter, what is decoded must be what its
+ * encoding gives, and every stretch between zeros must be counted once. */
 #include "fuzz.h"
 
 enum { ROOM = 600, MOST_PACKETS = 64, MOST_WIRE = 4096 };
@@ -22,14 +22,16 @@ static void check_packet(const eits_link_decoder *decoder, const eits_link_packe
 {
     static uint8_t again[EITS_LINK_ENCODED(ROOM)];
     static _Alignas(8) uint8_t buffer[ROOM];
-    MUST(packet->payload >= decoder->buffer && packet->payload + packet->size <= decoder->buffer + decoder->room);
+    MUST(packet->payload >= decoder->buffer &&
+         packet->payload + packet->size <= decoder->buffer + decoder->room);
     MUST(packet->size <= EITS_LINK_MAX_PAYLOAD);
-    const size_t wire = eits_link_encode(again, sizeof again, packet->type, packet->sequence, packet->payload, packet->size, NULL, 0);
+    const size_t wire = eits_link_encode(again, sizeof again, packet->type, packet->sequence,
+                                         packet->payload, packet->size, NULL, 0);
     MUST(wire > 0 && wire <= EITS_LINK_ENCODED(packet->size));
     const size_t cut = packet->size / 2;
     static uint8_t halves[EITS_LINK_ENCODED(ROOM)];
-    MUST(eits_link_encode(halves, sizeof halves, packet->type, packet->sequence, packet->payload, cut, packet->payload + cut,
-                          packet->size - cut) == wire);
+    MUST(eits_link_encode(halves, sizeof halves, packet->type, packet->sequence, packet->payload,
+                          cut, packet->payload + cut, packet->size - cut) == wire);
     MUST(memcmp(again, halves, wire) == 0);
     eits_link_decoder second;
     eits_link_packet out;
@@ -39,8 +41,10 @@ static void check_packet(const eits_link_decoder *decoder, const eits_link_packe
     MUST(memcmp(out.payload, packet->payload, out.size) == 0);
 }
 
-/* Give the decoder `size` bytes in pieces from a generator that starts at `pieces`; 0: all at once. */
-static void hear(heard *h, uint8_t *buffer, size_t room, const uint8_t *bytes, size_t size, uint32_t pieces)
+/* Give the decoder `size` bytes in pieces from a generator that starts at `pieces`; 0: all at once.
+ */
+static void hear(heard *h, uint8_t *buffer, size_t room, const uint8_t *bytes, size_t size,
+                 uint32_t pieces)
 {
     h->packets = 0;
     MUST(eits_link_decoder_init(&h->decoder, buffer, room) == EITS_OK);
@@ -50,7 +54,8 @@ static void hear(heard *h, uint8_t *buffer, size_t room, const uint8_t *bytes, s
         piece = piece < size - at ? piece : size - at;
         for (size_t taken = 0; taken < piece;) {
             eits_link_packet packet;
-            const size_t some = eits_link_feed(&h->decoder, bytes + at + taken, piece - taken, &packet);
+            const size_t some =
+                eits_link_feed(&h->decoder, bytes + at + taken, piece - taken, &packet);
             MUST(some > 0 && some <= piece - taken);
             MUST(h->decoder.used <= h->decoder.room);
             taken += some;
@@ -79,7 +84,8 @@ static uint32_t ended_stretches(const uint8_t *bytes, size_t size)
     return count;
 }
 
-/* 1 where the bytes end inside a stretch: then it may have overrun, but is counted as nothing else. */
+/* 1 where the bytes end inside a stretch: then it may have overrun, but is counted as nothing else.
+ */
 static uint32_t open_end(const uint8_t *bytes, size_t size)
 {
     return size > 0 && bytes[size - 1] != 0;
@@ -98,16 +104,22 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     hear(&cut, other, room, bytes, rest, pieces);
     const eits_link_decoder *a = &whole.decoder, *b = &cut.decoder;
     MUST(whole.packets == cut.packets && whole.packets == a->packets);
-    MUST(memcmp(whole.digest, cut.digest, sizeof whole.digest[0] * (whole.packets < MOST_PACKETS ? whole.packets : MOST_PACKETS)) == 0);
-    MUST(a->packets == b->packets && a->crc_errors == b->crc_errors && a->framing_errors == b->framing_errors);
-    MUST(a->overruns == b->overruns && a->version_errors == b->version_errors && a->other_version == b->other_version);
-    const uint32_t counted = a->packets + a->crc_errors + a->framing_errors + a->overruns + a->version_errors;
+    MUST(memcmp(whole.digest, cut.digest,
+                sizeof whole.digest[0] *
+                    (whole.packets < MOST_PACKETS ? whole.packets : MOST_PACKETS)) == 0);
+    MUST(a->packets == b->packets && a->crc_errors == b->crc_errors &&
+         a->framing_errors == b->framing_errors);
+    MUST(a->overruns == b->overruns && a->version_errors == b->version_errors &&
+         a->other_version == b->other_version);
+    const uint32_t counted =
+        a->packets + a->crc_errors + a->framing_errors + a->overruns + a->version_errors;
     const uint32_t ended = ended_stretches(bytes, rest);
     MUST(counted == ended || (counted == ended + 1 && open_end(bytes, rest) && a->broken));
     return 0;
 }
 
-/* ---- mutation: what lies between zeros may be decoded, changed, and encoded anew, so that checksums are no wall ---- */
+/* ---- mutation: what lies between zeros may be decoded, changed, and encoded anew, so that
+ * checksums are no wall ---- */
 
 static size_t mutate_packet(uint8_t *data, size_t size, size_t room, uint32_t seed)
 {
@@ -133,7 +145,9 @@ static size_t mutate_packet(uint8_t *data, size_t size, size_t room, uint32_t se
         from = to = size;
     }
     bytes = LLVMFuzzerMutate(payload, bytes, 560);
-    const size_t wire = eits_link_encode(made, sizeof made, type, sequence, payload, bytes, NULL, 0), tail = size - to;
+    const size_t wire =
+                     eits_link_encode(made, sizeof made, type, sequence, payload, bytes, NULL, 0),
+                 tail = size - to;
     if (wire == 0 || from + wire + tail > room)
         return size;
     memmove(data + from + wire, data + to, tail);
@@ -144,5 +158,6 @@ static size_t mutate_packet(uint8_t *data, size_t size, size_t room, uint32_t se
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t room, unsigned int seed);
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t room, unsigned int seed)
 {
-    return size >= 2 && seed % 3 == 0 ? mutate_packet(data, size, room, seed / 3u) : LLVMFuzzerMutate(data, size, room);
+    return size >= 2 && seed % 3 == 0 ? mutate_packet(data, size, room, seed / 3u)
+                                      : LLVMFuzzerMutate(data, size, room);
 }

@@ -1,7 +1,8 @@
-/* Any bytes as an .eitm model; where it opens, its own golden frame, its defaults, and frames made of its own voltages. */
+/* Any bytes as an .eitm model; where it opens, its own golden frame, its defaults, and frames made
+ * of its own voltages. */
 #include "fuzz.h"
 
-#include "vec.h"
+#include "base/vec.h"
 
 enum { MOST_BYTES = 1 << 15, MOST_WORK = 20000, MOST_ITERATIONS = 30, MOST_ROWS = 512 };
 
@@ -35,12 +36,14 @@ static void use(const eits_model *model)
     if (size > FUZZ_WORKSPACE || model->n_rows > MOST_ROWS || work > MOST_WORK)
         return;
     const int prepared = model->meta_size % 2 == 0;
-    MUST(eits_init(&ctx, model, fuzz_workspace(0), prepared ? size : eits_workspace_size(model, 0)) == EITS_OK);
+    MUST(eits_init(&ctx, model, fuzz_workspace(0),
+                   prepared ? size : eits_workspace_size(model, 0)) == EITS_OK);
     MUST(eits_options_default(model, &options) == EITS_OK);
     MUST(eits_set_options(&ctx, &options) == EITS_OK); /* its own defaults are always good ones */
     if (options.iterations <= MOST_ITERATIONS) {
         const eits_status status = eits_self_test(&ctx, &difference);
-        MUST(difference >= 0); /* infinite where the golden image is not of this world, never NaN */
+        /* infinite where the golden image is not of this world, never NaN */
+        MUST(difference >= 0);
         if (ctx.baseline.ready)
             fuzz_check_result(&ctx, status, 0);
     }
@@ -67,7 +70,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     eits_model model, before;
     if (size > MOST_BYTES)
         return 0;
-    uint8_t *blob = room + MOST_BYTES - ((size + 15u) & ~(size_t)15u); /* a read too far runs out of `room`, but for 15 bytes */
+    /* a read too far runs out of `room`, but for 15 bytes */
+    uint8_t *blob = room + MOST_BYTES - ((size + 15u) & ~(size_t)15u);
     memcpy(blob, data, size);
     memset(&model, 0x5A, sizeof model);
     memcpy(&before, &model, sizeof model);

@@ -1,8 +1,13 @@
-/* Mutations of .eitm models that keep what the reader checks right, most of the time: checksum, protocol hash, sizes of sections.
- * Otherwise nearly every input would end at the checksum. */
+/* Mutations of .eitm models that keep what the reader checks right, most of the time: checksum,
+ * protocol hash, sizes of sections. Otherwise nearly every input would end at the checksum. */
 #include "fuzz.h"
 
-enum { HEADER = 64, ENTRY = 16, SECTIONS = 12 /* that every model is laid out with */, MOST = 1 << 14 };
+enum {
+    HEADER = 64,
+    ENTRY = 16,
+    SECTIONS = 12 /* that every model is laid out with */,
+    MOST = 1 << 14
+};
 enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META, LOAD };
 static const char TAGS[] = "DIMSPROTFOLDVREFREDUSENSCOLWGRIDDEFSGOLDSCALMETALOAD";
 
@@ -36,7 +41,8 @@ static uint8_t *find(uint8_t *data, size_t size, int which, uint32_t *bytes)
 static void seal(uint8_t *data, size_t size)
 {
     uint32_t dims_bytes = 0, bytes = 0;
-    const uint8_t *dims = find(data, size, DIMS, &dims_bytes), *table = find(data, size, PROT, &bytes);
+    const uint8_t *dims = find(data, size, DIMS, &dims_bytes),
+                  *table = find(data, size, PROT, &bytes);
     if (dims != NULL && dims_bytes == 64 && table != NULL && bytes / 4 >= get(dims + 4)) {
         const uint64_t hash = eits_protocol_hash(get(dims), get(dims + 4), table);
         memcpy(data + 24, &hash, sizeof hash);
@@ -46,14 +52,16 @@ static void seal(uint8_t *data, size_t size)
         put(data + 12, eits_crc32(0, data + 16, total - 16u));
 }
 
-/* ---- other dimensions: every section anew, filled with what the old one held, over and over ---- */
+/* ---- other dimensions: every section anew, filled with what the old one held, over and over ----
+ */
 
 static size_t sizes_for(const uint32_t d[10], uint32_t bytes[SECTIONS])
 {
     static const uint32_t item[4] = {4, 2, 2, 1};
     const uint32_t m = d[1], k = d[2], stride = d[4], n = d[5], storage = d[8] % 4;
-    const uint32_t made[SECTIONS] = {64, 4 * m, 8 * k, 4 * k, 4 * k * stride, item[storage] * n * stride, 4 * n, 4 * n, 64,
-                                     4 * (2 * m + n), storage >= 2 ? 4 * n : 0, 2};
+    const uint32_t made[SECTIONS] = {
+        64,    4 * m, 8 * k, 4 * k,           4 * k * stride,           item[storage] * n * stride,
+        4 * n, 4 * n, 64,    4 * (2 * m + n), storage >= 2 ? 4 * n : 0, 2};
     size_t total = HEADER + ENTRY * SECTIONS;
     for (int which = 0; which < SECTIONS; ++which) {
         bytes[which] = made[which];
@@ -142,8 +150,10 @@ static size_t lay_out_anew(uint8_t *data, size_t size, size_t room, uint32_t see
 
 static void set_number(uint8_t *data, size_t size, uint32_t seed)
 {
-    static const uint32_t odd[] = {0x00000001u, 0x80000001u, 0x007FFFFFu, 0x00800000u, 0x7F7FFFFFu, 0xFF7FFFFFu, 0x7F800000u, 0x7FC00000u,
-                                   0x80000000u, 0x7E967699u, 0x01000000u, 0x3F800000u, 0xBF800000u, 0x5F000000u, 0x20000000u, 0u};
+    static const uint32_t odd[] = {0x00000001u, 0x80000001u, 0x007FFFFFu, 0x00800000u,
+                                   0x7F7FFFFFu, 0xFF7FFFFFu, 0x7F800000u, 0x7FC00000u,
+                                   0x80000000u, 0x7E967699u, 0x01000000u, 0x3F800000u,
+                                   0xBF800000u, 0x5F000000u, 0x20000000u, 0u};
     static const int numbers[] = {VREF, REDU, SENS, COLW, DEFS, GOLD, SCAL, DIMS, LOAD};
     uint32_t bytes = 0;
     uint8_t *section = find(data, size, numbers[seed % 9], &bytes);
@@ -153,8 +163,11 @@ static void set_number(uint8_t *data, size_t size, uint32_t seed)
     if (power < 16)
         put(section + place, odd[power]);
     else /* another unit for all of them: the exponents move */
-        for (uint32_t i = 0; i + 4 <= bytes && numbers[seed % 9] != DIMS && numbers[seed % 9] != DEFS && numbers[seed % 9] != LOAD; i += 4) {
-            const uint32_t bits = get(section + i), exponent = (bits >> 23 & 255u) + (power - 24u) * 9u;
+        for (uint32_t i = 0; i + 4 <= bytes && numbers[seed % 9] != DIMS &&
+                             numbers[seed % 9] != DEFS && numbers[seed % 9] != LOAD;
+             i += 4) {
+            const uint32_t bits = get(section + i),
+                           exponent = (bits >> 23 & 255u) + (power - 24u) * 9u;
             if ((bits & 0x7F800000u) != 0 && exponent >= 1 && exponent <= 254)
                 put(section + i, (bits & 0x807FFFFFu) | exponent << 23);
         }

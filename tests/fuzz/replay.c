@@ -1,4 +1,5 @@
-/* Every file of the folders named as arguments into a fuzz target: the kept corpus as a test, under any compiler. */
+/* Every file of the folders named as arguments into a fuzz target: the kept corpus as a test, under
+ * any compiler. */
 #include "fuzz.h"
 
 #include <dirent.h>

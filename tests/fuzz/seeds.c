@@ -1,4 +1,5 @@
-/* Writes the first inputs of a fuzz target into a folder: seeds TARGET FOLDER. scripts/fuzz begins with these and the kept corpus. */
+/* Writes the first inputs of a fuzz target into a folder: seeds TARGET FOLDER. scripts/fuzz begins
+ * with these and the kept corpus. */
 #include "fuzz.h"
 
 #include "small_model.h"
@@ -40,8 +41,13 @@ static void calibrated(unsigned k, const small_model *bare)
 static void models(void)
 {
     for (unsigned k = 0; k < 24; ++k) {
-        const small_spec spec = {.rank = 1 + k % 9, .side = 1 + k % 5, .storage = (eits_storage)(k % 4), .kind = (eits_data_kind)(k % 3),
-                                 .shape = k % 5 == 0 ? SMALL_WAVES : SMALL_RANDOM, .lipschitz_factor = k == 23 ? 0.1 : 0, .fields = k % 6 == 0};
+        const small_spec spec = {.rank = 1 + k % 9,
+                                 .side = 1 + k % 5,
+                                 .storage = (eits_storage)(k % 4),
+                                 .kind = (eits_data_kind)(k % 3),
+                                 .shape = k % 5 == 0 ? SMALL_WAVES : SMALL_RANDOM,
+                                 .lipschitz_factor = k == 23 ? 0.1 : 0,
+                                 .fields = k % 6 == 0};
         if (spec.shape == SMALL_WAVES && spec.side * spec.side < spec.rank)
             continue;
         small_model made = small_model_make(spec);
@@ -66,7 +72,8 @@ static void packets(void)
             payload[i] = (uint8_t)(k % 3 == 0 ? 0 : k % 3 == 1 ? 0xFF : i * 7);
         size_t at = 2;
         for (uint32_t sequence = 0; sequence < 2; ++sequence)
-            at += eits_link_encode(wire + at, sizeof wire - at, (uint8_t)(0x80 + k), sequence, payload, sizes[k], NULL, 0);
+            at += eits_link_encode(wire + at, sizeof wire - at, (uint8_t)(0x80 + k), sequence,
+                                   payload, sizes[k], NULL, 0);
         keep("packets", k, wire, at);
         wire[at / 2] ^= 0x10;
         keep("damaged", k, wire, at - 1);
@@ -80,12 +87,18 @@ static void scripts(void)
         for (unsigned solver = 0; solver < 4; ++solver) {
             uint8_t script[256] = {(uint8_t)(model | (model + solver) % 4 << 4)};
             size_t at = 1;
-            const uint8_t learn[] = {1, 4, 1, 127, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3, 4, 5, 1, 127, 9, 8, 7, 6, 5, 4, 3, 2, 1, 9, 8, 7, 6, 5,
-                                     0, 127, 0, 127};
+            const uint8_t learn[] = {1, 4, 1, 127, 1, 2, 3,   4, 5, 6,   7, 8,  9,
+                                     1, 2, 3, 4,   5, 1, 127, 9, 8, 7,   6, 5,  4,
+                                     3, 2, 1, 9,   8, 7, 6,   5, 0, 127, 0, 127};
             const uint8_t once[] = {0, 0, 127};
-            const uint8_t options[] = {3, 2, 23, (uint8_t)solver, 22, (uint8_t)(model % 3 + (solver > 1 ? 4 : 0) + (model == 2 ? 8 : 0)), 4, (uint8_t)(model % 2)};
-            const uint8_t frames[] = {6, 1, 127, 30, 0, 40, 0, 50, 0, 60, 0, 20, 0, 9, 0, 90, 0, 6, 6, 127, 5, 0, 0, 0xC0, 0x7F,
-                                      5, 1, 127, 1, 30, 2, 40, 0, 50, 0, 60, 0, 20, 0, 9, 0, 90};
+            const uint8_t options[] = {
+                3,  2,
+                23, (uint8_t)solver,
+                22, (uint8_t)(model % 3 + (solver > 1 ? 4 : 0) + (model == 2 ? 8 : 0)),
+                4,  (uint8_t)(model % 2)};
+            const uint8_t frames[] = {6, 1,  127, 30, 0, 40,  0, 50, 0, 60,   0,    20, 0, 9,
+                                      0, 90, 0,   6,  6, 127, 5, 0,  0, 0xC0, 0x7F, 5,  1, 127,
+                                      1, 30, 2,   40, 0, 50,  0, 60, 0, 20,   0,    9,  0, 90};
             memcpy(script + at, solver % 2 ? learn : once, solver % 2 ? sizeof learn : sizeof once);
             at += solver % 2 ? sizeof learn : sizeof once;
             memcpy(script + at, options, sizeof options);

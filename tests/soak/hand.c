@@ -1,7 +1,7 @@
 #include "hand.h"
 
-#include "kernels.h"
-#include "vec.h"
+#include "base/vec.h"
+#include "kernels/kernels.h"
 
 enum { CYCLE = 96, PRESS = 12, HOLD = 60 }; /* frames: a finger's coming and going */
 
@@ -33,7 +33,8 @@ static void factor(hand *h)
         for (uint32_t j = 0; j <= i; ++j) {
             eits_real sum = 0;
             for (uint32_t k = 0; k < h->model->n_folded; ++k)
-                sum += (eits_real)reduction_column(h->model, k)[i] * (eits_real)reduction_column(h->model, k)[j];
+                sum += (eits_real)reduction_column(h->model, k)[i] *
+                       (eits_real)reduction_column(h->model, k)[j];
             h->factor[i][j] = sum;
         }
         trace += h->factor[i][i];
@@ -65,7 +66,8 @@ static void solve(const hand *h, eits_real *y)
 
 int hand_begin(hand *h, const eits_model *model)
 {
-    if (model->n_rows > MOST_ROWS || model->n_folded > MOST_FOLDED || model->rank > MOST_RANK || model->data_kind != EITS_DATA_DIFFERENCE)
+    if (model->n_rows > MOST_ROWS || model->n_folded > MOST_FOLDED || model->rank > MOST_RANK ||
+        model->data_kind != EITS_DATA_DIFFERENCE)
         return 0;
     *h = (hand){.model = model, .random = 20260};
     eits_real squares = 0;
@@ -105,18 +107,22 @@ static void press(const hand *h, uint64_t k, uint32_t f, eits_real *y)
 {
     const eits_model *m = h->model;
     const eits_real change = pressure(k, f) * (eits_real)m->defaults->touch_change_s_per_m;
-    const eits_real x = (eits_real)m->nx * (R(0.2) + R(0.6) * to_and_fro(k + 77 * f, 701 + 130 * f));
-    const eits_real yy = (eits_real)m->ny * (R(0.2) + R(0.6) * to_and_fro(k + 251 * f, 463 + 190 * f));
+    const eits_real x =
+        (eits_real)m->nx * (R(0.2) + R(0.6) * to_and_fro(k + 77 * f, 701 + 130 * f));
+    const eits_real yy =
+        (eits_real)m->ny * (R(0.2) + R(0.6) * to_and_fro(k + 251 * f, 463 + 190 * f));
     const eits_real radius = R(1.5) + (eits_real)f * R(0.5);
     if (change == 0)
         return;
     for (uint32_t j = 0; j < m->n_pixels; ++j) {
-        const eits_real dx = (eits_real)m->pixel[j].ix + R(0.5) - x, dy = (eits_real)m->pixel[j].iy + R(0.5) - yy;
+        const eits_real dx = (eits_real)m->pixel[j].ix + R(0.5) - x,
+                        dy = (eits_real)m->pixel[j].iy + R(0.5) - yy;
         if (dx * dx + dy * dy > radius * radius)
             continue;
         eits_real column[MOST_RANK];
         eits_read_column(&m->sensitivity, j, column);
-        const eits_real scale = m->sensitivity.scale != NULL ? (eits_real)m->sensitivity.scale[j] : 1;
+        const eits_real scale =
+            m->sensitivity.scale != NULL ? (eits_real)m->sensitivity.scale[j] : 1;
         for (uint32_t i = 0; i < m->rank; ++i)
             y[i] += change * scale * column[i] / (eits_real)m->column_weight[j];
     }

@@ -1,5 +1,6 @@
-/* A hand on a skin, synthetic: up to three fingers wander, press and lift; voltages that the model itself would give, drift and
- * noise. By basic operations in a fixed order, so that host and board see the same frames. */
+/* A hand on a skin, synthetic: up to three fingers wander, press and lift; voltages that the model
+ * itself would give, drift and noise. By basic operations in a fixed order, so that host and board
+ * see the same frames. */
 #ifndef EITSKIN_SOAK_HAND_H
 #define EITSKIN_SOAK_HAND_H
 
@@ -21,7 +22,8 @@ int hand_begin(hand *h, const eits_model *model);
 /* A whole number from 0 to below `count`, from the hand's own sequence. */
 uint32_t hand_draw(hand *h, uint32_t count);
 
-/* Frame number k, V: the fingers as they are then on a skin whose gain is `gain`; with `touched` 0 nothing but noise. */
+/* Frame number k, V: the fingers as they are then on a skin whose gain is `gain`; with `touched` 0
+ * nothing but noise. */
 void hand_frame(hand *h, uint64_t k, eits_real gain, int touched, eits_real *frame);
 
 #endif

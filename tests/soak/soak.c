@@ -1,21 +1,29 @@
-/* Very many warm-started frames of a hand on the skin (hand.h), among them broken, dead and saturated ones, tares, changed
- * options: nothing may become infinite, grow, drift or be written outside the workspace.
+/* Very many warm-started frames of a hand on the skin (hand.h), among them broken, dead and
+ * saturated ones, tares, changed options: nothing may become infinite, grow, drift or be written
+ * outside the workspace.
  *
  *     soak MODEL FRAMES [portable]       on a host
  *
- * With SOAK_FRAMES defined it takes no arguments, so many frames and "model.eitm": on an emulated board. The last line's CRC is
- * over all images and touches, the same everywhere. */
+ * With SOAK_FRAMES defined it takes no arguments, so many frames and "model.eitm": on an emulated
+ * board. The last line's CRC is over all images and touches, the same everywhere. */
 #include "hand.h"
 
+#include "base/vec.h"
 #include "eitskin/eitskin.h"
-#include "kernels.h"
-#include "vec.h"
+#include "kernels/kernels.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_MODEL = 1024 * 1024, MOST_WORKSPACE = 640 * 1024, MOST_PIXELS = 4096, GUARD = 64, QUIET_FRAMES = 8, PAINT = 0xA5 };
+enum {
+    MOST_MODEL = 1024 * 1024,
+    MOST_WORKSPACE = 640 * 1024,
+    MOST_PIXELS = 4096,
+    GUARD = 64,
+    QUIET_FRAMES = 8,
+    PAINT = 0xA5
+};
 enum { HELD_FRAMES = 10, LONG_RUN = 100000, SHORT = 1000 };
 static const eits_real HELD_GAP = R(1e-3);
 static const uint32_t FIRST_ID = UINT32_MAX - 5; /* so that ids come round */
@@ -70,7 +78,8 @@ static void check_guards(const guarded *g)
     const size_t size = eits_workspace_size(&model, 0);
     const size_t beyond = sizeof g->workspace - size < GUARD ? sizeof g->workspace - size : GUARD;
     for (size_t i = 0; i < GUARD; ++i)
-        CHECK(g->before[i] == PAINT && g->after[i] == PAINT && (i >= beyond || g->workspace[size + i] == PAINT));
+        CHECK(g->before[i] == PAINT && g->after[i] == PAINT &&
+              (i >= beyond || g->workspace[size + i] == PAINT));
 }
 
 /* As the reference in force was taken. */
@@ -113,7 +122,8 @@ static void change_options(void)
     o.warm_start = hand_draw(&fingers, 8) != 0;
     o.project_baseline = hand_draw(&fingers, 8) != 0;
     o.mac_limit = hand_draw(&fingers, 4) ? 0 : 200000 + hand_draw(&fingers, 1000000);
-    o.touch_search = hand_draw(&fingers, 2) ? EITS_SEARCH_ALL : hand_draw(&fingers, EITS_SEARCH_ALL + 1);
+    o.touch_search =
+        hand_draw(&fingers, 2) ? EITS_SEARCH_ALL : hand_draw(&fingers, EITS_SEARCH_ALL + 1);
     o.refine = hand_draw(&fingers, 3) == 0;
     o.saturation_v = 100 * fingers.rms;
     set_options(&run.ctx, o);
@@ -126,10 +136,14 @@ static uint32_t break_rows(uint32_t wanted)
     uint32_t broken = 0;
     for (uint32_t k = 0; k < wanted; ++k) {
         const uint32_t row = hand_draw(&fingers, model.n_rows);
-        if (row == masked_row || !eits_is_finite(frame[row]) || eits_fabs(frame[row]) > 500 * fingers.rms)
+        if (row == masked_row || !eits_is_finite(frame[row]) ||
+            eits_fabs(frame[row]) > 500 * fingers.rms)
             continue;
         const double value = wild[hand_draw(&fingers, 5)];
-        frame[row] = (eits_real)(value > 999 ? 1000 : value < -999 ? -1000 : value) * (isfinite(value) ? fingers.rms : 1);
+        frame[row] = (eits_real)(value > 999    ? 1000
+                                 : value < -999 ? -1000
+                                                : value) *
+                     (isfinite(value) ? fingers.rms : 1);
         if (!isfinite(value))
             frame[row] = (eits_real)value;
         ++broken;
@@ -142,10 +156,12 @@ static void check_finite(const eits_context *ctx)
     const eits_info *i = &ctx->info;
     for (uint32_t j = 0; j < model.n_pixels; ++j)
         CHECK(eits_is_finite(ctx->image[j]) && eits_is_finite(ctx->x[j]));
-    CHECK(eits_is_finite(i->lambda) && eits_is_finite(i->lambda_max) && eits_is_finite(i->gap) && eits_is_finite(i->gap_rel) &&
-          eits_is_finite(i->residual) && eits_is_finite(i->data_norm));
+    CHECK(eits_is_finite(i->lambda) && eits_is_finite(i->lambda_max) && eits_is_finite(i->gap) &&
+          eits_is_finite(i->gap_rel) && eits_is_finite(i->residual) &&
+          eits_is_finite(i->data_norm));
     CHECK(i->gap >= 0 && i->residual >= 0 && i->residual <= i->data_norm * R(1.001));
-    CHECK(i->iterations <= ctx->options.iterations && i->nonzeros <= model.n_pixels && i->masked <= model.n_rows);
+    CHECK(i->iterations <= ctx->options.iterations && i->nonzeros <= model.n_pixels &&
+          i->masked <= model.n_rows);
     CHECK(ctx->basis_count <= model.rank && ctx->working_count <= model.n_pixels);
     CHECK(i->macs <= 20ull * (i->iterations + 20) * model.n_pixels * model.rank);
 }
@@ -155,11 +171,13 @@ static void check_touches(const eits_touch *touches, uint32_t count)
     CHECK(count <= EITS_MAX_TOUCHES);
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = touches + k;
-        CHECK(t->id != 0 && eits_is_finite(t->x_mm) && eits_is_finite(t->y_mm) && eits_is_finite(t->radius_mm));
+        CHECK(t->id != 0 && eits_is_finite(t->x_mm) && eits_is_finite(t->y_mm) &&
+              eits_is_finite(t->radius_mm));
         CHECK(eits_is_finite(t->strength_s_per_m_mm2) && t->confidence >= 0 && t->confidence <= 1);
         for (uint32_t l = 0; l < k; ++l)
             CHECK(touches[l].id != t->id);
-        const eits_real numbers[] = {t->x_mm, t->y_mm, t->radius_mm, t->strength_s_per_m_mm2, t->confidence, t->load_n};
+        const eits_real numbers[] = {t->x_mm,       t->y_mm,  t->radius_mm, t->strength_s_per_m_mm2,
+                                     t->confidence, t->load_n};
         crc = eits_crc32(crc, &t->id, sizeof t->id);
         crc = eits_crc32(crc, numbers, sizeof numbers);
     }
@@ -218,15 +236,20 @@ static void probe_for_drift(int portable)
     uint32_t count, expected_count;
     CHECK(eits_reconstruct(&run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
     CHECK(eits_reconstruct(&fresh.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
-    if (run.ctx.options.mac_limit == 0) { /* else the limit counts the basis, which one of them made earlier */
+    /* else the limit counts the basis, which one of them made earlier */
+    if (run.ctx.options.mac_limit == 0) {
         const eits_info *a = &run.ctx.info, *b = &fresh.ctx.info;
-        CHECK(memcmp(run.ctx.image, fresh.ctx.image, model.n_pixels * sizeof run.ctx.image[0]) == 0);
-        CHECK(a->stop == b->stop && a->iterations == b->iterations && a->gap == b->gap && a->residual == b->residual);
+        CHECK(memcmp(run.ctx.image, fresh.ctx.image, model.n_pixels * sizeof run.ctx.image[0]) ==
+              0);
+        CHECK(a->stop == b->stop && a->iterations == b->iterations && a->gap == b->gap &&
+              a->residual == b->residual);
         CHECK(eits_find_touches(&run.ctx, seen, EITS_MAX_TOUCHES, &count) == EITS_OK);
-        CHECK(eits_find_touches(&fresh.ctx, expected, EITS_MAX_TOUCHES, &expected_count) == EITS_OK);
+        CHECK(eits_find_touches(&fresh.ctx, expected, EITS_MAX_TOUCHES, &expected_count) ==
+              EITS_OK);
         CHECK(count == expected_count);
         for (uint32_t k = 0; k < count; ++k)
-            CHECK(seen[k].x_mm == expected[k].x_mm && seen[k].y_mm == expected[k].y_mm && seen[k].confidence == expected[k].confidence);
+            CHECK(seen[k].x_mm == expected[k].x_mm && seen[k].y_mm == expected[k].y_mm &&
+                  seen[k].confidence == expected[k].confidence);
     }
     check_guards(&fresh);
     ++counts.probes;
@@ -240,7 +263,8 @@ static eits_real objective(const eits_context *ctx)
     return R(0.5) * ctx->info.residual * ctx->info.residual + ctx->info.lambda * sum;
 }
 
-/* The same frame again and again: the gap asked for is kept, and no result is further from the optimum than its gap. */
+/* The same frame again and again: the gap asked for is kept, and no result is further from the
+ * optimum than its gap. */
 static void hold_a_frame(void)
 {
     const eits_options kept = run.ctx.options;
@@ -255,7 +279,8 @@ static void hold_a_frame(void)
     eits_real first = 0;
     for (int k = 0; k < HELD_FRAMES; ++k) {
         CHECK(eits_reconstruct(&run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
-        const eits_real half = R(0.5) * run.ctx.info.data_norm * run.ctx.info.data_norm, now = objective(&run.ctx);
+        const eits_real half = R(0.5) * run.ctx.info.data_norm * run.ctx.info.data_norm,
+                        now = objective(&run.ctx);
         CHECK(run.ctx.info.gap_rel <= HELD_GAP);
         first = k == 0 ? now : first;
         CHECK(eits_fabs(now - first) <= (HELD_GAP + R(1e-5)) * half);
@@ -330,8 +355,10 @@ int main(int argc, char **argv)
     open_model(argv[1]);
     soak(frames, argc == 4);
 #endif
-    printf("%lu frames, %lu refused, %lu tares, %lu touches, %lu probes, most MACs %lu, kernels %s, next id %lu, crc %08lx\n",
-           (unsigned long)frames, counts.refused, counts.tares, counts.touches, counts.probes, (unsigned long)counts.most_macs,
-           eits_kernels_name(&run.ctx), (unsigned long)run.ctx.next_id, (unsigned long)crc);
+    printf("%lu frames, %lu refused, %lu tares, %lu touches, %lu probes, most MACs %lu, kernels "
+           "%s, next id %lu, crc %08lx\n",
+           (unsigned long)frames, counts.refused, counts.tares, counts.touches, counts.probes,
+           (unsigned long)counts.most_macs, eits_kernels_name(&run.ctx),
+           (unsigned long)run.ctx.next_id, (unsigned long)crc);
     return 0;
 }

@@ -22,7 +22,7 @@ LEAST_LINES_PERCENT = 95.0
 SOURCES = "csrc/src"
 LIBRARIES = "/eitskin_f"  # the objects of both libraries, not the tests'
 NOT_COMPILED = {
-    "csrc/src/kernels_m7.c": (
+    "csrc/src/kernels/m7.c": (
         "is compiled for the Cortex-M7 only and is not in these numbers. Emulated, its bits are"
         " held against the portable kernels' for every storage type and product:"
         " tests/python/emulated."

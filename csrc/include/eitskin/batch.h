@@ -1,4 +1,5 @@
-/* eitskin: many frames that have nothing to do with each other, in one call: for hosts, where a thread has its own context. */
+/* eitskin: many frames that have nothing to do with each other, in one call: for hosts, where a
+ * thread has its own context. */
 #ifndef EITSKIN_BATCH_H
 #define EITSKIN_BATCH_H
 
@@ -10,16 +11,19 @@ extern "C" {
 
 /* One frame's result. Ids count on through the batch, as a frame's touches follow none. */
 typedef struct eits_result {
-    eits_status status; /* of eits_reconstruct; where it is not EITS_OK there are no touches and the image is zero */
-    uint32_t count;     /* touches; 0 where they were not looked for */
+    /* of eits_reconstruct; where it is not EITS_OK there are no touches and the image is zero */
+    eits_status status;
+    uint32_t count; /* touches; 0 where they were not looked for */
     eits_info info;
 } eits_result;
 
-/* eits_forget, eits_reconstruct and eits_find_touches for each of `count` frames of `length` numbers. `images` and
- * `coefficients` (count x n_pixels) may be NULL; `touches` (count x EITS_MAX_TOUCHES) too: then they are not looked for. A frame that is refused says so in its result; the others are done.
- * Errors: EITS_E_ARGUMENT. */
-eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, size_t length, size_t count, eits_real *images,
-                                   eits_real *coefficients, eits_touch *touches, eits_result *results);
+/* eits_forget, eits_reconstruct and eits_find_touches for each of `count` frames of `length`
+ * numbers. `images` and `coefficients` (count x n_pixels) may be NULL; `touches` (count x
+ * EITS_MAX_TOUCHES) too: then they are not looked for. A frame that is refused says so in its
+ * result; the others are done. Errors: EITS_E_ARGUMENT. */
+eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, size_t length,
+                                   size_t count, eits_real *images, eits_real *coefficients,
+                                   eits_touch *touches, eits_result *results);
 
 #ifdef __cplusplus
 }

@@ -2,15 +2,15 @@
 #ifndef EITSKIN_H
 #define EITSKIN_H
 
-#include "eitskin/types.h"
-#include "eitskin/findings.h"
-#include "eitskin/model.h"
-#include "eitskin/load.h"
+#include "eitskin/batch.h"
 #include "eitskin/context.h"
+#include "eitskin/findings.h"
 #include "eitskin/frame.h"
+#include "eitskin/link.h"
+#include "eitskin/load.h"
+#include "eitskin/model.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "eitskin/batch.h"
-#include "eitskin/link.h"
+#include "eitskin/types.h"
 
 #endif

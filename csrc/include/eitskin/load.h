@@ -8,10 +8,13 @@
 extern "C" {
 #endif
 
-/* The load in newtons of a touch of this strength (S/m mm^2, of either sign) at (x, y), by the section LOAD of an open model; 0
- * where it has none. The strength times the gain of the place is looked up in the table, straight between its points; beyond the
- * last, the last slope goes on to twice the greatest load; a place further out than was calibrated counts as on the calibrated rim. */
-eits_real eits_load_n(const eits_model *model, eits_real x_mm, eits_real y_mm, eits_real strength_s_per_m_mm2);
+/* The load in newtons of a touch of this strength (S/m mm^2, of either sign) at (x, y), by the
+ * section LOAD of an open model; 0 where it has none. The strength times the gain of the place is
+ * looked up in the table, straight between its points; beyond the last, the last slope goes on to
+ * twice the greatest load; a place further out than was calibrated counts as on the calibrated rim.
+ */
+eits_real eits_load_n(const eits_model *model, eits_real x_mm, eits_real y_mm,
+                      eits_real strength_s_per_m_mm2);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,8 @@
-/* eitskin: a view of an .eitm model, read in place (docs/reference/eitm-format.md specifies the bytes).
+/* eitskin: a view of an .eitm model, read in place (docs/reference/eitm-format.md specifies the
+ * bytes).
  *
- * Nothing is copied: the view points into the blob, which must stay where it is, unchanged, as long as the view is used.
+ * Nothing is copied: the view points into the blob, which must stay where it is, unchanged, as long
+ * as the view is used.
  */
 #ifndef EITSKIN_MODEL_H
 #define EITSKIN_MODEL_H
@@ -11,25 +13,32 @@
 extern "C" {
 #endif
 
-#define EITS_MODEL_MAJOR 1
-#define EITS_MODEL_MINOR 2
-#define EITS_MODEL_ALIGNMENT 16
-#define EITS_MAX_RANK 1024
-#define EITS_MAX_PIXELS 65535
-#define EITS_MAX_ROWS 65535
+#define EITS_MODEL_MAJOR          1
+#define EITS_MODEL_MINOR          2
+#define EITS_MODEL_ALIGNMENT      16
+#define EITS_MAX_RANK             1024
+#define EITS_MAX_PIXELS           65535
+#define EITS_MAX_ROWS             65535
 #define EITS_MAX_MODEL_ITERATIONS 100000 /* of a model's own defaults; options may ask for more */
 
 /* How the reduced Jacobian is stored. Integer types carry one scale per column. */
-typedef enum eits_storage { EITS_STORAGE_F32 = 0, EITS_STORAGE_F16 = 1, EITS_STORAGE_I16 = 2, EITS_STORAGE_I8 = 3 } eits_storage;
+typedef enum eits_storage {
+    EITS_STORAGE_F32 = 0,
+    EITS_STORAGE_F16 = 1,
+    EITS_STORAGE_I16 = 2,
+    EITS_STORAGE_I8 = 3
+} eits_storage;
 
 /* What the solver's data are, from a frame v and the reference frame v0. */
 typedef enum eits_data_kind {
     EITS_DATA_DIFFERENCE = 0, /* v - v0, in volts of the model */
     EITS_DATA_NORMALISED = 1, /* (v - v0) / v0: for channels that have gains of their own */
-    EITS_DATA_LOG_RATIO = 2   /* v0 log(v / v0): the same sensitivity as a difference, straighter for strong touches */
+    /* v0 log(v / v0): the same sensitivity as a difference, straighter for strong touches */
+    EITS_DATA_LOG_RATIO = 2
 } eits_data_kind;
 
-/* A matrix of `cols` columns of `rows` numbers each, column after column, `stride` numbers apart. */
+/* A matrix of `cols` columns of `rows` numbers each, column after column, `stride` numbers apart.
+ */
 typedef struct eits_matrix {
     const void *data;
     const float *scale; /* one per column for integer storage, else NULL */
@@ -39,12 +48,15 @@ typedef struct eits_matrix {
     eits_storage storage;
 } eits_matrix;
 
-/* The fields that the electrodes' currents make in the untouched skin, and the rim's mirror: for what touches do to each other. */
+/* The fields that the electrodes' currents make in the untouched skin, and the rim's mirror: for
+ * what touches do to each other. */
 typedef struct eits_fields {
-    eits_matrix at;   /* f16, a column a pixel: E_x of each electrode's current, E_y of each, then a_x, a_y, b_x, b_y of the mirror
-                       * (docs/reference/eitm-format.md, "FLDS"); data NULL where the model has none */
-    float volts;      /* dV = -volts change area E . E, in V per (S/m mm^2) */
-    float per_sheet;  /* 1 / (2 pi sigma): m/S */
+    /* f16, a column a pixel: E_x of each electrode's current, E_y of each, then a_x, a_y, b_x,
+     * b_y of the mirror (docs/reference/eitm-format.md, "FLDS"); data NULL where the model has
+     * none */
+    eits_matrix at;
+    float volts;     /* dV = -volts change area E . E, in V per (S/m mm^2) */
+    float per_sheet; /* 1 / (2 pi sigma): m/S */
 } eits_fields;
 
 /* One folded row: the mean of row `first` and, with `sign`, of its reciprocal `second`. */
@@ -64,11 +76,14 @@ typedef struct eits_pixel {
 
 /* How an image is found; each minimises the same objective (solve.h). */
 typedef enum eits_solver {
-    EITS_SOLVER_FISTA = 0,      /* every column in every iteration */
-    EITS_SOLVER_WORKING_SET = 1, /* FISTA on the columns that may differ from zero, chosen anew after gap_every iterations, then ever
-                                 * more rarely, or always so often where gap_rel asks for a gap */
-    EITS_SOLVER_COORDINATE = 2,  /* coordinate descent on such columns; an iteration is a sweep over them */
-    EITS_SOLVER_ACTIVE_SET = 3   /* to the optimum of the columns chosen, then more columns; an iteration is such a round */
+    EITS_SOLVER_FISTA = 0, /* every column in every iteration */
+    /* FISTA on the columns that may differ from zero, chosen anew after gap_every iterations,
+     * then ever more rarely, or always so often where gap_rel asks for a gap */
+    EITS_SOLVER_WORKING_SET = 1,
+    /* coordinate descent on such columns; an iteration is a sweep over them */
+    EITS_SOLVER_COORDINATE = 2,
+    /* to the optimum of the columns chosen, then more columns; an iteration is such a round */
+    EITS_SOLVER_ACTIVE_SET = 3
 } eits_solver;
 
 /* Defaults that the model's maker chose; eits_options_default() starts from them. */
@@ -88,7 +103,8 @@ typedef struct eits_defaults {
     float follow_mm;
     float touch_radius_weight;
     uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
-    uint32_t search_left_out; /* bits of eits_search (context.h) that are not set by default; files before 1.2 have 0 here */
+    /* bits of eits_search (context.h) that are not set by default; files before 1.2 have 0 here */
+    uint32_t search_left_out;
 } eits_defaults;
 
 /* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */
@@ -99,9 +115,10 @@ typedef struct eits_golden {
 } eits_golden;
 
 #define EITS_MAX_LOAD_POINTS 64
-#define EITS_MAX_LOAD_ORDER 4
+#define EITS_MAX_LOAD_ORDER  4
 
-/* How strength and place of a touch tell its load: what a calibration with known weights found (load.h). */
+/* How strength and place of a touch tell its load: what a calibration with known weights found
+ * (load.h). */
 typedef struct eits_load_head {
     uint32_t points;   /* of the table, 2 to EITS_MAX_LOAD_POINTS */
     uint32_t order;    /* of the gain's polynomial, at most EITS_MAX_LOAD_ORDER */
@@ -115,7 +132,8 @@ typedef struct eits_load {
     const eits_load_head *head; /* NULL: the model is not calibrated */
     const float *strength;      /* points, from 0 ascending: S/m mm^2 where the gain is 1 */
     const float *load_n;        /* points, from 0 ascending: N */
-    const float *gain;          /* (order + 1)(order + 2) / 2 coefficients: 1, u, v, u^2, u v, v^2... */
+    /* (order + 1)(order + 2) / 2 coefficients: 1, u, v, u^2, u v, v^2... */
+    const float *gain;
 } eits_load;
 
 typedef struct eits_model {
@@ -129,17 +147,19 @@ typedef struct eits_model {
     float pixel_mm;
     float origin_x_mm, origin_y_mm; /* lower left corner of pixel (0, 0) */
     float current_a;
-    float lipschitz;  /* at least the greatest eigenvalue of S'S as stored, and 2^-126 */
-    float noise_gain; /* max over pixels of the deviation of (S'P n)_j for unit white noise n on the folded rows */
+    float lipschitz; /* at least the greatest eigenvalue of S'S as stored, and 2^-126 */
+    /* max over pixels of the deviation of (S'P n)_j for unit white noise n on the folded rows */
+    float noise_gain;
     uint64_t protocol_hash;
-    const uint8_t *protocol;   /* n_rows x 4: I+, I-, V+, V- */
-    const eits_fold *fold;     /* n_folded */
-    const float *v_ref;        /* n_folded: boundary voltage of the untouched skin as modelled, V */
-    eits_matrix reduction;     /* P: rank x n_folded, whitened data y = P d; always f32 */
-    eits_matrix sensitivity;   /* S: rank x n_pixels, the reduced Jacobian */
+    const uint8_t *protocol; /* n_rows x 4: I+, I-, V+, V- */
+    const eits_fold *fold;   /* n_folded */
+    /* n_folded: boundary voltage of the untouched skin as modelled, V */
+    const float *v_ref;
+    eits_matrix reduction;      /* P: rank x n_folded, whitened data y = P d; always f32 */
+    eits_matrix sensitivity;    /* S: rank x n_pixels, the reduced Jacobian */
     const float *column_weight; /* n_pixels: image_j = coefficient_j * column_weight_j, in S/m */
     eits_fields fields;
-    const eits_pixel *pixel;   /* n_pixels, ordered by iy, then ix */
+    const eits_pixel *pixel; /* n_pixels, ordered by iy, then ix */
     const eits_defaults *defaults;
     eits_golden golden;
     eits_load load;

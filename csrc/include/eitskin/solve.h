@@ -2,26 +2,29 @@
  *
  *     minimise  |y - S x|^2 / 2 + lambda |x|_1     over x >= 0, x <= 0 or all x
  *
- * FISTA: Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183-202, doi 10.1137/080716542. The rows of S are whitened and its columns
- * scaled beforehand, so that the step is known and few iterations do (docs/reference/eitm-format.md, "Reduction").
+ * FISTA: Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183-202, doi 10.1137/080716542. The rows
+ * of S are whitened and its columns scaled beforehand, so that the step is known and few iterations
+ * do (docs/reference/eitm-format.md, "Reduction").
  *
- * EITS_SOLVER_WORKING_SET runs the same iterations on those columns that are not zero or would move, and looks at all of them
- * now and then, and for the gap at the end: a sixth of the work. Its image after a number of iterations is FISTA's but for what
- * columns outside would have done since the last look; its optimum is the same.
+ * EITS_SOLVER_WORKING_SET runs the same iterations on those columns that are not zero or would
+ * move, and looks at all of them now and then, and for the gap at the end: a sixth of the work. Its
+ * image after a number of iterations is FISTA's but for what columns outside would have done since
+ * the last look; its optimum is the same.
  *
- * EITS_SOLVER_COORDINATE sweeps over the columns that may differ from zero, one coefficient after another; an iteration is a
- * sweep. EITS_SOLVER_ACTIVE_SET finds the optimum itself, by Newton's steps on a few columns that come and go; an iteration is a
- * look at every column, and few are needed. The support never exceeds the directions that the data have; where the factor is of
- * no use coordinate descent goes on, and the gap tells how far that came. The optimum is not the best image: it is sparser than
- * a touch (docs/results/benchmarks.md).
+ * EITS_SOLVER_COORDINATE sweeps over the columns that may differ from zero, one coefficient after
+ * another; an iteration is a sweep. EITS_SOLVER_ACTIVE_SET finds the optimum itself, by Newton's
+ * steps on a few columns that come and go; an iteration is a look at every column, and few are
+ * needed. The support never exceeds the directions that the data have; where the factor is of no
+ * use coordinate descent goes on, and the gap tells how far that came. The optimum is not the best
+ * image: it is sparser than a touch (docs/results/benchmarks.md).
  *
- * With mac_limit > 0 each solver stops with the best so far (FISTA: the last so far) where the next step, and the gap after it,
- * would take info.macs beyond the limit. The frame stage's MACs count but are always spent; where S'y is not to be had for the
- * rest, the image is zero.
+ * With mac_limit > 0 each solver stops with the best so far (FISTA: the last so far) where the next
+ * step, and the gap after it, would take info.macs beyond the limit. The frame stage's MACs count
+ * but are always spent; where S'y is not to be had for the rest, the image is zero.
  *
- * A warm start goes on where the last frame ended. Held touches are then iterated ever further: their image is sharper from
- * frame to frame, and a mask threshold that was chosen for cold starts fits it less and less. Where each frame's image is to
- * mean the same, start cold.
+ * A warm start goes on where the last frame ended. Held touches are then iterated ever further:
+ * their image is sharper from frame to frame, and a mask threshold that was chosen for cold starts
+ * fits it less and less. Where each frame's image is to mean the same, start cold.
  */
 #ifndef EITSKIN_SOLVE_H
 #define EITSKIN_SOLVE_H
@@ -32,17 +35,20 @@
 extern "C" {
 #endif
 
-/* One frame to an image: frame stage, gate, solver. `image` (n_pixels, S/m) and `info` may be NULL; both are in ctx as well.
- * On an error the image is cleared, never NaN. Errors: those of eits_frame_stage, EITS_E_NOT_FINITE. */
-eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length, eits_real *image, eits_info *info);
+/* One frame to an image: frame stage, gate, solver. `image` (n_pixels, S/m) and `info` may be NULL;
+ * both are in ctx as well. On an error the image is cleared, never NaN. Errors: those of
+ * eits_frame_stage, EITS_E_NOT_FINITE. */
+eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length,
+                             eits_real *image, eits_info *info);
 
-/* The solver alone on reduced data ctx->y (as eits_frame_stage leaves it). Fills ctx->x, ctx->image and, anew, ctx->info;
- * masked rows and the frame stage's MACs are then not in it. */
+/* The solver alone on reduced data ctx->y (as eits_frame_stage leaves it). Fills ctx->x, ctx->image
+ * and, anew, ctx->info; masked rows and the frame stage's MACs are then not in it. */
 eits_status eits_solve(eits_context *ctx);
 
-/* Run the model's golden frame with default options: the image must have the bits that the model states (float32), or be
- * within `*difference` of it, relative to its peak (reported in either width). The context must be fresh from eits_init;
- * its baseline is the golden reference afterwards. Errors as eits_reconstruct. */
+/* Run the model's golden frame with default options: the image must have the bits that the model
+ * states (float32), or be within `*difference` of it, relative to its peak (reported in either
+ * width). The context must be fresh from eits_init; its baseline is the golden reference
+ * afterwards. Errors as eits_reconstruct. */
 eits_status eits_self_test(eits_context *ctx, eits_real *difference);
 
 #ifdef __cplusplus

@@ -1,7 +1,8 @@
 /* eitskin: scalar width, status codes, version.
  *
- * The same sources build twice on a host: with `float` (what a microcontroller runs) and, with EITS_DOUBLE defined,
- * with `double`, so that the narrow width is always judged against the wide one of the same code.
+ * The same sources build twice on a host: with `float` (what a microcontroller runs) and, with
+ * EITS_DOUBLE defined, with `double`, so that the narrow width is always judged against the wide
+ * one of the same code.
  */
 #ifndef EITSKIN_TYPES_H
 #define EITSKIN_TYPES_H
@@ -28,7 +29,8 @@ typedef float eits_real;
 #define EITS_VERSION_MINOR 1
 #define EITS_VERSION_PATCH 0
 
-/* Every function that can fail returns one of these. How a solve ended is not an error: see eits_info.stop. */
+/* Every function that can fail returns one of these. How a solve ended is not an error: see
+ * eits_info.stop. */
 typedef enum eits_status {
     EITS_OK = 0,
     EITS_E_ARGUMENT = -1,        /* a null pointer, or an option out of its documented range */
@@ -37,15 +39,21 @@ typedef enum eits_status {
     EITS_E_MODEL_MAGIC = -4,     /* not an .eitm model */
     EITS_E_MODEL_VERSION = -5,   /* a newer major version than this library reads */
     EITS_E_MODEL_CRC = -6,       /* the checksum does not fit the content */
-    EITS_E_MODEL_SECTION = -7,   /* a required section is missing, misplaced, misaligned or of the wrong size */
-    EITS_E_MODEL_VALUE = -8,     /* a dimension, index or number inside a section is out of range or not finite */
+    /* a required section is missing, misplaced, misaligned or of the wrong size */
+    EITS_E_MODEL_SECTION = -7,
+    /* a dimension, index or number inside a section is out of range or not finite */
+    EITS_E_MODEL_VALUE = -8,
     EITS_E_MODEL_ALIGNMENT = -9, /* the blob does not start at a 16-byte boundary */
     EITS_E_FRAME_LENGTH = -10,   /* a frame's length is not the number of protocol rows */
     EITS_E_FRAME_CHANNELS = -11, /* more channels are unusable than the options allow */
-    EITS_E_FRAME_ZERO = -12,     /* the reference or another frame is all zero, or a frame nothing but noise: the front end is dead */
-    EITS_E_NO_BASELINE = -13,    /* a frame came before the reference frame was set */
-    EITS_E_BASELINE_SHORT = -14, /* a baseline was finished with fewer quiet frames than it needs */
-    EITS_E_NOT_FINITE = -15      /* a result would not be finite; the outputs were cleared instead */
+    /* the reference or another frame is all zero, or a frame nothing but noise: the front end is
+     * dead */
+    EITS_E_FRAME_ZERO = -12,
+    EITS_E_NO_BASELINE = -13, /* a frame came before the reference frame was set */
+    /* a baseline was finished with fewer quiet frames than it needs */
+    EITS_E_BASELINE_SHORT = -14,
+    /* a result would not be finite; the outputs were cleared instead */
+    EITS_E_NOT_FINITE = -15
 } eits_status;
 
 /* One line of English for a status; never NULL. */

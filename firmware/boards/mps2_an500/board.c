@@ -85,7 +85,8 @@ void mps2_wake(void)
     woken = true;
 }
 
-/* Not WFI: QEMU lets its clock run with the host's while the processor sleeps, and runs would differ. */
+/* Not WFI: QEMU lets its clock run with the host's while the processor sleeps, and runs would
+ * differ. */
 static void spin_until_interrupt(void *ctx)
 {
     const uint32_t start = mps2_time_us(ctx);
@@ -126,12 +127,14 @@ static void show(void *ctx, uint32_t leds)
     (void)leds;
 }
 
-static const fw_system_ops system_ops = {mps2_time_us, spin_until_interrupt, mps2_lock, mps2_unlock,
-                                         feed_watchdog, restart, stack_used, show};
+static const fw_system_ops system_ops = {
+    mps2_time_us, spin_until_interrupt, mps2_lock, mps2_unlock, feed_watchdog,
+    restart,      stack_used,           show};
 
 int main(void)
 {
-    const uint32_t *const here = (const uint32_t *)__builtin_frame_address(0) - LEAVE_FREE / sizeof *here;
+    const uint32_t *const here =
+        (const uint32_t *)__builtin_frame_address(0) - LEAVE_FREE / sizeof *here;
     for (uint32_t *word = stack_bottom(); word < here; ++word)
         *(volatile uint32_t *)word = STACK_PAINT;
     mps2_store_start();
@@ -148,7 +151,8 @@ int main(void)
         .stack_bytes = STACK_BYTES,
         .generator = {&mps2_generator_ops, NULL},
         .multiplexers = {&mps2_multiplexers_ops, NULL},
-        .capture = {&mps2_capture_ops, NULL, MPS2_FULL_SCALE_CODE, MPS2_REFERENCE_UV, MPS2_GAIN_PPM},
+        .capture = {&mps2_capture_ops, NULL, MPS2_FULL_SCALE_CODE, MPS2_REFERENCE_UV,
+                    MPS2_GAIN_PPM},
         .link = {&mps2_link_ops, NULL},
         .store = {&mps2_store_ops, NULL, MPS2_BANK_BYTES},
         .system = &system_ops,

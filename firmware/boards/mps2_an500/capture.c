@@ -16,12 +16,14 @@ static struct {
 } capture;
 static uint16_t buffers[2][FW_MAX_SAMPLES];
 
-static fw_status configure(void *ctx, const fw_capture_setup *setup, void (*done)(void *user, const fw_burst *burst), void *user)
+static fw_status configure(void *ctx, const fw_capture_setup *setup,
+                           void (*done)(void *user, const fw_burst *burst), void *user)
 {
     (void)ctx;
     if (capture.running || done == NULL)
         return FW_E_ARGUMENT;
-    if (setup->sample_rate_hz == 0 || setup->sample_rate_hz > 2000000u || setup->samples == 0 || setup->samples > FW_MAX_SAMPLES)
+    if (setup->sample_rate_hz == 0 || setup->sample_rate_hz > 2000000u || setup->samples == 0 ||
+        setup->samples > FW_MAX_SAMPLES)
         return FW_E_RANGE;
     if (setup->samples * 1000000u % setup->sample_rate_hz != 0)
         return FW_E_RANGE;
@@ -66,11 +68,14 @@ static void stop(void *ctx)
 
 static void next_burst(bool lost)
 {
-    const fw_burst burst = {.samples = buffers[capture.buffer], .start_us = capture.start_us,
-                            .next_start_us = capture.start_us + capture.setup.slot_us, .lost = lost};
+    const fw_burst burst = {.samples = buffers[capture.buffer],
+                            .start_us = capture.start_us,
+                            .next_start_us = capture.start_us + capture.setup.slot_us,
+                            .lost = lost};
     if (!lost) {
         mps2_hold_time();
-        mps2_skin_burst(buffers[capture.buffer], capture.setup.samples, capture.setup.sample_rate_hz, burst.start_us,
+        mps2_skin_burst(buffers[capture.buffer], capture.setup.samples,
+                        capture.setup.sample_rate_hz, burst.start_us,
                         burst.start_us - capture.first_us);
         mps2_release_time();
     }
@@ -84,11 +89,13 @@ void mps2_slot_irq(void)
     TIMER_CTRL(TIMER_SLOT) = 0;
     TIMER_INTCLEAR(TIMER_SLOT) = 1;
     mps2_wake();
-    while (capture.running && (int32_t)(mps2_time_us(NULL) - capture.start_us - capture.burst_us - capture.setup.slot_us) >= 0)
+    while (capture.running && (int32_t)(mps2_time_us(NULL) - capture.start_us - capture.burst_us -
+                                        capture.setup.slot_us) >= 0)
         next_burst(true); /* this interrupt came later than the next burst's end */
     if (capture.running)
         next_burst(false);
-    if (capture.running && !mps2_link_ended(NULL)) /* the end of the run is the end of the skin: the application comes to rest */
+    /* the end of the run is the end of the skin: the application comes to rest */
+    if (capture.running && !mps2_link_ended(NULL))
         await_burst();
 }
 

@@ -1,5 +1,6 @@
-/* The link as files: what the host sends is in "link_in.bin", records of u32 time_us, u32 size and bytes, each given when the
- * board's clock has come to its time; one of no bytes ends the run. What the board sends is in "link_out.bin". */
+/* The link as files: what the host sends is in "link_in.bin", records of u32 time_us, u32 size and
+ * bytes, each given when the board's clock has come to its time; one of no bytes ends the run. What
+ * the board sends is in "link_out.bin". */
 #include "mps2.h"
 
 #include <string.h>
@@ -59,4 +60,5 @@ bool mps2_link_ended(void *ctx)
     return over && left == 0;
 }
 
-const fw_link_ops mps2_link_ops = {.write = write_bytes, .read = read_bytes, .ended = mps2_link_ended};
+const fw_link_ops mps2_link_ops = {
+    .write = write_bytes, .read = read_bytes, .ended = mps2_link_ended};

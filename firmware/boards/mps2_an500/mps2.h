@@ -1,7 +1,9 @@
-/* The board that QEMU's mps2-an500 makes: an instrument whose skin, link and flash are files (docs/guide/hardware.md).
+/* The board that QEMU's mps2-an500 makes: an instrument whose skin, link and flash are files
+ * (docs/guide/hardware.md).
  *
- * Its clock counts instructions: run with -icount shift=6, an instruction takes 64 ns of QEMU's time, which are 1.6 ticks of
- * a 25 MHz timer, and 5 ns of the board's, as if 200 MHz did one instruction a cycle. Runs are reproducible to the bit. */
+ * Its clock counts instructions: run with -icount shift=6, an instruction takes 64 ns of QEMU's
+ * time, which are 1.6 ticks of a 25 MHz timer, and 5 ns of the board's, as if 200 MHz did one
+ * instruction a cycle. Runs are reproducible to the bit. */
 #ifndef MPS2_H
 #define MPS2_H
 
@@ -10,40 +12,43 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#define REG32(address) (*(volatile uint32_t *)(address))
+#define REG32(address)        (*(volatile uint32_t *)(address))
 /* CMSDK timers (Arm DDI 0479, 4.2): count down from VALUE, then from RELOAD. */
-#define TIMER_TIME 0x40000000u /* timer 0: board time */
-#define TIMER_SLOT 0x40001000u /* timer 1: a burst has ended */
-#define TIMER_CTRL(timer) REG32((timer) + 0x0u)
-#define TIMER_VALUE(timer) REG32((timer) + 0x4u)
-#define TIMER_RELOAD(timer) REG32((timer) + 0x8u)
+#define TIMER_TIME            0x40000000u /* timer 0: board time */
+#define TIMER_SLOT            0x40001000u /* timer 1: a burst has ended */
+#define TIMER_CTRL(timer)     REG32((timer) + 0x0u)
+#define TIMER_VALUE(timer)    REG32((timer) + 0x4u)
+#define TIMER_RELOAD(timer)   REG32((timer) + 0x8u)
 #define TIMER_INTCLEAR(timer) REG32((timer) + 0xCu)
-#define TIMER_ENABLE 1u
-#define TIMER_INTERRUPT 8u
+#define TIMER_ENABLE          1u
+#define TIMER_INTERRUPT       8u
 
-#define MPS2_CPU_HZ 200000000u
-#define MPS2_MCLK_HZ 8000000u
-#define MPS2_TICKS_A_US 320u /* 200 instructions of 1.6 */
-#define MPS2_BANK_BYTES (512u * 1024u)
+#define MPS2_CPU_HZ          200000000u
+#define MPS2_MCLK_HZ         8000000u
+#define MPS2_TICKS_A_US      320u /* 200 instructions of 1.6 */
+#define MPS2_BANK_BYTES      (512u * 1024u)
 #define MPS2_FULL_SCALE_CODE 4095
-#define MPS2_REFERENCE_UV 3300000
-#define MPS2_GAIN_PPM 1500000
+#define MPS2_REFERENCE_UV    3300000
+#define MPS2_GAIN_PPM        1500000
 
 uint32_t mps2_time_us(void *ctx);
 uint32_t mps2_lock(void *ctx);
 void mps2_unlock(void *ctx, uint32_t state);
 void mps2_wake(void);
-/* What the world does takes no board time: between these two calls the board's timers stand still. */
+/* What the world does takes no board time: between these two calls the board's timers stand still.
+ */
 void mps2_hold_time(void);
 void mps2_release_time(void);
 
-/* The whole of a file into `bytes`; 0 if there is none. Ends the program if it is longer than `room`. */
+/* The whole of a file into `bytes`; 0 if there is none. Ends the program if it is longer than
+ * `room`. */
 size_t mps2_load(const char *name, void *bytes, size_t room);
 __attribute__((noreturn)) void mps2_fail(const char *what);
 
 void mps2_skin_start(void);
 /* Codes of a burst as the skin, the multiplexers and the generator make them. */
-void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us, uint32_t scanning_us);
+void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us,
+                     uint32_t scanning_us);
 void mps2_link_start(void);
 bool mps2_link_ended(void *ctx);
 void mps2_store_start(void);

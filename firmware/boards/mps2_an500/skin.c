@@ -1,8 +1,11 @@
-/* The analog side: what the AD9833 was told, which electrodes the multiplexers connect, and the voltages from "skin.bin":
+/* The analog side: what the AD9833 was told, which electrodes the multiplexers connect, and the
+ * voltages from "skin.bin":
  *
- *   u32 rows, u32 frames, u32 frame_us; rows x 4 u8 electrodes I+, I-, V+, V-; frames x rows f32 volts, amplitude
+ *   u32 rows, u32 frames, u32 frame_us; rows x 4 u8 electrodes I+, I-, V+, V-; frames x rows f32
+ * volts, amplitude
  *
- * A frame lasts frame_us from the start of the scan on, the last one for ever. Electrodes that are no row's read 0 V. */
+ * A frame lasts frame_us from the start of the scan on, the last one for ever. Electrodes that are
+ * no row's read 0 V. */
 #include "mps2.h"
 
 #include <math.h>
@@ -10,7 +13,7 @@
 
 enum { MOST_BYTES = 1024 * 1024, LINES = 20 };
 #define PHASE_BITS 28
-#define LATE_RAD 0.7f /* of the voltages against the generator: cables, filters, skin */
+#define LATE_RAD   0.7f /* of the voltages against the generator: cables, filters, skin */
 
 static _Alignas(4) uint8_t file_bytes[MOST_BYTES];
 static struct {
@@ -32,7 +35,8 @@ void mps2_skin_start(void)
     uint32_t head[3];
     memcpy(head, file_bytes, sizeof head);
     const size_t cells = (size_t)head[0] * head[1];
-    if (size < sizeof head || size != sizeof head + (size_t)head[0] * 4u + cells * sizeof(float) || cells == 0)
+    if (size < sizeof head || size != sizeof head + (size_t)head[0] * 4u + cells * sizeof(float) ||
+        cells == 0)
         mps2_fail("skin.bin: length");
     skin.rows = head[0];
     skin.frames = head[1];
@@ -41,7 +45,8 @@ void mps2_skin_start(void)
     skin.volts = (const float *)(const void *)(skin.electrodes + (size_t)head[0] * 4u);
 }
 
-/* AD9833 data sheet, tables 6 to 9: B28 loads frequency register 0 in two words, low half first; RESET holds the phase at 0. */
+/* AD9833 data sheet, tables 6 to 9: B28 loads frequency register 0 in two words, low half first;
+ * RESET holds the phase at 0. */
 static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
 {
     const uint32_t b28 = 1u << 13, select = 1u << 11, reset = 1u << 8;
@@ -60,7 +65,8 @@ static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
             parts.half ^= 1u;
         }
     }
-    return (parts.control & select) != 0 ? FW_E_BUS : FW_OK; /* frequency register 1 is not modelled */
+    /* frequency register 1 is not modelled */
+    return (parts.control & select) != 0 ? FW_E_BUS : FW_OK;
 }
 
 static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
@@ -88,25 +94,33 @@ static float connected_volts(uint32_t scanning_us)
         four[k] = (uint8_t)(parts.levels >> 4u * k & 0xFu);
     }
     const uint32_t passed = skin.frame_us == 0 ? 0 : scanning_us / skin.frame_us;
-    const float *const frame = skin.volts + (size_t)(passed < skin.frames ? passed : skin.frames - 1u) * skin.rows;
+    const float *const frame =
+        skin.volts + (size_t)(passed < skin.frames ? passed : skin.frames - 1u) * skin.rows;
     for (uint32_t row = 0; row < skin.rows; ++row)
         if (memcmp(skin.electrodes + (size_t)row * 4u, four, sizeof four) == 0)
             return frame[row];
     return 0;
 }
 
-void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us, uint32_t scanning_us)
+void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us,
+                     uint32_t scanning_us)
 {
     const bool quiet = (parts.control & 1u << 8) != 0 || skin.rows == 0;
     const float volts = quiet ? 0 : connected_volts(scanning_us) * ((float)MPS2_GAIN_PPM * 1e-6f);
-    const float steps = volts * ((float)(MPS2_FULL_SCALE_CODE + 1) / ((float)MPS2_REFERENCE_UV * 1e-6f));
-    const uint32_t a_us = parts.tuning * (MPS2_MCLK_HZ / 1000000u), begin = a_us * (start_us - parts.running_since_us);
+    const float steps =
+        volts * ((float)(MPS2_FULL_SCALE_CODE + 1) / ((float)MPS2_REFERENCE_UV * 1e-6f));
+    const uint32_t a_us = parts.tuning * (MPS2_MCLK_HZ / 1000000u),
+                   begin = a_us * (start_us - parts.running_since_us);
     for (uint32_t k = 0; k < samples; ++k) {
         /* sample k is taken k + 1/2 sample periods after the slot's start */
-        const uint32_t phase = begin + (uint32_t)((uint64_t)a_us * (2u * k + 1u) * 500000u / sample_rate_hz);
+        const uint32_t phase =
+            begin + (uint32_t)((uint64_t)a_us * (2u * k + 1u) * 500000u / sample_rate_hz);
         const float turn = (float)(phase & ((1u << PHASE_BITS) - 1u)) / (float)(1u << PHASE_BITS);
-        const long code = lrintf((float)((MPS2_FULL_SCALE_CODE + 1) / 2) + steps * sinf(turn * 6.283185307f - LATE_RAD));
-        codes[k] = (uint16_t)(code < 0 ? 0 : code > MPS2_FULL_SCALE_CODE ? MPS2_FULL_SCALE_CODE : code);
+        const long code = lrintf((float)((MPS2_FULL_SCALE_CODE + 1) / 2) +
+                                 steps * sinf(turn * 6.283185307f - LATE_RAD));
+        codes[k] = (uint16_t)(code < 0                      ? 0
+                              : code > MPS2_FULL_SCALE_CODE ? MPS2_FULL_SCALE_CODE
+                                                            : code);
     }
 }
 

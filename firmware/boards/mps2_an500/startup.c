@@ -1,5 +1,5 @@
-/* Start of a Cortex-M7 under QEMU's mps2-an500: vectors, FPU on, zeroed memory, semihosting, main. Programs without the
- * interrupt leave its handler out. */
+/* Start of a Cortex-M7 under QEMU's mps2-an500: vectors, FPU on, zeroed memory, semihosting, main.
+ * Programs without the interrupt leave its handler out. */
 #include <stdint.h>
 #include <stdlib.h>
 
@@ -7,18 +7,20 @@ extern uint32_t bss_start, bss_end, stack_top;
 extern void initialise_monitor_handles(void);
 extern int main(void);
 
-#define CPACR (*(volatile uint32_t *)0xE000ED88u)
+#define CPACR        (*(volatile uint32_t *)0xE000ED88u)
 #define CORE_VECTORS 16
-#define IRQ_TIMER1 9 /* Arm DAI 0500, table 3-9 */
+#define IRQ_TIMER1   9 /* Arm DAI 0500, table 3-9 */
 
 void reset(void);
 static void fault(void);
 __attribute__((weak)) void mps2_slot_irq(void);
 
-__attribute__((section(".vectors"), used)) static const void *const vectors[CORE_VECTORS + IRQ_TIMER1 + 1] = {
-    [0] = &stack_top, [1] = (const void *)reset, [2] = (const void *)fault, [3] = (const void *)fault,
-    [4] = (const void *)fault, [5] = (const void *)fault, [6] = (const void *)fault,
-    [CORE_VECTORS + IRQ_TIMER1] = (const void *)mps2_slot_irq};
+__attribute__((section(".vectors"),
+               used)) static const void *const vectors[CORE_VECTORS + IRQ_TIMER1 + 1] = {
+    [0] = &stack_top,          [1] = (const void *)reset,
+    [2] = (const void *)fault, [3] = (const void *)fault,
+    [4] = (const void *)fault, [5] = (const void *)fault,
+    [6] = (const void *)fault, [CORE_VECTORS + IRQ_TIMER1] = (const void *)mps2_slot_irq};
 
 void reset(void)
 {
@@ -38,5 +40,9 @@ static void fault(void)
 /* newlib's exit asks for these where no start files are linked */
 void _init(void);
 void _fini(void);
-void _init(void) {}
-void _fini(void) {}
+void _init(void)
+{
+}
+void _fini(void)
+{
+}

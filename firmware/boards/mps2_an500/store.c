@@ -23,7 +23,8 @@ static fw_status erase(void *ctx, uint32_t bank)
 static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
 {
     (void)ctx;
-    if (bank >= FW_BANKS || offset % 4u != 0 || size % 4u != 0 || offset > MPS2_BANK_BYTES || size > MPS2_BANK_BYTES - offset)
+    if (bank >= FW_BANKS || offset % 4u != 0 || size % 4u != 0 || offset > MPS2_BANK_BYTES ||
+        size > MPS2_BANK_BYTES - offset)
         return FW_E_ARGUMENT;
     for (size_t k = 0; k < size; ++k) /* bits fall, none rises */
         banks[bank][offset + k] &= ((const uint8_t *)bytes)[k];

@@ -1,10 +1,12 @@
 /* The NUCLEO-F767ZI as the application sees it. */
 #include "nucleo.h"
 
-/* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA and 1.5 would (docs/guide/hardware.md). */
+/* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA
+ * and 1.5 would (docs/guide/hardware.md). */
 enum { FULL_SCALE_CODE = 4095, REFERENCE_UV = 3300000, FRONT_END_GAIN_PPM = 1500000 };
 
-/* No 8 MHz: nothing that follows would be right. The red light blinks, from the 16 MHz oscillator, and that is all. */
+/* No 8 MHz: nothing that follows would be right. The red light blinks, from the 16 MHz oscillator,
+ * and that is all. */
 __attribute__((noreturn)) static void no_clock(void)
 {
     RCC_AHB1ENR |= RCC_AHB1ENR_GPIOBEN;
@@ -32,7 +34,8 @@ int main(void)
         .serial = nucleo_serial(),
         .f_cpu_hz = NUCLEO_SYSCLK_HZ,
         .mclk_hz = NUCLEO_MCLK_HZ,
-        .stack_bytes = (uint32_t)((uint8_t *)stack_top - (uint8_t *)stack_bottom) - NUCLEO_STACK_GUARD_BYTES,
+        .stack_bytes =
+            (uint32_t)((uint8_t *)stack_top - (uint8_t *)stack_bottom) - NUCLEO_STACK_GUARD_BYTES,
         .generator = {&nucleo_generator_ops, NULL},
         .multiplexers = {&nucleo_multiplexers_ops, NULL},
         .capture = {&nucleo_capture_ops, NULL, FULL_SCALE_CODE, REFERENCE_UV, FRONT_END_GAIN_PPM},

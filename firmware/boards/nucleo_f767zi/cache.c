@@ -5,15 +5,15 @@
 enum { LINE_BYTES = 32, SETS = 128, WAYS = 4 };
 
 /* RASR: execute never, access, type, subregions left out, size, enabled (PM0253 4.2.6). */
-#define XN (1u << 28)
-#define NO_ACCESS (0u << 24)
-#define READ_WRITE (3u << 24)
-#define WRITE_THROUGH (2u << 16) /* TEX 0, C 1, B 0: what is stored reaches the flash interface */
-#define WRITE_BACK (11u << 16)   /* TEX 1, C 1, B 1: allocates on reads and writes */
-#define UNCACHED (8u << 16)      /* TEX 1, C 0, B 0 */
-#define DEVICE (5u << 16)        /* TEX 0, shareable, C 0, B 1 */
+#define XN            (1u << 28)
+#define NO_ACCESS     (0u << 24)
+#define READ_WRITE    (3u << 24)
+#define WRITE_THROUGH (2u << 16)  /* TEX 0, C 1, B 0: what is stored reaches the flash interface */
+#define WRITE_BACK    (11u << 16) /* TEX 1, C 1, B 1: allocates on reads and writes */
+#define UNCACHED      (8u << 16)  /* TEX 1, C 0, B 0 */
+#define DEVICE        (5u << 16)  /* TEX 0, shareable, C 0, B 1 */
 #define LEFT_OUT(subregions) ((subregions) << 8)
-#define SIZE_LOG2(bits) ((((bits)-1u) << 1) | 1u)
+#define SIZE_LOG2(bits)      ((((bits) - 1u) << 1) | 1u)
 
 static void region(uint32_t number, uint32_t base, uint32_t attributes)
 {
@@ -24,15 +24,18 @@ static void region(uint32_t number, uint32_t base, uint32_t attributes)
 
 void nucleo_cache_start(void)
 {
-    /* Later regions win. The first closes 0x60000000 to 0xDFFFFFFF, where nothing is connected: the core may read ahead
-     * from ordinary memory, and would wait for ever (AN4839 4). */
+    /* Later regions win. The first closes 0x60000000 to 0xDFFFFFFF, where nothing is connected: the
+     * core may read ahead from ordinary memory, and would wait for ever (AN4839 4). */
     region(0, 0x00000000u, XN | NO_ACCESS | LEFT_OUT(0x87u) | SIZE_LOG2(32u));
-    region(1, 0x00000000u, XN | NO_ACCESS | SIZE_LOG2(14u)); /* ITCM, not used: catches null pointers */
+    /* ITCM, not used: catches null pointers */
+    region(1, 0x00000000u, XN | NO_ACCESS | SIZE_LOG2(14u));
     region(2, 0x08000000u, READ_WRITE | WRITE_THROUGH | SIZE_LOG2(21u)); /* flash */
     region(3, 0x20000000u, XN | READ_WRITE | UNCACHED | SIZE_LOG2(17u)); /* DTCM */
-    region(4, 0x20000000u, XN | READ_WRITE | WRITE_BACK | LEFT_OUT(0x03u) | SIZE_LOG2(19u)); /* SRAM1 and 2: after its first 128 KB */
+    /* SRAM1 and 2: after its first 128 KB */
+    region(4, 0x20000000u, XN | READ_WRITE | WRITE_BACK | LEFT_OUT(0x03u) | SIZE_LOG2(19u));
     region(5, 0x40000000u, XN | READ_WRITE | DEVICE | SIZE_LOG2(29u)); /* peripherals */
-    region(6, (uint32_t)stack_bottom, XN | NO_ACCESS | SIZE_LOG2(8u)); /* NUCLEO_STACK_GUARD_BYTES */
+    /* NUCLEO_STACK_GUARD_BYTES */
+    region(6, (uint32_t)stack_bottom, XN | NO_ACCESS | SIZE_LOG2(8u));
     MPU_CTRL = MPU_CTRL_ENABLE | MPU_CTRL_PRIVDEFENA;
     DSB();
     ISB();
@@ -57,7 +60,8 @@ void nucleo_cache_start(void)
 
 void nucleo_cache_forget(const void *start, size_t size)
 {
-    const uint32_t first = (uint32_t)start & ~(uint32_t)(LINE_BYTES - 1), end = (uint32_t)start + size;
+    const uint32_t first = (uint32_t)start & ~(uint32_t)(LINE_BYTES - 1),
+                   end = (uint32_t)start + size;
     DSB();
     for (uint32_t line = first; line < end; line += LINE_BYTES)
         SCB_DCIMVAC = line;

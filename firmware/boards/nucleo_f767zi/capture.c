@@ -1,18 +1,20 @@
 /* Slots and bursts, timed by hardware alone:
  *
  *   TIM5 (1 MHz, the board's clock) --compare--> starts TIM3 at an exact microsecond
- *   TIM3 (1 MHz, wraps every slot)  --OC1REF---> is high from a slot's start for as long as its burst lasts
- *   TIM2 (108 MHz) counts while OC1REF is high --update--> ADC1 converts --> DMA2 stream 0, two buffers in turn
+ *   TIM3 (1 MHz, wraps every slot)  --OC1REF---> is high from a slot's start for as long as its
+ * burst lasts TIM2 (108 MHz) counts while OC1REF is high --update--> ADC1 converts --> DMA2 stream
+ * 0, two buffers in turn
  *
- * Sample k of a slot is taken k + 1/2 sample periods after the slot's start (and a constant few timer clocks): TIM2 stands in
- * the middle of its period between bursts, so that no edge of the gate meets an edge of the sample clock. All timers and the
- * converter's clock divide the same 216 MHz, so the sampling instants do not move against the slots.
+ * Sample k of a slot is taken k + 1/2 sample periods after the slot's start (and a constant few
+ * timer clocks): TIM2 stands in the middle of its period between bursts, so that no edge of the
+ * gate meets an edge of the sample clock. All timers and the converter's clock divide the same 216
+ * MHz, so the sampling instants do not move against the slots.
  */
 #include "nucleo.h"
 
 enum {
-    ADC_CYCLES = 18,  /* a 12-bit conversion: 3 to sample, 12 to convert, 3 to spare */
-    LEAD_US = 40,     /* from a call of start to the first slot */
+    ADC_CYCLES = 18, /* a 12-bit conversion: 3 to sample, 12 to convert, 3 to spare */
+    LEAD_US = 40,    /* from a call of start to the first slot */
     LONGEST_SLOT_US = 65536,
     STREAM = 0,
     TRIGGER_ITR2 = 2, /* TIM2's is TIM3, TIM3's is TIM5 (RM0410 table 176) */
@@ -24,7 +26,8 @@ enum {
     OC1_PWM = 6,
     ADC_EXTSEL_TIM2_TRGO = 11, /* RM0410 table 99; not as on the F4 */
 };
-#define STREAM_FLAGS (DMA_LISR_FEIF0 | DMA_LISR_DMEIF0 | DMA_LISR_TEIF0 | DMA_LISR_HTIF0 | DMA_LISR_TCIF0)
+#define STREAM_FLAGS \
+    (DMA_LISR_FEIF0 | DMA_LISR_DMEIF0 | DMA_LISR_TEIF0 | DMA_LISR_HTIF0 | DMA_LISR_TCIF0)
 
 static struct {
     void (*done)(void *user, const fw_burst *burst);
@@ -40,10 +43,10 @@ NUCLEO_DTCM static uint16_t buffers[2][FW_MAX_SAMPLES];
 void nucleo_capture_start(void)
 {
     nucleo_pin(GPIOA_BASE, 3, PIN_ANALOG, 0, 0, 0);
-    ADC_CCR = 1u << ADC_CCR_ADCPRE_POS; /* APB2 / 4 = 27 MHz, of 36 at most */
+    ADC_CCR = 1u << ADC_CCR_ADCPRE_POS;              /* APB2 / 4 = 27 MHz, of 36 at most */
     ADC_SMPR2(ADC1_BASE) = 0u << ADC_SMPR2_SMP3_POS; /* 3 cycles */
-    ADC_SQR1(ADC1_BASE) = 0; /* one conversion, */
-    ADC_SQR3(ADC1_BASE) = 3u << ADC_SQR3_SQ1_POS; /* of channel 3 */
+    ADC_SQR1(ADC1_BASE) = 0;                         /* one conversion, */
+    ADC_SQR3(ADC1_BASE) = 3u << ADC_SQR3_SQ1_POS;    /* of channel 3 */
     ADC_CR1(ADC1_BASE) = ADC_CR1_OVRIE;
     TIM_PSC(TIM3_BASE) = NUCLEO_TIMER_HZ / 1000000u - 1u;
     TIM_CR2(TIM3_BASE) = (uint32_t)MASTER_OC1REF << TIM_CR2_MMS_POS;
@@ -70,7 +73,8 @@ static void halt(void)
     ADC_SR(ADC1_BASE) = 0;
 }
 
-/* From halt: everything ready for a first slot at `start_us`, which must not be past when TIM5's compare is written. */
+/* From halt: everything ready for a first slot at `start_us`, which must not be past when TIM5's
+ * compare is written. */
 static void arm(uint32_t start_us)
 {
     capture.start_us = start_us;
@@ -80,9 +84,11 @@ static void arm(uint32_t start_us)
     DMA_M0AR(DMA2_BASE, STREAM) = (uint32_t)buffers[0];
     DMA_M1AR(DMA2_BASE, STREAM) = (uint32_t)buffers[1];
     DMA_NDTR(DMA2_BASE, STREAM) = capture.samples;
-    DMA_FCR(DMA2_BASE, STREAM) = 0;               /* direct: each sample is in memory when its request has ended */
-    DMA_CR(DMA2_BASE, STREAM) = (0u << DMA_CR_CHSEL_POS) | DMA_CR_DBM | (3u << DMA_CR_PL_POS) | (1u << DMA_CR_MSIZE_POS) |
-                                (1u << DMA_CR_PSIZE_POS) | DMA_CR_MINC | DMA_CR_CIRC | DMA_CR_TCIE | DMA_CR_TEIE | DMA_CR_DMEIE;
+    /* direct: each sample is in memory when its request has ended */
+    DMA_FCR(DMA2_BASE, STREAM) = 0;
+    DMA_CR(DMA2_BASE, STREAM) = (0u << DMA_CR_CHSEL_POS) | DMA_CR_DBM | (3u << DMA_CR_PL_POS) |
+                                (1u << DMA_CR_MSIZE_POS) | (1u << DMA_CR_PSIZE_POS) | DMA_CR_MINC |
+                                DMA_CR_CIRC | DMA_CR_TCIE | DMA_CR_TEIE | DMA_CR_DMEIE;
     DMA_CR(DMA2_BASE, STREAM) |= DMA_CR_EN;
     /* On again, it needs 3 us to settle: less than until the first slot. */
     ADC_CR2(ADC1_BASE) = ADC_CR2_ADON | ADC_CR2_DMA | ADC_CR2_DDS | (1u << ADC_CR2_EXTEN_POS) |
@@ -91,9 +97,11 @@ static void arm(uint32_t start_us)
     TIM_CCMR1(TIM3_BASE) = (uint32_t)OC1_INACTIVE << TIM_CCMR1_OC1M_POS;
     TIM_ARR(TIM3_BASE) = capture.slot_us - 1u;
     TIM_CCR1(TIM3_BASE) = capture.burst_us;
-    TIM_EGR(TIM3_BASE) = TIM_EGR_UG;              /* the prescaler begins anew; */
-    TIM_CNT(TIM3_BASE) = capture.slot_us - 1u;    /* a microsecond after its start TIM3 wraps: the first slot. */
-    TIM_CCMR1(TIM3_BASE) = (uint32_t)OC1_PWM << TIM_CCMR1_OC1M_POS; /* high while it is below burst_us */
+    TIM_EGR(TIM3_BASE) = TIM_EGR_UG; /* the prescaler begins anew; */
+    /* a microsecond after its start TIM3 wraps: the first slot. */
+    TIM_CNT(TIM3_BASE) = capture.slot_us - 1u;
+    /* high while it is below burst_us */
+    TIM_CCMR1(TIM3_BASE) = (uint32_t)OC1_PWM << TIM_CCMR1_OC1M_POS;
     TIM_ARR(TIM2_BASE) = capture.sample_ticks - 1u;
     TIM_CNT(TIM2_BASE) = capture.sample_ticks / 2u;
     TIM_CR1(TIM2_BASE) = TIM_CR1_CEN;
@@ -101,13 +109,15 @@ static void arm(uint32_t start_us)
     TIM_CCR1(TIM5_BASE) = start_us - 1u;
 }
 
-static fw_status configure(void *ctx, const fw_capture_setup *setup, void (*done)(void *user, const fw_burst *burst), void *user)
+static fw_status configure(void *ctx, const fw_capture_setup *setup,
+                           void (*done)(void *user, const fw_burst *burst), void *user)
 {
     (void)ctx;
     const uint32_t rate = setup->sample_rate_hz, samples = setup->samples;
     if (capture.running || done == NULL)
         return FW_E_ARGUMENT;
-    /* The converter's clock divides into samples, and a burst into microseconds, without a rest: or instants would shift. */
+    /* The converter's clock divides into samples, and a burst into microseconds, without a rest: or
+     * instants would shift. */
     if (rate == 0 || NUCLEO_ADC_HZ % rate != 0 || NUCLEO_ADC_HZ / rate < ADC_CYCLES)
         return FW_E_RANGE;
     if (samples == 0 || samples > FW_MAX_SAMPLES || samples * 1000000u % rate != 0)
@@ -129,7 +139,8 @@ static fw_status start(void *ctx)
     if (capture.done == NULL || capture.running)
         return FW_E_ARGUMENT;
     halt();
-    const uint32_t state = nucleo_lock(ctx); /* arming is a few microseconds; an interrupt could make it more than the lead */
+    /* arming is a few microseconds; an interrupt could make it more than the lead */
+    const uint32_t state = nucleo_lock(ctx);
     capture.running = true;
     arm(nucleo_time_us(ctx) + LEAD_US);
     nucleo_unlock(ctx, state);
@@ -147,7 +158,10 @@ static void stop(void *ctx)
 /* The burst that was due now is told, and the next one is due. */
 static void tell(uint32_t start_us, uint32_t buffer, uint32_t next_start_us, bool lost)
 {
-    const fw_burst burst = {.samples = buffers[buffer], .start_us = start_us, .next_start_us = next_start_us, .lost = lost};
+    const fw_burst burst = {.samples = buffers[buffer],
+                            .start_us = start_us,
+                            .next_start_us = next_start_us,
+                            .lost = lost};
     capture.done(capture.user, &burst);
 }
 
@@ -159,15 +173,17 @@ static void next_burst(bool lost)
     tell(start_us, buffer, capture.start_us, lost);
 }
 
-/* The buffer that DMA fills now is `filling`: the other one's burst is the last that ended. If this interrupt came a whole
- * slot late or more, the bursts between have been overwritten, or soon will be: the clock says how many, the buffer's parity
- * settles it where the clock stands at the edge. */
+/* The buffer that DMA fills now is `filling`: the other one's burst is the last that ended. If this
+ * interrupt came a whole slot late or more, the bursts between have been overwritten, or soon will
+ * be: the clock says how many, the buffer's parity settles it where the clock stands at the edge.
+ */
 static void bursts_ended(uint32_t filling)
 {
     const uint32_t late_us = nucleo_time_us(NULL) - capture.start_us - capture.burst_us;
     uint32_t missed = (int32_t)late_us < 0 ? 0 : late_us / capture.slot_us;
     if (((capture.buffer + missed) & 1u) == filling)
-        missed += missed == 0 || late_us % capture.slot_us > capture.slot_us / 2u ? 1u : (uint32_t)-1;
+        missed +=
+            missed == 0 || late_us % capture.slot_us > capture.slot_us / 2u ? 1u : (uint32_t)-1;
     for (; missed > 0 && capture.running; --missed)
         next_burst(true);
     if (capture.running)
@@ -179,7 +195,8 @@ static void burst_failed(void)
 {
     const uint32_t lost_us = capture.start_us;
     halt();
-    const uint32_t now = nucleo_time_us(NULL), slots = (now + LEAD_US - lost_us) / capture.slot_us + 1u;
+    const uint32_t now = nucleo_time_us(NULL),
+                   slots = (now + LEAD_US - lost_us) / capture.slot_us + 1u;
     arm(lost_us + slots * capture.slot_us);
     tell(lost_us, 0, capture.start_us, true);
 }
@@ -187,7 +204,9 @@ static void burst_failed(void)
 void nucleo_dma2_stream0_irq(void)
 {
     uint32_t flags = 0, filling;
-    do { /* a burst that ends meanwhile counts too: which buffer is being filled must fit the flags that were cleared */
+    /* a burst that ends meanwhile counts too: which buffer is being filled must fit the flags
+     * that were cleared */
+    do {
         flags |= DMA_LISR(DMA2_BASE);
         DMA_LIFCR(DMA2_BASE) = STREAM_FLAGS;
         filling = (DMA_CR(DMA2_BASE, STREAM) & DMA_CR_CT) != 0 ? 1u : 0u;

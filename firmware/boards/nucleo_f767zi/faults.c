@@ -1,12 +1,15 @@
-/* A processor fault, or an interrupt that nobody asked for: what is known is kept over a reset, and told after it. */
+/* A processor fault, or an interrupt that nobody asked for: what is known is kept over a reset, and
+ * told after it. */
 #include "nucleo.h"
 
 #define CRASH_MAGIC 0xC0A57ED5u
 
 typedef struct crash_record {
     uint32_t magic;
-    uint32_t words[5]; /* pc, lr, cfsr, hfsr, address; of an unexpected interrupt: cfsr 0 and its exception number as address */
-    uint32_t check;    /* sum of the words: memory after power-up is random */
+    /* pc, lr, cfsr, hfsr, address; of an unexpected interrupt: cfsr 0 and its exception number
+     * as address */
+    uint32_t words[5];
+    uint32_t check; /* sum of the words: memory after power-up is random */
 } crash_record;
 
 NUCLEO_NOINIT static crash_record crash;
@@ -33,8 +36,10 @@ __attribute__((naked)) void nucleo_fault_irq(void)
 void nucleo_crash(const uint32_t *frame)
 {
     const uint32_t cfsr = SCB_CFSR;
-    /* Nothing was stacked, or nothing can be read, if stacking failed; r0 to r3, r12, lr, pc, xpsr otherwise. */
-    const uint32_t lowest = (uint32_t)stack_bottom + NUCLEO_STACK_GUARD_BYTES, highest = (uint32_t)stack_top - 32u;
+    /* Nothing was stacked, or nothing can be read, if stacking failed; r0 to r3, r12, lr, pc, xpsr
+     * otherwise. */
+    const uint32_t lowest = (uint32_t)stack_bottom + NUCLEO_STACK_GUARD_BYTES,
+                   highest = (uint32_t)stack_top - 32u;
     const bool inside = (uint32_t)frame >= lowest && (uint32_t)frame <= highest;
     const bool stacked = inside && (cfsr & (SCB_CFSR_MSTKERR | SCB_CFSR_STKERR)) == 0;
     crash.words[0] = stacked ? frame[6] : 0;

@@ -12,10 +12,12 @@ void nucleo_generator_start(void)
 {
     select_chip(false);
     nucleo_pin(GPIOD_BASE, FSYNC, PIN_OUTPUT, 0, 1, 0);
-    /* SCLK idles high and the AD9833 takes data on its falling edge (AD9833 data sheet, figure 3): mode 2. */
+    /* SCLK idles high and the AD9833 takes data on its falling edge (AD9833 data sheet, figure 3):
+     * mode 2. */
     const uint32_t mode = SPI_CR1_CPOL;
-    const uint32_t prescaler = 3u << SPI_CR1_BR_POS; /* 54 MHz / 16 = 3.4 MHz: wires of some length are no trouble */
-    SPI_CR2(SPI3_BASE) = 15u << SPI_CR2_DS_POS;      /* 16 bits */
+    /* 54 MHz / 16 = 3.4 MHz: wires of some length are no trouble */
+    const uint32_t prescaler = 3u << SPI_CR1_BR_POS;
+    SPI_CR2(SPI3_BASE) = 15u << SPI_CR2_DS_POS; /* 16 bits */
     SPI_CR1(SPI3_BASE) = mode | prescaler | SPI_CR1_MSTR | SPI_CR1_SSM | SPI_CR1_SSI;
     SPI_CR1(SPI3_BASE) |= SPI_CR1_SPE; /* the levels are there before the pins are */
     nucleo_pin(GPIOC_BASE, 10, PIN_ALTERNATE, 6, 1, 0);
@@ -42,7 +44,8 @@ static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
             SPI_DR(SPI3_BASE) = words[k];
         else
             status = FW_E_TIMEOUT;
-        /* What was written is out when the FIFO is empty and then the shifter idle (RM0410 35.5.9). */
+        /* What was written is out when the FIFO is empty and then the shifter idle (RM0410 35.5.9).
+         */
         if (!status_becomes(queued, 0) || !status_becomes(SPI_SR_BSY, 0))
             status = FW_E_TIMEOUT;
         select_chip(false);

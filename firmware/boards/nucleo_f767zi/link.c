@@ -1,13 +1,16 @@
-/* USART3 at 1 Mbaud through the ST-LINK's virtual COM port: TX PD8, RX PD9. DMA moves the bytes both ways, between rings in
- * DTCM; counts run freely and wrap. */
+/* USART3 at 1 Mbaud through the ST-LINK's virtual COM port: TX PD8, RX PD9. DMA moves the bytes
+ * both ways, between rings in DTCM; counts run freely and wrap. */
 #include "nucleo.h"
 
 #include <string.h>
 
-enum { TX_BYTES = 32768, RX_BYTES = 16384, TX = 3, RX = 1, CHANNEL = 4 }; /* streams 3 and 1 of DMA1 (RM0410 table 26) */
+/* streams 3 and 1 of DMA1 (RM0410 table 26) */
+enum { TX_BYTES = 32768, RX_BYTES = 16384, TX = 3, RX = 1, CHANNEL = 4 };
 #define BAUD 1000000u
-#define TX_FLAGS (DMA_LISR_FEIF3 | DMA_LISR_DMEIF3 | DMA_LISR_TEIF3 | DMA_LISR_HTIF3 | DMA_LISR_TCIF3)
-#define RX_FLAGS (DMA_LISR_FEIF1 | DMA_LISR_DMEIF1 | DMA_LISR_TEIF1 | DMA_LISR_HTIF1 | DMA_LISR_TCIF1)
+#define TX_FLAGS \
+    (DMA_LISR_FEIF3 | DMA_LISR_DMEIF3 | DMA_LISR_TEIF3 | DMA_LISR_HTIF3 | DMA_LISR_TCIF3)
+#define RX_FLAGS \
+    (DMA_LISR_FEIF1 | DMA_LISR_DMEIF1 | DMA_LISR_TEIF1 | DMA_LISR_HTIF1 | DMA_LISR_TCIF1)
 
 NUCLEO_DTCM static uint8_t tx_ring[TX_BYTES], rx_ring[RX_BYTES];
 static struct {
@@ -24,14 +27,14 @@ void nucleo_link_start(void)
 {
     nucleo_pin(GPIOD_BASE, 8, PIN_ALTERNATE, 7, 1, 0);
     nucleo_pin(GPIOD_BASE, 9, PIN_ALTERNATE, 7, 1, 1); /* pulled up: no cable is an idle line */
-    USART_BRR(USART3_BASE) = NUCLEO_APB1_HZ / BAUD; /* 54, exactly */
+    USART_BRR(USART3_BASE) = NUCLEO_APB1_HZ / BAUD;    /* 54, exactly */
     USART_CR3(USART3_BASE) = USART_CR3_DMAT | USART_CR3_DMAR | USART_CR3_EIE;
 
     DMA_PAR(DMA1_BASE, RX) = (uint32_t)&USART_RDR(USART3_BASE);
     DMA_M0AR(DMA1_BASE, RX) = (uint32_t)rx_ring;
     DMA_NDTR(DMA1_BASE, RX) = RX_BYTES;
-    DMA_CR(DMA1_BASE, RX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (2u << DMA_CR_PL_POS) | DMA_CR_MINC | DMA_CR_CIRC |
-                            DMA_CR_TCIE;
+    DMA_CR(DMA1_BASE, RX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (2u << DMA_CR_PL_POS) |
+                            DMA_CR_MINC | DMA_CR_CIRC | DMA_CR_TCIE;
     DMA_CR(DMA1_BASE, RX) |= DMA_CR_EN;
     DMA_PAR(DMA1_BASE, TX) = (uint32_t)&USART_TDR(USART3_BASE);
 
@@ -48,8 +51,8 @@ static void send_piece(void)
     tx.sending = waiting < TX_BYTES - at ? waiting : TX_BYTES - at;
     if (tx.sending == 0)
         return;
-    DMA_CR(DMA1_BASE, TX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (1u << DMA_CR_PL_POS) | DMA_CR_MINC |
-                            (1u << DMA_CR_DIR_POS) | DMA_CR_TCIE | DMA_CR_TEIE;
+    DMA_CR(DMA1_BASE, TX) = ((uint32_t)CHANNEL << DMA_CR_CHSEL_POS) | (1u << DMA_CR_PL_POS) |
+                            DMA_CR_MINC | (1u << DMA_CR_DIR_POS) | DMA_CR_TCIE | DMA_CR_TEIE;
     DMA_M0AR(DMA1_BASE, TX) = (uint32_t)&tx_ring[at];
     DMA_NDTR(DMA1_BASE, TX) = tx.sending;
     DSB(); /* the bytes are in memory */
@@ -72,7 +75,8 @@ static bool write_bytes(void *ctx, const uint8_t *bytes, size_t size)
     return true;
 }
 
-/* A transfer error ends the stream too: its bytes count as sent, the host sees a gap, and the link goes on. */
+/* A transfer error ends the stream too: its bytes count as sent, the host sees a gap, and the link
+ * goes on. */
 void nucleo_dma1_stream3_irq(void)
 {
     const uint32_t flags = DMA_LISR(DMA1_BASE);
@@ -100,9 +104,11 @@ static size_t read_bytes(void *ctx, uint8_t *bytes, size_t room)
     (void)ctx;
     const uint32_t received = bytes_received();
     uint32_t waiting = received - rx.taken;
-    if ((int32_t)waiting <= 0) /* less than nothing: DMA has wrapped, and its interrupt has not been yet */
+    /* less than nothing: DMA has wrapped, and its interrupt has not been yet */
+    if ((int32_t)waiting <= 0)
         return 0;
-    if (waiting > RX_BYTES) { /* overrun: what was there is gone, and the checksum of a packet will tell */
+    /* overrun: what was there is gone, and the checksum of a packet will tell */
+    if (waiting > RX_BYTES) {
         rx.taken = received;
         return 0;
     }
@@ -125,7 +131,8 @@ void nucleo_dma1_stream1_irq(void)
     DSB();
 }
 
-/* A message has ended, or a byte was bad: bad bytes are not stored (RM0410 34.5.15), and an overrun not cleared stops it all. */
+/* A message has ended, or a byte was bad: bad bytes are not stored (RM0410 34.5.15), and an overrun
+ * not cleared stops it all. */
 void nucleo_usart3_irq(void)
 {
     USART_ICR(USART3_BASE) = USART_ICR_IDLECF | USART_ICR_ORECF | USART_ICR_NCF | USART_ICR_FECF;

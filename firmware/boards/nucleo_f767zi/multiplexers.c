@@ -1,13 +1,15 @@
-/* The four ADG1206: lines 0 to 15 (addresses) on PE0 to PE15, 16 to 19 (enables) on PF12 to PF15. */
+/* The four ADG1206: lines 0 to 15 (addresses) on PE0 to PE15, 16 to 19 (enables) on PF12 to PF15.
+ */
 #include "nucleo.h"
 
 enum { ENABLE_PIN = 12, ADDRESS_LINES = 16 };
 #define ADDRESSES 0x0000FFFFu
-#define ENABLES 0x000F0000u
+#define ENABLES   0x000F0000u
 
 void nucleo_multiplexers_start(void)
 {
-    GPIO_BSRR(GPIOF_BASE) = (ENABLES >> ADDRESS_LINES << ENABLE_PIN) << 16; /* off, before they are outputs */
+    /* off, before they are outputs */
+    GPIO_BSRR(GPIOF_BASE) = (ENABLES >> ADDRESS_LINES << ENABLE_PIN) << 16;
     for (uint32_t line = 0; line < 4; ++line)
         nucleo_pin(GPIOF_BASE, ENABLE_PIN + line, PIN_OUTPUT, 0, 1, 0);
     for (uint32_t line = 0; line < ADDRESS_LINES; ++line)
@@ -24,7 +26,8 @@ static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
     if ((mask & ADDRESSES) != 0)
         GPIO_BSRR(GPIOE_BASE) = (high & ADDRESSES) | (low & ADDRESSES) << 16;
     if ((mask & ENABLES) != 0)
-        GPIO_BSRR(GPIOF_BASE) = ((high >> ADDRESS_LINES) | (low >> ADDRESS_LINES << 16)) << ENABLE_PIN;
+        GPIO_BSRR(GPIOF_BASE) = ((high >> ADDRESS_LINES) | (low >> ADDRESS_LINES << 16))
+                                << ENABLE_PIN;
     return FW_OK;
 }
 
@@ -32,7 +35,8 @@ static void wait_ns(void *ctx, uint32_t ns)
 {
     (void)ctx;
     const uint32_t per_us = NUCLEO_SYSCLK_HZ / 1000000u;
-    const uint32_t start = DWT_CYCCNT, cycles = ns / 1000u * per_us + (ns % 1000u * per_us + 999u) / 1000u;
+    const uint32_t start = DWT_CYCCNT,
+                   cycles = ns / 1000u * per_us + (ns % 1000u * per_us + 999u) / 1000u;
     while (DWT_CYCCNT - start < cycles)
         ;
 }

@@ -8,16 +8,17 @@
 #include <stdint.h>
 
 #define NUCLEO_SYSCLK_HZ 216000000u
-#define NUCLEO_APB1_HZ 54000000u
-#define NUCLEO_TIMER_HZ 108000000u /* of TIM2 to TIM5: twice APB1 (RM0410 5.2) */
-#define NUCLEO_ADC_HZ 27000000u
-#define NUCLEO_MCLK_HZ 8000000u
+#define NUCLEO_APB1_HZ   54000000u
+#define NUCLEO_TIMER_HZ  108000000u /* of TIM2 to TIM5: twice APB1 (RM0410 5.2) */
+#define NUCLEO_ADC_HZ    27000000u
+#define NUCLEO_MCLK_HZ   8000000u
 
-#define NUCLEO_STACK_PAINT 0x57AC57ACu
+#define NUCLEO_STACK_PAINT       0x57AC57ACu
 #define NUCLEO_STACK_GUARD_BYTES 256u
 
-/* Zero at start, in memory that is not cached and that DMA reaches: for whatever DMA reads or writes. */
-#define NUCLEO_DTCM __attribute__((section(".dtcm")))
+/* Zero at start, in memory that is not cached and that DMA reaches: for whatever DMA reads or
+ * writes. */
+#define NUCLEO_DTCM   __attribute__((section(".dtcm")))
 /* Not touched by the start-up code. */
 #define NUCLEO_NOINIT __attribute__((section(".noinit")))
 
@@ -33,12 +34,19 @@ enum { NUCLEO_URGENCY_CAPTURE = 0x10, NUCLEO_URGENCY_LINK = 0x40, NUCLEO_URGENCY
 
 bool nucleo_clock_start(void); /* false: no 8 MHz from the ST-LINK */
 void nucleo_cache_start(void);
-void nucleo_cache_forget(const void *start, size_t size); /* of read-only memory that was written behind the cache's back */
+/* of read-only memory that was written behind the cache's back */
+void nucleo_cache_forget(const void *start, size_t size);
 void nucleo_interrupt(uint32_t irq, uint32_t urgency);
 
 /* A pin's function; speeds and pulls are 2-bit fields of RM0410 6.4. */
-typedef enum nucleo_pin_mode { PIN_INPUT = 0, PIN_OUTPUT = 1, PIN_ALTERNATE = 2, PIN_ANALOG = 3 } nucleo_pin_mode;
-void nucleo_pin(uint32_t port, uint32_t pin, nucleo_pin_mode mode, uint32_t alternate, uint32_t speed, uint32_t pull);
+typedef enum nucleo_pin_mode {
+    PIN_INPUT = 0,
+    PIN_OUTPUT = 1,
+    PIN_ALTERNATE = 2,
+    PIN_ANALOG = 3
+} nucleo_pin_mode;
+void nucleo_pin(uint32_t port, uint32_t pin, nucleo_pin_mode mode, uint32_t alternate,
+                uint32_t speed, uint32_t pull);
 
 uint32_t nucleo_time_us(void *ctx);
 uint32_t nucleo_lock(void *ctx);

@@ -1,21 +1,24 @@
 /* From reset to main: vectors, the stack painted, FPU, .data and .bss. */
 #include "nucleo.h"
 
-extern uint32_t data_start[], data_end[], data_load[], bss_start[], bss_end[], dtcm_start[], dtcm_end[];
+extern uint32_t data_start[], data_end[], data_load[], bss_start[], bss_end[], dtcm_start[],
+    dtcm_end[];
 
 void nucleo_reset(void);
 void nucleo_start(void);
 
-/* RM0410 table 46. What is not used is a fault: an interrupt that nobody asked for is a bug to hear of. */
+/* RM0410 table 46. What is not used is a fault: an interrupt that nobody asked for is a bug to hear
+ * of. */
 #define CORE_VECTORS 16
-__attribute__((section(".vectors"), used)) static void (*const vectors[CORE_VECTORS + IRQ_COUNT])(void) = {
+__attribute__((section(".vectors"),
+               used)) static void (*const vectors[CORE_VECTORS + IRQ_COUNT])(void) = {
     (void (*)(void))stack_top,
     nucleo_reset,
     [2 ... 6] = nucleo_fault_irq, /* NMI, hard, memory, bus and usage fault */
     [11 ... 12] = nucleo_fault_irq,
     [14] = nucleo_fault_irq,
     [15] = nucleo_tick_irq,
-    [CORE_VECTORS ... CORE_VECTORS + IRQ_DMA1_STREAM1 - 1] = nucleo_fault_irq,
+    [CORE_VECTORS... CORE_VECTORS + IRQ_DMA1_STREAM1 - 1] = nucleo_fault_irq,
     [CORE_VECTORS + IRQ_DMA1_STREAM1] = nucleo_dma1_stream1_irq,
     [CORE_VECTORS + IRQ_DMA1_STREAM1 + 1] = nucleo_fault_irq,
     [CORE_VECTORS + IRQ_DMA1_STREAM3] = nucleo_dma1_stream3_irq,
@@ -28,7 +31,8 @@ __attribute__((section(".vectors"), used)) static void (*const vectors[CORE_VECT
     [CORE_VECTORS + IRQ_DMA2_STREAM0 + 1 ... CORE_VECTORS + IRQ_COUNT - 1] = nucleo_fault_irq,
 };
 
-/* The whole stack is painted before a word of it is used; stack_used counts what is still painted. */
+/* The whole stack is painted before a word of it is used; stack_used counts what is still painted.
+ */
 __attribute__((naked)) void nucleo_reset(void)
 {
     __asm volatile("ldr r0, =stack_bottom\n"
@@ -53,7 +57,8 @@ __attribute__((used, noreturn)) void nucleo_start(void)
     SCB_CPACR |= 0xFu << 20; /* full access to CP10 and CP11, the FPU (PM0253 4.6.1) */
     DSB();
     ISB();
-    RCC_AHB1ENR |= RCC_AHB1ENR_DTCMRAMEN; /* on after reset; a debugger may have left it otherwise */
+    /* on after reset; a debugger may have left it otherwise */
+    RCC_AHB1ENR |= RCC_AHB1ENR_DTCMRAMEN;
     const uint32_t *from = data_load;
     for (uint32_t *to = data_start; to < data_end; ++to)
         *to = *from++;

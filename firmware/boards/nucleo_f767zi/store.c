@@ -1,16 +1,18 @@
-/* Two banks for models in the program's own flash: 0x08040000 (sectors 5 and 6) and 0x080C0000 (7 and 8), 512 KB each.
+/* Two banks for models in the program's own flash: 0x08040000 (sectors 5 and 6) and 0x080C0000 (7
+ * and 8), 512 KB each.
  *
- * The flash is one bank (nDBANK set, as delivered): while it erases or programs, whoever reads it waits, the processor too
- * (RM0410 3.3.6). A sector of 256 KB takes 1 s, at most 4 (data sheet, table 52); bytes that the host sends meanwhile are kept
- * by DMA. */
+ * The flash is one bank (nDBANK set, as delivered): while it erases or programs, whoever reads it
+ * waits, the processor too (RM0410 3.3.6). A sector of 256 KB takes 1 s, at most 4 (data sheet,
+ * table 52); bytes that the host sends meanwhile are kept by DMA. */
 #include "nucleo.h"
 
 #include <string.h>
 
 enum { SECTORS_A_BANK = 2, FIRST_SECTOR = 5, WORD_US = 1000, SECTOR_US = 6000000 };
-#define BANKS_START 0x08040000u
+#define BANKS_START  0x08040000u
 #define SECTOR_BYTES (256u * 1024u)
-#define ERRORS (FLASH_SR_OPERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_PGPERR | FLASH_SR_ERSERR)
+#define ERRORS \
+    (FLASH_SR_OPERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_PGPERR | FLASH_SR_ERSERR)
 #define WORDS_OF_32_BITS (2u << FLASH_CR_PSIZE_POS) /* 2.7 to 3.6 V */
 
 static const uint8_t *bank_start(void *ctx, uint32_t bank)
@@ -48,7 +50,8 @@ static void close_flash(void)
 
 static bool all_ones(const uint8_t *start, size_t size)
 {
-    const uint32_t *word = (const uint32_t *)(const void *)start, *const end = word + size / sizeof *word;
+    const uint32_t *word = (const uint32_t *)(const void *)start, *const end =
+                                                                      word + size / sizeof *word;
     while (word < end)
         if (*word++ != 0xFFFFFFFFu)
             return false;
@@ -62,7 +65,8 @@ static fw_status erase(void *ctx, uint32_t bank)
     fw_status status = open_flash();
     for (uint32_t k = 0; k < SECTORS_A_BANK && status == FW_OK; ++k) {
         nucleo_feed_watchdog(ctx);
-        FLASH_CR = WORDS_OF_32_BITS | FLASH_CR_SER | (FIRST_SECTOR + SECTORS_A_BANK * bank + k) << FLASH_CR_SNB_POS;
+        FLASH_CR = WORDS_OF_32_BITS | FLASH_CR_SER |
+                   (FIRST_SECTOR + SECTORS_A_BANK * bank + k) << FLASH_CR_SNB_POS;
         FLASH_CR |= FLASH_CR_STRT;
         DSB();
         status = finished(SECTOR_US);
@@ -70,12 +74,14 @@ static fw_status erase(void *ctx, uint32_t bank)
     close_flash();
     nucleo_feed_watchdog(ctx);
     nucleo_cache_forget(bank_start(ctx, bank), NUCLEO_BANK_BYTES);
-    return status == FW_OK && !all_ones(bank_start(ctx, bank), NUCLEO_BANK_BYTES) ? FW_E_FLASH : status;
+    return status == FW_OK && !all_ones(bank_start(ctx, bank), NUCLEO_BANK_BYTES) ? FW_E_FLASH
+                                                                                  : status;
 }
 
 static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
 {
-    if (bank >= FW_BANKS || offset % 4u != 0 || size % 4u != 0 || offset > NUCLEO_BANK_BYTES || size > NUCLEO_BANK_BYTES - offset)
+    if (bank >= FW_BANKS || offset % 4u != 0 || size % 4u != 0 || offset > NUCLEO_BANK_BYTES ||
+        size > NUCLEO_BANK_BYTES - offset)
         return FW_E_ARGUMENT;
     const uint8_t *const start = bank_start(ctx, bank) + offset;
     fw_status status = open_flash();
@@ -84,7 +90,9 @@ static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *
         uint32_t word;
         memcpy(&word, (const uint8_t *)bytes + at, sizeof word);
         REG32((uint32_t)start + at) = word;
-        DSB(); /* one word at a time: two merged would not fit the parallelism (RM0410 3.3.7); and Arm's erratum 1259864 */
+        /* one word at a time: two merged would not fit the parallelism (RM0410 3.3.7); and Arm's
+         * erratum 1259864 */
+        DSB();
         status = finished(WORD_US);
     }
     close_flash();

@@ -39,7 +39,8 @@ void nucleo_system_start(void)
     nucleo_pin(GPIOB_BASE, LED_BLUE, PIN_OUTPUT, 0, 0, 0);
     nucleo_pin(GPIOB_BASE, LED_RED, PIN_OUTPUT, 0, 0, 0);
 
-    /* 32 kHz / 64 / 4000: about 8 s, more than the longest erase of a sector (4 s), during which the program stands still. */
+    /* 32 kHz / 64 / 4000: about 8 s, more than the longest erase of a sector (4 s), during which
+     * the program stands still. */
     IWDG_KR = 0xCCCCu;
     IWDG_KR = 0x5555u;
     IWDG_PR = 4u;
@@ -73,7 +74,8 @@ uint32_t nucleo_time_us(void *ctx)
     return TIM_CNT(TIM5_BASE);
 }
 
-/* An interrupt that is pending ends WFI even while interrupts are off: none can slip in between the look and the sleep. */
+/* An interrupt that is pending ends WFI even while interrupts are off: none can slip in between the
+ * look and the sleep. */
 static void sleep_until_interrupt(void *ctx)
 {
     (void)ctx;
@@ -116,7 +118,8 @@ static void restart(void *ctx)
 static uint32_t stack_used(void *ctx)
 {
     (void)ctx;
-    const uint32_t *word = stack_bottom + NUCLEO_STACK_GUARD_BYTES / sizeof *word; /* below, a look is a fault */
+    /* below, a look is a fault */
+    const uint32_t *word = stack_bottom + NUCLEO_STACK_GUARD_BYTES / sizeof *word;
     while (word < stack_top && *word == NUCLEO_STACK_PAINT)
         ++word;
     return (uint32_t)(stack_top - word) * (uint32_t)sizeof *word;
@@ -125,10 +128,13 @@ static uint32_t stack_used(void *ctx)
 static void show(void *ctx, uint32_t leds)
 {
     (void)ctx;
-    const uint32_t on = (leds & 1u) << LED_GREEN | (leds >> 1 & 1u) << LED_BLUE | (leds >> 2 & 1u) << LED_RED;
+    const uint32_t on =
+        (leds & 1u) << LED_GREEN | (leds >> 1 & 1u) << LED_BLUE | (leds >> 2 & 1u) << LED_RED;
     const uint32_t all = 1u << LED_GREEN | 1u << LED_BLUE | 1u << LED_RED;
     GPIO_BSRR(GPIOB_BASE) = on | (all & ~on) << 16;
 }
 
-const fw_system_ops nucleo_system_ops = {nucleo_time_us, sleep_until_interrupt, nucleo_lock, nucleo_unlock,
-                                         nucleo_feed_watchdog, restart, stack_used, show};
+const fw_system_ops nucleo_system_ops = {nucleo_time_us,       sleep_until_interrupt,
+                                         nucleo_lock,          nucleo_unlock,
+                                         nucleo_feed_watchdog, restart,
+                                         stack_used,           show};

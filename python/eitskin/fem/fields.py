@@ -2,7 +2,7 @@
 
 The Jacobian knows products of fields, each touch by itself. What touches do to each other needs the
 fields themselves: each touch answers as a dipole in the field that the others bend
-(csrc/src/coupling.h has the formula).
+(csrc/src/touch/interaction.h has the formula).
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ FloatArray = npt.NDArray[np.float64]
 
 HEAD = struct.Struct("<IIfff12x")
 MAX_POINTS, MAX_ORDER = 64, 4
-MOST_GAIN = 4.0  # csrc/src/load.c
+MOST_GAIN = 4.0  # csrc/src/model/force.c
 LEAST_RADIUS_MM, HUGE, MOST_REACH, MOST_COEFFICIENT = 1e-6, 1e30, 1e3, 1e6
 
 
@@ -56,7 +56,7 @@ class LoadLaw:
 
     def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
         """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the
-        table by its last slope, to twice its greatest load. What eits_load_n in csrc/src/load.c
+        table by its last slope, to twice its greatest load. What eits_load_n in csrc/src/model/force.c
         gives."""
         seen = np.abs(strength) * self.gains_at(place_mm)
         s, n = self.strength.astype(np.float64), self.load_n.astype(np.float64)

@@ -1,5 +1,5 @@
 """What is found wrong with a frame, in numpy: the rules of
-csrc/src/{electrodes,glitch,misfit,crowded}.c, written for reading.
+csrc/src/diagnostics/{electrodes,outliers,model_mismatch,crowded}.c, written for reading.
 
 docs/reference/diagnostics.md says what each rule is for and what its thresholds were chosen on.
 """
@@ -377,7 +377,7 @@ class Examiner:
 
     def crowd(self, touches: tuple[Touch, ...], options: Options, clearness: float) -> None:
         """Whether there are more touches than can be told apart, by the score of
-        csrc/src/crowded.c; ``found.unexplained`` is known. ``clearness``: max(S'y) over that of
+        csrc/src/diagnostics/crowded.c; ``found.unexplained`` is known. ``clearness``: max(S'y) over that of
         noise."""
         count, left = len(touches), self.found.unexplained
         if not count or "crowded" not in self.wanted or clearness < CROWD_FAINT:

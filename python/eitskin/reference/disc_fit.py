@@ -1,4 +1,4 @@
-"""The numpy reference of the off-grid fit of discs in csrc/src/fit.c, keep.c and disc.c: the same
+"""The numpy reference of the off-grid fit of discs in csrc/src/touch/disc_fit.c, keep.c and disc.c: the same
 steps, written for reading."""
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Coordinate descent and active set of the numpy reference: the C core's rules, written for
 reading.
 
-csrc/src/coordinate.c and active_set.c say where the methods are from. The columns' products are
+csrc/src/solve/coordinate_descent.c and active_set.c say where the methods are from. The columns' products are
 solved with anew at each step; the core keeps a factor of them up to date.
 """
 

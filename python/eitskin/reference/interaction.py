@@ -1,4 +1,4 @@
-"""The numpy reference of csrc/src/coupling.c: what touches do to each other's field, as data on the
+"""The numpy reference of csrc/src/touch/interaction.c: what touches do to each other's field, as data on the
 folded rows."""
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ NO_DIPOLE_MM2 = 1e-6
 
 def interplay(model: Model, discs: Sequence[Disc]) -> FloatArray:
     """What the interplay of ``discs`` adds to the folded data (k,), in the model's volts; see
-    csrc/src/coupling.h.
+    csrc/src/touch/interaction.h.
 
     The model must have fields.
     """

@@ -1,4 +1,4 @@
-"""The numpy reference of csrc/src/regroup.c: discs that are one touch are joined, those that are
+"""The numpy reference of csrc/src/touch/split_merge.c: discs that are one touch are joined, those that are
 two are parted."""
 
 from __future__ import annotations

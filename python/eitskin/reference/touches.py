@@ -1,4 +1,4 @@
-"""The numpy reference of the search for touches in csrc/src/touch.c and track.c: the same steps,
+"""The numpy reference of the search for touches in csrc/src/touch/touch.c and track.c: the same steps,
 written for reading."""
 
 from __future__ import annotations

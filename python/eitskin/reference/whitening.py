@@ -1,4 +1,4 @@
-"""The numpy reference of csrc/src/observed.c and floor.c: the reduction that a model would have had
+"""The numpy reference of csrc/src/frame/whitening.c and floor.c: the reduction that a model would have had
 without the rows that a frame lacks, or with a higher floor."""
 
 from __future__ import annotations

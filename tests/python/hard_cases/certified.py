@@ -54,7 +54,7 @@ class Judged:
 
     @property
     def gap(self) -> float:
-        """The duality gap (csrc/src/certificate.c has the formula)."""
+        """The duality gap (csrc/src/solve/duality_gap.c has the formula)."""
         r = self.residual
         correlation = self.s.T @ r
         largest = greatest(correlation, self.sign)

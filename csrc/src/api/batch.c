@@ -1,0 +1,29 @@
+#include "eitskin/batch.h"
+
+#include "base/vec.h"
+#include "eitskin/solve.h"
+#include "eitskin/touch.h"
+
+eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, size_t length,
+                                   size_t count, eits_real *images, eits_real *coefficients,
+                                   eits_touch *touches, eits_result *results)
+{
+    if (ctx == NULL || frames == NULL || results == NULL)
+        return EITS_E_ARGUMENT;
+    const size_t pixels = ctx->model->n_pixels;
+    for (size_t k = 0; k < count; ++k) {
+        eits_result *result = results + k;
+        memset(result, 0, sizeof *result);
+        eits_forget(ctx);
+        result->status = eits_reconstruct(ctx, frames + k * length, length, NULL, NULL);
+        if (result->status == EITS_OK && touches != NULL)
+            (void)eits_find_touches(ctx, touches + k * EITS_MAX_TOUCHES, EITS_MAX_TOUCHES,
+                                    &result->count);
+        result->info = ctx->info;
+        if (images != NULL)
+            eits_copy(images + k * pixels, ctx->image, pixels);
+        if (coefficients != NULL)
+            eits_copy(coefficients + k * pixels, ctx->x, pixels);
+    }
+    return EITS_OK;
+}

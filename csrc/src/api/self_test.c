@@ -1,0 +1,32 @@
+/* The golden frame that each model carries. */
+#include "base/vec.h"
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+
+eits_status eits_self_test(eits_context *ctx, eits_real *difference)
+{
+    if (ctx == NULL || difference == NULL)
+        return EITS_E_ARGUMENT;
+    const eits_model *model = ctx->model;
+    /* n_rows numbers that a single reference frame leaves unused */
+    eits_real *frame = ctx->baseline.m2;
+    *difference = 0;
+    for (uint32_t i = 0; i < model->n_rows; ++i)
+        ctx->baseline.v0[i] = (eits_real)model->golden.reference[i];
+    eits_status status = eits_baseline_set(ctx, ctx->baseline.v0, model->n_rows);
+    if (status != EITS_OK)
+        return status;
+    for (uint32_t i = 0; i < model->n_rows; ++i)
+        frame[i] = (eits_real)model->golden.frame[i];
+    status = eits_reconstruct(ctx, frame, model->n_rows, NULL, NULL);
+    eits_real largest = 0, peak = 0;
+    for (uint32_t j = 0; j < model->n_pixels; ++j) {
+        const eits_real expected = (eits_real)model->golden.image[j],
+                        off = eits_fabs(ctx->image[j] - expected);
+        largest = off > largest ? off : largest;
+        peak = eits_fabs(expected) > peak ? eits_fabs(expected) : peak;
+    }
+    *difference = peak > 0 ? largest / peak : largest;
+    eits_zero(frame, model->n_rows);
+    return status;
+}

@@ -1,0 +1,32 @@
+/* IEEE 754 half precision to float, exactly; subnormals too. Infinities and NaN are refused when a
+ * model is opened. */
+#ifndef EITSKIN_HALF_H
+#define EITSKIN_HALF_H
+
+#include <stdint.h>
+#include <string.h>
+
+static inline float eits_half_to_float(uint16_t half)
+{
+#if defined(__ARM_ARCH_7EM__) && defined(__ARM_FP)
+    /* both FPUs of that architecture convert halves, though GCC does not know it of fpv5-sp-d16 */
+    float value;
+    __asm__("vmov %0, %1\n\tvcvtb.f32.f16 %0, %0" : "=t"(value) : "r"((uint32_t)half));
+    return value;
+#else
+    /* the exponent and fraction as float bits, 112 too low in the exponent, mended by an exact
+     * multiplication by 2^112 */
+    const uint32_t bits = (uint32_t)(half & 0x7FFFu) << 13;
+    const uint32_t sign = (uint32_t)(half & 0x8000u) << 16;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    value *= 0x1p112f;
+    uint32_t result;
+    memcpy(&result, &value, sizeof result);
+    result |= sign;
+    memcpy(&value, &result, sizeof value);
+    return value;
+#endif
+}
+
+#endif

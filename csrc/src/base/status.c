@@ -1,0 +1,76 @@
+#include "eitskin/findings.h"
+
+const char *eits_status_text(eits_status status)
+{
+    switch (status) {
+    case EITS_OK:
+        return "ok";
+    case EITS_E_ARGUMENT:
+        return "an argument is null or out of range";
+    case EITS_E_WORKSPACE:
+        return "the workspace is too small or not 16-byte aligned";
+    case EITS_E_MODEL_TRUNCATED:
+        return "the model ends before the size that its header states";
+    case EITS_E_MODEL_MAGIC:
+        return "this is not an .eitm model";
+    case EITS_E_MODEL_VERSION:
+        return "the model has a newer major version than this library reads";
+    case EITS_E_MODEL_CRC:
+        return "the model's checksum does not fit its content";
+    case EITS_E_MODEL_SECTION:
+        return "a section of the model is missing, misplaced or of the wrong size";
+    case EITS_E_MODEL_VALUE:
+        return "a number inside the model is out of range";
+    case EITS_E_MODEL_ALIGNMENT:
+        return "the model does not start at a 16-byte boundary";
+    case EITS_E_FRAME_LENGTH:
+        return "the frame's length is not the number of rows of the protocol";
+    case EITS_E_FRAME_CHANNELS:
+        return "too many channels of the frame are unusable";
+    case EITS_E_FRAME_ZERO:
+        return "all voltages are zero; is the skin driven and connected?";
+    case EITS_E_NO_BASELINE:
+        return "no reference frame has been set";
+    case EITS_E_BASELINE_SHORT:
+        return "the baseline has too few quiet frames";
+    case EITS_E_NOT_FINITE:
+        return "the result would not be finite";
+    }
+    return "unknown status";
+}
+
+const char *eits_finding_text(eits_finding finding)
+{
+    switch (finding) {
+    case EITS_FINDING_SATURATED:
+        return "saturated";
+    case EITS_FINDING_ELECTRODE_OPEN:
+        return "electrode open";
+    case EITS_FINDING_BRIDGED:
+        return "electrodes bridged";
+    case EITS_FINDING_GLITCH:
+        return "glitch";
+    case EITS_FINDING_ELECTRODE_NOISY:
+        return "electrode noisy";
+    case EITS_FINDING_MISFIT:
+        return "misfit";
+    case EITS_FINDING_STALE_REFERENCE:
+        return "stale reference";
+    case EITS_FINDING_CROWDED:
+        return "crowded";
+    }
+    return "unknown finding";
+}
+
+#define TEXT_OF(x) #x
+#define TEXT(x)    TEXT_OF(x)
+
+const char *eits_version_text(void)
+{
+    return TEXT(EITS_VERSION_MAJOR) "." TEXT(EITS_VERSION_MINOR) "." TEXT(EITS_VERSION_PATCH);
+}
+
+size_t eits_real_size(void)
+{
+    return sizeof(eits_real);
+}

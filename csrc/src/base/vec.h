@@ -1,0 +1,53 @@
+/* Small vector sums in a fixed order: eight lanes, each a chain of fused multiply-adds, then a
+ * fixed tree. */
+#ifndef EITSKIN_VEC_H
+#define EITSKIN_VEC_H
+
+#include "eitskin/types.h"
+
+#include <math.h>
+#include <string.h>
+
+#ifdef EITS_DOUBLE
+#define eits_fma  fma
+#define eits_sqrt sqrt
+#define eits_fabs fabs
+#else
+#define eits_fma  fmaf
+#define eits_sqrt sqrtf
+#define eits_fabs fabsf
+#endif
+
+#define R(x) ((eits_real)(x))
+
+static inline eits_real eits_tree8(const eits_real lane[8])
+{
+    return ((lane[0] + lane[4]) + (lane[2] + lane[6])) +
+           ((lane[1] + lane[5]) + (lane[3] + lane[7]));
+}
+
+static inline void eits_zero(eits_real *out, size_t count)
+{
+    memset(out, 0, count * sizeof *out);
+}
+
+static inline void eits_copy(eits_real *out, const eits_real *a, size_t count)
+{
+    memmove(out, a, count * sizeof *out); /* may be the same place */
+}
+
+/* Finite by its exponent's bits, so that no compiler flag can take the test away. */
+static inline int eits_is_finite(eits_real value)
+{
+#ifdef EITS_DOUBLE
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return (bits & 0x7FF0000000000000u) != 0x7FF0000000000000u;
+#else
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return (bits & 0x7F800000u) != 0x7F800000u;
+#endif
+}
+
+#endif

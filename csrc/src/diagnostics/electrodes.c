@@ -1,0 +1,192 @@
+/* Open electrodes and bridged pairs: all the rows that would tell otherwise are dead. */
+#include "diagnostics/diagnostics.h"
+
+#include "base/vec.h"
+
+enum { DEAD = 1, ALIVE = 2, TURNED = 4 }; /* 0: a row that tells nothing */
+
+typedef struct limits {
+    eits_real significant, noise;
+} limits;
+
+static limits limits_of(const eits_context *ctx)
+{
+    const eits_real share = EITS_ROW_SIGNIFICANT * ctx->baseline.v0_rms,
+                    noise = EITS_ROW_DEAD_NOISE * ctx->baseline.noise_v;
+    return (limits){share > 10 * noise ? share : 10 * noise, noise};
+}
+
+static int judge_row(const eits_context *ctx, const eits_real *frame, limits most, uint32_t i)
+{
+    const eits_real v0 = ctx->baseline.v0[i], size = eits_fabs(v0);
+    if (!(size >= most.significant) || (ctx->unusable[i] & EITS_ROW_MASKED) != 0)
+        return 0;
+    if (ctx->unusable[i] != 0)
+        return DEAD;
+    const eits_real share = EITS_ROW_DEAD_SHARE * size,
+                    limit = share > most.noise ? share : most.noise;
+    const eits_real along = v0 < 0 ? -frame[i] : frame[i];
+    if (along >= limit)
+        return ALIVE;
+    return along > -limit ? DEAD : ALIVE | TURNED;
+}
+
+/* Far beyond what a touch makes of a row, be its reference ever so small. */
+static int is_grown(const eits_context *ctx, const eits_real *frame, limits most, uint32_t i)
+{
+    const eits_real v0 = eits_fabs(ctx->baseline.v0[i]),
+                    least = EITS_ROW_SMALL * ctx->baseline.v0_rms;
+    return ctx->unusable[i] == 0 &&
+           eits_fabs(frame[i]) > eits_fma(EITS_ROW_GROWN, v0 > least ? v0 : least, most.noise);
+}
+
+static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
+{
+    const uint8_t *row = eits_row(ctx, i);
+    const unsigned any = ctx->electrode[row[0]] | ctx->electrode[row[1]] | ctx->electrode[row[2]] |
+                         ctx->electrode[row[3]];
+    return (any & (unsigned)state) != 0;
+}
+
+/* Every significant row of an open electrode is dead. Were that so for all of them, it would not be
+ * the electrodes. Returns whether any electrode is alive; `alive` says which. */
+static int find_open(eits_context *ctx, const eits_real *frame, limits most, uint8_t *alive)
+{
+    uint8_t rows[EITS_MOST_ELECTRODES] = {0};
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        const int state = judge_row(ctx, frame, most, i);
+        if (state == 0)
+            continue;
+        for (uint32_t k = 0; k < 4; ++k) {
+            const uint8_t e = eits_row(ctx, i)[k];
+            rows[e] = (uint8_t)(rows[e] + (rows[e] < EITS_ROWS_TO_JUDGE));
+            alive[e] |= (state & ALIVE) != 0;
+        }
+    }
+    uint32_t judged = 0, open = 0;
+    for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
+        judged += rows[e] >= EITS_ROWS_TO_JUDGE;
+        open += rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e];
+    }
+    if (open == judged)
+        return 0;
+    if (open == 0 || !eits_wants(ctx, EITS_FINDING_ELECTRODE_OPEN))
+        return 1;
+    for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
+        if (rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e])
+            ctx->electrode[e] |= EITS_ELECTRODE_OPEN;
+    }
+    ctx->info.findings |= EITS_FINDING_ELECTRODE_OPEN;
+    return 1;
+}
+
+int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f)
+{
+    return (two[0] == e && two[1] == f) || (two[0] == f && two[1] == e);
+}
+
+/* Whether all significant rows that drive or measure across (e, f), and use no open electrode, are
+ * dead, and enough of them. */
+static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits most, uint8_t e,
+                        uint8_t f)
+{
+    uint32_t dead = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        const uint8_t *row = eits_row(ctx, i);
+        if ((!eits_is_pair(row, e, f) && !eits_is_pair(row + 2, e, f)) ||
+            uses(ctx, i, EITS_ELECTRODE_OPEN))
+            continue;
+        const int state = judge_row(ctx, frame, most, i);
+        if ((state & ALIVE) != 0)
+            return 0;
+        dead += state == DEAD;
+    }
+    return dead >= EITS_ROWS_TO_JUDGE;
+}
+
+/* Both of a bridged pair are alive in rows that use one of them alone. */
+static void find_bridged(eits_context *ctx, const eits_real *frame, limits most,
+                         const uint8_t *alive)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (judge_row(ctx, frame, most, i) != DEAD || uses(ctx, i, EITS_ELECTRODE_OPEN))
+            continue;
+        for (uint32_t k = 0; k < 4; k += 2) {
+            const uint8_t e = eits_row(ctx, i)[k], f = eits_row(ctx, i)[k + 1];
+            const unsigned known = ctx->electrode[e] & ctx->electrode[f] & EITS_ELECTRODE_BRIDGED;
+            if (known != 0 || !alive[e] || !alive[f] || !pair_is_dead(ctx, frame, most, e, f))
+                continue;
+            ctx->electrode[e] |= EITS_ELECTRODE_BRIDGED;
+            ctx->electrode[f] |= EITS_ELECTRODE_BRIDGED;
+            ctx->info.findings |= EITS_FINDING_BRIDGED;
+        }
+    }
+}
+
+void eits_name_electrodes(eits_context *ctx)
+{
+    eits_info *info = &ctx->info;
+    info->open_electrodes = info->bridged_electrodes = info->noisy_electrodes = 0;
+    for (uint32_t e = 0; e < ctx->model->n_electrodes && e < 64; ++e) {
+        const uint64_t bit = (uint64_t)1 << e;
+        info->open_electrodes |= (ctx->electrode[e] & EITS_ELECTRODE_OPEN) != 0 ? bit : 0;
+        info->bridged_electrodes |= (ctx->electrode[e] & EITS_ELECTRODE_BRIDGED) != 0 ? bit : 0;
+        info->noisy_electrodes |= (ctx->electrode[e] & EITS_ELECTRODE_NOISY) != 0 ? bit : 0;
+    }
+}
+
+void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_row_state why)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (uses(ctx, i, state))
+            ctx->unusable[i] |= (uint8_t)why;
+    }
+}
+
+void eits_leave_glitch(eits_context *ctx, uint32_t i)
+{
+    ctx->unusable[i] |= EITS_ROW_GLITCH;
+    ++ctx->info.glitches;
+    ctx->info.findings |= EITS_FINDING_GLITCH;
+}
+
+/* Rows that no sheet gives, if they are few; more of them are a misfit. */
+static void leave_impossible(eits_context *ctx, const eits_real *frame, limits most)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if ((judge_row(ctx, frame, most, i) & TURNED) != 0 || is_grown(ctx, frame, most, i))
+            eits_leave_glitch(ctx, i);
+    }
+}
+
+int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
+{
+    const limits most = limits_of(ctx);
+    /* silent: dead, though they can be used */
+    uint32_t dead = 0, silent = 0, turned = 0, grown = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        const int state = judge_row(ctx, frame, most, i);
+        dead += state == DEAD;
+        silent += state == DEAD && ctx->unusable[i] == 0;
+        turned += (state & TURNED) != 0;
+        grown += (uint32_t)is_grown(ctx, frame, most, i);
+    }
+    if (turned >= EITS_ROWS_TO_JUDGE && eits_wants(ctx, EITS_FINDING_MISFIT))
+        ctx->info.findings |= EITS_FINDING_MISFIT;
+    if (turned + grown > 0 && turned + grown < EITS_ROWS_TO_JUDGE &&
+        eits_wants(ctx, EITS_FINDING_GLITCH))
+        leave_impossible(ctx, frame, most);
+    if (dead < EITS_ROWS_TO_JUDGE)
+        return 1;
+    uint8_t alive[EITS_MOST_ELECTRODES] = {0};
+    if (!find_open(ctx, frame, most, alive))
+        return silent < EITS_ROWS_TO_JUDGE;
+    if (eits_wants(ctx, EITS_FINDING_BRIDGED))
+        find_bridged(ctx, frame, most, alive);
+    if ((ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED)) == 0)
+        return 1;
+    eits_name_electrodes(ctx);
+    eits_leave_electrodes(ctx, EITS_ELECTRODE_OPEN, EITS_ROW_OPEN);
+    eits_leave_electrodes(ctx, EITS_ELECTRODE_BRIDGED, EITS_ROW_BRIDGED);
+    return 1;
+}

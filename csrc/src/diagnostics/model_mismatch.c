@@ -1,0 +1,164 @@
+/* What of the data no sheet of the model's gives, and a reference that was taken with a touch on
+ * the skin. */
+#include "diagnostics/diagnostics.h"
+
+#include "base/vec.h"
+#include "frame/projection.h"
+#include "kernels/column.h"
+
+/* P's rows are whitened and orthogonal where the model was reduced by a singular value
+ * decomposition: P P' = diag(|P_i|^2). Then |d|^2 - sum (P d)_i^2 / |P_i|^2 is what lies outside.
+ * Told by two probes: P (P'v) against |P_i|^2 v. */
+static const eits_real ORTHOGONAL = R(1e-3);
+
+/* ctx->sheet_inverse = |P_i|^2 for now. */
+static void row_energies(eits_context *ctx)
+{
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
+        for (uint32_t i = 0; i < ctx->model->rank; ++i)
+            ctx->sheet_inverse[i] = eits_fma(column[i], column[i], ctx->sheet_inverse[i]);
+        ctx->sheet_energy += eits_dot(ctx, column, column, ctx->model->rank);
+    }
+}
+
+static int is_orthogonal(eits_context *ctx, uint32_t period)
+{
+    const uint32_t rank = ctx->model->rank, folds = ctx->model->n_folded;
+    eits_zero(ctx->sx, EITS_STRIDE(rank));
+    for (uint32_t i = 0; i < rank; ++i) {
+        if (!(ctx->sheet_inverse[i] > 0))
+            return 0;
+        ctx->sx[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->sheet_inverse[i]);
+    }
+    for (uint32_t k = 0; k < folds; ++k) {
+        ctx->list_index[k] = k;
+        ctx->list_value[k] =
+            eits_dot(ctx, eits_column(&ctx->model->reduction, k, ctx->residual), ctx->sx, rank);
+    }
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, folds,
+                      ctx->residual);
+    for (uint32_t i = 0; i < rank; ++i) {
+        const eits_real off = ctx->residual[i] - ctx->sheet_inverse[i] * ctx->sx[i];
+        if (!(eits_fabs(off) <= ORTHOGONAL * eits_sqrt(ctx->sheet_inverse[i])))
+            return 0;
+    }
+    return 1;
+}
+
+/* Ridge weights s_i^2 / (s_i^2 + nu s_1^2), s_i^2 = |S_i|^2 / |P_i|^2 the squared singular values
+ * of the unwhitened problem; over |P_i|^2 again, so that d is predicted by P' shrink P d. */
+static void make_shrink(eits_context *ctx)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    eits_real most = 0;
+    for (uint32_t j = 0; j < s->cols; ++j) {
+        const eits_real *column = eits_column(s, j, ctx->sx), scale = eits_column_scale(s, j);
+        for (uint32_t i = 0; i < s->rows; ++i) {
+            const eits_real value = scale * column[i];
+            ctx->sheet_shrink[i] = eits_fma(value, value, ctx->sheet_shrink[i]);
+        }
+    }
+    for (uint32_t i = 0; i < s->rows; ++i) {
+        ctx->sheet_shrink[i] /= ctx->sheet_inverse[i];
+        most = ctx->sheet_shrink[i] > most ? ctx->sheet_shrink[i] : most;
+    }
+    for (uint32_t i = 0; i < s->rows; ++i) {
+        const eits_real squared = ctx->sheet_shrink[i];
+        ctx->sheet_inverse[i] = 1 / ctx->sheet_inverse[i];
+        ctx->sheet_shrink[i] =
+            squared / eits_fma(EITS_GLITCH_RIDGE, most, squared) * ctx->sheet_inverse[i];
+    }
+    ctx->sheet_known =
+        eits_all_finite(ctx->sheet_shrink, s->rows) && eits_all_finite(ctx->sheet_inverse, s->rows);
+}
+
+void eits_learn_sheet(eits_context *ctx)
+{
+    row_energies(ctx);
+    if (is_orthogonal(ctx, 3) && is_orthogonal(ctx, 5))
+        make_shrink(ctx);
+    eits_zero(ctx->residual, EITS_STRIDE(ctx->model->rank));
+    eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
+}
+
+/* ctx->stray = what of the drift no sheet gives: along - P' |P_i|^-2 P along, in full, since
+ * differences of sums would be rounding. */
+static uint64_t learn_stray(eits_context *ctx)
+{
+    const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
+    for (uint32_t k = 0; k < folds; ++k)
+        ctx->list_index[k] = k;
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->along, folds, ctx->sz);
+    for (uint32_t i = 0; i < rank; ++i)
+        ctx->sz[i] *= ctx->sheet_inverse[i];
+    for (uint32_t k = 0; k < folds; ++k) {
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
+        ctx->stray[k] = ctx->along[k] - eits_dot(ctx, column, ctx->sz, rank);
+    }
+    ctx->stray_stale = 0;
+    return 2u * (uint64_t)folds * rank;
+}
+
+eits_real eits_noise_energy(const eits_context *ctx)
+{
+    const eits_baseline *b = &ctx->baseline;
+    const eits_real one = b->gain * b->noise_v * (b->gain * b->noise_v);
+    eits_real sum = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (ctx->basis_for[k] == EITS_SIDE_NONE) /* it may have no reference at all */
+            continue;
+        const eits_real v0 =
+            b->v0[ctx->basis_for[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second
+                                                        : ctx->model->fold[k].first];
+        const eits_real each = ctx->model->data_kind == EITS_DATA_NORMALISED
+                                   ? b->noise_v / v0 * (b->noise_v / v0)
+                                   : one;
+        sum += ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->apart[k] != 0 ? R(0.5) * each : each;
+    }
+    return sum;
+}
+
+eits_real eits_expected_noise(const eits_context *ctx)
+{
+    return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->sheet_energy;
+}
+
+int eits_judge_misfit(eits_context *ctx, uint64_t *macs)
+{
+    const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
+    if (rank >= folds || !(ctx->baseline.noise_v > 0))
+        return 0;
+    const eits_real drift = eits_dot(ctx, ctx->along, ctx->along, folds);
+    if (drift > 0 && ctx->stray_stale)
+        *macs += learn_stray(ctx);
+    for (uint32_t i = 0; i < rank; ++i)
+        ctx->sz[i] = ctx->sheet_inverse[i] * ctx->y[i];
+    eits_real whole = eits_dot(ctx, ctx->d, ctx->d, folds),
+              off = whole - eits_dot(ctx, ctx->sz, ctx->y, rank);
+    if (drift > 0) { /* how far it drifted is no news */
+        const eits_real along = eits_dot(ctx, ctx->d, ctx->along, folds),
+                        astray = eits_dot(ctx, ctx->d, ctx->stray, folds);
+        const eits_real stray = eits_dot(ctx, ctx->stray, ctx->stray, folds);
+        whole -= along * along / drift;
+        off -= stray > 0 ? astray * astray / stray : 0;
+    }
+    const eits_real noise = eits_noise_energy(ctx) * (eits_real)(folds - rank) / (eits_real)folds;
+    if (!(off > noise) || !(whole > 0))
+        return 0;
+    const eits_real share = eits_sqrt((off - noise) / whole);
+    ctx->info.misfit = share < 1 ? share : 1;
+    return share > EITS_MISFIT_SHARE && off > EITS_MISFIT_NOISE * EITS_MISFIT_NOISE * noise;
+}
+
+void eits_judge_reference(eits_context *ctx)
+{
+    const eits_sign sign = ctx->options.sign;
+    if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_FINDING_STALE_REFERENCE))
+        return;
+    const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
+    const eits_real against = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, other);
+    const eits_real least = EITS_STALE_NOISE * ctx->info.lambda_noise;
+    if (least > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > least)
+        ctx->info.findings |= EITS_FINDING_STALE_REFERENCE;
+}

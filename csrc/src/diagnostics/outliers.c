@@ -1,0 +1,287 @@
+/* Glitches: rows that their reciprocals, or all the other folds, do not bear out; too many that
+ * share an electrode: a noisy one. */
+#include "diagnostics/diagnostics.h"
+
+#include "base/vec.h"
+#include "kernels/column.h"
+
+eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k)
+{
+    uint32_t low = 0, high = n - 1;
+    while (low < high) { /* Hoare, Comm. ACM 4 (1961) 321 */
+        const eits_real pivot = v[low + (high - low) / 2];
+        uint32_t i = low, j = high;
+        while (i <= j) {
+            while (v[i] < pivot)
+                ++i;
+            while (pivot < v[j])
+                --j;
+            if (i <= j) {
+                const eits_real other = v[i];
+                v[i++] = v[j];
+                v[j] = other;
+                if (j == 0)
+                    break;
+                --j;
+            }
+        }
+        if (k <= j)
+            high = j;
+        else if (k >= i)
+            low = i;
+        else
+            break;
+    }
+    return v[k];
+}
+
+/* What a fold's sides may differ by. */
+typedef struct tolerance {
+    /* > 0 where no noise was learned: the most by the differences of all folds */
+    eits_real robust;
+    eits_real largest; /* share of the largest datum */
+} tolerance;
+
+static eits_real most_by_noise(const eits_context *ctx, uint32_t k)
+{
+    const eits_baseline *b = &ctx->baseline;
+    if (ctx->model->data_kind != EITS_DATA_NORMALISED)
+        return EITS_GLITCH_NOISE * eits_sqrt(R(2.0)) * eits_fabs(b->gain) * b->noise_v;
+    const eits_real first = b->noise_v / b->v0[ctx->model->fold[k].first],
+                    second = b->noise_v / b->v0[ctx->model->fold[k].second];
+    return EITS_GLITCH_NOISE * eits_sqrt(eits_fma(first, first, second * second));
+}
+
+static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)
+{
+    if (ctx->basis_for[k] != EITS_SIDE_BOTH)
+        return 0;
+    const eits_real off = eits_fabs(ctx->apart[k]);
+    if (!(off > (ctx->baseline.noise_v > 0 ? most_by_noise(ctx, k) : most.robust)) ||
+        !(off > most.largest))
+        return 0;
+    return off > EITS_GLITCH_SHARE * eits_fma(R(0.5), off, eits_fabs(ctx->d[k]));
+}
+
+/* The median of the folds' differences is 0 where they are copies: then nothing is flagged. */
+static tolerance find_tolerance(const eits_context *ctx)
+{
+    tolerance most = {0, 0};
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_real datum = eits_fabs(ctx->d[k]);
+        most.largest = datum > most.largest ? datum : most.largest;
+        if (ctx->basis_for[k] == EITS_SIDE_BOTH)
+            ctx->list_value[count++] = eits_fabs(ctx->apart[k]);
+    }
+    most.largest *= EITS_GLITCH_LARGEST;
+    if (!(ctx->baseline.noise_v > 0) && count > 0) {
+        const eits_real median = eits_kth(ctx->list_value, count, count / 2);
+        most.robust = EITS_GLITCH_ROBUST * EITS_ROBUST * median;
+        if (!(median > 0))
+            most.robust = R(INFINITY);
+    }
+    return most;
+}
+
+static void leave_row(eits_context *ctx, uint32_t row)
+{
+    if (row == EITS_FOLD_NONE || ctx->unusable[row] != 0)
+        return;
+    eits_leave_glitch(ctx, row);
+}
+
+/* ---- what the other folds predict ---- */
+
+static int all_known(const eits_context *ctx)
+{
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (ctx->basis_for[k] == 0)
+            return 0;
+    }
+    return 1;
+}
+
+/* ctx->sz = shrink * P d, so that P_k'sz is the ridge fit of d_k. */
+static void fit_all(eits_context *ctx, uint64_t *macs)
+{
+    const uint32_t rank = ctx->model->rank, folds = ctx->model->n_folded;
+    for (uint32_t k = 0; k < folds; ++k)
+        ctx->list_index[k] = k;
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->d, folds, ctx->sz);
+    for (uint32_t i = 0; i < rank; ++i)
+        ctx->sz[i] *= ctx->sheet_shrink[i];
+    *macs += (uint64_t)folds * rank;
+}
+
+/* What the other folds predict for each of `n` flagged ones: with H the ridge fit, e = (I -
+ * H_FF)^-1 (d - H d)_F is what d is off by. 0: they cannot be told from these. */
+static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_real *out,
+                   uint64_t *macs)
+{
+    eits_real l[EITS_GLITCH_MOST][EITS_GLITCH_MOST], e[EITS_GLITCH_MOST];
+    const uint32_t rank = ctx->model->rank;
+    fit_all(ctx, macs);
+    for (uint32_t a = 0; a < n; ++a) {
+        const eits_real *column = eits_column(&ctx->model->reduction, flagged[a], ctx->sx);
+        e[a] = ctx->d[flagged[a]] - eits_dot(ctx, column, ctx->sz, rank);
+        for (uint32_t i = 0; i < rank; ++i)
+            ctx->residual[i] = ctx->sheet_shrink[i] * column[i];
+        for (uint32_t b = 0; b <= a; ++b) {
+            const eits_real *other = eits_column(&ctx->model->reduction, flagged[b], ctx->sx);
+            eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx, ctx->residual, other, rank);
+            for (uint32_t k = 0; k < b; ++k)
+                sum = eits_fma(-l[a][k], l[b][k], sum);
+            if (a == b && !(sum > EITS_GLITCH_PIVOT))
+                return 0;
+            l[a][b] = a == b ? eits_sqrt(sum) : sum / l[b][b];
+        }
+    }
+    *macs += (uint64_t)n * (n + 3u) / 2u * rank;
+    for (uint32_t a = 0; a < n; ++a) {
+        for (uint32_t k = 0; k < a; ++k)
+            e[a] = eits_fma(-l[a][k], e[k], e[a]);
+        e[a] /= l[a][a];
+    }
+    for (uint32_t a = n; a-- > 0;) {
+        for (uint32_t k = a + 1; k < n; ++k)
+            e[a] = eits_fma(-l[k][a], e[k], e[a]);
+        e[a] /= l[a][a];
+        out[a] = ctx->d[flagged[a]] - e[a];
+    }
+    return 1;
+}
+
+/* The side that is clearly nearer to the prediction stays; else both go. */
+static void choose_sides(eits_context *ctx, const uint32_t *flagged, uint32_t n, uint64_t *macs)
+{
+    eits_real predicted[EITS_GLITCH_MOST];
+    const int known =
+        ctx->sheet_known && all_known(ctx) && predict(ctx, flagged, n, predicted, macs);
+    for (uint32_t a = 0; a < n; ++a) {
+        const eits_fold fold = ctx->model->fold[flagged[a]];
+        const eits_real d = ctx->d[flagged[a]], half = R(0.5) * ctx->apart[flagged[a]];
+        const eits_real first = known ? eits_fabs(d + half - predicted[a]) : 1,
+                        second = known ? eits_fabs(d - half - predicted[a]) : 1;
+        if (!(first <= EITS_GLITCH_NEARER * second))
+            leave_row(ctx, fold.first);
+        if (!(second <= EITS_GLITCH_NEARER * first))
+            leave_row(ctx, fold.second);
+    }
+}
+
+/* ---- too many to be glitches ---- */
+
+/* Where one pair is what the flagged folds share, it is its channel: the rows measured across it
+ * go, their reciprocals stay. */
+static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (eits_is_pair(eits_row(ctx, i) + 2, e, f))
+            ctx->unusable[i] |= EITS_ROW_NOISY;
+    }
+}
+
+/* Whether each flagged fold drives across (e, f) on one side and measures across it on the other.
+ */
+static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance most)
+{
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (!is_flagged(ctx, k, most))
+            continue;
+        const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
+        if (!eits_is_pair(row, e, f) && !eits_is_pair(row + 2, e, f))
+            return 0;
+    }
+    return 1;
+}
+
+/* Electrodes that nearly all flagged folds use. */
+static void find_noisy(eits_context *ctx, uint32_t count, tolerance most)
+{
+    uint16_t shared[EITS_MOST_ELECTRODES] = {0};
+    uint32_t found[2] = {0}, any = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (!is_flagged(ctx, k, most))
+            continue;
+        for (uint32_t p = 0; p < 4; ++p)
+            ++shared[eits_row(ctx, ctx->model->fold[k].first)[p]];
+    }
+    for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
+        if (!((eits_real)shared[e] >= EITS_NOISY_SHARE * (eits_real)count))
+            continue;
+        found[any < 2 ? any : 1] = e;
+        ++any;
+    }
+    if (any == 0) { /* no two-way network gives that */
+        ctx->info.findings |= eits_wants(ctx, EITS_FINDING_MISFIT) ? EITS_FINDING_MISFIT : 0;
+        return;
+    }
+    if (!eits_wants(ctx, EITS_FINDING_ELECTRODE_NOISY))
+        return;
+    for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e)
+        ctx->electrode[e] |=
+            (eits_real)shared[e] >= EITS_NOISY_SHARE * (eits_real)count ? EITS_ELECTRODE_NOISY : 0;
+    ctx->info.findings |= EITS_FINDING_ELECTRODE_NOISY;
+    eits_name_electrodes(ctx);
+    if (any == 2 && is_channel(ctx, found[0], found[1], most))
+        leave_channel(ctx, found[0], found[1]);
+    else
+        eits_leave_electrodes(ctx, EITS_ELECTRODE_NOISY, EITS_ROW_NOISY);
+}
+
+/* ---- without reciprocals ---- */
+
+int eits_find_unpaired(eits_context *ctx, uint64_t *macs)
+{
+    const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
+    for (uint32_t k = 0; k < folds; ++k) {
+        if (ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->apart[k] != 0)
+            return 0;
+    }
+    for (uint32_t i = 0; i < rank; ++i)
+        ctx->sz[i] = ctx->sheet_shrink[i] * ctx->y[i];
+    eits_real worst = 0, energy = 0;
+    uint32_t at = 0;
+    for (uint32_t k = 0; k < folds; ++k) {
+        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
+        eits_real leverage = 0;
+        const eits_real off = eits_fabs(ctx->d[k] - eits_dot(ctx, column, ctx->sz, rank));
+        for (uint32_t i = 0; i < rank; ++i)
+            leverage = eits_fma(ctx->sheet_shrink[i] * column[i], column[i], leverage);
+        const eits_real left = 1 - leverage;
+        energy = eits_fma(off, off, energy);
+        ctx->list_value[k] = left > EITS_GLITCH_PIVOT ? off / eits_sqrt(left) : 0;
+        if (ctx->list_value[k] > worst) {
+            worst = ctx->list_value[k];
+            at = k;
+        }
+    }
+    *macs += 2u * (uint64_t)folds * rank;
+    if (!(worst * worst > EITS_GLITCH_ENERGY * energy) ||
+        !(worst > EITS_GLITCH_UNPAIRED * EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2)))
+        return 0;
+    leave_row(ctx, ctx->model->fold[at].first);
+    leave_row(ctx, ctx->model->fold[at].second);
+    return 1;
+}
+
+int eits_find_glitches(eits_context *ctx, uint64_t *macs)
+{
+    uint32_t flagged[EITS_GLITCH_MOST], count = 0;
+    const tolerance most = find_tolerance(ctx);
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (!is_flagged(ctx, k, most))
+            continue;
+        if (count < EITS_GLITCH_MOST)
+            flagged[count] = k;
+        ++count;
+    }
+    if (count == 0)
+        return 0;
+    if (count > EITS_GLITCH_MOST)
+        find_noisy(ctx, count, most);
+    else if (eits_wants(ctx, EITS_FINDING_GLITCH))
+        choose_sides(ctx, flagged, count, macs);
+    return (ctx->info.findings & (EITS_FINDING_GLITCH | EITS_FINDING_ELECTRODE_NOISY)) != 0;
+}

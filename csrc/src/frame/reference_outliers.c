@@ -1,0 +1,154 @@
+/* Glitches in quiet frames: a reading that its reciprocal does not bear out is left out of the
+ * reference. */
+#include "diagnostics/diagnostics.h"
+
+#include "base/vec.h"
+
+/* robust deviations; and of the greatest voltage */
+static const eits_real PAIRED = R(12.0), PAIRED_LEAST = R(1e-3);
+/* the same where rows have no reciprocals, or copied ones */
+static const eits_real UNPAIRED = R(16.0), UNPAIRED_LEAST = R(1e-2);
+/* and of the row's own voltage: noise may go with that */
+static const eits_real OWN_LEAST = R(0.05);
+
+static int in_use(const eits_context *ctx, uint32_t row, const eits_real *older)
+{
+    return row != EITS_FOLD_NONE && !ctx->bad[row] && eits_is_finite(older[row]);
+}
+
+static eits_real change(const eits_context *ctx, uint32_t row, const eits_real *newer,
+                        const eits_real *older)
+{
+    return in_use(ctx, row, older) ? newer[row] - older[row] : 0;
+}
+
+/* How far the changes of fold k's rows are apart; with `paired` 0 the greater of them. */
+static eits_real oddity(const eits_context *ctx, uint32_t k, const eits_real *newer,
+                        const eits_real *older, int paired)
+{
+    const eits_fold fold = ctx->model->fold[k];
+    const eits_real first = change(ctx, fold.first, newer, older);
+    const eits_real second = (eits_real)fold.sign * change(ctx, fold.second, newer, older);
+    if (paired)
+        return in_use(ctx, fold.first, older) && in_use(ctx, fold.second, older)
+                   ? eits_fabs(first - second)
+                   : 0;
+    return eits_fabs(first) > eits_fabs(second) ? eits_fabs(first) : eits_fabs(second);
+}
+
+/* The greater voltage of fold k's rows. */
+static eits_real size_of(const eits_context *ctx, uint32_t k, const eits_real *older)
+{
+    const eits_fold fold = ctx->model->fold[k];
+    const eits_real first = in_use(ctx, fold.first, older) ? eits_fabs(older[fold.first]) : 0;
+    const eits_real second = in_use(ctx, fold.second, older) ? eits_fabs(older[fold.second]) : 0;
+    return first > second ? first : second;
+}
+
+/* What an oddity may be; sets `paired` where reciprocals tell. */
+static eits_real limit_of(const eits_context *ctx, const eits_real *newer, const eits_real *older,
+                          int *paired)
+{
+    const uint32_t folds = ctx->model->n_folded;
+    eits_real largest = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        const eits_real v = in_use(ctx, i, older) ? eits_fabs(older[i]) : 0;
+        largest = v > largest ? v : largest;
+    }
+    for (int way = 1; way >= 0; --way) {
+        int any = 0;
+        for (uint32_t k = 0; k < folds; ++k) {
+            ctx->list_value[k] = oddity(ctx, k, newer, older, way);
+            any |= ctx->list_value[k] > 0;
+        }
+        if (!any)
+            continue;
+        *paired = way;
+        const eits_real spread = EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2);
+        const eits_real limit = way ? PAIRED * spread : UNPAIRED * spread,
+                        least = (way ? PAIRED_LEAST : UNPAIRED_LEAST) * largest;
+        return limit > least ? limit : least;
+    }
+    *paired = 0;
+    return largest;
+}
+
+uint32_t eits_quiet_odd(eits_context *ctx, const eits_real *newer, const eits_real *older,
+                        uint8_t bit)
+{
+    int paired;
+    const eits_real limit = limit_of(ctx, newer, older, &paired);
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_real off = oddity(ctx, k, newer, older, paired);
+        const int odd = off > limit && off > OWN_LEAST * size_of(ctx, k, older);
+        ctx->list_index[k] = (ctx->list_index[k] & ~(uint32_t)bit) | (odd ? bit : 0u);
+        count += (uint32_t)odd;
+    }
+    for (uint32_t k = 0; k < ctx->model->n_folded && count > EITS_GLITCH_MOST; ++k)
+        ctx->list_index[k] &= ~(uint32_t)bit;
+    return count > EITS_GLITCH_MOST ? 0 : count;
+}
+
+/* The rows of fold k that changed: the one that changed more, and the other if it changed about as
+ * much. */
+static uint32_t odd_rows(const eits_context *ctx, uint32_t k, const eits_real *newer,
+                         const eits_real *older, uint32_t rows[2])
+{
+    const eits_fold fold = ctx->model->fold[k];
+    const eits_real first = eits_fabs(change(ctx, fold.first, newer, older)),
+                    second = eits_fabs(change(ctx, fold.second, newer, older));
+    uint32_t count = 0;
+    if (first > 0 && first >= R(0.5) * second)
+        rows[count++] = fold.first;
+    if (second > 0 && second >= R(0.5) * first)
+        rows[count++] = fold.second;
+    return count;
+}
+
+uint32_t eits_quiet_leave_out(eits_context *ctx, const eits_real *frame)
+{
+    uint32_t left = 0;
+    if (eits_quiet_odd(ctx, frame, ctx->baseline.v0, 1) == 0)
+        return 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        uint32_t rows[2], count = (ctx->list_index[k] & 1u) != 0
+                                      ? odd_rows(ctx, k, frame, ctx->baseline.v0, rows)
+                                      : 0;
+        left += count;
+        while (count > 0)
+            ctx->bad[rows[--count]] = EITS_BAD_NOW;
+    }
+    return left;
+}
+
+uint32_t eits_quiet_weigh(eits_context *ctx, const eits_real *frame)
+{
+    enum { WITH_SECOND = 1, FIRST_WITH_THIRD = 2, SECOND_WITH_THIRD = 4 };
+    eits_real *first = ctx->baseline.v0, *second = ctx->baseline.m2;
+    uint32_t left = 0;
+    (void)eits_quiet_odd(ctx, second, first, WITH_SECOND);
+    (void)eits_quiet_odd(ctx, frame, first, FIRST_WITH_THIRD);
+    (void)eits_quiet_odd(ctx, frame, second, SECOND_WITH_THIRD);
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const uint32_t odd = ctx->list_index[k] & 7u;
+        uint32_t rows[2], count = 0;
+        if (odd == (WITH_SECOND | FIRST_WITH_THIRD) || odd == (WITH_SECOND | SECOND_WITH_THIRD))
+            count = odd_rows(ctx, k, second, first, rows);
+        left += count;
+        while (count > 0) {
+            const uint32_t i = rows[--count];
+            if (odd == (WITH_SECOND | FIRST_WITH_THIRD))
+                first[i] = second[i];
+            else
+                second[i] = first[i];
+        }
+    }
+    return left;
+}
+
+void eits_quiet_clear(eits_context *ctx)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
+        ctx->bad[i] = ctx->bad[i] == EITS_BAD_NOW ? 0 : ctx->bad[i];
+}

@@ -1,0 +1,77 @@
+#include "frame/regularisation.h"
+
+#include "base/vec.h"
+
+/* The model's floor for the rows left, over that for all: fewer rows speak of fewer directions, and
+ * what is left of the weak ones is to be heard. Chosen on training scenes with one to three
+ * electrodes out. */
+static const eits_real LEAST_FLOOR_SHARE = R(0.1);
+/* of s_1^2, where rows are left out: what float32 needs */
+static const eits_real LEAST_FLOOR = R(1e-4);
+/* of s_1^2: beyond, all directions weigh as they are seen already */
+static const eits_real MOST_FLOOR = R(1.0);
+/* what a lift by less would change cannot be seen */
+static const eits_real AS_IT_IS = R(1.01);
+
+/* What the noise asks for. */
+static eits_real least_floor(const eits_context *ctx)
+{
+    const eits_baseline *b = &ctx->baseline;
+    const eits_real asked =
+        b->noise_v > 0 ? ctx->options.floor_noise_factor * (b->noise_v / b->v0_rms) : 0;
+    return asked < MOST_FLOOR ? asked : MOST_FLOOR;
+}
+
+eits_real eits_floor_of_all(const eits_context *ctx)
+{
+    const eits_real asked = least_floor(ctx);
+    return asked > AS_IT_IS * ctx->floor ? asked : ctx->floor;
+}
+
+eits_real eits_floor_of_rest(const eits_context *ctx, eits_real missing)
+{
+    const eits_real left = 1 - missing, cube = left * left * left,
+                    quiet = cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE;
+    const eits_real of_model = quiet * ctx->floor, asked = left * least_floor(ctx),
+                    wanted = asked > of_model ? asked : of_model;
+    return wanted > LEAST_FLOOR ? wanted : LEAST_FLOOR;
+}
+
+/* D_i, so scaled that the strongest direction keeps its weight. None exceeds 1, so the model's
+ * Lipschitz constant holds, whatever rounding made of the stored matrices. */
+static eits_real weight_of(const eits_context *ctx, eits_real floor, uint32_t i)
+{
+    const eits_real square = ctx->strongest_square * (1 + floor) / (ctx->row_strength[i] + floor);
+    const eits_real weight = eits_sqrt(square) * ctx->row_scale[i];
+    return weight < 1 ? weight : 1;
+}
+
+/* White noise on the rows has the covariance diag(w^2) in P d, so in S'D D P d, as a mean square
+ * over S's columns, the sum of |S_i|^2 w_i^2 D_i^4: s_i^2 w_i^4 D_i^4. */
+eits_real eits_floor_noise(const eits_context *ctx, eits_real floor)
+{
+    eits_real sum = 0, whole = 0;
+    if (!(floor > ctx->floor))
+        return 1;
+    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
+        const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]),
+                        square = ctx->row_strength[i] * w2 * w2;
+        const eits_real weight = weight_of(ctx, floor, i), w2_kept = weight * weight;
+        whole += square;
+        sum = eits_fma(square * w2_kept, w2_kept, sum);
+    }
+    return eits_sqrt(sum / whole);
+}
+
+eits_real eits_floor_weights(const eits_context *ctx, eits_real floor, eits_real *weight)
+{
+    eits_real energy = 0, whole = 0;
+    eits_zero(weight, EITS_STRIDE(ctx->model->rank));
+    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
+        const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
+        weight[i] = weight_of(ctx, floor, i);
+        energy = eits_fma(weight[i] * weight[i], w2, energy);
+        whole += w2;
+    }
+    return energy / whole;
+}

@@ -1,0 +1,53 @@
+/* The triangles of rows left out (observed.h), where they are kept and how they are laid out. */
+#ifndef EITSKIN_TRIANGLE_H
+#define EITSKIN_TRIANGLE_H
+
+#include "kernels/kernels.h"
+
+/* Upper triangles, row after row. Row i has its columns from this one on, a multiple of 8, those
+ * before i being zero: */
+static inline uint32_t first_of(uint32_t i)
+{
+    return i & ~7u;
+}
+
+/* Row i, so that [k] is its column k; there is nothing before first_of(i). */
+static inline eits_real *row_of(const eits_context *ctx, eits_real *triangle, uint32_t i)
+{
+    const size_t stride = EITS_STRIDE(ctx->model->rank), block = i / 8u;
+    return triangle + 8u * (block * stride - 4u * block * block + 4u * block) +
+           i % 8u * (stride - 8u * block) - 8u * block;
+}
+
+/* a . b and out += factor * a over the columns that row i has. */
+static inline eits_real dot_of_row(const eits_context *ctx, uint32_t i, const eits_real *a,
+                                   const eits_real *b)
+{
+    return eits_dot(ctx, a + first_of(i), b + first_of(i),
+                    EITS_STRIDE(ctx->model->rank) - first_of(i));
+}
+
+static inline void add_row(const eits_context *ctx, uint32_t i, eits_real *out, eits_real factor,
+                           const eits_real *a)
+{
+    eits_axpy(ctx, out + first_of(i), factor, a + first_of(i),
+              EITS_STRIDE(ctx->model->rank) - first_of(i));
+}
+
+/* F, or where it is diagonal its diagonal; behind the basis' one direction */
+static inline eits_real *map_of(const eits_context *ctx)
+{
+    return ctx->basis + EITS_STRIDE(ctx->model->rank);
+}
+
+static inline eits_real *metric_of(const eits_context *ctx) /* G */
+{
+    return map_of(ctx) + EITS_PADDED_TRIANGLE(ctx->model->rank);
+}
+
+static inline uint64_t triangle_macs(const eits_context *ctx)
+{
+    return (uint64_t)ctx->model->rank * (ctx->model->rank + 1u) / 2u;
+}
+
+#endif

@@ -1,0 +1,334 @@
+#include "frame/whitening.h"
+
+#include "base/vec.h"
+#include "frame/projection.h"
+#include "frame/regularisation.h"
+#include "frame/triangle.h"
+#include "kernels/column.h"
+#include "kernels/kernels.h"
+
+/* e over mu': how little a direction that no row sees is held to zero */
+static const eits_real LOST = R(0.01);
+static const eits_real ORTHOGONAL = R(1e-5); /* cosine between rows of P */
+/* |S_i|^2 + mu s_1^2 w_i^2 is 1 within this: S is rounded to 8 bits at worst */
+static const eits_real FORM = R(0.01);
+/* Rounding makes the rows of S a little less than orthogonal, and F with a lower floor must not
+ * exceed the stated constant. */
+static const eits_real STEP_MARGIN = R(0.995);
+
+/* ---- the model's form ---- */
+
+static eits_real greatest_entry(const eits_matrix *p, eits_real *copy)
+{
+    eits_real greatest = 0;
+    for (uint32_t k = 0; k < p->cols; ++k) {
+        const eits_real *column = eits_column(p, k, copy);
+        for (uint32_t i = 0; i < p->rows; ++i)
+            greatest = eits_fabs(column[i]) > greatest ? eits_fabs(column[i]) : greatest;
+    }
+    return greatest;
+}
+
+/* |P_i|^2 / greatest^2 into `square`; 0 where two rows are not orthogonal or one is zero. */
+static int orthogonal_rows(eits_context *ctx, eits_real greatest, eits_real *square)
+{
+    const eits_matrix *p = &ctx->model->reduction;
+    eits_real *gram = map_of(ctx), *v = ctx->sz;
+    eits_zero(gram, EITS_PADDED_TRIANGLE(p->rows));
+    for (uint32_t k = 0; k < p->cols; ++k) {
+        const eits_real *column = eits_column(p, k, v);
+        for (uint32_t i = 0; i < p->rows; ++i)
+            v[i] = column[i] / greatest;
+        for (uint32_t i = 0; i < p->rows; ++i)
+            add_row(ctx, i, row_of(ctx, gram, i), v[i], v);
+    }
+    for (uint32_t i = 0; i < p->rows; ++i) {
+        square[i] = row_of(ctx, gram, i)[i];
+        if (!(square[i] > 0))
+            return 0;
+        for (uint32_t j = 0; j < i; ++j) {
+            if (!(eits_fabs(row_of(ctx, gram, j)[i]) <=
+                  ORTHOGONAL * eits_sqrt(square[i]) * eits_sqrt(square[j])))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* |S_i|^2. */
+static void squares_of_rows(const eits_context *ctx, eits_real *square)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    for (uint32_t j = 0; j < s->cols; ++j) {
+        const eits_real *column = eits_column(s, j, ctx->sz), scale = eits_column_scale(s, j);
+        for (uint32_t i = 0; i < s->rows; ++i) {
+            const eits_real v = scale * column[i];
+            square[i] = eits_fma(v, v, square[i]);
+        }
+    }
+}
+
+/* With w^2 (over greatest^2) in row_scale and |S_i|^2 in row_strength: what they are to become. */
+static int take_form(eits_context *ctx, eits_real greatest)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_real *w2 = ctx->row_scale, *s2 = ctx->row_strength;
+    uint32_t weakest = 0, strongest = 0;
+    for (uint32_t i = 0; i < rank; ++i) {
+        weakest = w2[i] > w2[weakest] ? i : weakest;
+        strongest = s2[i] / w2[i] > s2[strongest] / w2[strongest] ? i : strongest;
+    }
+    const eits_real per_square = (1 - s2[weakest]) / w2[weakest]; /* mu s_1^2 */
+    const eits_real top = s2[strongest], top_w2 = w2[strongest];
+    for (uint32_t i = 0; i < rank; ++i) {
+        if (!(eits_fabs(eits_fma(per_square, w2[i], s2[i]) - 1) <= FORM))
+            return 0;
+    }
+    ctx->strongest = eits_sqrt(top / top_w2) / greatest;
+    if (!(ctx->strongest > R(1e-30)) || !(ctx->strongest < R(1e30)))
+        return 0;
+    ctx->strongest_square = top;
+    ctx->floor = per_square > 0 ? per_square * top_w2 / top : 0;
+    for (uint32_t i = 0; i < rank; ++i) {
+        s2[i] = s2[i] / w2[i] * (top_w2 / top);
+        w2[i] = eits_sqrt(top_w2 / w2[i]) / eits_sqrt(top);
+    }
+    return eits_all_finite(w2, rank) && eits_all_finite(s2, rank) && eits_is_finite(ctx->floor);
+}
+
+void eits_observed_init(eits_context *ctx)
+{
+    const eits_real greatest = greatest_entry(&ctx->model->reduction, ctx->sz);
+    if (!(greatest > 0) || !eits_is_finite(1 / greatest) ||
+        !orthogonal_rows(ctx, greatest, ctx->row_scale))
+        return;
+    squares_of_rows(ctx, ctx->row_strength);
+    ctx->rewhitens = (uint32_t)take_form(ctx, greatest);
+    ctx->sheet_energy_stored = ctx->sheet_energy;
+}
+
+/* ---- the map ---- */
+
+static int in_use(const eits_context *ctx, uint32_t k)
+{
+    return ctx->basis_for[k] != 0;
+}
+
+/* N = U_o' U_o + e I, summed over whichever rows are fewer, those left out or those in use. */
+static uint64_t sum_products(eits_context *ctx, uint32_t missing, eits_real lost, eits_real *n)
+{
+    const eits_matrix *p = &ctx->model->reduction;
+    const int by_missing = missing <= p->cols - missing;
+    eits_real *u = ctx->sz;
+    eits_zero(n, EITS_PADDED_TRIANGLE(p->rows));
+    for (uint32_t k = 0; k < p->cols; ++k) {
+        if (in_use(ctx, k) == by_missing)
+            continue;
+        const eits_real *column = eits_column(p, k, u);
+        for (uint32_t i = 0; i < p->rows; ++i)
+            u[i] = column[i] * ctx->row_scale[i] * ctx->strongest;
+        for (uint32_t i = 0; i < p->rows; ++i)
+            add_row(ctx, i, row_of(ctx, n, i), u[i], u);
+    }
+    for (uint32_t i = 0; i < p->rows; ++i) {
+        eits_real *row = row_of(ctx, n, i);
+        for (uint32_t j = i; by_missing && j < p->rows; ++j)
+            row[j] = j == i ? 1 - row[j] : -row[j];
+        row[i] += lost;
+    }
+    return (by_missing ? missing : p->cols - missing) * triangle_macs(ctx);
+}
+
+/* N = R'R in N's place. The strong directions come first, so that what rounding leaves of a lost
+ * one weighs little. What the padding has gathered goes. */
+static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_real *n)
+{
+    const uint32_t rank = ctx->model->rank;
+    uint64_t macs = 0;
+    for (uint32_t i = 0; i < rank; ++i) {
+        eits_real *r = row_of(ctx, n, i);
+        const eits_real left = r[i] > R(0.5) * lost ? r[i] : R(0.5) * lost, pivot = eits_sqrt(left),
+                        share = 1 / pivot;
+        eits_zero(r + first_of(i), i - first_of(i));
+        r[i] = pivot;
+        for (uint32_t j = i + 1; j < rank; ++j)
+            r[j] *= share;
+        for (uint32_t j = i + 1; j < rank; ++j) {
+            add_row(ctx, j, row_of(ctx, n, j), -r[j], r);
+            macs += rank - j;
+        }
+    }
+    return macs;
+}
+
+/* G G' = R diag(s^2) R' + floor I, from the last row up. */
+static uint64_t factor_metric(eits_context *ctx, eits_real floor, eits_real *r, eits_real *g)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_real *scaled = ctx->sz;
+    uint64_t macs = 0;
+    eits_zero(g, EITS_PADDED_TRIANGLE(rank));
+    for (uint32_t i = rank; i-- > 0;) {
+        eits_real *row = row_of(ctx, g, i);
+        for (uint32_t k = first_of(i); k < rank; ++k)
+            scaled[k] = row_of(ctx, r, i)[k] * ctx->row_strength[k];
+        for (uint32_t j = rank; j-- > i;) {
+            const eits_real product = dot_of_row(ctx, j, scaled, row_of(ctx, r, j));
+            /* row[j] is zero yet */
+            const eits_real left = product - dot_of_row(ctx, j, row, row_of(ctx, g, j));
+            if (j > i)
+                row[j] = left / row_of(ctx, g, j)[j];
+            else
+                row[i] = eits_sqrt(left > 0 ? left + floor : floor);
+            macs += 2u * (rank - j) - 1u;
+        }
+    }
+    return macs;
+}
+
+/* F = G^-1 R diag(share / w) in R's place, from the last row up. */
+static uint64_t finish_map(const eits_context *ctx, eits_real share, eits_real *g, eits_real *r)
+{
+    const uint32_t rank = ctx->model->rank;
+    uint64_t macs = 0;
+    for (uint32_t i = rank; i-- > 0;) {
+        eits_real *row = row_of(ctx, r, i);
+        const eits_real *weight = row_of(ctx, g, i), inverse = 1 / weight[i];
+        for (uint32_t k = i + 1; k < rank; ++k) {
+            add_row(ctx, k, row, -weight[k], row_of(ctx, r, k));
+            macs += rank - k;
+        }
+        for (uint32_t k = i; k < rank; ++k)
+            row[k] *= inverse;
+    }
+    for (uint32_t i = 0; i < rank; ++i) {
+        for (uint32_t k = i; k < rank; ++k)
+            row_of(ctx, r, i)[k] *= share * ctx->row_scale[k];
+    }
+    return macs;
+}
+
+static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v);
+
+enum { PROBES = 8 };
+
+/* Noise in S'F'y, over that in S'y with all rows. White noise on the rows has the covariance
+ * (G'G)^-1 in y; its mean square over S's columns is the trace of S'F' (G'G)^-1 F S, found by
+ * PROBES sign vectors that are orthogonal within each PROBES directions. The greatest of the
+ * columns grows faster than their mean does by rows left out, by an exponent found on masks of one
+ * row to three electrodes. */
+static uint64_t measure_noise(eits_context *ctx)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_real *v = ctx->sz, sum = 0, whole = 0;
+    for (uint32_t p = 0; p < PROBES; ++p) {
+        for (uint32_t i = 0; i < rank; ++i) {
+            const uint32_t both = i & p, odd = (both ^ both >> 1 ^ both >> 2) & 1u;
+            const eits_real size = eits_sqrt(ctx->row_strength[i]) / ctx->row_scale[i];
+            v[i] = odd ? -size : size;
+        }
+        (void)eits_map(ctx, v);
+        solve_transposed(ctx, metric_of(ctx), v);
+        sum += eits_dot(ctx, v, v, rank);
+    }
+    for (uint32_t i = 0; i < rank; ++i) {
+        const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
+        whole = eits_fma(ctx->row_strength[i] * w2, w2, whole);
+    }
+    const eits_real of_all = eits_floor_noise(ctx, eits_floor_of_all(ctx));
+    const eits_real ratio = eits_sqrt(ctx->map_square * sum / (PROBES * whole)) / of_all;
+    ctx->noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));
+    return PROBES * 2u * triangle_macs(ctx);
+}
+
+eits_real eits_lambda_noise(const eits_context *ctx)
+{
+    return ctx->noise_ratio * ctx->baseline.lambda_noise;
+}
+
+/* No row is left out: the floor alone may differ. */
+static void raise_floor(eits_context *ctx)
+{
+    const eits_real floor = eits_floor_of_all(ctx), noise = eits_floor_noise(ctx, floor);
+    /* a model's rows may be of any size */
+    if (!(floor > ctx->floor) || !(noise > 0) || !eits_is_finite(noise))
+        return;
+    ctx->rewhitened = EITS_BY_ROW;
+    ctx->floor_in_force = floor;
+    ctx->noise_ratio = noise;
+    ctx->sheet_energy = ctx->sheet_energy_stored * eits_floor_weights(ctx, floor, map_of(ctx));
+}
+
+static uint64_t build_triangle(eits_context *ctx, eits_real floor, uint32_t missing)
+{
+    const eits_real lost = LOST * floor;
+    ctx->map_square = STEP_MARGIN * ctx->strongest_square * (1 + floor) / (1 + lost);
+    eits_real *f = map_of(ctx), *g = metric_of(ctx);
+    uint64_t macs = sum_products(ctx, missing, lost, f);
+    macs += factor_products(ctx, lost, f);
+    macs += factor_metric(ctx, floor, f, g);
+    macs += finish_map(ctx, eits_sqrt(ctx->map_square), g, f);
+    ctx->rewhitened = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))
+                          ? EITS_BY_TRIANGLE
+                          : EITS_AS_STORED;
+    if (ctx->rewhitened)
+        macs += measure_noise(ctx);
+    if (!(ctx->noise_ratio > 0) || !eits_is_finite(ctx->noise_ratio)) {
+        ctx->rewhitened = EITS_AS_STORED;
+        ctx->noise_ratio = 1;
+    }
+    ctx->floor_in_force = ctx->rewhitened ? floor : ctx->floor;
+    return macs;
+}
+
+uint64_t eits_observed_build(eits_context *ctx)
+{
+    const uint32_t folded = ctx->model->n_folded;
+    uint32_t missing = 0;
+    for (uint32_t k = 0; k < folded; ++k)
+        missing += !in_use(ctx, k);
+    ctx->rewhitened = EITS_AS_STORED;
+    ctx->noise_ratio = 1;
+    if (!ctx->rewhitens)
+        return 0;
+    ctx->floor_in_force = ctx->floor;
+    ctx->sheet_energy = ctx->sheet_energy_stored;
+    if (missing > 0)
+        return build_triangle(ctx, eits_floor_of_rest(ctx, (eits_real)missing / (eits_real)folded),
+                              missing);
+    raise_floor(ctx);
+    return 0;
+}
+
+/* v = T^-1 v; v = T'^-1 v. */
+static void solve(const eits_context *ctx, eits_real *triangle, eits_real *v)
+{
+    for (uint32_t i = ctx->model->rank; i-- > 0;) {
+        const eits_real *row = row_of(ctx, triangle, i), before = v[i];
+        v[i] = 0;
+        v[i] = (before - dot_of_row(ctx, i, row, v)) / row[i];
+    }
+}
+
+static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_real *v)
+{
+    for (uint32_t i = 0; i < ctx->model->rank; ++i) {
+        const eits_real *row = row_of(ctx, triangle, i), after = v[i] / row[i];
+        add_row(ctx, i, v, -after, row);
+        v[i] = after;
+    }
+}
+
+/* R'^-1 is had from what is kept: R = G F diag(w) but for F's scale, so y = G^-1 G'^-1 F'^-1
+ * diag(1/w^2) P_o d_o. */
+uint64_t eits_observed_data(eits_context *ctx, eits_real *v)
+{
+    if (ctx->rewhitened == EITS_BY_ROW)
+        return eits_map(ctx, v);
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        v[i] *= ctx->map_square * ctx->row_scale[i] * ctx->row_scale[i];
+    solve_transposed(ctx, map_of(ctx), v);
+    solve_transposed(ctx, metric_of(ctx), v);
+    solve(ctx, metric_of(ctx), v);
+    return 3u * triangle_macs(ctx);
+}

@@ -1,0 +1,405 @@
+/* Active set: the exact optimum over a few columns by Newton's step on a factor of their products,
+ * which grows and shrinks with them; then those columns join whose correlation exceeds lambda and
+ * is the greatest among their neighbours in the image; and again until none is missing; between two
+ * looks at every column, looks beside those held so far (Lawson and Hanson, Solving Least Squares
+ * Problems, 1974, chapter 23, with several columns at a time). Each step keeps signs and lowers the
+ * objective. A column that depends on those held moves with them, along what leaves S x as it is,
+ * until one of them is zero and makes room: the factor never has more rows than there are
+ * directions. */
+#include "base/vec.h"
+#include "frame/projection.h"
+#include "frame/whitening.h"
+#include "kernels/column.h"
+#include "solve/duality_gap.h"
+#include "solve/gram_factor.h"
+#include "solve/solvers.h"
+#include "solve/violations.h"
+#include "solve/working_set.h"
+
+typedef struct active {
+    eits_real lambda;
+    eits_real tolerance; /* a correlation beyond lambda by no more than this is rounding */
+    uint32_t most;       /* columns that can be independent */
+    /* of each column held: its correlation less lambda times its sign; zero at the optimum */
+    eits_real *pull;
+    /* of each column held: that of its coefficient, or of the correlation that brought it in */
+    eits_real *sign;
+    eits_real *work;
+    eits_real *step;
+    eits_real *reach;  /* of each column held: what share of the step it can go */
+    eits_real *column; /* the new column's part that counts */
+    eits_nearby near;  /* columns beside those held, now or before */
+    int limited;       /* the next step is not to be had for the MACs */
+    int loose;         /* a column is held that the factor does not have */
+    int broken;        /* the factor is of no use */
+    int moved;         /* x is not as it was before the last columns were taken in */
+} active;
+
+static const eits_real EPSILON = (eits_real)(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
+/* least share of a column's square */
+static const eits_real INDEPENDENT = (eits_real)(sizeof(eits_real) == 4 ? 1e-5 : 1e-10);
+
+/* a share of the objective: what a look nearby must have won to be followed by one */
+static const eits_real WORTHWHILE = R(1e-6);
+enum { LOOKS_NEARBY = 20 };
+
+static uint64_t macs_to_finish(const eits_context *ctx, uint32_t count)
+{
+    return (uint64_t)count * ctx->model->rank + eits_gradient_macs(ctx);
+}
+
+/* Whether `macs`, and S x of one more column and the gap after it are still to be had. */
+static int affords(const eits_context *ctx, active *a, uint64_t macs)
+{
+    a->limited =
+        a->limited || !eits_affords(ctx, macs + macs_to_finish(ctx, ctx->working_count + 1));
+    return !a->limited;
+}
+
+/* The last column held takes the place. Uses a->work and a->step. */
+static void drop(eits_context *ctx, active *a, uint32_t place)
+{
+    const uint32_t count = ctx->working_count, last = count - 1;
+    if (affords(ctx, a, eits_factor_macs(count))) { /* otherwise the factor is needed no longer */
+        ctx->info.macs += eits_factor_macs(count);
+        eits_factor_drop(ctx, count, place, a->work, a->step);
+    }
+    ctx->working_count = last;
+    ctx->working[place] = ctx->working[last];
+    ctx->x[place] = ctx->x[last];
+    a->pull[place] = a->pull[last];
+    a->sign[place] = a->sign[last];
+}
+
+/* Hold column j without a row of the factor's: only where the solve ends or another solver goes on.
+ */
+static void hold_loosely(eits_context *ctx, uint32_t j, eits_real x)
+{
+    ctx->working[ctx->working_count] = j;
+    ctx->x[ctx->working_count++] = x;
+}
+
+/* The part of column j that counts into a->column; returns its square, 0 where it is but rounding.
+ */
+static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    const uint32_t rank = ctx->model->rank;
+    const eits_real scale = eits_column_scale(s, j), *from = eits_column(s, j, ctx->sz);
+    for (uint32_t i = 0; i < rank; ++i)
+        a->column[i] = scale * from[i];
+    const eits_real before = eits_dot(ctx, a->column, a->column, rank);
+    ctx->info.macs += rank;
+    if (ctx->basis_count == 0 && !ctx->rewhitened)
+        return before;
+    ctx->info.macs += rank + eits_forward(ctx, a->column);
+    const eits_real square = eits_dot(ctx, a->column, a->column, rank);
+    return square > INDEPENDENT * before ? square : 0;
+}
+
+/* a->step = the combination of the columns held that comes nearest to the new one; returns what it
+ * leaves of its square. */
+static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
+{
+    const uint32_t count = ctx->working_count;
+    ctx->kernels->dots(&ctx->model->sensitivity, ctx->working, count,
+                       eits_adjoint(ctx, a->column, ctx->adjoint), a->step);
+    eits_factor_solve(ctx, count, a->step, a->work, a->step);
+    ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_adjoint_macs(ctx) +
+                      eits_factor_macs(count) + count;
+    return square - eits_dot(ctx, a->work, a->work, count);
+}
+
+static void hold(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_real sign,
+                 eits_real pull, eits_real left)
+{
+    const uint32_t k = ctx->working_count++;
+    eits_factor_append(ctx, k, a->step, left);
+    ctx->working[k] = j;
+    ctx->x[k] = x;
+    a->sign[k] = sign;
+    a->pull[k] = pull;
+}
+
+/* The new column depends on those held (a->step as above). Move along what leaves S x as it is, if
+ * that lowers the objective, until a coefficient is zero, and drop that; returns by how much the
+ * new one moved, 0 where there is no such way. */
+static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_real pull)
+{
+    const uint32_t count = ctx->working_count;
+    ctx->info.macs += count;
+    eits_real slope = sign * pull, shortest = R(INFINITY);
+    uint32_t place = count;
+    for (uint32_t k = 0; k < count; ++k) {
+        const eits_real d = -sign * a->step[k];
+        slope = eits_fma(d, a->pull[k], slope);
+        if (d * a->sign[k] < 0 && ctx->x[k] / -d < shortest) {
+            shortest = ctx->x[k] / -d;
+            place = k;
+        }
+    }
+    if (!(slope > 0) || place == count)
+        return 0;
+    for (uint32_t k = 0; k < count; ++k)
+        ctx->x[k] = eits_fma(-sign * shortest, a->step[k], ctx->x[k]);
+    drop(ctx, a, place);
+    a->moved = 1;
+    return shortest;
+}
+
+/* Take column j in, at zero. */
+static void add(eits_context *ctx, active *a, uint32_t j)
+{
+    const eits_real sign = ctx->gradient[j] > 0 ? 1 : -1,
+                    pull = ctx->gradient[j] - sign * a->lambda;
+    const uint32_t rank = ctx->model->rank;
+    eits_real x = 0, square = 0;
+    for (int first = 1;; first = 0) {
+        const uint32_t count = ctx->working_count;
+        if (!affords(ctx, a,
+                     (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) +
+                         eits_adjoint_macs(ctx) + eits_factor_macs(count) + 2u * count))
+            break;
+        if (first && !((square = read_column(ctx, a, j)) > 0))
+            return;
+        const eits_real left = what_is_left(ctx, a, square);
+        if (count < a->most && left > INDEPENDENT * square) {
+            hold(ctx, a, j, sign * x, sign, pull, left);
+            return;
+        }
+        const eits_real moved = exchange(ctx, a, sign, pull);
+        x += moved;
+        if (ctx->working_count == count) /* no way on */
+            break;
+    }
+    if (x == 0)
+        return;
+    hold_loosely(ctx, j, sign * x);
+    a->loose = 1;
+}
+
+/* How far coefficient k can go of its step: 2 where it keeps its sign to the end. */
+static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
+{
+    const eits_real x = ctx->x[k], target = x + a->step[k];
+    if (a->sign[k] * target > 0)
+        return 2;
+    return x == 0 ? 0 : -x / a->step[k];
+}
+
+/* Newton's step to the optimum of the columns held, again and again without those that would change
+ * sign. */
+static void settle(eits_context *ctx, active *a)
+{
+    while (ctx->working_count > 0) {
+        const uint32_t count = ctx->working_count;
+        if (!affords(ctx, a, eits_factor_macs(count)))
+            return;
+        eits_factor_solve(ctx, count, a->pull, a->work, a->step);
+        ctx->info.macs += eits_factor_macs(count);
+        if (!eits_all_finite(a->step, count)) {
+            a->broken = 1;
+            return;
+        }
+        eits_real share = 1;
+        for (uint32_t k = 0; k < count; ++k) {
+            a->reach[k] = reach(ctx, a, k);
+            share = a->reach[k] < share ? a->reach[k] : share;
+        }
+        for (uint32_t k = 0; k < count; ++k) {
+            ctx->x[k] += share * a->step[k];
+            a->pull[k] *= 1 - share;
+        }
+        a->moved = a->moved || share > 0;
+        uint32_t dropped = 0;
+        for (uint32_t k = count; k-- > 0;) {
+            if (a->reach[k] <= share) { /* the last, which takes the place, is not among them */
+                drop(ctx, a, k);
+                ++dropped;
+            }
+        }
+        if (dropped == 0 || a->limited)
+            return;
+    }
+}
+
+/* The pull of the columns held, from ctx->gradient, which is zero for them afterwards; returns the
+ * greatest. */
+static eits_real take_pulls(eits_context *ctx, active *a)
+{
+    eits_real greatest = 0;
+    for (uint32_t k = 0; k < ctx->working_count; ++k) {
+        eits_real *g = &ctx->gradient[ctx->working[k]];
+        a->pull[k] = *g - a->sign[k] * a->lambda;
+        greatest = eits_fabs(a->pull[k]) > greatest ? eits_fabs(a->pull[k]) : greatest;
+        *g = 0;
+    }
+    return greatest;
+}
+
+static eits_certificate certify(eits_context *ctx, const active *a)
+{
+    ctx->info.nonzeros = eits_apply_working(ctx, ctx->x, ctx->sx);
+    ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
+    return eits_certify(ctx, a->lambda, EITS_LAYOUT_WORKING);
+}
+
+/* From a warm start's coefficients: a factor of their columns, without those that depend on the
+ * others. Returns 0, nothing changed, where that is not to be had for the MACs. */
+static int begin_warm(eits_context *ctx, active *a)
+{
+    const uint64_t held = ctx->info.nonzeros, rank = ctx->model->rank;
+    if (!eits_affords(
+            ctx, held * ((held + 2u) * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx)) +
+                     held * eits_factor_macs((uint32_t)held) + held * (rank + held) +
+                     2u * eits_gradient_macs(ctx)))
+        return 0;
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
+        const eits_real x = ctx->x[j];
+        const eits_real square =
+            x != 0 && ctx->working_count < a->most ? read_column(ctx, a, j) : 0;
+        if (!(square > 0))
+            continue;
+        const eits_real left = what_is_left(ctx, a, square);
+        if (left > INDEPENDENT * square)
+            hold(ctx, a, j, x, x > 0 ? 1 : -1, 0, left);
+    }
+    return 1;
+}
+
+static void start_over_from_zero(eits_context *ctx)
+{
+    ctx->working_count = 0;
+    ctx->info.nonzeros = 0;
+    eits_zero(ctx->x, ctx->model->n_pixels);
+    eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
+}
+
+/* Take in the first `missing` columns listed, and step to the optimum with them. Returns whether
+ * anything moved. */
+static int take_in(eits_context *ctx, active *a, uint32_t missing)
+{
+    a->moved = 0;
+    for (uint32_t k = 0; k < missing && !a->limited && !a->loose; ++k)
+        add(ctx, a, ctx->list_index[k]);
+    if (!a->loose)
+        settle(ctx, a);
+    return a->moved;
+}
+
+/* What joins next is mostly beside what is or was held: look there only. *objective is the last one
+ * known. Returns whether anything moved. */
+static int look_nearby(eits_context *ctx, active *a, eits_real *objective)
+{
+    const uint64_t rank = ctx->model->rank;
+    if (a->limited || a->loose || a->broken ||
+        !eits_affords(ctx, ctx->working_count * rank + eits_forward_macs(ctx) +
+                               macs_to_finish(ctx, ctx->working_count)))
+        return 0;
+    ctx->info.macs += rank * eits_apply_working(ctx, ctx->x, ctx->sx);
+    ctx->info.macs += eits_take_residual(ctx, ctx->sx);
+    eits_real l1 = 0;
+    for (uint32_t k = 0; k < ctx->working_count; ++k)
+        l1 += eits_fabs(ctx->x[k]);
+    const eits_real now =
+        R(0.5) * eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank) + a->lambda * l1;
+    if (!(now < *objective * (1 - WORTHWHILE)))
+        return 0;
+    *objective = now;
+    eits_nearby_add(ctx, &a->near);
+    if (!eits_affords(ctx, a->near.count * rank + eits_adjoint_macs(ctx) +
+                               macs_to_finish(ctx, ctx->working_count)))
+        return 0;
+    eits_take_gradient_nearby(ctx, &a->near);
+    (void)take_pulls(ctx, a);
+    const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, &a->near);
+    return missing > 0 && take_in(ctx, a, missing);
+}
+
+/* One round; *c becomes the certificate after it. */
+static int round_of(eits_context *ctx, active *a, uint32_t missing, eits_certificate *c)
+{
+    eits_real objective = c->objective;
+    ++ctx->info.iterations;
+    const int moved = take_in(ctx, a, missing);
+    for (int looks = 0; moved && looks < LOOKS_NEARBY && look_nearby(ctx, a, &objective); ++looks)
+        ;
+    if (moved)
+        *c = certify(ctx, a);
+    return moved;
+}
+
+/* Rounds until something ends them; 0 where another solver has to go on. */
+static int rounds(eits_context *ctx, active *a, eits_certificate *c)
+{
+    const eits_options *o = &ctx->options;
+    const eits_real enough = o->gap_rel * R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
+    for (int stalls = 0;;) {
+        if (o->gap_rel > 0 && c->gap <= enough) {
+            ctx->info.stop = EITS_STOP_GAP;
+            return 1;
+        }
+        if (ctx->info.iterations == o->iterations) {
+            ctx->info.stop = EITS_STOP_ITERATIONS;
+            return 1;
+        }
+        const eits_real pull = take_pulls(ctx, a), before = c->objective;
+        const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, NULL);
+        if (stalls == 2 || (missing == 0 && pull <= a->tolerance)) {
+            ctx->info.stop = EITS_STOP_OPTIMUM;
+            return 1;
+        }
+        const int moved = round_of(ctx, a, stalls > 0 && missing > 1 ? 1 : missing, c);
+        if (a->broken || (a->loose && !a->limited) || !(c->objective <= before * (1 + R(1e-3))))
+            return 0;
+        if (a->limited) {
+            ctx->info.stop = EITS_STOP_MACS;
+            return 1;
+        }
+        stalls = c->objective < before * (1 - EPSILON) ? 0 : stalls + 1;
+        if (!moved) /* the gradient is as it was, but for the columns held */
+            stalls = 2;
+    }
+}
+
+void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known)
+{
+    const uint32_t free = ctx->model->rank - ctx->basis_count;
+    active a = {.lambda = lambda,
+                .most = free < ctx->model->n_pixels ? free : ctx->model->n_pixels};
+    a.tolerance = 2 * EPSILON * eits_sqrt((eits_real)ctx->model->lipschitz) * ctx->info.data_norm;
+    a.pull = ctx->slope[0], a.sign = ctx->slope[1], a.work = ctx->slope[2], a.step = ctx->sz;
+    a.reach = ctx->x_next, a.column = ctx->sx_next;
+    a.near = eits_nearby_none(ctx);
+    eits_certificate c;
+    /* the set changes column by column here: none are held unpacked */
+    ctx->working_count = ctx->working_held = 0;
+    if (gradient_known) {
+        eits_copy(ctx->residual, ctx->y, EITS_STRIDE(ctx->model->rank));
+        c = eits_evaluate(ctx, lambda, EITS_LAYOUT_WORKING);
+    } else if (begin_warm(ctx, &a)) {
+        c = certify(ctx, &a);
+        if (!(c.objective < eits_ceiling(ctx))) {
+            start_over_from_zero(ctx);
+            c = eits_certify(ctx, lambda, EITS_LAYOUT_WORKING);
+        }
+    } else {
+        ctx->info.stop = EITS_STOP_MACS;
+        eits_report(ctx, eits_certify(ctx, lambda, EITS_LAYOUT_FULL));
+        return;
+    }
+    const int done = rounds(ctx, &a, &c);
+    if (!done && !(eits_all_finite(ctx->x, ctx->working_count) && c.objective <= eits_ceiling(ctx)))
+        start_over_from_zero(ctx);
+    eits_working_set_end(ctx);
+    if (done) {
+        eits_report(ctx, c);
+        return;
+    }
+    if (!eits_affords(ctx, macs_to_finish(ctx, ctx->info.nonzeros + 1))) {
+        ctx->info.stop = EITS_STOP_MACS;
+        eits_report(ctx, ctx->info.nonzeros == 0 ? eits_certify_zero(ctx, lambda) : c);
+        return;
+    }
+    eits_run_coordinate(ctx, lambda, 0);
+}

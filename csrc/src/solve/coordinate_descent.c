@@ -1,0 +1,231 @@
+/* Coordinate descent with the residual kept (Friedman et al., Ann. Appl. Stat. 1 (2007) 302,
+ * doi 10.1214/07-AOAS131). A sweep goes over a list of columns: at a look, those that are not zero
+ * or whose correlation with the residual exceeds lambda; then without those that stayed at zero.
+ * The residual is kept within the directions that count, so a column's correlation needs no
+ * projection; where at most one direction is ignored its part is kept apart and costs nothing
+ * either. Where rows left out are whitened anew (observed.h) what is kept is F' of the residual. */
+#include "base/vec.h"
+#include "frame/projection.h"
+#include "frame/whitening.h"
+#include "kernels/column.h"
+#include "kernels/kernels.h"
+#include "solve/duality_gap.h"
+#include "solve/solvers.h"
+#include "solve/working_set.h"
+
+typedef struct descent {
+    eits_real lambda;
+    /* where one direction is ignored: the residual's part along it, which ctx->residual then has
+     * too */
+    eits_real along;
+    eits_real *norm;  /* |s_j|^2; negative: not known yet */
+    eits_real *slant; /* s_j along the direction ignored */
+    int apart;        /* at most one direction is ignored, and nothing is re-whitened */
+} descent;
+
+static eits_real *scratch(const eits_context *ctx)
+{
+    return ctx->sz;
+}
+
+static uint64_t macs_of_a_visit(const eits_context *ctx, const descent *d)
+{
+    const uint64_t rank = ctx->model->rank;
+    if (ctx->rewhitened)
+        return 3u * rank + 2u * eits_forward_macs(ctx) + eits_adjoint_macs(ctx);
+    return rank * (d->apart ? 4u : 3u + 2u * ctx->basis_count);
+}
+
+/* Whether one more visit, S x with one more column and the gap after it are still to be had. */
+static int affords_visit(const eits_context *ctx, const descent *d)
+{
+    return eits_affords(ctx, macs_of_a_visit(ctx, d) +
+                                 ((uint64_t)ctx->info.nonzeros + 1) * ctx->model->rank +
+                                 eits_gradient_macs(ctx));
+}
+
+/* F s_j of a column. */
+static eits_real *see(eits_context *ctx, const eits_real *column, eits_real scale)
+{
+    eits_real *seen = ctx->sx_next;
+    for (uint32_t i = 0; i < ctx->model->rank; ++i)
+        seen[i] = scale * column[i];
+    ctx->info.macs += eits_map(ctx, seen);
+    return seen;
+}
+
+static void measure(eits_context *ctx, descent *d, uint32_t j, const eits_real *column,
+                    eits_real scale)
+{
+    const uint32_t rank = ctx->model->rank;
+    if (ctx->rewhitened) {
+        const eits_real *seen = see(ctx, column, scale);
+        d->norm[j] = eits_dot(ctx, seen, seen, rank);
+        ctx->info.macs += rank;
+        return;
+    }
+    d->norm[j] = scale * scale * eits_dot(ctx, column, column, rank);
+    ctx->info.macs += rank;
+    if (!d->apart || ctx->basis_count == 0)
+        return;
+    d->slant[j] = scale * eits_dot(ctx, column, ctx->basis, rank);
+    ctx->info.macs += rank;
+}
+
+/* Minimise over coefficient j alone, by a step for |s_j|^2 at least as large as that of its part
+ * that counts, so that the objective cannot rise. Returns what the step is worth: |s_j|^2 step^2.
+ */
+static eits_real visit(eits_context *ctx, descent *d, uint32_t j)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    const eits_real *column = eits_column(s, j, scratch(ctx)), scale = eits_column_scale(s, j);
+    const uint32_t rank = ctx->model->rank;
+    if (d->norm[j] < 0)
+        measure(ctx, d, j, column, scale);
+    eits_real gradient = scale * eits_dot(ctx, column, ctx->residual, rank);
+    ctx->info.macs += rank;
+    if (d->apart && ctx->basis_count == 1)
+        gradient = eits_fma(-d->along, d->slant[j], gradient);
+    const eits_real norm = d->norm[j], before = ctx->x[j], v = eits_fma(norm, before, gradient);
+    const int up = ctx->options.sign != EITS_SIGN_DECREASE && v > d->lambda;
+    const int down = ctx->options.sign != EITS_SIGN_INCREASE && v < -d->lambda;
+    const eits_real shrunk = up ? v - d->lambda : down ? v + d->lambda : 0;
+    const eits_real after = norm > 0 ? shrunk / norm : 0, step = after - before;
+    if (step == 0)
+        return 0;
+    ctx->x[j] = after;
+    ctx->info.nonzeros += (uint32_t)(after != 0) - (uint32_t)(before != 0);
+    ctx->info.macs += rank;
+    if (ctx->rewhitened) {
+        eits_real *seen = see(ctx, column, scale);
+        ctx->info.macs += eits_project(ctx, seen) + eits_adjoint_macs(ctx);
+        eits_axpy(ctx, ctx->residual, -step, eits_adjoint(ctx, seen, ctx->adjoint), rank);
+        return norm * step * step;
+    }
+    eits_axpy(ctx, ctx->residual, -step * scale, column, rank);
+    if (!d->apart)
+        ctx->info.macs += eits_project(ctx, ctx->residual);
+    else if (ctx->basis_count == 1)
+        d->along = eits_fma(-step, d->slant[j], d->along);
+    return norm * step * step;
+}
+
+static const eits_real SETTLED = R(0.001);
+
+typedef enum sweep_end { SWEEP_DONE, SWEEP_LIMIT } sweep_end;
+
+/* One sweep; leaves columns out of the list that stayed at zero. *worth is the sum of what its
+ * steps are worth. */
+static sweep_end sweep(eits_context *ctx, descent *d, eits_real *worth)
+{
+    uint32_t count = 0, k = 0;
+    *worth = 0;
+    for (; k < ctx->working_count && affords_visit(ctx, d); ++k) {
+        const uint32_t j = ctx->working[k];
+        const eits_real won = visit(ctx, d, j);
+        *worth += won;
+        if (ctx->x[j] != 0 || won != 0)
+            ctx->working[count++] = j;
+    }
+    const sweep_end end = k < ctx->working_count ? SWEEP_LIMIT : SWEEP_DONE;
+    ctx->working_count = count;
+    return end;
+}
+
+/* Take S x, the residual and the gradient of every column anew. */
+static eits_certificate look(eits_context *ctx, descent *d)
+{
+    ctx->info.nonzeros = eits_apply(ctx, ctx->x, ctx->sx);
+    ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
+    d->along = 0;
+    return eits_certify(ctx, d->lambda, EITS_LAYOUT_FULL);
+}
+
+static void choose(eits_context *ctx, const descent *d)
+{
+    uint32_t count = 0;
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
+        ctx->working[count] = j;
+        count += ctx->x[j] != 0 || eits_moves(ctx->gradient[j], d->lambda, ctx->options.sign);
+    }
+    ctx->working_count = count;
+}
+
+/* What all steps of a sweep are worth when only rounding moves. */
+static eits_real rounding(const eits_context *ctx)
+{
+    const eits_real epsilon = R(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
+    return 64 * epsilon * epsilon * ctx->info.data_norm * ctx->info.data_norm;
+}
+
+/* Sweeps until a look is due: after sweep `last`, or once a sweep is worth little beside the first,
+ * when a look is better. Returns 1 where the first moved nothing but by rounding: also what the
+ * look brought in is at rest. */
+static int descend(eits_context *ctx, descent *d, uint32_t last)
+{
+    eits_real first = 0, worth = 0;
+    eits_copy(ctx->residual, eits_adjoint(ctx, ctx->residual, ctx->adjoint),
+              EITS_STRIDE(ctx->model->rank));
+    ctx->info.macs += eits_adjoint_macs(ctx);
+    for (int begun = 0; ctx->info.iterations < last && !(begun && worth <= SETTLED * first);
+         begun = 1) {
+        if (sweep(ctx, d, &worth) == SWEEP_LIMIT) {
+            ctx->info.stop = EITS_STOP_MACS;
+            return 0;
+        }
+        ++ctx->info.iterations;
+        first = begun ? first : worth;
+        if (!begun && worth <= rounding(ctx))
+            return 1;
+    }
+    return 0;
+}
+
+void eits_run_coordinate(eits_context *ctx, eits_real lambda, int gradient_known)
+{
+    const eits_options *o = &ctx->options;
+    const eits_real scale = R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
+    const uint32_t end = o->iterations;
+    descent d = {.lambda = lambda,
+                 .norm = ctx->z,
+                 .slant = ctx->x_next,
+                 .apart = !ctx->rewhitened && ctx->basis_count <= 1};
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
+        d.norm[j] = -1;
+    eits_certificate c = {0};
+    if (gradient_known) {
+        eits_copy(ctx->residual, ctx->y, EITS_STRIDE(ctx->model->rank));
+        c = eits_evaluate(ctx, lambda, EITS_LAYOUT_FULL);
+    } else {
+        c = look(ctx, &d);
+    }
+    ctx->info.stop = EITS_STOP_ITERATIONS;
+    uint32_t interval = o->gap_every;
+    while (ctx->info.iterations < end) {
+        choose(ctx, &d);
+        if (!affords_visit(ctx, &d)) {
+            ctx->info.stop = EITS_STOP_MACS;
+            break;
+        }
+        const uint32_t done = ctx->info.iterations,
+                       due = interval < end - done ? done + interval : end;
+        const int resting = descend(ctx, &d, due);
+        c = look(ctx, &d);
+        if (!(c.objective <= eits_ceiling(ctx))) {
+            ctx->info.stop = EITS_STOP_DIVERGED;
+            break;
+        }
+        if (ctx->info.stop == EITS_STOP_MACS)
+            break;
+        if (o->gap_rel > 0 && c.gap <= o->gap_rel * scale) {
+            ctx->info.stop = EITS_STOP_GAP;
+            break;
+        }
+        if (resting) {
+            ctx->info.stop = EITS_STOP_OPTIMUM;
+            break;
+        }
+        interval = o->gap_rel > 0 || interval > UINT32_MAX / 12 ? interval : 6 * interval;
+    }
+    eits_report(ctx, c);
+}

@@ -1,0 +1,89 @@
+/* The duality gap, the gradient that it needs, and the limit of multiply-accumulates. */
+#include "solve/duality_gap.h"
+
+#include "base/vec.h"
+#include "frame/projection.h"
+#include "frame/whitening.h"
+#include "kernels/kernels.h"
+
+uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx)
+{
+    return eits_residual(ctx, sx, ctx->residual);
+}
+
+uint64_t eits_gradient_macs(const eits_context *ctx)
+{
+    return (uint64_t)ctx->model->n_pixels * ctx->model->rank + eits_forward_macs(ctx) +
+           eits_adjoint_macs(ctx);
+}
+
+void eits_take_gradient(eits_context *ctx, const eits_real *sx)
+{
+    (void)eits_take_residual(ctx, sx);
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->residual, ctx->adjoint), ctx->gradient);
+    ctx->info.macs += eits_gradient_macs(ctx);
+}
+
+int eits_affords(const eits_context *ctx, uint64_t macs)
+{
+    return ctx->options.mac_limit == 0 || ctx->info.macs + macs <= ctx->options.mac_limit;
+}
+
+static eits_real half_square_of_data(const eits_context *ctx)
+{
+    return R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
+}
+
+eits_real eits_ceiling(const eits_context *ctx)
+{
+    return half_square_of_data(ctx) * (1 + R(1e-3));
+}
+
+/* With r = y - S x, c = S' r and s = min(1, lambda / max c), the dual point s r gives
+ *     gap = (1 - s)^2 |r|^2 / 2 + sum_j (lambda |x_j| - s x_j c_j),
+ * a sum of terms that are not negative, so that nothing cancels (from Kim et al., IEEE J. Sel. Top.
+ * Signal Process. 1 (2007) 606, doi 10.1109/JSTSP.2007.910971, with |y|^2 / 2 - |y - s r|^2 / 2
+ * written out). */
+eits_certificate eits_evaluate(const eits_context *ctx, eits_real lambda, eits_layout layout)
+{
+    const eits_real largest =
+        eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, ctx->options.sign);
+    const eits_real s = largest > lambda ? lambda / largest : 1;
+    const uint32_t count =
+        layout == EITS_LAYOUT_WORKING ? ctx->working_count : ctx->model->n_pixels;
+    eits_real lane[8] = {0}, lane_l1[8] = {0};
+    for (uint32_t k = 0; k < count; ++k) { /* columns that are not held add zero to their lanes */
+        const uint32_t j = layout == EITS_LAYOUT_WORKING ? ctx->working[k] : k;
+        const eits_real weight = lambda * eits_fabs(ctx->x[k]);
+        const eits_real slack = eits_fma(-s * ctx->x[k], ctx->gradient[j], weight);
+        lane[j % 8] += slack > 0 ? slack : 0; /* below zero by rounding only */
+        lane_l1[j % 8] += weight;
+    }
+    eits_certificate c;
+    c.residual_squared = eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
+    c.gap = eits_fma(R(0.5) * (1 - s) * (1 - s), c.residual_squared, eits_tree8(lane));
+    c.objective = eits_fma(R(0.5), c.residual_squared, eits_tree8(lane_l1));
+    return c;
+}
+
+eits_certificate eits_certify(eits_context *ctx, eits_real lambda, eits_layout layout)
+{
+    eits_take_gradient(ctx, ctx->sx);
+    return eits_evaluate(ctx, lambda, layout);
+}
+
+eits_certificate eits_certify_zero(const eits_context *ctx, eits_real lambda)
+{
+    const eits_real half = half_square_of_data(ctx),
+                    s = ctx->info.lambda_max > lambda ? lambda / ctx->info.lambda_max : 1;
+    return (eits_certificate){(1 - s) * (1 - s) * half, half,
+                              ctx->info.data_norm * ctx->info.data_norm};
+}
+
+void eits_report(eits_context *ctx, eits_certificate c)
+{
+    ctx->info.gap = c.gap;
+    const eits_real half = half_square_of_data(ctx);
+    ctx->info.gap_rel = half > 0 ? c.gap / half : 0;
+    ctx->info.residual = eits_sqrt(c.residual_squared);
+}

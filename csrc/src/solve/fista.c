@@ -1,0 +1,200 @@
+/* FISTA with non-negative, non-positive or signed shrinkage; solve.h has the problem and its
+ * source. */
+#include "base/vec.h"
+#include "frame/whitening.h"
+#include "kernels/kernels.h"
+#include "solve/duality_gap.h"
+#include "solve/solvers.h"
+#include "solve/working_set.h"
+
+enum { MAX_STEP_HALVINGS = 8 };
+
+static int by_working_set(const eits_context *ctx)
+{
+    return ctx->options.solver == EITS_SOLVER_WORKING_SET;
+}
+
+/* How many coefficients x, x_next and z hold. */
+static uint32_t held(const eits_context *ctx)
+{
+    return by_working_set(ctx) ? ctx->working_count : ctx->model->n_pixels;
+}
+
+static void take_working_gradient(eits_context *ctx, const eits_real *sx)
+{
+    ctx->info.macs += eits_take_residual(ctx, sx);
+    eits_apply_t_working(ctx, eits_adjoint(ctx, ctx->residual, ctx->adjoint), ctx->gradient);
+    ctx->info.macs += (uint64_t)ctx->working_count * ctx->model->rank + eits_adjoint_macs(ctx);
+}
+
+/* The extrapolated point starts at x, momentum forgotten. */
+static void restart_momentum(eits_context *ctx)
+{
+    eits_copy(ctx->z, ctx->x, held(ctx));
+    eits_copy(ctx->sz, ctx->sx, EITS_STRIDE(ctx->model->rank));
+}
+
+static void start_over_from_zero(eits_context *ctx)
+{
+    ctx->working_count = 0;
+    ctx->info.nonzeros = 0;
+    eits_zero(ctx->x, ctx->model->n_pixels);
+    eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
+    restart_momentum(ctx);
+}
+
+static void swap(eits_real **a, eits_real **b)
+{
+    eits_real *kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+/* Whether S x_next, and the gap after it, are still to be had. */
+static int affords_product(const eits_context *ctx)
+{
+    if (ctx->options.mac_limit == 0)
+        return 1;
+    uint64_t count = 0;
+    for (uint32_t k = 0; k < held(ctx); ++k)
+        count += ctx->x_next[k] != 0;
+    return eits_affords(ctx, count * ctx->model->rank + eits_gradient_macs(ctx));
+}
+
+/* One iteration from z with the given step, ctx->gradient being that at z; *t is the momentum
+ * number. 0 where the limit of multiply-accumulates allows it no longer; x is as it was then. */
+static int iterate(eits_context *ctx, eits_real lambda, eits_real step, eits_real *t)
+{
+    const eits_real t_next = R(0.5) * (1 + eits_sqrt(eits_fma(4 * *t, *t, 1)));
+    const eits_real beta = (*t - 1) / t_next;
+    const eits_prox how = {
+        .step = step, .threshold = step * lambda, .beta = beta, .sign = ctx->options.sign};
+    ctx->kernels->prox(&how, held(ctx), ctx->gradient, ctx->x, ctx->x_next, ctx->z);
+    if (!affords_product(ctx))
+        return 0;
+    ctx->info.nonzeros = by_working_set(ctx) ? eits_apply_working(ctx, ctx->x_next, ctx->sx_next)
+                                             : eits_apply(ctx, ctx->x_next, ctx->sx_next);
+    ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
+    ctx->kernels->extrapolate(ctx->sz, beta, ctx->sx_next, ctx->sx, EITS_STRIDE(ctx->model->rank));
+    swap(&ctx->x, &ctx->x_next);
+    swap(&ctx->sx, &ctx->sx_next);
+    *t = t_next;
+    return 1;
+}
+
+/* When the working set is looked after: a look at every column after gap_every iterations, then
+ * after LOOK_GROWTH times as many, and so on: early looks matter, later ones change little; where a
+ * gap is to be reached, always after gap_every. In between, columns at rest are left out every few
+ * iterations. */
+typedef struct schedule {
+    uint32_t next_look, interval;
+} schedule;
+
+enum { PRUNE_EVERY = 5, LOOK_GROWTH = 6 };
+
+static int looks_at_every_column(const eits_context *ctx, uint32_t k, const schedule *s)
+{
+    return !by_working_set(ctx) || k >= s->next_look;
+}
+
+/* Whether the gradient for iteration k, and the gap after it, are still to be had. */
+static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule *s)
+{
+    const uint64_t whole = eits_gradient_macs(ctx);
+    const uint64_t some = (uint64_t)ctx->working_count * ctx->model->rank + eits_forward_macs(ctx) +
+                          eits_adjoint_macs(ctx);
+    return eits_affords(ctx, whole + (looks_at_every_column(ctx, k, s) ? whole : some));
+}
+
+/* The gradient at z for iteration k (from 1): of every column, or of the working set as it is then.
+ */
+static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, schedule *s,
+                             int known)
+{
+    if (looks_at_every_column(ctx, k, s)) {
+        if (!known)
+            eits_take_gradient(ctx, ctx->sz);
+        if (!by_working_set(ctx))
+            return;
+        eits_working_set_choose(ctx, lambda);
+        s->next_look = s->interval < UINT32_MAX - k ? k + s->interval : UINT32_MAX;
+        s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / LOOK_GROWTH / 2
+                          ? s->interval
+                          : LOOK_GROWTH * s->interval;
+        return;
+    }
+    take_working_gradient(ctx, ctx->sz);
+    if (k % PRUNE_EVERY == 1)
+        eits_working_set_prune(ctx, lambda);
+}
+
+static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient_known)
+{
+    const eits_options *o = &ctx->options;
+    const eits_layout layout = by_working_set(ctx) ? EITS_LAYOUT_WORKING : EITS_LAYOUT_FULL;
+    const eits_real scale = R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
+    const eits_real ceiling = eits_ceiling(ctx);
+    eits_real step = 1 / (eits_real)ctx->model->lipschitz, t = 1;
+    eits_certificate c = {0};
+    int certified = 0; /* c is that of x as it is */
+    schedule looks = {.next_look = 1, .interval = o->gap_every};
+    restart_momentum(ctx);
+    ctx->info.stop = EITS_STOP_ITERATIONS;
+    for (uint32_t k = 1; k <= o->iterations; ++k) {
+        const int known = gradient_known && k == 1;
+        if (!known && !affords_gradient(ctx, k, &looks))
+            ctx->info.stop = EITS_STOP_MACS;
+        else
+            prepare_gradient(ctx, lambda, k, &looks, known);
+        if (ctx->info.stop == EITS_STOP_MACS || !iterate(ctx, lambda, step, &t)) {
+            ctx->info.stop = EITS_STOP_MACS;
+            break;
+        }
+        ctx->info.iterations = k;
+        certified = 0;
+        if (k != o->iterations && k % o->gap_every != 0)
+            continue;
+        const int none = ctx->info.nonzeros == 0;
+        if (k != o->iterations && !(o->gap_rel > 0) && !none &&
+            eits_dot(ctx, ctx->sx, ctx->sx, ctx->model->rank) <= 4 * 2 * scale)
+            continue; /* |Sx| <= 2 |y| wherever the objective is below its value at zero */
+        c = eits_certify(ctx, lambda, layout);
+        certified = 1;
+        /* too long a step may also throw all coefficients beyond their sign, to zero: then the gap
+         * is that of the start */
+        if (!(c.objective <= ceiling) || (none && c.gap > R(1e-3) * scale)) {
+            if (ctx->info.step_halvings == MAX_STEP_HALVINGS || k == o->iterations) {
+                ctx->info.stop = EITS_STOP_DIVERGED;
+                break;
+            }
+            ++ctx->info.step_halvings;
+            step *= R(0.5);
+            t = 1;
+            start_over_from_zero(ctx);
+            looks = (schedule){.next_look = k + 1, .interval = o->gap_every};
+            c = eits_certify_zero(ctx, lambda);
+            continue;
+        }
+        if (o->gap_rel > 0 && c.gap <= o->gap_rel * scale) {
+            ctx->info.stop = EITS_STOP_GAP;
+            break;
+        }
+    }
+    if (ctx->info.stop == EITS_STOP_MACS && !certified) {
+        c = ctx->info.iterations == 0 && gradient_known ? eits_certify_zero(ctx, lambda)
+                                                        : eits_certify(ctx, lambda, layout);
+        if (!(c.objective <= ceiling))
+            ctx->info.stop = EITS_STOP_DIVERGED;
+    }
+    eits_report(ctx, c);
+}
+
+void eits_run_fista(eits_context *ctx, eits_real lambda, int gradient_known)
+{
+    ctx->working_count = 0;
+    if (by_working_set(ctx) && !gradient_known) /* a warm start */
+        eits_working_set_begin(ctx);
+    iterate_to_the_end(ctx, lambda, gradient_known);
+    if (by_working_set(ctx))
+        eits_working_set_end(ctx);
+}

@@ -1,0 +1,51 @@
+#include "solve/gram_factor.h"
+
+#include "base/vec.h"
+#include "kernels/kernels.h"
+
+static eits_real *row(const eits_context *ctx, uint32_t i)
+{
+    return ctx->factor + EITS_STRIDE(ctx->model->rank) * i;
+}
+
+void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, eits_real *w,
+                       eits_real *d)
+{
+    const size_t stride = EITS_STRIDE(ctx->model->rank), length = EITS_STRIDE(count);
+    eits_zero(b + count, length - count);
+    ctx->kernels->rows_dot(ctx->factor, stride, count, length, b, w);
+    ctx->kernels->rows_sum(ctx->factor, stride, count, length, w, d);
+}
+
+void eits_factor_append(eits_context *ctx, uint32_t count, const eits_real *d, eits_real left)
+{
+    const eits_real share = 1 / eits_sqrt(left);
+    eits_real *r = row(ctx, count);
+    eits_zero(r, EITS_STRIDE(ctx->model->rank));
+    for (uint32_t k = 0; k < count; ++k)
+        r[k] = -share * d[k];
+    r[count] = share;
+}
+
+void eits_factor_drop(eits_context *ctx, uint32_t count, uint32_t place, eits_real *scratch,
+                      eits_real *more)
+{
+    const size_t stride = EITS_STRIDE(ctx->model->rank), length = EITS_STRIDE(count);
+    const uint32_t last = count - 1;
+    eits_real square = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        scratch[i] = row(ctx, i)[place];
+        square += scratch[i] * scratch[i];
+    }
+    const eits_real norm = eits_sqrt(square), end = eits_fabs(scratch[last]);
+    /* the sign that does not cancel */
+    scratch[last] = scratch[last] < 0 ? -(norm + end) : norm + end;
+    const eits_real twice = norm > 0 ? 1 / (norm * (norm + end)) : 0;
+    ctx->kernels->rows_sum(ctx->factor, stride, count, length, scratch, more);
+    for (uint32_t i = 0; i < last; ++i) {
+        eits_real *r = row(ctx, i);
+        eits_axpy(ctx, r, -twice * scratch[i], more, length);
+        r[place] = r[last];
+        r[last] = 0;
+    }
+}

@@ -1,0 +1,162 @@
+#include "touch/disc.h"
+
+#include "base/vec.h"
+#include "context/column_cache.h"
+#include "frame/whitening.h"
+#include "kernels/column.h"
+#include "kernels/kernels.h"
+
+/* The kept pixels that the disc covers, in list_index, how much of each, and the cover's derivative
+ * by distance, times pixel_mm. */
+typedef struct covered {
+    uint32_t count;
+    uint32_t *index;
+    eits_matrix matrix; /* whose columns `index` lists: S, or the held columns */
+    eits_real *cover;
+    eits_real *ramp;                /* minus the derivative */
+    eits_real *toward_x, *toward_y; /* unit vector from centre to pixel; later the derivatives */
+} covered;
+
+/* Cells from first to last, clipped to 0 .. count - 1, whose centres may lie within `reach` of
+ * `at`; all in pixels. */
+static void cell_range(eits_real at, eits_real reach, uint32_t count, uint32_t *first,
+                       uint32_t *last)
+{
+    const eits_real low = at - reach - R(0.5), high = at + reach - R(0.5),
+                    top = (eits_real)(count - 1);
+    *first = low > 0 ? (low < top ? (uint32_t)low : count) : 0;
+    *last = high < 0 ? 0 : (high < top ? (uint32_t)high + 1 : count - 1);
+}
+
+static eits_real column_factor(const eits_model *model, uint32_t j)
+{
+    return eits_column_scale(&model->sensitivity, j) / (eits_real)model->column_weight[j];
+}
+
+static covered cover(eits_context *ctx, const eits_disc *disc)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm;
+    const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / pixel;
+    const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / pixel;
+    const eits_real radius = disc->radius_mm / pixel, reach = radius + R(0.5);
+    covered c = {0,      ctx->list_index, model->sensitivity, ctx->list_value, ctx->gradient,
+                 ctx->z, ctx->x_next};
+    uint32_t x0, x1, y0, y1;
+    cell_range(x, reach, model->nx, &x0, &x1);
+    cell_range(y, reach, model->ny, &y0, &y1);
+    for (uint32_t iy = y0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x0; ix <= x1 && ix < model->nx; ++ix) {
+            const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+            if (j == EITS_NO_PIXEL || model->column_weight[j] == 0.0f)
+                continue;
+            const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y;
+            const eits_real distance = eits_sqrt(eits_fma(dx, dx, dy * dy));
+            const eits_real share = R(0.5) + (radius - distance);
+            if (!(share > 0))
+                continue;
+            const eits_real from = distance > R(1e-6) ? 1 / distance : 0;
+            ctx->list_index[c.count] = j;
+            c.cover[c.count] = share < 1 ? share : 1;
+            c.ramp[c.count] = share < 1 ? 1 : 0;
+            c.toward_x[c.count] = dx * from;
+            c.toward_y[c.count] = dy * from;
+            ++c.count;
+        }
+    }
+    return c;
+}
+
+/* Covers become what columns of S are multiplied by: over the column weight, times the column
+ * scale. */
+static void weigh(eits_context *ctx, covered *c)
+{
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+    for (uint32_t k = 0; k < c->count; ++k) {
+        const eits_real factor = column_factor(ctx->model, c->index[k]);
+        c->cover[k] *= factor;
+        c->ramp[k] *= factor / pixel;
+    }
+    if (eits_hold_columns(ctx, c->index, c->count)) {
+        eits_slots_of(ctx, c->index, c->count, c->index);
+        c->matrix = eits_held_columns(ctx);
+    }
+}
+
+static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *value, eits_real *out)
+{
+    ctx->kernels->mul(&c->matrix, c->index, value, c->count, out);
+    return (uint64_t)c->count * ctx->model->rank + eits_forward(ctx, out);
+}
+
+uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom,
+                        eits_real *const *slope)
+{
+    covered c = cover(ctx, disc);
+    weigh(ctx, &c);
+    uint64_t macs = respond(ctx, &c, c.cover, atom);
+    if (slope == NULL)
+        return macs;
+    for (uint32_t k = 0; k < c.count; ++k) {
+        c.toward_x[k] *= c.ramp[k];
+        c.toward_y[k] *= c.ramp[k];
+    }
+    macs += respond(ctx, &c, c.toward_x, slope[0]);
+    macs += respond(ctx, &c, c.toward_y, slope[1]);
+    macs += respond(ctx, &c, c.ramp, slope[2]);
+    return macs;
+}
+
+uint64_t eits_disc_field(eits_context *ctx, const eits_disc *disc, eits_real *field)
+{
+    const eits_matrix *at = &ctx->model->fields.at;
+    const covered c = cover(ctx, disc);
+    eits_real sum = 0;
+    for (uint32_t k = 0; k < c.count; ++k)
+        sum += c.cover[k];
+    for (uint32_t k = 0; k < c.count; ++k)
+        c.cover[k] /= sum;
+    ctx->kernels->mul(at, c.index, c.cover, c.count, field);
+    return (uint64_t)c.count * at->rows;
+}
+
+eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, radius = disc->radius_mm / pixel,
+                    reach = radius + R(0.5);
+    const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / pixel;
+    const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / pixel;
+    eits_real pixels = 0;
+    uint32_t x0, x1, y0, y1;
+    cell_range(x, reach, model->nx, &x0, &x1);
+    cell_range(y, reach, model->ny, &y0, &y1);
+    for (uint32_t iy = y0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x0; ix <= x1 && ix < model->nx; ++ix) {
+            const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+            if (j == EITS_NO_PIXEL || model->column_weight[j] == 0.0f)
+                continue;
+            const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y;
+            const eits_real share = reach - eits_sqrt(eits_fma(dx, dx, dy * dy));
+            pixels += share > 0 ? (share < 1 ? share : 1) : 0;
+        }
+    }
+    return pixels * pixel * pixel;
+}
+
+int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc)
+{
+    const eits_model *model = ctx->model;
+    const eits_real x = (disc->x_mm - (eits_real)model->origin_x_mm) / (eits_real)model->pixel_mm;
+    const eits_real y = (disc->y_mm - (eits_real)model->origin_y_mm) / (eits_real)model->pixel_mm;
+    if (!(x >= -1 && y >= -1 && x < (eits_real)model->nx + 1 && y < (eits_real)model->ny + 1))
+        return 0;
+    const uint32_t x1 = (uint32_t)(x + 1), y1 = (uint32_t)(y + 1); /* its cell, counted from 1 */
+    for (uint32_t iy = y1 > 2 ? y1 - 2 : 0; iy <= y1 && iy < model->ny; ++iy) {
+        for (uint32_t ix = x1 > 2 ? x1 - 2 : 0; ix <= x1 && ix < model->nx; ++ix) {
+            if (ctx->cell[(size_t)iy * model->nx + ix] != EITS_NO_PIXEL)
+                return 1;
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,190 @@
+/* Discs' strengths, places and radii. */
+#include "touch/disc_fit.h"
+
+#include "base/vec.h"
+#include "kernels/kernels.h"
+
+enum { STRENGTH_PASSES = 10 };
+
+/* Relative deviation of the radius that strength suggests: contrasts of 3 to 10 make 2 (c - 1) / (c
+ * + 1) = 1.0 to 1.6, so that the root of strength tells the radius to about 12 %. */
+static const eits_real RADIUS_DEVIATION = R(0.12);
+static const eits_real DAMPING = R(1e-3);
+static const eits_real SETTLED_PIXELS = R(1.0 / 256.0);
+static const eits_real MOST_RADIUS_STEP_PIXELS = R(0.5);
+
+eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const eits_real *atom,
+                           const eits_real *target)
+{
+    const uint32_t rank = ctx->model->rank;
+    const eits_real energy = eits_dot(ctx, atom, atom, rank);
+    const eits_real change = energy > 0 ? eits_dot(ctx, atom, target, rank) / energy : 0;
+    return change * disc->polarity > 0 ? change : 0;
+}
+
+void eits_fit_strengths(eits_context *ctx, eits_fit *f)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_copy(ctx->residual, f->data, EITS_STRIDE(rank));
+    for (uint32_t k = 0; k < f->count; ++k) {
+        f->macs += eits_disc_atom(ctx, &f->disc[k], eits_atom(ctx, k), NULL);
+        f->disc[k].change = 0;
+    }
+    for (int pass = 0; pass < STRENGTH_PASSES; ++pass) {
+        for (uint32_t k = 0; k < f->count; ++k) {
+            eits_disc *disc = &f->disc[k];
+            eits_axpy(ctx, ctx->residual, disc->change, eits_atom(ctx, k), rank);
+            disc->change = eits_best_change(ctx, disc, eits_atom(ctx, k), ctx->residual);
+            eits_axpy(ctx, ctx->residual, -disc->change, eits_atom(ctx, k), rank);
+            f->macs += 4u * rank;
+        }
+    }
+}
+
+void eits_fit_restart(eits_context *ctx, eits_fit *f)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_copy(ctx->residual, f->data, EITS_STRIDE(rank));
+    for (uint32_t k = 0; k < f->count; ++k) {
+        f->macs += eits_disc_atom(ctx, &f->disc[k], eits_atom(ctx, k), NULL) + rank;
+        eits_axpy(ctx, ctx->residual, -f->disc[k].change, eits_atom(ctx, k), rank);
+    }
+}
+
+/* Solve H s = g for the step, H symmetric: scaled to a unit diagonal, damped, Cholesky. A parameter
+ * that nothing depends on, or that rounding makes dependent, does not move. */
+static void damped_step(const eits_real h[4][4], const eits_real g[4], eits_real step[4])
+{
+    eits_real scale[4], l[4][4] = {{0}}, w[4];
+    for (int i = 0; i < 4; ++i)
+        scale[i] = h[i][i] > 0 ? 1 / eits_sqrt(h[i][i]) : 0;
+    for (int i = 0; i < 4; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            eits_real sum = i == j ? 1 + DAMPING : h[i][j] * scale[i] * scale[j];
+            for (int k = 0; k < j; ++k)
+                sum = eits_fma(-l[i][k], l[j][k], sum);
+            if (i == j)
+                l[i][i] = eits_sqrt(sum > DAMPING * R(0.1) ? sum : DAMPING * R(0.1));
+            else
+                l[i][j] = sum / l[j][j];
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        eits_real sum = g[i] * scale[i];
+        for (int k = 0; k < i; ++k)
+            sum = eits_fma(-l[i][k], w[k], sum);
+        w[i] = sum / l[i][i];
+    }
+    for (int i = 3; i >= 0; --i) {
+        eits_real sum = w[i];
+        for (int k = i + 1; k < 4; ++k)
+            sum = eits_fma(-l[k][i], w[k], sum);
+        w[i] = sum / l[i][i];
+        step[i] = w[i] * scale[i];
+    }
+}
+
+eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc)
+{
+    if (!(o->touch_change_s_per_m > 0))
+        return o->touch_seed_radius_mm;
+    const eits_real area_ratio = disc->change * disc->polarity / o->touch_change_s_per_m;
+    return eits_clamp(disc->radius_mm * eits_sqrt(area_ratio), o->touch_min_radius_mm,
+                      o->touch_max_radius_mm);
+}
+
+/* |target - change atom|^2, target being what the other touches leave. */
+static eits_real misfit(const eits_context *ctx, const eits_real *target, eits_real change,
+                        const eits_real *atom)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_real *difference = ctx->sx;
+    for (uint32_t i = 0; i < rank; ++i)
+        difference[i] = eits_fma(-change, atom[i], target[i]);
+    return eits_dot(ctx, difference, difference, rank);
+}
+
+/* One damped Gauss-Newton step of one disc, others held; halved up to twice until the misfit falls.
+ * Returns how far it went, mm. ctx->residual is what all discs leave, before and after. */
+static eits_real move_disc(eits_context *ctx, eits_fit *f, uint32_t k)
+{
+    const uint32_t rank = ctx->model->rank;
+    const eits_options *o = &ctx->options;
+    eits_disc *disc = &f->disc[k];
+    eits_real *atom = eits_atom(ctx, k), *trial_atom = ctx->sx_next, *left = ctx->sz,
+              *target = ctx->residual;
+    eits_axpy(ctx, target, disc->change, atom, rank);
+    f->macs += eits_disc_atom(ctx, disc, atom, ctx->slope);
+    disc->change = eits_best_change(ctx, disc, atom, target);
+    for (uint32_t i = 0; i < rank; ++i)
+        left[i] = eits_fma(-disc->change, atom[i], target[i]);
+    const eits_real energy = disc->change * disc->change * eits_dot(ctx, atom, atom, rank);
+    const eits_real expected = eits_expected_radius(o, disc),
+                    deviation = RADIUS_DEVIATION * expected;
+    const eits_real by_energy = f->radius_weight * energy, by_noise = f->noise / (eits_real)rank;
+    const eits_real weight =
+        (by_energy > by_noise ? by_energy : by_noise) / (deviation * deviation);
+    const eits_real *column[4] = {ctx->slope[0], ctx->slope[1], ctx->slope[2], atom};
+    eits_real h[4][4], g[4], step[4];
+    for (int i = 0; i < 4; ++i) {
+        /* the fourth parameter is the change, relatively */
+        const eits_real by_change = disc->change * disc->change;
+        for (int j = 0; j <= i; ++j)
+            h[i][j] = h[j][i] = by_change * eits_dot(ctx, column[i], column[j], rank);
+        g[i] = disc->change * eits_dot(ctx, column[i], left, rank);
+    }
+    h[2][2] += weight;
+    g[2] = eits_fma(weight, expected - disc->radius_mm, g[2]);
+    f->macs += 17u * rank;
+    damped_step((const eits_real(*)[4])h, g, step);
+    const eits_real reach = (eits_real)ctx->model->pixel_mm,
+                    radius_reach = MOST_RADIUS_STEP_PIXELS * reach;
+    const eits_real off = disc->radius_mm - expected;
+    const eits_real cost = eits_dot(ctx, left, left, rank) + weight * off * off;
+    eits_real moved = 0, share = 1;
+    for (int attempt = 0; attempt < 3; ++attempt, share *= R(0.5)) {
+        eits_disc trial = *disc;
+        trial.x_mm += share * eits_clamp(step[0], -reach, reach);
+        trial.y_mm += share * eits_clamp(step[1], -reach, reach);
+        trial.radius_mm =
+            eits_clamp(disc->radius_mm + share * eits_clamp(step[2], -radius_reach, radius_reach),
+                       o->touch_min_radius_mm, o->touch_max_radius_mm);
+        if (!eits_disc_on_skin(ctx, &trial))
+            continue;
+        f->macs += eits_disc_atom(ctx, &trial, trial_atom, NULL) + 3u * rank;
+        trial.change = eits_best_change(ctx, &trial, trial_atom, target);
+        const eits_real trial_off = trial.radius_mm - expected;
+        if (!(misfit(ctx, target, trial.change, trial_atom) + weight * trial_off * trial_off <
+              cost))
+            continue;
+        const eits_real dx = eits_fabs(trial.x_mm - disc->x_mm),
+                        dy = eits_fabs(trial.y_mm - disc->y_mm);
+        const eits_real dr = eits_fabs(trial.radius_mm - disc->radius_mm);
+        moved = dx > dy ? dx : dy;
+        moved = dr > moved ? dr : moved;
+        *disc = trial;
+        eits_copy(atom, trial_atom, rank);
+        break;
+    }
+    eits_axpy(ctx, target, -disc->change, atom, rank);
+    return moved;
+}
+
+void eits_fit_move(eits_context *ctx, eits_fit *f, uint32_t first, uint32_t last, uint32_t sweeps)
+{
+    for (uint32_t sweep = 0; sweep < sweeps; ++sweep) {
+        eits_real farthest = 0;
+        for (uint32_t k = first; k <= last; ++k) {
+            const eits_real moved = move_disc(ctx, f, k);
+            farthest = moved > farthest ? moved : farthest;
+        }
+        if (farthest < SETTLED_PIXELS * (eits_real)ctx->model->pixel_mm)
+            break;
+    }
+}
+
+void eits_fit_move_all(eits_context *ctx, eits_fit *f, uint32_t sweeps)
+{
+    if (f->count > 0)
+        eits_fit_move(ctx, f, 0, f->count - 1u, sweeps);
+}

@@ -1,0 +1,67 @@
+/* Discs fitted off the grid to reduced data: strengths, places, radii; which to keep; which to join
+ * or to part. */
+#ifndef EITSKIN_FIT_H
+#define EITSKIN_FIT_H
+
+#include "touch/disc.h"
+
+typedef struct eits_fit {
+    eits_disc disc[EITS_MAX_TOUCHES];
+    /* what leaving it out would add to |residual|^2, relative to |y|^2 */
+    eits_real explained[EITS_MAX_TOUCHES];
+    /* stride: what the discs are to explain; ctx->residual is what they leave of it */
+    const eits_real *data;
+    eits_real whole; /* |y|^2 */
+    /* of that, what noise is expected to give; 0 where none was learned */
+    eits_real noise;
+    /* options.touch_radius_weight, times what the stage of the search asks for */
+    eits_real radius_weight;
+    uint32_t count;
+    uint64_t macs;
+} eits_fit;
+
+/* Where the k-th disc's answer to 1 S/m is kept: stride numbers. */
+static inline eits_real *eits_atom(const eits_context *ctx, uint32_t k)
+{
+    return ctx->atoms + EITS_STRIDE(ctx->model->rank) * k;
+}
+
+static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
+{
+    return v < low ? low : (v > high ? high : v);
+}
+
+/* fit.c */
+
+/* All strengths at once by coordinate descent, from none. */
+void eits_fit_strengths(eits_context *ctx, eits_fit *f);
+
+/* Atoms and residual of the discs as they are; after a change of discs or data. */
+void eits_fit_restart(eits_context *ctx, eits_fit *f);
+
+/* The change that explains `target` best along `atom`, of the disc's own sign. */
+eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const eits_real *atom,
+                           const eits_real *target);
+
+/* The radius that is expected: what strength suggests where the change is known, else the seed's.
+ */
+eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc);
+
+/* Sweeps of Gauss-Newton's steps over discs `first` to `last`, until they settle. */
+void eits_fit_move(eits_context *ctx, eits_fit *f, uint32_t first, uint32_t last, uint32_t sweeps);
+void eits_fit_move_all(eits_context *ctx, eits_fit *f, uint32_t sweeps);
+
+/* keep.c: drop the weakest while it explains too little or does not stand out of the noise; the
+ * others take up what it leaves. */
+void eits_fit_keep_real(eits_context *ctx, eits_fit *f);
+
+/* regroup.c */
+
+/* Overlapping or nearly touching discs become one where that explains as much. Returns 1 where any
+ * did. */
+int eits_fit_join(eits_context *ctx, eits_fit *f);
+
+/* A disc becomes two where they explain clearly more. Returns 1 where any did. */
+int eits_fit_part(eits_context *ctx, eits_fit *f);
+
+#endif

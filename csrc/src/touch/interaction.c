@@ -1,0 +1,131 @@
+#include "touch/interaction.h"
+
+#include "base/vec.h"
+#include "diagnostics/diagnostics.h"
+#include "frame/projection.h"
+#include "kernels/kernels.h"
+
+static const eits_real MOST = R(0.25); /* of |y|^2: what interplay may add */
+static const eits_real PI = R(3.14159265358979323846);
+
+typedef struct complex_number {
+    eits_real re, im;
+} complex_number;
+
+static complex_number product(complex_number a, complex_number b)
+{
+    return (complex_number){eits_fma(a.re, b.re, -(a.im * b.im)),
+                            eits_fma(a.re, b.im, a.im * b.re)};
+}
+
+/* 1 / a^2; 0 where a is all but zero: discs in one place have no field at each other that a dipole
+ * would tell. */
+static complex_number inverse_square(complex_number a)
+{
+    const eits_real square = eits_fma(a.re, a.re, a.im * a.im);
+    if (!(square > R(1e-6)))
+        return (complex_number){0, 0};
+    const complex_number inverse = {a.re / square, -(a.im / square)};
+    return product(inverse, inverse);
+}
+
+int eits_couples(const eits_context *ctx)
+{
+    return ctx->model->fields.at.data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE &&
+           (ctx->options.touch_search & EITS_SEARCH_COUPLED) != 0;
+}
+
+/* The change of the disc's conductivity times the area that its covers add up to. */
+static eits_real moment(const eits_context *ctx, const eits_disc *disc)
+{
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+    return disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, pixel * pixel / 12);
+}
+
+/* What disc j, in `source`, adds to the field of each electrode's current at disc i: into `bent`, L
+ * numbers for x, then L for y, as the fields are. */
+static void bend(const eits_context *ctx, const eits_disc *i, const eits_disc *j,
+                 const eits_real *source, eits_real *bent)
+{
+    const uint32_t electrodes = ctx->model->n_electrodes;
+    const eits_real s = moment(ctx, j) * (eits_real)ctx->model->fields.per_sheet;
+    const eits_real *mirror = source + 2 * (size_t)electrodes;
+    const complex_number z = {i->x_mm, i->y_mm}, apart = {i->x_mm - j->x_mm, i->y_mm - j->y_mm};
+    const complex_number b_z = product((complex_number){mirror[2], mirror[3]}, z);
+    /* inside each other discs are no dipoles: there the field is taken that they have where they
+     * touch */
+    const eits_real distance = eits_sqrt(eits_fma(apart.re, apart.re, apart.im * apart.im)),
+                    touching = i->radius_mm + j->radius_mm;
+    const eits_real share = distance < touching ? distance / touching : 1;
+    const complex_number whole = inverse_square(apart),
+                         direct = {share * share * whole.re, share * share * whole.im};
+    const complex_number mirrored =
+        inverse_square((complex_number){mirror[0] - b_z.re, mirror[1] - b_z.im});
+    /* conj(dE) = s ((direct - mirrored) E_x + i (direct + mirrored) E_y) */
+    const complex_number by_x = {s * (direct.re - mirrored.re), s * (direct.im - mirrored.im)};
+    const complex_number by_y = {-(s * (direct.im + mirrored.im)), s * (direct.re + mirrored.re)};
+    for (uint32_t e = 0; e < electrodes; ++e) {
+        const eits_real x = source[e], y = source[electrodes + e];
+        bent[e] = eits_fma(by_x.re, x, eits_fma(by_y.re, y, bent[e]));
+        bent[electrodes + e] = eits_fma(-by_x.im, x, eits_fma(-by_y.im, y, bent[electrodes + e]));
+    }
+}
+
+/* Add to each fold's `sum` what disc `i` answers to the `bent` field, measured in its own. */
+static void answer(const eits_context *ctx, const eits_disc *i, const eits_real *own,
+                   const eits_real *bent, eits_real *sum)
+{
+    const uint32_t electrodes = ctx->model->n_electrodes;
+    const eits_real factor = -((eits_real)ctx->model->fields.volts * moment(ctx, i));
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
+        const eits_real x = bent[row[0]] - bent[row[1]],
+                        y = bent[electrodes + row[0]] - bent[electrodes + row[1]];
+        const eits_real u = own[row[2]] - own[row[3]],
+                        v = own[electrodes + row[2]] - own[electrodes + row[3]];
+        sum[k] = eits_fma(factor, eits_fma(x, u, y * v), sum[k]);
+    }
+}
+
+/* The folds' sums in ctx->list_value, of those in use, reduced. */
+static uint64_t reduce(eits_context *ctx, eits_real *out)
+{
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        ctx->list_index[count] = k;
+        ctx->list_value[count] = ctx->list_value[k];
+        count += ctx->basis_for[k] != EITS_SIDE_NONE;
+    }
+    return eits_reduce(ctx, count, out);
+}
+
+uint64_t eits_couple(eits_context *ctx, const eits_disc *disc, uint32_t count, eits_real *data)
+{
+    const eits_model *model = ctx->model;
+    const size_t stride = model->fields.at.stride, room = model->rank * EITS_STRIDE(model->rank);
+    eits_copy(data, ctx->y, EITS_STRIDE(model->rank));
+    if (count < 2 || !eits_couples(ctx) || (count + 1) * stride > room)
+        return 0;
+    uint64_t macs = 0;
+    eits_real *field = ctx->factor, *bent = ctx->factor + stride * count;
+    for (uint32_t i = 0; i < count; ++i)
+        macs += eits_disc_field(ctx, &disc[i], field + stride * i);
+    eits_zero(ctx->list_value, model->n_folded);
+    for (uint32_t i = 0; i < count; ++i) {
+        eits_zero(bent, stride);
+        for (uint32_t j = 0; j < count; ++j) {
+            if (j != i)
+                bend(ctx, &disc[i], &disc[j], field + stride * j, bent);
+        }
+        answer(ctx, &disc[i], field + stride * i, bent, ctx->list_value);
+    }
+    macs += (uint64_t)count * ((count - 1u) * 4u * model->n_electrodes + 3u * model->n_folded);
+    macs += reduce(ctx, ctx->sx);
+    const eits_real whole = eits_dot(ctx, ctx->y, ctx->y, model->rank),
+                    added = eits_dot(ctx, ctx->sx, ctx->sx, model->rank);
+    if (!(added <= MOST * whole)) /* far beyond the second order: discs that are no touches */
+        return macs + 2u * model->rank;
+    for (uint32_t i = 0; i < model->rank; ++i)
+        data[i] -= ctx->sx[i];
+    return macs + 2u * model->rank;
+}

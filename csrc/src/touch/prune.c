@@ -1,0 +1,111 @@
+/* Which discs are touches. */
+#include "touch/disc_fit.h"
+
+#include "base/vec.h"
+#include "frame/whitening.h"
+#include "kernels/column.h"
+#include "kernels/kernels.h"
+
+enum { DROP_SWEEPS = 3 };
+
+/* What each disc alone explains: change^2 / (G^-1)_kk of the atoms' Gram matrix G, by Cholesky and
+ * its inverse. */
+static void judge(eits_context *ctx, eits_fit *f)
+{
+    const uint32_t rank = ctx->model->rank, n = f->count;
+    eits_real l[EITS_MAX_TOUCHES][EITS_MAX_TOUCHES] = {{0}}, norm[EITS_MAX_TOUCHES];
+    for (uint32_t i = 0; i < n; ++i) {
+        norm[i] = eits_sqrt(eits_dot(ctx, eits_atom(ctx, i), eits_atom(ctx, i), rank));
+        for (uint32_t j = 0; j <= i; ++j) {
+            const eits_real both = norm[i] * norm[j];
+            eits_real sum =
+                i == j
+                    ? 1 + R(1e-5)
+                    : (both > 0 ? eits_dot(ctx, eits_atom(ctx, i), eits_atom(ctx, j), rank) / both
+                                : 0);
+            for (uint32_t k = 0; k < j; ++k)
+                sum = eits_fma(-l[i][k], l[j][k], sum);
+            if (i == j)
+                l[i][i] = eits_sqrt(sum > R(1e-6) ? sum : R(1e-6));
+            else
+                l[i][j] = sum / l[j][j];
+        }
+    }
+    f->macs += (uint64_t)n * (n + 1) / 2 * rank;
+    for (uint32_t k = 0; k < n; ++k) { /* column k of L^-1; its squared norm is (G^-1)_kk */
+        eits_real column[EITS_MAX_TOUCHES] = {0}, squared = 0;
+        for (uint32_t i = k; i < n; ++i) {
+            eits_real sum = i == k ? 1 : 0;
+            for (uint32_t j = k; j < i; ++j)
+                sum = eits_fma(-l[i][j], column[j], sum);
+            column[i] = sum / l[i][i];
+            squared = eits_fma(column[i], column[i], squared);
+        }
+        const eits_real size = f->disc[k].change * norm[k];
+        f->explained[k] = f->whole > 0 ? size * size / (squared * f->whole) : 0;
+    }
+}
+
+/* Whether the disc stands out of the noise by the same test as the whole frame: S_j'(y - other
+ * discs) at its pixel. */
+static int stands_out(eits_context *ctx, eits_fit *f, uint32_t k)
+{
+    const eits_real least = ctx->options.gate_factor * eits_lambda_noise(ctx);
+    const uint32_t rank = ctx->model->rank;
+    if (!(least > 0))
+        return 1;
+    const eits_disc *disc = &f->disc[k];
+    const eits_real *atom = eits_adjoint(ctx, eits_atom(ctx, k), ctx->slope[0]);
+    const eits_real *residual = eits_adjoint(ctx, ctx->residual, ctx->slope[1]);
+    eits_real best = 0;
+    f->macs += 2u * eits_adjoint_macs(ctx);
+    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
+        const eits_pixel at = ctx->model->pixel[j];
+        const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+        const eits_real dx =
+            eits_fma((eits_real)at.ix + R(0.5), pixel, (eits_real)ctx->model->origin_x_mm) -
+            disc->x_mm;
+        const eits_real dy =
+            eits_fma((eits_real)at.iy + R(0.5), pixel, (eits_real)ctx->model->origin_y_mm) -
+            disc->y_mm;
+        if (eits_fabs(dx) > pixel || eits_fabs(dy) > pixel)
+            continue;
+        const eits_real *column = eits_column(&ctx->model->sensitivity, j, ctx->sx),
+                        scale = eits_column_scale(&ctx->model->sensitivity, j);
+        const eits_real seen = scale * eits_fma(disc->change, eits_dot(ctx, column, atom, rank),
+                                                eits_dot(ctx, column, residual, rank));
+        f->macs += 2u * rank;
+        best = seen * disc->polarity > best ? seen * disc->polarity : best;
+    }
+    return best >= least;
+}
+
+static void drop(eits_context *ctx, eits_fit *f, uint32_t k)
+{
+    const uint32_t rank = ctx->model->rank;
+    eits_axpy(ctx, ctx->residual, f->disc[k].change, eits_atom(ctx, k), rank);
+    --f->count;
+    for (uint32_t l = k; l < f->count; ++l) {
+        f->disc[l] = f->disc[l + 1];
+        eits_copy(eits_atom(ctx, l), eits_atom(ctx, l + 1), EITS_STRIDE(rank));
+    }
+}
+
+void eits_fit_keep_real(eits_context *ctx, eits_fit *f)
+{
+    while (f->count > 0) {
+        judge(ctx, f);
+        uint32_t weakest = 0;
+        for (uint32_t k = 1; k < f->count; ++k)
+            weakest = f->explained[k] < f->explained[weakest] ? k : weakest;
+        const int alone = f->count == 1;
+        const int enough =
+            alone ? f->explained[0] > 0 : f->explained[weakest] >= ctx->options.touch_share;
+        if (enough && stands_out(ctx, f, weakest))
+            return;
+        drop(ctx, f, weakest);
+        eits_fit_move_all(ctx, f,
+                          ctx->options.touch_sweeps < DROP_SWEEPS ? ctx->options.touch_sweeps
+                                                                  : DROP_SWEEPS);
+    }
+}

@@ -1,0 +1,271 @@
+/* Peaks are not touches: near the rim one touch may have two, and two near ones may have one. */
+#include "touch/disc_fit.h"
+
+#include "base/vec.h"
+#include "kernels/kernels.h"
+
+/* Chosen on scenes of 2 to 8 touches at 60 and 80 dB; eitskin study levers tells what they are
+ * worth. */
+/* edges nearer than this share of the smaller radius: one touch, perhaps, */
+static const eits_real NEAR = R(0.7);
+/* if one disc leaves at most so much more of |y|^2, */
+static const eits_real JOIN_WHOLE = R(0.002);
+static const eits_real JOIN_LEFT = R(0.5);    /* so much more of what is left */
+static const eits_real NOISE = R(20.0);       /* and so many directions of noise */
+static const eits_real PART_WHOLE = R(0.001); /* with less than this share of |y|^2 left */
+static const eits_real PART_NOISE = R(1.3);   /* beyond so much noise there is nothing to part */
+/* two discs in their first places may leave so many times as much, */
+static const eits_real PART_FIRST = R(2.0);
+static const eits_real PART_GAIN = R(0.85); /* fitted so little of it, */
+/* their edges so many times the smaller radius apart */
+static const eits_real PART_APART = R(-0.1);
+/* of the disc's radius: where the two begin, and how large */
+static const eits_real PART_OFFSET = R(1.3), PART_RADIUS = R(0.7);
+enum { DIRECTIONS = 4, JOIN_SWEEPS = 3, PART_SWEEPS = 4 };
+
+typedef struct saved {
+    eits_disc disc[EITS_MAX_TOUCHES];
+    uint32_t count;
+    eits_real left; /* |residual|^2 */
+} saved;
+
+static eits_real left_over(const eits_context *ctx)
+{
+    return eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
+}
+
+static saved save(const eits_context *ctx, const eits_fit *f)
+{
+    saved s = {.count = f->count, .left = left_over(ctx)};
+    memcpy(s.disc, f->disc, sizeof s.disc);
+    return s;
+}
+
+static void restore(eits_context *ctx, eits_fit *f, const saved *s)
+{
+    memcpy(f->disc, s->disc, sizeof s->disc);
+    f->count = s->count;
+    eits_fit_restart(ctx, f);
+}
+
+static eits_real lesser(eits_real a, eits_real b)
+{
+    return a < b ? a : b;
+}
+
+/* How far apart two discs' edges are, in the smaller radius. */
+static eits_real edges_apart(const eits_disc *a, const eits_disc *b)
+{
+    const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm;
+    return (eits_sqrt(eits_fma(dx, dx, dy * dy)) - a->radius_mm - b->radius_mm) /
+           lesser(a->radius_mm, b->radius_mm);
+}
+
+/* ---- joining ---- */
+
+typedef struct pair {
+    eits_real apart;
+    uint32_t i, j;
+} pair;
+
+static int comes_after(const pair *a, const pair *b)
+{
+    if (a->apart != b->apart)
+        return a->apart > b->apart;
+    return a->i != b->i ? a->i > b->i : a->j > b->j;
+}
+
+/* The nearest pair of one sign after `last` (NULL: at all) that may be one touch; 0 where there is
+ * none. */
+static int next_pair(const eits_fit *f, const pair *last, pair *next)
+{
+    int found = 0;
+    for (uint32_t i = 0; i < f->count; ++i) {
+        for (uint32_t j = i + 1u; j < f->count; ++j) {
+            const pair here = {edges_apart(&f->disc[i], &f->disc[j]), i, j};
+            if (f->disc[i].polarity != f->disc[j].polarity || !(here.apart < NEAR) ||
+                (last != NULL && !comes_after(&here, last)))
+                continue;
+            if (!found || comes_after(next, &here))
+                *next = here;
+            found = 1;
+        }
+    }
+    return found;
+}
+
+/* One disc in the middle of both, weighted by strength, of their area. */
+static eits_disc joined(const eits_options *o, const eits_disc *a, const eits_disc *b)
+{
+    const eits_real of_a = eits_fabs(a->change) * a->radius_mm * a->radius_mm,
+                    of_b = eits_fabs(b->change) * b->radius_mm * b->radius_mm;
+    const eits_real w = of_a + of_b > 0 ? of_a / (of_a + of_b) : R(0.5);
+    const eits_real radius =
+        eits_sqrt(eits_fma(a->radius_mm, a->radius_mm, b->radius_mm * b->radius_mm));
+    return (eits_disc){
+        .x_mm = eits_fma(w, a->x_mm - b->x_mm, b->x_mm),
+        .y_mm = eits_fma(w, a->y_mm - b->y_mm, b->y_mm),
+        .radius_mm = lesser(radius, o->touch_max_radius_mm),
+        .polarity = a->polarity,
+    };
+}
+
+/* Make the pair one disc; 1 if that is kept. */
+static int try_join(eits_context *ctx, eits_fit *f, const pair *p)
+{
+    const uint32_t rank = ctx->model->rank;
+    const saved before = save(ctx, f);
+    f->disc[p->i] = joined(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
+    --f->count;
+    for (uint32_t k = p->j; k < f->count; ++k)
+        f->disc[k] = f->disc[k + 1u];
+    eits_fit_restart(ctx, f);
+    f->disc[p->i].change =
+        eits_best_change(ctx, &f->disc[p->i], eits_atom(ctx, p->i), ctx->residual);
+    eits_axpy(ctx, ctx->residual, -f->disc[p->i].change, eits_atom(ctx, p->i), rank);
+    f->macs += 3u * rank;
+    eits_fit_move(ctx, f, p->i, p->i, JOIN_SWEEPS);
+    eits_fit_move_all(ctx, f, 1);
+    const eits_real more = eits_fma(
+        JOIN_WHOLE, f->whole, eits_fma(JOIN_LEFT, before.left, NOISE * f->noise / (eits_real)rank));
+    if (left_over(ctx) <= before.left + more)
+        return 1;
+    restore(ctx, f, &before);
+    return 0;
+}
+
+int eits_fit_join(eits_context *ctx, eits_fit *f)
+{
+    int any = 0;
+    pair next, last;
+    const pair *after = NULL;
+    while (next_pair(f, after, &next)) {
+        if (try_join(ctx, f, &next)) {
+            any = 1;
+            after = NULL;
+        } else {
+            last = next;
+            after = &last;
+        }
+    }
+    return any;
+}
+
+/* ---- parting ---- */
+
+typedef struct two {
+    eits_disc disc[2];
+    eits_real left; /* |residual|^2 with them in the place of the one; -1: no two are possible */
+} two;
+
+/* Strengths of two atoms that explain `target` best; what they leave, or -1 where they are no
+ * touches of that sign. */
+static eits_real both_changes(const eits_context *ctx, const eits_real *target,
+                              eits_real *const atom[2], eits_real polarity, eits_real change[2])
+{
+    const uint32_t rank = ctx->model->rank;
+    const eits_real aa = eits_dot(ctx, atom[0], atom[0], rank),
+                    bb = eits_dot(ctx, atom[1], atom[1], rank);
+    const eits_real ab = eits_dot(ctx, atom[0], atom[1], rank);
+    const eits_real at = eits_dot(ctx, atom[0], target, rank),
+                    bt = eits_dot(ctx, atom[1], target, rank);
+    const eits_real determinant = eits_fma(aa, bb, -(ab * ab));
+    if (!(determinant > R(1e-5) * aa * bb))
+        return -1;
+    change[0] = eits_fma(bb, at, -(ab * bt)) / determinant;
+    change[1] = eits_fma(aa, bt, -(ab * at)) / determinant;
+    if (!(change[0] * polarity > 0 && change[1] * polarity > 0))
+        return -1;
+    for (uint32_t i = 0; i < rank; ++i)
+        ctx->sx[i] = eits_fma(-change[1], atom[1][i], eits_fma(-change[0], atom[0][i], target[i]));
+    return eits_dot(ctx, ctx->sx, ctx->sx, rank);
+}
+
+/* The best of some pairs in the place of disc k. */
+static two best_two(eits_context *ctx, eits_fit *f, uint32_t k)
+{
+    static const eits_real along[DIRECTIONS][2] = {
+        {1, 0},
+        {R(0.70710678118654752440), R(0.70710678118654752440)},
+        {0, 1},
+        {-R(0.70710678118654752440), R(0.70710678118654752440)}};
+    const uint32_t rank = ctx->model->rank;
+    const eits_disc one = f->disc[k];
+    const eits_real radius = PART_RADIUS * one.radius_mm,
+                    smallest = ctx->options.touch_min_radius_mm;
+    eits_real *target = ctx->sz, *const atom[2] = {ctx->slope[0], ctx->slope[1]};
+    two best = {.left = -1};
+    eits_copy(target, ctx->residual, EITS_STRIDE(rank));
+    eits_axpy(ctx, target, one.change, eits_atom(ctx, k), rank);
+    for (int d = 0; d < DIRECTIONS; ++d) {
+        const eits_real dx = PART_OFFSET * one.radius_mm * along[d][0],
+                        dy = PART_OFFSET * one.radius_mm * along[d][1];
+        two here = {.disc = {one, one}};
+        for (int side = 0; side < 2; ++side) {
+            here.disc[side].x_mm += side ? -dx : dx;
+            here.disc[side].y_mm += side ? -dy : dy;
+            here.disc[side].radius_mm = radius > smallest ? radius : smallest;
+        }
+        if (!eits_disc_on_skin(ctx, &here.disc[0]) || !eits_disc_on_skin(ctx, &here.disc[1]))
+            continue;
+        for (int side = 0; side < 2; ++side)
+            f->macs += eits_disc_atom(ctx, &here.disc[side], atom[side], NULL);
+        eits_real change[2];
+        here.left = both_changes(ctx, target, atom, one.polarity, change);
+        f->macs += 8u * rank;
+        if (here.left < 0 || (best.left >= 0 && here.left >= best.left))
+            continue;
+        here.disc[0].change = change[0];
+        here.disc[1].change = change[1];
+        best = here;
+    }
+    return best;
+}
+
+/* Make disc k two; 1 if that is kept. */
+static int try_part(eits_context *ctx, eits_fit *f, uint32_t k)
+{
+    const uint32_t last = f->count;
+    const saved before = save(ctx, f);
+    const two begin = best_two(ctx, f, k);
+    if (begin.left < 0 || begin.left > PART_FIRST * before.left)
+        return 0;
+    f->disc[k] = begin.disc[0];
+    f->disc[last] = begin.disc[1];
+    ++f->count;
+    eits_fit_restart(ctx, f);
+    for (int sweep = 0; sweep < PART_SWEEPS; ++sweep) {
+        eits_fit_move(ctx, f, k, k, 1);
+        eits_fit_move(ctx, f, last, last, 1);
+    }
+    eits_fit_move_all(ctx, f, 1);
+    const eits_real left = left_over(ctx),
+                    least = eits_fma(PART_WHOLE, f->whole,
+                                     NOISE * f->noise / (eits_real)ctx->model->rank);
+    if (left <= PART_GAIN * before.left && before.left - left >= least &&
+        edges_apart(&f->disc[k], &f->disc[last]) > PART_APART)
+        return 1;
+    restore(ctx, f, &before);
+    return 0;
+}
+
+int eits_fit_part(eits_context *ctx, eits_fit *f)
+{
+    uint8_t looked[EITS_MAX_TOUCHES] = {0};
+    const eits_real enough = eits_fma(PART_WHOLE, f->whole, PART_NOISE * f->noise);
+    int any = 0;
+    /* those that come by parting are not parted again at once */
+    const uint32_t before = f->count;
+    for (uint32_t turn = 0; turn < before; ++turn) {
+        if (f->count >= ctx->options.max_touches || left_over(ctx) < enough)
+            return any;
+        uint32_t k = before;
+        for (uint32_t i = 0; i < before; ++i) { /* the largest first */
+            if (!looked[i] && (k == before || f->disc[i].radius_mm > f->disc[k].radius_mm))
+                k = i;
+        }
+        looked[k] = 1;
+        any |= try_part(ctx, f, k);
+    }
+    return any;
+}

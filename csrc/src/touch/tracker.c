@@ -1,0 +1,222 @@
+/* The filter is Kalman's (Trans. ASME, J. Basic Eng. 82 (1960) 35-45) for a place of constant
+ * velocity, the same along both axes; its noise is what each touch's own strength over the frame's
+ * noise makes of it. */
+#include "touch/tracker.h"
+
+#include "base/vec.h"
+#include "touch/disc.h"
+
+/* Chosen on tuning streams, docs/guide/tracking.md. */
+/* a touch that explains less of |y|^2 may be half of another */
+static const eits_real SURE_SHARE = R(0.05);
+/* and one whose own S'y is below so many times that of noise may be noise */
+static const eits_real SURE_CLEARNESS = R(1.5);
+/* of follow_mm, for touches that are not told of yet */
+static const eits_real NEWBORN_REACH = R(0.6);
+/* of follow_mm: rms by which a velocity changes from frame to frame */
+static const eits_real SPEED_CHANGE = R(0.028);
+/* of follow_mm: rms of a new touch's velocity, a frame */
+static const eits_real FIRST_SPEED = R(0.12);
+static const eits_real LEAST_DEVIATION = R(0.01); /* of a pixel: no place is surer than this */
+/* a touch that was found more often is told of while it is held */
+enum { KNOWN_FRAMES = 4 };
+enum { NONE = EITS_MAX_TOUCHES };
+
+static eits_real square(eits_real value)
+{
+    return value * value;
+}
+
+/* What S'y this touch has by itself, about: the whole frame's by its share of the energy. */
+static eits_real own_lambda(const eits_context *ctx, const eits_touch *touch)
+{
+    return ctx->info.lambda_max * eits_sqrt(touch->confidence);
+}
+
+/* Fainter than noise: it may be there all the same when it is not found. */
+static int is_faint(const eits_context *ctx, const eits_touch *touch)
+{
+    return own_lambda(ctx, touch) < ctx->info.lambda_noise;
+}
+
+static int is_finite(const eits_followed *f)
+{
+    const eits_real numbers[] = {
+        f->touch.x_mm, f->touch.y_mm, f->touch.radius_mm, f->touch.strength_s_per_m_mm2,
+        f->vx_mm,      f->vy_mm,      f->place_mm2,       f->both_mm2,
+        f->speed_mm2};
+    for (size_t k = 0; k < sizeof numbers / sizeof numbers[0]; ++k) {
+        if (!eits_is_finite(numbers[k]))
+            return 0;
+    }
+    return 1;
+}
+
+static int on_skin(const eits_context *ctx, const eits_touch *touch)
+{
+    const eits_disc disc = {
+        .x_mm = touch->x_mm, .y_mm = touch->y_mm, .radius_mm = touch->radius_mm};
+    return eits_disc_on_skin(ctx, &disc);
+}
+
+/* ---- places in time ---- */
+
+/* The variance of a found place, mm^2. */
+static eits_real place_variance(const eits_context *ctx, const eits_touch *found)
+{
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm, own = own_lambda(ctx, found);
+    const eits_real noise = own > 0 ? ctx->info.lambda_noise / own : 0;
+    return eits_fma(square(ctx->options.track_smooth * noise), square(pixel),
+                    square(LEAST_DEVIATION * pixel));
+}
+
+static eits_followed newborn(const eits_context *ctx, const eits_touch *found)
+{
+    return (eits_followed){.touch = *found,
+                           .place_mm2 = place_variance(ctx, found),
+                           .speed_mm2 = square(FIRST_SPEED * ctx->options.follow_mm),
+                           .seen = 1,
+                           .faint = (uint32_t)is_faint(ctx, found)};
+}
+
+/* A frame on; a touch that would leave the skin stays where it is. */
+static void predict(const eits_context *ctx, eits_followed *f)
+{
+    eits_followed next = *f;
+    const eits_real change = square(SPEED_CHANGE * ctx->options.follow_mm);
+    if (!(ctx->options.track_smooth > 0))
+        return;
+    next.touch.x_mm += f->vx_mm;
+    next.touch.y_mm += f->vy_mm;
+    next.place_mm2 += eits_fma(R(2), f->both_mm2, f->speed_mm2) + R(0.25) * change;
+    next.both_mm2 += eits_fma(R(0.5), change, f->speed_mm2);
+    next.speed_mm2 += change;
+    if (is_finite(&next) && on_skin(ctx, &next.touch))
+        *f = next;
+}
+
+/* What is known of a touch, with what was found of it. Where that would be no number, or off the
+ * skin, it starts anew. */
+static eits_followed met(const eits_context *ctx, const eits_followed *before,
+                         const eits_touch *found)
+{
+    eits_followed next = newborn(ctx, found);
+    next.touch.id = before->touch.id;
+    next.seen =
+        before->seen < KNOWN_FRAMES + EITS_MOST_TRACK_FRAMES ? before->seen + 1 : before->seen;
+    if (!(ctx->options.track_smooth > 0))
+        return next;
+    const eits_followed anew = next;
+    const eits_touch *old = &before->touch;
+    const eits_real whole = before->place_mm2 + next.place_mm2;
+    const eits_real gain = before->place_mm2 / whole, speed_gain = before->both_mm2 / whole;
+    const eits_real dx = found->x_mm - old->x_mm, dy = found->y_mm - old->y_mm;
+    next.touch.x_mm = eits_fma(gain, dx, old->x_mm);
+    next.touch.y_mm = eits_fma(gain, dy, old->y_mm);
+    next.touch.radius_mm = eits_fma(gain, found->radius_mm - old->radius_mm, old->radius_mm);
+    next.touch.strength_s_per_m_mm2 = eits_fma(
+        gain, found->strength_s_per_m_mm2 - old->strength_s_per_m_mm2, old->strength_s_per_m_mm2);
+    next.vx_mm = eits_fma(speed_gain, dx, before->vx_mm);
+    next.vy_mm = eits_fma(speed_gain, dy, before->vy_mm);
+    next.place_mm2 = eits_fma(-gain, before->place_mm2, before->place_mm2);
+    next.both_mm2 = eits_fma(-gain, before->both_mm2, before->both_mm2);
+    next.speed_mm2 = eits_fma(-speed_gain, before->both_mm2, before->speed_mm2);
+    return is_finite(&next) && on_skin(ctx, &next.touch) ? next : anew;
+}
+
+/* ---- which is which ---- */
+
+/* Nearest pairs first, among those that were told of or among the others: owner[k] is who the found
+ * touch k belongs to. */
+static void pair(const eits_context *ctx, const eits_touch *found, uint32_t count, int told,
+                 uint32_t *owner)
+{
+    uint8_t taken[EITS_MAX_TOUCHES] = {0};
+    for (;;) { /* at most EITS_MAX_TOUCHES pairs */
+        const eits_real reach =
+            square(told ? ctx->options.follow_mm : NEWBORN_REACH * ctx->options.follow_mm);
+        eits_real nearest = reach;
+        uint32_t from = NONE, to = NONE;
+        for (uint32_t k = 0; k < count; ++k) {
+            for (uint32_t l = 0; owner[k] == NONE && l < ctx->followed_count; ++l) {
+                const eits_touch *one = &ctx->followed[l].touch;
+                const eits_real dx = found[k].x_mm - one->x_mm, dy = found[k].y_mm - one->y_mm;
+                const eits_real squared = eits_fma(dx, dx, dy * dy);
+                if (!taken[l] && (one->id != 0) == told && squared <= nearest) {
+                    nearest = squared;
+                    from = l;
+                    to = k;
+                }
+            }
+        }
+        if (to == NONE)
+            return;
+        owner[to] = from;
+        taken[from] = 1;
+    }
+}
+
+/* An id for a touch that may be told of now. */
+static void name(eits_context *ctx, eits_followed *f)
+{
+    const int clear = own_lambda(ctx, &f->touch) >= SURE_CLEARNESS * ctx->info.lambda_noise &&
+                      f->touch.confidence >= SURE_SHARE;
+    if (f->touch.id != 0 || (f->seen < ctx->options.track_confirm && !clear))
+        return;
+    f->touch.id = ctx->next_id;
+    ctx->next_id = ctx->next_id == UINT32_MAX ? 1 : ctx->next_id + 1; /* 0 is never an id */
+}
+
+/* Those that were found, in their order, then those that are waited for, as far as there is room.
+ */
+static void renew(eits_context *ctx, const eits_touch *found, uint32_t count, const uint32_t *owner)
+{
+    eits_followed next[EITS_MAX_TOUCHES];
+    uint8_t met_again[EITS_MAX_TOUCHES] = {0};
+    for (uint32_t k = 0; k < count; ++k) {
+        next[k] = owner[k] == NONE ? newborn(ctx, &found[k])
+                                   : met(ctx, &ctx->followed[owner[k]], &found[k]);
+        if (owner[k] != NONE)
+            met_again[owner[k]] = 1;
+        name(ctx, &next[k]);
+    }
+    for (uint32_t l = 0; l < ctx->followed_count; ++l) {
+        eits_followed *f = &ctx->followed[l];
+        if (met_again[l] || f->touch.id == 0 || f->missed >= ctx->options.track_hold ||
+            count == EITS_MAX_TOUCHES)
+            continue;
+        ++f->missed;
+        f->touch.confidence = 0;
+        next[count++] = *f;
+    }
+    for (uint32_t k = 0; k < count; ++k)
+        ctx->followed[k] = next[k];
+    ctx->followed_count = count;
+}
+
+uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count)
+{
+    uint32_t owner[EITS_MAX_TOUCHES], told = 0;
+    for (uint32_t k = 0; k < count; ++k) {
+        touches[k].id = 0;
+        owner[k] = NONE;
+    }
+    for (uint32_t l = 0; l < ctx->followed_count; ++l)
+        predict(ctx, &ctx->followed[l]);
+    pair(ctx, touches, count, 1, owner);
+    pair(ctx, touches, count, 0, owner);
+    renew(ctx, touches, count, owner);
+    for (uint32_t l = 0; l < ctx->followed_count; ++l) {
+        const eits_followed *f = &ctx->followed[l];
+        const int held = f->faint && f->seen >= KNOWN_FRAMES && told < ctx->options.max_touches;
+        if (f->touch.id == 0 || (f->missed > 0 && !held))
+            continue;
+        uint32_t place = told++;
+        for (; place > 0 && eits_fabs(f->touch.strength_s_per_m_mm2) >
+                                eits_fabs(touches[place - 1].strength_s_per_m_mm2);
+             --place)
+            touches[place] = touches[place - 1];
+        touches[place] = f->touch;
+    }
+    return told;
+}

@@ -1,0 +1,17 @@
+/* Touches followed from frame to frame: births and deaths, ids, places smoothed in time.
+ * docs/guide/tracking.md says what each is worth. */
+#ifndef EITSKIN_TRACK_H
+#define EITSKIN_TRACK_H
+
+#include "eitskin/context.h"
+
+/* From the `count` touches that were found in a frame (room for EITS_MAX_TOUCHES) to those that are
+ * told of, in their place, strongest first; returns how many. ctx->info says how clear the frame
+ * is.
+ *
+ * Nearest pairs of a touch that is followed and one that is found, within follow_mm, belong
+ * together; those that were told of choose first. Ids count up from 1 and are given when a touch is
+ * first told of. */
+uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count);
+
+#endif
