@@ -1,5 +1,5 @@
 """The results of ``eitskin bench findings`` as text, and as the section "Rates" of
-docs/reference/diagnostics.md."""
+docs/results/diagnostics.md."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ from eitskin_studies.benchmarks.findings_scenes import (
 )
 
 SCENES, SEED = 4, 6
-PAGE = Path(__file__).parents[3] / "docs" / "reference" / "diagnostics.md"
+PAGE = Path(__file__).parents[3] / "docs" / "results" / "diagnostics.md"
 
 
 @pytest.fixture(scope="module")
