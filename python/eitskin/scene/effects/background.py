@@ -21,7 +21,7 @@ from eitskin.scene.parameter import parameter
 NAME = "background"
 STAGE = Stage.MATERIAL
 ORDER = 10
-SUMMARY = "The sheet's conductivity varies smoothly from place to place."
+SUMMARY = "The skin's conductivity varies smoothly from place to place."
 COSINES = 256
 
 

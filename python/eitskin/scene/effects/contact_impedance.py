@@ -1,4 +1,4 @@
-"""Contacts that are not ideal: a resistance times area between each electrode and the sheet.
+"""Contacts that are not ideal: a resistance times area between each electrode and the skin.
 
 In the complete electrode model (Cheng, Isaacson, Newell and Gisser, IEEE Trans. Biomed. Eng. 36,
 1989; Somersalo, Cheney and Isaacson, SIAM J. Appl. Math. 52, 1992) the potential drops by z times
@@ -22,7 +22,7 @@ from eitskin.scene.parameter import parameter
 NAME = "contact_impedance"
 STAGE = Stage.BOUNDARY
 ORDER = 10
-SUMMARY = "Current meets a resistance where it enters and leaves the sheet."
+SUMMARY = "Current meets a resistance where it enters and leaves the skin."
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from eitskin.scene.parameter import parameter
 NAME = "detached"
 STAGE = Stage.BOUNDARY
 ORDER = 20
-SUMMARY = "Electrodes come off the sheet."
+SUMMARY = "Electrodes come off the skin."
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from eitskin.scene.parameter import parameter
 NAME = "gel_drying"
 STAGE = Stage.MATERIAL
 ORDER = 30
-SUMMARY = "The sheet's conductivity falls as its water leaves."
+SUMMARY = "The skin's conductivity falls as its water leaves."
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def drying_factor(age_s: float, parameters: Parameters) -> float:
 
 
 def make(parameters: Parameters, session: Session) -> MaterialStep:
-    """The sheet's conductivity by time, one factor for all elements."""
+    """The skin's conductivity by time, one factor for all elements."""
     start_s = float(session.times_s()[0])
 
     def apply(conductivity: FloatArray, time_s: float, frame: int) -> FloatArray:

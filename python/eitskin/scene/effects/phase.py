@@ -1,4 +1,4 @@
-"""The alternating current's phase: displacement current in the sheet, and a capacitive interface
+"""The alternating current's phase: displacement current in the skin, and a capacitive interface
 under the electrodes.
 
 At the angular frequency w the sheet's conductivity becomes the admittivity sigma + j w eps_0 eps_r
@@ -39,7 +39,7 @@ class Parameters:
         50e3, "Hz", "the excitation's frequency", low=0, high=1e9, open_low=True
     )
     relative_permittivity: float = parameter(
-        80.0, "1", "the sheet's; water has 78 to 80", low=0, high=1e8
+        80.0, "1", "the skin's; water has 78 to 80", low=0, high=1e8
     )
     capacitance_f_per_m2: float = parameter(
         0.1, "F/m2", "double layer's, per contact area", low=0, high=1e3

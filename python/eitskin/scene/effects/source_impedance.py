@@ -27,7 +27,7 @@ SHARED = {"frequency_hz": "excitation frequency"}
 
 @dataclass(frozen=True)
 class Parameters:
-    """The output impedance, and what is in series with the sheet."""
+    """The output impedance, and what is in series with the skin."""
 
     resistance_ohm: float = parameter(500e3, "ohm", "output resistance", low=0, open_low=True)
     capacitance_pf: float = parameter(
@@ -37,7 +37,7 @@ class Parameters:
         50e3, "Hz", "the excitation's; 0 is direct current", low=0, high=1e9
     )
     series_ohm: float = parameter(
-        0.0, "ohm", "in series with the sheet, as closed switches", low=0, high=1e9
+        0.0, "ohm", "in series with the skin, as closed switches", low=0, high=1e9
     )
 
 

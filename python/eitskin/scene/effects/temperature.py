@@ -19,7 +19,7 @@ from eitskin.scene.parameter import parameter
 NAME = "temperature"
 STAGE = Stage.MATERIAL
 ORDER = 20
-SUMMARY = "The sheet's conductivity follows its temperature."
+SUMMARY = "The skin's conductivity follows its temperature."
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def temperature_factor(age_s: float, parameters: Parameters) -> float:
 
 
 def make(parameters: Parameters, session: Session) -> MaterialStep:
-    """The sheet's conductivity by time, one factor for all elements.
+    """The skin's conductivity by time, one factor for all elements.
 
     Raises:
         ConfigError: the linear law would make the conductivity 0 or negative within the session.
