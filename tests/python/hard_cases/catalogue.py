@@ -1,29 +1,58 @@
-"""All hard cases, group by group."""
+"""All hard cases, as ``cases.toml`` has them."""
 
 from __future__ import annotations
 
 import ast
+from dataclasses import dataclass
 from pathlib import Path
 
-import cases_bytes
-import cases_frames
-import cases_physics
-import cases_problem
-import cases_time
+from eitskin.config import load_toml
 
 HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent
 ROOT = TESTS.parents[1]
 
-CASES = (
-    *cases_frames.CASES,
-    *cases_physics.CASES,
-    *cases_problem.CASES,
-    *cases_time.CASES,
-    *cases_bytes.CASES,
-)
-
 OF_THE_CATALOGUE = "hard_cases/test_catalogue.py"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case that makes an EIT skin's numbers go wrong; ``cases.toml`` says what the fields are."""
+
+    id: str
+    what: str
+    promise: str
+    tests: tuple[str, ...]
+    picture: str | None = None
+
+    @property
+    def group(self) -> str:
+        """What comes before the slash of the id."""
+        return self.id.split("/")[0]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files of its tests, from the root, each once."""
+        return tuple(dict.fromkeys(_file(test) for test in self.tests))
+
+
+def _file(test: str) -> str:
+    return f"tests/python/{test.split('::')[0]}" if "::" in test else test
+
+
+def _read(path: Path) -> tuple[Case, ...]:
+    groups = load_toml(path, "catalogue of hard cases")
+    return tuple(
+        Case(
+            f"{group}/{name}", one["what"], one["promise"], tuple(one["tests"]), one.get("picture")
+        )
+        for group, cases in groups.items()
+        for name, one in cases.items()
+    )
+
+
+CASES = _read(HERE / "cases.toml")
+GROUPS = tuple(dict.fromkeys(case.group for case in CASES))
 
 
 def tests_in(path: Path) -> list[str]:
@@ -38,10 +67,8 @@ def tests_in(path: Path) -> list[str]:
 
 def exists(test: str) -> bool:
     """Whether what a case calls its test is there."""
-    if "::" not in test:
-        return (ROOT / test).is_file()
-    file, name = test.split("::")
-    return (TESTS / file).is_file() and name in tests_in(TESTS / file)
+    path = ROOT / _file(test)
+    return path.is_file() and ("::" not in test or test.split("::")[1] in tests_in(path))
 
 
 def hard_tests() -> set[str]:

@@ -58,7 +58,7 @@ def test_noise_that_flickers(same_everywhere: SameEverywhere, margins: Margins) 
     untracked, tracked = (sum(len(one.touches) for one in some) for some in (bare, told))
     assert untracked >= 10
     margins.everywhere(
-        FLICKER, "touches told of 40 quiet frames", tracked, untracked / 5, "touches"
+        FLICKER, "touches reported in 40 quiet frames", tracked, untracked / 5, "touches"
     )
 
 
