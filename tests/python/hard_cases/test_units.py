@@ -194,8 +194,8 @@ def test_the_noise_has_the_units_of_the_frames(margins: Margins, width: str) -> 
         baseline = engine.set_baseline(quiet * 10.0**e)
         off = abs(baseline.noise_v / (truth * 10.0**e) - 1)
         target = "host f32" if width == "float32" else "host f64"
-        # a quiet voltage is rounded by u |v0|, 1e3 u of a deviation of 1e-3 |v0|; 8 frames' errors add up at
-        # worst
+        # a quiet voltage is rounded by u |v0|, 1e3 u of a deviation of 1e-3 |v0|; at worst
+        # 8 frames' errors add up
         margins.record(
             FRAMES_CASE, "noise learned, frames in other volts", target, off, 8 * 1e3 * U, "of it"
         )
