@@ -359,10 +359,11 @@ def _print(
                 if k in errors
                 else ("     false" if score is not None else 10 * " ")
             )
+            grams = f"{touch.load_n / NEWTONS_PER_GRAM:10.1f}" if weighed else ""
             print(
                 f"{label if k == 0 else '':11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f}"
                 f" {touch.radius_mm:9.2f}"
-                f" {touch.strength_s_per_m_mm2:16.3f}{f'{touch.load_n / NEWTONS_PER_GRAM:10.1f}' if weighed else ''}"
+                f" {touch.strength_s_per_m_mm2:16.3f}{grams}"
                 f"  {error}{f'  {_solve(result)}' if k == 0 else ''}".rstrip()
             )
         if result.info.findings:

@@ -81,7 +81,8 @@ class CoreEngine:
         self._check(status, "workspace", UsageError)
         self._lib.eits_use_portable_kernels(self._context, int(portable))
         self.n_rows, self.n_pixels = int(self._model.n_rows), int(self._model.n_pixels)
-        # buffers and their pointers are made once: casting anew at each call would cost more than the call
+        # buffers and their pointers are made once: casting anew at each call would cost more than
+        # the call
         self._frame = np.zeros(self.n_rows, dtype=self.dtype)
         self._frame_pointer = self._ffi.from_buffer("eits_real[]", self._frame)
         self._image = self._view(self._context.image, self.n_pixels)

@@ -78,7 +78,8 @@ def board_subject(
         allow_nonfinite=True,
     )
     remarks = () if measured.info.check_every == 1 else (
-        "reciprocity of every row: the board measures one of each pair; scan fully with  eitskin stream --full",
+        "reciprocity of every row: the board measures one of each pair; scan fully with"
+        "  eitskin stream --full",
     )  # fmt: skip
     return Subject(device.transport.url, AS_GIVEN, ((AS_GIVEN, frames),), skin, remarks)
 

@@ -184,8 +184,8 @@ class ThreadedLink:
         except DeviceError:
             if self._failed is not None:
                 raise
-            # else the reader is opening the port again, and whoever sent this sends it again when no answer
-            # comes
+            # else the reader is opening the port again, and whoever sent this sends it again when
+            # no answer comes
         self._sequence += 1
 
     @property

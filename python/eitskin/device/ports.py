@@ -17,7 +17,8 @@ ST_LINKS = frozenset(
 )  # with a virtual port
 WRITE_S = 1.0
 ALLOW = (
-    """run  echo 'SUBSYSTEM=="tty", ATTRS{idVendor}=="0483", MODE="0660", TAG+="uaccess"' | sudo tee """
+    """run  echo 'SUBSYSTEM=="tty", ATTRS{idVendor}=="0483", MODE="0660", TAG+="uaccess"'"""
+    " | sudo tee "
     "/etc/udev/rules.d/70-eitskin.rules && sudo udevadm control --reload && sudo udevadm trigger  "
     "or  sudo usermod -aG dialout $USER  and log in again"
 )

@@ -4,8 +4,8 @@ Math. 52, 1992).
 A sheet of thickness t carries currents in its plane only. With potential phi inside and U_l on
 electrode l, weakly
 
-    sum_e sigma_e t int grad phi . grad v  +  sum_l (t / z_l) int_{E_l} (phi - U_l)(v - V_l)  =
-    sum_l I_l V_l .
+    sum_e sigma_e t int grad phi . grad v  +  sum_l (t / z_l) int_{E_l} (phi - U_l)(v - V_l)
+        =  sum_l I_l V_l .
 
 An electrode without contact impedance is an ideal shunt: its nodes and U_l are one unknown. The
 last electrode's U is fixed at 0, which leaves the matrix symmetric positive definite; potentials

@@ -56,8 +56,8 @@ class LoadLaw:
 
     def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
         """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the
-        table by its last slope, to twice its greatest load. What eits_load_n in csrc/src/model/force.c
-        gives."""
+        table by its last slope, to twice its greatest load. What eits_load_n in
+        csrc/src/model/force.c gives."""
         seen = np.abs(strength) * self.gains_at(place_mm)
         s, n = self.strength.astype(np.float64), self.load_n.astype(np.float64)
         k = np.clip(np.searchsorted(s, seen), 1, len(s) - 1)

@@ -3,13 +3,12 @@ rank.
 
 With A = J D, D = diag(|j_k|^-p), and its singular value decomposition A = U diag(s) V':
 
-    P = diag((s_i^2 + mu s_1^2)^-1/2) U'      whitens the data: y = P d
-    S = P A = diag(s_i / sqrt(s_i^2 + mu s_1^2)) V'      the stored matrix; its greatest eigenvalue
-    S S' is 1 / (1 + mu)
+    P = diag((s_i^2 + mu s_1^2)^-1/2) U'                  whitens the data: y = P d
+    S = P A = diag(s_i / sqrt(s_i^2 + mu s_1^2)) V'       the stored matrix
 
-so that |P d - S g|^2 is the misfit of J D g in a metric that lets weak directions speak up to the
-floor mu, and a first-order solver with step 1 needs few iterations. It is Tikhonov-floored
-whitening, a preconditioner on the data side.
+The greatest eigenvalue of S S' is 1 / (1 + mu). So |P d - S g|^2 is the misfit of J D g in a metric
+that lets weak directions speak up to the floor mu, and a first-order solver with step 1 needs few
+iterations. It is Tikhonov-floored whitening, a preconditioner on the data side.
 """
 
 from __future__ import annotations

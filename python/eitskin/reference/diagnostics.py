@@ -377,8 +377,8 @@ class Examiner:
 
     def crowd(self, touches: tuple[Touch, ...], options: Options, clearness: float) -> None:
         """Whether there are more touches than can be told apart, by the score of
-        csrc/src/diagnostics/crowded.c; ``found.unexplained`` is known. ``clearness``: max(S'y) over that of
-        noise."""
+        csrc/src/diagnostics/crowded.c; ``found.unexplained`` is known. ``clearness``: max(S'y) over
+        that of noise."""
         count, left = len(touches), self.found.unexplained
         if not count or "crowded" not in self.wanted or clearness < CROWD_FAINT:
             return

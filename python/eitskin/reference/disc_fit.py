@@ -1,5 +1,5 @@
-"""The numpy reference of the off-grid fit of discs in csrc/src/touch/disc_fit.c, keep.c and disc.c: the same
-steps, written for reading."""
+"""The numpy reference of the off-grid fit of discs in csrc/src/touch/disc_fit.c, keep.c and disc.c:
+the same steps, written for reading."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Coordinate descent and active set of the numpy reference: the C core's rules, written for
 reading.
 
-csrc/src/solve/coordinate_descent.c and active_set.c say where the methods are from. The columns' products are
-solved with anew at each step; the core keeps a factor of them up to date.
+csrc/src/solve/coordinate_descent.c and active_set.c say where the methods are from. The columns'
+products are solved with anew at each step; the core keeps a factor of them up to date.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""The numpy reference of csrc/src/touch/interaction.c: what touches do to each other's field, as data on the
-folded rows."""
+"""The numpy reference of csrc/src/touch/interaction.c: what touches do to each other's field, as
+data on the folded rows."""
 
 from __future__ import annotations
 

@@ -49,7 +49,8 @@ def certify(
     sign: str,
     basis: FloatArray,
 ) -> Certificate:
-    """Duality gap, objective and |residual| at ``x``; the formula is in csrc/src/solve/duality_gap.c."""
+    """Duality gap, objective and |residual| at ``x``; the formula is in
+    csrc/src/solve/duality_gap.c."""
     residual = project(y - sx, basis)
     correlation = s.T @ residual
     largest = greatest(correlation, sign)

@@ -1,4 +1,5 @@
-"""Glitches in quiet frames, in numpy: the rules of csrc/src/frame/reference_outliers.c, written for reading."""
+"""Glitches in quiet frames, in numpy: the rules of csrc/src/frame/reference_outliers.c, written for
+reading."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The numpy reference of csrc/src/touch/split_merge.c: discs that are one touch are joined, those that are
-two are parted."""
+"""The numpy reference of csrc/src/touch/split_merge.c: discs that are one touch are joined, those
+that are two are parted."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The numpy reference of the search for touches in csrc/src/touch/touch.c and track.c: the same steps,
-written for reading."""
+"""The numpy reference of the search for touches in csrc/src/touch/touch.c and track.c: the same
+steps, written for reading."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Touches followed in time, in numpy terms: what csrc/src/touch/tracker.c does, for tests and studies."""
+"""Touches followed in time, in numpy terms: what csrc/src/touch/tracker.c does, for tests and
+studies."""
 
 from __future__ import annotations
 

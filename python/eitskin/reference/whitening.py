@@ -1,5 +1,5 @@
-"""The numpy reference of csrc/src/frame/whitening.c and floor.c: the reduction that a model would have had
-without the rows that a frame lacks, or with a higher floor."""
+"""The numpy reference of csrc/src/frame/whitening.c and floor.c: the reduction that a model would
+have had without the rows that a frame lacks, or with a higher floor."""
 
 from __future__ import annotations
 
@@ -111,7 +111,8 @@ def _of_rest(form: Form, known: BoolArray, floor: float, noise_of_all: float) ->
     """Of some rows; ``noise_of_all``: the noise ratio of all of them."""
     lost = LOST * floor
     unit, missing = np.eye(len(form.scale)), ~known
-    # U is orthogonal but for rounding to float32: which rows are summed over shows in the eighth figure
+    # U is orthogonal but for rounding to float32: which rows are summed over shows in the eighth
+    # figure
     by_missing = missing.sum() <= known.sum()
     products = (
         unit - form.left[missing].T @ form.left[missing]

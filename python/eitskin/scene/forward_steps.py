@@ -29,8 +29,8 @@ IntArray = npt.NDArray[np.int64]
 AnyArray = npt.NDArray[Any]
 
 # Ordering and symbolic analysis, in multiplications per stored value of the matrix. Measured with
-# SuperLU at 3,000 and 10,000 elements: a factorisation takes as long as 50 to 80 solves, although it
-# multiplies only as much as 13 to 28.
+# SuperLU at 3,000 and 10,000 elements: a factorisation takes as long as 50 to 80 solves, although
+# it multiplies only as much as 13 to 28.
 SYMBOLIC_PER_VALUE = 200
 
 

@@ -24,8 +24,8 @@ AnyArray = npt.NDArray[Any]
 
 # A detached electrode's impedance in the solve. It carries no current as a whole, and 1e4 ohm m2
 # keeps what little runs in and out again along its width below 1e-8 of the other rows; one that a
-# bridge feeds has 2 Gohm on the paper's 48 mm2, where about 1e-5 leaks. More would cost the solve as
-# many digits.
+# bridge feeds has 2 Gohm on the paper's 48 mm2, where about 1e-5 leaks. More would cost the solve
+# as many digits.
 OPEN_OHM_M2 = 1e4
 OPEN_BRIDGED_OHM_M2 = 1e5
 

@@ -141,8 +141,9 @@ def hand_svg() -> str:
         for k, (x, y) in enumerate(hand_places_mm())
     )
     page = f'width="{width:g}mm" height="{height:g}mm" viewBox="0 0 {width:g} {height:g}"'
+    corners = as_svg_path(hand_corners(), height)
     return f"""<svg xmlns="http://www.w3.org/2000/svg" {page}>
-  <path id="skin" fill="none" stroke="black" stroke-width="0.5" d="{as_svg_path(hand_corners(), height)}"/>
+  <path id="skin" fill="none" stroke="black" stroke-width="0.5" d="{corners}"/>
   <g id="electrodes" fill="goldenrod">
 {marks}
   </g>

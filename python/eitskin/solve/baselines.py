@@ -9,10 +9,9 @@ matrix products, all of J's rows taken; what is made once for a skin is not coun
     linear back projection   x = J' dv, each pixel over the norm of its sensitivities
     Gauss-Newton, one step   x = (J'J + a s_1^2 I)^-1 J' dv                        (Tikhonov)
     NOSER                    x = (J'J + a s_1^2 R / mean(R))^-1 J' dv,  R = diag(J'J)^p, p = 1/2
-    GREIT-like               one matrix, trained to show small targets as blurred discs: see
-    greit.py conjugate gradient       CGLS, stopped after a few steps: the stop is the
-    regularisation plain FISTA              min 1/2 |J x - dv|^2 + lambda |x|_1, signed or x >= 0,
-    after K iterations
+    GREIT-like               one matrix, trained to show small targets as blurred discs: greit.py
+    conjugate gradient       CGLS, stopped after a few steps: the stop is the regularisation
+    plain FISTA              min 1/2 |J x - dv|^2 + lambda |x|_1, signed or x >= 0, K iterations
 """
 
 from __future__ import annotations

@@ -96,8 +96,8 @@ def train_greit(
         grid.centres_mm()[pixel] + generator.uniform(-0.5, 0.5, (targets, 2)) * grid.pixel_mm
     )
     cover = _cover(grid, places_mm, TARGET_RADIUS * half_mm)
-    # as much change in the disc as in the target; one height everywhere, so that one touch looks alike
-    # everywhere
+    # as much change in the disc as in the target; one height everywhere, so that one touch looks
+    # alike everywhere
     height = (TARGET_RADIUS / disc_radius) ** 2
     away_mm = np.sqrt(((grid.centres_mm()[:, None] - places_mm[None]) ** 2).sum(axis=2))
     desired = height / (1 + np.exp((away_mm - disc_radius * half_mm) / (EDGE * half_mm)))

@@ -274,7 +274,9 @@ def _rate(fault: Fault, snr_db: float, samples: Sequence[_Sample]) -> Rate:
         mean_of(one.clean.image - one.seen.image for one in samples),
         mean_of(one.clean.discs - one.seen.discs for one in samples),
         mean_of(blind),
-        None if gain is None else mean_of(1 - o.seen.peak / (gain * o.clean.peak) for o in samples if o.clean.peak > 0),
+        None if gain is None else mean_of(
+            1 - o.seen.peak / (gain * o.clean.peak) for o in samples if o.clean.peak > 0
+        ),
     )  # fmt: skip
 
 

@@ -109,7 +109,9 @@ def crowd_rows(result: Findings) -> list[tuple[str, ...]]:
     groups = [(f"{count}", [count]) for count in counts] + [("all", counts)]
     return [
         (name, *(cell for snr in SNRS_DB
-                 for cell in _crowd_cells([c for c in result.crowds if c.snr_db == snr and c.touches in group])))
+                 for cell in _crowd_cells([
+                     c for c in result.crowds if c.snr_db == snr and c.touches in group
+                 ])))
         for name, group in groups
     ]  # fmt: skip
 

@@ -46,8 +46,8 @@ def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
                 (even, {"color": EVEN, "linewidth": 2.4}),
                 (row, {"color": colour, "linewidth": 1.0}),
             ):
-                # turned so that an even skin is above 0; a tank's current and amplifier are not known: parts of its
-                # own rms
+                # turned so that an even skin is above 0; a tank's current and amplifier are not
+                # known: parts of its own rms
                 values = one.folded_v[0] * np.sign((one if tank else even).folded_v[0].mean())
                 scale = 1 / math.sqrt(np.mean(values**2)) if tank else 1e3
                 axes.plot(scale * values.ravel(), label=one.name, **style)

@@ -376,7 +376,8 @@ def draw_objective(path: Path, front: Front) -> None:
                 axes.plot([score["gap_rel"] for _, score in scores],
                     [score[judged]["mean"] for _, score in scores], style,
                           color=f"C{number}", markersize=4, linewidth=1.1,
-                          label=f"{judged}, {_base_name(group)} (lambda {group[0].configuration.lambda_rel:g})")  # fmt: skip
+                          label=f"{judged}, {_base_name(group)}"
+                          f" (lambda {group[0].configuration.lambda_rel:g})")  # fmt: skip
             for one, score in scores:
                 axes.annotate(f"{one.configuration.iterations}",
                     (score["gap_rel"], score["image"]["mean"]), xytext=(3, -9),

@@ -150,7 +150,8 @@ def run(
     }
     cells = [(name, snr_db) for name in (HEADLINE, *settings.sets) for snr_db in settings.snrs_db]
     scores: dict[str, dict[str, dict[str, Any]]] = {one.name: {} for one in configurations}
-    # cell by cell, so that frames with noise are made once for all configurations that measure alike
+    # cell by cell, so that frames with noise are made once for all configurations that measure
+    # alike
     for name, snr_db, one in progress(
         [(*cell, one) for cell in cells for one in configurations], "scoring"
     ):

@@ -40,7 +40,8 @@ rate_hz = 20
 seed = 5
 elements = 400
 [[touch]]
-path = [{ t_s = 0, x_mm = 40, y_mm = 25, radius_mm = 5, contrast = 3 }, { t_s = 0.1, x_mm = 45, y_mm = 25, radius_mm = 6 }]
+path = [{ t_s = 0, x_mm = 40, y_mm = 25, radius_mm = 5, contrast = 3 },
+        { t_s = 0.1, x_mm = 45, y_mm = 25, radius_mm = 6 }]
 hold = true
 [[touch]]
 x_mm = 80

@@ -13,8 +13,10 @@ from eitskin.skin.outline import polygon
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 HAND, FOREARM = ((EXAMPLES / name).read_bytes() for name in ("hand.svg", "forearm.dxf"))
-CURVES = b"""<svg width="9cm" height="9cm" viewBox="0 0 90 90"><g transform="rotate(9) translate(2,3)">
-<path id="a" d="m10,10 c20-5 30 5 40 0 q9,9 0 20 t-5 9 a9 5 30 1 0 -20 4 z"/></g><use href="#a" x="3"/>
+CURVES = b"""<svg width="9cm" height="9cm" viewBox="0 0 90 90">
+<g transform="rotate(9) translate(2,3)">
+<path id="a" d="m10,10 c20-5 30 5 40 0 q9,9 0 20 t-5 9 a9 5 30 1 0 -20 4 z"/></g>
+<use href="#a" x="3"/>
 <rect x="1" y="2" width="30" height="20" rx="4"/><polygon points="1,2 30,4 5,60"/></svg>"""
 WORDS = (
     *ODD_BYTES,

@@ -16,7 +16,8 @@ HEADERS = sorted((CSRC / "include" / "eitskin").glob("*.h"))
 MOST_LINES = 400
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
 ARITHMETIC = {"f32": {"fmaf", "sqrtf"}, "f64": {"fma", "sqrt"}}
-# what a compiler refers to by itself: the processor's features, position-independent code, hardening
+# what a compiler refers to by itself: the processor's features, position-independent code,
+# hardening
 PROCESSOR = {"__cpu_model", "__cpu_features2", "__cpu_indicator_init"}
 OF_THE_COMPILER = PROCESSOR | {
     "_GLOBAL_OFFSET_TABLE_",

@@ -108,7 +108,9 @@ WATCHDOG = """
 void program(void) {
     if (OUT[0] == 0x5A5A) { OUT[1] = RCC_CSR; OUT[2] += 1; return; }
     OUT[0] = 0x5A5A; OUT[2] = 0; RCC_CSR = 1u << 24;
-    IWDG_KR = 0xCCCC; IWDG_KR = 0x5555; IWDG_PR = 1; IWDG_RLR = 399; while (IWDG_SR) ; IWDG_KR = 0xAAAA;
+    IWDG_KR = 0xCCCC; IWDG_KR = 0x5555; IWDG_PR = 1; IWDG_RLR = 399;
+    while (IWDG_SR) ;
+    IWDG_KR = 0xAAAA;
     %s
     for (;;) ;
 }

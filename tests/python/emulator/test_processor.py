@@ -15,7 +15,8 @@ from eitskin.errors import DeviceError
 # arithmetic with IT blocks, floating point, division and memory: whatever slicing could spoil
 MIXED = """
 void program(void) {
-    uint32_t x = 12345, taken = 0; float f = 1.0f; volatile uint32_t memory[16]; for (int k = 0; k < 16; ++k) memory[k] = 0;
+    uint32_t x = 12345, taken = 0; float f = 1.0f; volatile uint32_t memory[16];
+    for (int k = 0; k < 16; ++k) memory[k] = 0;
     for (uint32_t k = 0; k < 4000; ++k) {
         x = x * 1664525u + 1013904223u;
         if (x & 0x10000) taken += 3; else taken ^= x >> 7;
@@ -70,7 +71,9 @@ def test_an_unknown_build_of_unicorn_is_refused(monkeypatch: pytest.MonkeyPatch)
 TWO_TIMERS = """
 static volatile uint32_t order[8], n;
 static void note(uint32_t what) { if (n < 8) order[n++] = what; }
-void irq_28(void) { note(2); T_SR(TIM2_BASE) = 0; __asm volatile(".rept 400\\n nop\\n .endr"); note(20); }
+void irq_28(void) {
+    note(2); T_SR(TIM2_BASE) = 0; __asm volatile(".rept 400\\n nop\\n .endr"); note(20);
+}
 void irq_29(void) { note(3); T_SR(TIM3_BASE) = 0; note(30); }
 void program(void) {
     n = 0;
@@ -104,14 +107,16 @@ def test_the_more_urgent_interrupt_preempts(
 
 FRAMES = """
 __attribute__((naked)) void svcall(void) {
-    __asm volatile("ldr r2, =0x20010000\\n str sp, [r2]\\n str lr, [r2, #4]\\n mrs r3, ipsr\\n str r3, [r2, #8]\\n bx lr\\n");
+    __asm volatile("ldr r2, =0x20010000\\n str sp, [r2]\\n str lr, [r2, #4]\\n mrs r3, ipsr\\n"
+                   "str r3, [r2, #8]\\n bx lr\\n");
 }
 void program(void) {
     uint32_t before, after; float f = 2.5f;
     %s
     __asm volatile("mov %%0, sp\\n movs r0, #11\\n movs r1, #12\\n svc #0\\n mov %%1, sp\\n"
                    : "=r"(before), "=r"(after) :: "r0", "r1", "memory");
-    OUT[3] = before; OUT[4] = after; OUT[5] = *(volatile uint32_t *)OUT[0]; OUT[6] = ((volatile uint32_t *)OUT[0])[1];
+    OUT[3] = before; OUT[4] = after; OUT[5] = *(volatile uint32_t *)OUT[0];
+    OUT[6] = ((volatile uint32_t *)OUT[0])[1];
     %s
 }
 """
@@ -134,9 +139,11 @@ def test_a_frame_has_8_words_or_26_after_floating_point() -> None:
 # too), registers, 64-bit sums
 SPOILING = """
 __attribute__((naked)) void systick(void) {
-    __asm volatile("vmov.f32 s0, #1.0\\n .irp n, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15\\n vmov.f32 s\\\\n, s0\\n .endr\\n"
+    __asm volatile("vmov.f32 s0, #1.0\\n .irp n, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15\\n"
+                   "vmov.f32 s\\\\n, s0\\n .endr\\n"
                    "vcmp.f32 s0, #0.0\\n"
-                   "ldr r0, =0x20010004\\n ldr r1, [r0]\\n add r1, #1\\n str r1, [r0]\\n mvn r2, #0\\n uadd8 r3, r2, r2\\n"
+                   "ldr r0, =0x20010004\\n ldr r1, [r0]\\n add r1, #1\\n str r1, [r0]\\n"
+                   "mvn r2, #0\\n uadd8 r3, r2, r2\\n"
                    "mov r12, #77\\n movs r1, #%d\\n lsls r1, #31\\n bx lr\\n");
 }
 void program(void) {
@@ -159,7 +166,10 @@ void program(void) {
         if (s > 0 && sum & 8) c = c * 3 + 1; else if (s < -5) c ^= 0x5555;
     }
     STK_CTRL = 0;
-    for (int k = 0; k < 8; ++k) { union { float f; uint32_t u; } bits = {f[k]}; OUT[6 + k] = bits.u; }
+    for (int k = 0; k < 8; ++k) {
+        union { float f; uint32_t u; } bits = {f[k]};
+        OUT[6 + k] = bits.u;
+    }
     OUT[3] = c; OUT[4] = (uint32_t)sum; OUT[5] = g; OUT[2] = 1;
 }
 """
@@ -234,7 +244,8 @@ def test_a_flag_that_a_handler_forgets_brings_it_back() -> None:
     void program(void) {
         OUT[0] = 0;
         RCC_APB1ENR |= 1; (void)RCC_APB1ENR;
-        NVIC_ISER(0) = 1u << 28; T_DIER(TIM2_BASE) = 1; TIM_ARR(TIM2_BASE) = 99; T_CR1(TIM2_BASE) = 9;
+        NVIC_ISER(0) = 1u << 28; T_DIER(TIM2_BASE) = 1; TIM_ARR(TIM2_BASE) = 99;
+        T_CR1(TIM2_BASE) = 9;
     }"""
     board = run_program(source, 200, (28,))
     assert out(board, 1) == [5]
@@ -242,10 +253,12 @@ def test_a_flag_that_a_handler_forgets_brings_it_back() -> None:
 
 FAULT = """
 static void tell(uint32_t which, uint32_t *frame) {
-    OUT[0] = which; OUT[1] = frame[6]; OUT[2] = SCB_CFSR; OUT[3] = SCB_HFSR; OUT[4] = SCB_BFAR; OUT[5] = SCB_MMFAR; for (;;) ;
+    OUT[0] = which; OUT[1] = frame[6]; OUT[2] = SCB_CFSR; OUT[3] = SCB_HFSR;
+    OUT[4] = SCB_BFAR; OUT[5] = SCB_MMFAR; for (;;) ;
 }
 #define TELL(name, number) \\
-    __attribute__((naked)) void name(void) { __asm volatile("mov r1, sp\\n movs r0, #" #number "\\n b tell_all\\n"); }
+    __attribute__((naked)) void name(void) { \\
+        __asm volatile("mov r1, sp\\n movs r0, #" #number "\\n b tell_all\\n"); }
 __attribute__((used)) void tell_all(uint32_t which, uint32_t *frame) { tell(which, frame); }
 TELL(hard_fault, 3) TELL(memory_fault, 4) TELL(bus_fault, 5) TELL(usage_fault, 6)
 __attribute__((noinline)) uint32_t load(uint32_t at) { return *(volatile uint32_t *)at; }
@@ -302,7 +315,9 @@ def test_a_fault_in_the_hard_fault_handler_locks_up() -> None:
 def test_a_program_asks_for_a_reset_and_ram_stays() -> None:
     source = """
     void program(void) {
-        if (OUT[0] != 0x1234) { OUT[0] = 0x1234; OUT[1] = RCC_CSR; SCB_AIRCR = 0x05FA0004u; for (;;) ; }
+        if (OUT[0] != 0x1234) {
+            OUT[0] = 0x1234; OUT[1] = RCC_CSR; SCB_AIRCR = 0x05FA0004u; for (;;) ;
+        }
         OUT[2] = RCC_CSR; RCC_CSR |= 1u << 24; OUT[3] = RCC_CSR;
     }"""
     board = run_program(source, 100)

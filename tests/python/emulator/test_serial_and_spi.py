@@ -18,13 +18,17 @@ SERIAL = """
     USART_BRR(USART3_BASE) = 54; USART_CR3(USART3_BASE) = 3u << 6;
 """
 SEND = """
-void irq_14(void) { OUT[1] = DMA_LISR(DMA1_BASE); OUT[2] = U_ISR(USART3_BASE); DMA_LIFCR(DMA1_BASE) = 0x3Du << 22; ++OUT[0]; }
+void irq_14(void) {
+    OUT[1] = DMA_LISR(DMA1_BASE); OUT[2] = U_ISR(USART3_BASE);
+    DMA_LIFCR(DMA1_BASE) = 0x3Du << 22; ++OUT[0];
+}
 void program(void) {
     OUT[0] = 0;
     %s
     for (uint32_t k = 0; k < 100; ++k) ((volatile uint8_t *)0x20011000u)[k] = (uint8_t)(k * 7 + 1);
     USART_CR1(USART3_BASE) = 13;
-    DMA_PAR(DMA1_BASE, 3) = USART3_BASE + 0x28; DMA_M0AR(DMA1_BASE, 3) = 0x20011000u; DMA_NDTR(DMA1_BASE, 3) = 100;
+    DMA_PAR(DMA1_BASE, 3) = USART3_BASE + 0x28; DMA_M0AR(DMA1_BASE, 3) = 0x20011000u;
+    DMA_NDTR(DMA1_BASE, 3) = 100;
     NVIC_ISER(0) = 1u << 14;
     DMA_CR(DMA1_BASE, 3) = 4u << 25 | DMA_CR_MINC | 1u << 6 | DMA_CR_TCIE | 1;
 }
@@ -95,7 +99,8 @@ void irq_39(void) {
 void program(void) {
     OUT[0] = OUT[1] = 0;
     %s
-    DMA_PAR(DMA1_BASE, 1) = USART3_BASE + 0x24; DMA_M0AR(DMA1_BASE, 1) = 0x20011000u; DMA_NDTR(DMA1_BASE, 1) = 64;
+    DMA_PAR(DMA1_BASE, 1) = USART3_BASE + 0x24; DMA_M0AR(DMA1_BASE, 1) = 0x20011000u;
+    DMA_NDTR(DMA1_BASE, 1) = 64;
     DMA_CR(DMA1_BASE, 1) = 4u << 25 | DMA_CR_MINC | DMA_CR_CIRC | DMA_CR_TCIE | 1;
     NVIC_ISER(0) = 1u << 12; NVIC_ISER(1) = 1u << 7;
     USART_CR1(USART3_BASE) = 13 | 1u << 4;
@@ -143,7 +148,9 @@ def test_a_receiver_at_another_rate_hears_garbage_and_framing_errors() -> None:
 def test_single_bytes_overrun() -> None:
     source = (
         """
-    void irq_39(void) { OUT[0] |= U_ISR(USART3_BASE) & 1u << 3; OUT[1] = U_RDR(USART3_BASE); USART_ICR(USART3_BASE) = 1u << 3;
+    void irq_39(void) {
+        OUT[0] |= U_ISR(USART3_BASE) & 1u << 3; OUT[1] = U_RDR(USART3_BASE);
+        USART_ICR(USART3_BASE) = 1u << 3;
         for (uint32_t k = 0; k < %d; ++k) __asm volatile("nop"); ++OUT[2]; }
     void program(void) { OUT[0] = OUT[2] = 0; """
         + SERIAL
@@ -182,7 +189,9 @@ static void word(uint16_t value) {
     while (SPI_SR(SPI3_BASE) & (1u << 7)) ;
     GPIO_BSRR(GPIOD_BASE) = 1u << 2;
 }
-void program(void) { %s word(0x2100); word(0x50C7); word(0x4000); word(0xC000); word(0x2000); OUT[0] = 1; }
+void program(void) {
+    %s word(0x2100); word(0x50C7); word(0x4000); word(0xC000); word(0x2000); OUT[0] = 1;
+}
 """
 CPOL, CPHA = "2", "1"
 

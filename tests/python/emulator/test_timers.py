@@ -65,7 +65,8 @@ def test_a_counter_counts_as_its_prescaler_says() -> None:
         __asm volatile(".rept 108\\n nop\\n .endr"); OUT[0] = TIM_CNT(TIM5_BASE) - t0;
         TIM_EGR(TIM5_BASE) = 1; uint32_t c0 = DWT_CYCCNT;
         while (TIM_CNT(TIM5_BASE) < 1000) ; OUT[1] = DWT_CYCCNT - c0;
-        TIM_CNT(TIM5_BASE) = 0xFFFFFFF0u; while (TIM_CNT(TIM5_BASE) > 1000) ; OUT[2] = DWT_CYCCNT - c0 - OUT[1];
+        TIM_CNT(TIM5_BASE) = 0xFFFFFFF0u; while (TIM_CNT(TIM5_BASE) > 1000) ;
+        OUT[2] = DWT_CYCCNT - c0 - OUT[1];
     }}"""
     unprescaled, cycles, wrap = out(run_program(CLOCK + source, 3000), 3)
     assert 54 <= unprescaled <= 60
@@ -80,13 +81,17 @@ CHAIN = f"""
     ADC_CCR = 1u << 16; ADC_SQR3(ADC1_BASE) = 3; ADC_CR2(ADC1_BASE) = 1;
     TIM_PSC(TIM5_BASE) = 107; TIM_ARR(TIM5_BASE) = 0xFFFFFFFFu; TIM_EGR(TIM5_BASE) = 1;
     TIM_CR2(TIM5_BASE) = 3u << 4; T_CR1(TIM5_BASE) = 1;
-    TIM_PSC(TIM3_BASE) = 107; TIM_EGR(TIM3_BASE) = 1; TIM_ARR(TIM3_BASE) = 99; TIM_CNT(TIM3_BASE) = 99;
+    TIM_PSC(TIM3_BASE) = 107; TIM_EGR(TIM3_BASE) = 1; TIM_ARR(TIM3_BASE) = 99;
+    TIM_CNT(TIM3_BASE) = 99;
     TIM_CCR1(TIM3_BASE) = 80; TIM_CCMR1(TIM3_BASE) = 6u << 4; TIM_CR2(TIM3_BASE) = 4u << 4;
-    TIM_SMCR(TIM2_BASE) = 5u | 2u << 4; TIM_CR2(TIM2_BASE) = 2u << 4; TIM_ARR(TIM2_BASE) = 107; TIM_CNT(TIM2_BASE) = 54;
+    TIM_SMCR(TIM2_BASE) = 5u | 2u << 4; TIM_CR2(TIM2_BASE) = 2u << 4; TIM_ARR(TIM2_BASE) = 107;
+    TIM_CNT(TIM2_BASE) = 54;
     T_CR1(TIM2_BASE) = 1;
-    DMA_PAR(DMA2_BASE, 0) = 0x4001204Cu; DMA_M0AR(DMA2_BASE, 0) = 0x20011000u; DMA_M1AR(DMA2_BASE, 0) = 0x20012000u;
+    DMA_PAR(DMA2_BASE, 0) = 0x4001204Cu; DMA_M0AR(DMA2_BASE, 0) = 0x20011000u;
+    DMA_M1AR(DMA2_BASE, 0) = 0x20012000u;
     DMA_NDTR(DMA2_BASE, 0) = 80;
-    DMA_CR(DMA2_BASE, 0) = DMA_CR_DBM | 1u << 13 | 1u << 11 | DMA_CR_MINC | DMA_CR_CIRC | DMA_CR_TCIE;
+    DMA_CR(DMA2_BASE, 0) =
+        DMA_CR_DBM | 1u << 13 | 1u << 11 | DMA_CR_MINC | DMA_CR_CIRC | DMA_CR_TCIE;
     DMA_CR(DMA2_BASE, 0) |= 1;
     ADC_CR2(ADC1_BASE) = 1u | 1u << 8 | 1u << 9 | 1u << 28 | 11u << 24;
     NVIC_ISER(1) = 1u << 24;

@@ -54,7 +54,8 @@ START = """
 #define WEAK __attribute__((weak, alias("unexpected")))
 void program(void);
 void unexpected(void) { OUT[-1] = SCB_ICSR & 0x1FF; for (;;) ; }
-void hard_fault(void) WEAK; void memory_fault(void) WEAK; void bus_fault(void) WEAK; void usage_fault(void) WEAK;
+void hard_fault(void) WEAK; void memory_fault(void) WEAK;
+void bus_fault(void) WEAK; void usage_fault(void) WEAK;
 void svcall(void) WEAK; void pendsv(void) WEAK; void systick(void) WEAK;
 %s
 static void start(void) {
@@ -64,7 +65,8 @@ static void start(void) {
     for (;;) __asm volatile("wfi");
 }
 __attribute__((section(".vectors"), used)) static void (*const vectors[16 + 110])(void) = {
-    (void (*)(void))0x20008000, start, [2] = unexpected, hard_fault, memory_fault, bus_fault, usage_fault,
+    (void (*)(void))0x20008000, start,
+    [2] = unexpected, hard_fault, memory_fault, bus_fault, usage_fault,
     [11] = svcall, [14] = pendsv, systick, %s
 };
 """
@@ -144,5 +146,7 @@ static void clock_216(void) {
     RCC_CFGR = 5u << 10 | 4u << 13 | 2u << 21 | 2u;
     while ((RCC_CFGR & 0xC) != 8) ;
 }
-static void cycle_counter(void) { DCB_DEMCR |= 1u << 24; DWT_LAR = 0xC5ACCE55u; DWT_CYCCNT = 0; DWT_CTRL |= 1; }
+static void cycle_counter(void) {
+    DCB_DEMCR |= 1u << 24; DWT_LAR = 0xC5ACCE55u; DWT_CYCCNT = 0; DWT_CTRL |= 1;
+}
 """

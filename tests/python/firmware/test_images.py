@@ -77,8 +77,8 @@ def test_places_in_memory(sections: dict[str, tuple[int, int]], symbols: dict[st
     for name, (size, address) in sections.items():
         ends = [start + room for start, room in MEMORIES if start <= address < start + room]
         assert ends and address + size <= ends[0], name
-    # The stack is at the bottom of DTCM, so that what overflows it meets the MPU's guard, aligned to its
-    # 256 bytes.
+    # The stack is at the bottom of DTCM, so that what overflows it meets the MPU's guard, aligned
+    # to its 256 bytes.
     assert (
         symbols["stack_bottom"] == DTCM
         and symbols["stack_top"] - symbols["stack_bottom"] >= 8 * 1024

@@ -21,8 +21,9 @@ for engine in ("c", "c64", "numpy"):
     baseline = reconstructor.tare(model.golden.reference_v + noise)
     result = reconstructor.reconstruct(model.golden.frame_v)
     facts[engine] = [baseline.correlation, float(result.image.max()), len(result.touches)]
-facts["loaded"] = sorted(name for name in sys.modules if name.split(".")[0] in ("scipy", "netgen", "matplotlib", "sklearn")
-                         and sys.modules[name] is not None)
+extras = ("scipy", "netgen", "matplotlib", "sklearn")
+facts["loaded"] = sorted(name for name, module in sys.modules.items()
+                         if name.split(".")[0] in extras and module is not None)
 print(json.dumps(facts))
 """
 

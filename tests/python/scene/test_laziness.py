@@ -21,11 +21,13 @@ from dataclasses import replace
 from eitskin.scene.description import Scene
 from eitskin.scene.touch_path import always
 effects = json.loads(sys.argv[1])
-scene = Scene("probe", touches=(always(0, 0, 10),), frames=2, quiet_frames=1, elements=400, effects=effects)
+scene = Scene("probe", touches=(always(0, 0, 10),), frames=2, quiet_frames=1, elements=400,
+              effects=effects)
 scene.plan()
 scene.run()
 prefix = "eitskin.scene.effects."
-print(json.dumps([sorted(m[len(prefix):] for m in sys.modules if m.startswith(prefix)), sorted(sys.modules)]))
+loaded = sorted(m[len(prefix):] for m in sys.modules if m.startswith(prefix))
+print(json.dumps([loaded, sorted(sys.modules)]))
 """
 
 

@@ -49,7 +49,8 @@ def test_polygon_measures() -> None:
 def test_centre_of_area_and_of_a_concave_outline() -> None:
     assert polygon([(10, 10), (30, 10), (30, 20), (10, 20)]).centre_mm == pytest.approx((20, 15))
     outline = polygon(L_SHAPE)
-    # The centre of area (35.6, 35.6) lies outside; the centre is the middle of the arm at that height.
+    # The centre of area (35.6, 35.6) lies outside; the centre is the middle of the arm at that
+    # height.
     assert outline.contains([outline.centre_mm])[0]
     assert outline.centre_mm == pytest.approx((15, 35.588235))
     for angle in range(0, 360, 7):

@@ -107,8 +107,8 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         (c["case"]["electrodes"], c["case"]["pattern"], c["case"]["equal"]): c
         for c in first.data["cases"]
     }
-    # a wider pair picks up more of the same current's voltage; more electrodes, nearer to each other,
-    # less
+    # a wider pair picks up more of the same current's voltage; more electrodes, nearer to each
+    # other, less
     assert (
         cases[16, "skip 2", "noise"]["rms_v0_mv"] > 3 * cases[16, "adjacent", "noise"]["rms_v0_mv"]
     )

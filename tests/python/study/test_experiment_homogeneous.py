@@ -85,7 +85,8 @@ def test_measures_see_what_they_are_for() -> None:
     one = EVEN_V.copy()
     one[fold.row[5, 6]] *= 1.16
     found = uniformity(one, PROTOCOL, fold)
-    # one of 16 larger by 16 %: a standard deviation of 16 sqrt(15) / 16 of a mean that is larger by 1 %
+    # one of 16 larger by 16 %: a standard deviation of 16 sqrt(15) / 16 of a mean that is larger by
+    # 1 %
     assert found.worst == pytest.approx(
         16 * np.sqrt(15) / 16 / 1.01
     ) and found.spread == pytest.approx(found.worst / 13)

@@ -93,10 +93,8 @@ def reply_text(reply: Reply) -> str:
         ),
     }
     known = reply.status in list(ReplyStatus)
-    return (
-        f"{name}:"
-        f" {texts[ReplyStatus(reply.status)] if known else f'refused with the unknown status {reply.status}'}"
-    )
+    unknown = f"refused with the unknown status {reply.status}"
+    return f"{name}: {texts[ReplyStatus(reply.status)] if known else unknown}"
 
 
 def fault_text(fault: Fault) -> str:

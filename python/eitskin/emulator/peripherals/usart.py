@@ -90,8 +90,8 @@ class Usart(Registers):
         self._stream: Stream | None = None
         self._idle_at = NEVER
 
-    # ---- sending: a byte lies in the transmit register until the shifter is free, which takes it for
-    # ten bit times ----
+    # ---- sending: a byte lies in the transmit register until the shifter is free, which takes it
+    # for ten bit times ----
 
     @property
     def frame_ticks(self) -> int:

@@ -145,7 +145,9 @@ def _why(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
         "the same, t chosen on tuning scenes": [one.at_fixed(t=one.fixed_t) for one in kept],
         "parameter and t chosen on tuning scenes": [one.at_best() for one in kept],
         "the same, cells show the nearest pixel": [one.at_best(lookup="nearest") for one in kept],
-        "the same (bilinear), each test image at its own best t": [one.at_each_own() for one in kept],
+        "the same (bilinear), each test image at its own best t": [
+            one.at_each_own() for one in kept
+        ],
         f"the three scenes of the picture, fixed parameter, t = {FIXED_THRESHOLD:g}": [
             summarise(column(one.shown_fixed[metrics.LOOKUP], FIXED_THRESHOLD)) for one in kept
         ],

@@ -23,8 +23,8 @@ from eitskin_studies.experiments.multitouch.variants import Seen
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-# what each feature is, in the order of the coefficients; none may thrive on touches of a scene being
-# equal, as half of these are
+# what each feature is, in the order of the coefficients; none may thrive on touches of a scene
+# being equal, as half of these are
 FEATURES = (
     "found touches, of 16 electrodes",
     "nearest pair's distance / sum of its radii, at most 2",

@@ -28,8 +28,10 @@ def conditions(lab: Lab, desk: Desk) -> str:
     """What all tables share."""
     settings = desk.settings
     mixed = MIXED_PARTS * settings.count(MIXED_SCENES, 3)
-    trained = "; ".join(f"{SHORT.get(name, name)}: {one.value:g} and t' = {one.threshold:g}" for name in CLASSICAL
-                        for one in [lab.trained(name)])  # fmt: skip
+    methods = [(SHORT.get(name, name), lab.trained(name)) for name in CLASSICAL]
+    trained = "; ".join(
+        f"{name}: {one.value:g} and t' = {one.threshold:g}" for name, one in methods
+    )
     return (
         f"Seed {settings.seed}; frames from a mesh of about {SIMULATED_ELEMENTS} elements, contacts"
         f" +-20 %, models and Jacobians from one of about {MODEL_ELEMENTS}. SNR as everywhere in"

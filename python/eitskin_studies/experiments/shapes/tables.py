@@ -93,15 +93,14 @@ def _lost_rows(variant: Variant, result: Mapping[str, Any]) -> list[tuple[str, .
             for value, place in zip(about["sensitivity_log10"], pixels, strict=True)
             if place == region
         ]
+        there = [seen for seen, place in zip(noticed, where, strict=True) if place == region]
         rows.append(
             (
                 variant.name,
                 region,
                 f"{len(mine)}",
                 share_text([error is not None for error in mine]),
-                (
-                    f"{100 * np.mean([seen for seen, place in zip(noticed, where, strict=True) if place == region]):.0f} %"
-                ),
+                f"{100 * np.mean(there):.0f} %",
                 f"{np.median(hits):.1f}" if hits else "-",
                 f"1 / {10 ** -float(np.median(seen)):.0f}" if seen else "-",
             )

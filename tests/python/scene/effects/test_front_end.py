@@ -162,7 +162,8 @@ def test_crosstalk_comes_from_driven_wires_beside(make_session: MakeSession) -> 
     step = crosstalk.make(crosstalk.Parameters(coupling_db=-40.0), session)
     got = step.apply(np.zeros(6), loads, 0.0, 0) / part
     a, b = loads.source_v, loads.sink_v
-    # wires 15 and 0 are not neighbours; 3 lies between 4 and 2, so couples onto both lines and cancels
+    # wires 15 and 0 are not neighbours; 3 lies between 4 and 2, so couples onto both lines and
+    # cancels
     expected = [b[0], a[1], 0.0, 0.0, 0.0, a[5] + b[5]]
     np.testing.assert_allclose(got, expected, atol=1e-13)
 
