@@ -1,5 +1,4 @@
-"""``eitskin scene run | plan | picture | list | effects | effect-picture | dataset``: simulated
-sessions."""
+"""``eitskin scene run | plan | picture | list | effects | dataset``: simulated sessions."""
 
 from __future__ import annotations
 
@@ -61,10 +60,6 @@ def add_parser(subparsers: Any) -> None:
     effects.add_argument("name", metavar="NAME", nargs="?", help="an effect")
     effects.add_argument("--json", action="store_true")
     effects.set_defaults(run=run_effects)
-    drawn = what.add_parser("effect-picture", help="draw what one effect does")
-    drawn.add_argument("name", metavar="NAME")
-    drawn.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
-    drawn.set_defaults(run=run_effect_picture)
     _add_dataset(what)
 
 
@@ -244,16 +239,6 @@ def run_effects(options: argparse.Namespace) -> int:
             f"  {one['name']:<24} {one['default']!s:<12} {unit:<8} {allowed:<18}"
             f" {one.get('doc', '')}".rstrip()
         )
-    return 0
-
-
-def run_effect_picture(options: argparse.Namespace) -> int:
-    """Draw one effect."""
-    from eitskin.view.effect_pictures import draw_effect
-
-    _check_folder(options.output)
-    draw_effect(options.output, options.name)
-    print(f"picture: {options.output}")
     return 0
 
 

@@ -127,11 +127,6 @@ class Cpu:
     def pc(self, value: int) -> None:
         self.pc_register.write((value | 1,))
 
-    @property
-    def in_slice(self) -> bool:
-        """Whether a callback is asking."""
-        return self._running
-
     def run(self, instructions: int, horizon: int) -> Stop:
         """Execute at most so many instructions, meant to last until ``horizon`` (ticks); tells why
         it stopped."""

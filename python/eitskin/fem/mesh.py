@@ -65,14 +65,6 @@ class Mesh:
         """Each triangle's centre of area, (E, 2)."""
         return np.asarray(self.nodes_mm[self.triangles].mean(axis=1))
 
-    def least_angle_deg(self) -> float:
-        """The smallest angle of any triangle: a measure of the mesh's quality (60 at best)."""
-        p = self.nodes_mm[self.triangles]
-        sides = np.roll(p, -1, axis=1) - p
-        lengths = np.hypot(sides[..., 0], sides[..., 1])
-        sines = 2 * self.areas_mm2[:, None] / (lengths * np.roll(lengths, 1, axis=1))
-        return float(np.degrees(np.arcsin(np.clip(sines, 0, 1)).min()))
-
 
 def build_mesh(
     skin: Skin,

@@ -66,11 +66,6 @@ class Piezoresistive:
 Law: TypeAlias = ShortCircuit | Piezoresistive
 
 
-def law_name(law: Law) -> str:
-    """The word of ``law`` in TOML."""
-    return "short_circuit" if isinstance(law, ShortCircuit) else "piezoresistive"
-
-
 def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
     """The law called ``name`` with its parameters in ``table``; other keys of the table are not
     looked at.

@@ -1,5 +1,4 @@
-"""From frames to images and touches: the C core, the numpy reference, and baselines to compare
-with."""
+"""From frames to images and touches: the C core and the numpy reference."""
 
 from eitskin.core.results import Baseline, Info, Options, Reconstruction, Touch
 from eitskin.solve.batch import Batch, reconstruct_many

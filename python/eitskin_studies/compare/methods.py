@@ -23,8 +23,8 @@ from eitskin.fem.sensitivity import sensitivity
 from eitskin.model.build import Linearisation
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
-from eitskin.solve import baselines
-from eitskin.solve.greit import train_greit
+from eitskin_studies.compare import baselines
+from eitskin_studies.compare.greit import train_greit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -132,8 +132,8 @@ def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
 
 
 def baseline_methods(jacobian: FloatArray, grid: Grid) -> tuple[Family, ...]:
-    """The methods of ``eitskin.solve.baselines`` and ``greit`` with the parameter values that are
-    tried for each."""
+    """The methods of ``baselines`` and ``greit`` with the parameter values that are tried for
+    each."""
     greit = train_greit(jacobian, grid)
 
     def fista(iterations: int, signed: bool) -> Family:

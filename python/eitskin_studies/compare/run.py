@@ -23,7 +23,6 @@ from eitskin.scene.simulate import ELEMENTS, Measurement, Simulated, simulate
 from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import best_touch_threshold, match_all, touches_in_image
 from eitskin.scoring.matching import GATE_MM, Matching
-from eitskin.scoring.summary import Summary, summarise
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin_studies.compare.methods import (
@@ -35,6 +34,7 @@ from eitskin_studies.compare.methods import (
     methods,
     setup_for,
 )
+from eitskin_studies.harness.summary import Summary, summarise
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any], str], Iterable[Any]]

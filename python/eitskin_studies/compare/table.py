@@ -10,8 +10,8 @@ from dataclasses import asdict
 from typing import Any
 
 from eitskin.scoring import metrics
-from eitskin.scoring.summary import Summary
 from eitskin_studies.compare.run import Comparison, Result
+from eitskin_studies.harness.summary import Summary
 
 SNR_DEFINITION = "SNR = 20 log10(rms(V0) / sigma), V0 the untouched skin's frame, rms over its rows"
 THRESHOLD_RULE = "touch where x > t max(x), t per method: the best mean MIoU on the training scenes"

@@ -16,9 +16,9 @@ from eitskin.model.model import Model
 from eitskin.scene.random_touches import Scene, TouchSet
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM, Matching, match
-from eitskin.scoring.summary import Summary
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.harness.sessions import Progress, SceneSolver, Session
+from eitskin_studies.harness.summary import Summary
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from eitskin.core.results import Reconstruction
 from eitskin.scene.random_touches import Scene
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import Matching, match
-from eitskin.scoring.summary import Summary, summarise
 from eitskin.tuning.configuration import Configuration
 from eitskin_studies.harness.sessions import Measured, Session, apparent_change_s_per_m_mm2
+from eitskin_studies.harness.summary import Summary, summarise
 from eitskin_studies.tradeoff.engines import Built
 
 FloatArray = npt.NDArray[np.float64]

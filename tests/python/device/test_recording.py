@@ -20,13 +20,12 @@ from device_helpers import FRAMES, QUIET, fresh_skin, sim_board, sim_device
 
 from eitskin.device.client import Device
 from eitskin.device.open import open_device
-from eitskin.device.recordings.recording import Recorder, export_frames, frames_of, read_head
+from eitskin.device.recordings.recording import Recorder, frames_of, read_head
 from eitskin.device.simulated.transport import SimTransport
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.commands import StreamCommand
 from eitskin.device.wire.packets import PacketType, RawFrame, SolvedImage, SolvedTouches, Stream
 from eitskin.errors import DeviceError, EitskinError, FileError, FrameError
-from eitskin.frames.frames import load_frames
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt, tiny_blob
@@ -216,8 +215,6 @@ def test_frames_of_a_recording_reconstruct_as_the_board_did(tmp_path: Path) -> N
         skin.reconstruct(frame).image.astype(np.float32).tobytes() == image.tobytes()
         for frame, image in zip(frames.voltage_v, images, strict=True)
     )
-    assert export_frames(tmp_path / "run.eits", tmp_path / "out.npz") == FRAMES
-    assert np.array_equal(load_frames(tmp_path / "out.npz").voltage_v, frames.voltage_v)
 
 
 def test_frames_of_a_recording_without_raw_or_quiet_frames(tmp_path: Path) -> None:

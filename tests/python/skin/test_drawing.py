@@ -16,17 +16,17 @@ from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, 
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.drawing import Reading, read_drawing
-from eitskin.skin.example_drawings import (
+from eitskin.skin.outline import Outline
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import Skin, load_skin, skin_from_table, skin_to_table
+from eitskin_studies.experiments.shapes.example_drawings import (
     forearm_corners,
     hand_corners,
     hand_places_mm,
     hand_svg,
-    main,
+    write_drawings,
 )
-from eitskin.skin.outline import Outline
-from eitskin.skin.protocol import adjacent
-from eitskin.skin.rounded import Corner, as_outline
-from eitskin.skin.skin import Skin, load_skin, skin_from_table, skin_to_table
+from eitskin_studies.experiments.shapes.rounded import Corner, as_outline
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" {} >{}</svg>'
@@ -390,7 +390,7 @@ def test_an_absent_library_is_named(
 
 
 def test_examples_are_what_the_script_draws(tmp_path: Path) -> None:
-    main([str(tmp_path)])
+    write_drawings(tmp_path)
     assert (tmp_path / "hand.svg").read_text() == (EXAMPLES / "hand.svg").read_text() == hand_svg()
     drawn, kept = (outline(folder / "forearm.dxf", "skin") for folder in (tmp_path, EXAMPLES))
     np.testing.assert_allclose(drawn.vertices_mm, kept.vertices_mm, atol=1e-9)
@@ -418,7 +418,7 @@ def test_a_model_does_not_need_the_drawing(tmp_path: Path) -> None:
 def test_dxf_bytes_are_the_same_in_two_runs(tmp_path: Path) -> None:
     texts = []
     for _ in range(2):
-        main([str(tmp_path)])
+        write_drawings(tmp_path)
         texts.append((tmp_path / "forearm.dxf").read_bytes())
     assert texts[0] == texts[1]
     assert ezdxf.read(io.StringIO(texts[0].decode())).modelspace()

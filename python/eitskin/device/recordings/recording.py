@@ -222,16 +222,3 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
                 " default)"
             )
         return as_frames(run.quiet, run.frames, protocol, device.board, known, allow_nonfinite=True)
-
-
-def export_frames(path: str | Path, target: str | Path, model: Path | None = None) -> int:
-    """Write the raw frames of the recording ``path`` to ``target`` (.npz); returns how many.
-
-    Raises:
-        as ``frames_of`` and ``save_frames``.
-    """
-    from eitskin.frames.frames import save_frames
-
-    frames = frames_of(path, model)
-    save_frames(target, frames)
-    return frames.n_frames

@@ -10,9 +10,9 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.solve import baselines
-from eitskin.solve.greit import GreitTraining, train_greit
+from eitskin_studies.compare import baselines
 from eitskin_studies.compare.core_method import CoreMethod, core_methods
+from eitskin_studies.compare.greit import GreitTraining, train_greit
 from eitskin_studies.compare.methods import RATIOS, STEPS, STRENGTHS, Family, Method, Setup
 
 FloatArray = npt.NDArray[np.float64]

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.scoring import metrics
-from eitskin.scoring.summary import Summary, summarise
 from eitskin_studies.experiments.algorithms.entrants import Entrant
 from eitskin_studies.experiments.algorithms.measure import (
     Arrays,
@@ -22,6 +21,7 @@ from eitskin_studies.experiments.algorithms.measure import (
     tuning_curves,
 )
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS
+from eitskin_studies.harness.summary import Summary, summarise
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from eitskin.scoring import metrics
-from eitskin.scoring.summary import Summary, summarise
 from eitskin_studies.experiments.algorithms.measure import SNR_DB, TEST, TUNING, Field
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, Result, column
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Table
+from eitskin_studies.harness.summary import Summary, summarise
 
 TOUCHES = ("1 touch", "2 touches", "3 touches")
 SHOWN_AT = (0.1, 0.2, 0.3, 0.5, 0.7)

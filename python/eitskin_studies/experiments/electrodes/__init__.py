@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.scoring.summary import summarise
 from eitskin_studies.experiments.electrodes.measuring import (
     COUNTS,
     PAIR_MM,
@@ -31,6 +30,7 @@ from eitskin_studies.experiments.electrodes.tables import all_tables, is_usual
 from eitskin_studies.experiments.electrodes.tuning import FLOORS, ITERATIONS, LAMBDAS
 from eitskin_studies.experiments.experiment import Desk, Outcome
 from eitskin_studies.experiments.scored import number_text
+from eitskin_studies.harness.summary import summarise
 from eitskin_studies.pictures.electrodes_pictures import Bar, draw_counts, draw_patterns
 
 TITLE = "16, 32 and 64 electrodes and skip patterns, at equal noise and at equal time"

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from eitskin.scoring.snr import BASE_SAMPLES
-from eitskin.scoring.summary import summarise
 from eitskin_studies.experiments.electrodes.measuring import (
     COUNTS,
     PAIR_MM,
@@ -25,6 +24,7 @@ from eitskin_studies.experiments.electrodes.patterns import (
 )
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.scored import hits_mm, number_text, score_text, share_text
+from eitskin_studies.harness.summary import summarise
 
 FOUND = (
     "mu, lambda, iterations, t", "image MIoU (95 %)", "worst tenth", "discs MIoU",

@@ -29,13 +29,8 @@ class Curves:
         """(radii,) of the straight line through the loads, a g."""
         return slopes_of(self.mean)
 
-    @property
-    def centre_share(self) -> float:
-        """The centre's slope over that near the rim."""
-        return float(self.slopes[0] / self.slopes[-1])
-
     def centre_share_band(self) -> tuple[float, float]:
-        """95 % of it over the laws."""
+        """The centre's slope over that near the rim: 95 % of it over the laws."""
         shares = [slopes_of(one)[0] / slopes_of(one)[-1] for one in self.bands]
         low, high = np.nanquantile(shares, [0.025, 0.975])
         return float(low), float(high)

@@ -16,8 +16,8 @@ from eitskin.model.build import BuildSettings, Linearisation, linearise, make_mo
 from eitskin.model.model import Model
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin.solve.baselines import PlainFista
 from eitskin.solve.batch import Batch
+from eitskin_studies.compare.baselines import PlainFista
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS
 from eitskin_studies.harness.sessions import Session
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.scoring.summary import summarise
 from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, Settings, Table
 from eitskin_studies.experiments.homogeneous.cases import INSTRUMENT, QUIET_FRAMES
 from eitskin_studies.experiments.homogeneous.measured import FILE, SOURCE
 from eitskin_studies.experiments.homogeneous.uniformity import Uniformity
+from eitskin_studies.harness.summary import summarise
 
 FloatArray = npt.NDArray[np.float64]
 

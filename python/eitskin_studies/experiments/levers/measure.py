@@ -16,7 +16,6 @@ from eitskin.model.model import Model
 from eitskin.scene.random_touches import Scene, TouchSet, random_touches, spaced_touches
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import match
-from eitskin.scoring.summary import summarise
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.batch import reconstruct_many
@@ -25,6 +24,7 @@ from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk
 from eitskin_studies.experiments.levers.configurations import Lever
 from eitskin_studies.experiments.scored import session_in_parts
 from eitskin_studies.harness.sessions import Session, apparent_change_s_per_m_mm2
+from eitskin_studies.harness.summary import summarise
 
 FloatArray = npt.NDArray[np.float64]
 

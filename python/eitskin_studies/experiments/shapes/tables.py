@@ -10,11 +10,11 @@ import numpy as np
 
 from eitskin.fem.grid import grid_for
 from eitskin.scoring.matching import GATE_MM
-from eitskin.scoring.summary import summarise
-from eitskin.skin.example_drawings import hand_region
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.scored import hits_mm, number_text, score_text, share_text
+from eitskin_studies.experiments.shapes.example_drawings import hand_region
 from eitskin_studies.experiments.shapes.variants import Variant
+from eitskin_studies.harness.summary import summarise
 
 SKINS_HEAD = (
     "shape, electrodes", "area, cm2", "rim, mm", "electrodes' part of it", "touch radii, mm",

@@ -13,17 +13,17 @@ from eitskin.fileio import write_bytes
 from eitskin.scene.random_touches import TouchRules, rim_distance_mm
 from eitskin.skin.drawing import Reading, read_drawing
 from eitskin.skin.electrodes import Electrodes
-from eitskin.skin.example_drawings import (
+from eitskin.skin.outline import Outline
+from eitskin.skin.placement import Placed, by_marks, by_points
+from eitskin.skin.skin import Skin, paper_skin, size_to_paper
+from eitskin_studies.experiments.shapes.example_drawings import (
     hand_pairs_mm,
     hand_region,
     hand_svg,
     rectangle_corners,
     write_forearm_dxf,
 )
-from eitskin.skin.outline import Outline
-from eitskin.skin.placement import Placed, by_marks, by_points
-from eitskin.skin.rounded import as_outline
-from eitskin.skin.skin import Skin, paper_skin, size_to_paper
+from eitskin_studies.experiments.shapes.rounded import as_outline
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -140,7 +140,7 @@ def datum(kind: str, frames_v: FloatArray, reference_v: FloatArray) -> FloatArra
 
 
 class BaselineImager:
-    """A method of ``eitskin.solve.baselines`` on folded data of one kind."""
+    """A method of ``eitskin_studies.compare.baselines`` on folded data of one kind."""
 
     def __init__(self, tank: Tank, kind: str, method: Method) -> None:
         self._kind, self._method = kind, method

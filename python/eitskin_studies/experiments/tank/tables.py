@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.scoring.summary import summarise
 from eitskin_studies.experiments.experiment import Outcome, Settings, Table
 from eitskin_studies.experiments.tank.contest import Grounds
 from eitskin_studies.experiments.tank.imagers import DISCS, KINDS, TUNED_DISCS, Levers
 from eitskin_studies.experiments.tank.levers import one_by_one, words_of
 from eitskin_studies.experiments.tank.tanks import TOUCH_LIKE
+from eitskin_studies.harness.summary import summarise
 
 CHOSEN = "eitskin, image, levers from simulation"
 Found = dict[str, Any]

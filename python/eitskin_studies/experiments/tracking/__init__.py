@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.scoring.summary import summarise
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments.experiment import Desk, Outcome, Table
 from eitskin_studies.experiments.tracking.counted import Count, total
@@ -20,6 +19,7 @@ from eitskin_studies.experiments.tracking.streams import (
     passing_streams,
     random_streams,
 )
+from eitskin_studies.harness.summary import summarise
 
 TITLE = "tracking with birth and death: counts, ids, places and latency of touches in streams"
 SNRS_DB = (40, 50, 60)

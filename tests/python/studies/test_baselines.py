@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eitskin.errors import FrameError, UsageError
-from eitskin.solve import baselines
+from eitskin_studies.compare import baselines
 
 GENERATOR = np.random.default_rng(11)
 J = GENERATOR.normal(size=(20, 35)) @ np.diag(np.geomspace(1, 0.05, 35))

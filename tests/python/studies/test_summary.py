@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eitskin.scoring.summary import bootstrap_interval, summarise
+from eitskin_studies.harness.summary import bootstrap_interval, summarise
 
 
 def test_summary_of_one_to_twenty() -> None:

@@ -2,7 +2,7 @@
 
 The frame is that of a press on the paper's skin; on the right stands the frame with the effect
 minus the frame without it. Parameters are chosen to be seen, and stand above the picture.
-docs/reference/effects/README.md shows all. ``eitskin scene effect-picture NAME -o PNG`` makes one
+docs/reference/effects/README.md shows all. ``eitskin draw effect NAME -o PNG`` makes one
 picture.
 """
 
@@ -25,8 +25,8 @@ from eitskin.scene.description import scene_from_table
 from eitskin.scene.effect import Session
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.streams import stream
-from eitskin.view.effect_sketches import LIGHT, SKETCHES, STRONG
 from eitskin.view.pictures import STYLE, load_matplotlib
+from eitskin_studies.pictures.effect_sketches import LIGHT, SKETCHES, STRONG
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

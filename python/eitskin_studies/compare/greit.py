@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid
-from eitskin.solve.baselines import LinearMethod
+from eitskin_studies.compare.baselines import LinearMethod
 
 FloatArray = npt.NDArray[np.float64]
 

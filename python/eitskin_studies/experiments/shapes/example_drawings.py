@@ -1,24 +1,23 @@
 """The shapes that skins have: a rounded rectangle, a forearm's developed sheet, a hand; and the
 examples' drawings of them.
 
-``python -m eitskin.skin.example_drawings examples`` writes hand.svg and forearm.dxf there.
+``eitskin draw examples -o examples`` writes hand.svg and forearm.dxf there.
 """
 
 from __future__ import annotations
 
 import importlib
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.errors import EitskinError, UsageError, missing_extra
+from eitskin.errors import missing_extra
 from eitskin.fileio import write_beside, write_bytes
 from eitskin.skin.placement import nearest_on_rim
-from eitskin.skin.rounded import Corner, as_outline, as_polyline, as_svg_path
+from eitskin_studies.experiments.shapes.rounded import Corner, as_outline, as_polyline, as_svg_path
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -179,21 +178,7 @@ def write_forearm_dxf(path: Path) -> None:
         ezdxf.options.write_fixed_meta_data_for_testing = before
 
 
-def main(arguments: list[str]) -> None:
-    """Write both drawings into the folder that is named.
-
-    Raises:
-        UsageError: not one folder.
-    """
-    if len(arguments) != 1 or not Path(arguments[0]).is_dir():
-        raise UsageError("name the folder that hand.svg and forearm.dxf are to be written to")
-    folder = Path(arguments[0])
+def write_drawings(folder: Path) -> None:
+    """Write hand.svg and forearm.dxf into ``folder``."""
     write_bytes(folder / "hand.svg", hand_svg().encode("utf-8"))
     write_forearm_dxf(folder / "forearm.dxf")
-
-
-if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except EitskinError as problem:
-        sys.exit(f"eitskin: {problem}")

@@ -14,7 +14,12 @@ from eitskin.errors import UsageError
 from eitskin.fem.cem import Counters, ForwardModel
 from eitskin.fem.grid import grid_for
 from eitskin.model.build import linearise
-from eitskin.skin.example_drawings import (
+from eitskin.skin.protocol import adjacent
+from eitskin_studies.experiments import registry, shapes
+from eitskin_studies.experiments.experiment import Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.scored import share_text
+from eitskin_studies.experiments.shapes import measuring
+from eitskin_studies.experiments.shapes.example_drawings import (
     FINGERS,
     forearm_corners,
     hand_corners,
@@ -22,12 +27,7 @@ from eitskin.skin.example_drawings import (
     main,
     rectangle_corners,
 )
-from eitskin.skin.protocol import adjacent
-from eitskin.skin.rounded import as_outline
-from eitskin_studies.experiments import registry, shapes
-from eitskin_studies.experiments.experiment import Outcome, Settings, desk_in, plain
-from eitskin_studies.experiments.scored import share_text
-from eitskin_studies.experiments.shapes import measuring
+from eitskin_studies.experiments.shapes.rounded import as_outline
 from eitskin_studies.experiments.shapes.variants import Variant, variants
 
 

@@ -20,7 +20,7 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scoring import metrics
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.solve import baselines
+from eitskin_studies.compare import baselines
 from eitskin_studies.compare.methods import Family, FindsTouches, Learns, Setup, baseline_methods
 from eitskin_studies.compare.run import Comparison, Settings, compare, truth_masks
 from eitskin_studies.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text

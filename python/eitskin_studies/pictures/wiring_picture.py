@@ -1,20 +1,19 @@
 """The drawing of docs/guide/hardware.md: board, generator, current source, multiplexers, skin and
 receiver.
 
-Made by ``python -m eitskin.view.wiring_picture docs/pictures/wiring.png``.
+Made by ``eitskin draw wiring -o docs/pictures/wiring.png``.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from eitskin.fileio import write_beside
 from eitskin.view.pictures import ELECTRODE, INK, STYLE, load_matplotlib
-from eitskin.view.wiring import MULTIPLEXERS, WIRES, Wire
+from eitskin_studies.pictures.wiring import MULTIPLEXERS, WIRES, Wire
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -249,7 +248,3 @@ def _receiver(axes: Axes) -> None:
     axes.text(
         BOARD_EDGE + 1, 25.2, f"{wire.zio}\n{wire.pin}", fontsize=SMALL, color=SIGNAL, va="bottom"
     )
-
-
-if __name__ == "__main__":
-    draw_wiring(sys.argv[1])

@@ -68,12 +68,3 @@ def _wires() -> tuple[Wire, ...]:
 
 
 WIRES = _wires()
-
-
-def wire_table() -> str:
-    """The table of docs/guide/hardware.md, as Markdown."""
-    lines = ["| pin | Zio | morpho | firmware | wire to |", "|---|---|---|---|---|"]
-    lines += [
-        f"| {one.pin} | {one.zio} | {one.morpho} | {one.function} | {one.to} |" for one in WIRES
-    ]
-    return "\n".join(lines) + "\n"

@@ -9,8 +9,8 @@ import pytest
 from eitskin.errors import UsageError
 from eitskin.fem.grid import Grid, grid_for
 from eitskin.skin.skin import paper_skin
-from eitskin.solve import baselines
-from eitskin.solve.greit import DISC_RADIUS, train_greit
+from eitskin_studies.compare import baselines
+from eitskin_studies.compare.greit import DISC_RADIUS, train_greit
 
 GRID = grid_for(paper_skin().outline, 16)
 HALF_MM = GRID.nx * GRID.pixel_mm / 2

@@ -8,8 +8,8 @@ import pytest
 
 from eitskin.errors import UsageError
 from eitskin.scene.registry import BUILT_IN
-from eitskin.view.effect_pictures import SHOWN, draw_effect
-from eitskin.view.effect_sketches import SKETCHES
+from eitskin_studies.pictures.effect_pictures import SHOWN, draw_effect
+from eitskin_studies.pictures.effect_sketches import SKETCHES
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

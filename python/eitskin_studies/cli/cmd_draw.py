@@ -1,0 +1,57 @@
+"""``eitskin draw effect | wiring | examples``: what the documentation and the examples show."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from eitskin.errors import UsageError
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add ``draw`` and its own subcommands."""
+    parser = subparsers.add_parser(
+        "draw", help="pictures of the documentation, and the examples' drawings"
+    )
+    what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    effect = what.add_parser("effect", help="what one effect does: its law, and what it adds")
+    effect.add_argument("name", metavar="NAME", help="of the effect (eitskin scene effects)")
+    effect.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
+    effect.set_defaults(run=run_effect)
+    wiring = what.add_parser("wiring", help="the wiring of board, multiplexers and skin")
+    wiring.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
+    wiring.set_defaults(run=run_wiring)
+    examples = what.add_parser("examples", help="hand.svg and forearm.dxf")
+    examples.add_argument("-o", "--output", metavar="FOLDER", type=Path, required=True)
+    examples.set_defaults(run=run_examples)
+
+
+def run_effect(options: argparse.Namespace) -> int:
+    """Draw one effect."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.pictures.effect_pictures import draw_effect
+
+    refuse_unwritable(options.output)
+    draw_effect(options.output, options.name)
+    print(f"picture: {options.output}")
+    return 0
+
+
+def run_wiring(options: argparse.Namespace) -> int:
+    """Draw the wiring."""
+    from eitskin_studies.pictures.wiring_picture import draw_wiring
+
+    draw_wiring(options.output)
+    print(f"picture: {options.output}")
+    return 0
+
+
+def run_examples(options: argparse.Namespace) -> int:
+    """Write both drawings."""
+    from eitskin_studies.experiments.shapes.example_drawings import write_drawings
+
+    if not options.output.is_dir():
+        raise UsageError(f"-o {options.output}: no such folder; make it first")
+    write_drawings(options.output)
+    return 0
