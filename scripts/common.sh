@@ -47,21 +47,42 @@ changed_since() {
         \( -name __pycache__ -prune \) -o -newer "$1" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
 }
 
+# pip_install ARGUMENTS...: pip, with a plain line for each package and for what is compiled.
+pip_install() {
+    {
+        "$venv/bin/python" -m pip install --progress-bar off --disable-pip-version-check "$@" &&
+            touch "$venv/pip-done"
+    } | while read -r word name rest; do
+        case "$word $name $rest" in
+        "Collecting "*) printf '   %s\n' "$name" ;;
+        "Processing "*) printf '   %s\n' "${name##*/}" ;;
+        "Installing build"*started) printf '   tools to build it\n' ;;
+        "Building wheel for"*started) printf '   compiling\n' ;;
+        "Building wheel for"*running...) printf '   still compiling\n' ;;
+        "Installing collected"*) printf '   unpacking all of these\n' ;;
+        esac
+    done
+    rm "$venv/pip-done" 2>/dev/null || {
+        say "pip could not install this; its message stands above"
+        exit 1
+    }
+}
+
 # install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since.
 install_package() {
     stamp=$venv/installed-$(printf '%s' "$1" | tr ',' '-')
     if [ ! -x "$venv/bin/python" ]; then
         find_python
-        say "making a virtual environment"
+        say "making a virtual environment in $venv"
         "$python" -m venv "$venv"
     fi
     if changed_since "$stamp"; then
         find_python
-        say "installing eitskin[$1]"
+        say "installing eitskin[$1]: packages, then compiling the C core; about a minute"
         touch "$stamp.next"
-        "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "$root[$1]"
+        pip_install "$root[$1]"
         case ",$1," in # the studies, which only a checkout has
-        *,test,*) "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "$root/python" ;;
+        *,test,*) pip_install --no-deps "$root/python" ;;
         esac
         mv "$stamp.next" "$stamp"
     fi

@@ -65,13 +65,15 @@ def run(options: argparse.Namespace) -> int:
     if not -20 <= options.snr_db <= 200 or options.seed < 0:
         raise UsageError("demo: --snr-db must be -20 to 200 and --seed at least 0")
     load_matplotlib()
-    demo = run_demo(options.seed, options.snr_db)
+    step = _Steps(3 if options.no_board else 4)
+    demo = run_demo(options.seed, options.snr_db, step)
     if options.frames is not None:
         save_frames(options.frames, demo.frames)
+    step(f"drawing {options.picture}")
     draw_demo(options.picture, demo)
     if not options.json:
         print(f"{to_text(demo)}\npicture: {options.picture}", flush=True)
-    board = None if options.no_board else _board()
+    board = None if options.no_board else _board(step)
     if options.json:
         print(
             json.dumps(
@@ -86,11 +88,24 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _board() -> BoardDemo | None:
+class _Steps:
+    """Say on stderr which step starts, so that nobody waits before a silent terminal."""
+
+    def __init__(self, total: int) -> None:
+        self.total = total
+        self.count = 0
+
+    def __call__(self, text: str) -> None:
+        self.count += 1
+        print(f"{self.count}/{self.total} {text}", file=sys.stderr, flush=True)
+
+
+def _board(step: _Steps) -> BoardDemo | None:
     """The same touches on the emulated board; None, with a word on stderr, where emulator or
     firmware are not installed."""
     from eitskin.demo.demo_board import run_board_demo
 
+    step("the same by the firmware, on an emulated board; ten to thirty seconds")
     try:
         return run_board_demo(BOARD)
     except (MissingExtraError, FileError) as error:

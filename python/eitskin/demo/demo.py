@@ -3,6 +3,7 @@ session."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -51,17 +52,19 @@ class Demo:
         )
 
 
-def run_demo(seed: int, snr_db: float) -> Demo:
+def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
     """Simulate on another, finer mesh with noise and contacts drawn under ``seed``, and reconstruct
-    with the prebuilt model.
+    with the prebuilt model; ``step`` gets a line for each step as it starts.
 
     Raises:
         MissingExtraError: scipy or netgen is not installed.
     """
+    step("simulating three touches: mesh, electrodes, forward model, noise")
     touches = TouchSet("demo", seed, (Scene("demo", TOUCHES),))
     frames = simulate(
         paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=snr_db)
     ).as_frames()
+    step("finding them: C core in float32 and float64, numpy")
     model, blob = load_prebuilt()
     results = {}
     for engine in ENGINES:
