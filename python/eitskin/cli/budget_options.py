@@ -109,7 +109,7 @@ def chosen_point(
             f"--budget and --accuracy: no measured point has this model's rank {model.rank},"
             f" {model.grid.n_pixels} pixels in"
             f" {model.stored.storage}{' and starts warm' if now.warm_start else ''}; make a model"
-            " of one by  eitskin tradeoff recommend -o MODEL.eitm"
+            " of one by  eitskin recommend -o MODEL.eitm"
         )
     return choose(points, wish, "measured point of this model")
 

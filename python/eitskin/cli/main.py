@@ -14,7 +14,7 @@ from eitskin import __version__
 from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
-    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate",
+    "demo", "model", "reconstruct", "import", "doctor", "scene", "calibrate", "recommend",
     "devices", "info", "tare", "stream", "record", "replay", "flash",
 )  # fmt: skip
 ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages; eitskin-studies names its own there

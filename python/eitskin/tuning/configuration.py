@@ -3,12 +3,11 @@ one frozen value."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
-from eitskin.config import check_keys, choice, integer, load_toml, number
+from eitskin.config import check_keys, choice, integer, number
 from eitskin.core.results import ALL_SEARCH, SOLVERS, Options
 from eitskin.errors import ConfigError
 from eitskin.model.model import Defaults
@@ -16,9 +15,14 @@ from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_FLOOR
 from eitskin.model.storage import STORAGES
 from eitskin.scoring.snr import BASE_SAMPLES
 
+if TYPE_CHECKING:
+    from eitskin.model.build import BuildSettings
+    from eitskin.skin.skin import Skin
+
 SCANS = ("full", "reciprocal")
 PERIOD_SAMPLES = 20
 HELD_FRAMES = 4
+ELEMENTS = 3000  # of the mesh that a configuration's model is made on
 
 
 @dataclass(frozen=True)
@@ -153,42 +157,31 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
     return one
 
 
-def load_set(path: str | Path) -> tuple[Configuration, ...]:
-    """The configurations in a TOML file: tables ``[[configuration]]``, and ``[defaults]`` for what
-    they share.
+def build_settings(
+    one: Configuration, skin: Skin, mask_threshold: float | None = None
+) -> BuildSettings:
+    """How the model of a configuration is built; its solver's settings and t become the model's
+    defaults, as far as a model has them: not the gap, a limit of MACs, the warm start and the
+    sweeps."""
+    from eitskin.model.build import BuildSettings, scaled_defaults
 
-    Raises:
-        FileError: it cannot be read.
-        ConfigError: it is no such file, is empty, names something twice, or a value is out of
-            range.
-    """
-    tables = load_toml(path, "set of configurations")
-    check_keys(tables, ("defaults", "configuration"), str(path))
-    shared, listed = tables.get("defaults", {}), tables.get("configuration", [])
-    if (
-        not isinstance(shared, dict)
-        or not isinstance(listed, list)
-        or not all(isinstance(one, dict) for one in listed)
-    ):
-        raise ConfigError(
-            f"{path}: expects one [defaults] table at most and [[configuration]] tables"
-        )
-    return checked_set(
-        [configuration_from({**shared, **one}, f"{path} [[configuration]]") for one in listed],
-        str(path),
+    usual = scaled_defaults(skin, "difference")
+    left_out = ALL_SEARCH & ~one.search
+    defaults = replace(
+        usual,
+        solver=one.solver,
+        iterations=one.iterations,
+        lambda_rel=one.lambda_rel,
+        search_left_out=left_out,
     )
-
-
-def checked_set(configurations: Sequence[Configuration], where: str) -> tuple[Configuration, ...]:
-    """``configurations`` if there are any and no two have one name.
-
-    Raises:
-        ConfigError: otherwise.
-    """
-    names = [one.name for one in configurations]
-    if not names:
-        raise ConfigError(f"{where}: holds no [[configuration]]; add at least one with a name")
-    for name in names:
-        if names.count(name) > 1:
-            raise ConfigError(f"{where}: two configurations are named {name!r}; names must differ")
-    return tuple(configurations)
+    if mask_threshold is not None:
+        defaults = replace(defaults, mask_threshold=mask_threshold)
+    return BuildSettings(
+        rank=one.rank,
+        pixels_across=one.pixels,
+        storage=one.storage,
+        floor=one.floor,
+        column_power=one.column_power,
+        elements=ELEMENTS,
+        defaults=defaults,
+    )

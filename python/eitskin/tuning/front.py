@@ -1,11 +1,11 @@
-"""Measured points, which of them nothing beats, and which to choose for a budget or an accuracy."""
+"""Measured points, and which of them to choose for a budget or an accuracy."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,10 @@ BOARDS = ("f767", "host")
 JUDGED = ("image", "discs")
 DEFAULT_PERIOD_US = 20_800  # of the default scan
 LEAST_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost of the discs
-SHIPPED_SCORES = (
-    "scenes", "image", "discs", "exact_count", "position_mm", "force_error", "solve_macs",
-    "touch_macs", "most_macs",
+MEASURED = ("threshold", "force_scale", "costs", "instructions", "host_us")
+SHORT_CELL = (
+    "image.mean", "image.low", "image.high", "image.worst_tenth", "discs.mean", "exact_count",
+    "solve_macs", "touch_macs", "most_macs",
 )  # fmt: skip
 MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_search"}  # of the solver's settings
 
@@ -139,18 +140,6 @@ class Point:
         )
         return bool(fits) and not unusual(self.configuration) - MODEL_HOLDS - board_takes()
 
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "configuration": self.configuration.as_dict(),
-            "threshold": self.threshold,
-            "force_scale": self.force_scale,
-            "costs": self.costs,
-            "instructions": self.instructions,
-            "host_us": self.host_us,
-            "scores": self.scores,
-        }
-
 
 def unusual(one: Configuration) -> set[str]:
     """The names of the solver's settings in which ``one`` differs from the defaults."""
@@ -183,34 +172,20 @@ class Front:
     points: tuple[Point, ...]
     where_from: str = "the shipped results"
 
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        listed = [one.as_dict() for one in self.points]
-        return {"format": FORMAT, "version": VERSION, "settings": self.settings, "points": listed}
 
-
-def for_package(front: Front) -> Front:
-    """What ships: of the sets beside "random" 60 dB only, of each cell what ``choose`` and its
-    answer need."""
-    kept = []
-    for one in front.points:
-        scores = {
-            name: {
-                snr: {key: _rounded(score[key]) for key in SHIPPED_SCORES}
-                for snr, score in cells.items()
-                if name == "random" or snr == "60"
-            }
-            for name, cells in one.scores.items()
-        }
-        kept.append(replace(one, scores=scores))
-    return Front(front.settings, tuple(kept), front.where_from)
-
-
-def _rounded(value: Any) -> Any:
-    """Numbers to four decimals."""
-    if isinstance(value, dict):
-        return {key: _rounded(one) for key, one in value.items()}
-    return round(value, 4) if isinstance(value, float) else value
+def _cell(cell: Any) -> dict[str, Any]:
+    """The scores of a set at an SNR: as they are, or from the numbers of the shipped results, which
+    are in the order of ``SHORT_CELL``."""
+    if isinstance(cell, dict):
+        return cell
+    scores: dict[str, Any] = {}
+    for name, value in zip(SHORT_CELL, cell, strict=True):
+        group, _, part = name.partition(".")
+        if group in ("image", "discs"):
+            scores.setdefault(group, {})[part] = value
+        else:
+            scores[group] = [value] if group in ("solve_macs", "touch_macs") else value
+    return scores
 
 
 def front_from(values: Any, where: str) -> Front:
@@ -224,20 +199,15 @@ def front_from(values: Any, where: str) -> Front:
             raise KeyError("format")
         points = []
         for one in values["points"]:
-            parts = {
-                name: one[name]
-                for name in (
-                    "threshold",
-                    "force_scale",
-                    "costs",
-                    "instructions",
-                    "host_us",
-                    "scores",
-                )
+            parts = {name: one[name] for name in MEASURED}
+            scores = {
+                name: {snr: _cell(cell) for snr, cell in cells.items()}
+                for name, cells in one["scores"].items()
             }
-            points.append(Point(configuration_from(one["configuration"], where), **parts))
+            configuration = configuration_from(one["configuration"], where)
+            points.append(Point(configuration, **parts, scores=scores))
         return Front(dict(values["settings"]), tuple(points), where)
-    except (KeyError, TypeError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError):
         raise ConfigError(
             f"{where}: no results of  eitskin tradeoff run  of version {VERSION}; run it again"
         ) from None
@@ -265,28 +235,6 @@ def load_front(path: Path | None = None) -> Front:
             " others with  --front"
         ) from None
     return front_from(json.loads(text), "the shipped results")
-
-
-def pareto(
-    points: Sequence[Point],
-    cost: Callable[[Point], float | None],
-    accuracy: Callable[[Point], float | None],
-    least_gain: float = 0.0,
-) -> list[Point]:
-    """Those that no other beats: none that costs no more is as accurate, less ``least_gain``.
-    Cheapest first."""
-    known = [
-        (c, -a, k)
-        for k, p in enumerate(points)
-        if (c := cost(p)) is not None and (a := accuracy(p)) is not None
-    ]
-    best = float("-inf")
-    kept: list[Point] = []
-    for _, negative, k in sorted(known):
-        if -negative > best + (least_gain if kept else 0.0):
-            best = -negative
-            kept.append(points[k])
-    return kept
 
 
 @dataclass(frozen=True)
@@ -382,26 +330,3 @@ def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") ->
         found = f"the best, {best[2].name!r}, has {best[1]:.3f} ({wish.where})"
         raise UsageError(f"no {what} reaches {wish.accuracy:g}{bound}; {found}")
     return min(reached, key=lambda row: (row[0], -row[1]))[2]
-
-
-def estimated_instructions(
-    points: Sequence[Point], one: Configuration, macs: tuple[float, float]
-) -> dict[str, Any] | None:
-    """Instructions from MACs by the counted points of the same storage and solver (their mean
-    instructions a MAC); None if there are none. An estimate, and called so."""
-    same = [
-        p.instructions["mean"] / p.instructions["macs_mean"]
-        for p in points
-        if p.instructions is not None
-        and p.instructions["kind"] == "counted"
-        and (p.configuration.storage, p.configuration.solver) == (one.storage, one.solver)
-    ]
-    if not same:
-        return None
-    ratio = sum(same) / len(same)
-    rounded = {
-        "mean": round(ratio * macs[0]),
-        "most": round(ratio * macs[1]),
-        "instructions_per_mac": round(ratio, 3),
-    }
-    return {"kind": "estimated", **rounded}

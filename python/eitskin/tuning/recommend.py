@@ -3,20 +3,14 @@ options for the rest."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from eitskin.core.results import ALL_SEARCH
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin.tuning.configuration import Configuration
+from eitskin.tuning.configuration import build_settings
 from eitskin.tuning.front import Point, Wish
-
-if TYPE_CHECKING:
-    from eitskin.model.build import BuildSettings
-
-ELEMENTS = 3000
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,34 +138,4 @@ def write_model(path: Path, point: Point, skin: Skin, protocol: Protocol) -> int
     return save_model(
         path,
         build_model(skin, protocol, build_settings(point.configuration, skin, point.threshold)),
-    )
-
-
-def build_settings(
-    one: Configuration, skin: Skin, mask_threshold: float | None = None
-) -> BuildSettings:
-    """How the model of a configuration is built; its solver's settings and t become the model's
-    defaults, as far as a model has
-    them: not the gap, a limit of MACs, the warm start and the sweeps."""
-    from eitskin.model.build import BuildSettings, scaled_defaults
-
-    usual = scaled_defaults(skin, "difference")
-    left_out = ALL_SEARCH & ~one.search
-    defaults = replace(
-        usual,
-        solver=one.solver,
-        iterations=one.iterations,
-        lambda_rel=one.lambda_rel,
-        search_left_out=left_out,
-    )
-    if mask_threshold is not None:
-        defaults = replace(defaults, mask_threshold=mask_threshold)
-    return BuildSettings(
-        rank=one.rank,
-        pixels_across=one.pixels,
-        storage=one.storage,
-        floor=one.floor,
-        column_power=one.column_power,
-        elements=ELEMENTS,
-        defaults=defaults,
     )

@@ -1,24 +1,18 @@
-"""``eitskin tradeoff run | recommend``: what accuracy costs in time, and which point of it to
-take."""
+"""``eitskin tradeoff run``: what accuracy costs in time."""
 
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from eitskin.cli.budget_options import add_wish
 from eitskin.errors import UsageError
-
-if TYPE_CHECKING:
-    from eitskin.tuning.front import Front
 
 
 def add_parser(subparsers: Any) -> None:
     """Add ``tradeoff`` and its own subcommands."""
     parser = subparsers.add_parser(
-        "tradeoff", help="what accuracy costs in time, and what to choose for a budget"
+        "tradeoff", help="measure what accuracy costs in time (recommend chooses from it)"
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     run = actions.add_parser(
@@ -104,84 +98,28 @@ def add_parser(subparsers: Any) -> None:
         help="also write what the package ships of the results",
     )
     run.add_argument(
+        "--recorded", type=Path, metavar="FRONT.json", help="also write what the page shows"
+    )
+    run.add_argument(
         "--page", type=Path, metavar="PAGE.md", help="also put tables and pictures into this page"
     )
     run.add_argument("--no-pictures", action="store_true", help="tables only")
     run.add_argument("--json", action="store_true", help="print the results as JSON")
     run.set_defaults(run=run_run)
-    recommend = actions.add_parser(
-        "recommend",
-        help="the point to take for a budget or an accuracy, and its model",
-        description=(
-            "Choose from measured results: the most accurate point within --budget, or the cheapest"
-            " that reaches --accuracy. The budget holds for solve and touches of the mean frame"
-            " (host: the median), with --worst of the costliest that was counted or timed."
-        ),
-    )
-    add_wish(recommend)
-    recommend.add_argument(
-        "--board", choices=("f767", "host"), default="f767", help="default: %(default)s"
-    )
-    recommend.add_argument(
-        "--front",
-        type=Path,
-        metavar="FRONT.json",
-        help="results of  tradeoff run  (default: those shipped)",
-    )
-    recommend.add_argument(
-        "--scenes",
-        default="random",
-        metavar="SET",
-        help="the set that accuracy is of (default: %(default)s)",
-    )
-    recommend.add_argument(
-        "--snr-db", type=float, default=60.0, metavar="DB", help="default: %(default)g"
-    )
-    recommend.add_argument(
-        "--by",
-        choices=("image", "discs"),
-        default="image",
-        help="whose MIoU (default: %(default)s)",
-    )
-    recommend.add_argument(
-        "--period",
-        metavar="TIME",
-        help="to measure a frame, as 12ms (default: the budget, or 20.8ms)",
-    )
-    recommend.add_argument(
-        "--worst",
-        action="store_true",
-        help="hold the costliest frame to the budget, not the mean one",
-    )
-    recommend.add_argument(
-        "--warm",
-        action="store_true",
-        help="also points that begin each frame from the last's image",
-    )
-    recommend.add_argument(
-        "-o", "--output", type=Path, metavar="MODEL.eitm", help="build and write the model to use"
-    )
-    recommend.add_argument(
-        "--skin",
-        type=Path,
-        metavar="SKIN.toml",
-        help="of the model (default: the paper's 194 mm disk)",
-    )
-    recommend.add_argument("--json", action="store_true")
-    recommend.set_defaults(run=run_recommend)
 
 
 def run_run(options: argparse.Namespace) -> int:
     """Measure, and write tables and pictures."""
     from eitskin.fileio import refuse_unwritable, write_bytes
-    from eitskin.tuning.configuration import load_set
-    from eitskin.tuning.front import Where, for_package
+    from eitskin.tuning.front import Where
     from eitskin_studies.cli.cmd_compare import progress
+    from eitskin_studies.tradeoff.configuration_sets import load_set
     from eitskin_studies.tradeoff.default_set import default_set
+    from eitskin_studies.tradeoff.fronts import as_dict, in_short, kept_cells, to_json
     from eitskin_studies.tradeoff.run import RunSettings, run
-    from eitskin_studies.tradeoff.table import to_csv, to_json, to_text
+    from eitskin_studies.tradeoff.table import to_csv, to_text
 
-    refuse_unwritable(options.front, options.page)
+    refuse_unwritable(options.front, options.recorded, options.page)
     if options.output.exists() and not options.output.is_dir():
         raise UsageError(f"-o {options.output}: this is a file; name a folder")
     configurations = default_set() if options.set is None else load_set(options.set)
@@ -193,9 +131,12 @@ def run_run(options: argparse.Namespace) -> int:
 
         load_matplotlib()
     front = run(configurations, settings, options.output, progress)
-    write_bytes(options.output / "front.json", to_json(front).encode())
+    write_bytes(options.output / "front.json", to_json(as_dict(front)).encode())
+    recorded = kept_cells(front)
+    if options.recorded is not None:
+        write_bytes(options.recorded, to_json(as_dict(recorded)).encode())
     if options.front is not None:
-        write_bytes(options.front, to_json(for_package(front)).encode())
+        write_bytes(options.front, to_json(in_short(recorded)).encode())
     write_bytes(options.output / "table.csv", to_csv(front).encode())
     if not options.no_pictures:
         from eitskin_studies.pictures.tradeoff_pictures import draw_all
@@ -205,8 +146,8 @@ def run_run(options: argparse.Namespace) -> int:
         from eitskin_studies.pictures.tradeoff_pictures import PICTURES
         from eitskin_studies.tradeoff.page import fill_page
 
-        fill_page(options.page, for_package(front), options.output, PICTURES)
-    print(to_json(front) if options.json else to_text(front, Where()))
+        fill_page(options.page, recorded, options.output, PICTURES)
+    print(to_json(as_dict(front)) if options.json else to_text(front, Where()))
     return 0
 
 
@@ -253,49 +194,3 @@ def _named(configurations: Any, name: str) -> Any:
             f"--only: no configuration is named {name.strip()!r}; {nearest(name.strip(), found)}"
         )
     return found[name.strip()]
-
-
-def run_recommend(options: argparse.Namespace) -> int:
-    """Choose, say why, and write the model."""
-    from eitskin.cli.budget_options import read_wish
-    from eitskin.fileio import refuse_unwritable
-    from eitskin.skin.protocol import adjacent
-    from eitskin.skin.skin import load_skin, paper_skin
-    from eitskin.tuning.front import Where, choose, load_front
-    from eitskin.tuning.recommend import Recommendation, write_model
-
-    wish = read_wish(
-        options, options.board, Where(options.scenes, options.snr_db, options.by), options.period
-    )
-    refuse_unwritable(options.output)
-    if options.skin is not None and options.output is None:
-        raise UsageError("--skin is for the model; name its file with  -o MODEL.eitm")
-    skin, protocol = (
-        (paper_skin(), adjacent(16)) if options.skin is None else load_skin(options.skin)
-    )
-    front: Front = load_front(options.front)
-    point = choose(
-        [one for one in front.points if options.warm or not one.configuration.warm_start], wish
-    )
-    chosen = Recommendation(point, wish)
-    facts = chosen.as_dict() | {"front": front.where_from}
-    size = None if options.output is None else write_model(options.output, point, skin, protocol)
-    if options.json:
-        print(
-            json.dumps(
-                facts | {"model": None if options.output is None else str(options.output)}, indent=2
-            )
-        )
-        return 0
-    print(chosen.text())
-    if size is not None:
-        print(
-            f"{options.output}: {size} bytes; its defaults are these settings, as far as a model"
-            " holds them"
-        )
-        if options.skin is not None:
-            print(
-                "the numbers are of the paper's skin; on another one they may differ:  eitskin"
-                " compare --skin  tells"
-            )
-    return 0

@@ -6,7 +6,8 @@ from __future__ import annotations
 from dataclasses import fields, replace
 
 from eitskin.core.results import SOLVERS, Options
-from eitskin.tuning.configuration import Configuration, checked_set
+from eitskin.tuning.configuration import Configuration
+from eitskin_studies.tradeoff.configuration_sets import checked_set
 
 STANDARD = Configuration("standard")
 FINE = Configuration("fine", lambda_rel=0.005, iterations=90)

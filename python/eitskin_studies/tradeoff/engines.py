@@ -18,8 +18,7 @@ from eitskin.scoring import metrics
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.recommend import ELEMENTS, build_settings
+from eitskin.tuning.configuration import ELEMENTS, Configuration, build_settings
 
 
 @dataclass(frozen=True, eq=False)

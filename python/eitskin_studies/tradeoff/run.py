@@ -16,9 +16,8 @@ from eitskin.core.engine import load_core
 from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
-from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.front import Front, Point, estimated_instructions, load_front
-from eitskin.tuning.recommend import ELEMENTS
+from eitskin.tuning.configuration import ELEMENTS, Configuration
+from eitskin.tuning.front import Front, Point
 from eitskin_studies.benchmarks.frame import machine
 from eitskin_studies.harness.sessions import Progress, Session
 from eitskin_studies.harness.store import Store
@@ -26,6 +25,7 @@ from eitskin_studies.tradeoff.accuracy import Solved, Trained, score, solve_sess
 from eitskin_studies.tradeoff.costs import static_costs
 from eitskin_studies.tradeoff.emulation import Emulator, count_instructions, make_emulator
 from eitskin_studies.tradeoff.engines import Built, ModelShop
+from eitskin_studies.tradeoff.fronts import estimated_instructions, recorded_front
 from eitskin_studies.tradeoff.host_times import host_times
 from eitskin_studies.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, Workshop
 
@@ -299,12 +299,12 @@ def _host(
 
 def _estimated(points: Sequence[Point]) -> list[Point]:
     """``points``, where nothing was counted with an estimate from those that were, or from the
-    shipped results."""
+    recorded results."""
     if all(one.instructions is not None for one in points):
         return list(points)
     table = [*points]
     with suppress(FileError, ConfigError):
-        table += load_front().points
+        table += recorded_front().points
     result = []
     for one in points:
         score = one.scores[HEADLINE][f"{HEADLINE_DB:g}"]

@@ -1,14 +1,14 @@
-"""A front as text, CSV and JSON."""
+"""A front as text and CSV."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 from typing import Any
 
-from eitskin.tuning.front import LEAST_SWEEPS, Front, Point, Where, pareto
+from eitskin.tuning.front import LEAST_SWEEPS, Front, Point, Where
+from eitskin_studies.tradeoff.fronts import pareto
 
 LEAST_GAIN = 0.002  # of MIoU: a fifth of the 95 % interval of 180 scenes
 COSTS = ("flash_bytes", "ram_bytes", "pixels_kept", "acquisition_us")
@@ -32,19 +32,6 @@ def best_points(points: Sequence[Point], where: Where) -> list[Point]:
         if not one.configuration.warm_start and one.configuration.touch_sweeps >= LEAST_SWEEPS
     ]
     return pareto(alike, lambda p: x_of(p, where), lambda p: p.accuracy(where), LEAST_GAIN)
-
-
-def to_json(front: Front) -> str:
-    """The whole front, a line a configuration, so that differences can be read."""
-    values = front.as_dict()
-    points = values.pop("points")
-    head = json.dumps(values, indent=1)[:-2]
-    return (
-        head
-        + ',\n "points": [\n'
-        + ",\n".join("  " + json.dumps(one) for one in points)
-        + "\n ]\n}\n"
-    )
 
 
 def to_csv(front: Front) -> str:

@@ -1,4 +1,4 @@
-"""``eitskin tradeoff``, and ``--budget`` and ``--accuracy`` on frames and boards."""
+"""``eitskin recommend``, ``tradeoff``, and ``--budget`` and ``--accuracy`` on frames and boards."""
 
 from __future__ import annotations
 
@@ -52,14 +52,12 @@ def test_run_writes_tables_and_pictures(done: Done, tmp_path: Path) -> None:
     assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     assert len(load_front(tmp_path / "out" / "front.json").points) == 3
     front = tmp_path / "small.json"
-    assert "MIoU" in done(
-        "tradeoff", "recommend", "--front", front, "--budget", "1s", "--board", "host"
-    )
+    assert "MIoU" in done("recommend", "--front", front, "--budget", "1s", "--board", "host")
 
 
 def test_the_recommended_model_is_the_measured_one(done: Done, tmp_path: Path) -> None:
     path = tmp_path / "model.eitm"
-    facts = json.loads(done("tradeoff", "recommend", "--budget", "5ms", "-o", path, "--json"))
+    facts = json.loads(done("recommend", "--budget", "5ms", "-o", path, "--json"))
     assert facts["solve_us"] <= 5000 < facts["frame_us"] == facts["acquisition_us"] == 20_800
     assert facts["options"] == ["--samples 80", "--full"]
     model, _ = load_model(path)
@@ -82,17 +80,15 @@ def test_the_recommended_model_is_the_measured_one(done: Done, tmp_path: Path) -
 
 
 def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:
-    slow = done("tradeoff", "recommend", "--accuracy", "0.88", "--board", "f767")
+    slow = done("recommend", "--accuracy", "0.88", "--board", "f767")
     assert "an estimate" in slow and "frames a second" in slow
-    assert "measuring bounds the rate" in done("tradeoff", "recommend", "--budget", "2ms")
+    assert "measuring bounds the rate" in done("recommend", "--budget", "2ms")
     assert "host: solve and touches median" in done(
-        "tradeoff", "recommend", "--budget", "1ms", "--board", "host"
+        "recommend", "--budget", "1ms", "--board", "host"
     )
-    facts = json.loads(
-        done("tradeoff", "recommend", "--budget", "10ms", "--period", "11ms", "--json")
-    )
+    facts = json.loads(done("recommend", "--budget", "10ms", "--period", "11ms", "--json"))
     assert facts["acquisition_us"] <= 11_000 and facts["configuration"]["scan"] == "reciprocal"
-    discs = json.loads(done("tradeoff", "recommend", "--budget", "10ms", "--by", "discs", "--json"))
+    discs = json.loads(done("recommend", "--budget", "10ms", "--by", "discs", "--json"))
     assert discs["judged"].startswith("discs") and discs["accuracy"] > 0.9
 
 
@@ -108,17 +104,17 @@ def test_recommendations_name_what_bounds_the_rate(done: Done) -> None:
         (2, ["recommend", "--budget", "9ms", "--period", "9kMACs"], "--period"),
         (3, ["recommend", "--budget", "9ms", "--front", "nowhere.json"], "nowhere.json"),
         (3, ["recommend", "--budget", "9ms", "-o", "nowhere/model.eitm"], "does not exist"),
-        (3, ["run", "--set", "nowhere.toml"], "nowhere.toml"),
-        (2, ["run", "--only", "standrad"], "did you mean 'standard'"),
-        (2, ["run", "--snr-db", "60;80"], "--snr-db"),
-        (2, ["run", "--sets", "quads"], "quads"),
-        (2, ["run", "--scenes", "0"], "scenes"),
-        (2, ["run", "--seed", "-1"], "--seed"),
-        (2, ["run", "--elements", "3"], "--elements"),
+        (3, ["tradeoff", "run", "--set", "nowhere.toml"], "nowhere.toml"),
+        (2, ["tradeoff", "run", "--only", "standrad"], "did you mean 'standard'"),
+        (2, ["tradeoff", "run", "--snr-db", "60;80"], "--snr-db"),
+        (2, ["tradeoff", "run", "--sets", "quads"], "quads"),
+        (2, ["tradeoff", "run", "--scenes", "0"], "scenes"),
+        (2, ["tradeoff", "run", "--seed", "-1"], "--seed"),
+        (2, ["tradeoff", "run", "--elements", "3"], "--elements"),
     ],
 )
 def test_refusals(refused: Refused, code: int, arguments: list[str], said: str) -> None:
-    assert said in refused(code, "tradeoff", *arguments)
+    assert said in refused(code, *arguments)
 
 
 def test_reconstruct_within_a_budget(
@@ -168,7 +164,7 @@ def test_a_model_that_nothing_was_measured_with(
 ) -> None:
     path = tmp_path / "odd.eitm"
     done("model", "build", "--paper", "--rank", "33", "--pixels", "12", "-o", path)
-    assert "tradeoff recommend" in refused(
+    assert "eitskin recommend" in refused(
         2, "reconstruct", frames_file, "--model", path, "--accuracy", "0.7"
     )
 

@@ -12,7 +12,8 @@ pytest.importorskip("scipy")
 from eitskin.core.results import SOLVERS
 from eitskin.errors import ConfigError
 from eitskin.model.storage import STORAGES
-from eitskin.tuning.configuration import Configuration, configuration_from, load_set
+from eitskin.tuning.configuration import Configuration, configuration_from
+from eitskin_studies.tradeoff.configuration_sets import load_set
 from eitskin_studies.tradeoff.default_set import KNOBS, SCALE, default_set
 
 
