@@ -34,6 +34,12 @@ def rows(text: str) -> list[list[str]]:
     ]
 
 
+def offsets(text: str) -> list[int]:
+    """The offsets of the byte tables in ``text``."""
+    fields = re.findall(r"^ *(\d+)  (?:u8|u16|u32|u64|i32|f32|char)\b", text, flags=re.M)
+    return [int(offset) for offset in fields]
+
+
 @pytest.mark.parametrize(
     ("title", "struct", "size"),
     [
@@ -50,11 +56,7 @@ def test_offsets_are_the_structs(title: str, struct: str, size: int) -> None:
     assert f"### {title}, {size}" in text
     assert core.ffi.sizeof(struct) == size
     in_c = {info.offset for _, info in core.ffi.typeof(struct).fields}
-    stated = [
-        int(row[0])
-        for row in rows(text)
-        if row[0].isdigit() and re.match(r"(u8|u16|u32|u64|i32|f32|char)", row[1])
-    ]
+    stated = offsets(text)
     beyond = [offset for offset in stated if offset >= size]
     assert set(stated) - set(beyond) <= in_c
     assert len(set(stated)) == len(stated)
