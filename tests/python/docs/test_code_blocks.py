@@ -62,3 +62,13 @@ def test_pages_link_to_files_that_exist() -> None:
                 assert (page.parent / target).exists(), (
                     f"{page.relative_to(ROOT)} links to {target}, which is not there"
                 )
+
+
+def test_paths_that_pages_name_exist() -> None:
+    """Files and folders of the tree, but for those with a placeholder in capitals."""
+    named = re.compile(r"`((?:csrc|python|firmware|tests|scripts|examples|tables)/[\w./-]+)`")
+    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md")]:
+        for path in named.findall(page.read_text(encoding="utf-8")):
+            if not re.search(r"[A-Z]{4}", path):
+                name = page.relative_to(ROOT)
+                assert (ROOT / path).exists(), f"{name} names {path}, which is not there"
