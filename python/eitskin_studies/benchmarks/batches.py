@@ -18,7 +18,7 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.batch import Batch, check_threads
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.benchmarks.frame import golden_session, machine
-from eitskin_studies.harness.sections import markdown_table, text_table
+from eitskin_studies.harness.sections import Filling, text_table
 
 
 @dataclass(frozen=True)
@@ -138,24 +138,10 @@ def as_text(result: BatchTimes) -> str:
     return f"{head}\n{text_table(HEAD, rows(result))}"
 
 
-def as_markdown(result: BatchTimes, command: str) -> str:
-    """The section "Batches"."""
-    return "\n\n".join(
-        [
-            (
-                f"Written by `{command}`: {result.frames} noisy golden frames, image and touches,"
-                f" {result.rounds} rounds in turns, {result.processors} processors;"
-                f" {result.machine}."
-            ),
-            markdown_table(HEAD, rows(result)),
-            (
-                "A batch has a context a thread, and C runs without Python's lock; results, counts"
-                " and ids are those of one frame after another, whatever the number of threads. *C"
-                " alone* is one call a thread with nothing of Python around it: what the machine"
-                " gave in the same minutes. Elapsed times suffer from other work on the machine, so"
-                " the least are compared; processor time suffers little: what a batch takes more"
-                " than C alone is under the lock, turns results into Python objects, and bounds the"
-                " speed-up."
-            ),
-        ]
+def for_page(result: BatchTimes, command: str) -> Filling:
+    """The marks ``batches-run`` and ``batches``."""
+    run = (
+        f"By `{command}`: {result.frames} noisy golden frames, image and touches, {result.rounds}"
+        f" rounds in turns, {result.processors} processors; {result.machine}."
     )
+    return {"batches-run": run}, {"batches": (HEAD, rows(result))}

@@ -36,7 +36,7 @@ from eitskin_studies.harness.emulated import (
     need_tools,
     run_frames,
 )
-from eitskin_studies.harness.sections import markdown_table, text_table
+from eitskin_studies.harness.sections import Filling, Tabular, text_table
 
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
@@ -285,9 +285,8 @@ def _milliseconds(instructions: float) -> str:
 
 
 COST_HEAD = (
-    "storage", "kernels", "start", "solve", "touches", "mean", "worst tenth", "worst", "MACs",
-    "a MAC",
-    "ms at 216 MHz (estimate)", "model, flash", "workspace, RAM",
+    "storage", "kernels", "start", "solve", "touches", "mean", "mean of worst 10 %", "worst",
+    "MACs", "a MAC", "ms at 216 MHz (estimate)", "model, flash", "workspace, RAM",
 )  # fmt: skip
 IMAGE_HEAD = ("image", "code and constants", "statics", "set aside for the stack")
 RATE_HEAD = (
@@ -350,49 +349,18 @@ def as_text(result: BoardCost) -> str:
     return "\n\n".join(parts)
 
 
-def as_markdown(result: BoardCost, command: str) -> str:
-    """The page that ``docs/results/board-cost.md`` is; ``command`` made it."""
+def for_page(result: BoardCost, command: str) -> Filling:
+    """The marks of docs/results/board-cost.md; ``rates`` where the emulated board ran."""
     stack = max(cost.stack_bytes for cost in result.costs if cost.kernels != "portable")
-    f32 = {c.storage: c for c in result.costs if c.kernels != "portable" and not c.warm}
-    ratios = ", ".join(
-        f"{name} {f32[name].mean / f32['f32'].mean:.2f}" for name in STORAGES if name != "f32"
+    run = (
+        f"By `{command}`: the prebuilt model with its default options (working set, 60 iterations,"
+        f" rank 64), {result.scenes} random scenes of seed {result.seed} (1 to 3 touches, 60 dB),"
+        f" {result.compiler}, {result.qemu}. Solve and touches take at most {stack} bytes of stack."
     )
-    parts = [
-        "# What a frame costs on the board",
-        (
-            f"Written by `{command}`. The prebuilt model with its default options (working set, 60"
-            f" iterations, rank 64), {result.scenes} random scenes of the test set of seed"
-            f" {result.seed} (1 to 3 touches, 60 dB), compiled by {result.compiler}."
-        ),
-        "## Instructions, flash and RAM",
-        (
-            f"Counted exactly by {result.qemu} on mps2-an500 (`-icount shift=6`), in millions;"
-            " worst is that of one frame, worst tenth the mean of a tenth of the frames. *M7* is"
-            " `kernels_m7.c`, *plain C* the portable kernels on the same processor: the same bits"
-            " of images and touches. *Warm* starts from the scene before, which has nothing to do"
-            " with it. Milliseconds are an **estimate**: an instruction a cycle at 216 MHz. A"
-            " Cortex-M7 issues up to two a cycle, and waits for flash; no silicon was measured."
-        ),
-        markdown_table(COST_HEAD, cost_rows(result)),
-        (
-            f"Cold, by the M7 kernels, relative to f32: {ratios}. Columns in use are unpacked to"
-            " float once and held in the workspace (64 KiB of it at rank 64, 256 columns), so that"
-            " only the three products a frame with every column convert, and those of a working"
-            f" set that is greater. Solve and touches take at most {stack} bytes of stack."
-        ),
-        "## Firmware",
-        "Bytes of the images. The NUCLEO's workspace is what its SRAM has left.",
-        markdown_table(IMAGE_HEAD, image_rows(result)),
-    ]
+    tables: dict[str, Tabular] = {
+        "cost": (COST_HEAD, cost_rows(result)),
+        "images": (IMAGE_HEAD, image_rows(result)),
+    }
     if result.rates:
-        parts += [
-            "## Frame rate",
-            (
-                f"The unmodified image on the emulated NUCLEO-F767ZI (`{SCENE}`), whose clock takes"
-                " an instruction a cycle: the same estimate. 104 rows are one of each reciprocal"
-                " pair (`--reciprocal 0`). Solve and touches run while the next frame is acquired,"
-                " and include its interrupts: demodulating a burst takes part of each 100 us slot."
-            ),
-            markdown_table(RATE_HEAD, rate_rows(result)),
-        ]
-    return "\n\n".join(parts) + "\n"
+        tables["rates"] = (RATE_HEAD, rate_rows(result))
+    return {"board-run": run}, tables

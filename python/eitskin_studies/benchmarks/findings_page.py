@@ -1,5 +1,4 @@
-"""The results of ``eitskin bench findings`` as text, and as the section "Rates" of
-docs/results/diagnostics.md."""
+"""The results of ``eitskin bench findings`` as text, and for docs/results/diagnostics.md."""
 
 from __future__ import annotations
 
@@ -15,18 +14,18 @@ from eitskin_studies.benchmarks.findings import (
     Rate,
 )
 from eitskin_studies.benchmarks.findings_faults import DETACHED, FAULTS, NONE
-from eitskin_studies.harness.sections import markdown_table, text_table
+from eitskin_studies.harness.sections import Filling, text_table
 
 SNR_WORDS = tuple(f"{snr:g} dB" for snr in SNRS_DB)
 FAULT_HEAD = (
     "fault", *(f"named, {snr}" for snr in SNR_WORDS), *(f"lost, {snr}" for snr in SNR_WORDS),
-    f"worst tenth, {HEADLINE_DB:g} dB", f"lost without findings, {HEADLINE_DB:g} dB",
+    f"mean of worst 10 %, {HEADLINE_DB:g} dB", f"lost without diagnostics, {HEADLINE_DB:g} dB",
 )  # fmt: skip
-DETACHED_HEAD = ("SNR", "named", "whole", "image lost", "worst tenth", "discs lost")
+DETACHED_HEAD = ("SNR", "named", "whole", "image lost", "mean of worst 10 %", "discs lost")
 PEAK_HEAD = ("gain", *SNR_WORDS)
 CROWD_HEAD = (
     "touches",
-    *(f"{snr}: {what}" for snr in SNR_WORDS for what in ("right", "if not said", "if said")),
+    *(f"{snr}: {what}" for snr in SNR_WORDS for what in ("right", "not reported", "reported")),
 )
 IMPERFECT_HEAD = ("front end", "full scans", "half scans")
 
@@ -148,7 +147,7 @@ def false_alarms(result: Findings) -> str:
         "" if other else f" (95 %: fewer than {300 / clean[0].scenes:.1f} %)"
     )
     crowded = ", ".join(f"{_share(one.crowded)} at {one.snr_db:g} dB" for one in clean)
-    return f"False alarms: {said}; and crowded is said about {crowded}."
+    return f"- **False alarms**: {said}; `crowded` is reported of {crowded}."
 
 
 def refused(rates: Sequence[Rate]) -> str:
@@ -176,46 +175,22 @@ def as_text(result: Findings) -> str:
     return "\n\n".join(parts)
 
 
-def as_markdown(result: Findings, command: str) -> str:
-    """The section "Rates"."""
-    clean, frames = result.rate(NONE), result.crowds[0].frames
-    parts = [
-        (
-            f"Written by `{command}`; rules and thresholds were chosen under seeds 77 and 177."
-            f" {clean.scenes} scenes of one to three touches (radius 6 to 12 mm, contrast 3 to 10),"
-            " solved nonlinearly on another mesh than the model's; contacts +-20 %, drawn for each"
-            " scene; the fault at electrode k mod 16 in scene k. SNR is 20 log10(rms(V0) / sigma)"
-            " of white noise on every row, V0 the untouched skin's frame; then a converter of 12"
-            " bits (16 at 80 dB) with 1.25 max|V0| as its range. 16 quiet frames, then one frame,"
-            " cold, with the paper's model and its own options and mask threshold. *Named*: by its"
-            " name in that very frame, electrodes and all; where there is no fault to name, the"
-            " share about which anything but `crowded` was said. *Lost*: mean image MIoU lost"
-            " against the same frame without the fault, noise included; ± is half of the 95 %"
-            " interval of that mean (1.96 standard errors over scenes); *worst tenth*: the mean of"
-            " the worst tenth of the scenes. A frame that is refused counts as an empty image;"
-            f" refused were: {refused(result.rates)}. Glitches and shifts are put on the"
-            " converter's readings, all else on the voltages."
-        ),
-        markdown_table(FAULT_HEAD, fault_rows(result)),
-        false_alarms(result),
-        (
-            "Common modes count as named where they are said to be crowded or stale. A detached"
-            " electrode, at more SNRs:"
-        ),
-        markdown_table(DETACHED_HEAD, detached_rows(result)),
-        "Gains: share of the image's peak lost, beside what the gain itself does to it:",
-        markdown_table(PEAK_HEAD, peak_rows(result)),
-        (
-            f"Crowded: {frames} scenes each of so many touches of radius 9 mm and contrast 5, half"
-            " of them at least 2.5 and half at least 4 radii apart; frames with the right count of"
-            " all, of those not said to be crowded, and of those said to be:"
-        ),
-        markdown_table(CROWD_HEAD, crowd_rows(result)),
-        (
-            "Clean frames about which anything but `crowded` was said, by what their front end"
-            f" does beside noise of {HEADLINE_DB:g} dB (effects of `eitskin scene`, at their"
-            " defaults where no number stands):"
-        ),
-        markdown_table(IMPERFECT_HEAD, imperfect_rows(result)),
-    ]
-    return "\n\n".join(parts)
+def for_page(result: Findings, command: str) -> Filling:
+    """The marks of docs/results/diagnostics.md."""
+    run = (
+        f"By `{command}`; rules and thresholds were chosen under seeds 77 and 177."
+        f" {result.rate(NONE).scenes} scenes of one to three touches (radius 6 to 12 mm, contrast 3"
+        " to 10), solved nonlinearly on another mesh than the model's; contacts +-20 %; the fault"
+        " at electrode k mod 16 in scene k. SNR is 20 log10(rms(V0) / sigma) of white noise, then a"
+        " converter of 12 bits (16 at 80 dB). 16 frames of reference, then one frame, cold, by the"
+        " paper's model with its own options. Frames rejected, which count as empty images:"
+        f" {refused(result.rates)}."
+    )
+    texts = {"run": run, "false-alarms": false_alarms(result)}
+    return texts, {
+        "faults": (FAULT_HEAD, fault_rows(result)),
+        "detached": (DETACHED_HEAD, detached_rows(result)),
+        "peaks": (PEAK_HEAD, peak_rows(result)),
+        "crowds": (CROWD_HEAD, crowd_rows(result)),
+        "imperfect": (IMPERFECT_HEAD, imperfect_rows(result)),
+    }

@@ -31,7 +31,7 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.benchmarks.frame import machine
-from eitskin_studies.harness.sections import markdown_table, text_table
+from eitskin_studies.harness.sections import Filling, text_table
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
@@ -264,25 +264,12 @@ def as_text(result: GrowthTimes) -> str:
     return "\n".join([head, text_table(HEAD, rows(result)), f"exponents: {summary(result)}"])
 
 
-def as_markdown(result: GrowthTimes, command: str, picture: str | None) -> str:
-    """The section "Growth"."""
-    parts = [
-        (
-            f"Written by `{command}`: one thing varied at a time about 16 electrodes, 812 pixels,"
-            " rank 64 and two touches; default options, cold, medians of the thread's time over"
-            f" {result.rounds} rounds in turns, {SCENES} frames each (linear answer, 60 dB);"
-            f" {result.machine}. MACs are exact."
-        ),
-        *(
-            [f"![time and multiply-accumulates of a frame as it grows]({picture})"]
-            if picture
-            else []
-        ),
-        markdown_table(HEAD, rows(result)),
-        (
-            f"Fitted exponents: {summary(result)}. The iterations run on a working set of columns;"
-            " three products a frame take every column; rows enter only where a frame is reduced"
-            " to the rank, and pairs of reciprocal rows as one."
-        ),
-    ]
-    return "\n\n".join(parts)
+def for_page(result: GrowthTimes, command: str) -> Filling:
+    """The marks ``growth-run`` and ``growth``."""
+    run = (
+        f"By `{command}`: one thing varied at a time about 16 electrodes, 812 pixels, rank 64 and"
+        " two touches; default options, cold, medians of the thread's time over"
+        f" {result.rounds} rounds in turns, {SCENES} frames each (linear answer, 60 dB);"
+        f" {result.machine}. MACs are exact. Fitted exponents: {summary(result)}."
+    )
+    return {"growth-run": run}, {"growth": (HEAD, rows(result))}

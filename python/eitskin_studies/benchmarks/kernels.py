@@ -20,7 +20,7 @@ import numpy as np
 from eitskin.errors import UsageError
 from eitskin_studies.benchmarks.frame import machine
 from eitskin_studies.harness.emulated import checkout_root, need_tools
-from eitskin_studies.harness.sections import markdown_table, text_table
+from eitskin_studies.harness.sections import Filling, text_table
 
 WIDTHS = ("f32", "f64")
 PEAKS = ("fma", "chain", "read")
@@ -183,7 +183,10 @@ def judge(width: str, output: str) -> Width:
     return Width(width, kernels, 1 / fma, chain, reads, tuple(judged))
 
 
-HEAD = ("kernel", "storage", "f32: ns", "limit", "times", "f64: ns", "limit", "times")
+HEAD = (
+    "kernel", "storage", "f32: ns", "f32: limit", "f32: times", "f64: ns", "f64: limit",
+    "f64: times",
+)  # fmt: skip
 
 
 def rows(result: KernelTimes) -> list[tuple[str, ...]]:
@@ -229,35 +232,15 @@ def as_text(result: KernelTimes) -> str:
     return "\n".join([head, *map(peaks_text, result.widths), "", text_table(HEAD, rows(result))])
 
 
-def as_markdown(result: KernelTimes, command: str) -> str:
-    """The section "Kernels"."""
-    hot, cold = missed(result, True), missed(result, False)
-    parts = [
-        (
-            f"Written by `{command}`: {result.columns} columns of {result.rank} numbers,"
-            f" {result.widths[0].kernels} kernels, one thread, medians of {result.rounds} rounds in"
-            f" turns; {result.machine}. Peaks, measured in the same rounds:"
-        ),
-        "\n".join(f"- {peaks_text(width)}" for width in result.widths),
-        (
-            "A kernel's limit is the slowest of three: its bytes at the rate at which as many bytes"
-            " are read, its multiply-accumulates at the peak rate, its longest chain of dependent"
-            " ones (the order of each sum is fixed). *times*: time over limit."
-        ),
-        markdown_table(HEAD, rows(result)),
-        "A prepared context, the default on a host, calls the panel products, `mul` on held columns"
-        " (f32 whatever the storage), `dots` (the active set), `dot`, `axpy`, `prox` and `unpack`: "
-        + (
-            "all are within 3 times their limit."
-            if not hot
-            else f"beyond 3 times the limit: {'; '.join(hot)}."
-        ),
-        "The others serve contexts without room for panels. Beyond 3 times their limit: "
-        + (f"{'; '.join(cold)}. " if cold else "none. ")
-        + "`mul_t` has to bring a row of eight columns into one register: 20 shuffles and 16 blends"
-        " for 64 numbers. It takes as long by 16-byte loads into halves, by broadcast loads and"
-        " blends, and by two, three or four groups of eight columns at a time. In double width"
-        " each packed number is converted twice. `dots` sums in another order, needs no such"
-        " rows, and is what the active set calls; the iterations keep `mul_t` for its bits.",
-    ]
-    return "\n\n".join(parts)
+def for_page(result: KernelTimes, command: str) -> Filling:
+    """The marks ``kernels-run`` and ``kernels``."""
+    hot = missed(result, True)
+    peaks = "\n".join(f"- {peaks_text(width)}" for width in result.widths)
+    run = (
+        f"By `{command}`: {result.columns} columns of {result.rank} numbers,"
+        f" {result.widths[0].kernels} kernels, one thread, medians of {result.rounds} rounds in"
+        f" turns; {result.machine}. Peaks, measured in the same rounds:\n\n{peaks}\n\n"
+        f"Of what a prepared context calls, beyond {MOST_TIMES:g} times its limit:"
+        f" {'; '.join(hot) or 'nothing'}."
+    )
+    return {"kernels-run": run}, {"kernels": (HEAD, rows(result))}

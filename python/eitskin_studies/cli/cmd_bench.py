@@ -8,9 +8,12 @@ import json
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from eitskin.errors import UsageError
+
+if TYPE_CHECKING:
+    from eitskin_studies.harness.sections import Filling
 
 
 def add_parser(subparsers: Any) -> None:
@@ -68,13 +71,7 @@ def add_parser(subparsers: Any) -> None:
     board.add_argument(
         "--build", type=Path, metavar="DIR", help="keep the build there, or take up an earlier one"
     )
-    board.add_argument(
-        "--markdown",
-        type=Path,
-        metavar="FILE.md",
-        help="write the page docs/results/board-cost.md is",
-    )
-    board.add_argument("--json", action="store_true")
+    _add_page(board, "board-cost")
     board.set_defaults(run=run_board)
     kernels = what.add_parser(
         "kernels",
@@ -90,7 +87,7 @@ def add_parser(subparsers: Any) -> None:
     )
     kernels.add_argument("--columns", type=int, default=812, help="default: %(default)s")
     kernels.add_argument("--rounds", type=int, default=41, help="default: %(default)s")
-    _add_page(kernels, "Kernels")
+    _add_page(kernels)
     kernels.set_defaults(run=run_kernels)
     growth = what.add_parser(
         "growth", help="a frame's time and MACs against pixels, rows, rank, touches and electrodes"
@@ -103,7 +100,7 @@ def add_parser(subparsers: Any) -> None:
         help="keeps the models (default: beside other temporary files)",
     )
     growth.add_argument("--picture", type=Path, metavar="PNG", help="draw it")
-    _add_page(growth, "Growth")
+    _add_page(growth)
     growth.set_defaults(run=run_growth)
     batches = what.add_parser(
         "batches", help="batches of frames over threads, beside one after another"
@@ -113,7 +110,7 @@ def add_parser(subparsers: Any) -> None:
     batches.add_argument(
         "--threads", type=int, nargs="+", default=[1, 2], metavar="N", help="default: 1 2"
     )
-    _add_page(batches, "Batches")
+    _add_page(batches)
     batches.set_defaults(run=run_batches)
     findings = what.add_parser(
         "findings",
@@ -139,7 +136,7 @@ def add_parser(subparsers: Any) -> None:
     findings.add_argument(
         "--seed", type=int, default=4001, help="of scenes and noise (default: %(default)s)"
     )
-    _add_page(findings, "Rates")
+    _add_page(findings, "diagnostics")
     findings.set_defaults(run=run_findings)
     effects = what.add_parser(
         "effects", help="scenes: the time with no effect, with each alone, with all"
@@ -163,23 +160,27 @@ def add_parser(subparsers: Any) -> None:
     scenes.set_defaults(run=run_scenes)
 
 
-def _add_page(parser: argparse.ArgumentParser, title: str) -> None:
+def _add_page(parser: argparse.ArgumentParser, page: str = "benchmarks") -> None:
     parser.add_argument(
-        "--markdown", type=Path, metavar="FILE.md", help=f'write the section "{title}" of that page'
+        "--page",
+        type=Path,
+        metavar="FILE.md",
+        help=f"fill the marked places of this page, docs/results/{page}.md",
     )
     parser.add_argument("--json", action="store_true")
 
 
-PAGE = "Kernels, growth, batches"
-
-
 def _show(
-    options: argparse.Namespace, title: str, result: Any, text: str, section: str, page: str = PAGE
+    options: argparse.Namespace,
+    result: Any,
+    text: str,
+    filling: Filling,
+    page: str = "benchmarks",
 ) -> int:
-    from eitskin_studies.harness.sections import put_section
+    from eitskin_studies.harness.sections import fill_marks
 
-    if options.markdown is not None:
-        put_section(options.markdown, title, section, page)
+    if options.page is not None:
+        fill_marks(options.page, page, filling)
     print(json.dumps(result.as_dict(), indent=2) if options.json else text)
     return 0
 
@@ -192,19 +193,14 @@ def run_kernels(options: argparse.Namespace) -> int:
     _within("--rank", options.rank, 8, 1024)
     _within("--columns", options.columns, 48, 20_000)
     _within("--rounds", options.rounds, 1, 200)
-    refuse_unwritable(options.markdown)
+    refuse_unwritable(options.page)
     result = bench_kernels.run(options.rank, options.columns, options.rounds)
     command = (
         f"eitskin bench kernels --rank {options.rank} --columns {options.columns} --rounds"
         f" {options.rounds}"
     )
-    return _show(
-        options,
-        "Kernels",
-        result,
-        bench_kernels.as_text(result),
-        bench_kernels.as_markdown(result, command),
-    )
+    filling = bench_kernels.for_page(result, command)
+    return _show(options, result, bench_kernels.as_text(result), filling)
 
 
 def run_growth(options: argparse.Namespace) -> int:
@@ -213,34 +209,19 @@ def run_growth(options: argparse.Namespace) -> int:
     from eitskin_studies.benchmarks import growth as bench_growth
 
     _within("--rounds", options.rounds, 1, 1000)
-    refuse_unwritable(options.markdown, options.picture)
+    refuse_unwritable(options.page, options.picture)
     if options.picture is not None:
         from eitskin.view.pictures import load_matplotlib
 
         load_matplotlib()
     result = bench_growth.run(options.rounds, options.cache, progress=_progress)
-    picture = None
     if options.picture is not None:
         from eitskin_studies.pictures.growth_picture import draw_growth
 
         draw_growth(options.picture, result)
-        beside = options.markdown is not None and options.picture.resolve().is_relative_to(
-            options.markdown.resolve().parent
-        )
-        folder = options.markdown.resolve().parent if beside else Path.cwd()
-        picture = (
-            options.picture.resolve().relative_to(folder).as_posix()
-            if beside
-            else options.picture.as_posix()
-        )
     command = f"eitskin bench growth --rounds {options.rounds}"
-    return _show(
-        options,
-        "Growth",
-        result,
-        bench_growth.as_text(result),
-        bench_growth.as_markdown(result, command, picture),
-    )
+    filling = bench_growth.for_page(result, command)
+    return _show(options, result, bench_growth.as_text(result), filling)
 
 
 def run_batches(options: argparse.Namespace) -> int:
@@ -253,16 +234,11 @@ def run_batches(options: argparse.Namespace) -> int:
     _within("--rounds", options.rounds, 1, 1000)
     for count in options.threads:
         check_threads(count)
-    refuse_unwritable(options.markdown)
+    refuse_unwritable(options.page)
     result = bench_batches.run(options.frames, options.rounds, options.threads)
     command = f"eitskin bench batches --frames {options.frames} --rounds {options.rounds}"
-    return _show(
-        options,
-        "Batches",
-        result,
-        bench_batches.as_text(result),
-        bench_batches.as_markdown(result, command),
-    )
+    filling = bench_batches.for_page(result, command)
+    return _show(options, result, bench_batches.as_text(result), filling)
 
 
 def run_findings(options: argparse.Namespace) -> int:
@@ -275,15 +251,15 @@ def run_findings(options: argparse.Namespace) -> int:
     _within("--crowds", options.crowds, 2, 10_000)
     _within("--imperfect", options.imperfect, 1, 10_000)
     _within("--seed", options.seed, 0, 2**31 - 1)
-    refuse_unwritable(options.markdown)
+    refuse_unwritable(options.page)
     result = bench_findings.run(
         options.seed, options.scenes, options.crowds, options.imperfect, progress=_progress
     )
     sizes = f"--scenes {options.scenes} --crowds {options.crowds} --imperfect {options.imperfect}"
-    section = bench_findings_page.as_markdown(
-        result, f"eitskin bench findings {sizes} --seed {options.seed}"
-    )
-    return _show(options, "Rates", result, bench_findings_page.as_text(result), section, "Findings")
+    command = f"eitskin bench findings {sizes} --seed {options.seed}"
+    filling = bench_findings_page.for_page(result, command)
+    text = bench_findings_page.as_text(result)
+    return _show(options, result, text, filling, "diagnostics")
 
 
 def run_frame(options: argparse.Namespace) -> int:
@@ -333,30 +309,23 @@ def run_jacobian(options: argparse.Namespace) -> int:
 
 def run_board(options: argparse.Namespace) -> int:
     """Count what a frame costs on the emulated board."""
-    from eitskin.fileio import refuse_unwritable, write_bytes
+    from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import board as bench_board
 
     _within("--scenes", options.scenes, 1, 2000)
     _within("--seed", options.seed, 0, 2**31)
     if options.frames:
         _within("--frames", options.frames, 2, 1000)
-    refuse_unwritable(options.markdown)
+    refuse_unwritable(options.page)
     result = bench_board.run(
         options.scenes, options.seed, frames=options.frames, build=options.build, progress=_progress
     )
-    if options.markdown is not None:
-        command = (
-            f"eitskin bench board --scenes {options.scenes} --seed {options.seed} --frames"
-            f" {options.frames} --markdown"
-        )
-        write_bytes(
-            options.markdown,
-            bench_board.as_markdown(result, f"{command} {options.markdown.as_posix()}").encode(
-                "utf-8"
-            ),
-        )
-    print(json.dumps(result.as_dict(), indent=2) if options.json else bench_board.as_text(result))
-    return 0
+    command = (
+        f"eitskin bench board --scenes {options.scenes} --seed {options.seed} --frames"
+        f" {options.frames}"
+    )
+    filling = bench_board.for_page(result, command)
+    return _show(options, result, bench_board.as_text(result), filling, "board-cost")
 
 
 def _within(name: str, value: int, low: int, high: int) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from eitskin.fileio import write_beside, write_bytes
 from eitskin_studies.experiments.experiment import Outcome, Settings, Table
-from eitskin_studies.harness.sections import fill_marks, markdown_table, text_table
+from eitskin_studies.harness.sections import Tabular, fill_marks, text_table
 
 
 def write_all(outcome: Outcome, folder: Path, pictures: bool = True) -> None:
@@ -40,8 +40,9 @@ def write_page(outcome: Outcome, folder: Path, page: Path, name: str, settings: 
         FileError: the page cannot be read or written.
         ConfigError: a mark is missing.
     """
-    marks = {table.name: markdown_table(table.head, table.rows) for table in outcome.tables}
-    fill_marks(page, {**marks, **outcome.words, "command": _command(name, page, settings)})
+    texts = {**outcome.words, "command": _command(name, page, settings)}
+    tables: dict[str, Tabular] = {table.name: (table.head, table.rows) for table in outcome.tables}
+    fill_marks(page, name, (texts, tables))
     target = page.parent / "pictures" / name
     target.mkdir(parents=True, exist_ok=True)
     for picture in outcome.pictures:

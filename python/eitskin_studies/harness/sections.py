@@ -1,46 +1,53 @@
-"""Pages whose tables commands write: a section a command, or the places between marks."""
+"""Pages whose tables commands write, between marks.
+
+A mark is ``<!-- NAME -->``; its place ends at ``<!-- end NAME -->``. ``pages.toml`` says what part
+of a table a page shows.
+"""
 
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, TypeAlias
 
+from eitskin.config import check_keys, load_toml, nearest
 from eitskin.errors import ConfigError
 from eitskin.fileio import read_bytes, write_bytes
 
+WIDTH = 100
 
-def put_section(path: Path, title: str, section: str, heading: str) -> None:
-    """Replace the section "## ``title``" of the page at ``path`` by ``section`` (without its
-    heading), or append it; a page that does not exist begins with ``heading``.
+Tabular: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]
+Filling: TypeAlias = tuple[dict[str, str], dict[str, Tabular]]
 
-    Raises:
-        FileError: it cannot be read or written.
-    """
-    page = read_bytes(path, "page").decode("utf-8") if path.exists() else f"# {heading}\n"
-    whole = f"## {title}\n\n{section.strip()}\n"
-    pattern = re.compile(rf"^## {re.escape(title)}\n.*?(?=^## |\Z)", re.M | re.S)
-    replaced, count = pattern.subn(lambda _: whole + "\n", page)
-    page = replaced if count else f"{page.rstrip()}\n\n{whole}"
-    write_bytes(path, (page.rstrip() + "\n").encode("utf-8"))
+PARTS = Path(__file__).parent / "pages.toml"
+_INTERVAL = re.compile(r" (?:\(-?[\d.]+ to [\d.]+\)|\[-?[\d.]+, [\d.]+\])")
 
 
-def fill_marks(page: Path, texts: Mapping[str, str]) -> None:
-    """Write each text between ``<!-- NAME -->`` and ``<!-- end NAME -->`` of ``page``, so that none
-    is ever copied by hand.
+def fill_marks(page: Path, name: str, filling: Filling) -> None:
+    """Write texts and tables between their marks in ``page``, so that none is ever copied by hand;
+    of the tables what ``pages.toml`` says of the page ``name``.
 
     Raises:
         FileError: the page cannot be read or written.
         ConfigError: a mark is missing; nothing was written.
     """
     text = read_bytes(page, "page").decode("utf-8")
-    for name, content in texts.items():
+    texts, tables = filling
+    parts = load_toml(PARTS, "list of what pages show").get(name, {})
+    contents = {mark: _wrapped(content) for mark, content in texts.items()}
+    for mark, table in tables.items():
+        part = parts.get(mark, {})
+        if part.get("page", True):
+            contents[mark] = markdown_table(*_part(table, part, f"{PARTS.name}: {name}.{mark}"))
+    for mark, content in contents.items():
         marked = re.compile(
-            f"(<!-- {re.escape(name)} -->\n).*?(<!-- end {re.escape(name)} -->)", re.DOTALL
+            f"(<!-- {re.escape(mark)} -->\n).*?(<!-- end {re.escape(mark)} -->)", re.DOTALL
         )
         if not marked.search(text):
             raise ConfigError(
-                f"{page}: has no marks <!-- {name} --> and <!-- end {name} -->; add them where the"
+                f"{page}: has no marks <!-- {mark} --> and <!-- end {mark} -->; add them where the"
                 " text is to be"
             )
         text = marked.sub(
@@ -48,6 +55,43 @@ def fill_marks(page: Path, texts: Mapping[str, str]) -> None:
             text,
         )
     write_bytes(page, text.encode("utf-8"))
+
+
+def _wrapped(text: str) -> str:
+    """Lines of at most ``WIDTH``, code spans whole; further lines of a list's entry stand in."""
+    whole = re.sub("`[^`]*`", lambda code: code[0].replace(" ", "\0"), text)
+    lines = (
+        textwrap.fill(
+            line,
+            WIDTH,
+            subsequent_indent="  " if line.startswith("- ") else "",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for line in whole.split("\n")
+    )
+    return "\n".join(lines).replace("\0", " ")
+
+
+def _part(table: Tabular, part: Mapping[str, Any], where: str) -> Tabular:
+    """Of a table what its page shows."""
+    head, rows = table
+    check_keys(part, ("page", "columns", "rows", "without", "intervals"), where)
+
+    def place(column: str) -> int:
+        if column not in head:
+            raise ConfigError(f"{where}: no column {column!r}; {nearest(column, head)}")
+        return list(head).index(column)
+
+    for key, kept in (("rows", True), ("without", False)):
+        for column, cells in part.get(key, {}).items():
+            at = place(column)
+            rows = [row for row in rows if (row[at] in cells) == kept]
+    columns = [place(one) for one in part.get("columns", head)]
+    shown = [[row[k] for k in columns] for row in rows]
+    if not part.get("intervals", True):
+        shown = [[_INTERVAL.sub("", cell) for cell in row] for row in shown]
+    return [head[k] for k in columns], shown
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

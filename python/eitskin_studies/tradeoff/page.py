@@ -1,5 +1,4 @@
-"""The tables of docs/results/tradeoff.md, written by the command between the page's marks, so that
-they are never copied by hand."""
+"""The tables of docs/results/tradeoff.md, written by the command between the page's marks."""
 
 from __future__ import annotations
 
@@ -9,7 +8,7 @@ from pathlib import Path
 from eitskin.errors import UsageError
 from eitskin.fileio import write_beside
 from eitskin.tuning.front import Budget, Front, Point, Where, Wish, choose
-from eitskin_studies.harness.sections import fill_marks
+from eitskin_studies.harness.sections import Tabular, fill_marks
 from eitskin_studies.tradeoff.table import best_points
 
 PICTURES = "pictures/tradeoff"
@@ -21,55 +20,67 @@ def _share(value: float) -> str:
     return f"{value:.3f}".lstrip("0")
 
 
-def front_table(front: Front) -> str:
+FRONT_HEAD = (
+    "point",
+    "rank, pixels, mu",
+    "iterations, lambda",
+    "image MIoU (95 %)",
+    "mean of worst 10 %",
+    "discs",
+    "exact",
+    "image at 40 / 80 dB",
+    "kMAC",
+    "million instructions, mean / most",
+    "F767 ms, mean / most",
+    "host us",
+    "flash, RAM kB",
+)
+RECOMMENDED_HEAD = (
+    "budget",
+    "point for the mean frame",
+    "image MIoU",
+    "solve, ms, mean / most",
+    "point with --worst",
+    "its MIoU",
+    "at 40 dB (--snr-db 40)",
+    "MIoU at 40 dB",
+)
+
+
+def front_table(front: Front) -> Tabular:
     """The front of images: model, solver, accuracy and cost of each point."""
     where = Where()
-    lines = [
-        (
-            "| point | rank, pixels, mu | iterations, lambda | image MIoU (95 %) | worst tenth |"
-            " discs | exact | image at 40 / 80 dB | kMAC | million instructions, mean / most | F767"
-            " ms, mean / most | host us | flash, RAM kB |"
-        ),
-        "|" + "---|" * 13,
-    ]
+    rows = []
     for point in best_points(front.points, where):
         one, score = point.configuration, point.score(where)
         macs, counted, host = point.macs(where), point.instructions, point.host_us
         assert score is not None and macs is not None
         image = score["image"]
-        at = " / ".join(
-            _share(a) if (a := point.accuracy(Where(snr_db=snr))) is not None else "-"
-            for snr in (40.0, 80.0)
+        at_snr = (point.accuracy(Where(snr_db=snr)) for snr in (40.0, 80.0))
+        both = [] if counted is None else [counted["mean"], counted["most"]]
+        rows.append(
+            (
+                point.name,
+                f"{one.rank}, {one.pixels}, {one.floor:g}",
+                f"{one.iterations}, {one.lambda_rel:g}",
+                f"{_share(image['mean'])} ({_share(image['low'])} to {_share(image['high'])})",
+                _share(image["worst_tenth"]),
+                _share(score["discs"]["mean"]),
+                f"{100 * score['exact_count']:.0f} %",
+                " / ".join("-" if value is None else _share(value) for value in at_snr),
+                f"{macs[0] / 1e3:.0f}",
+                " / ".join(f"{value / 1e6:.2f}" for value in both) or "-",
+                " / ".join(f"{value / 216e3:.1f}" for value in both) or "-",
+                "-" if host is None else f"{host['p50']:.0f}",
+                f"{point.costs['flash_bytes'] / 1e3:.0f}, {point.costs['ram_bytes'] / 1e3:.0f}",
+            )
         )
-        millions = (
-            "-" if counted is None else f"{counted['mean'] / 1e6:.2f} / {counted['most'] / 1e6:.2f}"
-        )
-        ms = (
-            "-"
-            if counted is None
-            else f"{counted['mean'] / 216e3:.1f} / {counted['most'] / 216e3:.1f}"
-        )
-        lines.append(
-            f"| {point.name} | {one.rank}, {one.pixels}, {one.floor:g} | {one.iterations},"
-            f" {one.lambda_rel:g} | {_share(image['mean'])} ({_share(image['low'])} to"
-            f" {_share(image['high'])}) | {_share(image['worst_tenth'])} |"
-            f" {_share(score['discs']['mean'])} | {100 * score['exact_count']:.0f} % | {at} |"
-            f" {macs[0] / 1e3:.0f} | {millions} | {ms} |"
-            f" {'-' if host is None else format(host['p50'], '.0f')} |"
-            f" {point.costs['flash_bytes'] / 1e3:.0f}, {point.costs['ram_bytes'] / 1e3:.0f} |"
-        )
-    return "\n".join(lines)
+    return FRONT_HEAD, rows
 
 
-def recommendation_table(front: Front) -> str:
+def recommendation_table(front: Front) -> Tabular:
     """What ``recommend`` chooses for times on the F767 and the host."""
-    lines = [
-        (
-            "| budget | point for the mean frame | image MIoU | solve, ms, mean / most | point with"
-            " --worst | image MIoU | at 40 dB (--snr-db 40) | image MIoU |"
-        ),
-        "|" + "---|" * 8,
-    ]
+    rows = []
     points = [one for one in front.points if not one.configuration.warm_start]
     for board, budgets in (("f767", F767_MS), ("host", HOST_MS)):
         for ms in budgets:
@@ -79,14 +90,16 @@ def recommendation_table(front: Front) -> str:
                 _chosen(points, one)
                 for one in (wish, Wish(wish.budget, None, board, Where(), worst=True), noisy)
             )
-            cells = [
-                f"{board}, {ms:g} ms",
-                *_cells(mean, Where()),
-                _times(mean, board),
-                *_cells(worst, Where()),
-            ]
-            lines.append("| " + " | ".join([*cells, *_cells(calm, noisy.where)]) + " |")
-    return "\n".join(lines)
+            rows.append(
+                (
+                    f"{board}, {ms:g} ms",
+                    *_cells(mean, Where()),
+                    _times(mean, board),
+                    *_cells(worst, Where()),
+                    *_cells(calm, noisy.where),
+                )
+            )
+    return RECOMMENDED_HEAD, rows
 
 
 def _chosen(points: list[Point], wish: Wish) -> Point | None:
@@ -113,28 +126,25 @@ def conditions(front: Front) -> str:
     how = front.settings
     return (
         f"{len(front.points)} configurations; seed {how.get('seed')}; {how.get('scenes')} test"
-        f" scenes of the set random, {how.get('train_scenes')} training scenes,"
-        f" {how.get('set_scenes')} of each other set; frames from a mesh of about"
-        f" {how.get('simulated_elements')} elements, models from one of about"
-        f" {how.get('model_elements')}. Instructions: {how.get('instructions')}. Host:"
-        f" {how.get('machine')}, {how.get('kernels')} kernels, one thread, medians of"
-        f" {how.get('rounds')} interleaved rounds on a shared virtual machine of two cores: ratios"
-        " hold better than times."
+        f" scenes, {how.get('train_scenes')} training scenes, {how.get('set_scenes')} of each other"
+        f" set; frames from a mesh of about {how.get('simulated_elements')} elements, models from"
+        f" one of about {how.get('model_elements')}. Instructions: {how.get('instructions')}. Host:"
+        f" {how.get('machine')}, {how.get('kernels')} kernels, one thread of a shared virtual"
+        f" machine, medians of {how.get('rounds')} interleaved rounds."
     )
 
 
-TABLES = {"conditions": conditions, "front": front_table, "recommendations": recommendation_table}
-
-
 def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) -> None:
-    """Write each table between ``<!-- NAME -->`` and ``<!-- end NAME -->`` in ``page``; pictures go
+    """Fill the marks ``conditions``, ``front`` and ``recommendations`` of ``page``; pictures go
     into ``PICTURES`` beside it.
 
     Raises:
         FileError: the page cannot be read or written.
         ConfigError: a mark is missing.
     """
-    fill_marks(page, {name: make(front) for name, make in TABLES.items()})
+    tables = {"front": front_table(front), "recommendations": recommendation_table(front)}
+    texts = {"conditions": conditions(front)}
+    fill_marks(page, "tradeoff", (texts, tables))
     folder = page.parent / PICTURES
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:

@@ -24,28 +24,32 @@ UP = "../../"
 
 HEAD = """# Hard cases
 
-What makes an EIT skin's numbers go wrong, and what eitskin promises then. Each case is a test that
-fails where the promise does not hold. Unless the case is about bytes or counters, it runs in
-float32 on the host (vector and plain C kernels) and on an emulated Cortex-M7 (QEMU mps2-an500), and
-all three give the same bits: images, touches and everything that is reported.
+What makes an EIT skin's numbers go wrong, and what eitskin promises then. Each case is a test, to
+which its name links, that fails where the promise does not hold. Unless the case is about bytes or
+counters, it runs in float32 on the host (vector and plain C kernels) and on an emulated Cortex-M7
+(QEMU mps2-an500); all three give the same bits.
 
 `scripts/hard-cases` runs the tests and writes this page and its pictures; `pytest` ends with a line
-a case. *Nearest to its bound* is the quantity that uses up most of what the test allows: measured
-of allowed. The tests derive the bounds from the arithmetic and the problem's condition; 0 of 0
-means that nothing may go wrong at all. Seeds are fixed. *Sound results*: finite, objective,
-residual and duality gap no worse than at zero, and reported as float64 arithmetic finds them. Cases
-of the group physics are simulated at 60 dB and 12 bits on another mesh than the model's.
+a case; `tests/python/hard_cases/cases.toml` names all tests of each. *Nearest to its bound*: what
+uses up most of what the test allows, measured of allowed. Bounds follow from the arithmetic and the
+problem's condition; 0 of 0 means that nothing may go wrong at all. Seeds are fixed. *Sound*:
+finite; objective, residual and gap no worse than at zero, and reported as float64 finds them.
+Touches (physics) are simulated at 60 dB and 12 bits on another mesh than the model's.
 """
 
 TABLE = (
-    "| case | what goes wrong | promise | nearest to its bound | tests |",
-    "|---|---|---|---|---|",
+    "| case | what goes wrong | promise | nearest to its bound |",
+    "|---|---|---|---|",
 )
 
 
 def cell(margin: Margin | None) -> str:
-    """One entry of a table."""
-    return "" if margin is None else margin.text.replace("|", "\\|")
+    """One entry of a table: what was measured of what is allowed; where nothing is allowed, the
+    promise says of what."""
+    if margin is None:
+        return ""
+    text = margin.text if margin.bound > 0 else margin.text.removeprefix(f"{margin.what}: ")
+    return text.replace("|", "\\|")
 
 
 def _worst(case: Case, found: Margins) -> Margin | None:
@@ -59,10 +63,8 @@ def _worst(case: Case, found: Margins) -> Margin | None:
 
 
 def _row(case: Case, found: Margins) -> str:
-    links = " ".join(
-        f"[{Path(file).stem.removeprefix('test_')}]({UP}{file})" for file in case.files
-    )
-    return f"| `{case.id}` | {case.what} | {case.promise} | {cell(_worst(case, found))} | {links} |"
+    name = f"[`{case.id}`]({UP}{case.files[0]})"
+    return f"| {name} | {case.what} | {case.promise} | {cell(_worst(case, found))} |"
 
 
 def page_text(found: Margins) -> str:
@@ -92,7 +94,7 @@ def without_numbers(text: str) -> str:
     """What of the page follows from the catalogue alone."""
     return "\n".join(
         line.replace("\\|", "").replace(f"| {measured(line)} |", "|  |")
-        if line.startswith("| `")
+        if line.startswith("| [`")
         else line
         for line in text.splitlines()
     )

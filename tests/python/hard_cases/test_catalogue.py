@@ -27,7 +27,7 @@ def test_the_page_is_that_of_the_catalogue() -> None:
     """All but the numbers: those come from running it."""
     written = page.PAGE.read_text(encoding="utf-8")
     assert page.without_numbers(written) == page.without_numbers(page.page_text(Margins()))
-    rows = {line.split("`")[1]: line for line in written.splitlines() if line.startswith("| `")}
+    rows = {line.split("`")[1]: line for line in written.splitlines() if line.startswith("| [`")}
     unmeasured = [
         case.id for case in CASES if page.measures(case) and not page.measured(rows[case.id])
     ]

@@ -57,7 +57,7 @@ def test_detached(same_everywhere: SameEverywhere, margins: Margins) -> None:
         unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
         margins.everywhere(
             "frames/detached",
-            "rows left out that should not be, or the other way round",
+            "rows left out wrongly, or not",
             unlike,
             0,
             "rows",
@@ -76,7 +76,7 @@ def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
         unlike = abs(one.info.masked - int(using(*pair(k)).sum()))
         margins.everywhere(
             "frames/bridged",
-            "rows left out that should not be, or the other way round",
+            "rows left out wrongly, or not",
             unlike,
             0,
             "rows",
@@ -113,7 +113,7 @@ def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
         unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
         margins.everywhere(
             "frames/noisy",
-            "rows left out that should not be, or the other way round",
+            "rows left out wrongly, or not",
             unlike,
             0,
             "rows",

@@ -202,6 +202,6 @@ def test_clean_frames_are_left_alone(same_everywhere: SameEverywhere, margins: M
     )
     for (one,), (other,) in zip(looked, blind, strict=True):
         margins.everywhere(
-            "frames/clean", "findings and rows left out", one.info.findings + one.info.masked, 0
+            "frames/clean", "diagnostics and rows left out", one.info.findings + one.info.masked, 0
         )
         assert (one.coefficients == other.coefficients).all() and one.touches == other.touches

@@ -13,6 +13,7 @@ from eitskin_studies.benchmarks import batches as bench_batches
 from eitskin_studies.benchmarks import growth as bench_growth
 from eitskin_studies.pictures.growth_picture import draw_growth
 
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "benchmarks.md"
 POINTS = (
     bench_growth.Point("pixels n", across=10, rank=20),
     bench_growth.Point("pixels n", across=14, rank=20),
@@ -40,12 +41,10 @@ def test_counts_are_exact_and_models_are_kept(tmp_path: Path) -> None:
     assert all(
         p.macs > 3 * p.n_pixels * 20 and p.solve_us > 0 and p.n_rows == 208 for p in first.points
     )
-    page = bench_growth.as_markdown(first, "the command", "p.png")
-    assert (
-        "![" in page
-        and "pixels n: MACs ^" in page
-        and f"{many.macs / 1e3:.0f}" in bench_growth.as_text(first)
-    )
+    texts, tables = bench_growth.for_page(first, "the command")
+    assert "`the command`" in texts["growth-run"] and "pixels n: MACs ^" in texts["growth-run"]
+    assert len(tables["growth"][1]) == 3
+    assert f"{many.macs / 1e3:.0f}" in bench_growth.as_text(first)
     draw_growth(tmp_path / "p.png", first)
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads(json.dumps(first.as_dict()))["points"][0]["macs"] == few.macs
@@ -68,28 +67,13 @@ def test_batches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         0 < s.least_us <= s.us and s.processor_us > 0 for s in result.speeds
     )
     page = tmp_path / "page.md"
-    assert (
-        main(
-            [
-                "bench",
-                "batches",
-                "--frames",
-                "16",
-                "--rounds",
-                "1",
-                "--markdown",
-                str(page),
-                "--json",
-            ]
-        )
-        == 0
-    )
+    page.write_bytes(PAGE.read_bytes())
+    given = ["--frames", "16", "--rounds", "1", "--page", str(page), "--json"]
+    assert main(["bench", "batches", *given]) == 0
     assert json.loads(capsys.readouterr().out)["frames"] == 16
-    head, written = (
-        "# Kernels, growth, batches\n\n## Batches\n\n",
-        "Written by `eitskin bench batches --frames 16",
-    )
-    assert page.read_text().startswith(head + written)
+    written, ours = page.read_text(), PAGE.read_text()
+    assert "By `eitskin bench batches --frames 16 --rounds 1`: 16 noisy" in written
+    assert written.split("<!-- batches-run -->")[0] == ours.split("<!-- batches-run -->")[0]
     for arguments in (
         "batches --threads 0",
         "batches --frames 1",

@@ -1,13 +1,10 @@
-"""``eitskin bench kernels``: limits from what the programs print; sections of pages."""
+"""``eitskin bench kernels``: limits from what the programs print; what its page shows."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import pytest
 
 from eitskin_studies.benchmarks import kernels as bench_kernels
-from eitskin_studies.harness.sections import put_section, text_table
 
 OUTPUT = """kernels avx2
 case fma;-;1000;0;0;0;20,20,20
@@ -37,16 +34,8 @@ def test_the_slowest_of_three_limits() -> None:
     result = bench_kernels.KernelTimes(64, 812, 3, "here", (width, width))
     assert bench_kernels.missed(result, True) == ["mul, 48 columns f32 (f32) 3.0"] * 2
     assert bench_kernels.missed(result, False) == []
-    page = bench_kernels.as_markdown(result, "the command")
-    assert "`the command`" in page and "beyond 3 times the limit: mul, 48" in page
+    texts, tables = bench_kernels.for_page(result, "the command")
+    assert "`the command`" in texts["kernels-run"]
+    assert "beyond 3 times its limit: mul, 48" in texts["kernels-run"]
+    assert len(tables["kernels"][1]) == 3
     assert "1.25" in bench_kernels.as_text(result)
-
-
-def test_sections_are_replaced(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    for title, text in (("One", "first\n"), ("Two", "second"), ("One", "third \\1")):
-        put_section(page, title, text, "Heading")
-    assert page.read_text() == "# Heading\n\n## One\n\nthird \\1\n\n## Two\n\nsecond\n"
-    put_section(page, "Two", "fourth", "Other")
-    assert page.read_text() == "# Heading\n\n## One\n\nthird \\1\n\n## Two\n\nfourth\n"
-    assert text_table(("a", "bb"), [("ccc", "d")]) == "a    bb\nccc   d"

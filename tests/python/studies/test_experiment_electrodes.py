@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from study_pages import fills_its_page
 
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
@@ -126,6 +127,7 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     for name, draw in first.pictures.items():
         draw(tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    fills_its_page(first, "electrodes", tmp_path)
 
 
 def test_scenes_are_solved_once_for_every_pattern(

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from study_pages import fills_its_page
 
 from eitskin.core.results import ALL_SEARCH
 from eitskin_studies.experiments import levers
@@ -78,3 +79,4 @@ def test_pictures_are_drawn(done: tuple[Path, Outcome], tmp_path: Path) -> None:
     for name, draw in done[1].pictures.items():
         draw(tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    fills_its_page(done[1], "levers", tmp_path)

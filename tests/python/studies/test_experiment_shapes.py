@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from study_pages import fills_its_page
 
 from eitskin.errors import UsageError
 from eitskin.fem.cem import Counters, ForwardModel
@@ -65,6 +66,7 @@ def test_a_run_and_one_that_goes_on(
     assert (again.tables, again.data) == (first.tables, first.data)
     first.pictures["shapes.png"](tmp_path / "shapes.png")
     assert (tmp_path / "shapes.png").read_bytes().startswith(b"\x89PNG")
+    fills_its_page(first, "shapes", tmp_path)
 
 
 def test_sets_depend_on_the_seed_only(known: dict[str, Variant], tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import fills_its_page
 
 from eitskin.cli.main import main
 from eitskin.errors import UsageError
@@ -218,6 +219,7 @@ def test_pictures_are_drawn(outcome: tuple[Desk, Outcome], tmp_path: Path) -> No
     ):  # all frames: the same function as touch-like ones, in half a minute
         outcome[1].pictures[name](tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    fills_its_page(outcome[1], "tank", tmp_path)
 
 
 def test_measured_frames_as_they_are_said_to_be(shared_data: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import fills_its_page
 
 from eitskin.core.results import Touch
 from eitskin.errors import UsageError
@@ -44,6 +45,7 @@ def test_the_whole_and_again(desk: Desk, monkeypatch: pytest.MonkeyPatch, tmp_pa
     for name, draw in outcome.pictures.items():
         draw(tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    fills_its_page(outcome, "tracking", tmp_path)
     monkeypatch.setattr(
         measured, "simulate_frames", lambda compiled: pytest.fail("simulated again")
     )

@@ -39,13 +39,12 @@ GRIDS = (32, 40)
 TRIES = len(FLOORS) * len(LAMBDAS) * len(ITERATIONS)
 SAID = (
     "Seed {seed}: {random} scenes of 1 to 3 random touches, {six} of six touches of radius 9 mm at"
-    " least 36 mm apart, {pairs} pairs of radius 9 mm at each distance. For each row of a table mu,"
-    " lambda and iterations are those of {tries} settings that do best, by the sum of image MIoU,"
-    " disc MIoU and exact count, and t the best by image MIoU, on scenes of seed {tuning_seed},"
-    " {tuning} of 1 to 3 touches and {tuning_six} of six. Noise: sigma = {sigma:.3g} V in a row of"
-    " 80 samples, {snr:g} dB below rms(V0) of 16 electrodes scanned adjacently, the same for every"
-    " pattern; no converter, for its range would be another choice a pattern. Contacts spread by 20"
-    " %; frames from meshes of about 11,000 elements, models from others of about 6,000."
+    " least 36 mm apart, {pairs} pairs of radius 9 mm at each distance. For each row mu, lambda and"
+    " iterations are the best of {tries} settings, by image MIoU + disc MIoU + exact count, and t"
+    " the best by image MIoU, on scenes of seed {tuning_seed} ({tuning} of 1 to 3 touches,"
+    " {tuning_six} of six). Noise: sigma = {sigma:.3g} V in a row of 80 samples, {snr:g} dB below"
+    " rms(V0) of 16 adjacent electrodes, the same for every pattern; no converter. Contacts spread"
+    " by 20 %; frames from meshes of about 11,000 elements, models from others of about 6,000."
 )
 
 

@@ -27,10 +27,10 @@ from eitskin_studies.experiments.scored import hits_mm, number_text, score_text,
 from eitskin_studies.harness.summary import summarise
 
 FOUND = (
-    "mu, lambda, iterations, t", "image MIoU (95 %)", "worst tenth", "discs MIoU",
+    "mu, lambda, iterations, t", "image MIoU (95 %)", "mean of worst 10 %", "discs MIoU",
     "exact, 1 to 3 (95 %)",
     "exact, six apart (95 %)", "false a scene of six", "position, median / p95, mm",
-    "pairs told apart from, mm", "kMAC, mean / most",
+    "pairs resolved from, mm", "kMAC, mean / most",
 )  # fmt: skip
 NOISE_HEAD = (
     "electrodes, pattern",

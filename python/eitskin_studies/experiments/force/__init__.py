@@ -129,13 +129,12 @@ def _sets(
     touch: anywhere.Anywhere,
 ) -> str:
     def of(one: PressSet) -> str:
-        return (
-            f"{len(set(map(tuple, one.place_mm.tolist())))} places (`{one.session.touches.name}`)"
-        )
+        return f"{len(set(map(tuple, one.place_mm.tolist())))} places"
 
+    seed, tuning_seed = desk.settings.seed, desk.settings.tuning_seed
     return (
-        f"Sets of seed {desk.settings.seed}: calibrated on {of(tuned)}, reported on {of(reported)},"
-        f" each with five loads; {len(laws) - 1} laws beside the nominal one; {reps} frames of each"
-        f" light press. The law that was chosen for the touch at {AVERAGED_DB:g} dB is"
+        f"Calibrated on {of(tuned)} of seed {tuning_seed}, reported on {of(reported)} of seed"
+        f" {seed}, each with five weights; {len(laws) - 1} laws beside the nominal one; {reps}"
+        f" frames of each light press. The law chosen for the touch at {AVERAGED_DB:g} dB is"
         f" *{touch.form}*, its gain of order {touch.order}."
     )

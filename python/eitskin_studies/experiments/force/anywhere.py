@@ -125,7 +125,7 @@ def table_of(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, f
 
 
 def by_load(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, float]) -> Table:
-    """The touch's calibrated load, weight by weight: scatter, bias, worst tenth."""
+    """The touch's calibrated load, weight by weight: scatter, bias, mean of worst 10 %."""
     rows = []
     for name in (TOUCH, LOG_TOUCH):
         for snr in snrs_db:
@@ -141,7 +141,7 @@ def by_load(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, fl
                 rows.append((name, f"{snr:g} dB", f"{grams:g} g", *cells))
     return Table(
         "by-load",
-        ("reading", "SNR", "load", "deviation over places", "off on average", "worst tenth"),
+        ("reading", "SNR", "weight", "deviation over places", "bias", "mean of worst 10 %"),
         tuple(rows),
     )
 

@@ -157,7 +157,7 @@ def table_of(found: list[Detection]) -> Table:
         "SNR",
         "centre",
         *(f"{share:g} R" for share in RADIUS_SHARES[1:]),
-        "false alarms, quiet frames",
+        "false alarms",
         "at most, 95 %",
     )
     return Table("detection", head, tuple(rows))

@@ -88,7 +88,7 @@ CASES = (
         for s in (0.01, 0.05)
     ),
     *(
-        Case(f"sheet uneven by {100 * s:g} % (sd)", USUAL | {"background": {"spread": s}})
+        Case(f"gel uneven by {100 * s:g} % (sd)", USUAL | {"background": {"spread": s}})
         for s in (0.05, 0.2)
     ),
     Case("crosstalk of -40 dB", USUAL | {"crosstalk": {"coupling_db": -40.0}}),

@@ -22,7 +22,7 @@ MEASURES = ("spread", "worst", "reciprocity", "mirror")
 HEAD = (
     "what is uneven",
     "spread over drives",
-    "worst position",
+    "largest at a position",
     "reciprocity",
     "mirror",
     "sessions",
@@ -94,8 +94,8 @@ def words(rows: Sequence[Row], settings: Settings, sessions: int, measured: bool
     conditions = (
         f"{sessions} sessions a case (one without any effect), seeds {seed} to"
         f" {seed + sessions - 1}, each with contacts, places, gains and noise of its own; the mean"
-        f" of {QUIET_FRAMES} quiet frames; about {SIMULATED_ELEMENTS:,} elements. Percent; mean [95"
-        " % bootstrap interval] over sessions. From the third row on: what the second has, and the"
+        f" of {QUIET_FRAMES} frames; about {SIMULATED_ELEMENTS:,} elements. Percent; mean [95"
+        " % bootstrap interval] over sessions. From the third case on: what the second has, and the"
         " one thing named."
     )
     reading = (
@@ -105,8 +105,8 @@ def words(rows: Sequence[Row], settings: Settings, sessions: int, measured: bool
         " instrument."
     )
     tank = (
-        f"The measured frame, `{FILE}` in the folder of `--data`, is the saline reference of"
-        f" {SOURCE}: one frame, so the doctor can tell nothing about its noise."
+        f"`{FILE}` in the folder of `--data` is the saline reference of {SOURCE}: one frame, so its"
+        " noise is unknown."
         if measured
         else f"The measured tank was left out: run with `--data FOLDER`, a folder with `{FILE}`."
     )
@@ -147,7 +147,5 @@ def _doctors_numbers(row: Row) -> str:
         ("snr_db", "{:.1f} dB"),
     ):
         values = [one[key] for one in row.measured if one.get(key) is not None]
-        told.append(
-            form.format(float(np.median(values))).replace("%", " %") if values else "not told"
-        )
+        told.append(form.format(float(np.median(values))).replace("%", " %") if values else "-")
     return ", ".join(told)

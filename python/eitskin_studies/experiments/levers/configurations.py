@@ -29,11 +29,11 @@ def _searching(name: str, bits: int, **options: Any) -> Lever:
 
 SEARCHES = (
     _searching("peaks alone", 0),
-    _searching("straight data first", STRAIGHT),
-    _searching("coupling", COUPLED),
-    _searching("straight, regrouping", STRAIGHT | REGROUP),
-    _searching("straight, coupling", STRAIGHT | COUPLED),
-    _searching("regrouping, coupling", REGROUP | COUPLED),
+    _searching("log data first", STRAIGHT),
+    _searching("interaction", COUPLED),
+    _searching("log data, split and merge", STRAIGHT | REGROUP),
+    _searching("log data, interaction", STRAIGHT | COUPLED),
+    _searching("split and merge, interaction", REGROUP | COUPLED),
     _searching("all (the default)", ALL_SEARCH),
     _searching("all, 12 sweeps", ALL_SEARCH, touch_sweeps=12),
     Lever("log-ratio model", BuildSettings(data_kind="log-ratio")),

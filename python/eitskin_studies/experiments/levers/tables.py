@@ -39,7 +39,7 @@ def _exact(values: list[int]) -> str:
 def search_table(searches: Found) -> Table:
     """Every search on every set."""
     counted = (f"exact, {name}" for name in COUNTED)
-    head = ("search", *counted, "discs, random 60 dB (95 %)", "worst tenth",
+    head = ("search", *counted, "discs, random 60 dB (95 %)", "mean of worst 10 %",
         "position, median / p95, mm",
             "strength, sd", "left, median", "kMAC of the touches, random / 8")  # fmt: skip
     rows = []
@@ -64,7 +64,7 @@ def image_table(images: Found) -> Table:
         "image",
         "t",
         *(f"MIoU, {snr:g} dB (95 %)" for snr in IMAGE_SNRS_DB),
-        "worst tenth, 60 dB",
+        "mean of worst 10 %, 60 dB",
         "kMAC, 60 dB",
     )
     rows = [
@@ -103,9 +103,9 @@ def conditions(settings: Settings) -> str:
     return (
         f"Seed {settings.seed}: {settings.count(SCENES)} scenes of 1 to 3 random touches (radius 6"
         f" to 12 mm, contrast 3 to 10), and {settings.count(60)} of each other set (radius 9 mm,"
-        f" contrast 5); t was chosen on {settings.count(TUNING)} scenes of seed"
+        f" contrast 5); t chosen on {settings.count(TUNING)} scenes of seed"
         f" {settings.tuning_seed} at 60 dB, for each row, and kept. Frames from a mesh of about"
         f" {SIMULATED_ELEMENTS} elements with contacts +-20 %, models from one of about"
         f" {MODEL_ELEMENTS}; 12 bits, 16 from 70 dB on. Brackets: 95 % intervals, Wilson's for"
-        " shares, bootstrap for means."
+        " fractions, bootstrap for means."
     )

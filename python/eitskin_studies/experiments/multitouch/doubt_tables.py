@@ -21,9 +21,9 @@ from eitskin_studies.experiments.multitouch.measure import Doubts
 from eitskin_studies.experiments.multitouch.tables import NAMES, percent
 
 HEAD = (
-    "count right where not said", "exact where not said", "not said", "count right where said",
-    "exact where said",
-    "wrong counts that are said",
+    "count right, not reported", "exact, not reported", "not reported", "count right, reported",
+    "exact, reported",
+    "wrong counts reported",
 )  # fmt: skip
 
 
@@ -67,7 +67,7 @@ def rule_table(doubts: Doubts) -> Table:
     """The score's coefficients, as the core could take them."""
     rule = doubts.rule
     rows = [(text, f"{weight:.4g}") for text, weight in zip(FEATURES, rule.weights, strict=True)]
-    rows += [("offset", f"{rule.offset:.4g}"), ("said below a score of", f"{rule.bar:.3f}")]
+    rows += [("offset", f"{rule.offset:.4g}"), ("reported below a score of", f"{rule.bar:.3f}")]
     return Table("rule", ("feature", "coefficient"), tuple(rows))
 
 

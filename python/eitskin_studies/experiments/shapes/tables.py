@@ -19,12 +19,12 @@ from eitskin_studies.harness.summary import summarise
 SKINS_HEAD = (
     "shape, electrodes", "area, cm2", "rim, mm", "electrodes' part of it", "touch radii, mm",
     "rank, pixels of mm", "rms(V0), mV",
-    "sensitivity over the greatest: median, worst tenth",
+    "sensitivity over the greatest: median, lowest 10 %",
 )  # fmt: skip
 FOUND_HEAD = (
-    "shape, electrodes", "t", "image MIoU (95 %)", "worst tenth", "perfect image", "discs MIoU",
-    "exact count (95 %)",
-    "false a scene", "position, median / p95, mm", "of the size", "kMAC, mean / most",
+    "shape, electrodes", "t", "image MIoU (95 %)", "mean of worst 10 %", "perfect image",
+    "discs MIoU", "exact count (95 %)", "false a scene",
+    "position, median / p95, mm", "of the size", "kMAC, mean / most",
 )  # fmt: skip
 LOST_HEAD = (
     "shape, electrodes", "where", "touches", "found (95 %)", "noticed", "position, median, mm",

@@ -1,4 +1,4 @@
-"""What following touches in time is worth: births confirmed, ids held, places smoothed; on streams
+"""What following touches in time is worth: starts confirmed, ids held, places smoothed; on streams
 of moving fingers."""
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ SPEEDS_MM_S = (0, 50, 200)
 STREAMS, TUNING_STREAMS, PASSING = 16, 10, 12
 COUNT_HEAD = (
     "exact count, % (95 %)",
-    "worst tenth",
+    "mean of worst 10 %",
     "false a frame",
     "missed a frame",
     "MOTA, %",
     "id switches a finger",
 )
-PLACE_HEAD = ("median mm", "p95 mm", "born, frames late", "gone, frames late")
+PLACE_HEAD = ("median mm", "p95 mm", "reported, frames late", "ended, frames late")
 
 Counts = Mapping[tuple[int, int, str], list[Count]]
 

@@ -43,12 +43,12 @@ def ways(model: Model) -> tuple[Way, ...]:
     low = replace(off, gate_factor=whole.gate_factor)
     return (
         Way("off", off),
-        Way("births confirmed", replace(off, track_confirm=whole.track_confirm)),
+        Way("starts confirmed", replace(off, track_confirm=whole.track_confirm)),
         Way("ids held", replace(off, track_hold=whole.track_hold)),
         Way("places smoothed", replace(off, track_smooth=whole.track_smooth)),
-        Way("lower gate alone", low),
-        Way("lower gate, births confirmed", replace(low, track_confirm=whole.track_confirm)),
-        Way("all, gate as it was", replace(whole, gate_factor=off.gate_factor)),
+        Way("lower threshold alone", low),
+        Way("lower threshold, starts confirmed", replace(low, track_confirm=whole.track_confirm)),
+        Way("all, usual threshold", replace(whole, gate_factor=off.gate_factor)),
         Way("all", whole),
     )
 
@@ -66,7 +66,7 @@ def choices(model: Model) -> tuple[Way, ...]:
             for pixels in (0.0, 0.33, 1.32)
         ),
         *(
-            Way(f"gate {share:g}", replace(whole, gate_factor=share * gate))
+            Way(f"threshold {share:g}", replace(whole, gate_factor=share * gate))
             for share in (1.0, 0.87, 0.6)
         ),
     )
