@@ -1,5 +1,5 @@
-"""Write the C source of one cffi module: ``build_cffi.py MODULE float|double OUTPUT.c``. Called by
-CMake."""
+"""Write the C source of one cffi module: ``build_cffi.py MODULE CDEF HEADER OUTPUT.c [TYPE NAME]``,
+with ``typedef TYPE NAME`` before what the file CDEF declares. Called by CMake."""
 
 import sys
 from pathlib import Path
@@ -7,11 +7,12 @@ from pathlib import Path
 import cffi
 
 
-def main(module: str, width: str, output: str) -> None:
-    cdef = (Path(__file__).parent / "eitskin" / "core" / "core.cdef").read_text(encoding="utf-8")
+def main(module: str, cdef: str, header: str, output: str, *typedef: str) -> None:
     ffi = cffi.FFI()
-    ffi.cdef(f"typedef {width} eits_real;\n" + cdef)
-    ffi.set_source(module, '#include "eitskin/eitskin.h"', py_limited_api=True)
+    if typedef:
+        ffi.cdef(f"typedef {' '.join(typedef)};")
+    ffi.cdef(Path(cdef).read_text(encoding="utf-8"))
+    ffi.set_source(module, f'#include "{header}"', py_limited_api=True)
     ffi.emit_c_code(output)
 
 

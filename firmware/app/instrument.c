@@ -132,6 +132,7 @@ void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
     memset(instrument, 0, sizeof *instrument);
     instrument->board = board;
     instrument->settings = (fw_scan_settings)FW_SCAN_DEFAULT;
+    instrument->settings.frame_period_us = board->frame_period_us;
     fw_outbox_init(&instrument->outbox, board->link);
     fw_faults_init(&instrument->faults, &instrument->outbox);
     fw_ad9833_init(&instrument->generator, board->generator);

@@ -42,7 +42,7 @@ def load_core(width: str) -> Any:
         ) from None
 
 
-def _aligned(size: int) -> npt.NDArray[np.uint8]:
+def aligned(size: int) -> npt.NDArray[np.uint8]:
     """``size`` zeroed bytes that start at a 64-byte boundary."""
     whole = np.zeros(size + 64, dtype=np.uint8)
     start = -whole.ctypes.data % 64
@@ -64,7 +64,7 @@ class CoreEngine:
         module = load_core(width)
         self._lib, self._ffi = module.lib, module.ffi
         self.dtype = np.dtype(np.float32 if width == "float32" else np.float64)
-        self._blob = _aligned(len(blob))
+        self._blob = aligned(len(blob))
         self._blob[:] = np.frombuffer(blob, dtype=np.uint8)
         self._model = self._ffi.new("eits_model *")
         self._check(
@@ -73,7 +73,7 @@ class CoreEngine:
             ModelError,
         )
         self.workspace_bytes = int(self._lib.eits_workspace_size(self._model, int(prepared)))
-        self._workspace = _aligned(self.workspace_bytes)
+        self._workspace = aligned(self.workspace_bytes)
         self._context = self._ffi.new("eits_context *")
         status = self._lib.eits_init(
             self._context, self._model, self._ffi.from_buffer(self._workspace), self.workspace_bytes

@@ -180,15 +180,15 @@ def take_reference(device: Device, frames: int, *, streamed: bool = False) -> No
 
 
 def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
-    """Let what is to be touched begin, on a simulated or emulated board, and the scan under way
-    end, which still shows the untouched skin. Returns the board's clock at the scene's time 0 (None
-    for others), and news that came meanwhile.
+    """Let what is to be touched begin, on a simulated or emulated board, and an emulated one's scan
+    under way end, which still shows the untouched skin. Returns the emulated board's clock at the
+    scene's time 0 (None: it is when the next scan begins), and news that came meanwhile.
     """
     transport, news = device.transport, []
     device.start_scene()
-    board = getattr(transport, "board", None)
     if not transport.url.startswith("emu:"):
-        return (int(board.time_us) if board is not None else None), []
+        return None, []
+    board = getattr(transport, "board", None)
     began = int(board.timers[CLOCK_TIMER].read(TIMER_COUNT, 4)) if board is not None else None
     info = device.board
     while (

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from eitskin.config import nearest
 from eitskin.device.check import check_model
@@ -14,9 +13,6 @@ from eitskin.device.link import Reconnect
 from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
 from eitskin.device.transport import Transport
 from eitskin.errors import UsageError
-
-if TYPE_CHECKING:
-    from eitskin.scene.description import Scene
 
 SCHEMES = ("auto", "serial", "sim", "emu", "file")
 MOST_BAUD = 20_000_000
@@ -79,7 +75,7 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
     if scheme == "serial":
         return SerialTransport(*_path_and_baud(url, rest))
     if scheme == "sim":
-        from eitskin.device.simulated.transport import open_simulated
+        from eitskin.device.simulated import open_simulated
 
         return open_simulated(rest, model=model)
     if scheme == "emu":
@@ -95,27 +91,6 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
 def list_devices() -> list[Port]:
     """Every serial port, boards first."""
     return sorted(ports(), key=lambda port: (not port.is_board, port.path))
-
-
-def find_device_scene(name: str) -> Scene:
-    """The scene behind ``sim:NAME`` and ``emu:NAME``: a file, or a library scene with or without
-    ".toml".
-
-    Raises:
-        FileError, ConfigError, GeometryError, ProtocolError: as
-            ``scene.library_scenes.find_scene``.
-    """
-    from eitskin.scene.library_scenes import find_scene, library
-
-    path = Path(name)
-    if (
-        path.suffix == ".toml"
-        and not path.exists()
-        and str(path.parent) == "."
-        and path.stem in library()
-    ):
-        name = path.stem
-    return find_scene(name)
 
 
 def _path_and_baud(url: str, rest: str) -> tuple[str, int]:

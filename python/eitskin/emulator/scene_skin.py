@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from eitskin.emulator.analog.skin import Skin
 from eitskin.errors import ProtocolError
+from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import Scene
 from eitskin.skin.protocol import Protocol
 
@@ -20,9 +19,6 @@ def skin_of(scene: Scene, protocol: Protocol) -> Skin:
         ProtocolError: the scene's skin has another number of electrodes than the model.
         ConfigError, MissingExtraError: the scene cannot be simulated.
     """
-    from eitskin.scene.compiler import compile_scene
-    from eitskin.scene.runner import simulate_frames
-
     electrodes = scene.skin.electrodes.count
     if electrodes != protocol.n_electrodes:
         raise ProtocolError(
@@ -30,15 +26,6 @@ def skin_of(scene: Scene, protocol: Protocol) -> Skin:
             f" {protocol.n_electrodes}; build a model of the scene's skin with  eitskin model build"
             "  and give it with  --model"
         )
-    effects = {
-        name: table for name, table in scene.effects.items() if name not in DONE_BY_THE_BOARD
-    }
-    own = replace(
-        scene,
-        effects=effects,
-        protocol=scene.protocol if scene.protocol.hash == protocol.hash else protocol,
-    )
-    voltage_v = simulate_frames(compile_scene(own)).voltage_v
-    return Skin(
-        own.protocol, voltage_v[: own.quiet_frames], voltage_v[own.quiet_frames :], own.rate_hz
-    )
+    voltage_v = BoardFrames(scene, DONE_BY_THE_BOARD).voltage_v(protocol)
+    quiet = scene.quiet_frames
+    return Skin(protocol, voltage_v[:quiet], voltage_v[quiet:], scene.rate_hz)

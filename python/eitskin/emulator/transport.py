@@ -100,15 +100,15 @@ def open_emulated(
         import unicorn  # noqa: F401
     except ImportError:
         raise missing_extra("emulator", "unicorn") from None
-    from eitskin.device.open import find_device_scene
     from eitskin.emulator.board import EmulatedBoard
     from eitskin.emulator.image import image_bytes
     from eitskin.emulator.scene_skin import skin_of
     from eitskin.model.eitm import decode_model
     from eitskin.model.prebuilt import load_prebuilt
+    from eitskin.scene.library_scenes import find_scene
 
     program = image_bytes(image)
-    described = find_device_scene(scene)
+    described = find_scene(scene)
     prebuilt, blob = load_prebuilt() if model is None else (decode_model(model, "the model"), model)
     banks = (bank_bytes(blob, 1),)
     board = EmulatedBoard(program, skin_of(described, prebuilt.protocol), banks)

@@ -25,15 +25,16 @@ def descriptions() -> dict[str, str]:
 
 
 def scene_path(name: str) -> Path:
-    """The file of ``name``: a path as given, or a library scene.
+    """The file of ``name``: a path as given, or a library scene with or without ".toml".
 
     Raises:
         FileError: neither exists.
     """
-    path = Path(name)
-    if path.suffix == ".toml" or path.exists():
+    path, known = Path(name), library()
+    if path.exists():
         return path
-    known = library()
+    if path.suffix == ".toml":
+        return known.get(path.stem, path) if str(path.parent) == "." else path
     if name not in known:
         raise FileError(
             f"{name}: no such scene file, nor a scene of the library; {nearest(name, known)}"

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame
-from eitskin.device.open import find_device_scene
 from eitskin.device.wire.packets import Fault
 from eitskin.scene.description import Scene
+from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import Touch
 from eitskin.scene.touch_path import touches_at
 from eitskin.scoring.matching import GATE_MM, Matching, match
@@ -94,7 +94,7 @@ def scene_of(url: str) -> Scene | None:
         FileError, ConfigError, GeometryError, ProtocolError: it cannot be read.
     """
     scheme, _, rest = url.partition(":")
-    return find_device_scene(rest) if scheme in ("sim", "emu") else None
+    return find_scene(rest) if scheme in ("sim", "emu") else None
 
 
 @dataclass

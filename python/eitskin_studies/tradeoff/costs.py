@@ -5,19 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from eitskin.core.engine import CoreEngine
-from eitskin.device.simulated.checks import slot_us
-from eitskin.device.wire.commands import Scan
 from eitskin.tuning.configuration import Configuration
 from eitskin_studies.tradeoff.engines import Built
 
-EXCITATION_MILLIHZ, SAMPLE_RATE_HZ, SETTLE_US = 50_000_000, 1_000_000, 16
+EXCITATION_PERIOD_US, SAMPLE_US, SETTLE_US, SWITCH_US = 20, 1, 16, 3
 
 
 def acquisition_us(one: Configuration, rows: int, unique_rows: int) -> int:
     """From the first measurement of a frame to that of the next: slots times rows, by the
     firmware's rule for slots."""
-    scan = Scan(EXCITATION_MILLIHZ, SAMPLE_RATE_HZ, one.samples, SETTLE_US, 1, 0, 0)
-    return slot_us(scan) * (rows if one.scan == "full" else unique_rows)
+    return slot_us(one.samples) * (rows if one.scan == "full" else unique_rows)
+
+
+def slot_us(samples: int) -> int:
+    """From one measurement to the next: burst, settling, switching; a whole number of excitation
+    periods where that costs at most a quarter more (fw_slot_us in firmware/app/scan.c)."""
+    least = samples * SAMPLE_US + SETTLE_US + SWITCH_US
+    whole = -(-least // EXCITATION_PERIOD_US) * EXCITATION_PERIOD_US
+    return whole if whole <= least + least // 4 else least
 
 
 def static_costs(one: Configuration, built: Built) -> dict[str, Any]:

@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
-from eitskin.device.open import find_device_scene
-from eitskin.device.simulated.board import SimBoard
-from eitskin.device.simulated.skin import SceneSkin
+from eitskin.device.simulated import SimBoard
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.scene.board_frames import BoardFrames
+from eitskin.scene.library_scenes import find_scene
 
 SCENE = """
 [scene]
@@ -47,10 +47,10 @@ def board_of(scene: Path, model: bytes | None = None, *, begun: bool = False) ->
     blob = load_prebuilt()[1] if model is None else model
     empty = bytes([ERASED]) * BANK_BYTES
     board = SimBoard(
-        SceneSkin(find_device_scene(str(scene))), [bank_bytes(blob, 1) if blob else empty, empty]
+        BoardFrames(find_scene(str(scene))), [bank_bytes(blob, 1) if blob else empty, empty]
     )
     if begun:
-        board.skin.begin(0)
+        board.begin_scene()
     return board
 
 

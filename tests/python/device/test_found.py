@@ -10,55 +10,54 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from device_helpers import QUIET, empty_bank, scene, sim_device
+from device_helpers import QUIET, Damaging, empty_bank, same, scene, sim_device
 
 from eitskin.core.findings import ALL_FINDINGS, FINDINGS
-from eitskin.core.results import Info
 from eitskin.device.bank import bank_bytes
+from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
 from eitskin.device.live import LiveFrame, follow, take_reference
 from eitskin.device.news import News
 from eitskin.device.open import open_device
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.run_file import RunRecorder
-from eitskin.device.simulated.board import SimBoard
-from eitskin.device.simulated.faults import SimFaults
-from eitskin.device.simulated.skin import SceneSkin
+from eitskin.device.simulated import SimBoard, SimTransport
+from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.packets import (
     CLEAN_FRAMES,
-    SHOWN_FRAMES,
     Fault,
     FaultCode,
+    PacketType,
     Solved,
     SolvedTouches,
     Stream,
 )
-from eitskin.device.wire.payloads import parse_fault
+from eitskin.device.wire.payloads import SOLVED_STRUCT
 from eitskin.errors import DeviceError
+from eitskin.scene.board_frames import BoardFrames
 from small_models import prebuilt
 
+OPEN_AT = SOLVED_STRUCT.size - 24  # of the open electrodes in a head
 OFF, FROM_FRAME, UNTIL_FRAME, FRAMES = 5, 3, 6, 20
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
 @cache
-def wobbling() -> SceneSkin:
+def wobbling() -> BoardFrames:
     """One touch, and electrode 5 off from the scene's frame 3 until frame 6."""
     off = {
         "electrodes": [OFF],
         "from_s": (FROM_FRAME - 0.5) / 20,
         "until_s": (UNTIL_FRAME - 0.5) / 20,
     }
-    skin = SceneSkin(replace(scene(), frames=FRAMES, effects={**scene().effects, "detached": off}))
-    skin.frame(prebuilt()[0].protocol, 0)
-    return skin
+    return BoardFrames(
+        replace(scene(), frames=FRAMES, effects={**scene().effects, "detached": off})
+    )
 
 
 def board() -> SimBoard:
-    skin = SceneSkin(wobbling().scene)
-    skin._frames = wobbling()._frames
-    return SimBoard(skin, [bank_bytes(prebuilt()[1], 1), empty_bank()])
+    return SimBoard(wobbling(), [bank_bytes(prebuilt()[1], 1), empty_bank()])
 
 
 def heads(items: Iterable[object]) -> list[Solved]:
@@ -150,16 +149,18 @@ def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_p
     assert (check.same, check.different) == (FRAMES, [])
 
 
-def test_the_check_tells_findings_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_check_tells_findings_apart(tmp_path: Path) -> None:
     """A board that hides an electrode's fate in its heads differs from the host."""
-    from eitskin.device.wire import payloads
 
-    build = payloads._build_solved
-    monkeypatch.setattr(
-        payloads, "_build_solved", lambda solved: build(replace(solved, open_electrodes=()))
-    )
-    path = tmp_path / "run.eits"
-    with sim_device(board()) as device, RunRecorder(path, device, board_options(prebuilt()[0])):
+    def hide(data: bytes) -> bytes:
+        packets = [(p.type, p.sequence, bytearray(p.payload)) for p in Decoder().feed(data)]
+        for kind, _, payload in packets:
+            if kind in (PacketType.IMAGE, PacketType.TOUCHES):
+                payload[OPEN_AT : OPEN_AT + 8] = bytes(8)
+        return b"".join(encode(kind, k, bytes(payload)) for kind, k, payload in packets)
+
+    path, hiding = tmp_path / "run.eits", Damaging(SimTransport("hides", board()), same, hide)
+    with Device(hiding) as device, RunRecorder(path, device, board_options(prebuilt()[0])):
         device.solver(board_options(prebuilt()[0]))
         take_reference(device, QUIET, streamed=True)
         device.start_scene()
@@ -258,35 +259,3 @@ def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:
         for frame in range(1, 12)
     ]
     assert told == [[]] * 8 + [["misfit 12.5 %, frame 9"], [], []]
-
-
-def test_simulated_faults_of_all_kinds_rise_and_go_after_clean_frames() -> None:
-    sent: list[Fault] = []
-    board_faults = SimFaults(lambda kind, payload: sent.append(parse_fault(payload)))
-    plain = Info(0, "gap", 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    all_found = replace(
-        plain, findings=bits("misfit", "stale reference"), misfit=0.25, open_electrodes=(1,),
-        bridged_electrodes=(2, 40),
-        noisy_electrodes=(3,),
-    )  # fmt: skip
-    board_faults.found(0, all_found, solved=True)
-    assert [f.code for f in sent] == [
-        FaultCode.ELECTRODE_OPEN,
-        FaultCode.BRIDGED,
-        FaultCode.BRIDGED,
-    ]
-    for _ in range(SHOWN_FRAMES - 1):
-        board_faults.found(1, all_found, solved=True)
-    assert [(f.code, f.index, f.value) for f in sent] == [
-        (FaultCode.ELECTRODE_OPEN, 1, 0), (FaultCode.BRIDGED, 2, 40), (FaultCode.BRIDGED, 40, 2),
-        (FaultCode.ELECTRODE_NOISY, 3, 0), (FaultCode.MISFIT, 0, 250),
-        (FaultCode.STALE_REFERENCE, 0, 0),
-    ]  # fmt: skip
-    assert sent[1].words[:2] == (4, 256)
-    rose = len(sent)
-    for frame in range(2, 2 + CLEAN_FRAMES - 1):
-        board_faults.found(frame, plain, solved=False)
-    assert len(sent) == rose
-    board_faults.found(10, plain, solved=False)
-    assert len(sent) == 2 * rose - 1  # only solved frames tell of the reference
-    assert board_faults.raised == 1 << FaultCode.STALE_REFERENCE

@@ -9,21 +9,24 @@ import threading
 import time
 import tty
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from device_helpers import sim_board
+from device_helpers import empty_bank, scene, sim_board
 
 from eitskin.device import ports as ports_module
+from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent, Reconnect
 from eitskin.device.open import list_devices, open_device, open_transport
 from eitskin.device.ports import Port, SerialTransport
-from eitskin.device.simulated.board import SimBoard
-from eitskin.device.simulated.transport import SimTransport
+from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.commands import Tare
 from eitskin.device.wire.packets import RawFrame, Stream
 from eitskin.errors import DeviceError, UsageError
+from eitskin.scene.board_frames import BoardFrames
+from small_models import prebuilt
 
 SOON = Reconnect(tries=40, every_s=0.05)
 
@@ -161,19 +164,13 @@ def test_unplugged_and_plugged_in_again_elsewhere(monkeypatch: pytest.MonkeyPatc
 
 
 def test_another_board_in_its_place_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from device_helpers import fresh_skin
-
     first, there = Wire(sim_board(), frame_s=0.005), []
     monkeypatch.setattr(
         ports_module, "ports", lambda: [Port(path, "", 0x0483, 0x374B, "SERIAL1") for path in there]
     )
     there.append(first.path)
-    other = sim_board()
-    skin = fresh_skin()
-    monkeypatch.setattr(
-        type(skin), "serial", property(lambda self: "OTHER" if self is other.skin else "FIRST")
-    )
-    second = Wire(other)
+    other = BoardFrames(replace(scene(), name="other"))  # another scene, another serial number
+    second = Wire(SimBoard(other, [bank_bytes(prebuilt()[1], 1), empty_bank()]))
     try:
         with (
             quick(f"serial:{first.path}") as device,

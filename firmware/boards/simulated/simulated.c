@@ -1,0 +1,407 @@
+#include "simulated.h"
+
+#include "app/sincos.h"
+
+#include <string.h>
+
+enum {
+    FULL_SCALE_CODE = 65535,
+    MCLK_HZ = 8000000,
+    LEAD_US = 20,  /* from the start of a capture to its first slot */
+    IDLE_US = 1000 /* that pass where nothing is scanned */
+};
+#define RANGE_MARGIN 1.05f /* the converter's range over the largest voltage that is shown */
+#define MAX_RANGE_UV 4000000000u
+
+size_t sim_board_bytes(void)
+{
+    return sizeof(sim_board);
+}
+
+/* ---- generator: AD9833 data sheet, tables 6 to 9 ---- */
+
+enum { CONTROL_RESET = 0x0100 };
+
+static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
+{
+    sim_board *sim = ctx;
+    for (size_t k = 0; k < count; ++k) {
+        const uint32_t value = words[k] & 0x3FFFu;
+        if (words[k] >> 14 == 0) {
+            if ((sim->generator_control & CONTROL_RESET) != 0 && (words[k] & CONTROL_RESET) == 0)
+                sim->released_us = (uint32_t)sim->now_us;
+            sim->generator_control = words[k];
+            sim->high_half_next = false;
+        } else if (words[k] >> 14 == 1) { /* two words, the low half first */
+            sim->tuning = sim->high_half_next ? (sim->tuning & 0x3FFFu) | value << 14
+                                              : (sim->tuning & 0xFFFC000u) | value;
+            sim->high_half_next = !sim->high_half_next;
+        }
+    }
+    return FW_OK;
+}
+
+static bool generator_runs(const sim_board *sim)
+{
+    return sim->generator_control != 0 && (sim->generator_control & CONTROL_RESET) == 0;
+}
+
+/* ---- multiplexers ---- */
+
+static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
+{
+    sim_board *sim = ctx;
+    sim->lines = (sim->lines & ~mask) | (levels & mask);
+    return FW_OK;
+}
+
+static void wait_ns(void *ctx, uint32_t ns)
+{
+    (void)ctx;
+    (void)ns;
+}
+
+/* ---- skin ---- */
+
+static uint32_t frame_number(const sim_scene *scene, uint64_t at_us)
+{
+    const double passed_us = (double)(at_us - scene->began_us);
+    const double number = passed_us * scene->rate_hz / 1e6 + 0.5;
+    return number < (double)scene->frames ? (uint32_t)number : scene->frames;
+}
+
+/* When the next scan begins, if none is under way: bursts before it are due are dropped. */
+static uint64_t next_scan_us(const sim_board *sim)
+{
+    const fw_scan *scan = &sim->instrument.scan;
+    const sim_converter *converter = &sim->converter;
+    const int32_t early_us = (int32_t)(scan->next_due_us - (uint32_t)converter->slot_us);
+    const uint32_t slot_us = converter->setup.slot_us;
+    if (!converter->running || scan->frame != NULL || !scan->due_known || early_us <= 0)
+        return converter->slot_us;
+    return converter->slot_us + ((uint32_t)early_us + slot_us - 1) / slot_us * slot_us;
+}
+
+bool sim_scene_over(const sim_board *sim)
+{
+    const sim_scene *scene = &sim->scene;
+    return scene->begun && !scene->begins_with_scan &&
+           frame_number(scene, next_scan_us(sim)) >= scene->frames;
+}
+
+void sim_begin_scene(sim_board *sim)
+{
+    sim->scene.begun = true;
+    sim->scene.begins_with_scan = true;
+}
+
+/* A scan may begin at at_us: its voltages. */
+static void choose_frame(sim_board *sim, uint64_t at_us)
+{
+    sim_scene *scene = &sim->scene;
+    const fw_tare *tare = &sim->instrument.tare;
+    if (tare->active && fw_tare_first(tare))
+        scene->untouched_shown = 0;
+    if (scene->begins_with_scan)
+        scene->began_us = at_us;
+    uint32_t frame = scene->untouched_shown % scene->untouched;
+    if (scene->begun) {
+        const uint32_t number = frame_number(scene, at_us);
+        frame = scene->untouched + (number < scene->frames ? number : scene->frames - 1u);
+    }
+    scene->shown = scene->volts + (size_t)frame * sim->instrument.engine.model.n_rows;
+}
+
+static void scan_has_begun(sim_board *sim)
+{
+    sim->scene.begins_with_scan = false;
+    ++sim->scene.untouched_shown;
+}
+
+/* Between V+ and V-, amplitude; 0 where the electrodes that are joined are no row of the table. */
+static float volts_now(sim_board *sim)
+{
+    const eits_model *model = &sim->instrument.engine.model;
+    uint8_t joined[4];
+    if ((sim->lines & FW_MUX_ENABLES) != FW_MUX_ENABLES || !generator_runs(sim))
+        return 0;
+    for (uint32_t k = 0; k < 4; ++k)
+        joined[k] = (uint8_t)(sim->lines >> 4 * k & 15u);
+    for (uint32_t tried = 0; tried < model->n_rows; ++tried) {
+        sim->row = sim->row + 1u < model->n_rows ? sim->row + 1u : 0;
+        if (memcmp(model->protocol + 4 * (size_t)sim->row, joined, sizeof joined) == 0)
+            return sim->scene.shown[sim->row];
+    }
+    return 0;
+}
+
+/* ---- converter ---- */
+
+static fw_status configure(void *ctx, const fw_capture_setup *setup,
+                           void (*done)(void *user, const fw_burst *burst), void *user)
+{
+    sim_converter *converter = &((sim_board *)ctx)->converter;
+    converter->setup = *setup;
+    converter->done = done;
+    converter->user = user;
+    return FW_OK;
+}
+
+static fw_status start(void *ctx)
+{
+    sim_board *sim = ctx;
+    sim_converter *converter = &sim->converter;
+    /* 2^28 times mclk / rate, of which the generator's phase takes `tuning` a sample */
+    const uint64_t turn = (uint64_t)sim->tuning * MCLK_HZ;
+    for (uint32_t k = 0; k < converter->setup.samples; ++k) {
+        const uint64_t phase = turn * k / converter->setup.sample_rate_hz;
+        fw_turn_cos_sin((uint32_t)phase << 4, &converter->cosine[k], &converter->sine[k]);
+    }
+    converter->slot_us = sim->now_us + LEAD_US;
+    converter->running = true;
+    return FW_OK;
+}
+
+static void stop(void *ctx)
+{
+    ((sim_board *)ctx)->converter.running = false;
+}
+
+static void convert(sim_board *sim, float volts)
+{
+    sim_converter *converter = &sim->converter;
+    const uint32_t passed_us = (uint32_t)converter->slot_us - sim->released_us;
+    const float steps_a_volt =
+        (FULL_SCALE_CODE + 1) / (1e-6f * (float)sim->board.capture.reference_uv);
+    const float steps = volts * steps_a_volt;
+    float c, s;
+    fw_turn_cos_sin((sim->tuning * (MCLK_HZ / 1000000u) * passed_us) << 4, &c, &s);
+    for (uint32_t k = 0; k < converter->setup.samples; ++k) {
+        const float code = 0.5f * (FULL_SCALE_CODE + 1) + 0.5f +
+                           steps * (c * converter->sine[k] + s * converter->cosine[k]);
+        const float low = code < 0 ? 0 : code;
+        converter->codes[k] = (uint16_t)(int32_t)(low > FULL_SCALE_CODE ? FULL_SCALE_CODE : low);
+    }
+}
+
+/* To the end of the next burst, which the application gets. */
+static void next_burst(sim_board *sim)
+{
+    const fw_scan *scan = &sim->instrument.scan;
+    sim_converter *converter = &sim->converter;
+    const fw_capture_setup *setup = &converter->setup;
+    converter->slot_us = next_scan_us(sim);
+    const bool between = scan->frame == NULL;
+    const uint32_t frames = scan->frames_scanned;
+    const uint64_t start_us = converter->slot_us;
+    if (between)
+        choose_frame(sim, start_us);
+    convert(sim, volts_now(sim));
+    converter->slot_us += setup->slot_us;
+    sim->now_us = start_us + ((uint64_t)setup->samples * 1000000u + setup->sample_rate_hz - 1) /
+                                 setup->sample_rate_hz;
+    const fw_burst burst = {.samples = converter->codes,
+                            .start_us = (uint32_t)start_us,
+                            .next_start_us = (uint32_t)converter->slot_us};
+    converter->done(converter->user, &burst);
+    if (between && (scan->frame != NULL || scan->frames_scanned != frames))
+        scan_has_begun(sim);
+}
+
+/* ---- flash, as NOR: bits fall, none rises ---- */
+
+static const uint8_t *bank_start(void *ctx, uint32_t bank)
+{
+    return ((const sim_board *)ctx)->bank[bank];
+}
+
+static fw_status erase(void *ctx, uint32_t bank)
+{
+    const sim_board *sim = ctx;
+    memset(sim->bank[bank], 0xFF, sim->board.store.bank_bytes);
+    return FW_OK;
+}
+
+static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
+{
+    const sim_board *sim = ctx;
+    const size_t room = sim->board.store.bank_bytes;
+    uint8_t *cells = sim->bank[bank] + offset;
+    if (offset % 4u != 0 || size % 4u != 0 || offset > room || size > room - offset)
+        return FW_E_ARGUMENT;
+    for (size_t k = 0; k < size; ++k)
+        cells[k] &= ((const uint8_t *)bytes)[k];
+    return memcmp(cells, bytes, size) == 0 ? FW_OK : FW_E_FLASH;
+}
+
+/* ---- link ---- */
+
+static bool write_bytes(void *ctx, const uint8_t *bytes, size_t size)
+{
+    sim_board *sim = ctx;
+    if (size > sizeof sim->to_host - sim->to_host_bytes)
+        return false;
+    memcpy(sim->to_host + sim->to_host_bytes, bytes, size);
+    sim->to_host_bytes += size;
+    return true;
+}
+
+static size_t read_bytes(void *ctx, uint8_t *bytes, size_t room)
+{
+    sim_board *sim = ctx;
+    const size_t size = sim->to_board_bytes < room ? sim->to_board_bytes : room;
+    if (size > 0)
+        memcpy(bytes, sim->to_board, size);
+    sim->to_board += size;
+    sim->to_board_bytes -= size;
+    return size;
+}
+
+size_t sim_read(sim_board *sim, uint8_t *bytes, size_t room)
+{
+    const size_t size = sim->to_host_bytes < room ? sim->to_host_bytes : room;
+    memcpy(bytes, sim->to_host, size);
+    sim->to_host_bytes -= size;
+    memmove(sim->to_host, sim->to_host + size, sim->to_host_bytes);
+    return size;
+}
+
+/* ---- the rest of the board ---- */
+
+static uint32_t time_us(void *ctx)
+{
+    return (uint32_t)((const sim_board *)ctx)->now_us;
+}
+
+static void wait_idle(void *ctx)
+{
+    ((sim_board *)ctx)->now_us += IDLE_US;
+}
+
+static uint32_t lock(void *ctx)
+{
+    (void)ctx;
+    return 0;
+}
+
+static void unlock(void *ctx, uint32_t state)
+{
+    (void)ctx;
+    (void)state;
+}
+
+static void nothing(void *ctx)
+{
+    (void)ctx;
+}
+
+static uint32_t no_stack(void *ctx)
+{
+    (void)ctx;
+    return 0;
+}
+
+static void show_leds(void *ctx, uint32_t leds)
+{
+    (void)ctx;
+    (void)leds;
+}
+
+static const fw_spi_ops GENERATOR = {write_words};
+static const fw_lines_ops MULTIPLEXERS = {write_lines, wait_ns};
+static const fw_capture_ops CAPTURE = {configure, start, stop};
+static const fw_link_ops LINK = {.write = write_bytes, .read = read_bytes};
+static const fw_store_ops STORE = {bank_start, erase, program};
+static const fw_system_ops SYSTEM = {time_us, wait_idle, lock,     unlock,
+                                     nothing, nothing,   no_stack, show_leds};
+
+void sim_init(sim_board *sim, const sim_setup *setup)
+{
+    memset(sim, 0, sizeof *sim);
+    for (uint32_t k = 0; k < FW_BANKS; ++k)
+        sim->bank[k] = setup->banks[k];
+    sim->board = (fw_board){.name = "simulated",
+                            .serial = setup->serial,
+                            .mclk_hz = MCLK_HZ,
+                            .frame_period_us = setup->frame_period_us,
+                            .generator = {&GENERATOR, sim},
+                            .multiplexers = {&MULTIPLEXERS, sim},
+                            .capture = {&CAPTURE, sim, FULL_SCALE_CODE, 1, 1000000},
+                            .link = {&LINK, sim},
+                            .store = {&STORE, sim, setup->bank_bytes},
+                            .system = &SYSTEM,
+                            .system_ctx = sim,
+                            .workspace = setup->workspace,
+                            .workspace_bytes = setup->workspace_bytes};
+    sim_start(sim);
+}
+
+void sim_start(sim_board *sim)
+{
+    sim->converter.running = false;
+    sim->generator_control = 0;
+    sim->to_board_bytes = 0;
+    fw_instrument_init(&sim->instrument, &sim->board);
+}
+
+static void turn(sim_board *sim)
+{
+    (void)fw_instrument_turn(&sim->instrument);
+    if (sim->instrument.reset_wanted)
+        sim_start(sim);
+}
+
+void sim_write(sim_board *sim, const uint8_t *bytes, size_t size)
+{
+    sim->to_board = bytes;
+    sim->to_board_bytes = size;
+    while (sim->to_board_bytes > 0)
+        turn(sim);
+}
+
+bool sim_wants_frame(const sim_board *sim)
+{
+    const fw_instrument *instrument = &sim->instrument;
+    return instrument->engine.open && !instrument->upload.active &&
+           (instrument->tare.active || instrument->stream.what != 0);
+}
+
+const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc)
+{
+    const fw_instrument *instrument = &sim->instrument;
+    *bytes = instrument->record.model_bytes;
+    *crc = instrument->record.model_crc;
+    return instrument->engine.open ? sim->bank[instrument->bank] : NULL;
+}
+
+/* The range is that of the frames, so that 16 bits are enough for any of them. */
+void sim_show(sim_board *sim, const float *volts, uint32_t untouched, uint32_t frames,
+              double rate_hz)
+{
+    const size_t cells = (size_t)(untouched + frames) * sim->instrument.engine.model.n_rows;
+    float largest = 0;
+    for (size_t k = 0; k < cells; ++k) {
+        const float size = volts[k] < 0 ? -volts[k] : volts[k];
+        largest = size > largest ? size : largest;
+    }
+    sim->scene.volts = volts;
+    sim->scene.untouched = untouched;
+    sim->scene.frames = frames;
+    sim->scene.rate_hz = rate_hz;
+    const float range_uv = 2e6f * RANGE_MARGIN * largest;
+    sim->board.capture.reference_uv =
+        range_uv < (float)MAX_RANGE_UV ? 1u + (uint32_t)range_uv : MAX_RANGE_UV;
+    fw_start_scan(&sim->instrument);
+}
+
+void sim_scan_frame(sim_board *sim)
+{
+    const uint32_t frames = sim->instrument.scan.frames_scanned;
+    while (sim->instrument.scan.frames_scanned == frames && sim_wants_frame(sim)) {
+        if (sim->converter.running)
+            next_burst(sim);
+        else
+            wait_idle(sim);
+        turn(sim);
+    }
+}

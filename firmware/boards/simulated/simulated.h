@@ -1,0 +1,104 @@
+/* The board behind `sim:SCENE`: the firmware's own application before parts that are made of
+ * memory.
+ *
+ * The generator and the multiplexers are decoded from what the drivers write to them, just far
+ * enough: which electrodes are joined, at which frequency. The converter has 16 bits and no noise;
+ * its range is that of the frames that are shown, and 1 uV until then. What it measures are frames
+ * that the host has simulated: a frame is one scan, and which one it is is decided when a scan
+ * begins.
+ *
+ * Time is counted, not waited for: it passes only in sim_scan_frame, and nothing that the processor
+ * does takes any. All is in the caller's memory, so that one process can have many boards. */
+#ifndef SIMULATED_H
+#define SIMULATED_H
+
+#include "app/instrument.h"
+
+/* Frames of the untouched skin, then those of the scene. */
+typedef struct sim_scene {
+    const float *volts; /* (untouched + frames) x n_rows, amplitudes in V */
+    uint32_t untouched, frames;
+    double rate_hz;
+    bool begun, begins_with_scan; /* time 0 is when the next scan begins */
+    uint64_t began_us;
+    uint32_t untouched_shown; /* since the last tare began */
+    const float *shown;       /* n_rows, of the scan under way */
+} sim_scene;
+
+typedef struct sim_converter {
+    void (*done)(void *user, const fw_burst *burst);
+    void *user;
+    fw_capture_setup setup;
+    bool running;
+    uint64_t slot_us; /* when the next slot begins */
+    /* of the generator's phase at each sample of a burst, from the first on */
+    float cosine[FW_MAX_SAMPLES], sine[FW_MAX_SAMPLES];
+    uint16_t codes[FW_MAX_SAMPLES];
+} sim_converter;
+
+typedef struct sim_board {
+    fw_board board;
+    uint64_t now_us;
+    /* AD9833: control register, frequency register 0, when reset was released last */
+    uint16_t generator_control;
+    bool high_half_next;
+    uint32_t tuning, released_us;
+    uint32_t lines; /* of the multiplexers, as in fw_board */
+    uint32_t row;   /* that was measured last */
+    sim_converter converter;
+    sim_scene scene;
+    uint8_t *bank[FW_BANKS];
+    const uint8_t *to_board; /* the caller's, in sim_write */
+    size_t to_board_bytes;
+    uint8_t to_host[1 << 18];
+    size_t to_host_bytes;
+    fw_instrument instrument;
+} sim_board;
+
+/* The caller's memory is used as long as the board is. */
+typedef struct sim_setup {
+    const char *serial;
+    uint32_t frame_period_us; /* of the first scan */
+    uint8_t *banks[FW_BANKS]; /* aligned to 16 */
+    uint32_t bank_bytes;
+    void *workspace; /* aligned to 16 */
+    size_t workspace_bytes;
+} sim_setup;
+
+/* Bytes of a board, whose memory must be aligned to 16. */
+size_t sim_board_bytes(void);
+
+/* A board at time 0 on what its banks hold, switched on. */
+void sim_init(sim_board *sim, const sim_setup *setup);
+
+/* Off and on again: time goes on, banks and skin stay. */
+void sim_start(sim_board *sim);
+
+/* Give the board bytes from the host; the commands in them are carried out. */
+void sim_write(sim_board *sim, const uint8_t *bytes, size_t size);
+
+/* Take what the board has sent, at most `room` bytes; returns how many. */
+size_t sim_read(sim_board *sim, uint8_t *bytes, size_t room);
+
+/* Whether the board scans for someone: a stream or a tare waits for frames. */
+bool sim_wants_frame(const sim_board *sim);
+
+/* The model that is open, its length and CRC-32; NULL where there is none. */
+const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc);
+
+/* Put a skin before the board that has a model: its frames in that model's rows, first
+ * `untouched` ones (at least 1), then `frames` (at least 1) at rate_hz. They are used until the
+ * next call; another model needs another call before sim_scan_frame. */
+void sim_show(sim_board *sim, const float *volts, uint32_t untouched, uint32_t frames,
+              double rate_hz);
+
+/* Let the scene begin with the next scan. Until then the untouched frames are shown over and over,
+ * from the first on when a tare begins; then the frame of the scene that is nearest to the
+ * beginning of the scan, and at last the last one. */
+void sim_begin_scene(sim_board *sim);
+bool sim_scene_over(const sim_board *sim);
+
+/* Where frames are wanted: scan until the application has had one more. */
+void sim_scan_frame(sim_board *sim);
+
+#endif

@@ -1,0 +1,178 @@
+"""``sim:SCENE``: the firmware's own application, built for this host, before a scene's frames.
+
+The parts around it are simulated (firmware/boards/simulated): a converter of 16 bits whose range is
+that of the frames, no noise but the scene's, and no processor time, so that every time that would
+tell of one is 0. The clock runs only while the board scans for someone. Deterministic; no thread.
+"""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+
+from eitskin.core.engine import aligned
+from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
+from eitskin.errors import UsageError
+from eitskin.scene.board_frames import BoardFrames
+
+WORKSPACE_BYTES = 4 << 20  # enough for any model that fits a bank
+OUTPUT_BYTES = 1 << 16
+
+
+def _load() -> Any:
+    try:
+        from eitskin.device import _board  # type: ignore[attr-defined]
+    except ImportError as error:
+        raise UsageError(
+            f"the simulated board is not built ({error}); install with  pip install .  in the"
+            " project's root"
+        ) from None
+    return _board
+
+
+class SimBoard:
+    """One board before ``frames``, switched on, with what its two ``banks`` hold.
+
+    Raises:
+        UsageError: the firmware is not built for this host.
+    """
+
+    def __init__(self, frames: BoardFrames, banks: list[bytes]) -> None:
+        module, scene = _load(), frames.scene
+        self._ffi, self._lib = module.ffi, module.lib
+        self.frames, self._shown_crc = frames, -1
+        self._banks = [aligned(len(bank)) for bank in banks]
+        for cells, bank in zip(self._banks, banks, strict=True):
+            cells[:] = np.frombuffer(bank, dtype=np.uint8)
+        self._workspace = aligned(WORKSPACE_BYTES)
+        self._memory = aligned(self._lib.sim_board_bytes())
+        serial = zlib.crc32((scene.text or repr(scene)).encode())  # the same for the same scene
+        self._serial = self._ffi.new("char[]", f"{serial:08X}".encode())
+        self._sim = self._ffi.cast("sim_board *", self._ffi.from_buffer(self._memory))
+        setup = self._ffi.new("sim_setup *")
+        setup.serial, setup.frame_period_us = self._serial, max(round(1e6 / scene.rate_hz), 1)
+        setup.banks = [self._pointer(cells, "uint8_t *") for cells in self._banks]
+        setup.bank_bytes = len(banks[0])
+        setup.workspace = self._pointer(self._workspace, "void *")
+        setup.workspace_bytes = WORKSPACE_BYTES
+        self._lib.sim_init(self._sim, setup)
+        self._output = self._ffi.new("uint8_t[]", OUTPUT_BYTES)
+        self._bytes, self._crc = self._ffi.new("uint32_t *"), self._ffi.new("uint32_t *")
+
+    def _pointer(self, array: Any, kind: str) -> Any:
+        return self._ffi.cast(kind, self._ffi.from_buffer(array))
+
+    @property
+    def banks(self) -> list[bytes]:
+        """What the banks hold now."""
+        return [bytes(cells) for cells in self._banks]
+
+    def restart(self) -> None:
+        """Switch it off and on again: time goes on, the banks stay."""
+        self._lib.sim_start(self._sim)
+
+    def receive(self, data: bytes) -> None:
+        """What the host sent; commands in it are carried out."""
+        self._lib.sim_write(self._sim, self._ffi.from_buffer(data), len(data))
+
+    def take_output(self) -> bytes:
+        """What the board has sent since the last call."""
+        pieces = []
+        while size := self._lib.sim_read(self._sim, self._output, OUTPUT_BYTES):
+            pieces.append(bytes(self._ffi.buffer(self._output, size)))
+        return b"".join(pieces)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether a stream or a tare waits for frames."""
+        return bool(self._lib.sim_wants_frame(self._sim))
+
+    @property
+    def ended(self) -> bool:
+        """Whether the scene is over when the next scan begins."""
+        return bool(self._lib.sim_scene_over(self._sim))
+
+    def begin_scene(self) -> None:
+        """Let the scene begin with the next scan."""
+        self._lib.sim_begin_scene(self._sim)
+
+    def scan_one(self) -> bool:
+        """Scan one frame; False where nobody wants one.
+
+        Raises:
+            EitskinError: the scene cannot be simulated.
+        """
+        if not self.wanted:
+            return False
+        self._show_skin()
+        self._lib.sim_scan_frame(self._sim)
+        return True
+
+    def _show_skin(self) -> None:
+        """Put the frames for the model in use before the board, where it is another than before."""
+        blob = self._lib.sim_model(self._sim, self._bytes, self._crc)
+        if self._crc[0] == self._shown_crc:
+            return
+        from eitskin.model.eitm import decode_model
+
+        model = decode_model(bytes(self._ffi.buffer(blob, self._bytes[0])), "the board's model")
+        scene = self.frames.scene
+        self._volts = np.ascontiguousarray(self.frames.voltage_v(model.protocol), np.float32)
+        volts = self._pointer(self._volts, "float *")
+        self._lib.sim_show(self._sim, volts, scene.quiet_frames, scene.frames, scene.rate_hz)
+        self._shown_crc = self._crc[0]
+
+
+class SimTransport:
+    """The bytes of a ``SimBoard``. It scans a frame each time that it is read and has nothing else
+    to say."""
+
+    synchronous = True
+    replays = False
+
+    def __init__(self, name: str, board: SimBoard) -> None:
+        self.url = self.name = f"sim:{name}"
+        self.board = board
+
+    @property
+    def ended(self) -> bool:
+        """The scene is over."""
+        return self.board.ended
+
+    def read(self, timeout_s: float) -> bytes:
+        """What the board sends; empty where it has nothing to do, or the scene is over."""
+        output = self.board.take_output()
+        while not output and not self.ended and self.board.scan_one():
+            output = self.board.take_output()
+        return output
+
+    def write(self, data: bytes) -> None:
+        self.board.receive(data)
+
+    def reopen(self) -> bool:
+        return True
+
+    def begin_scene(self) -> None:
+        self.board.begin_scene()
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def open_simulated(scene: str, *, model: bytes | None = None) -> SimTransport:
+    """A simulated board before ``scene`` (a file or a library scene), with ``model`` in its first
+    bank (or the prebuilt one).
+
+    Raises:
+        FileError, ConfigError, GeometryError, ProtocolError: the scene cannot be read.
+        DeviceError: the model does not fit a bank.
+    """
+    from eitskin.model.prebuilt import load_prebuilt
+    from eitskin.scene.library_scenes import find_scene
+
+    frames = BoardFrames(find_scene(scene))
+    blob = load_prebuilt()[1] if model is None else model
+    empty = bytes([ERASED]) * BANK_BYTES
+    return SimTransport(scene, SimBoard(frames, [bank_bytes(blob, 1), empty]))
