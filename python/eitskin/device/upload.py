@@ -6,15 +6,12 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from eitskin.device.exchange import Exchange
 from eitskin.device.wire.commands import ModelBegin, ModelCommit, ModelData
 from eitskin.device.wire.explain import reply_text
 from eitskin.device.wire.packets import MAX_PAYLOAD, Reply, ReplyStatus
 from eitskin.errors import DeviceError
-
-if TYPE_CHECKING:
-    from eitskin.device.client import Device
 
 ERASE_S = 15.0
 PIECE_S = 1.0
@@ -23,7 +20,7 @@ GOING_BACK = 10
 
 
 def upload(
-    device: Device, model: str | Path | bytes, progress: Callable[[int, int], None] | None
+    device: Exchange, model: str | Path | bytes, progress: Callable[[int, int], None] | None
 ) -> None:
     """See ``Device.upload_model``."""
     blob = _checked(device, model)
@@ -56,12 +53,12 @@ class _Refused(DeviceError):
     """The board said why."""
 
 
-def _demand(device: Device, reply: Reply) -> None:
+def _demand(device: Exchange, reply: Reply) -> None:
     if not reply.ok:
         raise _Refused(f"{device.transport.name}: {reply_text(reply)}")
 
 
-def _checked(device: Device, model: str | Path | bytes) -> bytes:
+def _checked(device: Exchange, model: str | Path | bytes) -> bytes:
     """The model's bytes, refused here rather than after minutes on the wire."""
     from eitskin.model.eitm import decode_model, load_model
 
@@ -84,7 +81,7 @@ def _checked(device: Device, model: str | Path | bytes) -> bytes:
     return blob
 
 
-def _send_pieces(device: Device, blob: bytes, done: int) -> Iterator[int]:
+def _send_pieces(device: Exchange, blob: bytes, done: int) -> Iterator[int]:
     """Send from ``done`` on; yields how far the board has it."""
     size = max(min(device.board.data_bytes, MAX_PAYLOAD - ModelData.LAYOUT.size) // 4 * 4, 4)
     back = 0
