@@ -161,9 +161,10 @@ def run_scene(options: argparse.Namespace) -> int:
 
 def run_plan(options: argparse.Namespace) -> int:
     """Print the plan."""
+    from eitskin.scene.compiler import compile_scene
     from eitskin.scene.library_scenes import find_scene
 
-    plan = find_scene(options.scene).plan()
+    plan = compile_scene(find_scene(options.scene)).plan
     print(json.dumps(plan.as_dict(), indent=2) if options.json else plan.text())
     return 0
 

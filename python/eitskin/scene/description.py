@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,10 +22,6 @@ from eitskin.scene.random_touches import rim_distance_mm
 from eitskin.scene.touch_path import ALWAYS_S, Keyframe, TouchTrack, TrackSamples, sample
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, load_skin, paper_skin
-
-if TYPE_CHECKING:
-    from eitskin.frames.frames import Frames
-    from eitskin.scene.plan import Plan
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -112,20 +108,6 @@ class Scene:
         """Each track at the recorded frames' times."""
         times = self.times_s()
         return tuple(sample(track, times) for track in self.touches)
-
-    def plan(self) -> Plan:
-        """What running this scene will do, step by step, and what it will cost
-        (``compiler.compile_scene``)."""
-        from eitskin.scene.compiler import compile_scene
-
-        return compile_scene(self).plan
-
-    def run(self) -> Frames:
-        """The frames of this scene with their truth (``runner.run``)."""
-        from eitskin.scene.compiler import compile_scene
-        from eitskin.scene.runner import run
-
-        return run(compile_scene(self))
 
 
 def load_scene(path: str | Path) -> Scene:

@@ -14,7 +14,8 @@ import numpy.typing as npt
 from eitskin import __version__
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
-from eitskin.scene.compiler import Compiled, State, background_of
+from eitskin.scene.compiler import Compiled, State, background_of, compile_scene
+from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
 from eitskin.scene.reading import PlainReader, Reading, WholeReader, solved_impedance
 from eitskin.scene.truth import Truth, truth_of
@@ -129,6 +130,15 @@ def run(
         meta=meta_of(compiled, done),
         **truth_fields(truth),
     )
+
+
+def run_scene(scene: Scene) -> Frames:
+    """The frames of ``scene`` with their truth.
+
+    Raises:
+        ConfigError: as ``compile_scene`` and ``simulate_frames``.
+    """
+    return run(compile_scene(scene))
 
 
 def truth_fields(truth: Truth) -> dict[str, Any]:

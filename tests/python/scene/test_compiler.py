@@ -23,7 +23,7 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.effect import Contacts, ContactStep, Cost, Stage, VoltageStep
 from eitskin.scene.forward_steps import count_costs
 from eitskin.scene.registry import BUILT_IN, Registry
-from eitskin.scene.runner import simulate_frames
+from eitskin.scene.runner import run_scene, simulate_frames
 from eitskin.scene.session import Bench
 from eitskin.scene.simulate import conductivity_with
 from eitskin.scene.touch_path import touches_at
@@ -51,7 +51,7 @@ def test_naming_an_effect_adds_exactly_one_step(name: str, bench: Bench) -> None
 
 def test_frames_without_effects_are_the_forward_models_to_the_bit() -> None:
     for scene in (still_scene(), moving_scene(4, solver="factorise")):
-        frames = scene.run()
+        frames = run_scene(scene)
         forward = ForwardModel(
             mesh_for_elements(scene.skin, ELEMENTS), scene.skin, scene.protocol, 0.0
         )
@@ -109,7 +109,7 @@ def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(bench: Be
     effects: dict[str, Any] = {"bridged": {"electrodes": [2, 3]}, "gel_drying": {}}
     plain = simulate_frames(compile_scene(still_scene(4, effects=effects))).voltage_v
     with_late = compile_scene(still_scene(4, effects={**effects, "late": {}}), registry=registry)
-    v0_v = still_scene(1, touches=()).run().voltage_v[0]
+    v0_v = run_scene(still_scene(1, touches=())).voltage_v[0]
     scaled = simulate_frames(with_late).voltage_v * np.sqrt(np.mean(v0_v**2))
     assert scaled == pytest.approx(plain, rel=1e-12)
 
@@ -179,7 +179,7 @@ def test_the_plan_tells_what_the_run_then_does(bench: Bench) -> None:
 
 
 def test_a_plan_cannot_be_changed_and_prints_every_step() -> None:
-    plan = moving_scene(4, effects={"noise": {"snr_db": 60.0}, "mains": {}}).plan()
+    plan = compile_scene(moving_scene(4, effects={"noise": {"snr_db": 60.0}, "mains": {}})).plan
     assert isinstance(plan.steps, tuple)
     with pytest.raises(dataclasses.FrozenInstanceError):
         plan.steps = ()  # type: ignore[misc]
@@ -191,11 +191,11 @@ def test_a_plan_cannot_be_changed_and_prints_every_step() -> None:
 
 
 def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames() -> None:
-    frames = still_scene(1000).run()
+    frames = run_scene(still_scene(1000))
     assert frames.n_frames == 1000
     assert frames.meta["counters"]["factorisations_in_recorded_frames"] == 1
     assert frames.meta["counters"]["factorisations"] == 2
-    bare = still_scene(1000, touches=()).run()
+    bare = run_scene(still_scene(1000, touches=()))
     assert bare.meta["counters"]["factorisations"] == 1
 
 

@@ -19,12 +19,12 @@ PROBE = """
 import json, sys
 from dataclasses import replace
 from eitskin.scene.description import Scene
+from eitskin.scene.runner import run_scene
 from eitskin.scene.touch_path import always
 effects = json.loads(sys.argv[1])
 scene = Scene("probe", touches=(always(0, 0, 10),), frames=2, quiet_frames=1, elements=400,
               effects=effects)
-scene.plan()
-scene.run()
+run_scene(scene)
 prefix = "eitskin.scene.effects."
 loaded = sorted(m[len(prefix):] for m in sys.modules if m.startswith(prefix))
 print(json.dumps([loaded, sorted(sys.modules)]))

@@ -20,7 +20,7 @@ from eitskin.scene import session
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.effect import Cost, MaterialStep, Stage
 from eitskin.scene.registry import BUILT_IN, Registry
-from eitskin.scene.runner import run, simulate_frames
+from eitskin.scene.runner import run, run_scene, simulate_frames
 from eitskin.scene.session import Bench
 
 RANDOM = ("noise", "jitter", "channel_gain", "contact_impedance", "background", "charge_injection")
@@ -114,10 +114,10 @@ def test_without_random_effects_no_generator_is_made(monkeypatch: pytest.MonkeyP
         "mux": {},
     }
     for own in ({}, effects):
-        frames = moving_scene(4, effects=own).run()
+        frames = run_scene(moving_scene(4, effects=own))
         assert frames.meta["counters"]["random_generators"] == 0
     with pytest.raises(AssertionError, match="generator was made"):
-        moving_scene(4, effects={"noise": {"snr_db": 60.0}}).run()
+        run_scene(moving_scene(4, effects={"noise": {"snr_db": 60.0}}))
 
 
 def test_arithmetic_is_complex_only_with_phase(
