@@ -73,9 +73,9 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.calibration.fit import calibrate
     from eitskin.calibration.presses import find_presses, joined
     from eitskin.calibration.weights import load_weights
-    from eitskin.cli.cmd_model import load_or_prebuilt
     from eitskin.fileio import refuse_unwritable
     from eitskin.model.eitm import save_model
+    from eitskin.model.prebuilt import load_or_prebuilt
     from eitskin.solve.reconstructor import Reconstructor
 
     if len(options.recordings) != len(options.weights):

@@ -95,16 +95,6 @@ def add_parser(subparsers: Any) -> None:
     upload.set_defaults(run=run_upload)
 
 
-def load_or_prebuilt(path: Path | None) -> tuple[Model, bytes, str]:
-    """The model at ``path`` or the prebuilt one, its bytes, and its name for messages."""
-    from eitskin.model.eitm import load_model
-    from eitskin.model.prebuilt import load_prebuilt
-
-    if path is None:
-        return *load_prebuilt(), "prebuilt paper skin"
-    return *load_model(path), str(path)
-
-
 def run_build(options: argparse.Namespace) -> int:
     """Build and write a model."""
     from eitskin.fileio import refuse_unwritable
@@ -142,6 +132,8 @@ def run_build(options: argparse.Namespace) -> int:
 
 def run_info(options: argparse.Namespace) -> int:
     """Print what is in a model."""
+    from eitskin.model.prebuilt import load_or_prebuilt
+
     model, blob, name = load_or_prebuilt(options.model)
     _print_info(model, len(blob), name, options.json)
     return 0
@@ -199,6 +191,7 @@ def run_verify(options: argparse.Namespace) -> int:
     import numpy as np
 
     from eitskin.core.engine import CoreEngine
+    from eitskin.model.prebuilt import load_or_prebuilt
     from eitskin.solve.reconstructor import Reconstructor
 
     model, blob, name = load_or_prebuilt(options.model)

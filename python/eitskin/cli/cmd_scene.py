@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.progress import bar
 from eitskin.errors import FileError, UsageError
 
 SCENE_HELP = "a scene file, or a scene of the library (eitskin scene list)"
@@ -101,25 +102,15 @@ def _check_folder(path: Path) -> None:
         raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
 
 
-def solve_progress(states: range) -> Iterable[int]:
-    """A bar on stderr where that is a terminal; nothing otherwise."""
-    from tqdm import tqdm
-
-    shown: Iterable[int] = tqdm(
-        states, desc="solving", unit="", leave=False, disable=not sys.stderr.isatty()
-    )
-    return shown
-
-
 def scene_progress(done: Iterable[int], total: int) -> Iterable[int]:
     """A bar over ``total`` scenes that ``done`` numbers bring nearer."""
     from tqdm import tqdm
 
     with tqdm(
         total=total, desc="scenes", unit="", leave=False, disable=not sys.stderr.isatty()
-    ) as bar:
+    ) as shown:
         for scenes in done:
-            bar.update(scenes)
+            shown.update(scenes)
             yield scenes
 
 
@@ -132,7 +123,7 @@ def run_scene(options: argparse.Namespace) -> int:
 
     _check_folder(options.output)
     scene = find_scene(options.scene)
-    frames = run(compile_scene(scene), truth_pixels=options.truth_pixels, progress=solve_progress)
+    frames = run(compile_scene(scene), truth_pixels=options.truth_pixels, progress=bar("solving"))
     save_frames(options.output, frames)
     counters = frames.meta["counters"]
     if options.json:
@@ -181,7 +172,7 @@ def run_picture(options: argparse.Namespace) -> int:
     load_matplotlib()
     scene = find_scene(options.scene)
     draw_scene(
-        options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=solve_progress)
+        options.output, scene, run(compile_scene(scene), truth_pixels=0, progress=bar("solving"))
     )
     print(f"picture: {options.output}")
     return 0

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.cli.budget_options import add_wish, wished
+from eitskin.cli.budget_options import add_wish, named_wish
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.packets import Stream
     from eitskin.scoring.scene_truth import SceneTruth
+    from eitskin.tuning.front import Wish
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in, default), serial:/dev/ttyACM0, sim:SCENE (simulated),"
@@ -82,12 +83,6 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     )
     solver = parser.add_argument_group("solver")
     add_solver(solver)
-    solver.add_argument(
-        "--gap",
-        type=float,
-        metavar="REL",
-        help="stop once the duality gap is below this share of |y|^2 / 2",
-    )
     add_wish(solver)
     solver.add_argument(
         "--sign",
@@ -140,6 +135,12 @@ def add_solver(parser: Any) -> None:
         help="of FISTA, sweeps or rounds, at most (default: the model's)",
     )
     parser.add_argument(
+        "--gap",
+        type=float,
+        metavar="REL",
+        help="stop once the duality gap is below this share of |y|^2 / 2",
+    )
+    parser.add_argument(
         "--mac-limit",
         type=int,
         metavar="N",
@@ -147,14 +148,23 @@ def add_solver(parser: Any) -> None:
     )
 
 
-def check_solver(options: argparse.Namespace) -> None:
-    """Refuse what ``add_solver``'s options cannot be.
+def named_solver(options: argparse.Namespace) -> dict[str, Any]:
+    """What ``add_solver``'s options name, by the names of ``core.results.Options``.
 
     Raises:
         UsageError: a number is out of range.
     """
     whole("--iterations", options.iterations, 1, 1_000_000)
     whole("--mac-limit", options.mac_limit, 1, 2**32 - 1)
+    if options.gap is not None and not 0 < options.gap <= 1:
+        raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
+    values = {
+        "solver": options.solver,
+        "iterations": options.iterations,
+        "gap_rel": options.gap,
+        "mac_limit": options.mac_limit,
+    }
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
@@ -275,15 +285,13 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
     """
     from eitskin.device.settings import SolverSettings
 
-    check_solver(options)
-    if options.gap is not None and not 0 < options.gap <= 1:
-        raise UsageError(f"--gap {options.gap:g} is out of range; use above 0 to 1")
-    warm = True if options.warm else False if options.cold else None
     return SolverSettings(
-        options.iterations, options.gap, warm, options.sign, solver=options.solver,
-        mac_limit=options.mac_limit,
-        findings=read_ignored(options.ignore), track=False if options.no_track else None,
-    )  # fmt: skip
+        warm_start=True if options.warm else False if options.cold else None,
+        sign=options.sign,
+        findings=read_ignored(options.ignore),
+        track=False if options.no_track else None,
+        **named_solver(options),
+    )
 
 
 def read_ignored(text: str | None) -> int | None:
@@ -317,10 +325,7 @@ def check_scan(options: argparse.Namespace) -> None:
 
     read_scan(options)
     read_solver(options)
-    if wished(options):
-        from eitskin.cli.budget_options import read_wish
-
-        read_wish(options, "f767")
+    named_wish(options, "f767")
     if options.tare is not None:
         check_tare_frames(options.tare)
 
@@ -372,7 +377,10 @@ def prepare(
     if device.transport.replays:
         _refuse_settings(options, device.transport.name)
         return None
-    settings = _wished_solver(options, device, known) if wished(options) else read_solver(options)
+    wish = named_wish(options, "f767")
+    settings = (
+        read_solver(options) if wish is None else _wished_solver(options, wish, device, known)
+    )
     solver = set_up(device, read_scan(options), settings, known)
     recorder = None if record is None else RunRecorder(record, device, solver, overwrite=True)
     try:
@@ -404,7 +412,7 @@ def prepare(
 
 
 def _wished_solver(
-    options: argparse.Namespace, device: Device, known: KnownModel | None
+    options: argparse.Namespace, wish: Wish, device: Device, known: KnownModel | None
 ) -> SolverSettings:
     """The settings of the measured point that ``--budget`` and ``--accuracy`` choose for the
     board's model.
@@ -415,15 +423,15 @@ def _wished_solver(
     """
     from dataclasses import replace
 
-    from eitskin.cli.budget_options import chosen_point, settings_text
     from eitskin.device.known_model import need_model
     from eitskin.device.settings import SolverSettings
+    from eitskin.tuning.for_model import chosen_point, settings_text
     from eitskin.tuning.front import board_takes
 
     if known is None:
         known = need_model(device.board, options.model, device.transport.name, "a budget")
     named = read_solver(options)
-    point = chosen_point(options, known.model, named.applied(known.model), "f767", board_takes())
+    point = chosen_point(wish, known.model, named.applied(known.model), board_takes())
     say(settings_text(point, "f767"))
     kept = {
         name: value

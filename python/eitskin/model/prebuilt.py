@@ -8,9 +8,10 @@ and compares.
 from __future__ import annotations
 
 from importlib import resources
+from pathlib import Path
 
 from eitskin.errors import FileError
-from eitskin.model.eitm import decode_model
+from eitskin.model.eitm import decode_model, load_model
 from eitskin.model.model import Model
 
 NAME = "paper.eitm"
@@ -29,3 +30,15 @@ def load_prebuilt() -> tuple[Model, bytes]:
             f"the prebuilt model {NAME} is missing from this installation; install eitskin again"
         ) from None
     return decode_model(blob, f"the prebuilt model {NAME}"), blob
+
+
+def load_or_prebuilt(path: Path | None) -> tuple[Model, bytes, str]:
+    """The model in the file ``path``, or without one the prebuilt, with its bytes and its name for
+    messages.
+
+    Raises:
+        FileError, ModelError: as ``load_model``.
+    """
+    if path is None:
+        return *load_prebuilt(), "prebuilt paper skin"
+    return *load_model(path), str(path)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-
-from eitskin.errors import missing_extra
 
 GATE_MM = 10.0
 
@@ -45,25 +44,52 @@ def match(true_mm: npt.ArrayLike, found_mm: npt.ArrayLike, gate_mm: float = GATE
 
     One assignment problem does both: a pair beyond the gate costs more than all pairs within it
     could together, so that a pair is never given up for shorter distances elsewhere.
-
-    Raises:
-        MissingExtraError: scipy is absent.
     """
-    try:
-        from scipy.optimize import linear_sum_assignment
-    except ImportError:
-        raise missing_extra("model", "scipy") from None
     true = np.asarray(true_mm, dtype=np.float64).reshape(-1, 2)
     found = np.asarray(found_mm, dtype=np.float64).reshape(-1, 2)
     distance = np.sqrt(((true[:, None, :] - found[None, :, :]) ** 2).sum(axis=2))
     cost = np.where(distance <= gate_mm, distance, gate_mm * (min(distance.shape) + 1.0))
-    rows, columns = linear_sum_assignment(cost)
-    pairs = tuple(
-        (int(i), int(j)) for i, j in zip(rows, columns, strict=True) if distance[i, j] <= gate_mm
-    )
+    if len(true) > len(found):
+        assigned = sorted((i, j) for j, i in enumerate(assign(cost.T)))
+    else:
+        assigned = list(enumerate(assign(cost)))
+    pairs = tuple((i, j) for i, j in assigned if distance[i, j] <= gate_mm)
     return Matching(
         pairs,
         tuple(float(distance[pair]) for pair in pairs),
         len(true) - len(pairs),
         len(found) - len(pairs),
     )
+
+
+def assign(cost: npt.NDArray[np.float64]) -> list[int]:
+    """The column of each row of ``cost`` (k, l), k <= l, all different, with the least sum.
+
+    Shortest augmenting paths with potentials (R. Jonker and A. Volgenant, Computing 38 (1987)
+    325-340, doi 10.1007/BF02278710).
+    """
+    columns = range(cost.shape[1])
+    values: list[list[float]] = cost.tolist()
+    of_row, of_column = [0.0] * len(values), [0.0] * len(columns)  # potentials
+    row_at = [-1] * len(columns)  # which row a column is assigned to
+    for start in range(len(values)):
+        least, before = [math.inf] * len(columns), [-1] * len(columns)
+        done: list[int] = []
+        reached, last = 0.0, -1
+        while last < 0 or row_at[last] >= 0:
+            row = start if last < 0 else row_at[last]
+            for k in columns:
+                through = reached + values[row][k] - of_row[row] - of_column[k]
+                if k not in done and through < least[k]:
+                    least[k], before[k] = through, last
+            last = min((k for k in columns if k not in done), key=least.__getitem__)
+            reached = least[last]
+            done.append(last)
+        of_row[start] += reached
+        for k in done[:-1]:
+            of_row[row_at[k]] += reached - least[k]
+            of_column[k] -= reached - least[k]
+        while last >= 0:
+            row_at[last] = start if before[last] < 0 else row_at[before[last]]
+            last = before[last]
+    return sorted(columns, key=lambda k: (row_at[k] < 0, row_at[k]))[: len(values)]

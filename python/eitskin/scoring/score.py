@@ -24,14 +24,21 @@ WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 class FrameScore:
     """One frame against its truth.
 
-    ``miou_image``: MIoU of the mask x > t max(x), t the model's own, image interpolated bilinearly.
-        ``miou_touches``: MIoU
-    of the touches as discs. ``matching`` of touch centres with the true ones.
+    Attributes:
+        miou_image: MIoU of the mask x > t max(x), t the model's own, interpolated bilinearly.
+        miou_touches: MIoU of the touches as discs.
+        matching: of touch centres with the true ones.
     """
 
     miou_image: float
     miou_touches: float
     matching: Matching
+
+    @property
+    def errors_mm(self) -> dict[int, float]:
+        """Position error of each found touch that has a true one."""
+        found = (k for _, k in self.matching.pairs)
+        return dict(zip(found, self.matching.distances_mm, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +52,7 @@ class Scorer:
     def score(
         self, frames: Frames, number: int, result: Reconstruction, sign: str
     ) -> FrameScore | None:
-        """Frame ``number`` of ``frames``; None where no truth of the wanted ``sign`` is known.
-
-        Raises:
-            MissingExtraError: scipy is not installed.
-        """
+        """Frame ``number`` of ``frames``; None where no truth of the wanted ``sign`` is known."""
         wanted = WANTED_SIGNS[sign]
         truth = self._truth(frames, number, wanted)
         if truth is None:

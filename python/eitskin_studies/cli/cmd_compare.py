@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.progress import bar
 from eitskin.errors import FileError, UsageError
 
 
@@ -138,9 +138,4 @@ def _check(options: argparse.Namespace) -> None:
 
 def progress(items: Sequence[Any], what: str) -> Iterable[Any]:
     """A bar on stderr where that is a terminal; nothing otherwise."""
-    from tqdm import tqdm
-
-    shown: Iterable[Any] = tqdm(
-        items, desc=what, unit="", leave=False, disable=not sys.stderr.isatty()
-    )
-    return shown
+    return bar(what)(items)

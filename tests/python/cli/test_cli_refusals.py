@@ -482,7 +482,7 @@ def test_missing_extras_are_named_with_the_command_to_install_them(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_scipy_frames_are_reconstructed_but_not_scored(
+def test_without_scipy_frames_are_reconstructed_and_scored(
     frames_file: Path, tmp_path: Path
 ) -> None:
     output = tmp_path / "out.npz"
@@ -490,11 +490,8 @@ def test_without_scipy_frames_are_reconstructed_but_not_scored(
         without("scipy", "netgen", "matplotlib") + MAIN, "reconstruct", frames_file, "-o", output
     )
     assert done.returncode == 0
-    assert "20 frames, 0 refused" in done.stdout and "against the truth" not in done.stdout
-    assert (
-        done.stderr.startswith("eitskin: warning: not held against the truth")
-        and done.stderr.count("\n") == 1
-    )
+    assert "20 frames, 0 refused" in done.stdout and done.stderr == ""
+    assert "against the truth of 20 frames" in done.stdout
     assert output.exists()
 
 

@@ -1,0 +1,384 @@
+"""Recorded frames to touches and images, step by step:
+
+    read -> choose the model -> take the reference -> solve -> score against the truth -> write
+
+:func:`reconstruct_frames` does these; :func:`to_text` and :func:`to_json` say what came of it.
+``eitskin reconstruct`` is this module with options.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from eitskin.config import nearest
+from eitskin.core.findings import plural
+from eitskin.core.results import NEWTONS_PER_GRAM, Baseline, Reconstruction, solve_text
+from eitskin.errors import ConfigError, EitskinError, FrameError, UsageError
+from eitskin.fileio import refuse_unwritable
+from eitskin.frames.frames import Frames, load_frames
+from eitskin.model.model import Model
+from eitskin.model.prebuilt import load_or_prebuilt
+from eitskin.solve.batch import Batch, check_threads
+from eitskin.solve.options import tracking
+from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
+
+if TYPE_CHECKING:
+    from eitskin.scoring.score import FrameScore
+    from eitskin.tuning.front import Point, Wish
+
+Results = dict[int, Reconstruction]
+Progress = Callable[[Iterable[Any], int], Iterable[Any]]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How frames are reconstructed.
+
+    Attributes:
+        model: an .eitm file; None: the prebuilt model of the paper's skin.
+        engine: "c", "c64" or "numpy".
+        changes: options of the solver by name (``core.results.Options``).
+        wish: a budget or an accuracy, whose measured settings are taken; or None.
+        track: the frames are a stream: touches are followed as a board does.
+        threads: frames side by side, the same results; 1 with a warm start, tracking or numpy.
+        only: names of the frames to reconstruct; None: all.
+    """
+
+    model: Path | None = None
+    engine: str = "c"
+    changes: dict[str, Any] = field(default_factory=dict)
+    wish: Wish | None = None
+    track: bool = False
+    threads: int = 1
+    only: tuple[str, ...] | None = None
+
+    @property
+    def follows(self) -> bool:
+        """Whether a frame's result depends on the frames before."""
+        return self.track or bool(self.changes.get("warm_start"))
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of the frames.
+
+    Attributes:
+        frames, model, model_name, engine: what was reconstructed, with what.
+        point: the measured point that a budget chose; or None.
+        reference: as learned from the untouched frames.
+        results, refused: by the frame's number: the result, or why there is none.
+        scores: by number, where the frames carry the truth.
+        notes: what a user should know, a line each.
+    """
+
+    frames: Frames
+    model: Model
+    model_name: str
+    engine: str
+    point: Point | None
+    reference: Baseline
+    results: Results
+    refused: dict[int, str]
+    scores: dict[int, FrameScore]
+    notes: tuple[str, ...]
+
+
+def reconstruct_frames(
+    path: Path,
+    settings: Settings | None = None,
+    *,
+    output: Path | None = None,
+    picture: Path | None = None,
+    progress: Progress = lambda frames, _: frames,
+) -> Outcome:
+    """Reconstruct the frames of the file ``path``; those that cannot be used are named in
+    ``refused``, and the others are still done. Images, touches and info go into the file ``output``
+    (.npz), a ``picture`` shows all frames.
+
+    Raises:
+        FileError, FrameError, ModelError, ProtocolError, UsageError: a file, an option or the
+            reference cannot be used.
+        MissingExtraError: the picture needs matplotlib.
+    """
+    how = settings or Settings()
+    check(how, output, picture)
+    notes: list[str] = []
+    frames, chosen = read(path, how.only)
+    reconstructor, blob, name = choose_model(path, frames, how)
+    point = apply_options(reconstructor, how, notes)
+    reference = take_reference(path, reconstructor, frames, notes)
+    results, refused = solve(reconstructor, blob, frames, chosen, how, progress)
+    scores = score(reconstructor.model, frames, results, reconstructor.options.sign, point, notes)
+    outcome = Outcome(
+        frames, reconstructor.model, name, how.engine, point, reference, results, refused, scores,
+        tuple(notes),
+    )  # fmt: skip
+    write(outcome, output, picture)
+    return outcome
+
+
+def check(how: Settings, output: Path | None, picture: Path | None) -> None:
+    """Refuse what cannot be, before any file is read."""
+    if check_threads(how.threads) > 1:
+        reasons = {
+            "--warm starts each frame from the last one": how.changes.get("warm_start"),
+            "--track needs one frame after another": how.track,
+            "the numpy engine has one": how.engine == "numpy",
+        }
+        for reason, applies in reasons.items():
+            if applies:
+                raise UsageError(f"--threads {how.threads}: {reason}; use --threads 1")
+    if how.wish is not None and how.engine != "c":
+        raise UsageError(
+            "--budget and --accuracy are of the C core in float32; leave  --engine"
+            f" {how.engine}  out"
+        )
+    refuse_unwritable(output, picture)
+    if picture is not None:
+        from eitskin.view.pictures import load_matplotlib
+
+        load_matplotlib()
+
+
+def read(path: Path, only: tuple[str, ...] | None) -> tuple[Frames, list[int]]:
+    """The frames, and the numbers of those that are named in ``only``."""
+    frames = load_frames(path, allow_nonfinite=True)
+    if not frames.n_frames:
+        raise FrameError(f"{path}: holds a reference but no frame; nothing to reconstruct")
+    for name in only or ():
+        if name not in frames.frame_name:
+            raise UsageError(
+                f"--only {','.join(only or ())}: no frame is named {name!r};"
+                f" {nearest(name, frames.frame_name)}"
+            )
+    names = frames.frame_name if only is None else only
+    return frames, [k for k, name in enumerate(frames.frame_name) if name in names]
+
+
+def choose_model(path: Path, frames: Frames, how: Settings) -> tuple[Reconstructor, bytes, str]:
+    """The model that fits the frames, its bytes and name."""
+    model, blob, name = load_or_prebuilt(how.model)
+    reconstructor = Reconstructor(model, engine=how.engine, blob=blob)
+    try:
+        reconstructor.check_protocol(frames.protocol)
+    except EitskinError as error:
+        raise type(error)(f"{path} and {name}: {error}") from None
+    return reconstructor, blob, name
+
+
+def apply_options(reconstructor: Reconstructor, how: Settings, notes: list[str]) -> Point | None:
+    """Give the solver its options; with a wish those of the measured point that fulfils it."""
+    reconstructor.with_options(**how.changes)
+    if how.track:
+        reconstructor.set_options(tracking(reconstructor.options))
+    if how.wish is None:
+        return None
+    from eitskin.tuning.for_model import chosen_point, settings_text
+
+    point = chosen_point(how.wish, reconstructor.model, reconstructor.options)
+    reconstructor.with_options(**point.configuration.solver_settings)
+    notes.append(settings_text(point, how.wish.board))
+    return point
+
+
+def take_reference(
+    path: Path, reconstructor: Reconstructor, frames: Frames, notes: list[str]
+) -> Baseline:
+    """Learn the reference from the untouched frames."""
+    try:
+        reference = reconstructor.tare(frames.reference_voltage_v)
+    except FrameError as error:
+        raise FrameError(f"{path}: {error}; run  eitskin doctor {path}") from None
+    if reference.correlation < MIN_CORRELATION:
+        notes.append(
+            f"warning: the reference correlates with the model by {reference.correlation:.3f}"
+            f" only; run  eitskin doctor {path}"
+        )
+    if reference.glitches:
+        notes.append(
+            f"{plural(reference.glitches, 'reading')} of the quiet frames left out as glitches"
+        )
+    return reference
+
+
+def solve(
+    reconstructor: Reconstructor,
+    blob: bytes,
+    frames: Frames,
+    chosen: list[int],
+    how: Settings,
+    progress: Progress,
+) -> tuple[Results, dict[int, str]]:
+    """The results of the ``chosen`` frames, and why there is none, by number."""
+    if how.threads > 1:
+        batch = Batch(
+            reconstructor.model,
+            threads=how.threads,
+            engine=how.engine,
+            options=reconstructor.options,
+            blob=blob,
+        )
+        batch.tare(frames.reference_voltage_v)
+        solved = batch.each(frames.voltage_v[chosen])
+    else:
+        solved = _one_by_one(reconstructor, frames.voltage_v[chosen], how.follows)
+    results: Results = {}
+    refused: dict[int, str] = {}
+    for number, result in zip(chosen, progress(solved, len(chosen)), strict=True):
+        if isinstance(result, FrameError):
+            refused[number] = str(result)
+        else:
+            results[number] = result
+    return results, refused
+
+
+def _one_by_one(
+    reconstructor: Reconstructor, frames_v: Any, follows: bool
+) -> Iterator[Reconstruction | FrameError]:
+    for frame_v in frames_v:
+        if not follows:
+            reconstructor.forget()
+        try:
+            yield reconstructor.reconstruct(frame_v)
+        except FrameError as error:
+            yield error
+
+
+def score(
+    model: Model,
+    frames: Frames,
+    results: Results,
+    sign: str,
+    point: Point | None,
+    notes: list[str],
+) -> dict[int, FrameScore]:
+    """The results against the truth, where the frames carry it."""
+    if frames.touch_frame is None and frames.truth_mask is None:
+        return {}
+    from eitskin.scoring.score import scorer_for
+
+    if point is not None:
+        model = replace(model, defaults=replace(model.defaults, mask_threshold=point.threshold))
+    try:
+        scorer = scorer_for(model)
+    except ConfigError as error:
+        notes.append(f"warning: not compared with the truth in the frames: {error}")
+        return {}
+    scored = {k: scorer.score(frames, k, result, sign) for k, result in results.items()}
+    return {k: one for k, one in scored.items() if one is not None}
+
+
+def write(outcome: Outcome, output: Path | None, picture: Path | None) -> None:
+    """The file of results and the picture, where there is something to show."""
+    if output is not None and outcome.results:
+        from eitskin.frames.results_file import save_results
+
+        save_results(output, outcome.model, outcome.frames, outcome.results)
+    if picture is not None and outcome.results:
+        from eitskin.view.frame_pictures import draw_results
+
+        draw_results(picture, outcome.model, outcome.frames, outcome.results, outcome.scores)
+
+
+def to_text(outcome: Outcome) -> str:
+    """A table of the touches, then what they cost and how true they are."""
+    results, scores = outcome.results, outcome.scores
+    weighed = any(touch.load_n for result in results.values() for touch in result.touches)
+    lines = [
+        f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'    load g' * weighed}  "
+        " error mm  solve"
+    ]
+    for number, result in results.items():
+        lines += _lines(outcome.frames.frame_name[number][:11], result, scores.get(number), weighed)
+    macs = [result.info.macs + result.info.touch_macs for result in results.values()]
+    cost = f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""
+    lines.append(f"{len(results)} frames, {len(outcome.refused)} refused{cost}")
+    if scores:
+        facts = summary(scores)
+        lines.append(
+            f"against the truth of {facts['frames']} frames: {facts['found']} of {facts['true']}"
+            f" touches found, {facts['false']} false; position error median"
+            f" {facts['position_median_mm']:.2f} mm, worst {facts['position_worst_mm']:.2f} mm;"
+            f" MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
+        )
+    return "\n".join(lines)
+
+
+def _lines(
+    label: str, result: Reconstruction, score: FrameScore | None, weighed: bool
+) -> Iterator[str]:
+    """A line a touch of one frame; a line where there is none, and one for what was found wrong."""
+    info = result.info
+    cost = solve_text(
+        info.iterations,
+        info.stop,
+        info.gap_rel,
+        info.macs + info.touch_macs,
+        info.solve_us + info.touch_us,
+    )
+    if not result.touches:
+        why = "no change above the noise" if info.stop == "gate" else info.stop
+        yield f"{label:11} none ({why}); {cost}"
+    errors = {} if score is None else score.errors_mm
+    for k, touch in enumerate(result.touches):
+        error = 10 * " " if score is None else f"{errors[k]:10.2f}" if k in errors else "     false"
+        grams = f"{touch.load_n / NEWTONS_PER_GRAM:10.1f}" if weighed else ""
+        yield (
+            f"{'' if k else label:11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f}"
+            f" {touch.radius_mm:9.2f} {touch.strength_s_per_m_mm2:16.3f}{grams}  {error}"
+            f"{'' if k else f'  {cost}'}".rstrip()
+        )
+    if info.findings:
+        yield f"{'':11} found: {'; '.join(info.found)}"
+
+
+def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
+    """The scores of all frames in a few numbers; positions are NaN where nothing was found."""
+    matchings = [score.matching for score in scores.values()]
+    distances = [d for matching in matchings for d in matching.distances_mm]
+    hits = sum(matching.hits for matching in matchings)
+    return {
+        "frames": len(scores),
+        "found": hits,
+        "true": hits + sum(matching.misses for matching in matchings),
+        "false": sum(matching.false_touches for matching in matchings),
+        "position_median_mm": float(np.median(distances)) if distances else float("nan"),
+        "position_worst_mm": float(np.max(distances)) if distances else float("nan"),
+        "miou_image": float(np.mean([score.miou_image for score in scores.values()])),
+        "miou_touches": float(np.mean([score.miou_touches for score in scores.values()])),
+    }
+
+
+def to_json(outcome: Outcome) -> dict[str, Any]:
+    """Everything that the text says, and more, for programs."""
+    listed = []
+    for number in sorted({*outcome.results, *outcome.refused}):
+        entry: dict[str, Any] = {"frame": number, "name": outcome.frames.frame_name[number]}
+        if number in outcome.refused:
+            entry["refused"] = outcome.refused[number]
+        else:
+            result = outcome.results[number]
+            entry["touches"] = [asdict(touch) for touch in result.touches]
+            entry["info"] = result.info.as_dict()
+        if number in outcome.scores:
+            score = outcome.scores[number]
+            entry["miou_image"], entry["miou_touches"] = score.miou_image, score.miou_touches
+            entry["position_errors_mm"] = list(score.matching.distances_mm)
+        listed.append(entry)
+    whole: dict[str, Any] = {
+        "model": outcome.model_name,
+        "engine": outcome.engine,
+        "frames": listed,
+    }
+    if outcome.point is not None:
+        settings = outcome.point.configuration.as_dict()
+        whole["settings"] = settings | {"mask_threshold": outcome.point.threshold}
+    if outcome.scores:
+        facts = summary(outcome.scores)
+        whole["summary"] = {k: None if value != value else value for k, value in facts.items()}
+    return whole
