@@ -306,8 +306,11 @@ def test_the_whole_way(done: Done, tmp_path: Path) -> None:
     assert load_frames(frames_path).n_frames == 12
 
 
-def test_the_demo(done: Done, tmp_path: Path) -> None:
-    facts = json.loads(done("demo", "--picture", tmp_path / "demo.png", "--json"))
+def test_the_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "--picture", str(tmp_path / "demo.png"), "--json"]) == 0
+    out, err = capsys.readouterr()
+    facts = json.loads(out)
+    assert [line[:4] for line in err.splitlines()] == ["1/4 ", "2/4 ", "3/4 ", "4/4 "]
     assert (facts["hits"], facts["false"]) == (3, 0)
     assert max(facts["position_errors_mm"]) < 1
     assert (tmp_path / "demo.png").read_bytes()[:8] == PNG

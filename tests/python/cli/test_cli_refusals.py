@@ -477,8 +477,9 @@ def test_missing_extras_are_named_with_the_command_to_install_them(
     given = [{"OUT": tmp_path / "out", "FRAMES": frames_file}.get(a, a) for a in arguments]
     done = run_python(without(package) + MAIN, *given)
     assert (done.returncode, done.stdout) == (EXTRA, "")
-    assert done.stderr.startswith("eitskin: ") and done.stderr.count("\n") == 1
-    assert package in done.stderr and done.stderr.endswith(f"run  pip install 'eitskin[{extra}]'\n")
+    said = [line for line in done.stderr.splitlines() if line[:2] != "1/"]  # the demo's first step
+    assert len(said) == 1 and said[0].startswith("eitskin: ") and package in said[0]
+    assert done.stderr.endswith(f"run  pip install 'eitskin[{extra}]'\n")
     assert list(tmp_path.iterdir()) == []
 
 
