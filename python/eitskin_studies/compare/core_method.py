@@ -12,7 +12,7 @@ from eitskin.model.build import BuildSettings, make_model
 from eitskin.scoring.metrics import pixel_cover
 from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.compare.methods import Family, Setup
+from eitskin_studies.compare.families import Family, Setup
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -1,122 +1,20 @@
-"""What can be compared: a method makes images of difference frames; a family is a method and its
-one parameter.
-
-A method needs ``name`` and ``reconstruct``. Two things are optional: ``learn`` is given the quiet
-frames of a session before its difference frames, and ``touches`` finds positions by itself, where
-others have theirs read off the image.
-"""
+"""The methods that are compared: baselines, the C core, and those of other packages."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from importlib.metadata import entry_points
 
-import numpy as np
-import numpy.typing as npt
-
-from eitskin.fem.cem import ForwardModel
-from eitskin.fem.fields import electrode_fields
-from eitskin.fem.grid import Grid, grid_for
-from eitskin.fem.mesh import mesh_for_elements
-from eitskin.fem.sensitivity import sensitivity
-from eitskin.model.build import Linearisation
-from eitskin.skin.protocol import Protocol as Scan
-from eitskin.skin.skin import Skin
+from eitskin.errors import UsageError
+from eitskin.fem.grid import Grid
 from eitskin_studies.compare import baselines
+from eitskin_studies.compare.core_method import core_methods
+from eitskin_studies.compare.families import Family, FloatArray, Setup
 from eitskin_studies.compare.greit import train_greit
 
-FloatArray = npt.NDArray[np.float64]
-
+ENTRY_POINT_GROUP = "eitskin.methods"
 STRENGTHS = (1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2)
 STEPS = (5, 10, 20, 30, 50, 80, 120, 200)
 RATIOS = (1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-
-
-class Method(Protocol):
-    """A reconstruction under comparison."""
-
-    @property
-    def name(self) -> str:
-        """What the table calls it."""
-
-    def reconstruct(self, dv: FloatArray) -> FloatArray:
-        """Images (k, n) of difference frames (k, m) in V."""
-
-
-@runtime_checkable
-class Learns(Protocol):
-    """A method that wants to see the untouched skin first."""
-
-    def learn(self, quiet_v: FloatArray) -> None:
-        """Quiet frames (q, m) in V of the session whose difference frames (to their mean) come
-        next."""
-
-
-@runtime_checkable
-class FindsTouches(Protocol):
-    """A method that reports positions itself."""
-
-    def touches(self, dv: FloatArray) -> Sequence[FloatArray]:
-        """For each difference frame the positions (t, 2) in mm that it finds."""
-
-
-@dataclass(frozen=True)
-class Family:
-    """A method with one parameter, to be chosen on training scenes.
-
-    Attributes:
-        parameter: what it is, for the table; "" where there is none.
-        values: those that are tried.
-        make: the method at a value.
-    """
-
-    parameter: str
-    values: tuple[float, ...]
-    make: Callable[[float], Method]
-
-
-@dataclass(frozen=True, eq=False)
-class Setup:
-    """What methods are built from.
-
-    Attributes:
-        skin, protocol, grid: what is reconstructed.
-        jacobian: (m, n) in V per (S/m) at the skin's own conductivity.
-        voltages_v: (m,) of the untouched skin.
-        electrode_fields: (n, 2, L) in V/m per A of each electrode's current in it.
-        mesh_nodes, mesh_elements: size of the mesh that both were computed on.
-    """
-
-    skin: Skin
-    protocol: Scan
-    grid: Grid
-    jacobian: FloatArray
-    voltages_v: FloatArray
-    electrode_fields: FloatArray
-    mesh_nodes: int
-    mesh_elements: int
-
-    @property
-    def linearisation(self) -> Linearisation:
-        """What a model is made of."""
-        return Linearisation(
-            self.grid, self.jacobian, self.voltages_v, self.mesh_elements, self.electrode_fields
-        )
-
-
-def setup_for(skin: Skin, protocol: Scan, *, elements: int, pixels_across: int = 32) -> Setup:
-    """Mesh, forward model, Jacobian.
-
-    Raises:
-        UsageError, GeometryError, ProtocolError, MissingExtraError: from those.
-    """
-    grid = grid_for(skin.outline, pixels_across)
-    mesh = mesh_for_elements(skin, elements)
-    forward = ForwardModel(mesh, skin, protocol)
-    jacobian, voltages = sensitivity(forward, skin.conductivity_s_per_m, grid)
-    fields = electrode_fields(forward, skin.conductivity_s_per_m, grid)
-    return Setup(skin, protocol, grid, jacobian, voltages, fields, mesh.n_nodes, mesh.n_elements)
 
 
 def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
@@ -124,11 +22,29 @@ def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     ``threads``.
 
     Raises:
-        UsageError: the C core is not built.
+        UsageError: the C core is not built, or a method of another package cannot be made.
     """
-    from eitskin_studies.compare.core_method import core_methods
+    classic = baseline_methods(setup.jacobian, setup.grid)
+    return (*classic, *own_methods(setup), *core_methods(setup, threads))
 
-    return (*baseline_methods(setup.jacobian, setup.grid), *core_methods(setup, threads))
+
+def own_methods(setup: Setup) -> tuple[Family, ...]:
+    """The families of other packages, by the names of their entry points
+    (docs/guide/own-method.md).
+
+    Raises:
+        UsageError: one cannot be loaded or made, or is no family.
+    """
+    families = []
+    for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
+        try:
+            family = entry.load()(setup)
+        except Exception as error:
+            raise UsageError(f"method {entry.name!r} ({entry.value}): {error}") from error
+        if not isinstance(family, Family):
+            raise UsageError(f"method {entry.name!r} ({entry.value}): returned no Family")
+        families.append(family)
+    return tuple(families)
 
 
 def baseline_methods(jacobian: FloatArray, grid: Grid) -> tuple[Family, ...]:

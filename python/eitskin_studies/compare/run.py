@@ -25,15 +25,8 @@ from eitskin.scoring.image_touches import best_touch_threshold, match_all, touch
 from eitskin.scoring.matching import GATE_MM, Matching
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin_studies.compare.methods import (
-    Family,
-    FindsTouches,
-    Learns,
-    Method,
-    Setup,
-    methods,
-    setup_for,
-)
+from eitskin_studies.compare.families import Family, FindsTouches, Learns, Method, Setup, setup_for
+from eitskin_studies.compare.methods import methods
 from eitskin_studies.harness.summary import Summary, summarise
 
 FloatArray = npt.NDArray[np.float64]
@@ -257,7 +250,7 @@ def _run(
     best: tuple[float, float, Method, FloatArray, FloatArray] | None = None
     for value in family.values:
         method = family.make(value)
-        images = _images(method, train)
+        images = _images(method, train, setup.grid.n_pixels)
         curves = judge.curves(images, train.truths)
         score = float(curves.mean(axis=0).max())
         if best is None or score > best[0] + 1e-12:
@@ -273,7 +266,7 @@ def _run(
         touch_threshold = best_touch_threshold(
             train_images, train.centres_mm, index, centres, TOUCH_THRESHOLDS, gate_mm=gate_mm
         )
-    images = _images(method, test)
+    images = _images(method, test, setup.grid.n_pixels)
     if isinstance(method, FindsTouches):
         found = tuple(
             np.asarray(xy, dtype=np.float64).reshape(-1, 2) for xy in method.touches(test.dv)
@@ -297,7 +290,13 @@ def _run(
     )
 
 
-def _images(method: Method, session: _Session) -> FloatArray:
+def _images(method: Method, session: _Session, n_pixels: int) -> FloatArray:
     if isinstance(method, Learns):
         method.learn(session.simulated.quiet_v)
-    return np.asarray(method.reconstruct(session.dv), dtype=np.float64)
+    images = np.asarray(method.reconstruct(session.dv), dtype=np.float64)
+    if images.shape != (len(session.dv), n_pixels) or not np.isfinite(images).all():
+        raise UsageError(
+            f"{method.name}: made images {images.shape} of {len(session.dv)} frames; they must be"
+            f" finite, one value for each of {n_pixels} pixels"
+        )
+    return images

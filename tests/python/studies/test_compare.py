@@ -21,7 +21,8 @@ from eitskin.scoring import metrics
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.compare import baselines
-from eitskin_studies.compare.methods import Family, FindsTouches, Learns, Setup, baseline_methods
+from eitskin_studies.compare.families import Family, FindsTouches, Learns, Setup
+from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.compare.run import Comparison, Settings, compare, truth_masks
 from eitskin_studies.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
 

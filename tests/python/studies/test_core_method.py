@@ -16,7 +16,8 @@ from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.compare.core_method import core_methods
-from eitskin_studies.compare.methods import FindsTouches, Learns, Setup, methods, setup_for
+from eitskin_studies.compare.families import FindsTouches, Learns, Setup, setup_for
+from eitskin_studies.compare.methods import methods
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
 PLACES = [(30.0, 20.0), (-45.0, 10.0)]

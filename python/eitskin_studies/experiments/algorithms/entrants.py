@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from eitskin_studies.compare import baselines
 from eitskin_studies.compare.core_method import CoreMethod, core_methods
+from eitskin_studies.compare.families import Family, Method, Setup
 from eitskin_studies.compare.greit import GreitTraining, train_greit
-from eitskin_studies.compare.methods import RATIOS, STEPS, STRENGTHS, Family, Method, Setup
+from eitskin_studies.compare.methods import RATIOS, STEPS, STRENGTHS
 
 FloatArray = npt.NDArray[np.float64]
 

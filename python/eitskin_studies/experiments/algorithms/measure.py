@@ -15,7 +15,7 @@ from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import match_all, touches_in_image
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin_studies.compare.methods import FindsTouches, Learns, Method, Setup, setup_for
+from eitskin_studies.compare.families import FindsTouches, Learns, Method, Setup, setup_for
 from eitskin_studies.experiments.algorithms.entrants import Entrant, macs_of
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Desk

@@ -14,7 +14,8 @@ from eitskin.model.model import Model
 from eitskin.scene.random_touches import TouchSet
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.compare.methods import Family, Method, Setup, baseline_methods, setup_for
+from eitskin_studies.compare.families import Family, Method, Setup, setup_for
+from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk, plain
 from eitskin_studies.experiments.multitouch.cells import Cell, draw, mixed_cells
 from eitskin_studies.experiments.multitouch.variants import (

@@ -16,7 +16,7 @@ from eitskin.model.model import Model
 from eitskin.scoring.image_touches import best_touch_threshold, match_all, touches_in_image
 from eitskin.solve.batch import Batch
 from eitskin.solve.options import default_options
-from eitskin_studies.compare.methods import Family, Method
+from eitskin_studies.compare.families import Family, Method
 from eitskin_studies.harness.sessions import Measured
 
 FloatArray = npt.NDArray[np.float64]

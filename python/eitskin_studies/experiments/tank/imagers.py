@@ -19,7 +19,8 @@ from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import Protocol as Scan
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.compare.methods import Family, Method, baseline_methods
+from eitskin_studies.compare.families import Family, Method
+from eitskin_studies.compare.methods import baseline_methods
 
 FloatArray = npt.NDArray[np.float64]
 
