@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
 
-from cross_build import ROOT, build_cortex_m7
+from cross_build import shared_build
 from margins import (  # noqa: F401
     margins,
     pytest_addoption,
@@ -16,6 +17,18 @@ from margins import (  # noqa: F401
     pytest_terminal_summary,
     pytest_unconfigure,
 )
+
+LONG = Path(__file__).with_name("long_tests.txt")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what ``long_tests.txt`` lists."""
+    lines = LONG.read_text(encoding="utf-8").splitlines()
+    patterns = [line for line in lines if line and not line.startswith("#")]
+    for item in items:
+        name = item.nodeid.rpartition("tests/python/")[2].replace("[", "(").replace("]", ")")
+        if any(fnmatch(name, pattern) for pattern in patterns):
+            item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +44,7 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def cortex_m7(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def cortex_m7() -> Path:
     """A build of everything for the Cortex-M7: ``firmware/eitskin_BOARD.elf``, ``.bin`` and
     ``.map``, ``tests/emulated``."""
-    return build_cortex_m7(ROOT, tmp_path_factory.mktemp("cortex-m7"))
+    return shared_build()

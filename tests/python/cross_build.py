@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import fcntl
 from pathlib import Path
 
 from eitskin_studies.harness.emulated import build_cortex_m7
 
-__all__ = ["ROOT", "build_cortex_m7"]
+__all__ = ["ROOT", "build_cortex_m7", "shared_build"]
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+def shared_build() -> Path:
+    """``build/cortex-m7`` brought up to date: one for all tests, whichever process asks first."""
+    (ROOT / "build").mkdir(exist_ok=True)
+    with (ROOT / "build" / "cortex-m7.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return build_cortex_m7(ROOT, ROOT / "build" / "cortex-m7")

@@ -1,212 +1,168 @@
-"""Change the core one mistake at a time (mutations.py) and see whether the C tests notice.
+"""Put small mistakes into the sources, one at a time, and see whether the tests notice.
 
-    python tests/tools/mutate.py [--only WORD] [--workers COUNT]
+    python tests/tools/mutate.py [--sample COUNT] [--python COUNT] [--only WORD] [--workers COUNT]
 
-Each worker has a copy of the sources in a temporary folder, where what a mutation changes is built
-anew and the C tests run, the likeliest first, until one fails, crashes or does not end. A test that
-fails is run on the unchanged sources too. Ends with 1 where a mutation survives, does not compile,
-or no longer fits the sources.
+Mistakes are made from the syntax (mutants.py): of all of them a sample, the same in every run, over
+the core and the firmware (tried by the C tests) and over the Python package (by the tests of what
+is changed). Beside these, a few picked by hand (mistakes.toml). A mutant that compiles to the same
+object is none. One that no test notices must be judged in survivors.toml. Ends with 1 where less
+than 95 % of the others are noticed, where a mistake picked by hand is not, or where a judgement or
+mistake fits no source any more.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
-import shutil
-import signal
-import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
-from mutation import Mutation
-from mutations import MUTATIONS
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
-ROOT = Path(__file__).resolve().parents[2]
-COPIED = (
-    "CMakeLists.txt",
-    "cmake",
-    "csrc",
-    "firmware",
-    "tests/c",
-    "tests/fuzz",
-    "tests/firmware",
-    "tests/soak",
-)
-SOURCES = Path("csrc") / "src"
-MOST_CPU_SECONDS = 12
-SLOW_LAST = ("solve_state", "solve", "touch", "working_set", "exact", "mac_limit", "model_values")
+import mutate_c
+import mutate_python
+from mutants import ROOT, Mutant, mutants_of
+
+TOOLS = Path(__file__).resolve().parent
+LEAST_KILL_PERCENT = 95.0
+NO_MUTANT = ("refused", "same")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a mutation: the test that noticed, and how; or what is wrong with it."""
+    """What became of a mutant; ``noticed`` is empty where it survived."""
 
-    mutation: Mutation
-    noticed: str = ""
-    wrong: str = ""
-
-    def __str__(self) -> str:
-        return f"{self.mutation.file:16s} {self.mutation.name:58s} {self.noticed or self.wrong}"
+    mutant: Mutant
+    noticed: str
 
 
-@dataclass
-class Tree:
-    """A copy of the sources with its build. ``sound``: tests that pass on the unchanged sources."""
+def all_mutants(files: Iterable[str], only: str) -> list[Mutant]:
+    """Of these sources, in the order in which samples take them."""
+    found = [mutant for file in files for mutant in mutants_of(file)]
+    return sorted((m for m in found if only in f"{m}"), key=lambda mutant: mutant.place)
 
-    root: Path
-    sound: set[str] = field(default_factory=set)
 
-    @property
-    def build(self) -> Path:
-        return self.root / "build"
+def read_judged() -> set[tuple[str, str, str, str]]:
+    """The keys in survivors.toml."""
+    rows = tomllib.loads((TOOLS / "survivors.toml").read_text()).get("survivor", [])
+    return {(row["file"], row["function"], row["before"], row["after"]) for row in rows}
 
-    def make(self) -> None:
-        """Copy and configure."""
-        for name in COPIED:
-            if (ROOT / name).is_dir():
-                shutil.copytree(ROOT / name, self.root / name)
-            else:
-                shutil.copy(ROOT / name, self.root / name)
-        command = [
-            "cmake",
-            "-S",
-            str(self.root),
-            "-B",
-            str(self.build),
-            "-G",
-            "Ninja",
-            "-DCMAKE_BUILD_TYPE=None",
-        ]
-        subprocess.run([*command, "-DCMAKE_C_FLAGS=-O1 -w"], check=True, capture_output=True)
 
-    def failure(self, test: str) -> str:
-        """How the test fails on the sources as they are; empty where it passes.
-
-        Raises:
-            ChildProcessError: it cannot be built.
-        """
-        built = subprocess.run(
-            ["cmake", "--build", str(self.build), "--target", test, "-j", "1"],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if built.returncode != 0:
-            raise ChildProcessError(
-                next(
-                    (line for line in built.stdout.splitlines() if "error:" in line),
-                    built.stdout[-300:],
-                )
+def read_mistakes() -> list[Mutant]:
+    """What is picked by hand. The text to change must be in its file once."""
+    made = []
+    for row in tomllib.loads((TOOLS / "mistakes.toml").read_text())["mistake"]:
+        source = (ROOT / row["file"]).read_text()
+        if source.count(row["before"]) != 1:
+            raise SystemExit(
+                f"mistakes.toml is stale: {row['file']} has not once {row['before']!r}"
             )
-        program = self.build / "tests" / "c" / test
-        limited = ["sh", "-c", f'ulimit -t {MOST_CPU_SECONDS}; exec "$0"', str(program)]
-        done = subprocess.run(limited, capture_output=True, check=False)
-        if done.returncode == -signal.SIGXCPU:
-            return "does not end"
-        if done.returncode < 0:
-            return "crashes"
-        return "fails" if done.returncode else ""
+        start = source.index(row["before"])
+        end = start + len(row["before"])
+        made.append(
+            Mutant(row["file"], row["name"], start, end, row["after"], row["before"], row["after"])
+        )
+    return made
 
 
-def c_tests() -> tuple[str, ...]:
-    """The names in tests/c/CMakeLists.txt, quick ones first."""
-    listed = re.search(
-        r"set\(EITSKIN_C_TESTS ([^)]*)\)", (ROOT / "tests" / "c" / "CMakeLists.txt").read_text()
-    )
-    names = listed[1].split() if listed else []
-    return tuple(sorted(names, key=lambda name: SLOW_LAST.index(name) if name in SLOW_LAST else -1))
+def try_all(
+    mutants: Iterable[Mutant], count: int, workers: int, one: Callable[[Mutant, int], str]
+) -> list[Outcome]:
+    """Try mutants until ``count`` of them are some; print each survivor as it comes."""
+    free: SimpleQueue[int] = SimpleQueue()
+    for worker in range(workers):
+        free.put(worker)
 
-
-def programs_for(mutation: Mutation, tests: Sequence[str]) -> Iterator[str]:
-    """The likeliest first; the narrow width before the wide one."""
-    for width in ("f32", "f64"):
-        for name in (mutation.first, *(test for test in tests if test != mutation.first)):
-            yield f"test_{name}_{width}"
-
-
-def stale(mutation: Mutation) -> str:
-    """What is wrong with the pattern; empty where it stands in its file once and is changed."""
-    count = (ROOT / SOURCES / mutation.file).read_text().count(mutation.original)
-    if mutation.original == mutation.replacement:
-        return "changes nothing"
-    return "" if count == 1 else f"stale: {mutation.original!r} is there {count} times, not once"
-
-
-def try_mutation(tree: Tree, mutation: Mutation, tests: Sequence[str]) -> Outcome:
-    """Whether the tests notice it in this tree, which is as it was afterwards."""
-    file = tree.root / SOURCES / mutation.file
-    source = file.read_text()
-    changed = source.replace(mutation.original, mutation.replacement)
-    try:
-        for program in programs_for(mutation, tests):
-            file.write_text(changed)
-            how = tree.failure(program)
-            if not how:
-                continue
-            if program not in tree.sound:
-                file.write_text(source)
-                if tree.failure(program):
-                    return Outcome(mutation, wrong=f"{program} fails without it too")
-                tree.sound.add(program)
-            return Outcome(mutation, noticed=f"{program.removeprefix('test_')} {how}")
-    except ChildProcessError as error:
-        return Outcome(mutation, wrong=f"does not compile: {error}")
-    finally:
-        file.write_text(source)
-    return Outcome(mutation, wrong="SURVIVED")
-
-
-def run_all(mutations: Sequence[Mutation], tests: Sequence[str], workers: int) -> list[Outcome]:
-    """Each mutation's outcome, in order, printed as it comes."""
-    trees: SimpleQueue[Tree] = SimpleQueue()
-
-    def one(mutation: Mutation) -> Outcome:
-        tree = trees.get()
+    def each(mutant: Mutant) -> Outcome:
+        worker = free.get()
         try:
-            outcome = try_mutation(tree, mutation, tests)
+            outcome = Outcome(mutant, one(mutant, worker))
         finally:
-            trees.put(tree)
-        print(outcome, flush=True)
+            free.put(worker)
+        if not outcome.noticed:
+            print(f"   survives: {mutant}", flush=True)
         return outcome
 
-    with (
-        tempfile.TemporaryDirectory(prefix="eitskin-mutate-") as folder,
-        ThreadPoolExecutor(workers) as pool,
-    ):
-        made = [Tree(Path(folder) / str(number)) for number in range(workers)]
-        for tree in made:
-            tree.root.mkdir()
-            (tree.root / "tests").mkdir()
-            tree.make()
-            trees.put(tree)
-        return list(pool.map(one, mutations))
+    done: list[Outcome] = []
+    queue = iter(mutants)
+    with ThreadPoolExecutor(workers) as pool:
+        while missing := count - len(done):
+            batch = [mutant for mutant, _ in zip(queue, range(missing), strict=False)]
+            if not batch:
+                break
+            tried = pool.map(each, batch)
+            done += [outcome for outcome in tried if outcome.noticed not in NO_MUTANT]
+    return done
+
+
+def try_c(mutants: Iterable[Mutant], count: int, workers: int) -> list[Outcome]:
+    """By the C tests."""
+    libraries = mutate_c.read_libraries()
+    with tempfile.TemporaryDirectory(prefix="eitskin-mutate-") as folder:
+        shops = [mutate_c.Workshop(libraries, Path(folder) / str(k)) for k in range(workers)]
+        return try_all(mutants, count, workers, lambda m, worker: shops[worker].try_mutant(m))
+
+
+def try_python(mutants: Iterable[Mutant], count: int, workers: int) -> list[Outcome]:
+    """By the Python tests; those of a file must pass on the sources as they are."""
+    mutate_python.prepare()
+    sound: dict[tuple[str, ...], str] = {}
+
+    def one(mutant: Mutant, _: int) -> str:
+        tests = mutate_python.tests_for(mutant)
+        noticed = mutate_python.try_mutant(mutant, tests)
+        if noticed and tuple(tests) not in sound:
+            sound[tuple(tests)] = mutate_python.try_mutant(None, tests)
+        if sound.get(tuple(tests)):
+            raise SystemExit(f"{sound[tuple(tests)]} fails on the sources as they are")
+        return noticed
+
+    return try_all(mutants, count, workers, one)
+
+
+def report(kind: str, outcomes: list[Outcome], least: float) -> bool:
+    """Print the rate; whether it suffices."""
+    killed = sum(bool(outcome.noticed) for outcome in outcomes)
+    percent = 100 * killed / max(len(outcomes), 1)
+    print(f"   {kind}: {killed} of {len(outcomes)} noticed, {percent:.1f} %", flush=True)
+    return percent >= least
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "--only", metavar="WORD", default="", help="mutations whose name or file has this"
-    )
+    parser.add_argument("--sample", metavar="COUNT", type=int, default=200, help="mutants of C")
+    parser.add_argument("--python", metavar="COUNT", type=int, default=40, help="and of Python")
+    parser.add_argument("--only", metavar="WORD", default="", help="those whose text has this")
     parser.add_argument("--workers", metavar="COUNT", type=int, default=2)
     options = parser.parse_args()
-    chosen = [m for m in MUTATIONS if options.only in m.name or options.only in m.file]
-    unfit = [f"{m.file}: {m.name}: {why}" for m in chosen if (why := stale(m))]
-    if unfit or not chosen:
-        print(*(unfit or [f"no mutation has {options.only!r} in its name or file"]), sep="\n")
-        return 1
-    outcomes = run_all(chosen, c_tests(), options.workers)
-    bad = [outcome for outcome in outcomes if not outcome.noticed]
-    print(
-        f"{len(outcomes)} mutations, {len(outcomes) - len(bad)} noticed", *map(str, bad), sep="\n  "
+    judged = read_judged()
+    in_c, in_python = (
+        all_mutants(files, options.only) for files in (mutate_c.sources(), mutate_python.sources())
     )
-    return 1 if bad else 0
+    stale = judged - {mutant.key for mutant in (*in_c, *in_python)} if not options.only else set()
+    for key in sorted(stale):
+        print("   survivors.toml is stale:", " | ".join(key))
+    in_c, in_python = ([m for m in some if m.key not in judged] for some in (in_c, in_python))
+    picked = [mistake for mistake in read_mistakes() if options.only in f"{mistake}"]
+    right = [
+        report("picked by hand", try_c(picked, len(picked), options.workers), 100),
+        report("made in C", try_c(in_c, options.sample, options.workers), LEAST_KILL_PERCENT),
+        report(
+            "made in Python",
+            try_python(in_python, options.python, options.workers),
+            LEAST_KILL_PERCENT,
+        ),
+    ]
+    return 0 if all(right) and not stale else 1
 
 
 if __name__ == "__main__":

@@ -1,0 +1,182 @@
+"""Mutants of the core and of the firmware's application and drivers, tried by the C tests.
+
+The tests are built once (preset host): what is changed lies in shared libraries, and of a
+mutant one object and its library are made, in a folder that the loader searches first.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import threading
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from subprocess import DEVNULL
+
+from mutants import ROOT, Mutant
+
+BUILD = ROOT / "build" / "host"
+TESTS = {"eitskin_f32": "tests/c", "eitskin_f64": "tests/c", "fw_app": "tests/firmware"}
+LIBRARIES = {
+    "csrc/src": ("eitskin_f32", "eitskin_f64"),
+    "firmware/app": ("fw_app",),
+    "firmware/drivers": ("fw_app",),
+}
+MIN_CPU_SECONDS = 4
+SLOWDOWN = 6
+
+
+@dataclass
+class Library:
+    """A shared library: the command that compiles each source, and its test programs, which pass
+    on the sources as they are. ``kills``: how many mutants of a source each test noticed."""
+
+    name: str
+    commands: dict[str, list[str]]
+    tests: dict[str, float] = field(default_factory=dict)
+    kills: dict[str, Counter[str]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def file(self) -> Path:
+        return next(BUILD.rglob(f"lib{self.name}.so"))
+
+    def ordered_tests(self, file: str) -> list[str]:
+        """Those that noticed mutants of the file before first, then those that name its functions
+        most, quick ones before slow ones."""
+        names = set(re.findall(r"^[a-z].*?\b(\w+)\(", (ROOT / file).read_text(), re.MULTILINE))
+        kills = self.kills.setdefault(file, Counter())
+
+        def rank(test: str) -> tuple[float, ...]:
+            words = re.findall(r"\w+", self.texts[test])
+            mentions = sum(word in names for word in words)
+            slow = self.tests[test] > 0.5
+            return (-kills[test], slow, -mentions, self.tests[test])
+
+        return sorted(self.tests, key=rank)
+
+
+def _after(command: Sequence[str], flag: str) -> str:
+    return command[command.index(flag) + 1]
+
+
+def read_libraries() -> dict[str, Library]:
+    """Configure, read what is compiled how, build."""
+    subprocess.run(["cmake", "--preset", "host"], cwd=ROOT, check=True, stdout=DEVNULL)
+    libraries = {name: Library(name, {}) for name in TESTS}
+    for entry in json.loads((BUILD / "compile_commands.json").read_text()):
+        target = re.search(r"CMakeFiles/(\w+)\.dir/", entry["command"])
+        if target and target[1] in libraries:
+            file = Path(entry["file"]).relative_to(ROOT).as_posix()
+            libraries[target[1]].commands[file] = shlex.split(entry["command"])
+    build = ["cmake", "--build", "--preset", "host", "--", "--quiet"]
+    subprocess.run(build, cwd=ROOT, check=True)
+    return libraries
+
+
+def time_tests(library: Library) -> None:
+    """Run its test programs once. One that fails is an error."""
+    folder = ROOT / TESTS[library.name]
+    start, ending = "", library.name.removeprefix("eitskin")
+    if library.name == "fw_app":
+        start, ending = "fw_", ""
+    for source in sorted(folder.glob("test_*.c")):
+        name = f"test_{start}{source.stem[5:]}{ending}"
+        before = os.times().children_user
+        failure = run_test(library, name, library.file.parent, 600)
+        if failure:
+            raise SystemExit(f"{name} {failure} on the sources as they are")
+        library.tests[name] = os.times().children_user - before
+        library.texts[name] = source.read_text()
+
+
+def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float) -> str:
+    """How it fails with the libraries in ``folder``, before the sound ones; empty where it
+    passes."""
+    program = BUILD / TESTS[library.name] / test
+    paths = [folder, BUILD, BUILD / "firmware"]
+    limited = f'ulimit -t {max(1, round(most_cpu_seconds))}; exec "$0"'
+    done = subprocess.run(
+        ["sh", "-c", limited, str(program)],
+        capture_output=True,
+        check=False,
+        env={**os.environ, "LD_LIBRARY_PATH": ":".join(map(str, paths))},
+    )
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "does not end"
+    if done.returncode < 0:
+        return "crashes"
+    return "fails" if done.returncode else ""
+
+
+class Workshop:
+    """Tries mutants one at a time; each thread has its own."""
+
+    lock = threading.Lock()
+
+    def __init__(self, libraries: dict[str, Library], folder: Path) -> None:
+        self.libraries, self.folder = libraries, folder
+        folder.mkdir(parents=True)
+
+    def compile(self, command: Sequence[str], file: str, text: str) -> bytes:
+        """The object of a source with this text; empty where the compiler refuses."""
+        changed, made = self.folder / Path(file).name, self.folder / "mutant.o"
+        changed.write_text(text)
+        words = list(command)
+        words[words.index("-o") + 1] = str(made)
+        words[words.index("-c") + 1] = str(changed)
+        words[1:1] = ["-w", "-iquote", str((ROOT / file).parent)]
+        words = [word for word in words if not word.startswith("-W")]
+        done = subprocess.run(words, cwd=BUILD, capture_output=True, check=False)
+        return b"" if done.returncode else made.read_bytes()
+
+    def is_same(self, library: Library, mutant: Mutant, source: str) -> bool:
+        """Whether the compiler makes the same of it."""
+        command = library.commands[mutant.file]
+        original, changed = (
+            self.compile(command, mutant.file, text) for text in (source, mutant.applied(source))
+        )
+        return original == changed
+
+    def try_mutant(self, mutant: Mutant) -> str:
+        """Which test noticed; "same" or "refused" by the compiler; empty where none did."""
+        source = (ROOT / mutant.file).read_text()
+        for name in next(n for at, n in LIBRARIES.items() if mutant.file.startswith(at)):
+            library = self.libraries[name]
+            with Workshop.lock:
+                if not library.tests:
+                    time_tests(library)
+            command = library.commands[mutant.file]
+            if not self.compile(command, mutant.file, mutant.applied(source)):
+                return "refused"
+            self.link(library, mutant.file)
+            for test in library.ordered_tests(mutant.file):
+                most = max(MIN_CPU_SECONDS, SLOWDOWN * library.tests[test])
+                failure = run_test(library, test, self.folder, most)
+                if failure:
+                    library.kills[mutant.file][test] += 1
+                    return f"{test} {failure}"
+            if self.is_same(library, mutant, source):
+                return "same"
+        return ""
+
+    def link(self, library: Library, file: str) -> None:
+        """The library with this worker's object of ``file``."""
+        objects = {name: _after(words, "-o") for name, words in library.commands.items()}
+        objects[file] = str(self.folder / "mutant.o")
+        compiler = library.commands[file][0]
+        command = [compiler, "-shared", "-o", str(self.folder / library.file.name)]
+        subprocess.run([*command, *objects.values(), "-lm"], cwd=BUILD, check=True)
+
+
+def sources() -> list[str]:
+    """What is changed: those that are compiled on a host."""
+    build = (ROOT / folder for folder in LIBRARIES)
+    files = (file.relative_to(ROOT).as_posix() for folder in build for file in folder.rglob("*.c"))
+    return sorted(file for file in files if not file.endswith("/m7.c"))
