@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import ConfigError, EitskinError, missing_extra
-from eitskin.skin.drawing import MAX_PIECES, MAX_SHAPES, Reading, Shape
+from eitskin.skin.drawing_shapes import MAX_PIECES, MAX_SHAPES, Reading, Shape
 
 try:
     import ezdxf.disassemble

@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import ConfigError, EitskinError, missing_extra
-from eitskin.skin.drawing import MAX_SHAPES, Reading, Shape, arc_pieces, bezier_pieces, flattened
+from eitskin.skin.drawing_shapes import (
+    MAX_SHAPES,
+    Reading,
+    Shape,
+    arc_pieces,
+    bezier_pieces,
+    flattened,
+)
 
 try:
     import svgelements

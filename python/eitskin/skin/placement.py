@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import GeometryError
-from eitskin.skin.drawing import Shape
+from eitskin.skin.drawing_shapes import Shape
 from eitskin.skin.outline import Outline
 
 FloatArray = npt.NDArray[np.float64]

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from eitskin.config import check_keys, choice, integer, load_toml, number
 from eitskin.errors import ConfigError, GeometryError
-from eitskin.skin.drawing import TOLERANCE_MM, Drawing, Reading, read_drawing
+from eitskin.skin.drawing import Drawing, read_drawing
+from eitskin.skin.drawing_shapes import TOLERANCE_MM, Reading
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT, Electrodes
 from eitskin.skin.outline import MAX_SIZE_MM, MIN_SIZE_MM, Outline, disk, polygon
 from eitskin.skin.placement import SNAP_MM, Placed, by_fractions, by_marks, by_points

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.view.pictures import COLOURS, INK, STYLE, load_matplotlib, save_png
-from eitskin_studies.experiments.homogeneous import MEASURED, SIMULATED_TANK
-from eitskin_studies.experiments.homogeneous.cases import IDEAL
+from eitskin_studies.experiments.homogeneous.cases import IDEAL, MEASURED_TANK, SIMULATED_TANK
 from eitskin_studies.experiments.homogeneous.tables import Row
 from eitskin_studies.experiments.homogeneous.uniformity import deviations_percent
 
@@ -32,8 +31,8 @@ def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
     ideal = by_name[IDEAL]
     usual = rows[1]
     pairs = [(ideal, usual, SHOWN), *((ideal, row, BROKEN) for row in rows if row.fault)]
-    if MEASURED in by_name:
-        pairs.append((by_name[SIMULATED_TANK], by_name[MEASURED], TANK))
+    if MEASURED_TANK in by_name:
+        pairs.append((by_name[SIMULATED_TANK], by_name[MEASURED_TANK], TANK))
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(
             figsize=(11.0, 1.75 * len(pairs) + 0.6), layout="constrained"
@@ -41,7 +40,7 @@ def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
         for axes, (even, row, colour) in zip(
             np.atleast_1d(figure.subplots(len(pairs), 1, sharex=True)), pairs, strict=True
         ):
-            tank = row.name == MEASURED
+            tank = row.name == MEASURED_TANK
             for one, style in (
                 (even, {"color": EVEN, "linewidth": 2.4}),
                 (row, {"color": colour, "linewidth": 1.0}),

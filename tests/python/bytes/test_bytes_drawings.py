@@ -8,7 +8,8 @@ import pytest
 from bytes_damage import ODD_BYTES, any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
 
-from eitskin.skin.drawing import Reading, read_drawing
+from eitskin.skin.drawing import read_drawing
+from eitskin.skin.drawing_shapes import Reading
 from eitskin.skin.outline import polygon
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"

@@ -15,7 +15,8 @@ import pytest
 from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, MissingExtraError
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
-from eitskin.skin.drawing import Reading, read_drawing
+from eitskin.skin.drawing import read_drawing
+from eitskin.skin.drawing_shapes import Reading
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import Skin, load_skin, skin_from_table, skin_to_table

@@ -180,7 +180,7 @@ def test_only_what_is_missing_is_computed(
 
 def test_without_a_tank_the_page_says_so(outcome: Outcome) -> None:
     assert "left out" in outcome.words["measured"] and FILE in outcome.words["measured"]
-    assert all(one["name"] != homogeneous.MEASURED for one in outcome.data["cases"])
+    assert all(one["name"] != homogeneous.MEASURED_TANK for one in outcome.data["cases"])
 
 
 def test_a_file_that_is_no_tank(tmp_path: Path) -> None:

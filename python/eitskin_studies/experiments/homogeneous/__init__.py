@@ -16,6 +16,8 @@ from eitskin_studies.experiments.homogeneous.cases import (
     CASES,
     ELECTRODES,
     IDEAL,
+    MEASURED_TANK,
+    SIMULATED_TANK,
     Case,
     doctored,
     examined,
@@ -26,7 +28,6 @@ from eitskin_studies.experiments.homogeneous.uniformity import fold_for, uniform
 
 TITLE = "The 208 values of an untouched skin"
 SESSIONS = 8
-MEASURED, SIMULATED_TANK = "measured: water tank", "simulated: the same tank, nothing else"
 
 
 def run(desk: Desk) -> Outcome:
@@ -60,7 +61,9 @@ def run(desk: Desk) -> Outcome:
         reference = {"reference_v": tank.frames.reference_voltage_v.mean(axis=0).tolist()}
         rows.append(
             _row(
-                MEASURED, [{**reference, **doctored(tank.frames, tank.skin)}], tank.frames.protocol
+                MEASURED_TANK,
+                [{**reference, **doctored(tank.frames, tank.skin)}],
+                tank.frames.protocol,
             )
         )
     drawn = {

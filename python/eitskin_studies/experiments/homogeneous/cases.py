@@ -25,6 +25,7 @@ MEASURED: dict[str, Any] = {
     "adc": {"bits": BITS, "headroom": HEADROOM},
 }
 USUAL = CONTACTS | MEASURED
+MEASURED_TANK, SIMULATED_TANK = "measured: water tank", "simulated: the same tank, nothing else"
 IDEAL, INSTRUMENT = "nothing (mesh only)", f"contacts ±20 %, {SNR_DB:g} dB, {BITS} bits"
 
 

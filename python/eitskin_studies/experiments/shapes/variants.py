@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from eitskin.fileio import write_bytes
 from eitskin.scene.random_touches import TouchRules, rim_distance_mm
-from eitskin.skin.drawing import Reading, read_drawing
+from eitskin.skin.drawing import read_drawing
+from eitskin.skin.drawing_shapes import Reading
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import Outline
 from eitskin.skin.placement import Placed, by_marks, by_points

@@ -1,0 +1,72 @@
+"""The shapes of a drawing, in mm with y up, and how its curves become straight pieces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+TOLERANCE_MM = 0.1
+MAX_SHAPES = 20_000
+MAX_PIECES = 2_000
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One line of a drawing: ``points_mm`` (k, 2), y up, curves flattened; a closed one's last
+    point is not its first.
+
+    ``name`` is its own id, empty for none; ``names`` also has its classes, its layer, and what the
+    groups around it are called.
+    """
+
+    name: str
+    names: frozenset[str]
+    points_mm: FloatArray
+    closed: bool
+
+    @property
+    def middle_mm(self) -> FloatArray:
+        """The middle of its bounding box, (2,)."""
+        return np.asarray((self.points_mm.min(axis=0) + self.points_mm.max(axis=0)) / 2)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a drawing is read: mm a unit of the drawing (None: the file's own units), and how far a
+    flattened curve may be from the true one."""
+
+    scale_mm: float | None = None
+    tolerance_mm: float = TOLERANCE_MM
+
+
+def flattened(
+    point_at: Callable[[float], tuple[float, float]], pieces: float
+) -> list[tuple[float, float]]:
+    """A curve's points after its first, for its parameter from 0 to 1 in about so many
+    ``pieces``."""
+    count = min(max(1, math.ceil(pieces)), MAX_PIECES) if math.isfinite(pieces) else 1
+    return [point_at((k + 1) / count) for k in range(count)]
+
+
+def bezier_pieces(controls: npt.ArrayLike, tolerance: float) -> float:
+    """How many straight pieces keep a Bezier curve of degree d with ``controls`` (d + 1, 2) within
+    ``tolerance``: the bound by second differences, sqrt(d (d - 1) max|P_i - 2 P_i+1 + P_i+2| / (8
+    tolerance))."""
+    bent = np.diff(np.asarray(controls, dtype=np.float64), n=2, axis=0)
+    degree = len(bent) + 1
+    return math.sqrt(
+        degree * (degree - 1) * float(np.hypot(bent[:, 0], bent[:, 1]).max()) / (8 * tolerance)
+    )
+
+
+def arc_pieces(radius: float, sweep_rad: float, tolerance: float) -> float:
+    """The same for an arc: a chord over an angle a lies radius (1 - cos(a / 2)) from it; at least 6
+    a turn."""
+    share = min(max(tolerance / radius, 1e-9), 0.5) if radius > 0 else 0.5
+    return abs(sweep_rad) / (2 * math.acos(1 - share))

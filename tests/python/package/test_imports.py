@@ -1,0 +1,109 @@
+"""Who imports whom: no circle of modules, each package only those that its data come from, and
+nothing of the studies in what is installed."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+PYTHON = Path(__file__).resolve().parents[3] / "python"
+
+# Each imports from its own line and those above it alone.
+ORDER = (
+    {"errors"},
+    {"fileio"},
+    {"config"},
+    {"core", "skin", "firmware"},
+    {"fem"},
+    {"model", "solve.options"},
+    {"frames", "reference"},
+    {"solve", "scene"},
+    {"calibration"},
+    {"device", "emulator"},  # emu: is opened by the one and speaks the other's link
+    {"scoring"},
+    {"tuning", "demo"},
+    {"view"},
+    {"reconstruct"},
+    {"cli"},
+)
+
+
+def modules(package: str) -> dict[str, Path]:
+    """Every module below ``package`` by its dotted name."""
+    found = {}
+    for path in (PYTHON / package).rglob("*.py"):
+        parts = path.relative_to(PYTHON).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imported(path: Path, known: Iterable[str]) -> set[str]:
+    """The modules among ``known`` that the file imports, wherever the statement stands."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            names |= {name if name in known else node.module for name in inner}
+        elif isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+    return names & set(known)
+
+
+def circles(imports: dict[str, set[str]]) -> list[list[str]]:
+    """Modules that reach themselves, together with those on the way."""
+
+    def reached(start: str) -> set[str]:
+        seen: set[str] = set()
+        left = [start]
+        while left:
+            new = imports[left.pop()] - seen
+            seen |= new
+            left += new
+        return seen
+
+    reach = {name: reached(name) for name in imports}
+    groups = {
+        tuple(sorted(other for other in reach[name] if name in reach[other]))
+        for name in imports
+        if name in reach[name]
+    }
+    return [list(group) for group in sorted(groups)]
+
+
+def graph(package: str) -> dict[str, set[str]]:
+    found = modules(package)
+    return {name: imported(path, found) - {name} for name, path in found.items()}
+
+
+def test_circles_are_seen() -> None:
+    chain = {"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set[str]()}
+    assert circles(chain) == [["b", "c"]]
+
+
+@pytest.mark.parametrize("package", ["eitskin", "eitskin_studies"])
+def test_no_module_imports_itself_by_way_of_others(package: str) -> None:
+    assert circles(graph(package)) == []
+
+
+def test_imports_follow_the_data() -> None:
+    def level(name: str) -> int:
+        inner = name.removeprefix("eitskin.")
+        room = inner if inner == "solve.options" else inner.partition(".")[0]
+        return next(k for k, rooms in enumerate(ORDER) if room in rooms)
+
+    against = {
+        f"{name} imports {other}"
+        for name, others in graph("eitskin").items()
+        for other in others
+        if "." in name and "." in other and level(other) > level(name)
+    }
+    assert against == set()
+
+
+def test_the_installed_package_knows_nothing_of_the_studies() -> None:
+    studies = modules("eitskin_studies")
+    named = {path for path in modules("eitskin").values() if imported(path, studies)}
+    assert named == set()
