@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -15,17 +16,8 @@ EXCLUDED = ("solver", "iterations", "gap", "mac_limit", "macs")
 
 def add_wish(parser: Any) -> None:
     """Add both."""
-    parser.add_argument(
-        "--budget",
-        metavar="COST",
-        help="of solve and touches: 10ms, 800us, 600kMACs, 2.5Minstructions",
-    )
-    parser.add_argument(
-        "--accuracy",
-        type=float,
-        metavar="MIOU",
-        help="at least: of images of 1 to 3 random touches, 60 dB",
-    )
+    option(parser, "--budget COST", "of solve and touches: 10ms, 800us, 600kMACs, 2.5Minstructions")
+    option(parser, "--accuracy MIOU", "at least: of images of 1 to 3 random touches, 60 dB", float)
 
 
 def named_wish(options: argparse.Namespace, board: str) -> Wish | None:

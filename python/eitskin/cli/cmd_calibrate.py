@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import EitskinError, FrameError, UsageError
 
 if TYPE_CHECKING:
@@ -29,40 +30,24 @@ def add_parser(subparsers: Any) -> None:
             " docs/guide/calibration.md shows how to record them."
         ),
     )
-    parser.add_argument(
-        "recordings",
-        nargs="+",
-        type=Path,
-        metavar="RECORDING",
-        help="frames (.npz) or a run (.eits) of weights",
+    option(
+        parser, "recordings RECORDING", "frames (.npz) or a run (.eits) of weights", Path, nargs="+"
     )
     parser.add_argument(
         "--weights", action="append", type=Path, required=True, metavar="LIST",
         help="the weights of a recording, .csv or .toml; once for each recording, in their order",
     )  # fmt: skip
-    parser.add_argument(
-        "--model",
-        type=Path,
-        metavar="MODEL.eitm",
-        help="default: the prebuilt model of the paper's skin",
-    )
-    parser.add_argument(
+    option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
+    option(
+        parser,
         "--sign",
+        "which changes a weight makes",
         choices=("increase", "decrease"),
         default="increase",
-        help="which changes a weight makes",
     )
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=1,
-        metavar="S",
-        help="of the resamples behind the intervals (default: 1)",
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="OUT.eitm", help="the model with its calibration"
-    )
-    parser.add_argument("--json", action="store_true")
+    option(parser, "--seed S", "of the resamples behind the intervals", default=1)
+    option(parser, "-o --output OUT.eitm", "the model with its calibration", Path)
+    option(parser, "--json")
     parser.set_defaults(run=run)
 
 

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import FileError, MissingExtraError, UsageError
 
 if TYPE_CHECKING:
@@ -29,27 +30,12 @@ def add_parser(subparsers: Any) -> None:
             " this host's results bit by bit."
         ),
     )
-    parser.add_argument(
-        "--snr-db",
-        type=float,
-        default=60.0,
-        metavar="DB",
-        help="20 log10(rms(V0)/sigma) (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=1, help="of noise and contacts (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--picture", type=Path, default=Path("demo.png"), metavar="PNG", help="default: %(default)s"
-    )
-    parser.add_argument(
-        "--frames",
-        type=Path,
-        metavar="NPZ",
-        help="also write the simulated frames, with their truth",
-    )
-    parser.add_argument("--no-board", action="store_true", help="leave the emulated board out")
-    parser.add_argument("--json", action="store_true")
+    option(parser, "--snr-db DB", "20 log10(rms(V0)/sigma)", default=60.0)
+    option(parser, "--seed", "of noise and contacts", default=1)
+    option(parser, "--picture PNG", None, Path, default=Path("demo.png"))
+    option(parser, "--frames NPZ", "also write the simulated frames, with their truth", Path)
+    option(parser, "--no-board", "leave the emulated board out")
+    option(parser, "--json")
     parser.set_defaults(run=run)
 
 

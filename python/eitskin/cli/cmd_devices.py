@@ -7,6 +7,8 @@ import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
+
 if TYPE_CHECKING:
     from eitskin.device.census import FoundPort
 
@@ -30,8 +32,8 @@ def add_parser(subparsers: Any) -> None:
             " serial:PORT."
         ),
     )
-    parser.add_argument("--quiet", action="store_true", help="ask no board")
-    parser.add_argument("--json", action="store_true", help="print for programs")
+    option(parser, "--quiet", "ask no board")
+    option(parser, "--json", "print for programs")
     parser.set_defaults(run=run)
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from eitskin.cli.arguments import option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.cli.import_options import add_import_options, floats, read_options, read_protocol
 from eitskin.errors import UsageError
@@ -35,28 +36,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             " reports. Exit code 0: nothing must be mended; 11: something must."
         ),
     )
-    parser.add_argument(
-        "source", type=Path, nargs="?", help="frames file, or CSV, NPZ, MAT as for import"
-    )
+    option(parser, "source", "frames file, or CSV, NPZ, MAT as for import", Path, nargs="?")
     device = parser.add_argument_group("a board in place of a source")
-    device.add_argument("--device", metavar="URL", help=DEVICE_HELP)
-    device.add_argument(
-        "--frames",
-        type=int,
-        default=32,
-        metavar="N",
-        help="to be measured, 4 to 1024 (default: %(default)s)",
-    )
-    device.add_argument(
-        "--model",
-        type=Path,
-        metavar="MODEL.eitm",
-        help="the board's, where it is not the prebuilt one",
-    )
-    parser.add_argument("--json", action="store_true", help="print the report as JSON")
-    parser.add_argument(
-        "--picture", type=Path, metavar="PNG", help="draw what was measured (needs matplotlib)"
-    )
+    option(device, "--device URL", DEVICE_HELP)
+    option(device, "--frames N", "to be measured, 4 to 1024", default=32)
+    option(device, "--model MODEL.eitm", "the board's, where it is not the prebuilt one", Path)
+    option(parser, "--json", "print the report as JSON")
+    option(parser, "--picture PNG", "draw what was measured (needs matplotlib)", Path)
     parser.add_argument(
         "--touch",
         action="append",
@@ -67,9 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             " negative"
         ),
     )
-    parser.add_argument(
-        "--touch-in", metavar="FRAME", help="the frame with these touches; else the largest change"
-    )
+    option(parser, "--touch-in FRAME", "the frame with these touches; else the largest change")
     add_import_options(parser)
     parser.set_defaults(run=run)
 

@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
 
 TOOLS = ("openocd", "st-flash", "pyocd")
@@ -25,24 +26,13 @@ def add_parser(subparsers: Any) -> None:
             " printed first. What is not named is what ships with eitskin."
         ),
     )
-    parser.add_argument(
-        "--image", type=Path, metavar="BIN", help="firmware (default: the prebuilt one)"
-    )
-    parser.add_argument(
-        "--model",
-        type=Path,
-        metavar="MODEL.eitm",
-        help="default: the prebuilt model of the paper's skin",
-    )
-    parser.add_argument(
-        "--no-model", action="store_true", help="leave the board's models as they are"
-    )
-    parser.add_argument("--tool", choices=TOOLS, help="default: the first that is installed")
-    parser.add_argument(
-        "--serial", metavar="NUMBER", help="the ST-LINK's, where several boards are plugged in"
-    )
-    parser.add_argument("--dry-run", action="store_true", help="print the commands and do nothing")
-    parser.add_argument("--json", action="store_true", help="print for programs; with --dry-run")
+    option(parser, "--image BIN", "firmware (default: the prebuilt one)", Path)
+    option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
+    option(parser, "--no-model", "leave the board's models as they are")
+    option(parser, "--tool", "default: the first that is installed", choices=TOOLS)
+    option(parser, "--serial NUMBER", "the ST-LINK's, where several boards are plugged in")
+    option(parser, "--dry-run", "print the commands and do nothing")
+    option(parser, "--json", "print for programs; with --dry-run")
     parser.set_defaults(run=run)
 
 

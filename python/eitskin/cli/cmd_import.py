@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.import_options import add_import_options, read_options, read_protocol
 
 
@@ -21,13 +22,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             " needs."
         ),
     )
-    parser.add_argument(
-        "source", type=Path, help="CSV or other text table, NPZ, MAT, or a frames file to mend"
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="OUT.npz", help="frames file to write"
-    )
-    parser.add_argument("--json", action="store_true", help="say what was written as JSON")
+    option(parser, "source", "CSV or other text table, NPZ, MAT, or a frames file to mend", Path)
+    option(parser, "-o --output OUT.npz", "frames file to write", Path, required=True)
+    option(parser, "--json", "say what was written as JSON")
     add_import_options(parser)
     parser.set_defaults(run=run)
 

@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.device_options import add_device, open_named, print_table
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     add_device(parser)
-    parser.add_argument("--reset-statistics", action="store_true", help="count anew after this")
+    option(parser, "--reset-statistics", "count anew after this")
     parser.set_defaults(run=run)
 
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.errors import UsageError, VerificationError
 
@@ -22,64 +23,40 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser("model", help="build, describe, verify or upload an .eitm model")
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
-    build.add_argument("skin", nargs="?", type=Path, metavar="SKIN.toml", help="skin description")
-    build.add_argument(
-        "--paper", action="store_true", help="the paper's 194 mm disk instead of a file"
-    )
-    build.add_argument("-o", "--output", type=Path, required=True, metavar="MODEL.eitm")
-    build.add_argument(
-        "--rank",
-        type=int,
-        default=0,
-        help="rows of the reduced Jacobian (default: 64, or all if fewer)",
-    )
-    build.add_argument(
-        "--pixels", type=int, default=32, help="pixels along the longer side (default: %(default)s)"
-    )
-    build.add_argument("--storage", choices=("f32", "f16", "i16", "i8"), default="f32")
-    build.add_argument(
+    option(build, "skin SKIN.toml", "skin description", Path, nargs="?")
+    option(build, "--paper", "the paper's 194 mm disk instead of a file")
+    option(build, "-o --output MODEL.eitm", None, Path, required=True)
+    option(build, "--rank", "rows of the reduced Jacobian (default: 64, or all if fewer)", int)
+    option(build, "--pixels", "pixels along the longer side", default=32)
+    option(build, "--storage", choices=("f32", "f16", "i16", "i8"), default="f32")
+    option(
+        build,
         "--data",
+        "what is solved for: v - v0; (v - v0)/v0, where channels have gains of their own; or"
+        " v0 log(v/v0)",
         choices=("difference", "normalised", "log-ratio"),
         default="difference",
-        help=(
-            "what is solved for: v - v0; (v - v0)/v0, where channels have gains of their own; or v0"
-            " log(v/v0)"
-        ),
     )
-    build.add_argument(
-        "--elements",
-        type=int,
-        default=3000,
-        help="about how many the mesh has (default: %(default)s)",
-    )
-    build.add_argument(
-        "--floor", type=float, default=0.01, help="mu of the whitening (default: %(default)g)"
-    )
-    build.add_argument(
-        "--touch-change",
-        type=float,
+    option(build, "--elements", "about how many the mesh has", default=3000)
+    option(build, "--floor", "mu of the whitening", default=0.01)
+    option(
+        build,
+        "--touch-change RATIO",
+        "expected change under a touch over the skin's conductivity: 1.35 for contrasts 3 to"
+        " 10, 2 for metal, 0 for unknown",
         default=1.35,
-        metavar="RATIO",
-        help=(
-            "expected change under a touch over the skin's conductivity: 1.35 for contrasts 3 to"
-            " 10, 2 for metal, 0 for unknown (default: %(default)g)"
-        ),
     )
-    build.add_argument("--json", action="store_true")
+    option(build, "--json")
     build.set_defaults(run=run_build)
     info = actions.add_parser("info", help="what is in a model")
-    info.add_argument(
-        "model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one"
-    )
-    info.add_argument("--json", action="store_true")
+    option(info, "model MODEL.eitm", "default: the prebuilt one", Path, nargs="?")
+    option(info, "--json")
     info.set_defaults(run=run_info)
     verify = actions.add_parser(
         "verify", help="run the golden frame through the C core in both widths and through numpy"
     )
-    verify.add_argument(
-        "model", nargs="?", type=Path, metavar="MODEL.eitm", help="default: the prebuilt one"
-    )
-    verify.add_argument("--json", action="store_true")
+    option(verify, "model MODEL.eitm", "default: the prebuilt one", Path, nargs="?")
+    option(verify, "--json")
     verify.set_defaults(run=run_verify)
     upload = actions.add_parser(
         "upload",
@@ -89,9 +66,9 @@ def add_parser(subparsers: Any) -> None:
             " it, then swaps; cut at any byte, it keeps its old model. The reference is forgotten."
         ),
     )
-    upload.add_argument("model", type=Path, metavar="MODEL.eitm")
-    upload.add_argument("--device", default="auto", metavar="URL", help=DEVICE_HELP)
-    upload.add_argument("--json", action="store_true")
+    option(upload, "model MODEL.eitm", None, Path)
+    option(upload, "--device URL", DEVICE_HELP, default="auto")
+    option(upload, "--json")
     upload.set_defaults(run=run_upload)
 
 
@@ -116,7 +93,7 @@ def run_build(options: argparse.Namespace) -> int:
         )
     skin, protocol = (paper_skin(), adjacent(16)) if options.paper else load_skin(options.skin)
     settings = BuildSettings(
-        rank=options.rank,
+        rank=options.rank or 0,
         pixels_across=options.pixels,
         storage=options.storage,
         data_kind=options.data,

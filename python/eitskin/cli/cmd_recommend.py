@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.budget_options import add_wish, read_wish
 from eitskin.errors import UsageError
 
@@ -24,55 +25,22 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     add_wish(parser)
-    parser.add_argument(
-        "--board", choices=("f767", "host"), default="f767", help="default: %(default)s"
+    option(parser, "--board", choices=("f767", "host"), default="f767")
+    option(
+        parser,
+        "--front FRONT.json",
+        "results of your own (eitskin tradeoff run)",
+        Path,
     )
-    parser.add_argument(
-        "--front",
-        type=Path,
-        metavar="FRONT.json",
-        help="results of your own (eitskin tradeoff run, of the studies)",
-    )
-    parser.add_argument(
-        "--scenes",
-        default="random",
-        metavar="SET",
-        help="the set that accuracy is of (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--snr-db", type=float, default=60.0, metavar="DB", help="default: %(default)g"
-    )
-    parser.add_argument(
-        "--by",
-        choices=("image", "discs"),
-        default="image",
-        help="whose MIoU (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--period",
-        metavar="TIME",
-        help="to measure a frame, as 12ms (default: the budget, or 20.8ms)",
-    )
-    parser.add_argument(
-        "--worst",
-        action="store_true",
-        help="hold the costliest frame to the budget, not the mean one",
-    )
-    parser.add_argument(
-        "--warm",
-        action="store_true",
-        help="also points that begin each frame from the last's image",
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="MODEL.eitm", help="build and write the model to use"
-    )
-    parser.add_argument(
-        "--skin",
-        type=Path,
-        metavar="SKIN.toml",
-        help="of the model (default: the paper's 194 mm disk)",
-    )
-    parser.add_argument("--json", action="store_true")
+    option(parser, "--scenes SET", "the set that accuracy is of", default="random")
+    option(parser, "--snr-db DB", default=60.0)
+    option(parser, "--by", "whose MIoU", choices=("image", "discs"), default="image")
+    option(parser, "--period TIME", "to measure a frame, as 12ms (default: the budget, or 20.8ms)")
+    option(parser, "--worst", "hold the costliest frame to the budget, not the mean one")
+    option(parser, "--warm", "also points that begin each frame from the last's image")
+    option(parser, "-o --output MODEL.eitm", "build and write the model to use", Path)
+    option(parser, "--skin SKIN.toml", "of the model (default: the paper's 194 mm disk)", Path)
+    option(parser, "--json")
     parser.set_defaults(run=run)
 
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.budget_options import add_wish, named_wish
 from eitskin.cli.device_options import add_solver, named_solver
 from eitskin.cli.progress import bar
@@ -24,63 +25,45 @@ def add_parser(subparsers: Any) -> None:
             " the touches are compared with it."
         ),
     )
-    parser.add_argument(
-        "frames", type=Path, metavar="FRAMES.npz", help="a frames file (eitskin import makes one)"
-    )
-    parser.add_argument(
-        "--model",
-        type=Path,
-        metavar="MODEL.eitm",
-        help="default: the prebuilt model of the paper's skin",
-    )
-    parser.add_argument(
+    option(parser, "frames FRAMES.npz", "a frames file (eitskin import makes one)", Path)
+    option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
+    option(
+        parser,
         "--engine",
+        "the C core in float32 as on a board or in float64, or numpy",
         choices=("c", "c64", "numpy"),
         default="c",
-        help="default: c, float32 as on a board",
     )
-    parser.add_argument(
+    option(
+        parser,
         "--sign",
+        "which changes to look for",
         choices=("increase", "decrease", "both"),
         default="increase",
-        help="which changes to look for",
     )
-    parser.add_argument("--only", metavar="NAME,...", help="frames with these names only")
+    option(parser, "--only NAME,...", "frames with these names only")
     add_solver(parser)
     add_wish(parser)
-    parser.add_argument(
-        "--warm", action="store_true", help="start each frame from the last one's result"
+    option(parser, "--warm", "start each frame from the last one's result")
+    option(
+        parser, "--refine", "solve again with what touches do to each other taken out of the data"
     )
-    parser.add_argument(
-        "--refine",
-        action="store_true",
-        help="solve again with what touches do to each other taken out of the data",
-    )
-    parser.add_argument(
+    option(
+        parser,
         "--track",
-        action="store_true",
-        help=(
-            "the frames are a stream, 48 or 96 a second: confirm births, keep ids, smooth places,"
-            " as a board does"
-        ),
+        "the frames are a stream, 48 or 96 a second: confirm births, keep ids, smooth places,"
+        " as a board does",
     )
-    parser.add_argument(
-        "--threads",
-        type=int,
+    option(
+        parser,
+        "--threads N",
+        "frames side by side, the same results; not with --warm or --track",
         default=1,
-        metavar="N",
-        help="frames side by side, the same results (default: 1; not with --warm or --track)",
     )
-    parser.add_argument(
-        "--saturation-v", type=float, metavar="V", help="leave channels at or beyond +-V out"
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="OUT.npz", help="write images, touches and solver info"
-    )
-    parser.add_argument(
-        "--picture", type=Path, metavar="PNG", help="draw all frames, with the truth where known"
-    )
-    parser.add_argument("--json", action="store_true")
+    option(parser, "--saturation-v V", "leave channels at or beyond +-V out", float)
+    option(parser, "-o --output OUT.npz", "write images, touches and solver info", Path)
+    option(parser, "--picture PNG", "draw all frames, with the truth where known", Path)
+    option(parser, "--json")
     parser.set_defaults(run=run)
 
 

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
     add_device,
     add_scan,
@@ -42,12 +43,10 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     add_device(parser)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="RUN.eits")
-    parser.add_argument("--overwrite", action="store_true", help="write over a file that exists")
+    option(parser, "-o --output RUN.eits", None, Path, required=True)
+    option(parser, "--overwrite", "write over a file that exists")
     add_stream(parser, "raw,image,touches")
-    parser.add_argument(
-        "--seconds", type=float, metavar="S", help="stop after S seconds of the board's time"
-    )
+    option(parser, "--seconds S", "stop after S seconds of the board's time", float)
     add_scan(parser)
     parser.set_defaults(run=run)
 

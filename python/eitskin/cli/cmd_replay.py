@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.device_options import read_mode, whole
 from eitskin.errors import EitskinError, FrameError, UsageError, VerificationError
 
@@ -26,32 +27,14 @@ def add_parser(subparsers: Any) -> None:
             " with what the board sent."
         ),
     )
-    parser.add_argument("recording", type=Path, metavar="RUN.eits")
-    parser.add_argument(
-        "--mode", metavar="KIND[,KIND]", help="raw, image, touches, or several (default: touches)"
-    )
-    parser.add_argument("--first", type=int, metavar="N", help="the first N frames only")
-    parser.add_argument(
-        "--model",
-        type=Path,
-        metavar="MODEL.eitm",
-        help="the board's model where it is not the prebuilt one",
-    )
-    parser.add_argument(
-        "--picture", type=Path, metavar="PNG", help="draw images and touches, a panel a frame"
-    )
-    parser.add_argument(
-        "--frames",
-        type=Path,
-        metavar="OUT.npz",
-        help="write the raw frames for  reconstruct  and  doctor",
-    )
-    parser.add_argument(
-        "--check",
-        action="store_true",
-        help="solve again here and compare; exit code 10 where bits differ",
-    )
-    parser.add_argument("--json", action="store_true", help="print for programs")
+    option(parser, "recording RUN.eits", None, Path)
+    option(parser, "--mode KIND[,KIND]", "raw, image, touches, or several (default: touches)")
+    option(parser, "--first N", "the first N frames only", int)
+    option(parser, "--model MODEL.eitm", "the board's model where it is not the prebuilt one", Path)
+    option(parser, "--picture PNG", "draw images and touches, a panel a frame", Path)
+    option(parser, "--frames OUT.npz", "write the raw frames for  reconstruct  and  doctor", Path)
+    option(parser, "--check", "solve again here and compare; exit code 10 where bits differ")
+    option(parser, "--json", "print for programs")
     parser.set_defaults(run=run)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.progress import bar
 from eitskin.errors import FileError, UsageError
 
@@ -27,39 +28,32 @@ def add_parser(subparsers: Any) -> None:
     )
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     one = what.add_parser("run", help="simulate a scene: frames with their truth")
-    one.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
-    one.add_argument(
-        "-o",
-        "--output",
-        metavar="FRAMES",
-        type=Path,
-        required=True,
-        help="frames file to write (.npz)",
-    )
+    option(one, "scene SCENE", SCENE_HELP)
+    option(one, "-o --output FRAMES", "frames file to write (.npz)", Path, required=True)
     pixels = "of mask and conductivity; 0: none (default: %(default)s)"
-    one.add_argument("--truth-pixels", metavar="N", type=int, default=64, help=pixels)
-    one.add_argument("--json", action="store_true")
+    option(one, "--truth-pixels N", pixels, default=64)
+    option(one, "--json")
     one.set_defaults(run=run_scene)
     plan = what.add_parser(
         "plan", help="what a scene will compute, step by step, and what that costs"
     )
-    plan.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
-    plan.add_argument("--json", action="store_true")
+    option(plan, "scene SCENE", SCENE_HELP)
+    option(plan, "--json")
     plan.set_defaults(run=run_plan)
     picture = what.add_parser(
         "picture", help="draw a scene: touches on the skin, voltages over time"
     )
-    picture.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
-    picture.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
+    option(picture, "scene SCENE", SCENE_HELP)
+    option(picture, "-o --output PNG", None, Path, required=True)
     picture.set_defaults(run=run_picture)
     names = what.add_parser("list", help="the scenes that come with the package")
-    names.add_argument("--json", action="store_true")
+    option(names, "--json")
     names.set_defaults(run=run_list)
     effects = what.add_parser(
         "effects", help="the effects that a scene can name, or one effect's parameters"
     )
-    effects.add_argument("name", metavar="NAME", nargs="?", help="an effect")
-    effects.add_argument("--json", action="store_true")
+    option(effects, "name NAME", "an effect", nargs="?")
+    option(effects, "--json")
     effects.set_defaults(run=run_effects)
     _add_dataset(what)
 
@@ -74,26 +68,15 @@ def _add_dataset(what: Any) -> None:
             " again to resume."
         ),
     )
-    dataset.add_argument("scene", metavar="SCENE", help=SCENE_HELP)
-    dataset.add_argument("--count", metavar="N", type=int, required=True, help="how many scenes")
-    dataset.add_argument("--seed", metavar="S", type=int, default=1, help="default: %(default)s")
-    dataset.add_argument(
-        "--ranges",
-        metavar="TOML",
-        type=Path,
-        help="file with [dataset] in place of the scene's own",
-    )
-    dataset.add_argument("-o", "--output", metavar="FOLDER", type=Path, required=True)
-    dataset.add_argument(
-        "--jobs", metavar="J", type=int, default=1, help="processes (default: %(default)s)"
-    )
-    dataset.add_argument(
-        "--chunk", metavar="N", type=int, default=100, help="scenes a file (default: %(default)s)"
-    )
-    dataset.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://HOST:8786"
-    )
-    dataset.add_argument("--json", action="store_true")
+    option(dataset, "scene SCENE", SCENE_HELP)
+    option(dataset, "--count N", "how many scenes", int, required=True)
+    option(dataset, "--seed S", default=1)
+    option(dataset, "--ranges TOML", "file with [dataset] in place of the scene's own", Path)
+    option(dataset, "-o --output FOLDER", None, Path, required=True)
+    option(dataset, "--jobs J", "processes", default=1)
+    option(dataset, "--chunk N", "scenes a file", default=100)
+    option(dataset, "--scheduler ADDRESS", "a Dask scheduler, as tcp://HOST:8786")
+    option(dataset, "--json")
     dataset.set_defaults(run=run_dataset)
 
 

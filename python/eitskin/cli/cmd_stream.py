@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
     add_device,
     add_scan,
@@ -38,16 +39,9 @@ def add_parser(subparsers: Any) -> None:
     )
     add_device(parser)
     add_stream(parser, "touches")
-    parser.add_argument(
-        "--picture", type=Path, metavar="PNG", help="draw images and touches, a panel a frame"
-    )
-    parser.add_argument(
-        "--record",
-        type=Path,
-        metavar="RUN.eits",
-        help="also record every packet, as  eitskin record  does",
-    )
-    parser.add_argument("--overwrite", action="store_true", help="record over a file that exists")
+    option(parser, "--picture PNG", "draw images and touches, a panel a frame", Path)
+    option(parser, "--record RUN.eits", "also record every packet, as  eitskin record  does", Path)
+    option(parser, "--overwrite", "record over a file that exists")
     add_scan(parser)
     parser.set_defaults(run=run)
 

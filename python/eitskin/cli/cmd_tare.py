@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.device_options import TARE_FRAMES, add_device, open_named, say
 
 
@@ -21,13 +22,7 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     add_device(parser)
-    parser.add_argument(
-        "--frames",
-        type=int,
-        default=TARE_FRAMES,
-        metavar="N",
-        help="1, or 4 to 1024 (default: %(default)s)",
-    )
+    option(parser, "--frames N", "1, or 4 to 1024", int, default=TARE_FRAMES)
     parser.set_defaults(run=run)
 
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.budget_options import add_wish, named_wish
 from eitskin.errors import UsageError
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from eitskin.tuning.front import Wish
 
 DEVICE_HELP = (
-    "auto (the one board that is plugged in, default), serial:/dev/ttyACM0, sim:SCENE (simulated),"
+    "auto (the one board that is plugged in), serial:/dev/ttyACM0, sim:SCENE (simulated),"
     " emu:SCENE (the firmware on an emulated board), file:RUN.eits (a recording); SCENE is a file"
     " or a scene of  eitskin scene list"
 )
@@ -30,121 +31,85 @@ TARE_FRAMES = 16
 
 def add_device(parser: argparse.ArgumentParser, *, model: bool = True) -> None:
     """``--device`` and ``--json``; with ``model``, also ``--model`` and ``--firmware``."""
-    parser.add_argument("--device", default="auto", metavar="URL", help=DEVICE_HELP)
+    option(parser, "--device URL", DEVICE_HELP, default="auto")
     if model:
-        parser.add_argument(
-            "--model",
-            type=Path,
-            metavar="MODEL.eitm",
-            help=(
-                "the board's model where it is not the prebuilt one; a simulated or emulated board"
-                " is given it"
-            ),
+        option(
+            parser,
+            "--model MODEL.eitm",
+            "the board's model where it is not the prebuilt one; a simulated or emulated board is"
+            " given it",
+            Path,
         )
-        parser.add_argument(
-            "--firmware",
-            type=Path,
-            metavar="BIN",
-            help="of an emulated board (default: the prebuilt one)",
-        )
-    parser.add_argument("--json", action="store_true", help="print for programs")
+        option(parser, "--firmware BIN", "of an emulated board (default: the prebuilt one)", Path)
+    option(parser, "--json", "print for programs")
 
 
 def add_scan(parser: argparse.ArgumentParser) -> None:
     """How frames are scanned and solved, and how the reference is taken."""
     scan = parser.add_argument_group("scan; what is not named stays as the board has it")
-    scan.add_argument("--excitation-hz", type=float, metavar="HZ", help="of the generator")
-    scan.add_argument("--sample-rate-hz", type=int, metavar="HZ", help="of the converter")
-    scan.add_argument(
-        "--samples", type=int, metavar="N", help="of a measurement: a whole number of periods"
-    )
-    scan.add_argument(
-        "--settle-us",
-        type=int,
-        metavar="US",
-        help="from switching the multiplexers to the first sample",
-    )
-    scan.add_argument(
-        "--frame-period-us",
-        type=int,
-        metavar="US",
-        help="from frame to frame; 0: as fast as the scan goes",
-    )
+    option(scan, "--excitation-hz HZ", "of the generator", float)
+    option(scan, "--sample-rate-hz HZ", "of the converter", int)
+    option(scan, "--samples N", "of a measurement: a whole number of periods", int)
+    option(scan, "--settle-us US", "from switching the multiplexers to the first sample", int)
+    option(scan, "--frame-period-us US", "from frame to frame; 0: as fast as the scan goes", int)
     rows = scan.add_mutually_exclusive_group()
-    rows.add_argument("--full", action="store_true", help="measure every row of the protocol")
-    rows.add_argument(
-        "--reciprocal",
-        type=int,
-        metavar="N",
-        help=(
-            "measure one row of each reciprocal pair, and all rows in every N-th frame as a check"
-            " (0: never)"
-        ),
+    option(rows, "--full", "measure every row of the protocol")
+    option(
+        rows,
+        "--reciprocal N",
+        "measure one row of each reciprocal pair, and all rows in every N-th frame as a check"
+        " (0: never)",
+        int,
     )
     solver = parser.add_argument_group("solver")
     add_solver(solver)
     add_wish(solver)
-    solver.add_argument(
+    option(
+        solver,
         "--sign",
+        "which changes to look for (default: increase)",
         choices=("increase", "decrease", "both"),
-        help="which changes to look for (default: increase)",
     )
-    solver.add_argument(
-        "--ignore",
-        metavar="FINDING[,FINDING]",
-        help=(
-            "do not look for saturated, electrode-open, electrodes-bridged, glitch,"
-            " electrode-noisy, misfit, stale-reference, crowded, or all (default: look for all)"
-        ),
+    option(
+        solver,
+        "--ignore FINDING[,FINDING]",
+        "do not look for saturated, electrode-open, electrodes-bridged, glitch,"
+        " electrode-noisy, misfit, stale-reference, crowded, or all (default: look for all)",
     )
     start = solver.add_mutually_exclusive_group()
-    start.add_argument(
-        "--warm", action="store_true", help="begin each frame from the last one's result"
-    )
-    start.add_argument(
-        "--cold", action="store_true", help="begin each frame from nothing (default)"
-    )
-    solver.add_argument(
+    option(start, "--warm", "begin each frame from the last one's result")
+    option(start, "--cold", "begin each frame from nothing (default)")
+    option(
+        solver,
         "--no-track",
-        action="store_true",
-        help="touches of each frame by itself (default: births confirmed, places smoothed)",
+        "touches of each frame by itself (default: births confirmed, places smoothed)",
     )
     tare = parser.add_argument_group("reference")
-    tare.add_argument(
-        "--tare",
-        type=int,
-        metavar="N",
-        help=(
-            "take the reference from N frames of the untouched skin first (1, or 4 to 1024);"
-            f" without it, from {TARE_FRAMES} where the board has none, and always on a simulated"
-            " or emulated board"
-        ),
+    option(
+        tare,
+        "--tare N",
+        "take the reference from N frames of the untouched skin first (1, or 4 to 1024);"
+        f" without it, from {TARE_FRAMES} where the board has none, and always on a simulated"
+        " or emulated board",
+        int,
     )
 
 
 def add_solver(parser: Any) -> None:
     """Which solver, and what ends it."""
     known = ("fista", "working-set", "coordinate", "active-set")
-    parser.add_argument(
-        "--solver", choices=known, help="default: the model's; all minimise the same objective"
+    option(
+        parser, "--solver", "default: the model's; all minimise the same objective", choices=known
     )
-    parser.add_argument(
-        "--iterations",
-        type=int,
-        metavar="N",
-        help="of FISTA, sweeps or rounds, at most (default: the model's)",
+    option(
+        parser, "--iterations N", "of FISTA, sweeps or rounds, at most (default: the model's)", int
     )
-    parser.add_argument(
-        "--gap",
-        type=float,
-        metavar="REL",
-        help="stop once the duality gap is below this share of |y|^2 / 2",
-    )
-    parser.add_argument(
-        "--mac-limit",
-        type=int,
-        metavar="N",
-        help="return the best so far when the next step would pass N multiply-accumulates",
+    option(parser, "--gap REL", "stop once the duality gap is below this share of |y|^2 / 2", float)
+    option(
+        parser,
+        "--mac-limit N",
+        "return the best so far when the next step would pass N multiply-accumulates",
+        int,
     )
 
 
@@ -169,23 +134,10 @@ def named_solver(options: argparse.Namespace) -> dict[str, Any]:
 
 def add_stream(parser: argparse.ArgumentParser, default: str) -> None:
     """What is streamed, and how much of it."""
-    parser.add_argument(
-        "--mode",
-        default=default,
-        metavar="KIND[,KIND]",
-        help="raw, image, touches, or several (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--every",
-        type=int,
-        metavar="N",
-        help="every N-th frame (default: as many as the line carries)",
-    )
-    parser.add_argument(
-        "--frames",
-        type=int,
-        metavar="N",
-        help="stop after N (default: go on until Ctrl-C, or the scene ends)",
+    option(parser, "--mode KIND[,KIND]", "raw, image, touches, or several", default=default)
+    option(parser, "--every N", "every N-th frame (default: as many as the line carries)", int)
+    option(
+        parser, "--frames N", "stop after N (default: go on until Ctrl-C, or the scene ends)", int
     )
 
 

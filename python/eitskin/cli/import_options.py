@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -219,13 +220,9 @@ def _add_mending(group: Any) -> None:
         help="the source's first electrode is electrode K",
     )
     turned = group.add_mutually_exclusive_group()
-    turned.add_argument(
-        "--mirror",
-        action="store_true",
-        help="the source numbers its electrodes the other way round",
-    )
+    option(turned, "--mirror", "the source numbers its electrodes the other way round")
     text = "the source numbers clockwise: mirror it unless the skin does"
-    turned.add_argument("--clockwise", action="store_true", help=text)
+    option(turned, "--clockwise", text)
     add(
         "--swap",
         action="append",

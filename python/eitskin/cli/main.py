@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from typing import NoReturn
 
 from eitskin import __version__
+from eitskin.cli.arguments import option
 from eitskin.errors import EitskinError, UsageError
 
 COMMANDS = (
@@ -35,9 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog="eitskin", description="Electrical impedance tomography skins, from model to touches."
     )
     parser.add_argument("--version", action="version", version=f"eitskin {__version__}")
-    parser.add_argument(
-        "--traceback", action="store_true", help="on an error, show where in the code it arose"
-    )
+    option(parser, "--traceback", "on an error, show where in the code it arose")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
         importlib.import_module(f"eitskin.cli.cmd_{name}").add_parser(subparsers)

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -23,28 +24,22 @@ def add_parser(subparsers: Any) -> None:
     frame = what.add_parser(
         "frame", help="one frame through cffi: p50, p99, share outside C, beside numpy"
     )
-    frame.add_argument("--runs", type=int, default=2000, help="default: %(default)s")
-    frame.add_argument("--json", action="store_true")
+    option(frame, "--runs", default=2000)
+    option(frame, "--json")
     frame.set_defaults(run=run_frame)
     solve = what.add_parser(
         "solve", help="the solve alone: time to a suboptimality, beside other solvers"
     )
-    solve.add_argument(
-        "--scenes", type=int, default=20, help="problems of each model (default: %(default)s)"
-    )
-    solve.add_argument("--seed", type=int, default=3, help="of the scenes (default: %(default)s)")
-    solve.add_argument(
-        "--rounds", type=int, default=11, help="interleaved rounds (default: %(default)s)"
-    )
-    solve.add_argument(
-        "--picture", type=Path, metavar="PNG", help="draw suboptimality against MIoU instead"
-    )
-    solve.add_argument("--json", action="store_true")
+    option(solve, "--scenes", "problems of each model", default=20)
+    option(solve, "--seed", "of the scenes", default=3)
+    option(solve, "--rounds", "interleaved rounds", default=11)
+    option(solve, "--picture PNG", "draw suboptimality against MIoU instead", Path)
+    option(solve, "--json")
     solve.set_defaults(run=run_solve)
     jacobian = what.add_parser(
         "jacobian", help="building: Jacobian beside pyEIT's, and the whole model"
     )
-    jacobian.add_argument("--json", action="store_true")
+    option(jacobian, "--json")
     jacobian.set_defaults(run=run_jacobian)
     board = what.add_parser(
         "board",
@@ -58,19 +53,10 @@ def add_parser(subparsers: Any) -> None:
             " the firmware itself on the emulated NUCLEO-F767ZI."
         ),
     )
-    board.add_argument(
-        "--scenes", type=int, default=60, help="random scenes (default: %(default)s)"
-    )
-    board.add_argument("--seed", type=int, default=1, help="of the scenes (default: %(default)s)")
-    board.add_argument(
-        "--frames",
-        type=int,
-        default=8,
-        help="on the emulated NUCLEO, 0 for none (default: %(default)s)",
-    )
-    board.add_argument(
-        "--build", type=Path, metavar="DIR", help="keep the build there, or take up an earlier one"
-    )
+    option(board, "--scenes", "random scenes", default=60)
+    option(board, "--seed", "of the scenes", default=1)
+    option(board, "--frames", "on the emulated NUCLEO, 0 for none", default=8)
+    option(board, "--build DIR", "keep the build there, or take up an earlier one", Path)
     _add_page(board, "board-cost")
     board.set_defaults(run=run_board)
     kernels = what.add_parser(
@@ -82,34 +68,25 @@ def add_parser(subparsers: Any) -> None:
             " each is."
         ),
     )
-    kernels.add_argument(
-        "--rank", type=int, default=64, help="numbers of a column (default: %(default)s)"
-    )
-    kernels.add_argument("--columns", type=int, default=812, help="default: %(default)s")
-    kernels.add_argument("--rounds", type=int, default=41, help="default: %(default)s")
+    option(kernels, "--rank", "numbers of a column", default=64)
+    option(kernels, "--columns", default=812)
+    option(kernels, "--rounds", default=41)
     _add_page(kernels)
     kernels.set_defaults(run=run_kernels)
     growth = what.add_parser(
         "growth", help="a frame's time and MACs against pixels, rows, rank, touches and electrodes"
     )
-    growth.add_argument("--rounds", type=int, default=15, help="default: %(default)s")
-    growth.add_argument(
-        "--cache",
-        type=Path,
-        metavar="DIR",
-        help="keeps the models (default: beside other temporary files)",
-    )
-    growth.add_argument("--picture", type=Path, metavar="PNG", help="draw it")
+    option(growth, "--rounds", default=15)
+    option(growth, "--cache DIR", "keeps the models (default: beside other temporary files)", Path)
+    option(growth, "--picture PNG", "draw it", Path)
     _add_page(growth)
     growth.set_defaults(run=run_growth)
     batches = what.add_parser(
         "batches", help="batches of frames over threads, beside one after another"
     )
-    batches.add_argument("--frames", type=int, default=1000, help="default: %(default)s")
-    batches.add_argument("--rounds", type=int, default=9, help="default: %(default)s")
-    batches.add_argument(
-        "--threads", type=int, nargs="+", default=[1, 2], metavar="N", help="default: 1 2"
-    )
+    option(batches, "--frames", default=1000)
+    option(batches, "--rounds", default=9)
+    option(batches, "--threads N", None, int, nargs="+", default=[1, 2])
     _add_page(batches)
     batches.set_defaults(run=run_batches)
     findings = what.add_parser(
@@ -121,53 +98,36 @@ def add_parser(subparsers: Any) -> None:
             " the same frame without the fault; some five minutes."
         ),
     )
-    findings.add_argument(
-        "--scenes", type=int, default=640, help="that every fault is put on (default: %(default)s)"
-    )
-    findings.add_argument(
-        "--crowds",
-        type=int,
-        default=24,
-        help="scenes of each number of touches (default: %(default)s)",
-    )
-    findings.add_argument(
-        "--imperfect", type=int, default=40, help="scenes of each front end (default: %(default)s)"
-    )
-    findings.add_argument(
-        "--seed", type=int, default=4001, help="of scenes and noise (default: %(default)s)"
-    )
+    option(findings, "--scenes", "that every fault is put on", default=640)
+    option(findings, "--crowds", "scenes of each number of touches", default=24)
+    option(findings, "--imperfect", "scenes of each front end", default=40)
+    option(findings, "--seed", "of scenes and noise", default=4001)
     _add_page(findings, "diagnostics")
     findings.set_defaults(run=run_findings)
     effects = what.add_parser(
         "effects", help="scenes: the time with no effect, with each alone, with all"
     )
-    effects.add_argument("--frames", type=int, default=100, help="default: %(default)s")
-    effects.add_argument("--json", action="store_true")
+    option(effects, "--frames", default=100)
+    option(effects, "--json")
     effects.set_defaults(run=run_effects)
     scenes = what.add_parser(
         "scenes", help="scenes: frames/s of a moving touch, static scenes/s of a dataset"
     )
-    scenes.add_argument(
-        "--frames", type=int, default=400, help="of the moving touch (default: %(default)s)"
-    )
-    scenes.add_argument(
-        "--scenes", type=int, default=500, help="of the dataset (default: %(default)s)"
-    )
-    scenes.add_argument(
-        "--elements", type=int, default=3000, help="of the mesh (default: %(default)s)"
-    )
-    scenes.add_argument("--json", action="store_true")
+    option(scenes, "--frames", "of the moving touch", default=400)
+    option(scenes, "--scenes", "of the dataset", default=500)
+    option(scenes, "--elements", "of the mesh", default=3000)
+    option(scenes, "--json")
     scenes.set_defaults(run=run_scenes)
 
 
 def _add_page(parser: argparse.ArgumentParser, page: str = "benchmarks") -> None:
-    parser.add_argument(
-        "--page",
-        type=Path,
-        metavar="FILE.md",
-        help=f"fill the marked places of this page, docs/results/{page}.md",
+    option(
+        parser,
+        "--page FILE.md",
+        f"fill the marked places of this page, docs/results/{page}.md",
+        Path,
     )
-    parser.add_argument("--json", action="store_true")
+    option(parser, "--json")
 
 
 def _show(

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.cli.progress import bar
 from eitskin.errors import FileError, UsageError
 
@@ -24,55 +25,23 @@ def add_parser(subparsers: Any) -> None:
             " thresholds are fixed on training scenes."
         ),
     )
-    parser.add_argument(
-        "--skin",
-        metavar="TOML",
-        type=Path,
-        help="skin description (default: the paper's 194 mm disk)",
-    )
-    parser.add_argument(
-        "--scenes", metavar="N", type=int, default=180, help="test scenes (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--train", metavar="N", type=int, default=60, help="training scenes (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--seed",
-        metavar="S",
-        type=int,
-        default=1,
-        help="of all that is random (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--snr-db",
-        metavar="DB",
-        type=float,
-        default=60.0,
-        help="20 log10(rms(V0)/sigma) (default: %(default)g)",
-    )
-    parser.add_argument(
+    option(parser, "--skin TOML", "skin description (default: the paper's 194 mm disk)", Path)
+    option(parser, "--scenes N", "test scenes", default=180)
+    option(parser, "--train N", "training scenes", default=60)
+    option(parser, "--seed S", "of all that is random", default=1)
+    option(parser, "--snr-db DB", "20 log10(rms(V0)/sigma)", default=60.0)
+    option(
+        parser,
         "--lookup",
+        "what a cell of MIoU's raster shows: the nearest pixel, or one interpolated (default:"
+        " bilinear)",
         choices=("nearest", "bilinear"),
-        help=(
-            "what a cell of MIoU's raster shows: the nearest pixel, or one interpolated (default:"
-            " bilinear)"
-        ),
     )
-    parser.add_argument(
-        "--threads",
-        metavar="N",
-        type=int,
-        default=1,
-        help="of the C core's frames (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="print JSON, with the curves over the threshold"
-    )
-    parser.add_argument("--csv", metavar="FILE", type=Path, help="write the numbers of every scene")
-    parser.add_argument(
-        "--picture", metavar="PNG", type=Path, help="draw test scenes as each method shows them"
-    )
-    parser.add_argument("--curves", metavar="PNG", type=Path, help="draw MIoU over the threshold")
+    option(parser, "--threads N", "of the C core's frames", default=1)
+    option(parser, "--json", "print JSON, with the curves over the threshold")
+    option(parser, "--csv FILE", "write the numbers of every scene", Path)
+    option(parser, "--picture PNG", "draw test scenes as each method shows them", Path)
+    option(parser, "--curves PNG", "draw MIoU over the threshold", Path)
     parser.set_defaults(run=run)
 
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
 
 
@@ -16,14 +17,14 @@ def add_parser(subparsers: Any) -> None:
     )
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     effect = what.add_parser("effect", help="what one effect does: its law, and what it adds")
-    effect.add_argument("name", metavar="NAME", help="of the effect (eitskin scene effects)")
-    effect.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
+    option(effect, "name NAME", "of the effect (eitskin scene effects)")
+    option(effect, "-o --output PNG", None, Path, required=True)
     effect.set_defaults(run=run_effect)
     wiring = what.add_parser("wiring", help="the wiring of board, multiplexers and skin")
-    wiring.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
+    option(wiring, "-o --output PNG", None, Path, required=True)
     wiring.set_defaults(run=run_wiring)
     examples = what.add_parser("examples", help="hand.svg and forearm.dxf")
-    examples.add_argument("-o", "--output", metavar="FOLDER", type=Path, required=True)
+    option(examples, "-o --output FOLDER", None, Path, required=True)
     examples.set_defaults(run=run_examples)
 
 

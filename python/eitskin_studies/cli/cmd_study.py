@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import FileError
 
 
@@ -20,32 +21,14 @@ def add_parser(subparsers: Any) -> None:
             " list` names them."
         ),
     )
-    parser.add_argument("name", metavar="NAME", help="of the experiment, or: list")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="folder of its results (default: out/NAME)"
-    )
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=1,
-        metavar="S",
-        help="of all that is random (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--share",
-        type=float,
-        default=1.0,
-        metavar="X",
-        help="of the usual number of scenes (default: 1)",
-    )
-    parser.add_argument(
-        "--data", type=Path, metavar="DIR", help="measured frames, for the study on them"
-    )
-    parser.add_argument(
-        "--page", type=Path, metavar="FILE.md", help="fill the marked places of this page"
-    )
-    parser.add_argument("--no-pictures", action="store_true", help="tables and data only")
-    parser.add_argument("--json", action="store_true", help="print the data instead of tables")
+    option(parser, "name NAME", "of the experiment, or: list")
+    option(parser, "-o --output DIR", "folder of its results (default: out/NAME)", Path)
+    option(parser, "--seed S", "of all that is random", default=1)
+    option(parser, "--share X", "of the usual number of scenes", default=1.0)
+    option(parser, "--data DIR", "measured frames, for the study on them", Path)
+    option(parser, "--page FILE.md", "fill the marked places of this page", Path)
+    option(parser, "--no-pictures", "tables and data only")
+    option(parser, "--json", "print the data instead of tables")
     parser.set_defaults(run=run)
 
 

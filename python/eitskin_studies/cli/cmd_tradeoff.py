@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
 
 
@@ -25,86 +26,23 @@ def add_parser(subparsers: Any) -> None:
             " ended when called again with the same folder."
         ),
     )
-    run.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path("tradeoff"),
-        metavar="DIR",
-        help="default: %(default)s",
-    )
-    run.add_argument(
-        "--set", type=Path, metavar="FILE.toml", help="your own configurations (default: built in)"
-    )
-    run.add_argument("--only", metavar="NAME,...", help="these configurations only")
-    run.add_argument(
-        "--scenes",
-        type=int,
-        default=180,
-        metavar="N",
-        help="of the set 'random' (default: %(default)s)",
-    )
-    run.add_argument(
-        "--train", type=int, default=60, metavar="N", help="training scenes (default: %(default)s)"
-    )
-    run.add_argument(
-        "--set-scenes",
-        type=int,
-        default=30,
-        metavar="N",
-        help="of each other set (default: %(default)s)",
-    )
-    run.add_argument(
-        "--sets", metavar="NAME,...", help="sets beside 'random' (default: all; '' for none)"
-    )
-    run.add_argument(
-        "--snr-db",
-        default="40,60,80",
-        metavar="DB,...",
-        help="60 must be among them (default: %(default)s)",
-    )
-    run.add_argument(
-        "--seed",
-        type=int,
-        default=1,
-        metavar="S",
-        help="of all that is random (default: %(default)s)",
-    )
-    run.add_argument(
-        "--elements",
-        type=int,
-        default=11_000,
-        metavar="N",
-        help="of the frames' mesh (default: %(default)s)",
-    )
-    run.add_argument(
-        "--counted",
-        type=int,
-        default=24,
-        metavar="N",
-        help="scenes emulated to count instructions; 0: none",
-    )
-    run.add_argument(
-        "--rounds",
-        type=int,
-        default=25,
-        metavar="N",
-        help="in which times are taken on this host; 0: none",
-    )
-    run.add_argument(
-        "--front",
-        type=Path,
-        metavar="FRONT.json",
-        help="also write what the package ships of the results",
-    )
-    run.add_argument(
-        "--recorded", type=Path, metavar="FRONT.json", help="also write what the page shows"
-    )
-    run.add_argument(
-        "--page", type=Path, metavar="PAGE.md", help="also put tables and pictures into this page"
-    )
-    run.add_argument("--no-pictures", action="store_true", help="tables only")
-    run.add_argument("--json", action="store_true", help="print the results as JSON")
+    option(run, "-o --output DIR", None, Path, default=Path("tradeoff"))
+    option(run, "--set FILE.toml", "your own configurations (default: built in)", Path)
+    option(run, "--only NAME,...", "these configurations only")
+    option(run, "--scenes N", "of the set 'random'", default=180)
+    option(run, "--train N", "training scenes", default=60)
+    option(run, "--set-scenes N", "of each other set", default=30)
+    option(run, "--sets NAME,...", "sets beside 'random' (default: all; '' for none)")
+    option(run, "--snr-db DB,...", "60 must be among them", default="40,60,80")
+    option(run, "--seed S", "of all that is random", default=1)
+    option(run, "--elements N", "of the frames' mesh", default=11_000)
+    option(run, "--counted N", "scenes emulated to count instructions; 0: none", default=24)
+    option(run, "--rounds N", "in which times are taken on this host; 0: none", default=25)
+    option(run, "--front FRONT.json", "also write what the package ships of the results", Path)
+    option(run, "--recorded FRONT.json", "also write what the page shows", Path)
+    option(run, "--page PAGE.md", "also put tables and pictures into this page", Path)
+    option(run, "--no-pictures", "tables only")
+    option(run, "--json", "print the results as JSON")
     run.set_defaults(run=run_run)
 
 

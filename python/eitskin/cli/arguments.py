@@ -1,0 +1,36 @@
+"""How commands declare their options: a line each, defaults said in the help."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+
+def option(
+    parser: Any,
+    names: str,
+    text: str | None = None,
+    kind: Callable[[str], Any] | None = None,
+    *,
+    default: Any = None,
+    **more: Any,
+) -> None:
+    """Add an option: ``names`` are its names and what stands for its value, as "-o --output OUT".
+
+    Without a value's name, ``kind``, ``default`` and ``choices`` it is a flag. ``kind`` turns the
+    text into the value; where it is not given it is that of the default. The default is said in
+    the help.
+    """
+    listed = names.split()
+    metavar = listed.pop() if len(listed) > 1 and not listed[-1].startswith("-") else None
+    if metavar is None and kind is None and default is None and not more:
+        parser.add_argument(*listed, action="store_true", help=text)
+        return
+    if kind is None and isinstance(default, (int, float)):
+        kind = type(default)
+    if metavar is not None:
+        more["metavar"] = metavar
+    if default is not None:
+        said = f"default: %(default){'g' if isinstance(default, float) else 's'}"
+        text = f"{text} ({said})" if text else said
+    parser.add_argument(*listed, type=kind, default=default, help=text, **more)
