@@ -14,6 +14,7 @@ from eitskin.cli.device_options import (
     add_device,
     add_scan,
     add_stream,
+    check_recording,
     check_scan,
     chosen_every,
     open_named,
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     check_scan(options)
     if options.seconds is not None and not 0 < options.seconds <= 1e6:
         raise UsageError(f"--seconds {options.seconds:g} is out of range; use above 0 to 1000000")
-    check_output(options.output, options.overwrite)
+    check_recording(options.output, options.overwrite)
     summary = LiveSummary()
     with open_named(options) as device:
         if device.transport.replays:
@@ -98,22 +99,6 @@ def run(options: argparse.Namespace) -> int:
         print("\n".join(summary.lines()))
         print(f"{options.output}: {recorder.packets} packets, {recorder.bytes} bytes")
     return 0
-
-
-def check_output(path: Path | None, overwrite: bool) -> None:
-    """Refuse a recording that could not be written, before a device is opened.
-
-    Raises:
-        FileError: its folder is not there, or it exists and may not be written over.
-    """
-    from eitskin.errors import FileError
-    from eitskin.fileio import refuse_unwritable
-
-    refuse_unwritable(path)
-    if path is not None and path.exists() and not overwrite:
-        raise FileError(
-            f"{path}: exists already; name another file, or write over it with  --overwrite"
-        )
 
 
 def _until(

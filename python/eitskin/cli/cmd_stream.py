@@ -13,6 +13,7 @@ from eitskin.cli.device_options import (
     add_device,
     add_scan,
     add_stream,
+    check_recording,
     check_scan,
     chosen_every,
     open_named,
@@ -48,7 +49,6 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Set up, follow, sum up."""
-    from eitskin.cli.cmd_record import check_output
     from eitskin.cli.live_output import check_picture, show
     from eitskin.device.known_model import find_model, need_model
     from eitskin.device.live import follow, replayed
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     what, (every, frames) = read_mode(options.mode), read_every(options)
     check_scan(options)
     refuse_unwritable(options.picture)
-    check_output(options.record, options.overwrite)
+    check_recording(options.record, options.overwrite)
     check_picture(options.picture, what)
     with open_named(options) as device:
         name = device.transport.name

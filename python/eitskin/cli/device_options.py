@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import option
 from eitskin.cli.budget_options import add_wish, named_wish
-from eitskin.errors import UsageError
+from eitskin.errors import FileError, UsageError
 
 if TYPE_CHECKING:
     from eitskin.device.client import Device
@@ -280,6 +280,21 @@ def check_scan(options: argparse.Namespace) -> None:
     named_wish(options, "f767")
     if options.tare is not None:
         check_tare_frames(options.tare)
+
+
+def check_recording(path: Path | None, overwrite: bool) -> None:
+    """Refuse a recording that could not be written, before a device is opened.
+
+    Raises:
+        FileError: its folder is not there, or it exists and may not be written over.
+    """
+    from eitskin.fileio import refuse_unwritable
+
+    refuse_unwritable(path)
+    if path is not None and path.exists() and not overwrite:
+        raise FileError(
+            f"{path}: exists already; name another file, or write over it with  --overwrite"
+        )
 
 
 def open_named(options: argparse.Namespace) -> Device:

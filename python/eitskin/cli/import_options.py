@@ -144,129 +144,80 @@ def _four(text: str) -> tuple[float, float, float, float]:
 
 
 def _add_protocol(group: Any) -> None:
-    add = group.add_argument
-    add("--skin", type=Path, metavar="FILE", help="skin description (TOML) with its protocol")
-    add(
+    option(group, "--skin FILE", "skin description (TOML) with its protocol", Path)
+    option(
+        group,
         "--protocol",
+        "table: keep the source's own",
         choices=("adjacent", "opposite", "skip", "table"),
-        help="table: keep the source's own",
     )
-    add("--skip", type=int, metavar="K", help="electrodes skipped, with --protocol skip")
-    add("--electrodes", type=int, metavar="N", help="number of electrodes, where no skin says so")
-    add(
-        "--current-a", type=float, metavar="A", help="drive current in A, instead of the protocol's"
-    )
+    option(group, "--skip K", "electrodes skipped, with --protocol skip", int)
+    option(group, "--electrodes N", "number of electrodes, where no skin says so", int)
+    option(group, "--current-a A", "drive current in A, instead of the protocol's", float)
 
 
 def _add_place(group: Any) -> None:
-    add = group.add_argument
-    add("--voltage", metavar="KEY", help="NPZ, MAT: array of the frames")
-    add("--reference", metavar="KEY", help="NPZ, MAT: array of the quiet frame or frames")
-    add(
-        "--columns",
-        metavar="LIST",
-        help="text: columns of the voltages, from 0 or by name: 2 or 1:209",
-    )
-    add("--reference-columns", metavar="LIST", help="text: columns of the quiet frames")
-    add(
-        "--reference-frames",
-        metavar="LIST",
-        help="which of the frames are the quiet ones, as in 0:20",
-    )
-    add("--names", metavar="KEY", help="NPZ, MAT: array of the frames' names")
-    add("--time", metavar="KEY", help="array or column of the frames' times in s")
+    option(group, "--voltage KEY", "NPZ, MAT: array of the frames")
+    option(group, "--reference KEY", "NPZ, MAT: array of the quiet frame or frames")
+    option(group, "--columns LIST", "text: columns of the voltages, from 0 or by name: 2 or 1:209")
+    option(group, "--reference-columns LIST", "text: columns of the quiet frames")
+    option(group, "--reference-frames LIST", "which of the frames are the quiet ones, as in 0:20")
+    option(group, "--names KEY", "NPZ, MAT: array of the frames' names")
+    option(group, "--time KEY", "array or column of the frames' times in s")
     layouts = ("auto", "frames-in-rows", "channels-in-rows")
-    add("--layout", choices=layouts, default="auto", help="needed only where both sides fit")
+    option(group, "--layout", "needed only where both sides fit", choices=layouts, default="auto")
     parts = ("real", "imag", "abs", "in-phase")
-    add("--complex-part", choices=parts, help="of complex numbers; in text, of column pairs re,im")
-    add(
-        "--scale",
-        type=float,
-        metavar="FACTOR",
-        help="times the source's numbers gives volts; 1 for volts",
+    option(
+        group, "--complex-part", "of complex numbers; in text, of column pairs re,im", choices=parts
     )
-    add(
-        "--delimiter",
-        metavar="WORD",
-        help="comma, semicolon, tab, bar, space, a character; else found",
-    )
-    add("--header-rows", type=int, metavar="N", help="rows before the numbers; else found")
+    option(group, "--scale FACTOR", "times the source's numbers gives volts; 1 for volts", float)
+    option(group, "--delimiter WORD", "comma, semicolon, tab, bar, space, a character; else found")
+    option(group, "--header-rows N", "rows before the numbers; else found", int)
 
 
 def _add_mending(group: Any) -> None:
-    add = group.add_argument
-    add("--order", choices=ORDERS, default="fixed", help="how the source lists its channels")
-    add("--table-file", metavar="FILE", help="text table of the source's rows: I+, I-, V+, V-")
-    add("--protocol-table", metavar="KEY", help="NPZ, MAT: array with that table")
-    add(
-        "--table-base",
-        type=int,
-        default=0,
-        metavar="N",
-        help="the table's number of the first electrode",
-    )
+    option(group, "--order", "how the source lists its channels", choices=ORDERS, default="fixed")
+    option(group, "--table-file FILE", "text table of the source's rows: I+, I-, V+, V-")
+    option(group, "--protocol-table KEY", "NPZ, MAT: array with that table")
+    option(group, "--table-base N", "the table's number of the first electrode", default=0)
     signs = ("signed", "reversed", "magnitude")
-    add(
+    option(
+        group,
         "--sign",
+        "magnitude: signs from the homogeneous prediction",
         choices=signs,
         default="signed",
-        help="magnitude: signs from the homogeneous prediction",
     )
-    add(
-        "--rotate",
-        type=int,
-        default=0,
-        metavar="K",
-        help="the source's first electrode is electrode K",
-    )
+    option(group, "--rotate K", "the source's first electrode is electrode K", default=0)
     turned = group.add_mutually_exclusive_group()
     option(turned, "--mirror", "the source numbers its electrodes the other way round")
     text = "the source numbers clockwise: mirror it unless the skin does"
     option(turned, "--clockwise", text)
-    add(
+    group.add_argument(
         "--swap",
         action="append",
         default=[],
         metavar="I,J",
         help="wires of these electrodes are exchanged",
     )
-    add(
-        "--flip-channels",
-        metavar="LIST",
-        help="change the sign of these channels (numbers in our order)",
+    option(
+        group, "--flip-channels LIST", "change the sign of these channels (numbers in our order)"
     )
-    add("--impute-channels", metavar="LIST", help="fill these channels from their reciprocals")
-    add(
-        "--drop-channels",
-        metavar="LIST",
-        help="leave these channels out (the result is a table protocol)",
+    option(group, "--impute-channels LIST", "fill these channels from their reciprocals")
+    option(
+        group, "--drop-channels LIST", "leave these channels out (the result is a table protocol)"
     )
-    add("--drop-electrodes", metavar="LIST", help="leave out all channels of these electrodes")
-    add(
-        "--equalise",
-        action="store_true",
-        help="give each channel the gain of the homogeneous prediction",
-    )
+    option(group, "--drop-electrodes LIST", "leave out all channels of these electrodes")
+    option(group, "--equalise", "give each channel the gain of the homogeneous prediction")
 
 
 def _add_truth(group: Any) -> None:
-    add = group.add_argument
-    add("--truth-frame", metavar="KEY", help="touches: frame of each, as a number from 0 or a name")
-    add("--truth-xy", metavar="KEY", help="touches: centres (t, 2)")
-    add("--truth-radius", metavar="KEY", help="touches: radii (t,)")
-    add("--truth-sign", metavar="KEY", help="touches: true or above 0 where more conductive")
-    add("--truth-strength", metavar="KEY", help="touches: relative conductivity change")
-    add(
-        "--truth-unit-mm",
-        type=float,
-        default=1.0,
-        metavar="MM",
-        help="mm in a unit of centres and radii",
-    )
-    add("--truth-mask", metavar="KEY", help="masks (frames, rows, columns) of +1, -1, 0")
-    add("--truth-mask-extent", metavar="X,Y,X,Y", help="the masks' box in mm; else the skin's")
-    add(
-        "--truth-mask-top-first",
-        action="store_true",
-        help="row 0 of a mask is the top, not the bottom",
-    )
+    option(group, "--truth-frame KEY", "touches: frame of each, as a number from 0 or a name")
+    option(group, "--truth-xy KEY", "touches: centres (t, 2)")
+    option(group, "--truth-radius KEY", "touches: radii (t,)")
+    option(group, "--truth-sign KEY", "touches: true or above 0 where more conductive")
+    option(group, "--truth-strength KEY", "touches: relative conductivity change")
+    option(group, "--truth-unit-mm MM", "mm in a unit of centres and radii", default=1.0)
+    option(group, "--truth-mask KEY", "masks (frames, rows, columns) of +1, -1, 0")
+    option(group, "--truth-mask-extent X,Y,X,Y", "the masks' box in mm; else the skin's")
+    option(group, "--truth-mask-top-first", "row 0 of a mask is the top, not the bottom")
