@@ -186,7 +186,8 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
         share_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
         share_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
         outside(&bad, offsetof(eits_command_solver, solver), c.solver, 0, EITS_SOLVER_ACTIVE_SET) ||
-        outside(&bad, offsetof(eits_command_solver, findings), c.findings, 0, EITS_FINDINGS_ALL) ||
+        outside(&bad, offsetof(eits_command_solver, diagnostics), c.diagnostics, 0,
+                EITS_DIAGNOSTICS_ALL) ||
         outside(&bad, offsetof(eits_command_solver, track), c.track, 0, 1))
         return bad;
     if (!instrument->engine.open)
@@ -200,7 +201,7 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
     options.gap_rel = c.gap_rel;
     options.solver = (eits_solver)c.solver;
     options.mac_limit = c.mac_limit;
-    options.findings = c.findings;
+    options.diagnostics = c.diagnostics;
     set_tracking(instrument, &options, c.track != 0);
     const eits_status status = eits_set_options(&instrument->engine.ctx, &options);
     return status == EITS_OK ? ok() : answer(EITS_REPLY_CORE, (int32_t)status, 0);

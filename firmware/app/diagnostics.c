@@ -5,11 +5,11 @@ static void tell_electrodes(fw_faults *faults, eits_fault code, uint64_t which,
 {
     for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
         detail.index = (int32_t)e;
-        fw_fault_found(faults, code, (which >> e & 1u) != 0, detail);
+        fw_fault_observe(faults, code, (which >> e & 1u) != 0, detail);
     }
 }
 
-void fw_found_open(fw_faults *faults, uint32_t frame, uint64_t open)
+void fw_diagnostics_open(fw_faults *faults, uint32_t frame, uint64_t open)
 {
     tell_electrodes(faults, EITS_FAULT_ELECTRODE_OPEN, open, (fw_fault_detail){.frame = frame});
 }
@@ -32,37 +32,39 @@ static void tell_bridged(fw_faults *faults, uint32_t frame, uint64_t bridged)
     for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
         const bool is = (bridged >> e & 1u) != 0;
         const int32_t other = is ? partner(bridged, e) : 0;
-        fw_fault_found(
+        fw_fault_observe(
             faults, EITS_FAULT_BRIDGED, is,
             (fw_fault_detail){.frame = frame, .index = (int32_t)e, .value = other, .words = words});
     }
 }
 
-void fw_found_skin(fw_faults *faults, uint32_t frame, const eits_info *info)
+void fw_diagnostics_skin(fw_faults *faults, uint32_t frame, const eits_info *info)
 {
-    const fw_fault_detail detail = {.frame = frame, .value = (int32_t)(1000 * info->misfit + 0.5f)};
+    const fw_fault_detail detail = {.frame = frame,
+                                    .value = (int32_t)(1000 * info->model_mismatch + 0.5f)};
     tell_bridged(faults, frame, info->bridged_electrodes);
     tell_electrodes(faults, EITS_FAULT_ELECTRODE_NOISY, info->noisy_electrodes,
                     (fw_fault_detail){.frame = frame});
-    fw_fault_found(faults, EITS_FAULT_MISFIT, (info->findings & EITS_FINDING_MISFIT) != 0, detail);
+    fw_fault_observe(faults, EITS_FAULT_MODEL_MISMATCH,
+                     (info->diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0, detail);
 }
 
-void fw_found_reference(fw_faults *faults, uint32_t frame, const eits_info *info)
+void fw_diagnostics_reference(fw_faults *faults, uint32_t frame, const eits_info *info)
 {
-    fw_fault_found(faults, EITS_FAULT_STALE_REFERENCE,
-                   (info->findings & EITS_FINDING_STALE_REFERENCE) != 0,
-                   (fw_fault_detail){.frame = frame});
+    fw_fault_observe(faults, EITS_FAULT_STALE_REFERENCE,
+                     (info->diagnostics & EITS_DIAGNOSTIC_STALE_REFERENCE) != 0,
+                     (fw_fault_detail){.frame = frame});
 }
 
-void fw_found_head(eits_packet_solved *head, const eits_info *info, const fw_judgement *judged,
-                   const eits_options *options)
+void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info,
+                         const fw_judgement *judged, const eits_options *options)
 {
     const bool saturated =
-        judged->saturated > 0 && (options->findings & EITS_FINDING_SATURATED) != 0;
-    head->findings = info->findings | (saturated ? EITS_FINDING_SATURATED : 0u);
+        judged->saturated > 0 && (options->diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0;
+    head->diagnostics = info->diagnostics | (saturated ? EITS_DIAGNOSTIC_SATURATED : 0u);
     head->saturated = (uint16_t)(info->saturated + judged->saturated);
-    head->glitches = (uint16_t)info->glitches;
-    head->misfit = info->misfit;
+    head->outliers = (uint16_t)info->outliers;
+    head->model_mismatch = info->model_mismatch;
     head->open_electrodes = info->open_electrodes;
     head->bridged_electrodes = info->bridged_electrodes;
     head->noisy_electrodes = info->noisy_electrodes;

@@ -1,23 +1,23 @@
 /* What the core, or before a tare the board, found wrong with a frame: told as faults by name, and
  * in the head of its packets. */
-#ifndef FW_FOUND_H
-#define FW_FOUND_H
+#ifndef FW_DIAGNOSTICS_H
+#define FW_DIAGNOSTICS_H
 
 #include "app/faults.h"
 #include "app/quality.h"
 
 /* Open electrodes, bit e: electrode e. */
-void fw_found_open(fw_faults *faults, uint32_t frame, uint64_t open);
+void fw_diagnostics_open(fw_faults *faults, uint32_t frame, uint64_t open);
 
-/* Bridged and noisy electrodes, misfit. */
-void fw_found_skin(fw_faults *faults, uint32_t frame, const eits_info *info);
+/* Bridged and noisy electrodes, mismatch. */
+void fw_diagnostics_skin(fw_faults *faults, uint32_t frame, const eits_info *info);
 
 /* A stale reference: only frames that were solved tell. */
-void fw_found_reference(fw_faults *faults, uint32_t frame, const eits_info *info);
+void fw_diagnostics_reference(fw_faults *faults, uint32_t frame, const eits_info *info);
 
 /* The head's fields for what was found. The converter knows saturated rows, and the core gets them
  * as no numbers: they are added where `options` names them. */
-void fw_found_head(eits_packet_solved *head, const eits_info *info, const fw_judgement *judged,
-                   const eits_options *options);
+void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info,
+                         const fw_judgement *judged, const eits_options *options);
 
 #endif

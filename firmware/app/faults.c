@@ -46,7 +46,7 @@ void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detai
     tell(faults, code, there, detail);
 }
 
-void fw_fault_found(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail)
+void fw_fault_observe(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail)
 {
     const uint32_t place = place_of(code, detail);
     const bool there = (faults->there[code] >> place & 1u) != 0;

@@ -27,7 +27,7 @@ void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detai
 /* A frame shows the fault, or does not: it rises at once, from ELECTRODE_NOISY on with the
  * EITS_FAULT_SHOWN_FRAMES-th in a row, and goes with the EITS_FAULT_CLEAN_FRAMES-th that does not,
  * so that what comes and goes with the noise does not fill the line. */
-void fw_fault_found(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail);
+void fw_fault_observe(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail);
 
 bool fw_fault_is(const fw_faults *faults, eits_fault code);
 

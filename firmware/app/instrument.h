@@ -58,7 +58,7 @@ typedef struct fw_instrument {
     bool touched; /* the last solved frame had a touch */
     uint32_t tried_us;
     uint32_t frames_solved, deadlines_missed, last_frame;
-    uint32_t glitches;           /* rows, of all frames that the core looked at */
+    uint32_t outliers;           /* rows, of all frames that the core looked at */
     uint32_t doubtful, agreeing; /* checked frames in a row */
     uint32_t uptime_ms, uptime_us;
     /* the last answer, to be given again when its command is sent again */

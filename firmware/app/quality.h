@@ -33,12 +33,12 @@ void fw_quality_prepare(fw_engine *engine, fw_frame *frame);
  * sets the remaining bits, copies reciprocals where they are not to be used as measured, and makes
  * rows that must not be used NaN.
  *
- * Against a reference the core finds open electrodes (findings.h). Without one, and in the frames
- * of a tare, which must not be learned with an electrode off, `by_model` asks for them here: an
- * electrode is open where every significant row that uses it is dead or saturated, and there are at
- * least three of them. The model tells shares only, the frame itself gives the scale: the limit is
- * 0.6 % of the rms voltage, and noise above a third of that hides an open electrode until there is
- * a tare. */
+ * Against a reference the core finds open electrodes (diagnostics.h). Without one, and in the
+ * frames of a tare, which must not be learned with an electrode off, `by_model` asks for them here:
+ * an electrode is open where every significant row that uses it is dead or saturated, and there are
+ * at least three of them. The model tells shares only, the frame itself gives the scale: the limit
+ * is 0.6 % of the rms voltage, and noise above a third of that hides an open electrode until there
+ * is a tare. */
 void fw_quality_judge(fw_engine *engine, fw_frame *frame, bool by_model, fw_judgement *judged);
 
 #endif

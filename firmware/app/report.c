@@ -69,7 +69,7 @@ static void collect(fw_instrument *instrument, eits_packet_stats *stats)
                                  .packets_dropped = instrument->outbox.dropped,
                                  .deadlines_missed = instrument->deadlines_missed,
                                  .slots_repeated = instrument->scan.slots_repeated,
-                                 .glitches = instrument->glitches,
+                                 .outliers = instrument->outliers,
                                  .link_packets = decoder->packets,
                                  .link_crc_errors = decoder->crc_errors,
                                  .link_framing_errors = decoder->framing_errors,

@@ -12,7 +12,7 @@ static void tell_scan(fw_instrument *instrument, const fw_frame *frame, const fw
     fw_fault_set(faults, EITS_FAULT_BUS, frame->bus_errors > 0, detail);
     detail.index = (int32_t)judged->first_saturated;
     detail.value = (int32_t)judged->saturated;
-    fw_fault_found(faults, EITS_FAULT_SATURATED, judged->saturated > 0, detail);
+    fw_fault_observe(faults, EITS_FAULT_SATURATED, judged->saturated > 0, detail);
     if (!judged->checked)
         return;
     /* one frame in which a touch moves has reciprocals that disagree too */
@@ -27,14 +27,14 @@ static void tell_scan(fw_instrument *instrument, const fw_frame *frame, const fw
 }
 
 /* What the core found, whose info is of this frame; `solved`: not its frame stage alone. */
-static void tell_found(fw_instrument *instrument, const fw_frame *frame, bool solved)
+static void send_diagnostics(fw_instrument *instrument, const fw_frame *frame, bool solved)
 {
     const eits_info *info = &instrument->engine.ctx.info;
-    instrument->glitches += info->glitches;
-    fw_found_open(&instrument->faults, frame->number, info->open_electrodes);
-    fw_found_skin(&instrument->faults, frame->number, info);
+    instrument->outliers += info->outliers;
+    fw_diagnostics_open(&instrument->faults, frame->number, info->open_electrodes);
+    fw_diagnostics_skin(&instrument->faults, frame->number, info);
     if (solved)
-        fw_found_reference(&instrument->faults, frame->number, info);
+        fw_diagnostics_reference(&instrument->faults, frame->number, info);
 }
 
 /* Look at a frame that is not solved: faults are told whether anything is streamed or not. */
@@ -45,7 +45,7 @@ static void examine(fw_instrument *instrument, const fw_frame *frame, const fw_j
     else
         instrument->engine.ctx.info = (eits_info){.open_electrodes = judged->open};
     /* without a reference none is stale */
-    tell_found(instrument, frame, !instrument->engine.tared);
+    send_diagnostics(instrument, frame, !instrument->engine.tared);
 }
 
 static void send_raw(fw_instrument *instrument, const fw_frame *frame, uint32_t flags)
@@ -152,7 +152,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
                                .gap_rel = info->gap_rel,
                                .residual = info->residual,
                                .data_norm = info->data_norm};
-    fw_found_head(&head, info, judged, &ctx->options);
+    fw_diagnostics_head(&head, info, judged, &ctx->options);
     fw_stats_add(&instrument->stats, EITS_STAGE_SOLVE, head.solve_us);
     if (wanted)
         fw_stats_add(&instrument->stats, EITS_STAGE_TOUCHES, head.touch_us);
@@ -160,7 +160,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
     instrument->touched = count > 0;
     fw_fault_set(&instrument->faults, EITS_FAULT_SOLVER, status != EITS_OK,
                  (fw_fault_detail){.frame = frame->number, .value = (int32_t)status});
-    tell_found(instrument, frame, status == EITS_OK);
+    send_diagnostics(instrument, frame, status == EITS_OK);
     send_solved(instrument, frame, &head, touches, count);
     return done_us - began_us;
 }
@@ -193,7 +193,7 @@ void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
     fw_stats_add(&instrument->stats, EITS_STAGE_SCAN, frame->scan_us);
     fw_stats_add(&instrument->stats, EITS_STAGE_DEMODULATE, frame->busy_us);
     if (quiet) {
-        fw_found_open(&instrument->faults, frame->number, judged.open);
+        fw_diagnostics_open(&instrument->faults, frame->number, judged.open);
         take_tare(instrument, frame);
         return;
     }

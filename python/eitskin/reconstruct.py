@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from eitskin.config import nearest
-from eitskin.core.findings import plural
+from eitskin.core.diagnostics import plural
 from eitskin.core.results import NEWTONS_PER_GRAM, Baseline, Reconstruction, solve_text
 from eitskin.errors import ConfigError, EitskinError, FrameError, UsageError
 from eitskin.fileio import refuse_unwritable
@@ -199,9 +199,9 @@ def take_reference(
             f"warning: the reference correlates with the model by {reference.correlation:.3f}"
             f" only; run  eitskin doctor {path}"
         )
-    if reference.glitches:
+    if reference.outliers:
         notes.append(
-            f"{plural(reference.glitches, 'reading')} of the quiet frames left out as glitches"
+            f"{plural(reference.outliers, 'reading')} of the quiet frames left out as outliers"
         )
     return reference
 
@@ -333,7 +333,7 @@ def _lines(
             f" {touch.radius_mm:9.2f} {touch.strength_s_per_m_mm2:16.3f}{grams}  {error}"
             f"{'' if k else f'  {cost}'}".rstrip()
         )
-    if info.findings:
+    if info.diagnostics:
         yield f"{'':11} found: {'; '.join(info.found)}"
 
 

@@ -355,7 +355,7 @@ static void straight_data_without_a_ratio(void)
     ctx->baseline.v0[fold.first] = ctx->baseline.v0[fold.second] = 0;
     frame[fold.first] = frame[fold.second] = R(0.01);
     eits_options o = ctx->options;
-    o.findings = 0;
+    o.diagnostics = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
     eits_copy(y, ctx->y, RANK);

@@ -1,5 +1,5 @@
 /* Open electrodes, bridged pairs, dead front ends, and rows that no sheet gives. */
-#include "findings_bench.h"
+#include "spoiled_frame.h"
 
 /* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that
  * lives, and it is not. */
@@ -9,7 +9,7 @@ static void open_electrodes(void)
         for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
             bench b;
             eits_context *ctx = set_up(&b, 1);
-            look_for(ctx, EITS_FINDINGS_ALL);
+            look_for(ctx, EITS_DIAGNOSTICS_ALL);
             eits_options o = ctx->options;
             o.saturation_v = 2;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -24,10 +24,11 @@ static void open_electrodes(void)
             reconstruct(&b);
             CHECK_EQUAL(ctx->info.masked, count);
             CHECK_EQUAL(ctx->info.open_electrodes, 1u << e);
-            CHECK_EQUAL(ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED),
-                        EITS_FINDING_ELECTRODE_OPEN);
+            CHECK_EQUAL(ctx->info.diagnostics &
+                            (EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED),
+                        EITS_DIAGNOSTIC_ELECTRODE_OPEN);
             CHECK_EQUAL(ctx->info.saturated, kind == 2 ? count : 0);
-            CHECK((ctx->info.findings & EITS_FINDING_SATURATED) != 0 || kind != 2);
+            CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0 || kind != 2);
             for (uint32_t k = 0; k < SMALL_ELECTRODES; ++k)
                 CHECK_EQUAL(ctx->electrode[k], k == e ? EITS_ELECTRODE_OPEN : 0);
             for (uint32_t i = 0; i < SMALL_ROWS; ++i)
@@ -38,7 +39,7 @@ static void open_electrodes(void)
             CHECK_EQUAL(ctx->info.open_electrodes, 0);
             CHECK_EQUAL(ctx->electrode[e] & EITS_ELECTRODE_OPEN, 0);
             b.frame[last] = dead;
-            look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN);
+            look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN);
             reconstruct(&b);
             CHECK_EQUAL(ctx->info.open_electrodes, 0);
             tear_down(&b);
@@ -53,11 +54,11 @@ static void all_dead(void)
     eits_context *ctx = set_up(&b, 1);
     memset(b.frame, 0, sizeof b.frame);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
-    CHECK_EQUAL(ctx->info.findings, 0);
+    CHECK_EQUAL(ctx->info.diagnostics, 0);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = R(NAN);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-    CHECK_EQUAL(ctx->info.findings, 0);
+    CHECK_EQUAL(ctx->info.diagnostics, 0);
     tear_down(&b);
 }
 
@@ -67,16 +68,16 @@ static void noise_alone(void)
     for (int open = 0; open < 2; ++open) {
         bench b;
         eits_context *ctx = set_up(&b, 1);
-        look_for(ctx, open ? EITS_FINDINGS_ALL
-                           : EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN);
+        look_for(ctx, open ? EITS_DIAGNOSTICS_ALL
+                           : EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         memset(b.frame, 0, sizeof b.frame);
         add_noise(&b, b.frame);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
-        CHECK(ctx->info.findings == 0 && ctx->info.open_electrodes == 0);
+        CHECK(ctx->info.diagnostics == 0 && ctx->info.open_electrodes == 0);
         b.frame[7] = ctx->baseline.v0[7]; /* one row that lives, and it is not the front end */
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(ctx->info.findings & EITS_FINDING_ELECTRODE_OPEN,
-                    open ? EITS_FINDING_ELECTRODE_OPEN : 0);
+        CHECK_EQUAL(ctx->info.diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
+                    open ? EITS_DIAGNOSTIC_ELECTRODE_OPEN : 0);
         tear_down(&b);
     }
 }
@@ -94,7 +95,7 @@ static void what_a_dead_row_is(void)
             b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) *
                          (b.frame[i] < 0 ? R(-1) : R(1));
         CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
-        look_for(ctx, EITS_FINDING_ELECTRODE_OPEN);
+        look_for(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         /* as though it had been learned */
         ctx->baseline.noise_v = way == 2 || way == 3 ? R(0.006) : 0;
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
@@ -119,7 +120,7 @@ static void refused_by_name(void)
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = row_uses(ctx, i, 3) ? 0 : b.frame[i];
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_ELECTRODE_OPEN);
+    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
     CHECK_EQUAL(ctx->info.open_electrodes, 1u << 3);
     tear_down(&b);
 }
@@ -130,16 +131,16 @@ static void bridged_pairs(void)
         bench b;
         eits_context *ctx = set_up(&b, 1);
         const uint32_t f = (e + 1) % SMALL_ELECTRODES;
-        look_for(ctx, EITS_FINDINGS_ALL);
+        look_for(ctx, EITS_DIAGNOSTICS_ALL);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] *= row_crosses(ctx, i, e, f) ? R(0.01) : R(1);
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.findings, EITS_FINDING_BRIDGED);
+        CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_BRIDGED);
         CHECK_EQUAL(ctx->info.bridged_electrodes, (1u << e) | (1u << f));
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             CHECK_EQUAL(ctx->unusable[i],
                         row_uses(ctx, i, e) || row_uses(ctx, i, f) ? EITS_ROW_BRIDGED : 0);
-        look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_BRIDGED);
+        look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_BRIDGED);
         reconstruct(&b);
         CHECK_EQUAL(ctx->info.bridged_electrodes, 0);
         tear_down(&b);
@@ -153,7 +154,7 @@ static void pairs_that_live(void)
         bench b;
         eits_context *ctx = set_up(&b, 1);
         const uint32_t f = (e + 1) % SMALL_ELECTRODES;
-        look_for(ctx, EITS_FINDING_BRIDGED);
+        look_for(ctx, EITS_DIAGNOSTIC_BRIDGED);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] *= row_crosses(ctx, i, e, f) ? R(0.01) : R(1);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
@@ -162,11 +163,11 @@ static void pairs_that_live(void)
                 continue;
             b.frame[i] *= 100;
             reconstruct(&b);
-            CHECK_EQUAL(ctx->info.findings, 0);
+            CHECK_EQUAL(ctx->info.diagnostics, 0);
             b.frame[i] = dead;
         }
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.findings, EITS_FINDING_BRIDGED);
+        CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_BRIDGED);
         uint32_t telling = 0; /* two rows that tell something are too few */
         memcpy(b.frame, b.quiet[0], sizeof b.frame);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
@@ -177,35 +178,35 @@ static void pairs_that_live(void)
             b.frame[i] *= row_crosses(ctx, i, e, f) || another ? 0 : R(1);
         }
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.findings, 0);
+        CHECK_EQUAL(ctx->info.diagnostics, 0);
         tear_down(&b);
     }
 }
 
-/* Rows that the user masked are no sign of an open electrode, nor saturated; and a frame's findings
- * end with it. */
+/* Rows that the user masked are no sign of an open electrode, nor saturated; and a frame's
+ * diagnostics end with it. */
 static void masked_and_forgotten(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
-    look_for(ctx, EITS_FINDINGS_ALL);
+    look_for(ctx, EITS_DIAGNOSTICS_ALL);
     eits_options o = ctx->options;
     o.saturation_v = 2;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     const eits_real good = b.frame[9];
     b.frame[9] *= -1;
     reconstruct(&b);
-    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
+    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
     b.frame[9] = good;
     reconstruct(&b);
-    CHECK(ctx->info.findings == 0 && ctx->info.glitches == 0 && ctx->info.masked == 0);
+    CHECK(ctx->info.diagnostics == 0 && ctx->info.outliers == 0 && ctx->info.masked == 0);
     for (int turned = 1; turned >= 0; --turned) { /* the stage by itself */
         uint32_t masked;
         uint64_t macs;
         b.frame[9] = turned ? -good : good;
         CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-        CHECK_EQUAL(ctx->info.findings, turned ? EITS_FINDING_GLITCH : 0);
-        CHECK_EQUAL(ctx->info.glitches, turned);
+        CHECK_EQUAL(ctx->info.diagnostics, turned ? EITS_DIAGNOSTIC_OUTLIER : 0);
+        CHECK_EQUAL(ctx->info.outliers, turned);
     }
     for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
         if (!row_uses(ctx, i, 3))
@@ -214,7 +215,7 @@ static void masked_and_forgotten(void)
         b.frame[i] = i % 2 ? 3 : 0;
     }
     reconstruct(&b);
-    CHECK(ctx->info.findings == 0 && ctx->info.saturated == 0 && ctx->info.masked == 20);
+    CHECK(ctx->info.diagnostics == 0 && ctx->info.saturated == 0 && ctx->info.masked == 20);
     tear_down(&b);
 }
 
@@ -231,7 +232,7 @@ static void small_rows(void)
         b.frame[fold.first] = grown ? R(0.42) : R(0.36),
         b.frame[fold.second] = (eits_real)fold.sign * b.frame[fold.first];
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.findings, grown ? EITS_FINDING_GLITCH : 0);
+        CHECK_EQUAL(ctx->info.diagnostics, grown ? EITS_DIAGNOSTIC_OUTLIER : 0);
         CHECK_EQUAL(ctx->info.masked, grown ? 2 : 0);
     }
     tear_down(&b);
@@ -246,18 +247,18 @@ static void impossible_rows(void)
     const eits_real good = b.frame[9];
     b.frame[9] *= -1;
     reconstruct(&b);
-    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
-    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_GLITCH);
+    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_OUTLIER);
     CHECK_EQUAL(ctx->info.masked, 1);
     b.frame[9] = 9 * good;
     reconstruct(&b);
-    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_GLITCH);
+    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_OUTLIER);
     CHECK_EQUAL(ctx->info.masked, 1);
     b.frame[9] = good;
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] *= R(-1);
     reconstruct(&b);
-    CHECK((ctx->info.findings & EITS_FINDING_MISFIT) != 0);
+    CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0);
     CHECK_EQUAL(ctx->info.masked, 0);
     tear_down(&b);
 }

@@ -254,7 +254,7 @@ static void hidden_columns(void)
     eits_context *ctx = &b.c.ctx;
     eits_options o = ctx->options;
     o.solver = EITS_SOLVER_ACTIVE_SET;
-    o.findings = o.project_baseline = 0;
+    o.diagnostics = o.project_baseline = 0;
     o.max_masked = SMALL_ROWS;
     o.gate_factor = o.gap_rel = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);

@@ -1,6 +1,6 @@
-/* What is found wrong with a frame, and what is left out because of it; glitches in quiet frames.
+/* What is found wrong with a frame, and what is left out because of it; outliers in quiet frames.
  */
-#include "findings_bench.h"
+#include "spoiled_frame.h"
 
 static void nothing_wrong(void)
 {
@@ -8,16 +8,16 @@ static void nothing_wrong(void)
         bench b;
         eits_context *ctx = set_up(&b, known);
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.findings, 0);
+        CHECK_EQUAL(ctx->info.diagnostics, 0);
         CHECK_EQUAL(ctx->info.masked, 0);
-        CHECK(ctx->baseline.glitches == 0 && (ctx->baseline.noise_v > 0) == known);
+        CHECK(ctx->baseline.outliers == 0 && (ctx->baseline.noise_v > 0) == known);
         tear_down(&b);
     }
 }
 
 /* The small model's P is arbitrary: nothing predicts, so both sides of a fold go; the noise is
  * known or told by all folds. */
-static void one_glitch(void)
+static void one_outlier(void)
 {
     for (int known = 0; known < 2; ++known) {
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -28,15 +28,15 @@ static void one_glitch(void)
             b.frame[fold.first] *= R(1.3);
             reconstruct(&b);
             if (fold.second == EITS_FOLD_NONE) {
-                CHECK_EQUAL(ctx->info.glitches, 0);
+                CHECK_EQUAL(ctx->info.outliers, 0);
             } else {
-                CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
-                CHECK_EQUAL(ctx->info.glitches, 2);
+                CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+                CHECK_EQUAL(ctx->info.outliers, 2);
                 CHECK_EQUAL(ctx->info.masked, 2);
-                CHECK(ctx->unusable[fold.first] == EITS_ROW_GLITCH &&
-                      ctx->unusable[fold.second] == EITS_ROW_GLITCH);
+                CHECK(ctx->unusable[fold.first] == EITS_ROW_OUTLIER &&
+                      ctx->unusable[fold.second] == EITS_ROW_OUTLIER);
             }
-            look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_GLITCH);
+            look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER);
             reconstruct(&b);
             CHECK_EQUAL(ctx->info.masked, 0);
             tear_down(&b);
@@ -46,34 +46,34 @@ static void one_glitch(void)
 
 /* Many folds whose sides disagree: those that share an electrode leave with it; those that share
  * none are no network's. */
-static void many_glitches(void)
+static void many_outliers(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
-    look_for(ctx, EITS_FINDINGS_ALL);
+    look_for(ctx, EITS_DIAGNOSTICS_ALL);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         const uint32_t i = b.c.model.fold[k].first;
         b.frame[i] *= row_uses(ctx, i, 5) ? R(1.2) : R(1);
     }
     reconstruct(&b);
-    CHECK_EQUAL(ctx->info.findings, EITS_FINDING_ELECTRODE_NOISY);
+    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_ELECTRODE_NOISY);
     CHECK_EQUAL(ctx->info.noisy_electrodes, 1u << 5);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         CHECK_EQUAL(ctx->unusable[i], row_uses(ctx, i, 5) ? EITS_ROW_NOISY : 0);
-    look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_NOISY);
+    look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_NOISY);
     reconstruct(&b);
     CHECK_EQUAL(ctx->info.masked, 0);
     memcpy(b.frame, b.quiet[0], sizeof b.frame);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
         b.frame[b.c.model.fold[k].first] *= k % 2 == 0 ? R(1.2) : R(0.9);
-    look_for(ctx, EITS_FINDINGS_ALL);
+    look_for(ctx, EITS_DIAGNOSTICS_ALL);
     reconstruct(&b);
-    CHECK((ctx->info.findings & EITS_FINDING_MISFIT) != 0 && ctx->info.masked == 0);
+    CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0 && ctx->info.masked == 0);
     tear_down(&b);
 }
 
 /* One reading of any of the quiet frames: left out, and the reference is as without it. */
-static void quiet_glitch(void)
+static void an_outlier_in_the_reference(void)
 {
     for (int at = 0; at < QUIET; ++at) {
         bench b;
@@ -87,7 +87,7 @@ static void quiet_glitch(void)
             CHECK_EQUAL(ctx->baseline.count, k + 1);
         }
         CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-        CHECK_EQUAL(ctx->baseline.glitches, 1);
+        CHECK_EQUAL(ctx->baseline.outliers, 1);
         CHECK_NEAR(eits_fabs(ctx->baseline.v0[row]), 1, 2e-3);
         CHECK_NEAR(ctx->baseline.noise_v, noise, 0.05 * (double)noise);
         CHECK_NEAR(ctx->baseline.lambda_noise, lambda_noise, 0.3 * (double)lambda_noise);
@@ -98,24 +98,24 @@ static void quiet_glitch(void)
         for (int k = 0; k < QUIET; ++k)
             CHECK_EQUAL(eits_baseline_add(ctx, b.quiet[k], SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-        CHECK(ctx->baseline.glitches == 0 && ctx->baseline.noise_v > 5 * noise);
+        CHECK(ctx->baseline.outliers == 0 && ctx->baseline.noise_v > 5 * noise);
         tear_down(&b);
     }
 }
 
-/* More readings of a quiet frame than glitches are: it counts as it is. */
+/* More readings of a quiet frame than outliers are: it counts as it is. */
 static void quiet_frame_of_another_kind(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
-    for (uint32_t count = 1; count <= EITS_GLITCH_MOST + 1; ++count) {
+    for (uint32_t count = 1; count <= EITS_OUTLIER_MAX + 1; ++count) {
         b.quiet[5][b.c.model.fold[count].first] += R(0.5);
         CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
         for (int k = 0; k < QUIET; ++k)
             CHECK_EQUAL(eits_baseline_add(ctx, b.quiet[k], SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-        CHECK_EQUAL(ctx->baseline.glitches, count <= EITS_GLITCH_MOST ? count : 0);
-        CHECK((ctx->baseline.noise_v < R(2e-3)) == (count <= EITS_GLITCH_MOST));
+        CHECK_EQUAL(ctx->baseline.outliers, count <= EITS_OUTLIER_MAX ? count : 0);
+        CHECK((ctx->baseline.noise_v < R(2e-3)) == (count <= EITS_OUTLIER_MAX));
     }
     tear_down(&b);
 }
@@ -145,27 +145,27 @@ static void options_and_names(void)
     bench b;
     eits_context *ctx = set_up(&b, 0);
     eits_options o = ctx->options;
-    CHECK_EQUAL(o.findings, EITS_FINDINGS_ALL);
-    o.findings = EITS_FINDINGS_ALL + 1;
+    CHECK_EQUAL(o.diagnostics, EITS_DIAGNOSTICS_ALL);
+    o.diagnostics = EITS_DIAGNOSTICS_ALL + 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
     uint32_t all = 0;
-    for (uint32_t bit = 1; bit <= EITS_FINDINGS_ALL; bit <<= 1) {
-        CHECK(strcmp(eits_finding_text((eits_finding)bit), "unknown finding") != 0);
+    for (uint32_t bit = 1; bit <= EITS_DIAGNOSTICS_ALL; bit <<= 1) {
+        CHECK(strcmp(eits_diagnostic_text((eits_diagnostic)bit), "unknown diagnostic") != 0);
         all |= bit;
     }
-    CHECK_EQUAL(all, EITS_FINDINGS_ALL);
-    CHECK(strcmp(eits_finding_text((eits_finding)0), "unknown finding") == 0);
+    CHECK_EQUAL(all, EITS_DIAGNOSTICS_ALL);
+    CHECK(strcmp(eits_diagnostic_text((eits_diagnostic)0), "unknown diagnostic") == 0);
     tear_down(&b);
 }
 
 int main(void)
 {
     nothing_wrong();
-    one_glitch();
-    many_glitches();
-    quiet_glitch();
+    one_outlier();
+    many_outliers();
+    an_outlier_in_the_reference();
     quiet_frame_of_another_kind();
     medians();
     options_and_names();
-    return checks_report("findings");
+    return checks_report("diagnostics");
 }

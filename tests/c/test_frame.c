@@ -37,7 +37,7 @@ static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int proj
         b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
     eits_options o = b->c.ctx.options;
     o.project_baseline = (uint32_t)project;
-    o.findings = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
+    o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
     CHECK_EQUAL(eits_set_options(&b->c.ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_baseline_set(&b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
     return &b->c.ctx;
@@ -421,7 +421,7 @@ static void directions_that_nearly_agree(void)
     small_context c;
     small_context_open(&c, &made, 0);
     eits_options o = c.ctx.options;
-    o.project_baseline = o.findings = 0;
+    o.project_baseline = o.diagnostics = 0;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
     eits_real frame[SMALL_ROWS];

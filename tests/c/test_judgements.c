@@ -1,4 +1,4 @@
-/* What is said of a frame that is imaged as it is - misfit, a stale reference, crowds - and which
+/* What is said of a frame that is imaged as it is - mismatch, a stale reference, crowds - and which
  * readings of quiet frames are odd: from numbers set by hand, on both sides of each limit. */
 #include "check.h"
 #include "dense.h"
@@ -22,7 +22,7 @@ static eits_context *set_up(dense_bench *b, eits_data_kind kind)
     eits_real reference[SMALL_ROWS];
     small_reference(ctx->model, 1, reference);
     CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
-    ctx->info.findings = 0;
+    ctx->info.diagnostics = 0;
     return ctx;
 }
 
@@ -30,8 +30,8 @@ static eits_context *set_up(dense_bench *b, eits_data_kind kind)
 
 static int crowded(eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
-    eits_judge_crowd(ctx, 1, touches, count);
-    return (ctx->info.findings & EITS_FINDING_CROWDED) != 0;
+    eits_check_crowd(ctx, 1, touches, count);
+    return (ctx->info.diagnostics & EITS_DIAGNOSTIC_CROWDED) != 0;
 }
 
 /* The score of crowded.c, in double, from its features. */
@@ -102,11 +102,11 @@ static void crowds(void)
     o.max_touches = 5;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     said_as(ctx, t, 4, score_of(4, 8, 2, 1, 0.01, 2, 2), 0);
-    o.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
+    o.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_CROWDED;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     t[3].x_mm = -41;
     CHECK_EQUAL(crowded(ctx, t, 4), 0);
-    eits_judge_crowd(ctx, 0, t, 0);
+    eits_check_crowd(ctx, 0, t, 0);
     CHECK(ctx->info.unexplained == 0);
     dense_bench_close(&b);
 }
@@ -137,17 +137,17 @@ static void stale_references(void)
         ctx->info.lambda_max =
             (eits_real)(o.sign == EITS_SIGN_DECREASE ? CASES[k].down : CASES[k].up);
         ctx->info.lambda_noise = (eits_real)CASES[k].noise;
-        ctx->info.findings = 0;
-        eits_judge_reference(ctx);
-        CHECK_EQUAL(ctx->info.findings, CASES[k].stale ? EITS_FINDING_STALE_REFERENCE : 0);
+        ctx->info.diagnostics = 0;
+        eits_check_stale_reference(ctx);
+        CHECK_EQUAL(ctx->info.diagnostics, CASES[k].stale ? EITS_DIAGNOSTIC_STALE_REFERENCE : 0);
     }
     dense_bench_close(&b);
 }
 
-/* ---- misfit ---- */
+/* ---- mismatch ---- */
 
-/* d = what a sheet gives, and `off` times what none gives; 1 where it is judged a misfit. */
-static int misfit(eits_context *ctx, double off)
+/* d = what a sheet gives, and `off` times what none gives; 1 where it is judged a mismatch. */
+static int model_mismatch(eits_context *ctx, double off)
 {
     const double pi = 3.14159265358979323846;
     uint32_t index[SMALL_FOLDED];
@@ -161,11 +161,11 @@ static int misfit(eits_context *ctx, double off)
     }
     ctx->kernels->mul(&ctx->model->reduction, index, ctx->d, SMALL_FOLDED, ctx->y);
     eits_zero(ctx->along, SMALL_FOLDED);
-    ctx->info.misfit = 0;
-    return eits_judge_misfit(ctx, &macs);
+    ctx->info.model_mismatch = 0;
+    return eits_check_model_mismatch(ctx, &macs);
 }
 
-static void misfits(void)
+static void mismatches(void)
 {
     dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
@@ -175,21 +175,21 @@ static void misfits(void)
         CHECK_NEAR(ctx->sheet_shrink[i], s2 / (s2 + 1e-4) * inverse, 1e-4 * inverse);
         CHECK_NEAR(ctx->sheet_inverse[i], inverse, 1e-5);
     }
-    CHECK(!misfit(ctx, 0.5) && ctx->info.misfit == 0); /* the noise is not known */
+    CHECK(!model_mismatch(ctx, 0.5) && ctx->info.model_mismatch == 0); /* the noise is not known */
     ctx->baseline.noise_v = R(1e-4);
-    CHECK(misfit(ctx, 0.06));
-    CHECK_NEAR(ctx->info.misfit, 0.06, 2e-4);
-    CHECK(!misfit(ctx, 0.045));
-    CHECK_NEAR(ctx->info.misfit, 0.045, 2e-4);
+    CHECK(model_mismatch(ctx, 0.06));
+    CHECK_NEAR(ctx->info.model_mismatch, 0.06, 2e-4);
+    CHECK(!model_mismatch(ctx, 0.045));
+    CHECK_NEAR(ctx->info.model_mismatch, 0.045, 2e-4);
     /* of |d|^2 = (1 + off^2) 21/2; noise leaves 8 times noise_v^2 outside */
     const double off = 0.4, outside = off * off * SMALL_FOLDED / 2.0;
     ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 8.5));
-    CHECK(!misfit(ctx, off));
-    CHECK_NEAR(ctx->info.misfit, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)), 1e-3);
+    CHECK(!model_mismatch(ctx, off));
+    CHECK_NEAR(ctx->info.model_mismatch, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)), 1e-3);
     ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 9.5));
-    CHECK(misfit(ctx, off));
+    CHECK(model_mismatch(ctx, off));
     ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 0.9));
-    CHECK(!misfit(ctx, off) && ctx->info.misfit == 0);
+    CHECK(!model_mismatch(ctx, off) && ctx->info.model_mismatch == 0);
     dense_bench_close(&b);
 }
 
@@ -263,10 +263,10 @@ static void odd_readings(void)
         CHECK_EQUAL(marked[CASES[n].fold], CASES[n].odd);
     }
     memcpy(spoilt, newer, sizeof spoilt);
-    /* as many are no glitches */
-    for (uint32_t count = 1; count <= EITS_GLITCH_MOST + 1; ++count) {
+    /* as many are no outliers */
+    for (uint32_t count = 1; count <= EITS_OUTLIER_MAX + 1; ++count) {
         spoilt[ctx->model->fold[count].first] += R(0.2);
-        CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), count <= EITS_GLITCH_MOST ? count : 0);
+        CHECK_EQUAL(odd_folds(ctx, spoilt, older, marked), count <= EITS_OUTLIER_MAX ? count : 0);
     }
     dense_bench_close(&b);
 }
@@ -300,7 +300,7 @@ static void noise_of_any_size(void)
         for (int i = 0; i < SMALL_ROWS; ++i)
             sum += (squares[i] - FRAMES * mean[i] * mean[i]) / (FRAMES - 1) / SMALL_ROWS;
         CHECK_NEAR((double)ctx->baseline.noise_v / sizes[n], sqrt(sum), 1e-4);
-        CHECK_EQUAL(ctx->baseline.glitches, 0);
+        CHECK_EQUAL(ctx->baseline.outliers, 0);
         memset(frame, 0, sizeof frame); /* a dead front end is no quiet frame */
         CHECK_EQUAL(eits_baseline_begin(ctx, FRAMES), EITS_OK);
         for (int k = 0; k < FRAMES; ++k) {
@@ -329,7 +329,7 @@ int main(void)
 {
     crowds();
     stale_references();
-    misfits();
+    mismatches();
     noise_of_the_data();
     odd_readings();
     noise_of_any_size();

@@ -54,7 +54,7 @@ static void touches_are_finite_whatever_the_units(void)
 static void look_for_nothing(eits_context *ctx)
 {
     eits_options o = ctx->options;
-    o.findings = 0;
+    o.diagnostics = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
 

@@ -308,7 +308,7 @@ static void the_refined_image_is_that_of_coupled_data(void)
     CHECK_EQUAL(ctx->info.macs, first.macs + other->info.macs);
     CHECK_EQUAL(ctx->info.step_halvings, first.step_halvings + other->info.step_halvings);
     CHECK_EQUAL(ctx->info.touches, 2);
-    CHECK_EQUAL(ctx->info.findings, first.findings);
+    CHECK_EQUAL(ctx->info.diagnostics, first.diagnostics);
     CHECK(ctx->info.data_norm == other->info.data_norm && ctx->info.stop == other->info.stop &&
           ctx->info.lambda == other->info.lambda);
     dense_bench_close(&plain);
@@ -357,13 +357,13 @@ static void nothing_comes_of_it(void)
     eits_copy(image, ctx->image, SIDE * SIDE);
     eits_copy(y, ctx->y, RANK);
     const eits_info before = ctx->info;
-    ctx->info.findings = 4;
+    ctx->info.diagnostics = 4;
     eits_solve_again(ctx, nothing);
     CHECK(memcmp(y, ctx->y, sizeof y) == 0);
     for (int j = 0; j < SIDE * SIDE; ++j)
         CHECK(ctx->image[j] == image[j]);
     CHECK(ctx->info.stop == before.stop && ctx->info.data_norm == before.data_norm &&
-          ctx->info.findings == 4);
+          ctx->info.diagnostics == 4);
     CHECK_EQUAL(ctx->info.iterations, 2 * before.iterations);
     CHECK_EQUAL(ctx->straight, 0);
     eits_solve_again(ctx, infinite);

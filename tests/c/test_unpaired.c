@@ -1,4 +1,4 @@
-/* Glitches where the other folds tell what is right: half scans, whose second rows are copies, and
+/* Outliers where the other folds tell what is right: half scans, whose second rows are copies, and
  * which side of a fold is wrong; and channels: many folds that share a pair. */
 #include "check.h"
 #include "small_model.h"
@@ -149,10 +149,10 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-static void look_for(eits_context *ctx, uint32_t findings, uint32_t max_masked)
+static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_masked)
 {
     eits_options o = ctx->options;
-    o.findings = findings;
+    o.diagnostics = diagnostics;
     o.max_masked = max_masked;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
@@ -162,8 +162,8 @@ static void look_for(eits_context *ctx, uint32_t findings, uint32_t max_masked)
 static uint32_t reconstruct(bench *b)
 {
     CHECK_EQUAL(eits_reconstruct(&b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    return b->c.ctx.info.findings &
-           ~(uint32_t)(EITS_FINDING_CROWDED | EITS_FINDING_STALE_REFERENCE);
+    return b->c.ctx.info.diagnostics &
+           ~(uint32_t)(EITS_DIAGNOSTIC_CROWDED | EITS_DIAGNOSTIC_STALE_REFERENCE);
 }
 
 /* Row and copy of fold k are off by `off`. */
@@ -186,7 +186,7 @@ static void clean_half_scans(void)
             clean_frame(&b, k % 2 ? 0.15 : 0.001);
             CHECK_EQUAL(reconstruct(&b), 0);
             CHECK_EQUAL(ctx->info.masked, 0);
-            CHECK(ctx->info.misfit < EITS_MISFIT_SHARE || k % 2 == 0);
+            CHECK(ctx->info.model_mismatch < EITS_MISMATCH_FRACTION || k % 2 == 0);
         }
         tear_down(&b);
     }
@@ -194,7 +194,7 @@ static void clean_half_scans(void)
 
 /* Left out with its copy, and counted; the image is that of a frame whose rows were known to be
  * bad. */
-static void one_glitch_of_a_half_scan(void)
+static void one_outlier_of_a_half_scan(void)
 {
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         bench b;
@@ -210,23 +210,23 @@ static void one_glitch_of_a_half_scan(void)
             tear_down(&b);
             continue;
         }
-        CHECK_EQUAL(found, EITS_FINDING_GLITCH);
-        CHECK_EQUAL(ctx->info.glitches, rows);
+        CHECK_EQUAL(found, EITS_DIAGNOSTIC_OUTLIER);
+        CHECK_EQUAL(ctx->info.outliers, rows);
         CHECK_EQUAL(ctx->info.masked, rows);
-        CHECK(ctx->info.misfit == 0 && ctx->unusable[fold.first] == EITS_ROW_GLITCH);
+        CHECK(ctx->info.model_mismatch == 0 && ctx->unusable[fold.first] == EITS_ROW_OUTLIER);
         memcpy(data, ctx->y, sizeof data);
-        look_for(ctx, EITS_FINDINGS_ALL, rows - 1);
+        look_for(ctx, EITS_DIAGNOSTICS_ALL, rows - 1);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-        CHECK_EQUAL(ctx->info.findings, EITS_FINDING_GLITCH);
-        CHECK_EQUAL(ctx->info.glitches, rows);
-        look_for(ctx, EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_GLITCH, SMALL_ROWS);
-        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
-        CHECK(ctx->info.misfit > EITS_MISFIT_SHARE && ctx->info.misfit <= 1 &&
+        CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+        CHECK_EQUAL(ctx->info.outliers, rows);
+        look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);
+        CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
+        CHECK(ctx->info.model_mismatch > EITS_MISMATCH_FRACTION && ctx->info.model_mismatch <= 1 &&
               ctx->info.masked == 0);
         look_for(ctx, 0, SMALL_ROWS);
         CHECK_EQUAL(reconstruct(&b), 0);
         CHECK_EQUAL(ctx->info.masked, 0);
-        look_for(ctx, EITS_FINDINGS_ALL, SMALL_ROWS);
+        look_for(ctx, EITS_DIAGNOSTICS_ALL, SMALL_ROWS);
         CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
         if (fold.second != EITS_FOLD_NONE)
             CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
@@ -238,36 +238,36 @@ static void one_glitch_of_a_half_scan(void)
 
 /* Which of several it is cannot be told without reciprocals; and reciprocals that differ by noise
  * bear each other out. */
-static void misfits_that_are_no_glitch(void)
+static void mismatches_that_are_no_outlier(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
     clean_frame(&b, 0.15);
     for (uint32_t k = 0; k < 9; k += 3)
         spoil(&b, k, 0.6);
-    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
-    CHECK(ctx->info.masked == 0 && ctx->info.glitches == 0);
+    CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
+    CHECK(ctx->info.masked == 0 && ctx->info.outliers == 0);
     clean_frame(&b, 0.15); /* noise all over: nothing stands out of it */
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
         spoil(&b, k, 0.05 * small_random(&b.state));
     spoil(&b, 4, 0.4);
-    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     CHECK_EQUAL(ctx->info.masked, 0);
     clean_frame(&b, 0.02); /* a lesser one beside it does not matter */
     spoil(&b, 0, 0.6);
     spoil(&b, 3, 0.36);
-    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
-    CHECK(ctx->info.glitches == 2 && ctx->unusable[b.c.model.fold[0].first] == EITS_ROW_GLITCH);
+    CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
+    CHECK(ctx->info.outliers == 2 && ctx->unusable[b.c.model.fold[0].first] == EITS_ROW_OUTLIER);
     clean_frame(&b, 0.02); /* a fold that none determines is not blamed, however large */
     spoil(&b, 18, 6);
     for (uint32_t k = 0; k < 9; k += 3)
         spoil(&b, k, 0.3);
-    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     CHECK_EQUAL(ctx->info.masked, 0);
     clean_frame(&b, 0.02); /* rows that have turned, though one stands out */
     spoil(&b, 0, -7);
     spoil(&b, 3, -1.1);
-    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     CHECK_EQUAL(ctx->info.masked, 0);
     tear_down(&b);
     ctx = set_up(&b, 0);
@@ -275,13 +275,13 @@ static void misfits_that_are_no_glitch(void)
     const eits_fold fold = b.c.model.fold[5];
     b.frame[fold.first] += R(0.6);
     b.frame[fold.second] += (eits_real)fold.sign * R(0.6);
-    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+    CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     CHECK_EQUAL(ctx->info.masked, 0);
     tear_down(&b);
 }
 
-/* How far the gain drifted is no news; a glitch beside it is. */
-static void drift_is_no_misfit(void)
+/* How far the gain drifted is no news; a outlier beside it is. */
+static void drift_is_no_mismatch(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 0);
@@ -305,12 +305,12 @@ static void drift_is_no_misfit(void)
         CHECK_EQUAL(reconstruct(&b), 0);
         for (int i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] += R(0.2) * b.reference[i];
-        CHECK_EQUAL(reconstruct(&b), project ? 0 : EITS_FINDING_MISFIT);
-        CHECK((ctx->info.misfit < R(0.01)) == project);
+        CHECK_EQUAL(reconstruct(&b), project ? 0 : EITS_DIAGNOSTIC_MODEL_MISMATCH);
+        CHECK((ctx->info.model_mismatch < R(0.01)) == project);
         const eits_fold fold = b.c.model.fold[7];
         b.frame[fold.first] += R(0.05);
         b.frame[fold.second] += (eits_real)fold.sign * R(0.05);
-        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_MISFIT);
+        CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
     }
     tear_down(&b);
 }
@@ -328,10 +328,10 @@ static void the_wrong_side_goes(void)
                                right = side ? fold.first : fold.second;
                 clean_frame(&b, 0.15);
                 b.frame[wrong] *= R(1.5);
-                CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
-                CHECK_EQUAL(ctx->unusable[wrong], EITS_ROW_GLITCH);
-                CHECK_EQUAL(ctx->unusable[right], block_of(k) < BLOCKS ? 0 : EITS_ROW_GLITCH);
-                CHECK_EQUAL(ctx->info.glitches, block_of(k) < BLOCKS ? 1 : 2);
+                CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
+                CHECK_EQUAL(ctx->unusable[wrong], EITS_ROW_OUTLIER);
+                CHECK_EQUAL(ctx->unusable[right], block_of(k) < BLOCKS ? 0 : EITS_ROW_OUTLIER);
+                CHECK_EQUAL(ctx->info.outliers, block_of(k) < BLOCKS ? 1 : 2);
             }
             tear_down(&b);
         }
@@ -343,24 +343,24 @@ static void several_wrong_sides(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 0);
-    for (uint32_t count = 1; count <= EITS_GLITCH_MOST; ++count) {
+    for (uint32_t count = 1; count <= EITS_OUTLIER_MAX; ++count) {
         clean_frame(&b, 0.15);
         for (uint32_t l = 0; l < count; ++l) { /* folds 0, 1, 3, 4, ... */
             const eits_fold fold = b.c.model.fold[l + l / 2];
             b.frame[l % 3 ? fold.first : fold.second] *= l % 2 ? R(1.6) : R(1.4);
         }
-        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
-        CHECK_EQUAL(ctx->info.glitches, count);
+        CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
+        CHECK_EQUAL(ctx->info.outliers, count);
         for (uint32_t l = 0; l < count; ++l) {
             const eits_fold fold = b.c.model.fold[l + l / 2];
-            CHECK_EQUAL(ctx->unusable[l % 3 ? fold.first : fold.second], EITS_ROW_GLITCH);
+            CHECK_EQUAL(ctx->unusable[l % 3 ? fold.first : fold.second], EITS_ROW_OUTLIER);
         }
     }
     clean_frame(&b, 0.15);
     CHECK_EQUAL(eits_mask_row(ctx, b.c.model.fold[UNSEEN].first, 1), EITS_OK);
     b.frame[b.c.model.fold[2].first] *= R(1.5);
-    CHECK_EQUAL(reconstruct(&b), EITS_FINDING_GLITCH);
-    CHECK_EQUAL(ctx->info.glitches, 2);
+    CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
+    CHECK_EQUAL(ctx->info.outliers, 2);
     tear_down(&b);
 }
 
@@ -377,7 +377,7 @@ static void what_sides_may_differ_by(void)
         bench b;
         eits_context *ctx = set_up(&b, 0);
         CHECK(ctx->baseline.noise_v > R(4e-5) && ctx->baseline.noise_v < R(7e-5));
-        look_for(ctx, EITS_FINDING_GLITCH, SMALL_ROWS);
+        look_for(ctx, EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);
         memcpy(b.frame, b.reference, sizeof b.frame);
         for (uint32_t k = 0; k < 6; ++k) {
             const eits_fold fold = b.c.model.fold[k];
@@ -389,7 +389,7 @@ static void what_sides_may_differ_by(void)
         /* the frame against its own reference's noise */
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] += ctx->baseline.v0[i] - b.reference[i];
-        CHECK_EQUAL(reconstruct(&b), CASES[n].found ? EITS_FINDING_GLITCH : 0);
+        CHECK_EQUAL(reconstruct(&b), CASES[n].found ? EITS_DIAGNOSTIC_OUTLIER : 0);
         tear_down(&b);
     }
 }
@@ -420,7 +420,7 @@ static void noisy_channel(void)
             const eits_fold fold = b.c.model.fold[k];
             b.frame[measures_across(ctx, fold.second) ? fold.second : fold.first] *= R(1.3);
         }
-        CHECK_EQUAL(reconstruct(&b), EITS_FINDING_ELECTRODE_NOISY);
+        CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_ELECTRODE_NOISY);
         CHECK_EQUAL(ctx->info.noisy_electrodes, 3);
         uint32_t count = 0;
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
@@ -436,9 +436,9 @@ static void noisy_channel(void)
 int main(void)
 {
     clean_half_scans();
-    one_glitch_of_a_half_scan();
-    misfits_that_are_no_glitch();
-    drift_is_no_misfit();
+    one_outlier_of_a_half_scan();
+    mismatches_that_are_no_outlier();
+    drift_is_no_mismatch();
     the_wrong_side_goes();
     several_wrong_sides();
     what_sides_may_differ_by();

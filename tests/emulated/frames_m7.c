@@ -105,7 +105,7 @@ static const option option_table[] = {
     WHOLE(project_baseline),
     WHOLE(touch_sweeps),
     WHOLE(mac_limit),
-    WHOLE(findings),
+    WHOLE(diagnostics),
     WHOLE(touch_search),
     WHOLE(refine),
     REAL(lambda_abs),
@@ -219,9 +219,9 @@ static void print_info(const eits_info *info)
                            info->gap_rel, info->residual,   info->data_norm};
     for (size_t k = 0; k < sizeof reals / sizeof reals[0]; ++k)
         printf(":%08lx", bits_of(reals[k]));
-    printf(":%lu:%lu:%lu:%08lx:%08lx", (unsigned long)info->findings,
-           (unsigned long)info->saturated, (unsigned long)info->glitches, bits_of(info->misfit),
-           bits_of(info->unexplained));
+    printf(":%lu:%lu:%lu:%08lx:%08lx", (unsigned long)info->diagnostics,
+           (unsigned long)info->saturated, (unsigned long)info->outliers,
+           bits_of(info->model_mismatch), bits_of(info->unexplained));
     const uint64_t electrodes[] = {info->open_electrodes, info->bridged_electrodes,
                                    info->noisy_electrodes};
     for (size_t k = 0; k < 3; ++k)

@@ -172,7 +172,7 @@ static void test_solver(void)
                                       .gap_rel = 0.01f,
                                       .solver = EITS_SOLVER_COORDINATE,
                                       .mac_limit = 123456,
-                                      .findings = EITS_FINDING_GLITCH};
+                                      .diagnostics = EITS_DIAGNOSTIC_OUTLIER};
     eits_command_solver c = good;
     c.iterations = 0;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 4, 1);
@@ -199,8 +199,8 @@ static void test_solver(void)
     c.solver = 4;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 28, 3);
     c = good;
-    c.findings = EITS_FINDINGS_ALL + 1;
-    REPLY(solver_with(c), EITS_REPLY_RANGE, 36, EITS_FINDINGS_ALL);
+    c.diagnostics = EITS_DIAGNOSTICS_ALL + 1;
+    REPLY(solver_with(c), EITS_REPLY_RANGE, 36, EITS_DIAGNOSTICS_ALL);
     c = good;
     c.track = 2;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 40, 1);
@@ -218,7 +218,7 @@ static void test_solver(void)
     CHECK_NEAR(options->lambda_rel, 0.05f, 0);
     CHECK_NEAR(options->gap_rel, 0.01f, 0);
     CHECK_EQUAL(options->solver, EITS_SOLVER_COORDINATE);
-    CHECK_EQUAL(options->findings, EITS_FINDING_GLITCH);
+    CHECK_EQUAL(options->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
     CHECK_EQUAL(options->mac_limit, 123456);
     CHECK(options->track_confirm == 0 && options->track_hold == 0 && options->track_smooth == 0);
     CHECK_NEAR(options->gate_factor, 1.2f, 0);

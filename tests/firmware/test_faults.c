@@ -132,30 +132,30 @@ static void test_hysteresis(void)
         uint32_t shown;
     } kinds[] = {{EITS_FAULT_ELECTRODE_OPEN, 1}, {EITS_FAULT_SATURATED, 1},
                  {EITS_FAULT_BRIDGED, 1},        {EITS_FAULT_ELECTRODE_NOISY, 3},
-                 {EITS_FAULT_MISFIT, 3},         {EITS_FAULT_STALE_REFERENCE, 3}};
+                 {EITS_FAULT_MODEL_MISMATCH, 3}, {EITS_FAULT_STALE_REFERENCE, 3}};
     bench_start(&b, NULL);
     fw_faults *faults = &b.host.instrument.faults;
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; ++k) {
         const eits_fault code = kinds[k].code;
         const fw_fault_detail detail = {.index = 9, .value = 5};
         for (uint32_t frame = 1; frame < kinds[k].shown; ++frame)
-            fw_fault_found(faults, code, true, detail);
+            fw_fault_observe(faults, code, true, detail);
         CHECK(!fw_fault_is(faults, code));
         if (kinds[k].shown > 1)
-            fw_fault_found(faults, code, false, detail);
+            fw_fault_observe(faults, code, false, detail);
         for (uint32_t frame = 1; frame <= kinds[k].shown; ++frame) {
             CHECK(!fw_fault_is(faults, code));
-            fw_fault_found(faults, code, true, detail);
+            fw_fault_observe(faults, code, true, detail);
         }
         CHECK(fw_fault_is(faults, code));
         for (uint32_t again = 0; again < 2; ++again) {
             for (uint32_t frame = 1; frame < EITS_FAULT_CLEAN_FRAMES; ++frame)
-                fw_fault_found(faults, code, false, detail);
+                fw_fault_observe(faults, code, false, detail);
             CHECK(fw_fault_is(faults, code));
             if (again == 0)
-                fw_fault_found(faults, code, true, detail);
+                fw_fault_observe(faults, code, true, detail);
         }
-        fw_fault_found(faults, code, false, detail);
+        fw_fault_observe(faults, code, false, detail);
         CHECK(!fw_fault_is(faults, code));
         host_run(&b.host, 5);
         CHECK_EQUAL(told(code, true), 1);
@@ -163,7 +163,7 @@ static void test_hysteresis(void)
         CHECK_EQUAL(host_fault(&b.host, code, true, 0)->value, 5);
     }
     for (int32_t e = 0; e < 16; e += 15)
-        fw_fault_found(faults, EITS_FAULT_BRIDGED, true, (fw_fault_detail){.index = e});
+        fw_fault_observe(faults, EITS_FAULT_BRIDGED, true, (fw_fault_detail){.index = e});
     CHECK_EQUAL(faults->there[EITS_FAULT_BRIDGED], 1u << 15 | 1u);
     fw_faults_clear(faults, 0);
     CHECK_EQUAL(faults->raised, 0);

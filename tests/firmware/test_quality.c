@@ -41,7 +41,7 @@ static uint32_t first_named(uint32_t e, bool tared)
     for (uint32_t k = 0; tared && k < host_count(&b.host, EITS_PACKET_IMAGE); ++k) {
         const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_IMAGE, k));
         if (head->open_electrodes == (uint64_t)1 << e &&
-            (head->findings & EITS_FINDING_ELECTRODE_OPEN) != 0)
+            (head->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN) != 0)
             return head->frame;
     }
     for (uint32_t k = 0; !tared && k < host_count(&b.host, EITS_PACKET_RAW); ++k) {
@@ -105,7 +105,8 @@ static void test_open(bool tared, uint16_t check_every)
             for (uint32_t i = 0; i < 208; ++i)
                 lost += uses(i, e);
             CHECK_EQUAL(image->masked, lost);
-            CHECK_EQUAL(image->findings & EITS_FINDING_ELECTRODE_OPEN, EITS_FINDING_ELECTRODE_OPEN);
+            CHECK_EQUAL(image->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
+                        EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         }
         b.sheet.detached[e] = false;
         sheet_solve(&b.sheet);
@@ -263,7 +264,7 @@ static void test_saturation(void)
     const eits_packet_solved *image = (const void *)host_last(&b.host, EITS_PACKET_IMAGE)->payload;
     CHECK_EQUAL(image->masked, 2);
     CHECK_EQUAL(image->saturated, 2);
-    CHECK_EQUAL(image->findings, EITS_FINDING_SATURATED);
+    CHECK_EQUAL(image->diagnostics, EITS_DIAGNOSTIC_SATURATED);
     bench_stop(&b);
 }
 

@@ -7,7 +7,7 @@
 #ifndef EITSKIN_CONTEXT_H
 #define EITSKIN_CONTEXT_H
 
-#include "eitskin/findings.h"
+#include "eitskin/diagnostics.h"
 #include "eitskin/model.h"
 #include "eitskin/types.h"
 
@@ -74,8 +74,8 @@ typedef struct eits_options {
     /* > 0: stop where the next step and the gap after it would take info.macs beyond this; see
      * solve.h */
     uint32_t mac_limit;
-    /* bits of eits_finding that are looked for; EITS_FINDINGS_ALL by default */
-    uint32_t findings;
+    /* bits of eits_diagnostic that are looked for; EITS_DIAGNOSTICS_ALL by default */
+    uint32_t diagnostics;
     uint32_t touch_search; /* bits of eits_search; EITS_SEARCH_ALL by default */
     /* 1: once more than one touch is found, eits_find_touches solves again with their interplay
      * taken out of the data; image and info are then the refined image's. Not with a mac_limit */
@@ -127,15 +127,15 @@ typedef struct eits_info {
     /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED, and where
      * MACS came before anything was known */
     eits_real gap;
-    eits_real gap_rel;   /* gap / (|y|^2 / 2) */
-    eits_real residual;  /* |y - S x| */
-    eits_real data_norm; /* |y| */
-    uint32_t findings;   /* bits of eits_finding; CROWDED is set by eits_find_touches */
-    uint32_t saturated;  /* rows, masked ones apart */
-    uint32_t glitches;   /* rows left out as glitches */
+    eits_real gap_rel;    /* gap / (|y|^2 / 2) */
+    eits_real residual;   /* |y - S x| */
+    eits_real data_norm;  /* |y| */
+    uint32_t diagnostics; /* bits of eits_diagnostic; CROWDED is set by eits_find_touches */
+    uint32_t saturated;   /* rows, masked ones apart */
+    uint32_t outliers;    /* rows left out as outliers */
     /* share of |d| beyond noise that the model's sheet cannot give, 0 to 1; 0 where it was not
      * judged */
-    eits_real misfit;
+    eits_real model_mismatch;
     /* share of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
      * for */
     eits_real unexplained;
@@ -190,7 +190,7 @@ typedef struct eits_baseline {
     /* greatest max(S'y) seen in quiet frames, as with all rows in use; 0 if unknown */
     eits_real lambda_noise;
     uint32_t second_waits; /* the second quiet frame is in m2 until there is a third */
-    uint32_t glitches;     /* readings of quiet frames that were left out of the reference */
+    uint32_t outliers;     /* readings of quiet frames that were left out of the reference */
 } eits_baseline;
 
 typedef struct eits_context {
@@ -211,7 +211,7 @@ typedef struct eits_context {
     eits_real *along;
     eits_real *stray; /* n_folded: what of that no sheet gives, unless stale */
     uint32_t stray_stale;
-    /* stride each: 1 / |P_i|^2, and so much of it as predicts d (misfit.c) */
+    /* stride each: 1 / |P_i|^2, and so much of it as predicts d (mismatch.c) */
     eits_real *sheet_inverse, *sheet_shrink;
     /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where the floor is raised */
     eits_real sheet_energy;

@@ -4,7 +4,7 @@
 
 #include "eitskin/batch.h"
 #include "eitskin/context.h"
-#include "eitskin/findings.h"
+#include "eitskin/diagnostics.h"
 #include "eitskin/frame.h"
 #include "eitskin/link.h"
 #include "eitskin/load.h"

@@ -35,7 +35,7 @@ eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t 
  * gives a first mean; the second half also gives lambda_noise, the greatest max(S'y) that a quiet
  * frame showed, told as with the model's own floor; the mean of all is the reference. Until finish
  * returns EITS_OK there is no reference. Single readings that neither their reciprocals nor the
- * other frames bear out are left out of it, and counted (baseline.glitches). Errors as above;
+ * other frames bear out are left out of it, and counted (baseline.outliers). Errors as above;
  * EITS_E_BASELINE_SHORT if frames are missing, EITS_E_NOT_FINITE if S'y of a frame would not be
  * finite. A frame that is refused does not count. */
 eits_status eits_baseline_begin(eits_context *ctx, uint32_t count);

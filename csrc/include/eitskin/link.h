@@ -9,7 +9,7 @@
 #ifndef EITSKIN_LINK_H
 #define EITSKIN_LINK_H
 
-#include "eitskin/findings.h"
+#include "eitskin/diagnostics.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -106,12 +106,12 @@ typedef enum eits_fault {
     EITS_FAULT_CRASH = 8,
     EITS_FAULT_WATCHDOG = 9, /* the board restarted because the program hung */
     EITS_FAULT_BUS = 10,     /* the generator or the multiplexers could not be written */
-    /* what the core found in a frame (findings.h); so are 2 and 3 after a tare */
+    /* what the core found in a frame (diagnostics.h); so are 2 and 3 after a tare */
     /* index: electrode; value: its partner, -1 where there are more; words: all, bit e */
     EITS_FAULT_BRIDGED = 11,
     EITS_FAULT_ELECTRODE_NOISY = 12, /* index: electrode */
     /* value: parts per thousand of the data that no sheet of the model's gives */
-    EITS_FAULT_MISFIT = 13,
+    EITS_FAULT_MODEL_MISMATCH = 13,
     EITS_FAULT_STALE_REFERENCE = 14
 } eits_fault;
 #define EITS_FAULTS 15u
@@ -191,10 +191,10 @@ typedef struct eits_packet_solved {
     uint32_t iterations, nonzeros;
     uint32_t macs, touch_macs;
     float lambda, lambda_max, lambda_noise, gap_rel, residual, data_norm;
-    uint32_t findings;  /* bits of eits_finding */
-    uint16_t saturated; /* rows at either end of the converter's range, masked ones apart */
-    uint16_t glitches;  /* rows left out as glitches */
-    float misfit;
+    uint32_t diagnostics; /* bits of eits_diagnostic */
+    uint16_t saturated;   /* rows at either end of the converter's range, masked ones apart */
+    uint16_t outliers;    /* rows left out as outliers */
+    float model_mismatch;
     uint64_t open_electrodes, bridged_electrodes, noisy_electrodes; /* bit e: electrode e */
 } eits_packet_solved;
 
@@ -229,8 +229,8 @@ typedef struct eits_packet_stats {
     uint32_t deadlines_missed;
     /* measurements taken again because the switch came too late */
     uint32_t slots_repeated;
-    /* rows left out as glitches, of all frames after a tare */
-    uint32_t glitches;
+    /* rows left out as outliers, of all frames after a tare */
+    uint32_t outliers;
     uint32_t link_packets, link_crc_errors, link_framing_errors, link_overruns;
     uint32_t stack_bytes, stack_used; /* used: the most so far */
     uint32_t workspace_bytes, workspace_used;
@@ -278,9 +278,9 @@ typedef struct eits_command_solver {
     uint32_t request;
     uint32_t iterations, max_touches, warm_start, sign;
     float lambda_rel, gap_rel;
-    uint32_t solver;    /* eits_solver */
-    uint32_t mac_limit; /* 0: none */
-    uint32_t findings;  /* bits of eits_finding that are looked for */
+    uint32_t solver;      /* eits_solver */
+    uint32_t mac_limit;   /* 0: none */
+    uint32_t diagnostics; /* bits of eits_diagnostic that are looked for */
     /* 1: touches are followed in time (eits_options_track), as after a start; 0: each frame by
      * itself */
     uint32_t track;

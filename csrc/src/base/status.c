@@ -1,4 +1,4 @@
-#include "eitskin/findings.h"
+#include "eitskin/diagnostics.h"
 
 const char *eits_status_text(eits_status status)
 {
@@ -39,27 +39,27 @@ const char *eits_status_text(eits_status status)
     return "unknown status";
 }
 
-const char *eits_finding_text(eits_finding finding)
+const char *eits_diagnostic_text(eits_diagnostic diagnostic)
 {
-    switch (finding) {
-    case EITS_FINDING_SATURATED:
+    switch (diagnostic) {
+    case EITS_DIAGNOSTIC_SATURATED:
         return "saturated";
-    case EITS_FINDING_ELECTRODE_OPEN:
+    case EITS_DIAGNOSTIC_ELECTRODE_OPEN:
         return "electrode open";
-    case EITS_FINDING_BRIDGED:
+    case EITS_DIAGNOSTIC_BRIDGED:
         return "electrodes bridged";
-    case EITS_FINDING_GLITCH:
-        return "glitch";
-    case EITS_FINDING_ELECTRODE_NOISY:
+    case EITS_DIAGNOSTIC_OUTLIER:
+        return "outlier";
+    case EITS_DIAGNOSTIC_ELECTRODE_NOISY:
         return "electrode noisy";
-    case EITS_FINDING_MISFIT:
-        return "misfit";
-    case EITS_FINDING_STALE_REFERENCE:
+    case EITS_DIAGNOSTIC_MODEL_MISMATCH:
+        return "model mismatch";
+    case EITS_DIAGNOSTIC_STALE_REFERENCE:
         return "stale reference";
-    case EITS_FINDING_CROWDED:
+    case EITS_DIAGNOSTIC_CROWDED:
         return "crowded";
     }
-    return "unknown finding";
+    return "unknown diagnostic";
 }
 
 #define TEXT_OF(x) #x

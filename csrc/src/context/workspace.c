@@ -46,7 +46,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_sweeps = 6,
         .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
-        .findings = EITS_FINDINGS_ALL,
+        .diagnostics = EITS_DIAGNOSTICS_ALL,
         .touch_search = EITS_SEARCH_ALL & ~d->search_left_out,
         .refine = 0,
         .track_confirm = 0,
@@ -197,9 +197,10 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
         in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
         in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 &&
-        o->findings <= EITS_FINDINGS_ALL && o->touch_search <= EITS_SEARCH_ALL && o->refine <= 1 &&
-        o->track_confirm <= EITS_MOST_TRACK_FRAMES && o->track_hold <= EITS_MOST_TRACK_FRAMES &&
-        in_range(o->track_smooth, 0, huge) && in_range(o->floor_noise_factor, 0, huge);
+        o->diagnostics <= EITS_DIAGNOSTICS_ALL && o->touch_search <= EITS_SEARCH_ALL &&
+        o->refine <= 1 && o->track_confirm <= EITS_MOST_TRACK_FRAMES &&
+        o->track_hold <= EITS_MOST_TRACK_FRAMES && in_range(o->track_smooth, 0, huge) &&
+        in_range(o->floor_noise_factor, 0, huge);
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)

@@ -73,13 +73,13 @@ static eits_real score(const eits_context *ctx, const eits_touch *touches, uint3
     return eits_fma(CLEAREST, clear, sum);
 }
 
-void eits_judge_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count)
+void eits_check_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count)
 {
     ctx->info.unexplained = looked ? unexplained(ctx) : 0;
-    ctx->info.findings &= ~(uint32_t)EITS_FINDING_CROWDED;
-    if (count == 0 || !eits_wants(ctx, EITS_FINDING_CROWDED) ||
+    ctx->info.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_CROWDED;
+    if (count == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) ||
         ctx->info.lambda_max < FAINT * ctx->info.lambda_noise)
         return;
     if (count >= ctx->options.max_touches || score(ctx, touches, count) < LEAST)
-        ctx->info.findings |= EITS_FINDING_CROWDED;
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_CROWDED;
 }

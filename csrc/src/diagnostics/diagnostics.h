@@ -1,5 +1,5 @@
-/* What the stages ask of a frame before and after it is solved: electrodes.c, glitch.c, misfit.c,
- * quiet.c. */
+/* What the stages ask of a frame before and after it is solved: electrodes.c, outlier.c,
+ * mismatch.c, quiet.c. */
 #ifndef EITSKIN_EXAMINE_H
 #define EITSKIN_EXAMINE_H
 
@@ -16,41 +16,41 @@ enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_
     R(5.0) /* times the noise; a significant row's reference is at least ten times that */
 #define EITS_ROWS_TO_JUDGE                                                                         \
     3u /* so many significant rows of an electrode or a pair must agree; so many turned ones are a \
-          misfit */
+          mismatch */
 #define EITS_ROW_GROWN \
     R(8.0) /* times the reference, or times this share of its rms where that is more: */
 #define EITS_ROW_SMALL R(0.05)
 #define EITS_ROBUST \
     R(1.4826) /* the deviation of a normal distribution over the median of its magnitudes */
-#define EITS_GLITCH_NOISE \
+#define EITS_OUTLIER_NOISE \
     R(6.5) /* reciprocals that differ by so many times their difference's noise, */
-#define EITS_GLITCH_ROBUST                                                              \
+#define EITS_OUTLIER_ROBUST                                                             \
     R(16.0) /* the same where no noise was learned, of the robust deviation of all such \
                differences, */
-#define EITS_GLITCH_LARGEST \
+#define EITS_OUTLIER_LARGEST \
     R(0.03) /* and by this share of the largest datum: common modes scale with that, */
-#define EITS_GLITCH_SHARE \
+#define EITS_OUTLIER_FRACTION \
     R(0.25) /* and by this share of the larger: channel gains that differ scale with the change */
-#define EITS_GLITCH_NEARER \
+#define EITS_OUTLIER_NEARER \
     R(0.5) /* the side stays that is at most so many times as far from what the others predict */
-#define EITS_GLITCH_MOST  8u      /* folds; more are no glitches */
-#define EITS_GLITCH_PIVOT R(0.05) /* below it the others predict nothing */
-#define EITS_GLITCH_RIDGE \
+#define EITS_OUTLIER_MAX   8u      /* folds; more are no outliers */
+#define EITS_OUTLIER_PIVOT R(0.05) /* below it the others predict nothing */
+#define EITS_OUTLIER_RIDGE \
     R(1e-4) /* of the prediction, relative to the greatest squared singular value */
-#define EITS_GLITCH_UNPAIRED \
+#define EITS_OUTLIER_UNPAIRED \
     R(16.0) /* without reciprocals: so many times the robust deviation of the prediction errors */
-#define EITS_GLITCH_ENERGY R(0.5)  /* of all that is not predicted is in that fold */
-#define EITS_NOISY_SHARE   R(0.9)  /* of the folds that are flagged share a noisy electrode */
-#define EITS_MISFIT_SHARE  R(0.05) /* of |d| */
-#define EITS_MISFIT_NOISE \
+#define EITS_OUTLIER_ENERGY    R(0.5)  /* of all that is not predicted is in that fold */
+#define EITS_NOISY_SHARE       R(0.9)  /* of the folds that are flagged share a noisy electrode */
+#define EITS_MISMATCH_FRACTION R(0.05) /* of |d| */
+#define EITS_MISMATCH_NOISE \
     R(3.0) /* and so many times what noise leaves outside of the model's sheet */
 #define EITS_STALE_RATIO R(1.7) /* the change against the sign rule to that along it, */
 #define EITS_STALE_NOISE R(5.0) /* and so many lambda_noise */
 
-/* Whether a finding is looked for. */
-static inline int eits_wants(const eits_context *ctx, eits_finding finding)
+/* Whether a diagnostic is looked for. */
+static inline int eits_wants(const eits_context *ctx, eits_diagnostic diagnostic)
 {
-    return (ctx->options.findings & (uint32_t)finding) != 0;
+    return (ctx->options.diagnostics & (uint32_t)diagnostic) != 0;
 }
 
 /* Row i's electrodes, I+, I-, V+, V-. */
@@ -62,8 +62,8 @@ static inline const uint8_t *eits_row(const eits_context *ctx, uint32_t i)
 /* Whether the two electrodes at `two` are e and f, either way round. */
 int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f);
 
-/* Leave row i, which is in use so far, out of this frame as a glitch, and count it. */
-void eits_leave_glitch(eits_context *ctx, uint32_t i);
+/* Leave row i, which is in use so far, out of this frame as a outlier, and count it. */
+void eits_leave_outlier(eits_context *ctx, uint32_t i);
 
 /* info names the electrodes in ctx->electrode. */
 void eits_name_electrodes(eits_context *ctx);
@@ -81,18 +81,18 @@ int eits_find_electrodes(eits_context *ctx, const eits_real *frame);
  * data, ctx->apart what each fold's two sides differ by (0 where it has one), ctx->basis_for which
  * sides are in use. Marks ctx->unusable; returns 1 where it marked any row. Uses residual, sx, sz
  * and the list. */
-int eits_find_glitches(eits_context *ctx, uint64_t *macs);
+int eits_find_outliers(eits_context *ctx, uint64_t *macs);
 
 /* The same for frames that have no reciprocals, or copied ones: the one fold that the others
  * predict worst, if it stands out of their prediction errors. ctx->y is P d, not yet projected, no
  * fold left out, ctx->sheet_known. */
-int eits_find_unpaired(eits_context *ctx, uint64_t *macs);
+int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs);
 
 /* A row of ctx->bad that is left out of the quiet frame at hand only. */
 enum { EITS_BAD_NOW = 2 };
 
 /* The quiet frame `newer` against `older`: how many folds do not agree (0 where they are too many
- * to be glitches); sets `bit` in ctx->list_index of those, clears it in the others. Uses the list.
+ * to be outliers); sets `bit` in ctx->list_index of those, clears it in the others. Uses the list.
  */
 uint32_t eits_quiet_odd(eits_context *ctx, const eits_real *newer, const eits_real *older,
                         uint8_t bit);
@@ -106,16 +106,16 @@ void eits_quiet_clear(eits_context *ctx);
  * out become the other's. Returns their number. */
 uint32_t eits_quiet_weigh(eits_context *ctx, const eits_real *frame);
 
-/* What misfit and prediction need to know of P and S; once, at the start. */
+/* What mismatch and prediction need to know of P and S; once, at the start. */
 void eits_learn_sheet(eits_context *ctx);
 
 /* How much of ctx->d no sheet gives, into info; returns 1 where that stands out. ctx->y is P d, not
  * yet projected, no fold left out; ctx->along is the drift of the gain (zeros: it is not ignored);
  * ctx->sheet_known. Uses residual, sz and the list. */
-int eits_judge_misfit(eits_context *ctx, uint64_t *macs);
+int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs);
 
 /* Whether the change goes the way touches cannot; ctx->gradient is S'y, info.lambda_max known. */
-void eits_judge_reference(eits_context *ctx);
+void eits_check_stale_reference(eits_context *ctx);
 
 /* The variance of a fold's datum by the noise that was learned, summed over the folds in use;
  * copied reciprocals are one measurement. */
@@ -126,7 +126,7 @@ eits_real eits_expected_noise(const eits_context *ctx);
 
 /* info.unexplained, from ctx->residual as the touches' fit left it (0 where nothing was `looked`
  * for), and whether `count` touches are more than can be told apart. */
-void eits_judge_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count);
+void eits_check_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count);
 
 /* The k-th smallest of n numbers, which are put in another order. */
 eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k);

@@ -70,13 +70,13 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits most, uin
     }
     if (open == judged)
         return 0;
-    if (open == 0 || !eits_wants(ctx, EITS_FINDING_ELECTRODE_OPEN))
+    if (open == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN))
         return 1;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
         if (rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e])
             ctx->electrode[e] |= EITS_ELECTRODE_OPEN;
     }
-    ctx->info.findings |= EITS_FINDING_ELECTRODE_OPEN;
+    ctx->info.diagnostics |= EITS_DIAGNOSTIC_ELECTRODE_OPEN;
     return 1;
 }
 
@@ -118,7 +118,7 @@ static void find_bridged(eits_context *ctx, const eits_real *frame, limits most,
                 continue;
             ctx->electrode[e] |= EITS_ELECTRODE_BRIDGED;
             ctx->electrode[f] |= EITS_ELECTRODE_BRIDGED;
-            ctx->info.findings |= EITS_FINDING_BRIDGED;
+            ctx->info.diagnostics |= EITS_DIAGNOSTIC_BRIDGED;
         }
     }
 }
@@ -143,19 +143,19 @@ void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_r
     }
 }
 
-void eits_leave_glitch(eits_context *ctx, uint32_t i)
+void eits_leave_outlier(eits_context *ctx, uint32_t i)
 {
-    ctx->unusable[i] |= EITS_ROW_GLITCH;
-    ++ctx->info.glitches;
-    ctx->info.findings |= EITS_FINDING_GLITCH;
+    ctx->unusable[i] |= EITS_ROW_OUTLIER;
+    ++ctx->info.outliers;
+    ctx->info.diagnostics |= EITS_DIAGNOSTIC_OUTLIER;
 }
 
-/* Rows that no sheet gives, if they are few; more of them are a misfit. */
+/* Rows that no sheet gives, if they are few; more of them are a mismatch. */
 static void leave_impossible(eits_context *ctx, const eits_real *frame, limits most)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if ((judge_row(ctx, frame, most, i) & TURNED) != 0 || is_grown(ctx, frame, most, i))
-            eits_leave_glitch(ctx, i);
+            eits_leave_outlier(ctx, i);
     }
 }
 
@@ -171,19 +171,19 @@ int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
         turned += (state & TURNED) != 0;
         grown += (uint32_t)is_grown(ctx, frame, most, i);
     }
-    if (turned >= EITS_ROWS_TO_JUDGE && eits_wants(ctx, EITS_FINDING_MISFIT))
-        ctx->info.findings |= EITS_FINDING_MISFIT;
+    if (turned >= EITS_ROWS_TO_JUDGE && eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH))
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_MODEL_MISMATCH;
     if (turned + grown > 0 && turned + grown < EITS_ROWS_TO_JUDGE &&
-        eits_wants(ctx, EITS_FINDING_GLITCH))
+        eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER))
         leave_impossible(ctx, frame, most);
     if (dead < EITS_ROWS_TO_JUDGE)
         return 1;
     uint8_t alive[EITS_MOST_ELECTRODES] = {0};
     if (!find_open(ctx, frame, most, alive))
         return silent < EITS_ROWS_TO_JUDGE;
-    if (eits_wants(ctx, EITS_FINDING_BRIDGED))
+    if (eits_wants(ctx, EITS_DIAGNOSTIC_BRIDGED))
         find_bridged(ctx, frame, most, alive);
-    if ((ctx->info.findings & (EITS_FINDING_ELECTRODE_OPEN | EITS_FINDING_BRIDGED)) == 0)
+    if ((ctx->info.diagnostics & (EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED)) == 0)
         return 1;
     eits_name_electrodes(ctx);
     eits_leave_electrodes(ctx, EITS_ELECTRODE_OPEN, EITS_ROW_OPEN);

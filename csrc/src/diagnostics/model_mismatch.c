@@ -67,7 +67,7 @@ static void make_shrink(eits_context *ctx)
         const eits_real squared = ctx->sheet_shrink[i];
         ctx->sheet_inverse[i] = 1 / ctx->sheet_inverse[i];
         ctx->sheet_shrink[i] =
-            squared / eits_fma(EITS_GLITCH_RIDGE, most, squared) * ctx->sheet_inverse[i];
+            squared / eits_fma(EITS_OUTLIER_RIDGE, most, squared) * ctx->sheet_inverse[i];
     }
     ctx->sheet_known =
         eits_all_finite(ctx->sheet_shrink, s->rows) && eits_all_finite(ctx->sheet_inverse, s->rows);
@@ -124,7 +124,7 @@ eits_real eits_expected_noise(const eits_context *ctx)
     return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->sheet_energy;
 }
 
-int eits_judge_misfit(eits_context *ctx, uint64_t *macs)
+int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs)
 {
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     if (rank >= folds || !(ctx->baseline.noise_v > 0))
@@ -147,18 +147,19 @@ int eits_judge_misfit(eits_context *ctx, uint64_t *macs)
     if (!(off > noise) || !(whole > 0))
         return 0;
     const eits_real share = eits_sqrt((off - noise) / whole);
-    ctx->info.misfit = share < 1 ? share : 1;
-    return share > EITS_MISFIT_SHARE && off > EITS_MISFIT_NOISE * EITS_MISFIT_NOISE * noise;
+    ctx->info.model_mismatch = share < 1 ? share : 1;
+    return share > EITS_MISMATCH_FRACTION &&
+           off > EITS_MISMATCH_NOISE * EITS_MISMATCH_NOISE * noise;
 }
 
-void eits_judge_reference(eits_context *ctx)
+void eits_check_stale_reference(eits_context *ctx)
 {
     const eits_sign sign = ctx->options.sign;
-    if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_FINDING_STALE_REFERENCE))
+    if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE))
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
     const eits_real against = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, other);
     const eits_real least = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (least > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > least)
-        ctx->info.findings |= EITS_FINDING_STALE_REFERENCE;
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
 }

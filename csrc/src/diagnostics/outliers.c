@@ -1,4 +1,4 @@
-/* Glitches: rows that their reciprocals, or all the other folds, do not bear out; too many that
+/* Outliers: rows that their reciprocals, or all the other folds, do not bear out; too many that
  * share an electrode: a noisy one. */
 #include "diagnostics/diagnostics.h"
 
@@ -46,10 +46,10 @@ static eits_real most_by_noise(const eits_context *ctx, uint32_t k)
 {
     const eits_baseline *b = &ctx->baseline;
     if (ctx->model->data_kind != EITS_DATA_NORMALISED)
-        return EITS_GLITCH_NOISE * eits_sqrt(R(2.0)) * eits_fabs(b->gain) * b->noise_v;
+        return EITS_OUTLIER_NOISE * eits_sqrt(R(2.0)) * eits_fabs(b->gain) * b->noise_v;
     const eits_real first = b->noise_v / b->v0[ctx->model->fold[k].first],
                     second = b->noise_v / b->v0[ctx->model->fold[k].second];
-    return EITS_GLITCH_NOISE * eits_sqrt(eits_fma(first, first, second * second));
+    return EITS_OUTLIER_NOISE * eits_sqrt(eits_fma(first, first, second * second));
 }
 
 static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)
@@ -60,7 +60,7 @@ static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)
     if (!(off > (ctx->baseline.noise_v > 0 ? most_by_noise(ctx, k) : most.robust)) ||
         !(off > most.largest))
         return 0;
-    return off > EITS_GLITCH_SHARE * eits_fma(R(0.5), off, eits_fabs(ctx->d[k]));
+    return off > EITS_OUTLIER_FRACTION * eits_fma(R(0.5), off, eits_fabs(ctx->d[k]));
 }
 
 /* The median of the folds' differences is 0 where they are copies: then nothing is flagged. */
@@ -74,10 +74,10 @@ static tolerance find_tolerance(const eits_context *ctx)
         if (ctx->basis_for[k] == EITS_SIDE_BOTH)
             ctx->list_value[count++] = eits_fabs(ctx->apart[k]);
     }
-    most.largest *= EITS_GLITCH_LARGEST;
+    most.largest *= EITS_OUTLIER_LARGEST;
     if (!(ctx->baseline.noise_v > 0) && count > 0) {
         const eits_real median = eits_kth(ctx->list_value, count, count / 2);
-        most.robust = EITS_GLITCH_ROBUST * EITS_ROBUST * median;
+        most.robust = EITS_OUTLIER_ROBUST * EITS_ROBUST * median;
         if (!(median > 0))
             most.robust = R(INFINITY);
     }
@@ -88,7 +88,7 @@ static void leave_row(eits_context *ctx, uint32_t row)
 {
     if (row == EITS_FOLD_NONE || ctx->unusable[row] != 0)
         return;
-    eits_leave_glitch(ctx, row);
+    eits_leave_outlier(ctx, row);
 }
 
 /* ---- what the other folds predict ---- */
@@ -119,7 +119,7 @@ static void fit_all(eits_context *ctx, uint64_t *macs)
 static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_real *out,
                    uint64_t *macs)
 {
-    eits_real l[EITS_GLITCH_MOST][EITS_GLITCH_MOST], e[EITS_GLITCH_MOST];
+    eits_real l[EITS_OUTLIER_MAX][EITS_OUTLIER_MAX], e[EITS_OUTLIER_MAX];
     const uint32_t rank = ctx->model->rank;
     fit_all(ctx, macs);
     for (uint32_t a = 0; a < n; ++a) {
@@ -132,7 +132,7 @@ static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_
             eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx, ctx->residual, other, rank);
             for (uint32_t k = 0; k < b; ++k)
                 sum = eits_fma(-l[a][k], l[b][k], sum);
-            if (a == b && !(sum > EITS_GLITCH_PIVOT))
+            if (a == b && !(sum > EITS_OUTLIER_PIVOT))
                 return 0;
             l[a][b] = a == b ? eits_sqrt(sum) : sum / l[b][b];
         }
@@ -155,7 +155,7 @@ static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_
 /* The side that is clearly nearer to the prediction stays; else both go. */
 static void choose_sides(eits_context *ctx, const uint32_t *flagged, uint32_t n, uint64_t *macs)
 {
-    eits_real predicted[EITS_GLITCH_MOST];
+    eits_real predicted[EITS_OUTLIER_MAX];
     const int known =
         ctx->sheet_known && all_known(ctx) && predict(ctx, flagged, n, predicted, macs);
     for (uint32_t a = 0; a < n; ++a) {
@@ -163,14 +163,14 @@ static void choose_sides(eits_context *ctx, const uint32_t *flagged, uint32_t n,
         const eits_real d = ctx->d[flagged[a]], half = R(0.5) * ctx->apart[flagged[a]];
         const eits_real first = known ? eits_fabs(d + half - predicted[a]) : 1,
                         second = known ? eits_fabs(d - half - predicted[a]) : 1;
-        if (!(first <= EITS_GLITCH_NEARER * second))
+        if (!(first <= EITS_OUTLIER_NEARER * second))
             leave_row(ctx, fold.first);
-        if (!(second <= EITS_GLITCH_NEARER * first))
+        if (!(second <= EITS_OUTLIER_NEARER * first))
             leave_row(ctx, fold.second);
     }
 }
 
-/* ---- too many to be glitches ---- */
+/* ---- too many to be outliers ---- */
 
 /* Where one pair is what the flagged folds share, it is its channel: the rows measured across it
  * go, their reciprocals stay. */
@@ -214,15 +214,16 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance most)
         ++any;
     }
     if (any == 0) { /* no two-way network gives that */
-        ctx->info.findings |= eits_wants(ctx, EITS_FINDING_MISFIT) ? EITS_FINDING_MISFIT : 0;
+        ctx->info.diagnostics |=
+            eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH) ? EITS_DIAGNOSTIC_MODEL_MISMATCH : 0;
         return;
     }
-    if (!eits_wants(ctx, EITS_FINDING_ELECTRODE_NOISY))
+    if (!eits_wants(ctx, EITS_DIAGNOSTIC_ELECTRODE_NOISY))
         return;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e)
         ctx->electrode[e] |=
             (eits_real)shared[e] >= EITS_NOISY_SHARE * (eits_real)count ? EITS_ELECTRODE_NOISY : 0;
-    ctx->info.findings |= EITS_FINDING_ELECTRODE_NOISY;
+    ctx->info.diagnostics |= EITS_DIAGNOSTIC_ELECTRODE_NOISY;
     eits_name_electrodes(ctx);
     if (any == 2 && is_channel(ctx, found[0], found[1], most))
         leave_channel(ctx, found[0], found[1]);
@@ -232,7 +233,7 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance most)
 
 /* ---- without reciprocals ---- */
 
-int eits_find_unpaired(eits_context *ctx, uint64_t *macs)
+int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs)
 {
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     for (uint32_t k = 0; k < folds; ++k) {
@@ -251,37 +252,39 @@ int eits_find_unpaired(eits_context *ctx, uint64_t *macs)
             leverage = eits_fma(ctx->sheet_shrink[i] * column[i], column[i], leverage);
         const eits_real left = 1 - leverage;
         energy = eits_fma(off, off, energy);
-        ctx->list_value[k] = left > EITS_GLITCH_PIVOT ? off / eits_sqrt(left) : 0;
+        ctx->list_value[k] = left > EITS_OUTLIER_PIVOT ? off / eits_sqrt(left) : 0;
         if (ctx->list_value[k] > worst) {
             worst = ctx->list_value[k];
             at = k;
         }
     }
     *macs += 2u * (uint64_t)folds * rank;
-    if (!(worst * worst > EITS_GLITCH_ENERGY * energy) ||
-        !(worst > EITS_GLITCH_UNPAIRED * EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2)))
+    if (!(worst * worst > EITS_OUTLIER_ENERGY * energy) ||
+        !(worst >
+          EITS_OUTLIER_UNPAIRED * EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2)))
         return 0;
     leave_row(ctx, ctx->model->fold[at].first);
     leave_row(ctx, ctx->model->fold[at].second);
     return 1;
 }
 
-int eits_find_glitches(eits_context *ctx, uint64_t *macs)
+int eits_find_outliers(eits_context *ctx, uint64_t *macs)
 {
-    uint32_t flagged[EITS_GLITCH_MOST], count = 0;
+    uint32_t flagged[EITS_OUTLIER_MAX], count = 0;
     const tolerance most = find_tolerance(ctx);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (!is_flagged(ctx, k, most))
             continue;
-        if (count < EITS_GLITCH_MOST)
+        if (count < EITS_OUTLIER_MAX)
             flagged[count] = k;
         ++count;
     }
     if (count == 0)
         return 0;
-    if (count > EITS_GLITCH_MOST)
+    if (count > EITS_OUTLIER_MAX)
         find_noisy(ctx, count, most);
-    else if (eits_wants(ctx, EITS_FINDING_GLITCH))
+    else if (eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER))
         choose_sides(ctx, flagged, count, macs);
-    return (ctx->info.findings & (EITS_FINDING_GLITCH | EITS_FINDING_ELECTRODE_NOISY)) != 0;
+    return (ctx->info.diagnostics & (EITS_DIAGNOSTIC_OUTLIER | EITS_DIAGNOSTIC_ELECTRODE_NOISY)) !=
+           0;
 }

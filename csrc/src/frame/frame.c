@@ -21,8 +21,8 @@ static void find_unusable(eits_context *ctx, const eits_real *frame)
         ctx->unusable[i] = (uint8_t)(masked | unknown | saturated);
         ctx->info.saturated += masked == 0 && saturated != 0;
     }
-    if (ctx->info.saturated > 0 && eits_wants(ctx, EITS_FINDING_SATURATED))
-        ctx->info.findings |= EITS_FINDING_SATURATED;
+    if (ctx->info.saturated > 0 && eits_wants(ctx, EITS_DIAGNOSTIC_SATURATED))
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_SATURATED;
 }
 
 static uint32_t count_unusable(const eits_context *ctx)
@@ -33,12 +33,12 @@ static uint32_t count_unusable(const eits_context *ctx)
     return count;
 }
 
-static void forget_findings(eits_context *ctx)
+static void clear_diagnostics(eits_context *ctx)
 {
     eits_info *info = &ctx->info;
-    info->findings = info->saturated = info->glitches = 0;
+    info->diagnostics = info->saturated = info->outliers = 0;
     info->open_electrodes = info->bridged_electrodes = info->noisy_electrodes = 0;
-    info->misfit = info->unexplained = 0;
+    info->model_mismatch = info->unexplained = 0;
     memset(ctx->electrode, 0, sizeof ctx->electrode);
 }
 
@@ -240,16 +240,17 @@ static uint64_t reduce_straight(eits_context *ctx, const eits_real *frame)
  */
 static int examine_reduced(eits_context *ctx, uint64_t *macs)
 {
-    if (!ctx->sheet_known || !eits_judge_misfit(ctx, macs))
+    if (!ctx->sheet_known || !eits_check_model_mismatch(ctx, macs))
         return 0;
     /* by turned rows: then it is no single fold */
-    const int known = (ctx->info.findings & EITS_FINDING_MISFIT) != 0;
-    if (!known && eits_wants(ctx, EITS_FINDING_GLITCH) && eits_find_unpaired(ctx, macs)) {
-        ctx->info.misfit = 0;
+    const int known = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0;
+    if (!known && eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER) &&
+        eits_find_unpaired_outlier(ctx, macs)) {
+        ctx->info.model_mismatch = 0;
         return 1;
     }
-    if (eits_wants(ctx, EITS_FINDING_MISFIT))
-        ctx->info.findings |= EITS_FINDING_MISFIT;
+    if (eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH))
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_MODEL_MISMATCH;
     return 0;
 }
 
@@ -268,7 +269,7 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     /* without a reference there is nothing to judge by */
     const int judged = ctx->baseline.ready != 0;
     *macs = 0;
-    forget_findings(ctx);
+    clear_diagnostics(ctx);
     find_unusable(ctx, frame);
     const int dead = judged && !eits_find_electrodes(ctx, frame);
     eits_status status = check_rows(ctx, frame, masked);
@@ -277,7 +278,7 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     if (status != EITS_OK)
         return status;
     int changed = fold_data(ctx, frame);
-    if (judged && eits_find_glitches(ctx, macs)) {
+    if (judged && eits_find_outliers(ctx, macs)) {
         status = check_rows(ctx, frame, masked);
         if (status != EITS_OK)
             return status;

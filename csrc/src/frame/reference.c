@@ -106,7 +106,7 @@ eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t 
         b->count = 1;
         b->noise_v = 0;
         b->lambda_noise = 0;
-        b->glitches = b->second_waits = 0;
+        b->outliers = b->second_waits = 0;
     }
     eits_zero(b->m2, length);
     return status;
@@ -124,7 +124,7 @@ eits_status eits_baseline_begin(eits_context *ctx, uint32_t count)
     b->ready = 0;
     b->lambda_noise = 0;
     b->noise_v = 0;
-    b->glitches = b->second_waits = 0;
+    b->outliers = b->second_waits = 0;
     return EITS_OK;
 }
 
@@ -209,7 +209,7 @@ static void keep_second(eits_context *ctx, const eits_real *frame)
 static void weigh_second(eits_context *ctx, const eits_real *frame)
 {
     eits_baseline *b = &ctx->baseline;
-    b->glitches += eits_quiet_weigh(ctx, frame);
+    b->outliers += eits_quiet_weigh(ctx, frame);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* as take_in */
         const eits_real delta = b->m2[i] - b->v0[i], second = b->m2[i];
         b->m2[i] = 0;
@@ -229,7 +229,7 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
     eits_status status = check_quiet(ctx, frame, length);
     if (status != EITS_OK)
         return status;
-    const int judged = eits_wants(ctx, EITS_FINDING_GLITCH);
+    const int judged = eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER);
     if (b->count == 1 && judged) {
         keep_second(ctx, frame);
         return EITS_OK;
@@ -248,7 +248,7 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
         if (b->count == 0)
             b->m2_unit = unit_for(ctx, frame);
         take_in(ctx, frame);
-        b->glitches += left;
+        b->outliers += left;
     }
     eits_quiet_clear(ctx);
     return status;

@@ -1,4 +1,4 @@
-/* Glitches in quiet frames: a reading that its reciprocal does not bear out is left out of the
+/* Outliers in quiet frames: a reading that its reciprocal does not bear out is left out of the
  * reference. */
 #include "diagnostics/diagnostics.h"
 
@@ -85,9 +85,9 @@ uint32_t eits_quiet_odd(eits_context *ctx, const eits_real *newer, const eits_re
         ctx->list_index[k] = (ctx->list_index[k] & ~(uint32_t)bit) | (odd ? bit : 0u);
         count += (uint32_t)odd;
     }
-    for (uint32_t k = 0; k < ctx->model->n_folded && count > EITS_GLITCH_MOST; ++k)
+    for (uint32_t k = 0; k < ctx->model->n_folded && count > EITS_OUTLIER_MAX; ++k)
         ctx->list_index[k] &= ~(uint32_t)bit;
-    return count > EITS_GLITCH_MOST ? 0 : count;
+    return count > EITS_OUTLIER_MAX ? 0 : count;
 }
 
 /* The rows of fold k that changed: the one that changed more, and the other if it changed about as

@@ -107,7 +107,7 @@ static eits_status solve(eits_context *ctx, int from_last)
         answer_zero(ctx, EITS_STOP_DIVERGED);
         return EITS_E_NOT_FINITE;
     }
-    eits_judge_reference(ctx);
+    eits_check_stale_reference(ctx);
     if (o->gate_factor > 0 && ctx->info.lambda_max < o->gate_factor * ctx->info.lambda_noise) {
         answer_zero(ctx, EITS_STOP_GATE);
         return EITS_OK;
@@ -157,7 +157,7 @@ void eits_solve_again(eits_context *ctx, const eits_real *y)
     }
     ctx->info.iterations += before.iterations;
     ctx->info.step_halvings += before.step_halvings;
-    ctx->info.findings = before.findings; /* judged by the frame as it came */
+    ctx->info.diagnostics = before.diagnostics; /* judged by the frame as it came */
 }
 
 eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length,

@@ -94,8 +94,8 @@ eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc)
 }
 
 /* |target - change atom|^2, target being what the other touches leave. */
-static eits_real misfit(const eits_context *ctx, const eits_real *target, eits_real change,
-                        const eits_real *atom)
+static eits_real squared_residual(const eits_context *ctx, const eits_real *target,
+                                  eits_real change, const eits_real *atom)
 {
     const uint32_t rank = ctx->model->rank;
     eits_real *difference = ctx->sx;
@@ -104,8 +104,8 @@ static eits_real misfit(const eits_context *ctx, const eits_real *target, eits_r
     return eits_dot(ctx, difference, difference, rank);
 }
 
-/* One damped Gauss-Newton step of one disc, others held; halved up to twice until the misfit falls.
- * Returns how far it went, mm. ctx->residual is what all discs leave, before and after. */
+/* One damped Gauss-Newton step of one disc, others held; halved up to twice until the residual
+ * falls. Returns how far it went, mm. ctx->residual is what all discs leave, before and after. */
 static eits_real move_disc(eits_context *ctx, eits_fit *f, uint32_t k)
 {
     const uint32_t rank = ctx->model->rank;
@@ -154,7 +154,8 @@ static eits_real move_disc(eits_context *ctx, eits_fit *f, uint32_t k)
         f->macs += eits_disc_atom(ctx, &trial, trial_atom, NULL) + 3u * rank;
         trial.change = eits_best_change(ctx, &trial, trial_atom, target);
         const eits_real trial_off = trial.radius_mm - expected;
-        if (!(misfit(ctx, target, trial.change, trial_atom) + weight * trial_off * trial_off <
+        if (!(squared_residual(ctx, target, trial.change, trial_atom) +
+                  weight * trial_off * trial_off <
               cost))
             continue;
         const eits_real dx = eits_fabs(trial.x_mm - disc->x_mm),

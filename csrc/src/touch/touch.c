@@ -185,7 +185,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         search(ctx, &f);
     const uint32_t finite = report(ctx, &f, found);
     ctx->info.touch_macs = f.macs;
-    eits_judge_crowd(ctx, looked, found, finite);
+    eits_check_crowd(ctx, looked, found, finite);
     const uint32_t told = eits_track(ctx, found, finite);
     ctx->info.touches = told;
     for (uint32_t k = 0; k < told; ++k)

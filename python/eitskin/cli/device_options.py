@@ -73,8 +73,9 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     option(
         solver,
         "--ignore FINDING[,FINDING]",
-        "do not look for saturated, electrode-open, electrodes-bridged, glitch,"
-        " electrode-noisy, misfit, stale-reference, crowded, or all (default: look for all)",
+        "do not look for saturated, electrode-open, electrodes-bridged, outlier,"
+        " electrode-noisy, model_mismatch, stale-reference, crowded, or all (default: look for"
+        " all)",
     )
     start = solver.add_mutually_exclusive_group()
     option(start, "--warm", "begin each frame from the last one's result")
@@ -240,26 +241,26 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
     return SolverSettings(
         warm_start=True if options.warm else False if options.cold else None,
         sign=options.sign,
-        findings=read_ignored(options.ignore),
+        diagnostics=read_ignored(options.ignore),
         track=False if options.no_track else None,
         **named_solver(options),
     )
 
 
 def read_ignored(text: str | None) -> int | None:
-    """The findings that are left, bit k of ``core.findings.FINDINGS``, without those in
-    "glitch,electrode-noisy" or "all"; None for None.
+    """The diagnostics that are left, bit k of ``core.diagnostics.DIAGNOSTICS``, without those in
+    "outlier,electrode-noisy" or "all"; None for None.
 
     Raises:
         UsageError: one is unknown.
     """
     from eitskin.config import nearest
-    from eitskin.core.findings import ALL_FINDINGS, FINDINGS
+    from eitskin.core.diagnostics import ALL_DIAGNOSTICS, DIAGNOSTICS
 
     if text is None:
         return None
-    names = [name.replace(" ", "-") for name in FINDINGS]
-    left: int = ALL_FINDINGS
+    names = [name.replace(" ", "-") for name in DIAGNOSTICS]
+    left: int = ALL_DIAGNOSTICS
     for name in text.split(","):
         if name != "all" and name not in names:
             raise UsageError(f"--ignore {text}: {nearest(name, (*names, 'all'))}")
@@ -405,7 +406,7 @@ def _wished_solver(
         for name, value in point.configuration.solver_settings.items()
         if name in board_takes()
     }
-    own = {name: getattr(named, name) for name in ("sign", "warm_start", "findings", "track")}
+    own = {name: getattr(named, name) for name in ("sign", "warm_start", "diagnostics", "track")}
     return replace(SolverSettings(**kept), **own)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.findings import with_findings
+from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.results import (
     SIGNS,
     SOLVERS,
@@ -164,7 +164,7 @@ class CoreEngine:
             b.v0_rms,
             b.noise_v,
             b.lambda_noise,
-            int(b.glitches),
+            int(b.outliers),
         )
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
@@ -250,7 +250,9 @@ class CoreEngine:
         began_ns = perf_counter_ns()
         status = self.solve_frame(frame)
         if status != 0:
-            raise FrameError(with_findings(f"frame: {self._status_text(status)}", self.last_info()))
+            raise FrameError(
+                with_diagnostics(f"frame: {self._status_text(status)}", self.last_info())
+            )
         solved_ns = found_ns = perf_counter_ns()
         found: tuple[Touch, ...] = ()
         if touches:
@@ -315,7 +317,7 @@ class CoreEngine:
             if r.status != 0:
                 done.append(
                     FrameError(
-                        with_findings(f"frame: {self._status_text(r.status)}", _info(r.info))
+                        with_diagnostics(f"frame: {self._status_text(r.status)}", _info(r.info))
                     )
                 )
                 continue
@@ -365,7 +367,7 @@ def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
         i.touch_macs,
         getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual,
         i.data_norm,
-        i.findings, i.saturated, i.glitches, i.misfit, i.unexplained,
+        i.diagnostics, i.saturated, i.outliers, i.model_mismatch, i.unexplained,
         _bits(i.open_electrodes), _bits(i.bridged_electrodes), _bits(i.noisy_electrodes),
         i.floor,
         solve_us=solve_ns / 1000, touch_us=touch_ns / 1000,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.findings import ALL_FINDINGS, names, words
+from eitskin.core.diagnostics import ALL_DIAGNOSTICS, names, words
 from eitskin.errors import FrameError, UsageError
 
 SIGNS = ("increase", "decrease", "both")
@@ -30,8 +30,8 @@ class Options:
     ``solver`` is "fista" (every column in every iteration), "working-set" (FISTA on the columns
     that may differ from zero), "coordinate" (sweeps of coordinate descent) or "active-set" (rounds
     to the exact optimum). ``mac_limit`` (0: none): the best so far when the next step would take
-    the solve beyond so many multiply-accumulates. ``findings``: what is looked for, bit k of
-    ``FINDINGS``. ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow
+    the solve beyond so many multiply-accumulates. ``diagnostics``: what is looked for, bit k of
+    ``DIAGNOSTICS``. ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow
     touches in time; all 0: each frame by itself (``solve.options.tracking`` sets them,
     docs/guide/tracking.md).
     ``floor_noise_factor``: the whitening's floor is at least this times the tare's noise over
@@ -62,7 +62,7 @@ class Options:
     saturation_v: float = 0.0
     touch_sweeps: int = 6
     mac_limit: int = 0
-    findings: int = ALL_FINDINGS
+    diagnostics: int = ALL_DIAGNOSTICS
     touch_search: int = ALL_SEARCH
     refine: bool = False
     track_confirm: int = 0
@@ -83,7 +83,7 @@ WHOLE = {
     "max_masked": (0, 2**32 - 1),
     "touch_sweeps": (0, 1000),
     "mac_limit": (0, 2**32 - 1),
-    "findings": (0, ALL_FINDINGS),
+    "diagnostics": (0, ALL_DIAGNOSTICS),
     "touch_search": (0, ALL_SEARCH),
     "track_confirm": (0, MOST_TRACK_FRAMES),
     "track_hold": (0, MOST_TRACK_FRAMES),
@@ -154,7 +154,7 @@ def check_quiet(
 class Baseline:
     """The reference as learned: ``correlation`` with the model's own, ``gain`` in model volts per
     measured volt, ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was
-    given; ``glitches`` readings were left out.
+    given; ``outliers`` readings were left out.
     """
 
     frames: int
@@ -163,7 +163,7 @@ class Baseline:
     v0_rms_v: float
     noise_v: float
     lambda_noise: float
-    glitches: int = 0
+    outliers: int = 0
 
 
 @dataclass(frozen=True)
@@ -211,10 +211,10 @@ class Info:
     gap_rel: float
     residual: float
     data_norm: float
-    findings: int = 0
+    diagnostics: int = 0
     saturated: int = 0
-    glitches: int = 0
-    misfit: float = 0.0
+    outliers: int = 0
+    model_mismatch: float = 0.0
     unexplained: float = 0.0
     open_electrodes: tuple[int, ...] = ()
     bridged_electrodes: tuple[int, ...] = ()
@@ -226,18 +226,18 @@ class Info:
     @property
     def found(self) -> tuple[str, ...]:
         """What was found wrong with the frame, each in a few words: "electrode 5 open", "2 rows
-        left out as glitches"..."""
+        left out as outliers"..."""
         return words(self)
 
     @property
-    def findings_by_name(self) -> tuple[str, ...]:
-        """Those of ``FINDINGS`` that were made."""
-        return names(self.findings)
+    def diagnostics_by_name(self) -> tuple[str, ...]:
+        """Those of ``DIAGNOSTICS`` that were made."""
+        return names(self.diagnostics)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the same names, without the underscore of ``lambda_``; findings by name."""
+        """For JSON: the same names, without the underscore of ``lambda_``; diagnostics by name."""
         values = {key.rstrip("_"): value for key, value in asdict(self).items()}
-        return values | {"findings": list(self.findings_by_name), "found": list(self.found)}
+        return values | {"diagnostics": list(self.diagnostics_by_name), "found": list(self.found)}
 
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:

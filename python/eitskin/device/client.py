@@ -89,7 +89,7 @@ class Device(Exchange):
 
     def solver(self, options: Options) -> None:
         """Give the board's solver these of ``options``: iterations, max_touches, warm_start, sign,
-        lambda_rel, gap_rel, solver, mac_limit, findings, and whether touches are tracked.
+        lambda_rel, gap_rel, solver, mac_limit, diagnostics, and whether touches are tracked.
 
         Raises:
             UsageError: one is out of its range.
@@ -102,7 +102,7 @@ class Device(Exchange):
                 SIGNS.index(options.sign),
                 options.lambda_rel, options.gap_rel, SOLVERS.index(options.solver),
                 options.mac_limit,
-                options.findings, int(options.tracks),
+                options.diagnostics, int(options.tracks),
             ),
             ANSWER_S,
         )  # fmt: skip

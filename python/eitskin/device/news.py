@@ -7,7 +7,7 @@ tell is said once.
 
 from __future__ import annotations
 
-from eitskin.core.findings import names, words
+from eitskin.core.diagnostics import names, words
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import fault_text
@@ -21,14 +21,14 @@ from eitskin.device.wire.packets import (
     Solved,
 )
 
-Key = tuple[str, int]  # a name of core.findings.FINDINGS, and which electrode; -1: none
+Key = tuple[str, int]  # a name of core.diagnostics.DIAGNOSTICS, and which electrode; -1: none
 
 _NAMES = {
     FaultCode.ELECTRODE_OPEN: "electrode open",
     FaultCode.SATURATED: "saturated",
     FaultCode.BRIDGED: "electrodes bridged",
     FaultCode.ELECTRODE_NOISY: "electrode noisy",
-    FaultCode.MISFIT: "misfit",
+    FaultCode.MODEL_MISMATCH: "model mismatch",
     FaultCode.STALE_REFERENCE: "stale reference",
 }
 _DOUBTFUL = frozenset(_NAMES[code] for code in DOUBTFUL_FAULTS)
@@ -117,7 +117,7 @@ def _found(solved: Solved) -> dict[Key, str]:
         "electrode noisy": solved.noisy_electrodes,
     }
     found: dict[Key, str] = {}
-    for name, text in zip(names(solved.findings), words(solved), strict=True):
+    for name, text in zip(names(solved.diagnostics), words(solved), strict=True):
         which = electrodes.get(name, ())
         found |= {(name, e): _plain((name, e)) for e in which} if which else {(name, -1): text}
     return found

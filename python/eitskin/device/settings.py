@@ -35,7 +35,7 @@ class ScanSettings:
 @dataclass(frozen=True)
 class SolverSettings:
     """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at
-    none, ``findings`` at all, ``track`` at on."""
+    none, ``diagnostics`` at all, ``track`` at on."""
 
     iterations: int | None = None
     gap_rel: float | None = None
@@ -45,7 +45,7 @@ class SolverSettings:
     max_touches: int | None = None
     solver: str | None = None
     mac_limit: int | None = None
-    findings: int | None = None
+    diagnostics: int | None = None
     track: bool | None = None
 
     @property

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.findings import FINDINGS
+from eitskin.core.diagnostics import DIAGNOSTICS
 from eitskin.core.results import Options, Touch
 from eitskin.model.model import Model
 
@@ -23,7 +23,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 ROW_SIGNIFICANT, ROW_DEAD_SHARE, ROW_DEAD_NOISE, ROWS_TO_JUDGE = 0.3, 0.02, 5.0, 3
 ROW_GROWN, ROW_SMALL = 8.0, 0.05
-GLITCH_NOISE, GLITCH_ROBUST, GLITCH_LARGEST, GLITCH_SHARE, GLITCH_NEARER, GLITCH_MOST = (
+OUTLIER_NOISE, OUTLIER_ROBUST, OUTLIER_LARGEST, OUTLIER_FRACTION, OUTLIER_NEARER, OUTLIER_MAX = (
     6.5,
     16.0,
     0.03,
@@ -31,8 +31,14 @@ GLITCH_NOISE, GLITCH_ROBUST, GLITCH_LARGEST, GLITCH_SHARE, GLITCH_NEARER, GLITCH
     0.5,
     8,
 )
-GLITCH_PIVOT, GLITCH_RIDGE, GLITCH_UNPAIRED, GLITCH_ENERGY, NOISY_SHARE = 0.05, 1e-4, 16.0, 0.5, 0.9
-MISFIT_SHARE, MISFIT_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
+OUTLIER_PIVOT, OUTLIER_RIDGE, OUTLIER_UNPAIRED, OUTLIER_ENERGY, NOISY_SHARE = (
+    0.05,
+    1e-4,
+    16.0,
+    0.5,
+    0.9,
+)
+MISMATCH_FRACTION, MISMATCH_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
 CROWD_WEIGHTS, CROWD_OFFSET, CROWD_LEAST = (
     (-0.2429, 3.645, -4.607, -3.659, 0.1329, 0.7892),
     -0.3583,
@@ -57,18 +63,18 @@ class Found:
 
     names: set[str] = field(default_factory=set)
     saturated: int = 0
-    glitches: int = 0
+    outliers: int = 0
     no_signal: bool = False  # on any electrode: it is the front end
-    misfit: float = 0.0
+    model_mismatch: float = 0.0
     unexplained: float = 0.0
     open_electrodes: tuple[int, ...] = ()
     bridged_electrodes: tuple[int, ...] = ()
     noisy_electrodes: tuple[int, ...] = ()
 
     @property
-    def findings(self) -> int:
-        """As eits_info.findings."""
-        return sum(1 << bit for bit, name in enumerate(FINDINGS) if name in self.names)
+    def diagnostics(self) -> int:
+        """As eits_info.diagnostics."""
+        return sum(1 << bit for bit, name in enumerate(DIAGNOSTICS) if name in self.names)
 
 
 class Sheet(NamedTuple):
@@ -88,7 +94,7 @@ class Sheet(NamedTuple):
         ):
             return None
         squared = (s**2).sum(axis=1) / energy
-        return cls(1 / energy, squared / (squared + GLITCH_RIDGE * squared.max()) / energy)
+        return cls(1 / energy, squared / (squared + OUTLIER_RIDGE * squared.max()) / energy)
 
 
 @dataclass
@@ -130,7 +136,7 @@ class Examiner:
         self.model = model
         self.rows = model.protocol.drive_measure.astype(np.int64)
         self._p = model.projection.astype(np.float64)
-        self.wanted: set[str] = set(FINDINGS)
+        self.wanted: set[str] = set(DIAGNOSTICS)
         self.found = Found()
 
     @cached_property
@@ -160,13 +166,13 @@ class Examiner:
             np.abs(along) > ROW_GROWN * np.maximum(size, ROW_SMALL * ref.rms_v) + noise
         )
         out = np.zeros(len(frame), dtype=np.bool_)
-        if turned.sum() >= ROWS_TO_JUDGE and "misfit" in self.wanted:
-            self.found.names.add("misfit")
+        if turned.sum() >= ROWS_TO_JUDGE and "model mismatch" in self.wanted:
+            self.found.names.add("model mismatch")
         impossible = turned | grown
-        if 0 < turned.sum() + grown.sum() < ROWS_TO_JUDGE and "glitch" in self.wanted:
+        if 0 < turned.sum() + grown.sum() < ROWS_TO_JUDGE and "outlier" in self.wanted:
             out |= impossible
-            self.found.glitches += int(impossible.sum())
-            self.found.names.add("glitch")
+            self.found.outliers += int(impossible.sum())
+            self.found.names.add("outlier")
             alive = alive & ~impossible
         if dead.sum() < ROWS_TO_JUDGE:
             return out
@@ -226,27 +232,30 @@ class Examiner:
         if ref.noise_v > 0 and self.model.data_kind == "normalised":
             with np.errstate(divide="ignore", invalid="ignore"):
                 most = (
-                    GLITCH_NOISE
+                    OUTLIER_NOISE
                     * ref.noise_v
                     * np.hypot(1 / ref.v0[fold.first], 1 / ref.v0[fold.second])
                 )
         elif ref.noise_v > 0:
-            most = np.full(len(off), GLITCH_NOISE * np.sqrt(2) * abs(ref.gain) * ref.noise_v)
+            most = np.full(len(off), OUTLIER_NOISE * np.sqrt(2) * abs(ref.gain) * ref.noise_v)
         else:
             spread = robust(off[folded.both])
-            most = np.full(len(off), GLITCH_ROBUST * spread if spread > 0 else np.inf)
-        large = off > GLITCH_LARGEST * np.abs(folded.d).max(initial=0.0)
+            most = np.full(len(off), OUTLIER_ROBUST * spread if spread > 0 else np.inf)
+        large = off > OUTLIER_LARGEST * np.abs(folded.d).max(initial=0.0)
         return np.flatnonzero(
-            folded.both & (off > most) & large & (off > GLITCH_SHARE * (np.abs(folded.d) + off / 2))
+            folded.both
+            & (off > most)
+            & large
+            & (off > OUTLIER_FRACTION * (np.abs(folded.d) + off / 2))
         )
 
-    def glitches(self, folded: Folded, ref: Reference) -> BoolArray:
-        """Rows (m,) to leave out as glitches, or because of noisy electrodes."""
+    def outliers(self, folded: Folded, ref: Reference) -> BoolArray:
+        """Rows (m,) to leave out as outliers, or because of noisy electrodes."""
         out, fold = np.zeros(self.model.protocol.n_rows, dtype=np.bool_), self.model.fold
         flagged = self.flagged(folded, ref)
-        if len(flagged) > GLITCH_MOST:
+        if len(flagged) > OUTLIER_MAX:
             return self._noisy(flagged)
-        if not len(flagged) or "glitch" not in self.wanted:
+        if not len(flagged) or "outlier" not in self.wanted:
             return out
         half = folded.apart[flagged] / 2
         predicted = self._predict(folded, flagged)
@@ -256,10 +265,10 @@ class Examiner:
             first, second = (
                 np.abs(folded.d[flagged] + side * half - predicted) for side in (1, -1)
             )
-        out[fold.first[flagged[~(first <= GLITCH_NEARER * second)]]] = True
-        out[fold.second[flagged[~(second <= GLITCH_NEARER * first)]]] = True
-        self.found.glitches += int(out.sum())
-        self.found.names.add("glitch")
+        out[fold.first[flagged[~(first <= OUTLIER_NEARER * second)]]] = True
+        out[fold.second[flagged[~(second <= OUTLIER_NEARER * first)]]] = True
+        self.found.outliers += int(out.sum())
+        self.found.names.add("outlier")
         return out
 
     def _predict(self, folded: Folded, flagged: npt.NDArray[np.intp]) -> FloatArray | None:
@@ -275,7 +284,7 @@ class Examiner:
             return None
         return (
             None
-            if pivots.min() <= GLITCH_PIVOT
+            if pivots.min() <= OUTLIER_PIVOT
             else np.asarray(folded.d[flagged] - np.linalg.solve(left, off))
         )
 
@@ -287,7 +296,7 @@ class Examiner:
         shared = np.array([(used == e).sum() for e in range(self.model.protocol.n_electrodes)])
         found = tuple(int(e) for e in np.flatnonzero(shared >= NOISY_SHARE * len(flagged)))
         if not found:
-            self.found.names |= {"misfit"} & self.wanted
+            self.found.names |= {"model mismatch"} & self.wanted
             return out
         if "electrode noisy" not in self.wanted:
             return out
@@ -312,9 +321,9 @@ class Examiner:
         used = folded.first | folded.second
         return float(np.where(folded.both & (folded.apart != 0), each / 2, each)[used].sum())
 
-    def misfit(self, folded: Folded, along: FloatArray | None, ref: Reference) -> bool:
+    def model_mismatch(self, folded: Folded, along: FloatArray | None, ref: Reference) -> bool:
         """Whether more of d lies outside of the model's sheet than noise explains; ``along`` is the
-        drift that is ignored. Sets ``found.misfit``."""
+        drift that is ignored. Sets ``found.model_mismatch``."""
         rank, folds = self._p.shape
         if self.sheet is None or not folded.whole or rank >= folds or not ref.noise_v > 0:
             return False
@@ -335,32 +344,32 @@ class Examiner:
         if not off > noise or not whole > 0:
             return False
         share = float(np.sqrt((off - noise) / whole))
-        self.found.misfit = min(share, 1.0)
-        return share > MISFIT_SHARE and off > MISFIT_NOISE**2 * noise
+        self.found.model_mismatch = min(share, 1.0)
+        return share > MISMATCH_FRACTION and off > MISMATCH_NOISE**2 * noise
 
     def unpaired(self, folded: Folded) -> BoolArray:
         """Rows of the one fold that the others predict worst, where no fold has a reciprocal of its
         own."""
         out, fold = np.zeros(self.model.protocol.n_rows, dtype=np.bool_), self.model.fold
         if (
-            "glitch" not in self.wanted
+            "outlier" not in self.wanted
             or self.sheet is None
-            or {"misfit"} & self.found.names
+            or {"model mismatch"} & self.found.names
             or (folded.apart != 0).any()
         ):
             return out
         off = np.abs(folded.d - self._p.T @ (self.sheet.shrink * (self._p @ folded.d)))
         left = 1 - (self._p**2 * self.sheet.shrink[:, None]).sum(axis=0)
-        size = np.where(left > GLITCH_PIVOT, off / np.sqrt(np.maximum(left, GLITCH_PIVOT)), 0.0)
+        size = np.where(left > OUTLIER_PIVOT, off / np.sqrt(np.maximum(left, OUTLIER_PIVOT)), 0.0)
         worst = int(size.argmax())
-        if size[worst] ** 2 > GLITCH_ENERGY * float(off @ off) and size[
+        if size[worst] ** 2 > OUTLIER_ENERGY * float(off @ off) and size[
             worst
-        ] > GLITCH_UNPAIRED * robust(size):
+        ] > OUTLIER_UNPAIRED * robust(size):
             out[fold.first[worst]] = True
             if fold.second[worst] >= 0:
                 out[fold.second[worst]] = True
-            self.found.glitches += int(out.sum())
-            self.found.names.add("glitch")
+            self.found.outliers += int(out.sum())
+            self.found.names.add("outlier")
         return out
 
     # ---- after the solve ----
@@ -409,4 +418,4 @@ class Examiner:
         """The fields of ``Info`` that say what was found."""
         f = self.found
         told = (entry.name for entry in fields(f) if entry.name not in PRIVATE)
-        return {name: getattr(f, name) for name in ("findings", *told)}
+        return {name: getattr(f, name) for name in ("diagnostics", *told)}

@@ -15,7 +15,7 @@ from time import perf_counter_ns
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.findings import FINDINGS, with_findings
+from eitskin.core.diagnostics import DIAGNOSTICS, with_diagnostics
 from eitskin.core.results import (
     COUPLED,
     STRAIGHT,
@@ -102,7 +102,7 @@ class ReferenceEngine:
             self._warm = None
         self.options = options
         self._examiner.wanted = {
-            name for bit, name in enumerate(FINDINGS) if options.findings >> bit & 1
+            name for bit, name in enumerate(DIAGNOSTICS) if options.diagnostics >> bit & 1
         }
 
     def mask_rows(self, rows: BoolArray) -> None:
@@ -149,7 +149,7 @@ class ReferenceEngine:
         was_ready, self._ready = self._ready, False
         try:
             if len(frames) >= 4:
-                if "glitch" in self._examiner.wanted:
+                if "outlier" in self._examiner.wanted:
                     frames, left = clean(frames, self.model.fold, ~self._bad)
                 lambda_noise = self._learn_lambda_noise(frames, left)
                 self._noise_v = self._noise_of(frames)
@@ -231,15 +231,15 @@ class ReferenceEngine:
             raise FrameError(f"frame: {DEAD}")
         folded = self._fold(frame, unusable)
         if judged:
-            unusable = unusable | look.glitches(folded, judged)
+            unusable = unusable | look.outliers(folded, judged)
             folded = self._fold(frame, self._check_rows(frame, unusable))
-        if judged and look.misfit(folded, self._along(folded), judged):
-            glitch = look.unpaired(folded)
-            if glitch.any():
-                look.found.misfit, unusable = 0.0, unusable | glitch
+        if judged and look.model_mismatch(folded, self._along(folded), judged):
+            outlier = look.unpaired(folded)
+            if outlier.any():
+                look.found.model_mismatch, unusable = 0.0, unusable | outlier
                 folded = self._fold(frame, self._check_rows(frame, unusable))
             else:
-                look.found.names |= {"misfit"} & look.wanted
+                look.found.names |= {"model mismatch"} & look.wanted
         self._noise_energy = look.noise_energy(folded, judged) if judged else 0.0
         known = folded.first | folded.second
         self._leave_out(known)
@@ -272,7 +272,7 @@ class ReferenceEngine:
         """
         if int(unusable.sum()) > self.options.max_masked:
             raise FrameError(
-                with_findings(
+                with_diagnostics(
                     "frame: too many channels of the frame are unusable", self._examiner.found
                 )
             )
@@ -329,8 +329,8 @@ class ReferenceEngine:
         return self._p @ d if self._whitening is None else self._whitening.data @ (self._p @ d)
 
     def _directions(self, folded: Folded) -> list[FloatArray]:
-        """What the misfit ignores: P's columns of folds left out, unless that is whitened anew, and
-        the drift of the gain."""
+        """What the model_mismatch ignores: P's columns of folds left out, unless that is whitened
+        anew, and the drift of the gain."""
         left_out: list[int] = (
             [] if self._whitening else np.flatnonzero(~(folded.first | folded.second)).tolist()
         )

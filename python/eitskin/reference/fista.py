@@ -21,7 +21,7 @@ def fista(
     basis: FloatArray,
     start: FloatArray | None = None,
 ) -> Result:
-    """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the misfit.
+    """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the model_mismatch.
 
     With the solver "working-set", columns outside the working set see no gradient until it is
     chosen anew.

@@ -63,7 +63,7 @@ def certify(
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """S (r, n), data y (r,), lambda, sign rule, and the directions that the misfit ignores,
+    """S (r, n), data y (r,), lambda, sign rule, and the directions that the model_mismatch ignores,
     orthonormal rows (k, r)."""
 
     s: FloatArray

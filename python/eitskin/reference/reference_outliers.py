@@ -1,4 +1,4 @@
-"""Glitches in quiet frames, in numpy: the rules of csrc/src/frame/reference_outliers.c, written for
+"""Outliers in quiet frames, in numpy: the rules of csrc/src/frame/reference_outliers.c, written for
 reading."""
 
 from __future__ import annotations
@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.reference.diagnostics import GLITCH_MOST, robust
+from eitskin.reference.diagnostics import OUTLIER_MAX, robust
 from eitskin.skin.protocol import Reciprocity
 
 FloatArray = npt.NDArray[np.float64]
@@ -19,7 +19,7 @@ def odd_rows(
     newer: FloatArray, older: FloatArray, fold: Reciprocity, used: BoolArray
 ) -> tuple[BoolArray, BoolArray]:
     """Folds (k,) whose rows do not agree on how ``newer`` (m,) differs from ``older``, none where
-    they are too many to be glitches; and the rows (m,) of those that changed most."""
+    they are too many to be outliers; and the rows (m,) of those that changed most."""
     change = np.where(used, newer - older, 0.0)
     has_second = fold.second >= 0
     both = has_second & used[fold.first] & used[fold.second]
@@ -35,7 +35,7 @@ def odd_rows(
     size = np.where(used, np.abs(older), 0.0)
     own = np.maximum(size[fold.first], np.where(has_second, size[fold.second], 0.0))
     odd = (off > limit) & (off > OWN_LEAST * own)
-    if odd.sum() > GLITCH_MOST:
+    if odd.sum() > OUTLIER_MAX:
         odd[:] = False
     rows[fold.first[odd & (np.abs(first) > 0) & (np.abs(first) >= np.abs(second) / 2)]] = True
     rows[fold.second[odd & (np.abs(second) > 0) & (np.abs(second) >= np.abs(first) / 2)]] = True

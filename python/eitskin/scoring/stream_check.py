@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.findings import words
+from eitskin.core.diagnostics import words
 from eitskin.core.results import load_text, solve_text
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame

@@ -32,8 +32,8 @@ class Reconstructor:
 
     ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or
     "numpy" (the reference). What is wrong with a frame is found, left out where that helps, and
-    named in ``info.found`` (docs/reference/diagnostics.md); the option ``findings`` chooses what is
-    looked for.
+    named in ``info.found`` (docs/reference/diagnostics.md); the option ``diagnostics`` chooses what
+    is looked for.
 
     Raises:
         ModelError: the C core refuses the model.
@@ -113,7 +113,7 @@ class Reconstructor:
 
     def tare(self, quiet_v: npt.ArrayLike) -> Baseline:
         """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
-        noise, and single readings that the others do not bear out are left out (``glitches``).
+        noise, and single readings that the others do not bear out are left out (``outliers``).
 
         Raises:
             FrameError: a frame has the wrong length or cannot be used.

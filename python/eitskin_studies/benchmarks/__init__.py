@@ -1,1 +1,1 @@
-"""``eitskin bench``: speed side by side, and what findings are worth."""
+"""``eitskin bench``: speed side by side, and what diagnostics are worth."""

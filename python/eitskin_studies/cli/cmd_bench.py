@@ -1,5 +1,5 @@
 """``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes,
-boards, kernels, growth, batches; and what findings are worth."""
+boards, kernels, growth, batches; and what diagnostics are worth."""
 
 from __future__ import annotations
 
@@ -89,8 +89,8 @@ def add_parser(subparsers: Any) -> None:
     option(batches, "--threads N", None, int, nargs="+", default=[1, 2])
     _add_page(batches)
     batches.set_defaults(run=run_batches)
-    findings = what.add_parser(
-        "findings",
+    diagnostics = what.add_parser(
+        "diagnostics",
         help="how often faults are called by their name, and what they cost the image",
         description=(
             "Spoil frames of random scenes in every way that docs/reference/diagnostics.md names,"
@@ -98,12 +98,12 @@ def add_parser(subparsers: Any) -> None:
             " the same frame without the fault; some five minutes."
         ),
     )
-    option(findings, "--scenes", "that every fault is put on", default=640)
-    option(findings, "--crowds", "scenes of each number of touches", default=24)
-    option(findings, "--imperfect", "scenes of each front end", default=40)
-    option(findings, "--seed", "of scenes and noise", default=4001)
-    _add_page(findings, "diagnostics")
-    findings.set_defaults(run=run_findings)
+    option(diagnostics, "--scenes", "that every fault is put on", default=640)
+    option(diagnostics, "--crowds", "scenes of each number of touches", default=24)
+    option(diagnostics, "--imperfect", "scenes of each front end", default=40)
+    option(diagnostics, "--seed", "of scenes and noise", default=4001)
+    _add_page(diagnostics, "diagnostics")
+    diagnostics.set_defaults(run=run_diagnostics)
     effects = what.add_parser(
         "effects", help="scenes: the time with no effect, with each alone, with all"
     )
@@ -201,24 +201,24 @@ def run_batches(options: argparse.Namespace) -> int:
     return _show(options, result, bench_batches.as_text(result), filling)
 
 
-def run_findings(options: argparse.Namespace) -> int:
+def run_diagnostics(options: argparse.Namespace) -> int:
     """Count how often faults are named, and what they cost."""
     from eitskin.fileio import refuse_unwritable
-    from eitskin_studies.benchmarks import findings as bench_findings
-    from eitskin_studies.benchmarks import findings_page as bench_findings_page
+    from eitskin_studies.benchmarks import diagnostics as bench_diagnostics
+    from eitskin_studies.benchmarks import diagnostics_page as bench_diagnostics_page
 
     _within("--scenes", options.scenes, 2, 100_000)
     _within("--crowds", options.crowds, 2, 10_000)
     _within("--imperfect", options.imperfect, 1, 10_000)
     _within("--seed", options.seed, 0, 2**31 - 1)
     refuse_unwritable(options.page)
-    result = bench_findings.run(
+    result = bench_diagnostics.run(
         options.seed, options.scenes, options.crowds, options.imperfect, progress=_progress
     )
     sizes = f"--scenes {options.scenes} --crowds {options.crowds} --imperfect {options.imperfect}"
-    command = f"eitskin bench findings {sizes} --seed {options.seed}"
-    filling = bench_findings_page.for_page(result, command)
-    text = bench_findings_page.as_text(result)
+    command = f"eitskin bench diagnostics {sizes} --seed {options.seed}"
+    filling = bench_diagnostics_page.for_page(result, command)
+    text = bench_diagnostics_page.as_text(result)
     return _show(options, result, text, filling, "diagnostics")
 
 

@@ -166,7 +166,7 @@ def test_solver_options_reach_the_board(done: Done, scene: Path) -> None:
     )
     other = infos("--sign", "decrease", "--iterations", "3", "--ignore", "all")
     assert other[0]["nonzeros"] != infos("--iterations", "3")[0]["nonzeros"]
-    assert all(info["findings"] == [] for info in other)
+    assert all(info["diagnostics"] == [] for info in other)
 
 
 def test_findings_are_said_once_they_rise_and_stand_in_each_frame(
@@ -178,7 +178,9 @@ def test_findings_are_said_once_they_rise_and_stand_in_each_frame(
     assert main([*arguments, "--json"]) == 0
     out, err = capsys.readouterr()
     frames = json_lines(out)[:-1]
-    shown = [frame["frame"] for frame in frames if "stale reference" in frame["info"]["findings"]]
+    shown = [
+        frame["frame"] for frame in frames if "stale reference" in frame["info"]["diagnostics"]
+    ]
     lines = [line for line in err.splitlines() if "stale reference" in line]
     assert len(shown) > 3
     assert lines == [
@@ -206,7 +208,7 @@ def test_another_model_than_the_prebuilt_one(done: Done, scene: Path, tmp_path: 
         "--model",
         model,
         "--ignore",
-        "misfit",
+        "model mismatch",
     )  # the coarse model does not fit the scene well
     frames = json_lines(done("stream", *given, "--mode", "image", "--json"))
     assert len(frames) == FRAMES + 1 and len(frames[0]["image_s_per_m"]) < 812
@@ -424,10 +426,10 @@ def test_doctor_on_a_board_that_reports_a_fault(
         property(lambda info: as_it_is(type(info)(**{**vars(info), "faults": 1 << 2}))),
     )
     assert main(["doctor", "--device", f"sim:{scene}", "--frames", "4", "--json"]) == 11
-    findings = strict(capsys.readouterr().out)["findings"]
-    assert [finding["name"] for finding in findings] == ["board-electrode-open"] and findings[0][
-        "mend"
-    ] == ""
+    diagnostics = strict(capsys.readouterr().out)["diagnostics"]
+    assert [diagnostic["name"] for diagnostic in diagnostics] == [
+        "board-electrode-open"
+    ] and diagnostics[0]["mend"] == ""
 
 
 # ---- start-up ----

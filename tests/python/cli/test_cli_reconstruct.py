@@ -30,7 +30,7 @@ INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs",
     "lambda", "lambda_max",
     "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",
-    "findings", "found", "saturated", "glitches", "misfit", "unexplained", "floor",
+    "diagnostics", "found", "saturated", "outliers", "model mismatch", "unexplained", "floor",
     "open_electrodes", "bridged_electrodes", "noisy_electrodes",
 }  # fmt: skip
 SUMMARY = {
@@ -66,7 +66,7 @@ def test_json(engine: str, done: Done, frames_file: Path) -> None:
 def test_what_is_found_is_said(
     done: Done, frames_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A detached electrode in frame 1, a glitch in frame 2: by name in table and JSON; too many
+    """A detached electrode in frame 1, an outlier in frame 2: by name in table and JSON; too many
     rows: refused, by name."""
     frames = load_frames(frames_file)
     spoilt = frames.voltage_v.copy()
@@ -83,8 +83,11 @@ def test_what_is_found_is_said(
         and "electrodes 2, 6 and 10 open" in said.err
     )
     assert listed[1]["info"]["found"][0] == "electrode 5 open" and listed[1]["info"]["masked"] == 52
-    assert listed[2]["info"]["findings"][0] == "glitch" and listed[2]["info"]["glitches"] in (1, 2)
-    assert listed[0]["info"]["masked"] == 0 and set(listed[0]["info"]["findings"]) <= {"crowded"}
+    assert listed[2]["info"]["diagnostics"][0] == "outlier" and listed[2]["info"]["outliers"] in (
+        1,
+        2,
+    )
+    assert listed[0]["info"]["masked"] == 0 and set(listed[0]["info"]["diagnostics"]) <= {"crowded"}
     main(["reconstruct", str(tmp_path / "spoilt.npz"), "--only", "test-s3-1"])
     assert "found: electrode 5 open" in capsys.readouterr().out
 

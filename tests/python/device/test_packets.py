@@ -235,7 +235,7 @@ def test_stats_and_faults_are_read_as_built() -> None:
     c = core.ffi.from_buffer("eits_packet_stats *", bytearray(payload))
     assert (
         c.slots_repeated,
-        c.glitches,
+        c.outliers,
         c.workspace_used,
         c.stage[5].worst_us,
         c.stage[0].count,

@@ -154,10 +154,10 @@ def as_printed(outcome: Outcome) -> tuple[object, ...]:
     info = ":".join(
         [
             info,
-            str(i.findings),
+            str(i.diagnostics),
             str(i.saturated),
-            str(i.glitches),
-            bits(i.misfit),
+            str(i.outliers),
+            bits(i.model_mismatch),
             bits(i.unexplained),
         ]
     )

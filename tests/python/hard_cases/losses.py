@@ -51,7 +51,7 @@ def steps_of(kind: str, level: float) -> list[Step]:
     masked = np.zeros(len(v0), dtype=bool)
     masked[order_of_loss()[: int(level) if kind == "rows left out" else 0]] = True
     options = replace(
-        default_options(small_model()), findings=0
+        default_options(small_model()), diagnostics=0
     )  # linear answers are no sheet's, and rows would be left out
     return [Load(small_blob()), Choose(options), Mask(masked), Tare(quiet), Play(frames)]
 

@@ -32,8 +32,8 @@ def compare(
 
 
 def unnamed(outcomes: list[tuple[Outcome, Outcome]]) -> int:
-    """Spoilt frames that are not said to be a misfit."""
-    return sum("misfit" not in one.info.findings_by_name for _, one in outcomes)
+    """Spoilt frames that are not said to be a model mismatch."""
+    return sum("model mismatch" not in one.info.diagnostics_by_name for _, one in outcomes)
 
 
 def pair(k: int) -> tuple[int, ...]:
@@ -66,7 +66,7 @@ def test_detached(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
 def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Neighbours: both are named, and left out. Others: no row is dead, and the frame is named a
-    misfit."""
+    model_mismatch."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["bridged"])):
         assert (
             one.status == 0
@@ -82,12 +82,12 @@ def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
             "rows",
         )
     for _, one in compare(same_everywhere, lambda k, _: simulated()[k]["bridged apart"]):
-        assert one.status == 0 and "misfit" in one.info.findings_by_name
+        assert one.status == 0 and "model mismatch" in one.info.diagnostics_by_name
 
 
 @pytest.mark.parametrize("which", ["swapped", "swapped apart"])
 def test_swapped(same_everywhere: SameEverywhere, margins: Margins, which: str) -> None:
-    """A misfit, by name."""
+    """A model mismatch, by name."""
     outcomes = compare(same_everywhere, lambda k, _: simulated()[k][which])
     assert all(one.status == 0 for _, one in outcomes)
     margins.everywhere(
@@ -128,8 +128,8 @@ def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> Non
         same_everywhere, lambda k, frame: np.where(ROWS[:, 2] == k % ELECTRODES, -frame, frame)
     )
     for k, (clean, one) in enumerate(outcomes):
-        assert {"electrode noisy", "misfit"} <= set(
-            one.info.findings_by_name
+        assert {"electrode noisy", "model mismatch"} <= set(
+            one.info.diagnostics_by_name
         ) and one.info.noisy_electrodes == pair(k)
         assert one.info.masked == 13
         losses.append(miou(clean.image, k) - miou(one.image, k))
@@ -138,7 +138,7 @@ def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> Non
 
 @pytest.mark.parametrize("by", [1, 3, 13, 65])
 def test_rotated(same_everywhere: SameEverywhere, margins: Margins, by: int) -> None:
-    """All rows in the place of others: a misfit, by name."""
+    """All rows in the place of others: a model mismatch, by name."""
     outcomes = compare(same_everywhere, lambda _, frame: np.roll(frame, by))
     assert all(one.status == 0 for _, one in outcomes)
     margins.everywhere(

@@ -233,7 +233,7 @@ def test_light_presses(same_everywhere: SameEverywhere, margins: Margins) -> Non
 
 def says_that_there_are_too_many(one: Outcome) -> bool:
     """Whether the core says that touches cannot be told apart, or that the frame is no touch's."""
-    return bool({"crowded", "stale reference"} & set(one.info.findings_by_name))
+    return bool({"crowded", "stale reference"} & set(one.info.diagnostics_by_name))
 
 
 def is_one_group(one: Outcome, touches: tuple[Touch, ...]) -> bool:

@@ -70,7 +70,7 @@ def test_common_mode_jump(same_everywhere: SameEverywhere, margins: Margins) -> 
         for j, one in enumerate(jumped):
             assert one.status == 0 and one.info.masked == 0
             losses[k, j] = miou(clean.image, k) - miou(one.image, k)
-            named += abs(JUMPS[j]) > 0.01 and one.info.findings != 0
+            named += abs(JUMPS[j]) > 0.01 and one.info.diagnostics != 0
     for jump, loss in zip(JUMPS, losses.mean(axis=0), strict=True):
         margins.everywhere(
             "frames/common-mode",
@@ -98,8 +98,8 @@ def test_touch_during_tare(same_everywhere: SameEverywhere, margins: Margins) ->
         )
     missed = 0
     for held, lifted in run(same_everywhere, played, options()):
-        assert held.info.findings == 0 and held.touches == ()
-        missed += "stale reference" not in lifted.info.findings_by_name
+        assert held.info.diagnostics == 0 and held.touches == ()
+        missed += "stale reference" not in lifted.info.diagnostics_by_name
     margins.everywhere("frames/touch-during-tare", "lifts that were not named", missed, 0, "frames")
 
 

@@ -16,7 +16,7 @@ from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, Tar
 from margins import Margins
 from small_models import prebuilt
 
-GLITCHES = (0.05, 0.3, 1.0, 5.0)  # of rms(V0)
+OUTLIERS = (0.05, 0.3, 1.0, 5.0)  # of rms(V0)
 CHANNELS, ZERO = -11, -12  # eits_status
 
 
@@ -49,29 +49,29 @@ def damaged(k: int, amplitude: float) -> np.ndarray:
     return frame
 
 
-def test_glitch(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_outlier(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """One row of a full scan off by 5 % of rms(V0) to five times that: left out, counted, and
     hardly seen."""
     played = [
         (
             quiet_frames(k),
-            np.array([noisy(k, simulated()[k]["touched"], 1), *(damaged(k, a) for a in GLITCHES)]),
+            np.array([noisy(k, simulated()[k]["touched"], 1), *(damaged(k, a) for a in OUTLIERS)]),
         )
         for k in range(COUNT)
     ]
-    losses = np.zeros((COUNT, len(GLITCHES)))
+    losses = np.zeros((COUNT, len(OUTLIERS)))
     for k, (clean, *spoilt) in enumerate(run(same_everywhere, played, options())):
-        assert clean.info.glitches == 0 and clean.info.masked == 0
-        for a, (amplitude, one) in enumerate(zip(GLITCHES, spoilt, strict=True)):
+        assert clean.info.outliers == 0 and clean.info.masked == 0
+        for a, (amplitude, one) in enumerate(zip(OUTLIERS, spoilt, strict=True)):
             losses[k, a] = miou(clean.image, k) - miou(one.image, k)
-            assert one.info.glitches == one.info.masked <= 2 and one.info.glitches >= (
+            assert one.info.outliers == one.info.masked <= 2 and one.info.outliers >= (
                 amplitude > 0.05
             )
-    for amplitude, loss in zip(GLITCHES, losses.mean(axis=0), strict=True):
-        margins.everywhere("frames/glitch", f"MIoU lost to {amplitude:g} rms(V0)", loss, 0.02)
+    for amplitude, loss in zip(OUTLIERS, losses.mean(axis=0), strict=True):
+        margins.everywhere("frames/outlier", f"MIoU lost to {amplitude:g} rms(V0)", loss, 0.02)
 
 
-def test_glitch_in_half_scans(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_outlier_in_half_scans(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Without reciprocals only what the other rows contradict can be told: the mean loss is at most
     half of what it would be."""
     found, blind = [], []
@@ -82,14 +82,14 @@ def test_glitch_in_half_scans(same_everywhere: SameEverywhere, margins: Margins)
         )
         for k in range(COUNT)
     ]
-    for chosen, losses in ((options(), found), (options(findings=0), blind)):
+    for chosen, losses in ((options(), found), (options(diagnostics=0), blind)):
         for k, (clean, spoilt) in enumerate(run(same_everywhere, played, chosen)):
             losses.append(miou(clean.image, k) - miou(spoilt.image, k))
     bound = 0.5 * float(np.mean(blind))
-    margins.everywhere("frames/glitch", "MIoU lost in half scans", np.mean(found), bound)
+    margins.everywhere("frames/outlier", "MIoU lost in half scans", np.mean(found), bound)
 
 
-def test_glitch_while_taring(same_everywhere: SameEverywhere, margins: Margins) -> None:
+def test_outlier_in_the_reference(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """One reading of one of 16 quiet frames off by rms(V0) / 2: left out of the reference and of
     its noise."""
     played = []
@@ -101,9 +101,9 @@ def test_glitch_while_taring(same_everywhere: SameEverywhere, margins: Margins) 
     results = run(same_everywhere, played, options())
     for k, ((clean,), (spoilt,)) in enumerate(zip(results[::2], results[1::2], strict=True)):
         off = abs(spoilt.info.lambda_noise - clean.info.lambda_noise) / clean.info.lambda_noise
-        margins.everywhere("frames/glitch-while-taring", "change of lambda_noise", off, 0.3)
+        margins.everywhere("frames/outlier-while-taring", "change of lambda_noise", off, 0.3)
         loss = miou(clean.image, k) - miou(spoilt.image, k)
-        margins.everywhere("frames/glitch-while-taring", "MIoU lost", loss, 0.02)
+        margins.everywhere("frames/outlier-while-taring", "MIoU lost", loss, 0.02)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
@@ -140,19 +140,19 @@ def test_zero_and_denormal(same_everywhere: SameEverywhere) -> None:
         same_everywhere, [(quiet_frames(0), frames)], options()
     )
     for one in (zero, minus):
-        assert one.status == ZERO and not one.image.any() and one.info.findings_by_name == ()
+        assert one.status == ZERO and not one.image.any() and one.info.diagnostics_by_name == ()
     assert tiny.status in (0, ZERO, CHANNELS) and tiny.touches == ()
     assert (again.image == clean.image).all()
 
 
 def test_one_denormal_row(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """A row that fell to 1e-39 V is a glitch like any other."""
+    """A row that fell to 1e-39 V is an outlier like any other."""
     good = noisy(0, simulated()[0]["touched"], 1)
     row = int(np.abs(simulated()[0]["quiet"]).argmax())
     spoilt = good.copy()
     spoilt[row] = 1e-39
     ((clean, one),) = run(same_everywhere, [(quiet_frames(0), np.array([good, spoilt]))], options())
-    assert one.info.glitches in (1, 2)
+    assert one.info.outliers in (1, 2)
     margins.everywhere(
         "frames/zero-and-denormal",
         "MIoU lost to one row",
@@ -171,7 +171,7 @@ def test_saturation_in_touch(same_everywhere: SameEverywhere, margins: Margins) 
     ((clean, one),) = run(
         same_everywhere, [(quiet_frames(0), np.array([good, spoilt]))], options(saturation_v=limit)
     )
-    assert one.info.saturated == one.info.masked == len(rows) and one.info.findings_by_name == (
+    assert one.info.saturated == one.info.masked == len(rows) and one.info.diagnostics_by_name == (
         "saturated",
     )
     margins.everywhere(
@@ -191,17 +191,20 @@ def test_saturation_in_baseline(same_everywhere: SameEverywhere) -> None:
 
 
 def test_clean_frames_are_left_alone(same_everywhere: SameEverywhere, margins: Margins) -> None:
-    """Nothing is found, and the bits are those without any finding."""
+    """Nothing is found, and the bits are those without any diagnostic."""
     played = [(quiet_frames(k), noisy(k, simulated()[k]["touched"], 1)[None]) for k in range(COUNT)]
     quietly = {
-        "findings": options().findings & ~(1 << 7)
+        "diagnostics": options().diagnostics & ~(1 << 7)
     }  # whether a scene is crowded is for test_hard_touches.py
     looked, blind = (
         run(same_everywhere, played, options(**quietly)),
-        run(same_everywhere, played, options(findings=0)),
+        run(same_everywhere, played, options(diagnostics=0)),
     )
     for (one,), (other,) in zip(looked, blind, strict=True):
         margins.everywhere(
-            "frames/clean", "diagnostics and rows left out", one.info.findings + one.info.masked, 0
+            "frames/clean",
+            "diagnostics and rows left out",
+            one.info.diagnostics + one.info.masked,
+            0,
         )
         assert (one.coefficients == other.coefficients).all() and one.touches == other.touches

@@ -72,7 +72,7 @@ def test_a_second_batch_and_no_touches() -> None:
 
 def test_options_masks_and_engines_reach_every_thread() -> None:
     frames, quiet = small().frames(44, 12), small().quiet(42, 8)
-    options = replace(default_options(small_model()), iterations=7, sign="both", findings=0)
+    options = replace(default_options(small_model()), iterations=7, sign="both", diagnostics=0)
     mask = np.zeros(frames.shape[1], dtype=np.bool_)
     mask[:6] = True
     batch = Batch(small_model(), threads=3, options=options)

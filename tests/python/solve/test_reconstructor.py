@@ -190,8 +190,8 @@ def test_saturated_channels_are_left_out(engine: str) -> None:
     limit = 1.5 * float(np.abs(session().quiet_v).max())
     damaged = frame.copy()
     damaged[[3, 50, 171]] = [limit, -limit, 3 * limit]
-    assert reconstructor.reconstruct(damaged).info.glitches == 3
-    reconstructor.with_options(findings=0)
+    assert reconstructor.reconstruct(damaged).info.outliers == 3
+    reconstructor.with_options(diagnostics=0)
     spoilt = reconstructor.reconstruct(damaged)
     assert np.abs(spoilt.image - whole.image).max() > whole.image.max()
     reconstructor.with_options(saturation_v=limit)
@@ -348,7 +348,7 @@ BAD_OPTIONS = [
     ({"max_touches": 17}, "max_touches = 17 is out of range; use 0 to 16"),
     ({"max_masked": -1}, "max_masked"),
     ({"mac_limit": -1}, "mac_limit"),
-    ({"findings": 256}, "findings = 256 is out of range; use 0 to 255"),
+    ({"diagnostics": 256}, "diagnostics = 256 is out of range; use 0 to 255"),
     ({"touch_search": 8}, "touch_search = 8 is out of range; use 0 to 7"),
     ({"touch_search": -1}, "touch_search"),
     ({"refine": 2}, "refine = 2 must be true or false"),

@@ -98,7 +98,7 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
     )
     damaged = s.frames(4, 1)[0]
     damaged[fold.first[lost]] = damaged[fold.second[lost]] = np.nan
-    engine = reference(model, project_baseline=False, findings=0)
+    engine = reference(model, project_baseline=False, diagnostics=0)
     y, basis, masked = engine.frame_stage(damaged)
     known = np.ones(len(fold.first), dtype=bool)
     known[lost] = False
@@ -128,12 +128,12 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
     s, frame = small(), small().frames(4, 1)[0]
     quiet = s.quiet(6, 8, noise=noise)
     engine = reference(
-        small_model(), findings=0
-    )  # of discs this strong some rows count as glitches
+        small_model(), diagnostics=0
+    )  # of discs this strong some rows count as outliers
     learned = engine.set_baseline(quiet)
     floor = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
     settings = BuildSettings(rank=37, floor=floor)
-    other = reference(make_model(s.skin, s.protocol, s.linear, settings), findings=0)
+    other = reference(make_model(s.skin, s.protocol, s.linear, settings), diagnostics=0)
     other.set_baseline(quiet)
     scale = (1 + floor) / 1.01
     y, expected = engine.frame_stage(frame)[0], other.frame_stage(frame)[0]
@@ -155,7 +155,7 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
 @pytest.mark.parametrize("quiet_frames", [1, 8])
 def test_the_floor_stays_where_noise_is_little_or_unknown(quiet_frames: int) -> None:
     s = small()
-    engine = reference(small_model(), findings=0)
+    engine = reference(small_model(), diagnostics=0)
     engine.set_baseline(s.quiet(6, quiet_frames, noise=1.5e-3 if quiet_frames > 1 else 0.1))
     assert engine.reconstruct(s.frames(4, 1)[0]).info.floor == pytest.approx(0.01, rel=1e-4)
     assert engine.seen is small_model().sensitivity

@@ -143,13 +143,13 @@ def test_each_effect_moves_what_physics_says(outcome: Outcome) -> None:
 
 
 def test_the_doctor_names_what_is_broken(outcome: Outcome) -> None:
-    found = {one["name"]: one["findings"] for one in outcome.data["cases"]}
-    for name, finding in (
+    found = {one["name"]: one["diagnostics"] for one in outcome.data["cases"]}
+    for name, diagnostic in (
         ("an electrode off", "dead-electrode"),
         ("two neighbours bridged by 10 ohm", "shorted-electrodes"),
         ("wires of two neighbours exchanged", "swapped-electrodes"),
     ):
-        assert all([finding, "fault"] in session for session in found[name]), name
+        assert all([diagnostic, "fault"] in session for session in found[name]), name
     assert found[INSTRUMENT] == [[], []] and found[IDEAL] == [[]]
 
 

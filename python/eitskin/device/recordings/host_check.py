@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.findings import FINDINGS
+from eitskin.core.diagnostics import DIAGNOSTICS
 from eitskin.core.results import Info, Options, Reconstruction, Touch
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
@@ -136,7 +136,7 @@ class HostTwin:
         assert frame.solved is not None
         same, difference = (
             frame.refused is None
-            and same_findings(result.info, raw, frame.solved, self._core.options),
+            and same_diagnostics(result.info, raw, frame.solved, self._core.options),
             1.0,
         )
         if same and frame.image is not None:
@@ -198,17 +198,21 @@ def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
     return [_numbers(touch) for touch in one] == [_numbers(touch) for touch in other]
 
 
-def same_findings(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
+def same_diagnostics(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
     """Whether this host's core found in a frame what the board says of it. Rows that the converter
     saturated are no numbers to the core: the quality of the raw frame tells them."""
     lost = int(
         np.count_nonzero(raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED)
     )
-    saturated = 1 << FINDINGS.index("saturated") if lost else 0
-    here = info.findings | (saturated & options.findings), info.saturated + lost, info.glitches
+    saturated = 1 << DIAGNOSTICS.index("saturated") if lost else 0
+    here = (
+        info.diagnostics | (saturated & options.diagnostics),
+        info.saturated + lost,
+        info.outliers,
+    )
     electrodes = info.open_electrodes, info.bridged_electrodes, info.noisy_electrodes
     return (here, electrodes) == (
-        (solved.findings, solved.saturated, solved.glitches),
+        (solved.diagnostics, solved.saturated, solved.outliers),
         (solved.open_electrodes, solved.bridged_electrodes, solved.noisy_electrodes),
     )
 

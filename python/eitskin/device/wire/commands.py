@@ -92,8 +92,8 @@ class Scan(Command):
 @dataclass(frozen=True)
 class Solver(Command):
     """Options of the solver; ``sign`` and ``solver`` are their places in ``core.results.SIGNS`` and
-    ``SOLVERS``, ``findings`` what is looked for, bit k of ``FINDINGS``; ``track`` 1: touches are
-    followed in time."""
+    ``SOLVERS``, ``diagnostics`` what is looked for, bit k of ``DIAGNOSTICS``; ``track`` 1: touches
+    are followed in time."""
 
     TYPE = PacketType.SOLVER
     LAYOUT = struct.Struct("<IIIIIffIIII")
@@ -105,7 +105,7 @@ class Solver(Command):
     gap_rel: float
     solver: int
     mac_limit: int
-    findings: int
+    diagnostics: int
     track: int
 
 

@@ -128,8 +128,10 @@ def found_name(fault: Fault) -> str:
             else f"electrode {fault.index} bridged"
         ),
         FaultCode.ELECTRODE_NOISY: f"electrode {fault.index} noisy",
-        FaultCode.MISFIT: (
-            f"misfit {fault.value / 10:.1f} %" if fault.raised and fault.value else "misfit"
+        FaultCode.MODEL_MISMATCH: (
+            f"model mismatch {fault.value / 10:.1f} %"
+            if fault.raised and fault.value
+            else "model mismatch"
         ),
         FaultCode.STALE_REFERENCE: "stale reference",
     }
@@ -141,7 +143,7 @@ _FOUND = {
     FaultCode.SATURATED: "beyond the converter's range; lower the gain or the current",
     FaultCode.BRIDGED: "water, paste or a wire joins them; dry or part them",
     FaultCode.ELECTRODE_NOISY: "a loose contact or wire; press it, or see to its wire",
-    FaultCode.MISFIT: (
+    FaultCode.MODEL_MISMATCH: (
         "no such sheet gives such voltages; check order, signs and wiring (eitskin doctor)"
     ),
     FaultCode.STALE_REFERENCE: (

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.findings import names, words
+from eitskin.core.diagnostics import names, words
 from eitskin.core.results import Touch
 
 LINK_VERSION = 3
@@ -86,18 +86,18 @@ class FaultCode(IntEnum):
     BUS = 10
     BRIDGED = 11
     ELECTRODE_NOISY = 12
-    MISFIT = 13
+    MODEL_MISMATCH = 13
     STALE_REFERENCE = 14
 
 
 # faults that frames show, and that go after CLEAN_FRAMES; of those of an electrode each has its own
 FOUND_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY,
-    FaultCode.MISFIT,
+    FaultCode.MODEL_MISMATCH,
      FaultCode.STALE_REFERENCE)
 )  # fmt: skip
 DOUBTFUL_FAULTS = frozenset(
-    (FaultCode.ELECTRODE_NOISY, FaultCode.MISFIT, FaultCode.STALE_REFERENCE)
+    (FaultCode.ELECTRODE_NOISY, FaultCode.MODEL_MISMATCH, FaultCode.STALE_REFERENCE)
 )  # rise after SHOWN_FRAMES
 ELECTRODE_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY)
@@ -243,7 +243,8 @@ class RawFrame:
 class Solved:
     """eits_packet_solved: what the board's core says of a frame and its solve, and the times.
     ``status`` is 0 or an eits_status (negative), ``stop`` one of ``core.results.STOPS``,
-    ``findings`` as in ``core.findings``; ``saturated`` also counts what the converter tells."""
+    ``diagnostics`` as in ``core.diagnostics``; ``saturated`` also counts what the converter
+    tells."""
 
     frame: int
     time_us: int
@@ -264,18 +265,18 @@ class Solved:
     gap_rel: float
     residual: float
     data_norm: float
-    findings: int = 0
+    diagnostics: int = 0
     saturated: int = 0
-    glitches: int = 0
-    misfit: float = 0.0
+    outliers: int = 0
+    model_mismatch: float = 0.0
     open_electrodes: tuple[int, ...] = ()
     bridged_electrodes: tuple[int, ...] = ()
     noisy_electrodes: tuple[int, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the same names, without the underscore of ``lambda_``; findings by name."""
+        """For JSON: the same names, without the underscore of ``lambda_``; diagnostics by name."""
         values = {key.rstrip("_"): value for key, value in asdict(self).items()}
-        return values | {"findings": list(names(self.findings)), "found": list(words(self))}
+        return values | {"diagnostics": list(names(self.diagnostics)), "found": list(words(self))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,7 +326,7 @@ class BoardStats:
     packets_dropped: int
     deadlines_missed: int
     slots_repeated: int
-    glitches: int
+    outliers: int
     link_packets: int
     link_crc_errors: int
     link_framing_errors: int

@@ -79,7 +79,7 @@ def gallery(lab: Lab, desk: Desk) -> list[Example]:
                 "found": (
                     np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in result.touches]).reshape(-1, 3)
                 ),
-                "said": np.array("crowded" in result.info.findings_by_name),
+                "said": np.array("crowded" in result.info.diagnostics_by_name),
                 "classical_image": method.reconstruct(frame)[0],
                 "classical": read_images(
                     method, frame, trained.threshold, grid.index, grid.centres_mm()

@@ -99,7 +99,7 @@ def solve(model: Model, variant: Variant, measured: Measured) -> list[Seen]:
             [round(t.radius_mm, DIGITS) for t in touches],
             [round(abs(t.strength_s_per_m_mm2), DIGITS) for t in touches],
             [float(f"{t.confidence:.5g}") for t in touches],
-            "crowded" in info.findings_by_name,
+            "crowded" in info.diagnostics_by_name,
             float(f"{info.unexplained:.5g}"),
             float(f"{clear:.5g}"),
             info.macs,

@@ -1,29 +1,29 @@
-"""What was found wrong with a frame, by name and in a few words (csrc/include/eitskin/findings.h,
-docs/reference/diagnostics.md)."""
+"""What was found wrong with a frame, by name and in a few words
+(csrc/include/eitskin/diagnostics.h, docs/reference/diagnostics.md)."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
-# bit k of eits_info.findings, as eits_finding_text names it
-FINDINGS = (
+# bit k of eits_info.diagnostics, as eits_diagnostic_text names it
+DIAGNOSTICS = (
     "saturated",
     "electrode open",
     "electrodes bridged",
-    "glitch",
+    "outlier",
     "electrode noisy",
-    "misfit",
+    "model mismatch",
     "stale reference",
     "crowded",
 )
-ALL_FINDINGS = 2 ** len(FINDINGS) - 1
+ALL_DIAGNOSTICS = 2 ** len(DIAGNOSTICS) - 1
 
 
 class Found(Protocol):
-    """What eits_info says of findings."""
+    """What eits_info says of diagnostics."""
 
     @property
-    def findings(self) -> int:
+    def diagnostics(self) -> int:
         """Bits."""
 
     @property
@@ -31,11 +31,11 @@ class Found(Protocol):
         """Rows."""
 
     @property
-    def glitches(self) -> int:
+    def outliers(self) -> int:
         """Rows left out."""
 
     @property
-    def misfit(self) -> float:
+    def model_mismatch(self) -> float:
         """Share of |d|."""
 
     @property
@@ -51,30 +51,32 @@ class Found(Protocol):
         """From 0."""
 
 
-def names(findings: int) -> tuple[str, ...]:
-    """Those of ``FINDINGS`` whose bits are set."""
-    return tuple(name for bit, name in enumerate(FINDINGS) if findings >> bit & 1)
+def names(diagnostics: int) -> tuple[str, ...]:
+    """Those of ``DIAGNOSTICS`` whose bits are set."""
+    return tuple(name for bit, name in enumerate(DIAGNOSTICS) if diagnostics >> bit & 1)
 
 
 def words(found: Found) -> tuple[str, ...]:
-    """Each finding in a few words: "electrode 5 open", "2 rows left out as glitches"..."""
+    """Each diagnostic in a few words: "electrode 5 open", "2 rows left out as outliers"..."""
     details = {
         "saturated": f"{plural(found.saturated, 'row')} saturated",
         "electrode open": f"{_electrodes(found.open_electrodes)} open",
         "electrodes bridged": f"{_electrodes(found.bridged_electrodes)} bridged",
-        "glitch": (
-            f"{plural(found.glitches, 'row')} left out as"
-            f" {'glitches' if found.glitches > 1 else 'a glitch'}"
+        "outlier": (
+            f"{plural(found.outliers, 'row')} left out as"
+            f" {'outliers' if found.outliers > 1 else 'an outlier'}"
         ),
         "electrode noisy": f"{_electrodes(found.noisy_electrodes)} noisy",
-        "misfit": f"misfit {100 * found.misfit:.1f} %" if found.misfit > 0 else "misfit",
+        "model mismatch": f"model mismatch {100 * found.model_mismatch:.1f} %"
+        if found.model_mismatch > 0
+        else "model mismatch",
         "stale reference": "stale reference: tare again",
         "crowded": "crowded: more touches than can be told apart",
     }
-    return tuple(details[name] for name in names(found.findings))
+    return tuple(details[name] for name in names(found.diagnostics))
 
 
-def with_findings(text: str, found: Found) -> str:
+def with_diagnostics(text: str, found: Found) -> str:
     """``text``, why a frame is refused, and what was found wrong with it."""
     return "; ".join((text, *words(found)))
 

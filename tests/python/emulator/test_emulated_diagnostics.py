@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.core.findings import names
+from eitskin.core.diagnostics import names
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.live import LiveFrame, put_together
@@ -63,7 +63,7 @@ def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
     for frame in seen:
         if frame.number in whole:
             assert frame.solved is not None
-            assert names(frame.solved.findings) == ("electrode open",)
+            assert names(frame.solved.diagnostics) == ("electrode open",)
             assert frame.solved.masked == uses.sum()
             assert frame.raw is not None
             assert np.isfinite(frame.raw.voltage_v).all()
@@ -119,11 +119,13 @@ def test_a_reading_that_is_off_is_left_out_and_counted(image: bytes) -> None:
     board.adc.sample = spoil  # type: ignore[assignment]
     frames, faults = taken(device, 5)
     assert spoiled
-    rows = [frame.solved.glitches for frame in frames if frame.solved is not None]
+    rows = [frame.solved.outliers for frame in frames if frame.solved is not None]
     assert sorted(rows)[:-1] == [0, 0, 0, 0]
     assert 1 <= max(rows) <= 2
     assert [
-        names(frame.solved.findings) for frame in frames if frame.solved and frame.solved.glitches
-    ] == [("glitch",)]
-    assert device.stats().glitches == max(rows)
+        names(frame.solved.diagnostics)
+        for frame in frames
+        if frame.solved and frame.solved.outliers
+    ] == [("outlier",)]
+    assert device.stats().outliers == max(rows)
     assert not faults

@@ -1,10 +1,10 @@
-"""The results of ``eitskin bench findings`` as text, and for docs/results/diagnostics.md."""
+"""The results of ``eitskin bench diagnostics`` as text, and for docs/results/diagnostics.md."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from eitskin_studies.benchmarks.findings import (
+from eitskin_studies.benchmarks.diagnostics import (
     BETWEEN_DB,
     HEADLINE_DB,
     SNRS_DB,
@@ -13,7 +13,7 @@ from eitskin_studies.benchmarks.findings import (
     Mean,
     Rate,
 )
-from eitskin_studies.benchmarks.findings_faults import DETACHED, FAULTS, NONE
+from eitskin_studies.benchmarks.diagnostics_faults import DETACHED, FAULTS, NONE
 from eitskin_studies.harness.sections import Filling, text_table
 
 SNR_WORDS = tuple(f"{snr:g} dB" for snr in SNRS_DB)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from eitskin.core.results import Info
 from eitskin.scene.streams import stream
-from eitskin_studies.benchmarks.findings_scenes import PROTOCOL, ROLE, ROWS, Case
+from eitskin_studies.benchmarks.diagnostics_scenes import PROTOCOL, ROLE, ROWS, Case
 
 FloatArray = npt.NDArray[np.float64]
 Spoil = Callable[[Case, FloatArray], FloatArray]
@@ -46,7 +46,7 @@ def _solved(name: str) -> Spoil:
 
 
 def _says(*names: str) -> Callable[[Case, Info], bool]:
-    return lambda _, info: any(name in info.findings_by_name for name in names)
+    return lambda _, info: any(name in info.diagnostics_by_name for name in names)
 
 
 def _pair(case: Case) -> tuple[int, ...]:
@@ -86,11 +86,11 @@ def _shifted(by: int) -> Spoil:
     return lambda _, values: np.roll(values, by)
 
 
-def _glitch(size: float, rows: npt.NDArray[np.int64]) -> Spoil:
+def _outlier(size: float, rows: npt.NDArray[np.int64]) -> Spoil:
     """One reading of ``rows`` off, up or down; the same row for each size."""
 
     def spoil(case: Case, values: FloatArray) -> FloatArray:
-        generator, spoilt = stream(case.seed, f"{ROLE} glitch", case.number), values.copy()
+        generator, spoilt = stream(case.seed, f"{ROLE} outlier", case.number), values.copy()
         spoilt[generator.choice(rows)] += size * case.rms_v * generator.choice((-1, 1))
         return spoilt
 
@@ -109,10 +109,10 @@ EVERY, MEASURED = (
     np.arange(len(ROWS)),
     PROTOCOL.reciprocal_pairs().first,
 )  # rows of a full and of a half scan
-GLITCHES = (0.05, 0.1, 0.15, 0.3, 5.0)  # of rms(V0)
+OUTLIERS = (0.05, 0.1, 0.15, 0.3, 5.0)  # of rms(V0)
 JUMPS = (-0.05, -0.01, 0.01, 0.05)
 GAINS = (0.8, 0.95, 0.99, 1.01, 1.05, 1.2)
-NONE, DETACHED, GLITCH = "none", "an electrode detached", "one row off by {:g} rms(V0)"
+NONE, DETACHED, OUTLIER = "none", "an electrode detached", "one row off by {:g} rms(V0)"
 HALF = ", half scan"
 
 FAULTS: tuple[Fault, ...] = (
@@ -120,27 +120,43 @@ FAULTS: tuple[Fault, ...] = (
     Fault("none" + HALF, None, half=True),
     Fault(DETACHED, _open, _solved("detached")),
     Fault("neighbours bridged by 10 ohm", _bridged, _solved("bridged")),
-    Fault("electrodes 3 apart bridged by 10 ohm", _says("misfit"), _solved("bridged apart")),
-    Fault("neighbours swapped", _says("misfit"), _solved("swapped")),
-    Fault("electrodes 5 apart swapped", _says("misfit"), _solved("swapped apart")),
+    Fault(
+        "electrodes 3 apart bridged by 10 ohm", _says("model mismatch"), _solved("bridged apart")
+    ),
+    Fault("neighbours swapped", _says("model mismatch"), _solved("swapped")),
+    Fault("electrodes 5 apart swapped", _says("model mismatch"), _solved("swapped apart")),
     *(
-        Fault(f"frame shifted by {n} row{'s' * (n > 1)}", _says("misfit"), readings=_shifted(n))
+        Fault(
+            f"frame shifted by {n} row{'s' * (n > 1)}",
+            _says("model mismatch"),
+            readings=_shifted(n),
+        )
         for n in (1, 13)
     ),
-    Fault("frame shifted by 13 rows" + HALF, _says("misfit"), readings=_shifted(13), half=True),
+    Fault(
+        "frame shifted by 13 rows" + HALF, _says("model mismatch"), readings=_shifted(13), half=True
+    ),
     Fault("a channel's polarity flipped", _channel, _channel_times(-1.0)),
-    Fault("a channel's polarity flipped" + HALF, _says("misfit"), _channel_times(-1.0), half=True),
+    Fault(
+        "a channel's polarity flipped" + HALF,
+        _says("model mismatch"),
+        _channel_times(-1.0),
+        half=True,
+    ),
     Fault("a channel's gain off by 10 %", _channel, _channel_times(1.1)),
     Fault("an electrode's readings off by 20 % at random", _noisy, _rubs),
     *(
-        Fault(GLITCH.format(size), _says("glitch"), readings=_glitch(size, EVERY))
-        for size in GLITCHES
+        Fault(OUTLIER.format(size), _says("outlier"), readings=_outlier(size, EVERY))
+        for size in OUTLIERS
     ),
     *(
         Fault(
-            GLITCH.format(size) + HALF, _says("glitch"), readings=_glitch(size, MEASURED), half=True
+            OUTLIER.format(size) + HALF,
+            _says("outlier"),
+            readings=_outlier(size, MEASURED),
+            half=True,
         )
-        for size in GLITCHES
+        for size in OUTLIERS
     ),
     Fault(
         "touch during the tare, then lifted",

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from device_helpers import QUIET, Damaging, empty_bank, same, scene, sim_device
 
-from eitskin.core.findings import ALL_FINDINGS, FINDINGS
+from eitskin.core.diagnostics import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
@@ -115,11 +115,13 @@ def test_it_is_told_though_nobody_wants_images() -> None:
 def test_what_is_not_looked_for_is_not_found() -> None:
     with sim_device(board()) as device:
         device.tare(QUIET)
-        open_bit = 1 << FINDINGS.index("electrode open")
-        device.solver(replace(board_options(prebuilt()[0]), findings=ALL_FINDINGS & ~open_bit))
+        open_bit = 1 << DIAGNOSTICS.index("electrode open")
+        device.solver(
+            replace(board_options(prebuilt()[0]), diagnostics=ALL_DIAGNOSTICS & ~open_bit)
+        )
         device.start_scene()
         items = list(device.stream(Stream.TOUCHES))
-    assert not any(head.open_electrodes or head.findings & open_bit for head in heads(items))
+    assert not any(head.open_electrodes or head.diagnostics & open_bit for head in heads(items))
     assert FaultCode.ELECTRODE_OPEN not in {fault[0] for fault in faults(items)}
 
 
@@ -193,29 +195,29 @@ def solved(frame: int, **found: object) -> LiveFrame:
 
 
 def bits(*names: str) -> int:
-    return sum(1 << FINDINGS.index(name) for name in names)
+    return sum(1 << DIAGNOSTICS.index(name) for name in names)
 
 
 def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
     news = News()
-    glitch = {"findings": bits("glitch"), "glitches": 1}
+    outlier = {"diagnostics": bits("outlier"), "outliers": 1}
     assert news.lines(solved(1)) == []
-    assert news.lines(solved(2, **glitch)) == ["1 row left out as a glitch, frame 2"]
-    assert news.lines(solved(3, **glitch)) == []
+    assert news.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
+    assert news.lines(solved(3, **outlier)) == []
     assert [news.lines(solved(4 + k)) for k in range(CLEAN_FRAMES - 1)] == [[]] * (CLEAN_FRAMES - 1)
-    assert news.lines(solved(20, **glitch)) == []  # it came back in time
+    assert news.lines(solved(20, **outlier)) == []  # it came back in time
     said = [news.lines(solved(21 + k)) for k in range(CLEAN_FRAMES)]
-    assert said == [[]] * (CLEAN_FRAMES - 1) + [[f"glitch: over, frame {20 + CLEAN_FRAMES}"]]
+    assert said == [[]] * (CLEAN_FRAMES - 1) + [[f"outlier: over, frame {20 + CLEAN_FRAMES}"]]
 
 
 def test_what_fault_and_head_tell_is_said_once() -> None:
-    news, off = News(), {"findings": bits("electrode open"), "open_electrodes": (5,)}
+    news, off = News(), {"diagnostics": bits("electrode open"), "open_electrodes": (5,)}
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
     assert news.lines(rise) == [
         "electrode 5 open, frame 41: it makes no contact; wet or press it, then tare"
     ]
     assert news.lines(solved(41, **off)) == []
-    also = {"findings": bits("electrode open"), "open_electrodes": (5, 9)}
+    also = {"diagnostics": bits("electrode open"), "open_electrodes": (5, 9)}
     assert news.lines(solved(42, **also)) == ["electrode 9 open, frame 42"]  # its fault was lost
     assert news.lines(replace(rise, frame=42, index=9)) == []
     assert news.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == [
@@ -232,7 +234,8 @@ def test_a_bridged_pair_is_said_once() -> None:
     assert news.lines(Fault(FaultCode.BRIDGED, True, 3, 6, 7, (0xC0, 0, 0, 0, 0))) == [text]
     assert news.lines(Fault(FaultCode.BRIDGED, True, 3, 7, 6, (0xC0, 0, 0, 0, 0))) == []
     assert (
-        news.lines(solved(3, findings=bits("electrodes bridged"), bridged_electrodes=(6, 7))) == []
+        news.lines(solved(3, diagnostics=bits("electrodes bridged"), bridged_electrodes=(6, 7)))
+        == []
     )
     over = [line for e in (6, 7) for line in news.lines(Fault(FaultCode.BRIDGED, False, 11, e, 0))]
     assert over == ["electrode 6 bridged: over, frame 11", "electrode 7 bridged: over, frame 11"]
@@ -244,8 +247,8 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
         assert ", frame 17: " in text
         assert fault_text(Fault(code, False, 18, 3, 0)).endswith(": over, frame 18")
     assert fault_text(Fault(99, True, 17, 3, 2)) == "fault 99, frame 17: value 2"
-    assert fault_text(Fault(FaultCode.MISFIT, True, 1, 0, 123)).startswith(
-        "misfit 12.3 %, frame 1: "
+    assert fault_text(Fault(FaultCode.MODEL_MISMATCH, True, 1, 0, 123)).startswith(
+        "model mismatch 12.3 %, frame 1: "
     )
     assert fault_text(Fault(FaultCode.BRIDGED, True, 1, 4, -1)).startswith(
         "electrode 4 bridged, frame 1: "
@@ -253,9 +256,9 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:
-    news, misfit = News(), {"findings": bits("misfit"), "misfit": 0.125}
+    news, model_mismatch = News(), {"diagnostics": bits("model mismatch"), "model mismatch": 0.125}
     told = [
-        news.lines(solved(frame, **(misfit if frame in (2, 3, 7, 8, 9, 10) else {})))
+        news.lines(solved(frame, **(model_mismatch if frame in (2, 3, 7, 8, 9, 10) else {})))
         for frame in range(1, 12)
     ]
-    assert told == [[]] * 8 + [["misfit 12.5 %, frame 9"], [], []]
+    assert told == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]

@@ -1,7 +1,7 @@
 /* A small skin with quiet frames, and what its rows use: for tests of what is found wrong with a
  * frame. */
-#ifndef EITSKIN_TEST_FINDINGS_BENCH_H
-#define EITSKIN_TEST_FINDINGS_BENCH_H
+#ifndef EITSKIN_TEST_SPOILED_FRAME_H
+#define EITSKIN_TEST_SPOILED_FRAME_H
 
 #include "check.h"
 #include "small_model.h"
@@ -73,10 +73,10 @@ static inline int row_crosses(const eits_context *ctx, uint32_t i, uint32_t e, u
            (row[2] == e && row[3] == f) || (row[2] == f && row[3] == e);
 }
 
-static inline void look_for(eits_context *ctx, uint32_t findings)
+static inline void look_for(eits_context *ctx, uint32_t diagnostics)
 {
     eits_options o = ctx->options;
-    o.findings = findings;
+    o.diagnostics = diagnostics;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }

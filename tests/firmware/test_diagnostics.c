@@ -74,7 +74,7 @@ static void test_bridged(void)
     CHECK(host_fault(&b.host, EITS_FAULT_BRIDGED, true, 2) == NULL);
     const eits_packet_solved *head = head_of(host_last(&b.host, EITS_PACKET_TOUCHES));
     CHECK_EQUAL(head->bridged_electrodes, 0xC0);
-    CHECK_EQUAL(head->findings & EITS_FINDING_BRIDGED, EITS_FINDING_BRIDGED);
+    CHECK_EQUAL(head->diagnostics & EITS_DIAGNOSTIC_BRIDGED, EITS_DIAGNOSTIC_BRIDGED);
     CHECK_EQUAL(host_info(&b.host).faults >> EITS_FAULT_BRIDGED & 1u, 1);
     b.board.volts = bench_sheet;
     host_run(&b.host, 300);
@@ -91,11 +91,11 @@ static double one_row_off(void *user, const uint8_t e[4], uint64_t at_ns)
     return sheet_volts(user, e) + (e[0] == 2 && e[2] == 9 ? 0.02 : 0);
 }
 
-static void test_glitch(void)
+static void test_outlier(void)
 {
     start();
     host_run(&b.host, 50);
-    const uint32_t before = host_stats(&b.host, 0).glitches;
+    const uint32_t before = host_stats(&b.host, 0).outliers;
     host_forget(&b.host);
     b.board.volts = one_row_off;
     host_run(&b.host, 24);
@@ -105,13 +105,13 @@ static void test_glitch(void)
     for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_TOUCHES); ++k) {
         const eits_packet_solved *head = head_of(host_packet_of(&b.host, EITS_PACKET_TOUCHES, k));
         /* noise that passed for a touch may be said to be a guess */
-        const uint32_t crowded = EITS_FINDING_CROWDED;
-        CHECK_EQUAL(head->findings & ~crowded, head->glitches > 0 ? EITS_FINDING_GLITCH : 0);
-        CHECK(head->glitches <= 2 && head->masked == head->glitches);
-        rows += head->glitches;
+        const uint32_t crowded = EITS_DIAGNOSTIC_CROWDED;
+        CHECK_EQUAL(head->diagnostics & ~crowded, head->outliers > 0 ? EITS_DIAGNOSTIC_OUTLIER : 0);
+        CHECK(head->outliers <= 2 && head->masked == head->outliers);
+        rows += head->outliers;
     }
     CHECK(rows >= 1);
-    CHECK_EQUAL(host_stats(&b.host, 0).glitches - before, rows);
+    CHECK_EQUAL(host_stats(&b.host, 0).outliers - before, rows);
     CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FAULT), 0);
     bench_stop(&b);
 }
@@ -126,8 +126,8 @@ static void test_switched_off(void)
                                   .lambda_rel = o->lambda_rel,
                                   .gap_rel = o->gap_rel,
                                   .solver = o->solver,
-                                  .findings =
-                                      EITS_FINDINGS_ALL & ~(uint32_t)EITS_FINDING_ELECTRODE_OPEN};
+                                  .diagnostics = EITS_DIAGNOSTICS_ALL &
+                                                 ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN};
     CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SOLVER, &solver, sizeof solver).status,
                 EITS_REPLY_OK);
     b.sheet.detached[5] = true;
@@ -143,7 +143,7 @@ int main(void)
     test_open_while_nobody_looks(0);
     test_open_while_nobody_looks(5);
     test_bridged();
-    test_glitch();
+    test_outlier();
     test_switched_off();
     return checks_report("found");
 }

@@ -28,13 +28,13 @@ from eitskin_studies.harness.sessions import converter_for
 
 FloatArray = npt.NDArray[np.float64]
 
-ROLE = "findings"
+ROLE = "findings"  # keys the seeds of recorded results
 ELECTRODES, QUIET_FRAMES, RATE_HZ, BRIDGE_OHM = 16, 16, 20.0, 10.0
 PROTOCOL = adjacent(ELECTRODES)
 ROWS = PROTOCOL.drive_measure.astype(np.int64)
 CONTACTS: dict[str, Any] = {"contact_impedance": {"spread": 0.2}}
 
-# effects that no finding is about, one at a time, beside contacts, noise of 60 dB
+# effects that no diagnostic is about, one at a time, beside contacts, noise of 60 dB
 IMPERFECT: dict[str, dict[str, Any]] = {
     "converter of 12 bits": {"adc": {"bits": 12, "headroom": 1.25}},
     "channel gains of 1 %": {"channel_gain": {"spread": 0.01}},

@@ -1,4 +1,4 @@
-"""``eitskin bench findings``: what is counted agrees with the frames, and the page says what the
+"""``eitskin bench diagnostics``: what is counted agrees with the frames, and the page says what the
 command wrote."""
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ pytest.importorskip("netgen")
 from eitskin.cli.main import main
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.benchmarks import findings as bench_findings
-from eitskin_studies.benchmarks.findings_faults import DETACHED, FAULTS, GLITCH, NONE
-from eitskin_studies.benchmarks.findings_scenes import (
+from eitskin_studies.benchmarks import diagnostics as bench_diagnostics
+from eitskin_studies.benchmarks.diagnostics_faults import DETACHED, FAULTS, NONE, OUTLIER
+from eitskin_studies.benchmarks.diagnostics_scenes import (
     IMPERFECT,
     QUIET_FRAMES,
     ROWS,
@@ -34,7 +34,7 @@ FIRST_CELL = re.compile(r"^\| ([^|]+) \|", re.MULTILINE)
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("findings") / "page.md"
+    path = tmp_path_factory.mktemp("diagnostics") / "page.md"
     path.write_text(PAGE.read_text())
     return path
 
@@ -46,7 +46,7 @@ def result(page: Path) -> dict[str, list[dict[str, object]]]:
     with pytest.MonkeyPatch.context() as patch:
         shown: list[str] = []
         patch.setattr("builtins.print", lambda text: shown.append(text))
-        assert main(["bench", "findings", *sizes.split(), "--json", "--page", str(page)]) == 0
+        assert main(["bench", "diagnostics", *sizes.split(), "--json", "--page", str(page)]) == 0
     whole: dict[str, list[dict[str, object]]] = json.loads("".join(shown))
     return whole
 
@@ -74,7 +74,7 @@ def test_what_is_certain_is_counted(result: dict[str, list[dict[str, object]]]) 
         DETACHED,
         "neighbours bridged by 10 ohm",
         "neighbours swapped",
-        GLITCH.format(0.3),
+        OUTLIER.format(0.3),
         lifted,
     ):
         assert rate(result, fault)["named"] == 1.0 and rate(result, fault)["refused"] == 0
@@ -83,10 +83,10 @@ def test_what_is_certain_is_counted(result: dict[str, list[dict[str, object]]]) 
         assert clean["named"] is None and clean["other"] == 0.0 and lost(clean) == 0.0
     assert lost(rate(result, DETACHED)) < 0.2 < lost(rate(result, DETACHED), "lost_blind")
     assert (
-        lost(rate(result, GLITCH.format(5.0)))
+        lost(rate(result, OUTLIER.format(5.0)))
         < 0.02
         < 0.2
-        < lost(rate(result, GLITCH.format(5.0)), "lost_blind")
+        < lost(rate(result, OUTLIER.format(5.0)), "lost_blind")
     )
     assert abs(lost(rate(result, "gain off by +20 %", 80.0), "peak_lost")) < 0.02
     assert [one["touches"] for one in result["crowds"]] == [
@@ -117,8 +117,8 @@ def test_wires_exchanged_twice_are_right_again() -> None:
 
 
 def test_intervals() -> None:
-    mean = bench_findings.mean_of([*[0.0] * 10, *[1.0] * 10])
-    assert mean is not None and bench_findings.mean_of([]) is None
+    mean = bench_diagnostics.mean_of([*[0.0] * 10, *[1.0] * 10])
+    assert mean is not None and bench_diagnostics.mean_of([]) is None
     assert mean.mean == 0.5 and mean.worst_tenth == 1.0
     assert mean.half_95 == pytest.approx(1.96 * np.sqrt(0.25 * 20 / 19 / 20))
 
@@ -128,7 +128,7 @@ def test_the_page_is_filled_and_has_its_rows(
 ) -> None:
     """The fixture's page is a copy of ours; what no command writes stays."""
     written, ours = page.read_text(), PAGE.read_text()
-    assert "`eitskin bench findings --scenes 4 " in written
+    assert "`eitskin bench diagnostics --scenes 4 " in written
     assert "--scenes 640 --crowds 24 --imperfect 40 --seed 4001" in ours  # nothing was chosen on it
     assert written.split("<!-- run -->")[0] == ours.split("<!-- run -->")[0]
     assert written.rsplit("<!-- end", 1)[1] == ours.rsplit("<!-- end", 1)[1]
@@ -139,4 +139,4 @@ def test_the_page_is_filled_and_has_its_rows(
 
 def test_sizes_out_of_range_are_refused() -> None:
     for arguments in ("--scenes 1", "--crowds 0", "--imperfect 0", "--seed -1"):
-        assert main(["bench", "findings", *arguments.split()]) == 2
+        assert main(["bench", "diagnostics", *arguments.split()]) == 2

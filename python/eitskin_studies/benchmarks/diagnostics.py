@@ -1,5 +1,5 @@
 """How often what is wrong with a frame is called by its name, and what it costs the image, with the
-findings and without.
+diagnostics and without.
 
 Every frame is compared with the same one without the fault: same scene, contacts, noise and
 reference. Rules and thresholds were chosen under other seeds (docs/reference/diagnostics.md).
@@ -23,8 +23,8 @@ from eitskin.scoring import metrics
 from eitskin.scoring.score import scorer_for
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.benchmarks.findings_faults import CROWDED, DETACHED, FAULTS, NONE, Fault
-from eitskin_studies.benchmarks.findings_scenes import (
+from eitskin_studies.benchmarks.diagnostics_faults import CROWDED, DETACHED, FAULTS, NONE, Fault
+from eitskin_studies.benchmarks.diagnostics_scenes import (
     IMPERFECT,
     PROTOCOL,
     QUIET_FRAMES,
@@ -61,8 +61,8 @@ class Rate:
     ``named``: share called by its name; ``other``: share about which anything but "crowded" was
         said; ``crowded``; ``miou``: mean
     of the spoilt frames' images. ``lost``: image MIoU lost; ``lost_discs``: that of the touches as
-    discs; ``lost_blind``: with the findings off, at 60 dB; ``peak_lost``: share of the peak, gain
-    apart.
+    discs; ``lost_blind``: with the diagnostics off, at 60 dB; ``peak_lost``: share of the peak,
+    gain apart.
     """
 
     fault: str
@@ -131,10 +131,10 @@ class _Seen:
     peak: float
 
     def says_other(self) -> bool:
-        return self.info is not None and bool(set(self.info.findings_by_name) - {CROWDED})
+        return self.info is not None and bool(set(self.info.diagnostics_by_name) - {CROWDED})
 
     def says_crowded(self) -> bool:
-        return self.info is not None and CROWDED in self.info.findings_by_name
+        return self.info is not None and CROWDED in self.info.diagnostics_by_name
 
 
 class _Eye:
@@ -143,7 +143,7 @@ class _Eye:
     def __init__(self) -> None:
         model, blob = load_prebuilt()
         self._solver = Reconstructor(model, blob=blob)
-        self._all = self._solver.options.findings
+        self._all = self._solver.options.diagnostics
         self._judge, self._threshold = scorer_for(model).judge, model.defaults.mask_threshold
         self._points = self._judge.raster.points_mm
 
@@ -151,12 +151,12 @@ class _Eye:
         return metrics.disc_mask(self._points, scene.centres_mm(), scene.radii_mm())
 
     def tare(self, quiet_v: FloatArray) -> None:
-        self._solver.with_options(findings=self._all)
+        self._solver.with_options(diagnostics=self._all)
         self._solver.tare(quiet_v)
 
     def look(self, frame_v: FloatArray, blind: bool = False) -> Reconstruction | None:
         """None where the frame is refused."""
-        self._solver.with_options(findings=0 if blind else self._all)
+        self._solver.with_options(diagnostics=0 if blind else self._all)
         self._solver.forget()
         try:
             return self._solver.reconstruct(frame_v)
@@ -314,7 +314,7 @@ def crowds(
                 result = eye.look(_frames(case, FAULTS[0], snr_db))
                 if result is not None:
                     right[k] = len(result.touches) == count
-                    said[k] = CROWDED in result.info.findings_by_name
+                    said[k] = CROWDED in result.info.diagnostics_by_name
             found.append(
                 Crowd(
                     count,
@@ -342,7 +342,9 @@ def imperfect(
                 shown = copied(volts, PROTOCOL) if half else volts
                 eye.tare(shown[:QUIET_FRAMES])
                 result = eye.look(shown[QUIET_FRAMES])
-                said[half] += result is None or bool(set(result.info.findings_by_name) - {CROWDED})
+                said[half] += result is None or bool(
+                    set(result.info.diagnostics_by_name) - {CROWDED}
+                )
         found.append(Imperfect(effect, frames, said[False], said[True]))
     return tuple(found)
 
