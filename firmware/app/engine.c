@@ -133,9 +133,9 @@ void fw_engine_examine(fw_engine *engine, const float *volts)
 void fw_engine_keep(fw_engine *engine)
 {
     fw_kept *kept = &engine->kept;
-    memcpy(kept->v0, engine->ctx.baseline.v0, engine->model.n_rows * sizeof(float));
+    memcpy(kept->v0, engine->ctx.reference.v0, engine->model.n_rows * sizeof(float));
     memcpy(kept->bad, engine->ctx.bad, engine->model.n_rows);
-    kept->baseline = engine->ctx.baseline;
+    kept->reference = engine->ctx.reference;
     kept->options = engine->ctx.options;
     kept->next_id = engine->ctx.next_id;
     kept->cosine = engine->cosine;
@@ -147,10 +147,10 @@ void fw_engine_keep(fw_engine *engine)
 void fw_engine_restore(fw_engine *engine)
 {
     const fw_kept *kept = &engine->kept;
-    float *m2 = engine->ctx.baseline.m2, *v0 = engine->ctx.baseline.v0;
-    engine->ctx.baseline = kept->baseline;
-    engine->ctx.baseline.v0 = v0;
-    engine->ctx.baseline.m2 = m2;
+    float *m2 = engine->ctx.reference.m2, *v0 = engine->ctx.reference.v0;
+    engine->ctx.reference = kept->reference;
+    engine->ctx.reference.v0 = v0;
+    engine->ctx.reference.m2 = m2;
     engine->ctx.options = kept->options;
     memcpy(v0, kept->v0, engine->model.n_rows * sizeof(float));
     memcpy(engine->ctx.bad, kept->bad, engine->model.n_rows);

@@ -7,10 +7,10 @@
 #include "eitskin/eitskin.h"
 #include "hal/hal.h"
 
-/* What a baseline and its settings are, apart from the context: to go back to when a tare or a
+/* What a reference and its settings are, apart from the context: to go back to when a tare or a
  * self-test fails. */
 typedef struct fw_kept {
-    eits_baseline baseline;
+    eits_reference reference;
     eits_options options;
     uint32_t next_id; /* of touches: ids are not used twice */
     float *v0;        /* n_rows */
@@ -53,7 +53,7 @@ fw_scan_table fw_engine_table(const fw_engine *engine);
  * frames that are solved get the bits that they would have got without it. */
 void fw_engine_examine(fw_engine *engine, const float *volts);
 
-/* Keep baseline, options, masks and angle; restore puts them back, the warm start forgotten. */
+/* Keep reference, options, masks and angle; restore puts them back, the warm start forgotten. */
 void fw_engine_keep(fw_engine *engine);
 void fw_engine_restore(fw_engine *engine);
 

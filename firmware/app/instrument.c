@@ -51,7 +51,7 @@ void fw_start_scan(fw_instrument *instrument)
     if (status != FW_OK && !bus) /* a frame takes the fault back */
         fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true, detail);
     if (status != FW_OK)
-        fw_fail_tare(instrument, EITS_E_BASELINE_SHORT);
+        fw_fail_tare(instrument, EITS_E_REFERENCE_SHORT);
 }
 
 void fw_fail_tare(fw_instrument *instrument, eits_status why)
@@ -71,7 +71,7 @@ static void watch_scan(fw_instrument *instrument)
     if (fw_scan_stalled(&instrument->scan, now_us)) {
         fw_fault_set(&instrument->faults, EITS_FAULT_SCAN_STALLED, true,
                      (fw_fault_detail){.frame = instrument->last_frame});
-        fw_fail_tare(instrument, EITS_E_BASELINE_SHORT);
+        fw_fail_tare(instrument, EITS_E_REFERENCE_SHORT);
         fw_start_scan(instrument);
     } else if (wanted && !instrument->scan.running && now_us - instrument->tried_us > FW_RETRY_US) {
         fw_start_scan(instrument);

@@ -66,7 +66,7 @@ static void take_tare(fw_instrument *instrument, const fw_frame *frame)
     eits_status status = EITS_OK;
     const fw_tare_step step = fw_tare_add(&instrument->tare, &instrument->engine, frame, &status);
     if (step == FW_TARE_TAKEN || step == FW_TARE_DONE)
-        send_raw(instrument, frame, EITS_RAW_QUIET);
+        send_raw(instrument, frame, EITS_RAW_REFERENCE);
     if (step == FW_TARE_DONE) {
         fw_fault_set(&instrument->faults, EITS_FAULT_STALE_REFERENCE, false,
                      (fw_fault_detail){.frame = frame->number});
@@ -179,20 +179,20 @@ void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
 {
     fw_engine *engine = &instrument->engine;
     fw_stream *stream = &instrument->stream;
-    const bool quiet = fw_tare_wants(&instrument->tare, frame);
+    const bool untouched = fw_tare_wants(&instrument->tare, frame);
     const bool solved =
         engine->tared && (stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0;
     fw_judgement judged;
     instrument->last_frame = frame->number;
     fw_quality_prepare(engine, frame);
-    if (quiet ? fw_tare_first(&instrument->tare) : !engine->angle_known)
+    if (untouched ? fw_tare_first(&instrument->tare) : !engine->angle_known)
         fw_angle_learn(engine, frame);
     fw_angle_apply(engine, frame);
-    fw_quality_judge(engine, frame, quiet || !engine->tared, &judged);
+    fw_quality_judge(engine, frame, untouched || !engine->tared, &judged);
     tell_scan(instrument, frame, &judged);
     fw_stats_add(&instrument->stats, EITS_STAGE_SCAN, frame->scan_us);
     fw_stats_add(&instrument->stats, EITS_STAGE_DEMODULATE, frame->busy_us);
-    if (quiet) {
+    if (untouched) {
         fw_diagnostics_open(&instrument->faults, frame->number, judged.open);
         take_tare(instrument, frame);
         return;

@@ -29,12 +29,12 @@ static eits_status add(fw_tare *tare, fw_engine *engine, const fw_frame *frame)
     eits_context *ctx = &engine->ctx;
     const uint32_t rows = engine->model.n_rows;
     if (tare->wanted == 1)
-        return eits_baseline_set(ctx, frame->volts, rows);
-    eits_status status = tare->taken == 0 ? eits_baseline_begin(ctx, tare->wanted) : EITS_OK;
+        return eits_reference_set(ctx, frame->volts, rows);
+    eits_status status = tare->taken == 0 ? eits_reference_begin(ctx, tare->wanted) : EITS_OK;
     if (status == EITS_OK)
-        status = eits_baseline_add(ctx, frame->volts, rows);
+        status = eits_reference_add(ctx, frame->volts, rows);
     if (status == EITS_OK && tare->taken + 1 == tare->wanted)
-        status = eits_baseline_finish(ctx);
+        status = eits_reference_finish(ctx);
     return status;
 }
 

@@ -1,5 +1,5 @@
-/* Learning the reference from quiet frames. Until it is done, the last reference stays; should it
- * fail, it comes back. */
+/* Learning the reference from reference frames. Until it is done, the last reference stays; should
+ * it fail, it comes back. */
 #ifndef FW_TARE_H
 #define FW_TARE_H
 
@@ -7,12 +7,12 @@
 
 #define FW_TARE_MOST 1024u
 #define FW_TARE_REFUSED \
-    16u /* quiet frames that may be refused (a saturated row...) before the tare fails */
+    16u /* reference frames that may be refused (a saturated row...) before the tare fails */
 
 typedef struct fw_tare {
     bool active;
     uint32_t request, wanted, taken, refused;
-    uint32_t since_us; /* frames whose scan began earlier are not quiet ones */
+    uint32_t since_us; /* frames whose scan began earlier are not untouched ones */
 } fw_tare;
 
 typedef enum fw_tare_step {

@@ -17,7 +17,7 @@ import numpy as np
 
 from eitskin.config import nearest
 from eitskin.core.diagnostics import plural
-from eitskin.core.results import NEWTONS_PER_GRAM, Baseline, Reconstruction, solve_text
+from eitskin.core.results import NEWTONS_PER_GRAM, LearnedReference, Reconstruction, solve_text
 from eitskin.errors import ConfigError, EitskinError, FrameError, UsageError
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import Frames, load_frames
@@ -81,7 +81,7 @@ class Outcome:
     model_name: str
     engine: str
     point: Point | None
-    reference: Baseline
+    reference: LearnedReference
     results: Results
     refused: dict[int, str]
     scores: dict[int, FrameScore]
@@ -188,7 +188,7 @@ def apply_options(reconstructor: Reconstructor, how: Settings, notes: list[str])
 
 def take_reference(
     path: Path, reconstructor: Reconstructor, frames: Frames, notes: list[str]
-) -> Baseline:
+) -> LearnedReference:
     """Learn the reference from the untouched frames."""
     try:
         reference = reconstructor.tare(frames.reference_voltage_v)

@@ -36,11 +36,11 @@ static inline eits_context *set_up(bench *b, small_spec spec, int project)
         b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
     eits_options o = ctx->options;
     o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
-    o.project_baseline = (uint32_t)project;
+    o.project_reference = (uint32_t)project;
     o.max_masked = SMALL_ROWS;
     o.iterations = 40;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(ctx, b->reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b->reference, SMALL_ROWS), EITS_OK);
     return ctx;
 }
 
@@ -57,7 +57,7 @@ static inline void leave_out(bench *b, uint32_t k)
 /* As though so much noise had been learned, over the reference's rms. */
 static inline void pretend_noise(eits_context *ctx, double noise)
 {
-    ctx->baseline.noise_v = (eits_real)noise * ctx->baseline.v0_rms;
+    ctx->reference.noise_v = (eits_real)noise * ctx->reference.v0_rms;
     ctx->basis_stale = 1;
 }
 

@@ -1,5 +1,5 @@
-/* A small skin with quiet frames, and what its rows use: for tests of what is found wrong with a
- * frame. */
+/* A small skin with reference frames, and what its rows use: for tests of what is found wrong with
+ * a frame. */
 #ifndef EITSKIN_TEST_SPOILED_FRAME_H
 #define EITSKIN_TEST_SPOILED_FRAME_H
 
@@ -12,12 +12,12 @@
 #include <math.h>
 #include <string.h>
 
-enum { QUIET = 16 };
+enum { UNTOUCHED = 16 };
 
 typedef struct bench {
     small_model made;
     small_context c;
-    eits_real quiet[QUIET][SMALL_ROWS], frame[SMALL_ROWS];
+    eits_real untouched[UNTOUCHED][SMALL_ROWS], frame[SMALL_ROWS];
     uint64_t state;
 } bench;
 
@@ -38,17 +38,17 @@ static inline eits_context *set_up(bench *b, int noise_known)
     /* all rows of a like size, so that all are significant */
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b->frame[i] = b->frame[i] < 0 ? R(-1) : R(1);
-    for (int k = 0; k < QUIET; ++k) {
-        memcpy(b->quiet[k], b->frame, sizeof b->frame);
-        add_noise(b, b->quiet[k]);
+    for (int k = 0; k < UNTOUCHED; ++k) {
+        memcpy(b->untouched[k], b->frame, sizeof b->frame);
+        add_noise(b, b->untouched[k]);
     }
     if (noise_known) {
-        CHECK_EQUAL(eits_baseline_begin(&b->c.ctx, QUIET), EITS_OK);
-        for (int k = 0; k < QUIET; ++k)
-            CHECK_EQUAL(eits_baseline_add(&b->c.ctx, b->quiet[k], SMALL_ROWS), EITS_OK);
-        CHECK_EQUAL(eits_baseline_finish(&b->c.ctx), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(&b->c.ctx, UNTOUCHED), EITS_OK);
+        for (int k = 0; k < UNTOUCHED; ++k)
+            CHECK_EQUAL(eits_reference_add(&b->c.ctx, b->untouched[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_finish(&b->c.ctx), EITS_OK);
     } else {
-        CHECK_EQUAL(eits_baseline_set(&b->c.ctx, b->frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(&b->c.ctx, b->frame, SMALL_ROWS), EITS_OK);
     }
     add_noise(b, b->frame);
     return &b->c.ctx;

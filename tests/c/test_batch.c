@@ -28,7 +28,7 @@ static eits_context *set_up(bench *b)
     uint64_t state = 12;
     eits_real reference[SMALL_ROWS];
     small_reference(&b->c.model, 1, reference);
-    CHECK_EQUAL(eits_baseline_set(&b->c.ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(&b->c.ctx, reference, SMALL_ROWS), EITS_OK);
     for (int k = 0; k < FRAMES; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
             b->frames[k][i] =

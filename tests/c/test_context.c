@@ -48,7 +48,7 @@ static void sizes_agree(void)
                     CHECK((uintptr_t)ctx.panels % EITS_LINE == 0);
                     CHECK((ctx.panels != NULL) == prepared &&
                           (ctx.working_panels != NULL) == prepared);
-                    CHECK((uint8_t *)ctx.baseline.v0 == workspace);
+                    CHECK((uint8_t *)ctx.reference.v0 == workspace);
                     CHECK(((uintptr_t)ctx.y | (uintptr_t)ctx.basis | (uintptr_t)ctx.x |
                            (uintptr_t)ctx.list_index) %
                               16 ==
@@ -100,13 +100,13 @@ static void exercise(eits_context *ctx, uint64_t *state)
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count;
     small_reference(ctx->model, 1, reference);
-    CHECK_EQUAL(eits_baseline_begin(ctx, 8), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(ctx, 8), EITS_OK);
     for (int k = 0; k < 8; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
             frame[i] = reference[i] * (eits_real)(1 + 1e-4 * small_random(state));
-        CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     eits_options o = ctx->options;
     o.touch_share = 0;
     o.touch_threshold = 0;
@@ -168,7 +168,7 @@ static void contexts_are_independent(void)
         small_reference(&c[k].model, k == 0 ? 1 : -3, references[k]);
         for (int i = 0; i < SMALL_ROWS; ++i)
             frames[k][i] = references[k][i] * (eits_real)(1 + 0.2 * small_random(&state));
-        CHECK_EQUAL(eits_baseline_set(&c[k].ctx, references[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(&c[k].ctx, references[k], SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(&c[k].ctx, frames[k], SMALL_ROWS, alone[k], NULL), EITS_OK);
     }
     CHECK(memcmp(alone[0], alone[1], sizeof image) != 0);
@@ -178,10 +178,10 @@ static void contexts_are_independent(void)
         CHECK(memcmp(image, alone[round % 2], sizeof image) == 0);
     }
     const size_t size = eits_workspace_size(&c[0].model, 0);
-    memset(c[0].ctx.baseline.v0, 0xFF, size); /* the workspace's first byte; all NaN */
-    uint8_t *workspace = (uint8_t *)c[0].ctx.baseline.v0;
+    memset(c[0].ctx.reference.v0, 0xFF, size); /* the workspace's first byte; all NaN */
+    uint8_t *workspace = (uint8_t *)c[0].ctx.reference.v0;
     CHECK_EQUAL(eits_init(&c[0].ctx, &c[0].model, workspace, size), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(&c[0].ctx, references[0], SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(&c[0].ctx, references[0], SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(&c[0].ctx, frames[0], SMALL_ROWS, image, NULL), EITS_OK);
     CHECK(memcmp(image, alone[0], sizeof image) == 0);
     small_context_close(&c[0]);
@@ -204,7 +204,7 @@ static void default_options(void)
     CHECK(o.iterations == 60 && o.max_touches == EITS_MAX_TOUCHES &&
           o.max_masked == SMALL_ROWS / 2);
     CHECK(o.gap_every >= 1 && o.sign == EITS_SIGN_INCREASE && o.warm_start == 0 &&
-          o.project_baseline == 1);
+          o.project_reference == 1);
     CHECK(o.lambda_abs == 0 && o.gap_rel == 0 && o.saturation_v == 0 && o.touch_sweeps >= 1);
     CHECK_NEAR(o.lambda_rel, 0.03f, 0);
     CHECK_NEAR(o.lambda_noise_factor, 0.3f, 0);
@@ -252,7 +252,7 @@ static void options_out_of_range(void)
         WORD(sign, 3),
         WORD(sign, 4294967295.0),
         WORD(warm_start, 2),
-        WORD(project_baseline, 2),
+        WORD(project_reference, 2),
         WORD(touch_sweeps, 1001),
         REAL_WRONG(lambda_abs),
         REAL_WRONG(lambda_rel),
@@ -343,17 +343,17 @@ static void self_test(void)
         CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
         /* the very bits; in double, the rounding of the stored image */
         CHECK_NEAR(difference, 0, BOTH_WIDTHS(0, 1e-7));
-        CHECK(c.ctx.baseline.ready);
-        CHECK_NEAR(c.ctx.baseline.v0[3], c.model.golden.reference[3], 0);
+        CHECK(c.ctx.reference.ready);
+        CHECK_NEAR(c.ctx.reference.v0[3], c.model.golden.reference[3], 0);
         /* a context as before: learning starts from nothing */
-        CHECK_EQUAL(eits_baseline_begin(&c.ctx, 4), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(&c.ctx, 4), EITS_OK);
         for (int k = 0; k < 4; ++k) {
             eits_real frame[SMALL_ROWS];
             small_reference(&c.model, 1, frame);
-            CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
         }
-        CHECK_EQUAL(eits_baseline_finish(&c.ctx), EITS_OK);
-        CHECK(c.ctx.baseline.noise_v <= R(1e-6));
+        CHECK_EQUAL(eits_reference_finish(&c.ctx), EITS_OK);
+        CHECK(c.ctx.reference.noise_v <= R(1e-6));
         small_context_close(&c);
     }
     small_put_f32(golden + 4 * 7, (float)(image[7] + (eits_real)(0.25 * peak)));

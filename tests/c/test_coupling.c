@@ -27,14 +27,14 @@ static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out, e
 {
     eits_context *ctx = dense_bench_open(b, spec, 0);
     eits_options o = ctx->options;
-    o.project_baseline = 0;
+    o.project_reference = 0;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     uint64_t state = 3;
     uint32_t masked;
     uint64_t macs;
     small_reference(&b->c.model, 1, frame);
-    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
     for (int i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)(1 + 0.05 * small_random(&state));
     for (int side = 0; left_out >= 0 && side < 2; ++side) {
@@ -350,9 +350,9 @@ static void straight_data_without_a_ratio(void)
     uint64_t macs;
     eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
     for (int i = 0; i < SMALL_ROWS; ++i)
-        frame[i] = ctx->baseline.v0[i];
+        frame[i] = ctx->reference.v0[i];
     const eits_fold fold = b.c.model.fold[3];
-    ctx->baseline.v0[fold.first] = ctx->baseline.v0[fold.second] = 0;
+    ctx->reference.v0[fold.first] = ctx->reference.v0[fold.second] = 0;
     frame[fold.first] = frame[fold.second] = R(0.01);
     eits_options o = ctx->options;
     o.diagnostics = 0;

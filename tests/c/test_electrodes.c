@@ -34,7 +34,7 @@ static void open_electrodes(void)
             for (uint32_t i = 0; i < SMALL_ROWS; ++i)
                 CHECK((ctx->unusable[i] & EITS_ROW_OPEN) != 0 || !row_uses(ctx, i, e));
             const eits_real dead = b.frame[last];
-            b.frame[last] = ctx->baseline.v0[last];
+            b.frame[last] = ctx->reference.v0[last];
             reconstruct(&b);
             CHECK_EQUAL(ctx->info.open_electrodes, 0);
             CHECK_EQUAL(ctx->electrode[e] & EITS_ELECTRODE_OPEN, 0);
@@ -74,7 +74,7 @@ static void noise_alone(void)
         add_noise(&b, b.frame);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
         CHECK(ctx->info.diagnostics == 0 && ctx->info.open_electrodes == 0);
-        b.frame[7] = ctx->baseline.v0[7]; /* one row that lives, and it is not the front end */
+        b.frame[7] = ctx->reference.v0[7]; /* one row that lives, and it is not the front end */
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(ctx->info.diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
                     open ? EITS_DIAGNOSTIC_ELECTRODE_OPEN : 0);
@@ -94,10 +94,10 @@ static void what_a_dead_row_is(void)
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) *
                          (b.frame[i] < 0 ? R(-1) : R(1));
-        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         look_for(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
         /* as though it had been learned */
-        ctx->baseline.noise_v = way == 2 || way == 3 ? R(0.006) : 0;
+        ctx->reference.noise_v = way == 2 || way == 3 ? R(0.006) : 0;
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
             if (row_uses(ctx, i, 6) && (way < 4 || !row_uses(ctx, i, 2)))
                 b.frame[i] = way == 2 || way == 3 ? (way == 2 ? R(0.028) : R(0.033)) * b.frame[i]
@@ -169,10 +169,10 @@ static void pairs_that_live(void)
         reconstruct(&b);
         CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_BRIDGED);
         uint32_t telling = 0; /* two rows that tell something are too few */
-        memcpy(b.frame, b.quiet[0], sizeof b.frame);
+        memcpy(b.frame, b.untouched[0], sizeof b.frame);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] *= row_crosses(ctx, i, e, f) && ++telling > 2 ? R(0.1) : R(1);
-        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         for (uint32_t i = 0, more = 0; i < SMALL_ROWS; ++i) {
             const int another = !row_crosses(ctx, i, e, f) && more++ == 0;
             b.frame[i] *= row_crosses(ctx, i, e, f) || another ? 0 : R(1);
@@ -227,7 +227,7 @@ static void small_rows(void)
     eits_context *ctx = set_up(&b, 0);
     const eits_fold fold = b.c.model.fold[4];
     b.frame[fold.first] = R(0.01), b.frame[fold.second] = (eits_real)fold.sign * R(0.01);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     for (int grown = 0; grown < 2; ++grown) {
         b.frame[fold.first] = grown ? R(0.42) : R(0.36),
         b.frame[fold.second] = (eits_real)fold.sign * b.frame[fold.first];

@@ -289,7 +289,7 @@ static void beside_a_basis(void)
                     frame[b.c.model.fold[i].second > SMALL_ROWS ? b.c.model.fold[i].first
                                                                 : b.c.model.fold[i].second] =
                         R(NAN);
-            CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
             eits_options o = ctx->options;
             o.solver = SOLVERS[s];
             o.iterations = MANY;

@@ -254,13 +254,13 @@ static void hidden_columns(void)
     eits_context *ctx = &b.c.ctx;
     eits_options o = ctx->options;
     o.solver = EITS_SOLVER_ACTIVE_SET;
-    o.diagnostics = o.project_baseline = 0;
+    o.diagnostics = o.project_reference = 0;
     o.max_masked = SMALL_ROWS;
     o.gate_factor = o.gap_rel = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_real frame[SMALL_ROWS];
     small_reference(ctx->model, 1, frame);
-    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
     for (int i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)(1 + 0.2 * small_random(&state));
     CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].first, 1), EITS_OK);

@@ -56,9 +56,10 @@ static void reference(float volts, double measured, eits_status expected)
     eits_context *ctx = open_made(&b);
     for (int i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = (eits_real)measured;
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), expected);
-    CHECK_EQUAL(ctx->baseline.ready, expected == EITS_OK);
-    CHECK(expected != EITS_OK || (isfinite((double)ctx->baseline.gain) && ctx->baseline.gain != 0));
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), expected);
+    CHECK_EQUAL(ctx->reference.ready, expected == EITS_OK);
+    CHECK(expected != EITS_OK ||
+          (isfinite((double)ctx->reference.gain) && ctx->reference.gain != 0));
     tear_down(&b);
 }
 

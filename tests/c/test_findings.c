@@ -1,4 +1,5 @@
-/* What is found wrong with a frame, and what is left out because of it; outliers in quiet frames.
+/* What is found wrong with a frame, and what is left out because of it; outliers in reference
+ * frames.
  */
 #include "spoiled_frame.h"
 
@@ -10,7 +11,7 @@ static void nothing_wrong(void)
         reconstruct(&b);
         CHECK_EQUAL(ctx->info.diagnostics, 0);
         CHECK_EQUAL(ctx->info.masked, 0);
-        CHECK(ctx->baseline.outliers == 0 && (ctx->baseline.noise_v > 0) == known);
+        CHECK(ctx->reference.outliers == 0 && (ctx->reference.noise_v > 0) == known);
         tear_down(&b);
     }
 }
@@ -63,7 +64,7 @@ static void many_outliers(void)
     look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_NOISY);
     reconstruct(&b);
     CHECK_EQUAL(ctx->info.masked, 0);
-    memcpy(b.frame, b.quiet[0], sizeof b.frame);
+    memcpy(b.frame, b.untouched[0], sizeof b.frame);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
         b.frame[b.c.model.fold[k].first] *= k % 2 == 0 ? R(1.2) : R(0.9);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
@@ -72,50 +73,50 @@ static void many_outliers(void)
     tear_down(&b);
 }
 
-/* One reading of any of the quiet frames: left out, and the reference is as without it. */
+/* One reading of any of the reference frames: left out, and the reference is as without it. */
 static void an_outlier_in_the_reference(void)
 {
-    for (int at = 0; at < QUIET; ++at) {
+    for (int at = 0; at < UNTOUCHED; ++at) {
         bench b;
         eits_context *ctx = set_up(&b, 1);
-        const eits_real noise = ctx->baseline.noise_v, lambda_noise = ctx->baseline.lambda_noise;
+        const eits_real noise = ctx->reference.noise_v, lambda_noise = ctx->reference.lambda_noise;
         const uint32_t row = at % 3 ? b.c.model.fold[at].second : b.c.model.fold[at].first;
-        b.quiet[at][row] += R(0.5);
-        CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-        for (int k = 0; k < QUIET; ++k) {
-            CHECK_EQUAL(eits_baseline_add(ctx, b.quiet[k], SMALL_ROWS), EITS_OK);
-            CHECK_EQUAL(ctx->baseline.count, k + 1);
+        b.untouched[at][row] += R(0.5);
+        CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+        for (int k = 0; k < UNTOUCHED; ++k) {
+            CHECK_EQUAL(eits_reference_add(ctx, b.untouched[k], SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(ctx->reference.count, k + 1);
         }
-        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-        CHECK_EQUAL(ctx->baseline.outliers, 1);
-        CHECK_NEAR(eits_fabs(ctx->baseline.v0[row]), 1, 2e-3);
-        CHECK_NEAR(ctx->baseline.noise_v, noise, 0.05 * (double)noise);
-        CHECK_NEAR(ctx->baseline.lambda_noise, lambda_noise, 0.3 * (double)lambda_noise);
+        CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+        CHECK_EQUAL(ctx->reference.outliers, 1);
+        CHECK_NEAR(eits_fabs(ctx->reference.v0[row]), 1, 2e-3);
+        CHECK_NEAR(ctx->reference.noise_v, noise, 0.05 * (double)noise);
+        CHECK_NEAR(ctx->reference.lambda_noise, lambda_noise, 0.3 * (double)lambda_noise);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             CHECK_EQUAL(ctx->bad[i], 0);
         look_for(ctx, 0);
-        CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-        for (int k = 0; k < QUIET; ++k)
-            CHECK_EQUAL(eits_baseline_add(ctx, b.quiet[k], SMALL_ROWS), EITS_OK);
-        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-        CHECK(ctx->baseline.outliers == 0 && ctx->baseline.noise_v > 5 * noise);
+        CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+        for (int k = 0; k < UNTOUCHED; ++k)
+            CHECK_EQUAL(eits_reference_add(ctx, b.untouched[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+        CHECK(ctx->reference.outliers == 0 && ctx->reference.noise_v > 5 * noise);
         tear_down(&b);
     }
 }
 
-/* More readings of a quiet frame than outliers are: it counts as it is. */
-static void quiet_frame_of_another_kind(void)
+/* More readings of a reference frame than outliers are: it counts as it is. */
+static void reference_frame_of_another_kind(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
     for (uint32_t count = 1; count <= EITS_OUTLIER_MAX + 1; ++count) {
-        b.quiet[5][b.c.model.fold[count].first] += R(0.5);
-        CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-        for (int k = 0; k < QUIET; ++k)
-            CHECK_EQUAL(eits_baseline_add(ctx, b.quiet[k], SMALL_ROWS), EITS_OK);
-        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-        CHECK_EQUAL(ctx->baseline.outliers, count <= EITS_OUTLIER_MAX ? count : 0);
-        CHECK((ctx->baseline.noise_v < R(2e-3)) == (count <= EITS_OUTLIER_MAX));
+        b.untouched[5][b.c.model.fold[count].first] += R(0.5);
+        CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+        for (int k = 0; k < UNTOUCHED; ++k)
+            CHECK_EQUAL(eits_reference_add(ctx, b.untouched[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+        CHECK_EQUAL(ctx->reference.outliers, count <= EITS_OUTLIER_MAX ? count : 0);
+        CHECK((ctx->reference.noise_v < R(2e-3)) == (count <= EITS_OUTLIER_MAX));
     }
     tear_down(&b);
 }
@@ -164,7 +165,7 @@ int main(void)
     one_outlier();
     many_outliers();
     an_outlier_in_the_reference();
-    quiet_frame_of_another_kind();
+    reference_frame_of_another_kind();
     medians();
     options_and_names();
     return checks_report("diagnostics");

@@ -66,7 +66,7 @@ static void noise_through_it(void)
     eits_context *ctx = set_up(&b, WHITENED, 0);
     const double stored = (double)ctx->sheet_energy;
     double energy = 0, sum = 0, whole = 0;
-    ctx->baseline.lambda_noise = R(3.0);
+    ctx->reference.lambda_noise = R(3.0);
     pretend_noise(ctx, 0.01);
     (void)stage(&b);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -147,7 +147,7 @@ static void only_where_asked_for(void)
     reconstruct(&other, image);
     CHECK(memcmp(image, raised, sizeof image) == 0);
     /* of one frame nothing is known of the noise */
-    CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
     reconstruct(&b, image);
     CHECK(memcmp(image, plain, sizeof image) == 0);
     dense_bench_close(&other.b);
@@ -183,34 +183,34 @@ static void models_of_other_forms(void)
     dense_bench_close(&b.b);
 }
 
-/* The quiet frames' own noise raises the floor for the second half of them already, and
+/* The reference frames' own noise raises the floor for the second half of them already, and
  * lambda_noise is as with the model's. */
 static void learned_with_it(void)
 {
-    enum { QUIET = 4 };
+    enum { UNTOUCHED = 4 };
     bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
-    eits_real quiet[QUIET][SMALL_ROWS], mean[SMALL_ROWS];
+    eits_real untouched[UNTOUCHED][SMALL_ROWS], mean[SMALL_ROWS];
     uint64_t state = 5;
     double square = 0;
-    for (int k = 0; k < QUIET; ++k) {
+    for (int k = 0; k < UNTOUCHED; ++k) {
         for (int i = 0; i < SMALL_ROWS; ++i)
-            quiet[k][i] = b.reference[i] + (eits_real)(0.03 * small_random(&state));
+            untouched[k][i] = b.reference[i] + (eits_real)(0.03 * small_random(&state));
     }
     for (int i = 0; i < SMALL_ROWS; ++i) {
-        mean[i] = R(0.5) * (quiet[0][i] + quiet[1][i]);
-        square += pow((double)(quiet[1][i] - quiet[0][i]), 2) / 2;
+        mean[i] = R(0.5) * (untouched[0][i] + untouched[1][i]);
+        square += pow((double)(untouched[1][i] - untouched[0][i]), 2) / 2;
         /* says nothing: the third alone tells */
-        quiet[3][i] = (mean[i] + mean[i] + quiet[2][i]) / 3;
+        untouched[3][i] = (mean[i] + mean[i] + untouched[2][i]) / 3;
     }
-    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-    for (int k = 0; k < QUIET; ++k)
-        CHECK_EQUAL(eits_baseline_add(ctx, quiet[k], SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-    const double learned = (double)ctx->baseline.lambda_noise, noise = sqrt(square / SMALL_ROWS);
-    CHECK_EQUAL(eits_baseline_set(ctx, mean, SMALL_ROWS), EITS_OK);
-    pretend_noise(ctx, noise / (double)ctx->baseline.v0_rms);
-    memcpy(b.frame, quiet[2], sizeof b.frame);
+    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+    for (int k = 0; k < UNTOUCHED; ++k)
+        CHECK_EQUAL(eits_reference_add(ctx, untouched[k], SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    const double learned = (double)ctx->reference.lambda_noise, noise = sqrt(square / SMALL_ROWS);
+    CHECK_EQUAL(eits_reference_set(ctx, mean, SMALL_ROWS), EITS_OK);
+    pretend_noise(ctx, noise / (double)ctx->reference.v0_rms);
+    memcpy(b.frame, untouched[2], sizeof b.frame);
     (void)stage(&b);
     CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
     double *back = dense_copy(eits_adjoint(ctx, ctx->y, ctx->adjoint), RANK), most = 0;

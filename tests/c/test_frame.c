@@ -36,10 +36,10 @@ static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int proj
     for (int i = 0; i < SMALL_ROWS; ++i)
         b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
     eits_options o = b->c.ctx.options;
-    o.project_baseline = (uint32_t)project;
+    o.project_reference = (uint32_t)project;
     o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
     CHECK_EQUAL(eits_set_options(&b->c.ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(&b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(&b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
     return &b->c.ctx;
 }
 
@@ -64,8 +64,8 @@ static void check_stage(bench *b, uint32_t masked_expected)
     uint32_t masked = 99;
     CHECK_EQUAL(stage(b, &masked), EITS_OK);
     CHECK_EQUAL(masked, masked_expected);
-    dense_frame(&b->c.model, &b->d, v0, (double)ctx->baseline.gain,
-                ctx->options.project_baseline ? v0 : NULL, b->frame, b->out, y);
+    dense_frame(&b->c.model, &b->d, v0, (double)ctx->reference.gain,
+                ctx->options.project_reference ? v0 : NULL, b->frame, b->out, y);
     CHECK(sqrt(dense_dot(y, y, RANK)) > 0.01);
     CHECK_NEAR(dense_greatest_difference(y, ctx->y, RANK), 0, 60 * EPS);
     for (uint32_t i = RANK; i < EITS_STRIDE(RANK); ++i)
@@ -93,7 +93,7 @@ static void data_of_each_kind(void)
                 bench b;
                 eits_context *ctx = set_up(&b, (eits_data_kind)kind, turned ? -0.5 : 2, project);
                 check_stage(&b, 0);
-                const double gain = (double)ctx->baseline.gain;
+                const double gain = (double)ctx->reference.gain;
                 CHECK_NEAR(gain, turned ? -2 : 0.5, 0.02);
                 for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
                     const eits_fold fold = b.c.model.fold[k];
@@ -114,7 +114,7 @@ static void data_of_each_kind(void)
                 }
                 CHECK_EQUAL(ctx->basis_count, project);
                 eits_options o = ctx->options; /* the option counts from the next frame on */
-                o.project_baseline = !project;
+                o.project_reference = !project;
                 CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
                 check_stage(&b, 0);
                 CHECK_EQUAL(ctx->basis_count, !project);
@@ -237,7 +237,7 @@ static void left_out_is_minimised_over(void)
     CHECK(memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
     /* min over a of |y + a p|^2, p the row's column of P, is |projected y|^2, and any start gives
      * the same */
-    dense_frame(&b.c.model, &b.d, v0, (double)ctx->baseline.gain, NULL, b.frame, b.out, y_with);
+    dense_frame(&b.c.model, &b.d, v0, (double)ctx->reference.gain, NULL, b.frame, b.out, y_with);
     const double *p = b.d.p + k * RANK;
     const double a = -dense_dot(y_with, p, RANK) / dense_dot(p, p, RANK);
     for (int i = 0; i < RANK; ++i)
@@ -357,18 +357,18 @@ static void row_without_reference(void)
         CHECK_EQUAL(eits_mask_row(ctx, 9, 1), EITS_OK);
         b.out[9] = 1;
         if (learned) {
-            CHECK_EQUAL(eits_baseline_begin(ctx, 6), EITS_OK);
+            CHECK_EQUAL(eits_reference_begin(ctx, 6), EITS_OK);
             for (int k = 0; k < 6; ++k)
-                CHECK_EQUAL(eits_baseline_add(ctx, b.reference, SMALL_ROWS), EITS_OK);
-            CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-            CHECK(ctx->baseline.noise_v <= 10 * EPS);
+                CHECK_EQUAL(eits_reference_add(ctx, b.reference, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+            CHECK(ctx->reference.noise_v <= 10 * EPS);
         } else {
-            CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         }
         check_stage(&b, 1);
         CHECK_EQUAL(eits_mask_row(ctx, 9, 0), EITS_OK);
         check_stage(&b, 1);
-        CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         b.out[9] = 0;
         check_stage(&b, 0);
         tear_down(&b);
@@ -383,7 +383,7 @@ static void ratios_at_their_limits(void)
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, 0);
         const uint32_t row = b.c.model.fold[20].first;
         b.reference[row] = R(1e-8);
-        CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         b.out[row] = 1; /* left out as if masked, though not counted as unusable */
         check_stage(&b, 0);
         CHECK_EQUAL(ctx->basis_count, 1);
@@ -399,7 +399,7 @@ static void ratios_at_their_limits(void)
         uint32_t masked;
         CHECK_EQUAL(stage(&b, &masked), EITS_OK);
         CHECK_NEAR(ctx->d[20],
-                   (double)ctx->baseline.gain * (double)b.reference[row] * log(ratios[f]),
+                   (double)ctx->reference.gain * (double)b.reference[row] * log(ratios[f]),
                    20 * EPS);
     }
     tear_down(&b);
@@ -421,12 +421,12 @@ static void directions_that_nearly_agree(void)
     small_context c;
     small_context_open(&c, &made, 0);
     eits_options o = c.ctx.options;
-    o.project_baseline = o.diagnostics = 0;
+    o.project_reference = o.diagnostics = 0;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
     eits_real frame[SMALL_ROWS];
     small_reference(&c.model, 1, frame);
-    CHECK_EQUAL(eits_baseline_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
     frame[0] *= R(1.1);
     for (uint32_t k = 4; k < 6; ++k) {
         CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[k].first, 1), EITS_OK);
@@ -456,8 +456,8 @@ static void reciprocals_that_agree(void)
         CHECK_EQUAL(fold.sign, 1);
         for (int step = 0; step < 4; ++step) {
             static const double off[] = {0, 2, 4, 40}; /* in units of the last place */
-            const eits_real v0 = ctx->baseline.v0[fold.first];
-            ctx->baseline.v0[fold.second] = v0 * (eits_real)(1 + off[step] * EPS);
+            const eits_real v0 = ctx->reference.v0[fold.first];
+            ctx->reference.v0[fold.second] = v0 * (eits_real)(1 + off[step] * EPS);
             b.frame[fold.first] = b.frame[fold.second] = R(1.01) * v0;
             CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs), EITS_OK);
             CHECK((ctx->apart[4] == 0) == (step < 3));

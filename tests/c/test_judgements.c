@@ -1,5 +1,5 @@
 /* What is said of a frame that is imaged as it is - mismatch, a stale reference, crowds - and which
- * readings of quiet frames are odd: from numbers set by hand, on both sides of each limit. */
+ * readings of reference frames are odd: from numbers set by hand, on both sides of each limit. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
@@ -21,7 +21,7 @@ static eits_context *set_up(dense_bench *b, eits_data_kind kind)
         b, (small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .kind = kind}, 0);
     eits_real reference[SMALL_ROWS];
     small_reference(ctx->model, 1, reference);
-    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
     ctx->info.diagnostics = 0;
     return ctx;
 }
@@ -176,19 +176,19 @@ static void mismatches(void)
         CHECK_NEAR(ctx->sheet_inverse[i], inverse, 1e-5);
     }
     CHECK(!model_mismatch(ctx, 0.5) && ctx->info.model_mismatch == 0); /* the noise is not known */
-    ctx->baseline.noise_v = R(1e-4);
+    ctx->reference.noise_v = R(1e-4);
     CHECK(model_mismatch(ctx, 0.06));
     CHECK_NEAR(ctx->info.model_mismatch, 0.06, 2e-4);
     CHECK(!model_mismatch(ctx, 0.045));
     CHECK_NEAR(ctx->info.model_mismatch, 0.045, 2e-4);
     /* of |d|^2 = (1 + off^2) 21/2; noise leaves 8 times noise_v^2 outside */
     const double off = 0.4, outside = off * off * SMALL_FOLDED / 2.0;
-    ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 8.5));
+    ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 8.5));
     CHECK(!model_mismatch(ctx, off));
     CHECK_NEAR(ctx->info.model_mismatch, sqrt(off * off * 7.5 / 8.5 / (1 + off * off)), 1e-3);
-    ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 9.5));
+    ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 9.5));
     CHECK(model_mismatch(ctx, off));
-    ctx->baseline.noise_v = (eits_real)sqrt(outside / (8 * 0.9));
+    ctx->reference.noise_v = (eits_real)sqrt(outside / (8 * 0.9));
     CHECK(!model_mismatch(ctx, off) && ctx->info.model_mismatch == 0);
     dense_bench_close(&b);
 }
@@ -200,7 +200,7 @@ static void noise_of_the_data(void)
     for (int kind = 0; kind < 2; ++kind) {
         dense_bench b;
         eits_context *ctx = set_up(&b, kind ? EITS_DATA_NORMALISED : EITS_DATA_DIFFERENCE);
-        ctx->baseline.noise_v = R(0.25);
+        ctx->reference.noise_v = R(0.25);
         double sum = 0;
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
             const int two = k % 3 == 0 && k < SMALL_PAIRS;
@@ -208,7 +208,7 @@ static void noise_of_the_data(void)
                                                 : EITS_SIDE_FIRST;
             ctx->apart[k] = two ? R(0.1) : 0;
             const double one =
-                kind ? 0.25 / (double)ctx->model->v_ref[k] : 0.25 * (double)ctx->baseline.gain;
+                kind ? 0.25 / (double)ctx->model->v_ref[k] : 0.25 * (double)ctx->reference.gain;
             sum += one * one / (two ? 2 : 1);
         }
         CHECK_NEAR(eits_noise_energy(ctx), sum, 1e-5 * sum);
@@ -216,13 +216,13 @@ static void noise_of_the_data(void)
     }
 }
 
-/* ---- readings of quiet frames ---- */
+/* ---- readings of reference frames ---- */
 
 static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_real *older,
                           uint32_t marked[SMALL_FOLDED])
 {
     memset(ctx->list_index, 0xFF, SMALL_FOLDED * sizeof *ctx->list_index);
-    const uint32_t count = eits_quiet_odd(ctx, newer, older, 4);
+    const uint32_t count = eits_reference_compare(ctx, newer, older, 4);
     uint32_t bits = 0;
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         CHECK_EQUAL(ctx->list_index[k] | 4u, 0xFFFFFFFFu); /* the other bits are not touched */
@@ -286,7 +286,7 @@ static void noise_of_any_size(void)
         eits_real reference[SMALL_ROWS], frame[SMALL_ROWS];
         double mean[SMALL_ROWS] = {0}, squares[SMALL_ROWS] = {0}, sum = 0;
         small_reference(ctx->model, 1, reference);
-        CHECK_EQUAL(eits_baseline_begin(ctx, FRAMES), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(ctx, FRAMES), EITS_OK);
         for (int k = 0; k < FRAMES; ++k) {
             for (int i = 0; i < SMALL_ROWS; ++i) {
                 const double off = 0.01 * small_random(&state);
@@ -294,19 +294,19 @@ static void noise_of_any_size(void)
                 mean[i] += off / FRAMES;
                 squares[i] += off * off;
             }
-            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS), EITS_OK);
         }
-        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+        CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
         for (int i = 0; i < SMALL_ROWS; ++i)
             sum += (squares[i] - FRAMES * mean[i] * mean[i]) / (FRAMES - 1) / SMALL_ROWS;
-        CHECK_NEAR((double)ctx->baseline.noise_v / sizes[n], sqrt(sum), 1e-4);
-        CHECK_EQUAL(ctx->baseline.outliers, 0);
-        memset(frame, 0, sizeof frame); /* a dead front end is no quiet frame */
-        CHECK_EQUAL(eits_baseline_begin(ctx, FRAMES), EITS_OK);
+        CHECK_NEAR((double)ctx->reference.noise_v / sizes[n], sqrt(sum), 1e-4);
+        CHECK_EQUAL(ctx->reference.outliers, 0);
+        memset(frame, 0, sizeof frame); /* a dead front end is no reference frame */
+        CHECK_EQUAL(eits_reference_begin(ctx, FRAMES), EITS_OK);
         for (int k = 0; k < FRAMES; ++k) {
             for (int i = 0; i < SMALL_ROWS; ++i)
                 frame[i] = k < FRAMES / 2 ? reference[i] : 0;
-            CHECK_EQUAL(eits_baseline_add(ctx, frame, SMALL_ROWS),
+            CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS),
                         k < FRAMES / 2 ? EITS_OK : EITS_E_FRAME_ZERO);
         }
         dense_bench_close(&b);
@@ -314,7 +314,7 @@ static void noise_of_any_size(void)
     dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     small_new_data(ctx, 5);
-    ctx->baseline.lambda_noise = R(0.25);
+    ctx->reference.lambda_noise = R(0.25);
     eits_options o = ctx->options;
     o.lambda_rel = R(1e-3);
     o.lambda_noise_factor = R(0.5);

@@ -171,7 +171,7 @@ static void touches_have_loads(void)
     options.gate_factor = 0;
     CHECK_EQUAL(eits_set_options(&c.ctx, &options), EITS_OK);
     small_reference(&c.model, 1, frame);
-    CHECK_EQUAL(eits_baseline_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)(1 + 0.05 * sin(1.7 * i));
     CHECK_EQUAL(eits_reconstruct(&c.ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);

@@ -163,7 +163,7 @@ static void of_a_whole_frame(void)
         small_reference(&b.c.model, 1, reference);
         for (int i = 0; i < SMALL_ROWS; ++i)
             frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
-        CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
         uint64_t least = 0;
         for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
             eits_options o = ctx->options;

@@ -38,7 +38,7 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
     for (int f = 0; f < SMALL_FOLDED; ++f)
         left += !b->out[f] / (double)SMALL_FOLDED;
     const double asked =
-        fmin(NOISE_FACTOR * (double)(ctx->baseline.noise_v / ctx->baseline.v0_rms), MOST);
+        fmin(NOISE_FACTOR * (double)(ctx->reference.noise_v / ctx->reference.v0_rms), MOST);
     const double mu = fmax(SMALL_FLOOR * fmax(left * left * left, LEAST_SHARE), left * asked),
                  lost = LOST * mu;
     const double scale = MARGIN / (1 + SMALL_FLOOR) * (1 + mu) / (1 + lost);
@@ -111,7 +111,7 @@ static void noise_in_the_correlations(double noise)
     bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
     double all = 0;
-    ctx->baseline.lambda_noise = R(3.0);
+    ctx->reference.lambda_noise = R(3.0);
     (void)stage(&b);
     CHECK(ctx->noise_ratio == 1 && eits_lambda_noise(ctx) == R(3.0));
     pretend_noise(ctx, noise);
@@ -243,7 +243,7 @@ static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows,
     small_reference(ctx->model, 1, b.reference);
     memcpy(b.frame, b.reference, sizeof b.frame);
     b.frame[3] *= R(1.1);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
     leave_out(&b, 4);
     leave_out(&b, 9);
     (void)stage(&b);

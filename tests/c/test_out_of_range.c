@@ -38,7 +38,7 @@ static void touches_are_finite_whatever_the_units(void)
         small_context_open(&c, &made, 0);
         eits_real frame[SMALL_ROWS];
         small_reference(&c.model, 1.0, frame);
-        CHECK_EQUAL(eits_baseline_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
         for (uint32_t i = 0; i < SMALL_ROWS; i += 3)
             frame[i] *= (eits_real)(1.0 + 0.01 * (i % 7));
         eits_touch touches[EITS_MAX_TOUCHES];
@@ -58,8 +58,8 @@ static void look_for_nothing(eits_context *ctx)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
 
-/* Six quiet frames, the first `first` times the model's volts, the others `others` times; the noise
- * that was learned. */
+/* Six reference frames, the first `first` times the model's volts, the others `others` times; the
+ * noise that was learned. */
 static eits_real learn_noise(double first, double others)
 {
     small_model made = small_model_make(SPEC);
@@ -67,17 +67,17 @@ static eits_real learn_noise(double first, double others)
     small_context_open(&c, &made, 0);
     look_for_nothing(&c.ctx);
     eits_real frame[SMALL_ROWS];
-    CHECK_EQUAL(eits_baseline_begin(&c.ctx, 6), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(&c.ctx, 6), EITS_OK);
     for (int k = 0; k < 6; ++k) {
         small_reference(&c.model, k == 0 ? first : others, frame);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             frame[i] *= (eits_real)(1.0 + 1e-3 * ((i + (uint32_t)k) % 5));
-        CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_baseline_finish(&c.ctx), EITS_OK);
-    CHECK(c.ctx.baseline.ready && isfinite(c.ctx.baseline.lambda_noise) &&
-          c.ctx.baseline.lambda_noise > 0);
-    const eits_real noise_v = c.ctx.baseline.noise_v;
+    CHECK_EQUAL(eits_reference_finish(&c.ctx), EITS_OK);
+    CHECK(c.ctx.reference.ready && isfinite(c.ctx.reference.lambda_noise) &&
+          c.ctx.reference.lambda_noise > 0);
+    const eits_real noise_v = c.ctx.reference.noise_v;
     small_context_close(&c);
     small_model_free(&made);
     return noise_v;
@@ -93,8 +93,8 @@ static void noise_out_of_range_is_unknown(void)
                1e-5 * (double)learn_noise(1, 1));
 }
 
-/* A quiet frame that leads beyond the range is refused and does not count. */
-static void a_quiet_frame_out_of_range_is_refused(void)
+/* A reference frame that leads beyond the range is refused and does not count. */
+static void a_reference_frame_out_of_range_is_refused(void)
 {
     small_model made = small_model_make(SPEC);
     uint8_t *reduction = small_model_section(&made, "REDU", NULL);
@@ -106,15 +106,15 @@ static void a_quiet_frame_out_of_range_is_refused(void)
     small_context_open(&c, &made, 0);
     look_for_nothing(&c.ctx);
     eits_real frame[SMALL_ROWS];
-    CHECK_EQUAL(eits_baseline_begin(&c.ctx, 4), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(&c.ctx, 4), EITS_OK);
     small_reference(&c.model, 1.0, frame);
-    CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_baseline_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
     frame[0] *= (eits_real)1.5;
-    const eits_status status = eits_baseline_add(&c.ctx, frame, SMALL_ROWS);
+    const eits_status status = eits_reference_add(&c.ctx, frame, SMALL_ROWS);
     CHECK_EQUAL(status, BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
-    CHECK_EQUAL(c.ctx.baseline.count, status == EITS_OK ? 3 : 2);
-    CHECK(isfinite(c.ctx.baseline.lambda_noise));
+    CHECK_EQUAL(c.ctx.reference.count, status == EITS_OK ? 3 : 2);
+    CHECK(isfinite(c.ctx.reference.lambda_noise));
     small_context_close(&c);
     small_model_free(&made);
 }
@@ -149,7 +149,7 @@ int main(void)
 {
     touches_are_finite_whatever_the_units();
     noise_out_of_range_is_unknown();
-    a_quiet_frame_out_of_range_is_refused();
+    a_reference_frame_out_of_range_is_refused();
     data_too_small_to_square_give_zero();
     return checks_report("out_of_range");
 }

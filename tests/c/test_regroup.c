@@ -382,7 +382,7 @@ static void images_of_a_batch(void)
     uint32_t count, refined = 0;
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
     small_reference(&b.c.model, 1, frame[0]);
-    CHECK_EQUAL(eits_baseline_set(ctx, frame[0], SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, frame[0], SMALL_ROWS), EITS_OK);
     for (int i = 0; i < SMALL_ROWS; ++i) {
         frame[1][i] = frame[0][i] * (eits_real)(1 + 0.1 * small_random(&state));
         frame[0][i] *= (eits_real)(1 + 0.05 * small_random(&state));

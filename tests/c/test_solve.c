@@ -292,7 +292,7 @@ static void solving_beside_a_basis(void)
         frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
     frame[b.c.model.fold[4].first] = frame[b.c.model.fold[4].second] =
         frame[b.c.model.fold[20].first] = R(NAN);
-    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
     CHECK_EQUAL(ctx->basis_count, 3);
     const eits_info info = solve(ctx, 40, EITS_SIGN_INCREASE, 0.01);
@@ -351,7 +351,7 @@ static void work_is_counted(void)
      * projections' passes for the drift direction at first */
     eits_real frame[SMALL_ROWS];
     small_reference(&b.c.model, 1, frame);
-    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     const uint64_t reduce = SMALL_FOLDED * 16, project = 2 * 16;
     CHECK_EQUAL(ctx->info.macs,
@@ -373,7 +373,7 @@ static void work_is_counted(void)
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     /* the map is kept */
     CHECK_EQUAL(ctx->info.macs, 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
-    o.project_baseline = 0; /* each residual is mapped, there and back */
+    o.project_reference = 0; /* each residual is mapped, there and back */
     o.warm_start = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);

@@ -63,11 +63,11 @@ static void gate_and_lambda_rule(void)
     const double top = (double)info.lambda_max;
     CHECK(top > 0.1 && info.stop == EITS_STOP_ITERATIONS);
     CHECK_NEAR(info.lambda, 0.1 * top, 2 * EPS * top);
-    ctx->baseline.lambda_noise = (eits_real)(0.1 * top);
+    ctx->reference.lambda_noise = (eits_real)(0.1 * top);
     info = solve(ctx); /* 0.05 of lambda_max by the noise, 0.1 by the share */
     CHECK_NEAR(info.lambda, 0.1 * top, 2 * EPS * top);
     CHECK_NEAR(info.lambda_noise, 0.1 * top, 2 * EPS * top);
-    ctx->baseline.lambda_noise = (eits_real)(0.5 * top);
+    ctx->reference.lambda_noise = (eits_real)(0.5 * top);
     info = solve(ctx);
     CHECK_NEAR(info.lambda, 0.25 * top, 2 * EPS * top);
     o.lambda_abs = (eits_real)(0.6 * top); /* goes before both */
@@ -76,17 +76,17 @@ static void gate_and_lambda_rule(void)
     CHECK_NEAR(info.lambda, 0.6 * top, 2 * EPS * top);
     CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
     /* just below the gate, then just above */
-    ctx->baseline.lambda_noise = (eits_real)(top / 1.49);
+    ctx->reference.lambda_noise = (eits_real)(top / 1.49);
     info = solve(ctx);
     CHECK(info.stop == EITS_STOP_GATE && info.iterations == 0 && info.nonzeros == 0);
     for (int j = 0; j < N; ++j)
         CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
-    ctx->baseline.lambda_noise = (eits_real)(top / 1.51);
+    ctx->reference.lambda_noise = (eits_real)(top / 1.51);
     info = solve(ctx);
     CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros > 0);
     o.gate_factor = 0;
     set_options(ctx, o);
-    ctx->baseline.lambda_noise = (eits_real)(100 * top);
+    ctx->reference.lambda_noise = (eits_real)(100 * top);
     /* no gate, and lambda_abs does not look at the noise */
     CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS);
     dense_bench_close(&b);
@@ -173,7 +173,7 @@ static void warm_start_is_forgotten(void)
     CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
     small_reference(&b.c.model, 1, reference);
     /* nor are those against another reference */
-    CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
     (void)solve(ctx);
     CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
     o.warm_start = 0;
@@ -336,7 +336,7 @@ static void units_do_not_matter(void)
             reference[i] *= (eits_real)units[u];
             frame[i] *= (eits_real)units[u];
         }
-        CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         if (u == 0) {
             memcpy(first, ctx->image, sizeof first);

@@ -100,7 +100,7 @@ static eits_context *open_warm(bench *b, int solver)
     eits_context *ctx = dense_bench_open(b, WAVES, 0);
     eits_real frame[SMALL_ROWS];
     small_reference(&b->c.model, 1, frame);
-    CHECK_EQUAL(eits_baseline_set(ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
     eits_options o = ctx->options;
     o.solver = (eits_solver)solver;
     o.warm_start = 1;

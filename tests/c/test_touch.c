@@ -275,11 +275,11 @@ static void gate_by_noise(void)
     const eits_real weak = ctx->info.lambda_max;
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
-    ctx->baseline.lambda_noise = R(0.8) * weak; /* the weaker one stands out of such noise */
+    ctx->reference.lambda_noise = R(0.8) * weak; /* the weaker one stands out of such noise */
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
     /* of this it does not, though the frame as a whole does */
-    ctx->baseline.lambda_noise = R(1.25) * weak;
+    ctx->reference.lambda_noise = R(1.25) * weak;
     press(&b, two, 2, 0);
     CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
     CHECK_EQUAL(b.count, 1);

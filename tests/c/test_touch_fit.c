@@ -68,9 +68,9 @@ static void work_is_counted(void)
     CHECK_EQUAL(touch_macs(ctx, 2), 2 * strengths + 3 * RANK);
     (void)press(ctx, 0);
     /* a gate: the 3 x 3 pixels around it, two products each */
-    ctx->baseline.lambda_noise = R(1e-6);
+    ctx->reference.lambda_noise = R(1e-6);
     CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK + 9 * 2 * RANK);
-    ctx->baseline.lambda_noise = 0;
+    ctx->reference.lambda_noise = 0;
     /* a response with three slopes, 17 products, and each attempted step's response with 3
      * products */
     o.touch_sweeps = 1;
@@ -207,10 +207,10 @@ static void gate_of_one_touch(void)
             most = fmax(most, 0.02 * dense_dot(d.s + (iy * SIDE + ix) * RANK, part, RANK));
     }
     for (int k = 0; k < 2; ++k) {
-        ctx->baseline.lambda_noise = 0;
+        ctx->reference.lambda_noise = 0;
         (void)press(ctx, 1);
-        ctx->baseline.lambda_noise = (eits_real)(most * (k == 0 ? 0.999 : 1.001));
-        CHECK(ctx->info.lambda_max > R(1.5) * ctx->baseline.lambda_noise);
+        ctx->reference.lambda_noise = (eits_real)(most * (k == 0 ? 0.999 : 1.001));
+        CHECK(ctx->info.lambda_max > R(1.5) * ctx->reference.lambda_noise);
         (void)touch_macs(ctx, k == 0 ? 2 : 1);
     }
     free(part);

@@ -24,8 +24,8 @@ static void status_texts(void)
         {EITS_E_FRAME_LENGTH, "length"},
         {EITS_E_FRAME_CHANNELS, "channels"},
         {EITS_E_FRAME_ZERO, "zero"},
-        {EITS_E_NO_BASELINE, "no reference"},
-        {EITS_E_BASELINE_SHORT, "too few quiet"},
+        {EITS_E_NO_REFERENCE, "no reference"},
+        {EITS_E_REFERENCE_SHORT, "too few frames"},
         {EITS_E_NOT_FINITE, "finite"},
     };
     const int count = (int)(sizeof known / sizeof known[0]);

@@ -12,7 +12,7 @@
 enum {
     RANK = 8,
     SIDE = 4,
-    QUIET = 16,
+    UNTOUCHED = 16,
     BLOCKS = 6,
     ALONE = RANK - 1,
     UNSEEN = SMALL_PAIRS,
@@ -125,16 +125,16 @@ static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kin
             b->reference[fold.second] = (eits_real)fold.sign;
     }
     eits_options o = ctx->options;
-    o.project_baseline = 0;
+    o.project_reference = 0;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-    for (int k = 0; k < QUIET; ++k) {
+    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+    for (int k = 0; k < UNTOUCHED; ++k) {
         clean_frame(b, 0);
-        CHECK_EQUAL(eits_baseline_add(ctx, b->frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(ctx, b->frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-    CHECK(ctx->sheet_known && ctx->baseline.noise_v > 0);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    CHECK(ctx->sheet_known && ctx->reference.noise_v > 0);
     return ctx;
 }
 
@@ -179,9 +179,9 @@ static void clean_half_scans(void)
         bench b;
         eits_context *ctx = set_up(&b, 1);
         eits_options o = ctx->options;
-        o.project_baseline = (uint32_t)project;
+        o.project_reference = (uint32_t)project;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        CHECK_EQUAL(eits_baseline_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         for (int k = 0; k < 40; ++k) {
             clean_frame(&b, k % 2 ? 0.15 : 0.001);
             CHECK_EQUAL(reconstruct(&b), 0);
@@ -291,15 +291,15 @@ static void drift_is_no_mismatch(void)
         if (fold.second != EITS_FOLD_NONE)
             b.reference[fold.second] *= R(1) + R(0.1) * (eits_real)(k % 3);
     }
-    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-    for (int k = 0; k < QUIET; ++k) {
+    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+    for (int k = 0; k < UNTOUCHED; ++k) {
         clean_frame(&b, 0);
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     for (int project = 0; project < 2; ++project) {
         eits_options o = ctx->options;
-        o.project_baseline = (uint32_t)project;
+        o.project_reference = (uint32_t)project;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         clean_frame(&b, 0.02);
         CHECK_EQUAL(reconstruct(&b), 0);
@@ -376,7 +376,7 @@ static void what_sides_may_differ_by(void)
     for (size_t n = 0; n < sizeof CASES / sizeof *CASES; ++n) {
         bench b;
         eits_context *ctx = set_up(&b, 0);
-        CHECK(ctx->baseline.noise_v > R(4e-5) && ctx->baseline.noise_v < R(7e-5));
+        CHECK(ctx->reference.noise_v > R(4e-5) && ctx->reference.noise_v < R(7e-5));
         look_for(ctx, EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);
         memcpy(b.frame, b.reference, sizeof b.frame);
         for (uint32_t k = 0; k < 6; ++k) {
@@ -388,7 +388,7 @@ static void what_sides_may_differ_by(void)
         }
         /* the frame against its own reference's noise */
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            b.frame[i] += ctx->baseline.v0[i] - b.reference[i];
+            b.frame[i] += ctx->reference.v0[i] - b.reference[i];
         CHECK_EQUAL(reconstruct(&b), CASES[n].found ? EITS_DIAGNOSTIC_OUTLIER : 0);
         tear_down(&b);
     }

@@ -207,7 +207,7 @@ static void beside_a_basis(void)
         for (int i = 0; i < SMALL_ROWS; ++i)
             frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
         frame[b[solver].c.model.fold[4].first] = frame[b[solver].c.model.fold[4].second] = R(NAN);
-        CHECK_EQUAL(eits_baseline_set(ctx, reference, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
         eits_options o = with(ctx, (eits_solver)solver, 40, EITS_SIGN_INCREASE, 0.01);
         look_always(&o);
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);

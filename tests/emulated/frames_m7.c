@@ -7,7 +7,7 @@
  *     option NAME X   as eits_options calls it; "choose" puts all of them in force
  *     choose
  *     mask ROW 0|1
- *     quiet COUNT     take the reference from as many frames, until one is refused
+ *     untouched COUNT     take the reference from as many frames, until one is refused
  *     frames COUNT    reconstruct as many
  *     solve COUNT     as many vectors of reduced data, by the solver alone
  *     forget
@@ -102,7 +102,7 @@ static const option option_table[] = {
     WHOLE(max_touches),
     WHOLE(max_masked),
     WHOLE(warm_start),
-    WHOLE(project_baseline),
+    WHOLE(project_reference),
     WHOLE(touch_sweeps),
     WHOLE(mac_limit),
     WHOLE(diagnostics),
@@ -186,16 +186,16 @@ static int read_numbers(float *to, uint32_t count)
 /* All of `count` frames are read, also where one is refused. */
 static int tare(unsigned count)
 {
-    eits_status status = count >= 4 ? eits_baseline_begin(&ctx, count) : EITS_OK;
+    eits_status status = count >= 4 ? eits_reference_begin(&ctx, count) : EITS_OK;
     for (unsigned k = 0; k < count; ++k) {
         if (!read_numbers(frame, model.n_rows))
             return fail("frames.f32 is short");
         if (status == EITS_OK)
-            status = count >= 4 ? eits_baseline_add(&ctx, frame, model.n_rows)
-                                : eits_baseline_set(&ctx, frame, model.n_rows);
+            status = count >= 4 ? eits_reference_add(&ctx, frame, model.n_rows)
+                                : eits_reference_set(&ctx, frame, model.n_rows);
     }
     if (status == EITS_OK && count >= 4)
-        status = eits_baseline_finish(&ctx);
+        status = eits_reference_finish(&ctx);
     printf("quiet status %d\n", (int)status);
     return 1;
 }

@@ -68,8 +68,8 @@ static void draft_rows(draft *d, const skin_spec *spec)
 
 static void draft_volts(draft *d)
 {
-    static sheet quiet, touched;
-    sheet_init(&quiet);
+    static sheet untouched, touched;
+    sheet_init(&untouched);
     sheet_init(&touched);
     sheet_touch(&touched, 2, -1.5, 1.6, 4);
     sheet_solve(&touched);
@@ -77,7 +77,7 @@ static void draft_volts(draft *d)
         uint8_t at[4];
         for (int k = 0; k < 4; ++k)
             at[k] = d->rows[i][k] % SHEET_ELECTRODES;
-        d->volts[i] = (float)sheet_volts(&quiet, at);
+        d->volts[i] = (float)sheet_volts(&untouched, at);
         d->touched[i] = (float)sheet_volts(&touched, at);
     }
 }

@@ -17,7 +17,7 @@ static struct mirror {
     uint32_t frame;
 } mirror;
 
-static void mirror_start(uint32_t quiet)
+static void mirror_start(uint32_t untouched)
 {
     memset(&mirror, 0, sizeof mirror);
     CHECK_EQUAL(eits_init(&mirror.ctx, &b.open, mirror.workspace, eits_workspace_size(&b.open, 0)),
@@ -27,8 +27,8 @@ static void mirror_start(uint32_t quiet)
     options.warm_start = 1; /* of both, so that a frame depends on those before it */
     b.host.instrument.engine.ctx.options.warm_start = 1;
     CHECK_EQUAL(eits_set_options(&mirror.ctx, &options), EITS_OK);
-    if (quiet > 1)
-        CHECK_EQUAL(eits_baseline_begin(&mirror.ctx, quiet), EITS_OK);
+    if (untouched > 1)
+        CHECK_EQUAL(eits_reference_begin(&mirror.ctx, untouched), EITS_OK);
 }
 
 static int same_bits(const void *a, const void *c, size_t size)
@@ -76,15 +76,15 @@ static void mirror_follow(void)
         if (packet->type == EITS_PACKET_RAW) {
             memcpy(mirror.volts, packet->payload + sizeof *head, 4 * b.open.n_rows);
             mirror.frame = head->frame;
-            if ((head->flags & EITS_RAW_QUIET) != 0)
-                CHECK_EQUAL(mirror.ctx.baseline.wanted > 0
-                                ? eits_baseline_add(&mirror.ctx, mirror.volts, b.open.n_rows)
-                                : eits_baseline_set(&mirror.ctx, mirror.volts, b.open.n_rows),
+            if ((head->flags & EITS_RAW_REFERENCE) != 0)
+                CHECK_EQUAL(mirror.ctx.reference.wanted > 0
+                                ? eits_reference_add(&mirror.ctx, mirror.volts, b.open.n_rows)
+                                : eits_reference_set(&mirror.ctx, mirror.volts, b.open.n_rows),
                             EITS_OK);
         } else if (packet->type == EITS_PACKET_REPLY &&
                    ((const eits_packet_reply *)(const void *)head)->command == EITS_PACKET_TARE) {
-            if (mirror.ctx.baseline.wanted > 0)
-                CHECK_EQUAL(eits_baseline_finish(&mirror.ctx), EITS_OK);
+            if (mirror.ctx.reference.wanted > 0)
+                CHECK_EQUAL(eits_reference_finish(&mirror.ctx), EITS_OK);
             eits_forget(&mirror.ctx);
         } else if (packet->type == EITS_PACKET_IMAGE) {
             mirror_image(packet);
@@ -102,7 +102,7 @@ static void touch(double x, double y, double factor)
 
 /* Images and touches have the bits of the core run on the frames that were sent; warm starts
  * included, whatever is masked. */
-static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every,
+static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t every,
                            uint16_t check_every, uint32_t busy_ms)
 {
     bench_start(&b, spec);
@@ -116,15 +116,15 @@ static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every
     }
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
     host_forget(&b.host);
-    mirror_start(quiet);
-    CHECK_EQUAL(host_tare(&b.host, quiet).status, EITS_REPLY_OK);
+    mirror_start(untouched);
+    CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
     mirror_follow();
-    CHECK(b.host.instrument.engine.ctx.baseline.correlation > 0.99f);
-    CHECK(same_bits(mirror.ctx.baseline.v0, b.host.instrument.engine.ctx.baseline.v0,
+    CHECK(b.host.instrument.engine.ctx.reference.correlation > 0.99f);
+    CHECK(same_bits(mirror.ctx.reference.v0, b.host.instrument.engine.ctx.reference.v0,
                     4 * b.open.n_rows));
-    CHECK(same_bits(&mirror.ctx.baseline.lambda_noise,
-                    &b.host.instrument.engine.ctx.baseline.lambda_noise, 4));
+    CHECK(same_bits(&mirror.ctx.reference.lambda_noise,
+                    &b.host.instrument.engine.ctx.reference.lambda_noise, 4));
     const uint32_t ms = busy_ms > 0 ? 1500 : 150;
     touch(2, -3, 4);
     host_run(&b.host, ms);
@@ -132,10 +132,10 @@ static void test_same_bits(const skin_spec *spec, uint32_t quiet, uint16_t every
     host_run(&b.host, ms);
     mirror_follow();
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
-    if (quiet > 1)
-        CHECK_EQUAL(eits_baseline_begin(&mirror.ctx, quiet), EITS_OK);
+    if (untouched > 1)
+        CHECK_EQUAL(eits_reference_begin(&mirror.ctx, untouched), EITS_OK);
     /* with the touches: they are gone, and their ids */
-    CHECK_EQUAL(host_tare(&b.host, quiet).status, EITS_REPLY_OK);
+    CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
     touch(4, -2, 3);
     host_run(&b.host, ms);
@@ -165,8 +165,8 @@ static void test_angle(void)
         b.board.extra_turn = k / 9.0;
         CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
         CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
-        CHECK_NEAR(b.host.instrument.engine.ctx.baseline.gain, 1, 1e-3);
-        CHECK(b.host.instrument.engine.ctx.baseline.correlation > 0.9999f);
+        CHECK_NEAR(b.host.instrument.engine.ctx.reference.gain, 1, 1e-3);
+        CHECK(b.host.instrument.engine.ctx.reference.correlation > 0.9999f);
         host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
         float volts[256];
         memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
@@ -246,8 +246,8 @@ static void test_failed_tare(void)
     mirror_start(0);
     const fw_engine *engine = &b.host.instrument.engine;
     static float v0[256];
-    memcpy(v0, engine->ctx.baseline.v0, sizeof(float) * 208);
-    const eits_baseline before = engine->ctx.baseline;
+    memcpy(v0, engine->ctx.reference.v0, sizeof(float) * 208);
+    const eits_reference before = engine->ctx.reference;
     const float cosine = engine->cosine;
     touch(0, 0, 5);
     eits_command_tare tare = {.request = ++b.host.request, .frames = 16};
@@ -258,10 +258,10 @@ static void test_failed_tare(void)
     const eits_packet_reply reply = host_reply(&b.host, tare.request);
     CHECK_EQUAL(reply.status, EITS_REPLY_CORE);
     CHECK_EQUAL(reply.detail[0], EITS_E_FRAME_CHANNELS);
-    CHECK(same_bits(v0, engine->ctx.baseline.v0, sizeof(float) * 208));
-    CHECK_EQUAL(engine->ctx.baseline.ready, 1);
-    CHECK(same_bits(&before.noise_v, &engine->ctx.baseline.noise_v, 4));
-    CHECK(same_bits(&before.gain, &engine->ctx.baseline.gain, 4));
+    CHECK(same_bits(v0, engine->ctx.reference.v0, sizeof(float) * 208));
+    CHECK_EQUAL(engine->ctx.reference.ready, 1);
+    CHECK(same_bits(&before.noise_v, &engine->ctx.reference.noise_v, 4));
+    CHECK(same_bits(&before.gain, &engine->ctx.reference.gain, 4));
     CHECK(engine->cosine == cosine);
     CHECK_EQUAL(host_info(&b.host).tared, 1);
     b.sheet.detached[3] = false;
@@ -281,9 +281,9 @@ static void test_failed_tare(void)
     bench_stop(&b);
 }
 
-/* Frames whose scan began before the command are not quiet ones; frames of a tare are all sent,
+/* Frames whose scan began before the command are not untouched ones; frames of a tare are all sent,
  * whatever `every` is. */
-static void test_quiet_frames(void)
+static void test_reference_frames(void)
 {
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 5, 0).status, EITS_REPLY_OK);
@@ -291,17 +291,17 @@ static void test_quiet_frames(void)
     host_forget(&b.host);
     const uint32_t asked_us = (uint32_t)(b.board.now_ns / 1000);
     CHECK_EQUAL(host_tare(&b.host, 6).status, EITS_REPLY_OK);
-    uint32_t quiet = 0, last = 0;
+    uint32_t untouched = 0, last = 0;
     for (uint32_t k = 0; k < b.host.packets; ++k) {
         const eits_packet_raw *head = (const void *)b.host.packet[k].payload;
-        if (b.host.packet[k].type != EITS_PACKET_RAW || (head->flags & EITS_RAW_QUIET) == 0)
+        if (b.host.packet[k].type != EITS_PACKET_RAW || (head->flags & EITS_RAW_REFERENCE) == 0)
             continue;
         CHECK((int32_t)(head->time_us - asked_us) >= 0);
-        CHECK(quiet == 0 || head->frame == last + 1);
+        CHECK(untouched == 0 || head->frame == last + 1);
         last = head->frame;
-        ++quiet;
+        ++untouched;
     }
-    CHECK_EQUAL(quiet, 6);
+    CHECK_EQUAL(untouched, 6);
     CHECK_EQUAL(b.host.packet[b.host.packets - 1].type, EITS_PACKET_REPLY);
     bench_stop(&b);
 }
@@ -340,7 +340,7 @@ int main(void)
     test_streaming();
     test_back_pressure();
     test_failed_tare();
-    test_quiet_frames();
+    test_reference_frames();
     test_self_test_keeps_the_tare();
     return checks_report("instrument");
 }

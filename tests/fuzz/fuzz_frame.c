@@ -141,8 +141,8 @@ static void read_frame(twins *t, fuzz_bytes *in)
 
 static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
 {
-    uint32_t *whole[] = {&o->iterations,    &o->gap_every,        &o->max_touches,  &o->max_masked,
-                         &o->warm_start,    &o->project_baseline, &o->touch_sweeps, &o->mac_limit,
+    uint32_t *whole[] = {&o->iterations,    &o->gap_every,         &o->max_touches,  &o->max_masked,
+                         &o->warm_start,    &o->project_reference, &o->touch_sweeps, &o->mac_limit,
                          &o->track_confirm, &o->track_hold};
     eits_real *real[] = {&o->lambda_abs,
                          &o->lambda_rel,
@@ -193,9 +193,9 @@ static void change_options(twins *t, fuzz_bytes *in)
         MUST(eits_set_options(&t->ctx[k], &wanted) == EITS_OK);
 }
 
-static void check_baseline(const twins *t)
+static void check_reference(const twins *t)
 {
-    const eits_baseline *a = &t->ctx[0].baseline, *b = &t->ctx[t->count - 1].baseline;
+    const eits_reference *a = &t->ctx[0].reference, *b = &t->ctx[t->count - 1].reference;
     MUST(a->ready == b->ready && a->count == b->count);
     if (!a->ready)
         return;
@@ -209,24 +209,24 @@ static void check_baseline(const twins *t)
 
 static void take_reference(twins *t, size_t length)
 {
-#define SET(ctx) eits_baseline_set(ctx, t->frame, length)
-    const uint32_t ready = t->ctx[0].baseline.ready;
+#define SET(ctx) eits_reference_set(ctx, t->frame, length)
+    const uint32_t ready = t->ctx[0].reference.ready;
     const eits_status status = BOTH(SET);
     MUST(length == SMALL_ROWS || status == EITS_E_FRAME_LENGTH);
-    MUST(t->ctx[0].baseline.ready == (status == EITS_OK ? 1 : ready));
+    MUST(t->ctx[0].reference.ready == (status == EITS_OK ? 1 : ready));
 }
 
 static void learn_reference(twins *t, fuzz_bytes *in)
 {
     const uint32_t count = fuzz_u8(in) % 8u;
-#define BEGIN(ctx) eits_baseline_begin(ctx, count)
-#define ADD(ctx)   eits_baseline_add(ctx, t->frame, SMALL_ROWS)
+#define BEGIN(ctx) eits_reference_begin(ctx, count)
+#define ADD(ctx)   eits_reference_add(ctx, t->frame, SMALL_ROWS)
     MUST((BOTH(BEGIN) == EITS_OK) == (count >= 4));
     for (uint32_t k = 0; k < count; ++k) {
         read_frame(t, in);
         (void)BOTH(ADD);
     }
-    (void)BOTH(eits_baseline_finish);
+    (void)BOTH(eits_reference_finish);
 }
 
 static void reconstruct(twins *t, fuzz_bytes *in, int touches)
@@ -289,7 +289,7 @@ static void step(twins *t, fuzz_bytes *in)
         reconstruct(t, in, 0);
         break;
     }
-    check_baseline(t);
+    check_reference(t);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -44,7 +44,7 @@ static void use(const eits_model *model)
         const eits_status status = eits_self_test(&ctx, &difference);
         /* infinite where the golden image is not of this world, never NaN */
         MUST(difference >= 0);
-        if (ctx.baseline.ready)
+        if (ctx.reference.ready)
             fuzz_check_result(&ctx, status, 0);
     }
     options.iterations = 1 + (options.iterations - 1) % MOST_ITERATIONS;
@@ -52,7 +52,7 @@ static void use(const eits_model *model)
     options.warm_start = 1;
     MUST(eits_set_options(&ctx, &options) == EITS_OK);
     frame_of(model, model->golden.reference, 1.0f, frame);
-    if (eits_baseline_set(&ctx, frame, model->n_rows) != EITS_OK)
+    if (eits_reference_set(&ctx, frame, model->n_rows) != EITS_OK)
         return;
     frame_of(model, model->golden.frame, 1.0f, frame);
     reconstruct(&ctx, frame);

@@ -74,9 +74,9 @@ int hand_begin(hand *h, const eits_model *model)
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
         const eits_real v = (eits_real)model->v_ref[k];
-        h->quiet[fold.first] = v;
+        h->untouched[fold.first] = v;
         if (fold.second != EITS_FOLD_NONE)
-            h->quiet[fold.second] = (eits_real)fold.sign * v;
+            h->untouched[fold.second] = (eits_real)fold.sign * v;
         squares += v * v;
     }
     h->rms = eits_sqrt(squares / (eits_real)model->n_folded);
@@ -136,7 +136,7 @@ void hand_frame(hand *h, uint64_t k, eits_real gain, int touched, eits_real *fra
         press(h, k, f, y);
     solve(h, y);
     for (uint32_t i = 0; i < m->n_rows; ++i)
-        frame[i] = gain * h->quiet[i] + NOISE * h->rms * uniform(h);
+        frame[i] = gain * h->untouched[i] + NOISE * h->rms * uniform(h);
     for (uint32_t fold = 0; fold < m->n_folded; ++fold) {
         const float *column = reduction_column(m, fold);
         eits_real d = 0;

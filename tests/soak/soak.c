@@ -21,7 +21,7 @@ enum {
     MOST_WORKSPACE = 640 * 1024,
     MOST_PIXELS = 4096,
     GUARD = 64,
-    QUIET_FRAMES = 8,
+    REFERENCE_FRAMES = 8,
     PAINT = 0xA5
 };
 enum { HELD_FRAMES = 10, LONG_RUN = 100000, SHORT = 1000 };
@@ -89,12 +89,12 @@ static void take_reference(eits_context *ctx)
     again.random = tare_random;
     for (uint32_t i = 0; i < model.n_rows; ++i)
         CHECK(eits_mask_row(ctx, i, i == masked_row) == EITS_OK);
-    CHECK(eits_baseline_begin(ctx, QUIET_FRAMES) == EITS_OK);
-    for (int k = 0; k < QUIET_FRAMES; ++k) {
+    CHECK(eits_reference_begin(ctx, REFERENCE_FRAMES) == EITS_OK);
+    for (int k = 0; k < REFERENCE_FRAMES; ++k) {
         hand_frame(&again, 0, tare_gain, 0, frame);
-        CHECK(eits_baseline_add(ctx, frame, model.n_rows) == EITS_OK);
+        CHECK(eits_reference_add(ctx, frame, model.n_rows) == EITS_OK);
     }
-    CHECK(eits_baseline_finish(ctx) == EITS_OK);
+    CHECK(eits_reference_finish(ctx) == EITS_OK);
 }
 
 static void tare(void)
@@ -120,7 +120,7 @@ static void change_options(void)
     o.gap_rel = hand_draw(&fingers, 2) ? R(1e-2) : 0;
     o.sign = hand_draw(&fingers, 4) ? EITS_SIGN_INCREASE : EITS_SIGN_BOTH;
     o.warm_start = hand_draw(&fingers, 8) != 0;
-    o.project_baseline = hand_draw(&fingers, 8) != 0;
+    o.project_reference = hand_draw(&fingers, 8) != 0;
     o.mac_limit = hand_draw(&fingers, 4) ? 0 : 200000 + hand_draw(&fingers, 1000000);
     o.touch_search =
         hand_draw(&fingers, 2) ? EITS_SEARCH_ALL : hand_draw(&fingers, EITS_SEARCH_ALL + 1);

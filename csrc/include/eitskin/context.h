@@ -1,6 +1,6 @@
 /* eitskin: one reconstruction context in memory that the caller owns.
  *
- * Order of calls: eits_model_open, eits_init, a reference frame (eits_baseline_*), then
+ * Order of calls: eits_model_open, eits_init, a reference frame (eits_reference_*), then
  * eits_reconstruct and, if touches are wanted, eits_find_touches for each frame. Contexts share
  * nothing; one context is used by one thread at a time.
  */
@@ -50,7 +50,7 @@ typedef struct eits_options {
     /* 1: start from the last frame's coefficients, momentum reset; see solve.h for what it does */
     uint32_t warm_start;
     /* 1: ignore changes along the reference frame, that is drift of the gain */
-    uint32_t project_baseline;
+    uint32_t project_reference;
     eits_real lambda_abs; /* > 0: this lambda, in the units of S'y; 0: by the rule below */
     /* lambda = max(lambda_rel lambda_max, lambda_noise_factor lambda_noise) */
     eits_real lambda_rel;
@@ -123,7 +123,7 @@ typedef struct eits_info {
     uint64_t touch_macs; /* the same for eits_find_touches */
     eits_real lambda;
     eits_real lambda_max;
-    eits_real lambda_noise; /* the baseline's, times what rows left out add */
+    eits_real lambda_noise; /* the reference's, times what rows left out add */
     /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED, and where
      * MACS came before anything was known */
     eits_real gap;
@@ -171,12 +171,12 @@ typedef struct eits_followed {
 /* matrix products, chosen at start-up among builds that give the same bits */
 struct eits_kernels;
 
-/* Learned from quiet frames. */
-typedef struct eits_baseline {
-    /* n_rows: mean of the quiet frames, V; NaN for a row that was masked in any of them */
+/* Learned from reference frames. */
+typedef struct eits_reference {
+    /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them */
     eits_real *v0;
     eits_real *m2; /* n_rows: sum of squared deviations, in m2_unit^2 */
-    /* V: a power of two near the first quiet frame's greatest voltage, so that squares are
+    /* V: a power of two near the first reference frame's greatest voltage, so that squares are
      * numbers */
     eits_real m2_unit;
     uint32_t wanted, count;
@@ -186,18 +186,18 @@ typedef struct eits_baseline {
     eits_real gain;
     /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
     eits_real correlation;
-    eits_real noise_v; /* rms over rows of the quiet frames' deviation, V; 0 if unknown */
-    /* greatest max(S'y) seen in quiet frames, as with all rows in use; 0 if unknown */
+    eits_real noise_v; /* rms over rows of the reference frames' deviation, V; 0 if unknown */
+    /* greatest max(S'y) seen in reference frames, as with all rows in use; 0 if unknown */
     eits_real lambda_noise;
-    uint32_t second_waits; /* the second quiet frame is in m2 until there is a third */
-    uint32_t outliers;     /* readings of quiet frames that were left out of the reference */
-} eits_baseline;
+    uint32_t second_waits; /* the second reference frame is in m2 until there is a third */
+    uint32_t outliers;     /* readings of reference frames that were left out of the reference */
+} eits_reference;
 
 typedef struct eits_context {
     const eits_model *model;
     const struct eits_kernels *kernels;
     eits_options options;
-    eits_baseline baseline;
+    eits_reference reference;
     uint8_t *bad; /* n_rows: masked by the caller */
     /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
     uint8_t *unusable;

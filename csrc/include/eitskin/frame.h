@@ -29,18 +29,18 @@ extern "C" {
 /* Take one frame as the reference; noise and lambda_noise stay unknown (0), so nothing is gated.
  * Errors: EITS_E_ARGUMENT, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO. The old
  * reference then stays. */
-eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t length);
+eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t length);
 
-/* Learn reference and noise from `count` >= 4 quiet frames: begin, add each, finish. The first half
- * gives a first mean; the second half also gives lambda_noise, the greatest max(S'y) that a quiet
- * frame showed, told as with the model's own floor; the mean of all is the reference. Until finish
- * returns EITS_OK there is no reference. Single readings that neither their reciprocals nor the
- * other frames bear out are left out of it, and counted (baseline.outliers). Errors as above;
- * EITS_E_BASELINE_SHORT if frames are missing, EITS_E_NOT_FINITE if S'y of a frame would not be
- * finite. A frame that is refused does not count. */
-eits_status eits_baseline_begin(eits_context *ctx, uint32_t count);
-eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length);
-eits_status eits_baseline_finish(eits_context *ctx);
+/* Learn reference and noise from `count` >= 4 reference frames: begin, add each, finish. The first
+ * half gives a first mean; the second half also gives lambda_noise, the greatest max(S'y) that a
+ * reference frame showed, told as with the model's own floor; the mean of all is the reference.
+ * Until finish returns EITS_OK there is no reference. Single readings that neither their
+ * reciprocals nor the other frames bear out are left out of it, and counted (reference.outliers).
+ * Errors as above; EITS_E_REFERENCE_SHORT if frames are missing, EITS_E_NOT_FINITE if S'y of a
+ * frame would not be finite. A frame that is refused does not count. */
+eits_status eits_reference_begin(eits_context *ctx, uint32_t count);
+eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t length);
+eits_status eits_reference_finish(eits_context *ctx);
 
 /* Leave row `row` of the protocol out of every frame (bad = 1) or use it again (0). A row that was
  * left out while the reference was taken has none, and stays out until the next reference. Errors:
@@ -48,7 +48,7 @@ eits_status eits_baseline_finish(eits_context *ctx);
 eits_status eits_mask_row(eits_context *ctx, uint32_t row, int bad);
 
 /* The frame stage alone: fills ctx->d, ctx->y, ctx->basis (and F), ctx->unusable and returns the
- * number of rows left out in `masked`. Errors: EITS_E_NO_BASELINE, EITS_E_FRAME_LENGTH,
+ * number of rows left out in `masked`. Errors: EITS_E_NO_REFERENCE, EITS_E_FRAME_LENGTH,
  * EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO, EITS_E_NOT_FINITE. */
 eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t length,
                              uint32_t *masked, uint64_t *macs);

@@ -123,7 +123,7 @@ typedef enum eits_fault {
 #define EITS_FAULT_CLEAN_FRAMES 8u
 
 /* Bits of eits_packet_raw.flags */
-#define EITS_RAW_QUIET      1u /* a frame of a tare */
+#define EITS_RAW_REFERENCE  1u /* a frame of a tare */
 #define EITS_RAW_RECIPROCAL 2u /* only reciprocal-unique rows were measured */
 #define EITS_RAW_CHECK      4u /* a full scan among reciprocal ones, for the check of reciprocity */
 

@@ -47,7 +47,7 @@ eits_status eits_solve(eits_context *ctx);
 
 /* Run the model's golden frame with default options: the image must have the bits that the model
  * states (float32), or be within `*difference` of it, relative to its peak (reported in either
- * width). The context must be fresh from eits_init; its baseline is the golden reference
+ * width). The context must be fresh from eits_init; its reference is the golden reference
  * afterwards. Errors as eits_reconstruct. */
 eits_status eits_self_test(eits_context *ctx, eits_real *difference);
 

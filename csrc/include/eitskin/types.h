@@ -49,9 +49,9 @@ typedef enum eits_status {
     /* the reference or another frame is all zero, or a frame nothing but noise: the front end is
      * dead */
     EITS_E_FRAME_ZERO = -12,
-    EITS_E_NO_BASELINE = -13, /* a frame came before the reference frame was set */
-    /* a baseline was finished with fewer quiet frames than it needs */
-    EITS_E_BASELINE_SHORT = -14,
+    EITS_E_NO_REFERENCE = -13, /* a frame came before the reference frame was set */
+    /* a reference was finished with fewer reference frames than it needs */
+    EITS_E_REFERENCE_SHORT = -14,
     /* a result would not be finite; the outputs were cleared instead */
     EITS_E_NOT_FINITE = -15
 } eits_status;

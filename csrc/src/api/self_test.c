@@ -9,11 +9,11 @@ eits_status eits_self_test(eits_context *ctx, eits_real *difference)
         return EITS_E_ARGUMENT;
     const eits_model *model = ctx->model;
     /* n_rows numbers that a single reference frame leaves unused */
-    eits_real *frame = ctx->baseline.m2;
+    eits_real *frame = ctx->reference.m2;
     *difference = 0;
     for (uint32_t i = 0; i < model->n_rows; ++i)
-        ctx->baseline.v0[i] = (eits_real)model->golden.reference[i];
-    eits_status status = eits_baseline_set(ctx, ctx->baseline.v0, model->n_rows);
+        ctx->reference.v0[i] = (eits_real)model->golden.reference[i];
+    eits_status status = eits_reference_set(ctx, ctx->reference.v0, model->n_rows);
     if (status != EITS_OK)
         return status;
     for (uint32_t i = 0; i < model->n_rows; ++i)

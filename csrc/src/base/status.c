@@ -29,10 +29,10 @@ const char *eits_status_text(eits_status status)
         return "too many channels of the frame are unusable";
     case EITS_E_FRAME_ZERO:
         return "all voltages are zero; is the skin driven and connected?";
-    case EITS_E_NO_BASELINE:
+    case EITS_E_NO_REFERENCE:
         return "no reference frame has been set";
-    case EITS_E_BASELINE_SHORT:
-        return "the baseline has too few quiet frames";
+    case EITS_E_REFERENCE_SHORT:
+        return "the reference has too few frames";
     case EITS_E_NOT_FINITE:
         return "the result would not be finite";
     }

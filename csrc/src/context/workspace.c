@@ -29,7 +29,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .sign = EITS_SIGN_INCREASE,
         .solver = (eits_solver)d->solver,
         .warm_start = 0,
-        .project_baseline = 1,
+        .project_reference = 1,
         .lambda_abs = 0,
         .lambda_rel = (eits_real)d->lambda_rel,
         .lambda_noise_factor = (eits_real)d->lambda_noise_factor,
@@ -104,8 +104,8 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     const size_t rows = ctx->model->n_rows, folded = ctx->model->n_folded,
                  pixels = ctx->model->n_pixels;
     const size_t stride = EITS_STRIDE(ctx->model->rank);
-    ctx->baseline.v0 = take_reals(a, rows);
-    ctx->baseline.m2 = take_reals(a, rows);
+    ctx->reference.v0 = take_reals(a, rows);
+    ctx->reference.m2 = take_reals(a, rows);
     ctx->bad = take_bytes(a, rows);
     ctx->unusable = take_bytes(a, rows);
     ctx->basis_for = take_bytes(a, folded);
@@ -187,7 +187,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         o->iterations >= 1 && o->gap_every >= 1 && o->max_touches <= EITS_MAX_TOUCHES &&
         (uint32_t)o->sign <= (uint32_t)EITS_SIGN_BOTH &&
         (uint32_t)o->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET && o->warm_start <= 1 &&
-        o->project_baseline <= 1 && in_range(o->lambda_abs, 0, huge) &&
+        o->project_reference <= 1 && in_range(o->lambda_abs, 0, huge) &&
         in_range(o->lambda_rel, 0, 1) && in_range(o->lambda_noise_factor, 0, huge) &&
         in_range(o->gate_factor, 0, huge) && in_range(o->gap_rel, 0, 1) &&
         in_range(o->saturation_v, 0, huge) && in_range(o->touch_threshold, 0, 1) &&
@@ -205,7 +205,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)
         ctx->warm = 0;
-    if (o->project_baseline != ctx->options.project_baseline ||
+    if (o->project_reference != ctx->options.project_reference ||
         o->floor_noise_factor != ctx->options.floor_noise_factor)
         ctx->basis_stale = 1;
     ctx->options = *o;

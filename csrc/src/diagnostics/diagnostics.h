@@ -1,5 +1,5 @@
 /* What the stages ask of a frame before and after it is solved: electrodes.c, outlier.c,
- * mismatch.c, quiet.c. */
+ * mismatch.c, reference_outliers.c. */
 #ifndef EITSKIN_EXAMINE_H
 #define EITSKIN_EXAMINE_H
 
@@ -88,23 +88,24 @@ int eits_find_outliers(eits_context *ctx, uint64_t *macs);
  * fold left out, ctx->sheet_known. */
 int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs);
 
-/* A row of ctx->bad that is left out of the quiet frame at hand only. */
-enum { EITS_BAD_NOW = 2 };
+/* A row of ctx->bad that is left out of the reference frame at hand only. */
+enum { EITS_MASKED_NOW = 2 };
 
-/* The quiet frame `newer` against `older`: how many folds do not agree (0 where they are too many
- * to be outliers); sets `bit` in ctx->list_index of those, clears it in the others. Uses the list.
+/* The reference frame `newer` against `older`: how many folds do not agree (0 where they are too
+ * many to be outliers); sets `bit` in ctx->list_index of those, clears it in the others. Uses the
+ * list.
  */
-uint32_t eits_quiet_odd(eits_context *ctx, const eits_real *newer, const eits_real *older,
-                        uint8_t bit);
+uint32_t eits_reference_compare(eits_context *ctx, const eits_real *newer, const eits_real *older,
+                                uint8_t bit);
 
-/* Mark the readings of a quiet frame that the mean so far does not bear out with EITS_BAD_NOW;
- * returns their number. */
-uint32_t eits_quiet_leave_out(eits_context *ctx, const eits_real *frame);
-void eits_quiet_clear(eits_context *ctx);
+/* Mark the readings of a reference frame that the mean so far does not bear out with
+ * EITS_MASKED_NOW; returns their number. */
+uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_real *frame);
+void eits_reference_unmask(eits_context *ctx);
 
-/* Of the first two quiet frames, in v0 and m2: readings that neither the other nor the third bears
- * out become the other's. Returns their number. */
-uint32_t eits_quiet_weigh(eits_context *ctx, const eits_real *frame);
+/* Of the first two reference frames, in v0 and m2: readings that neither the other nor the third
+ * bears out become the other's. Returns their number. */
+uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_real *frame);
 
 /* What mismatch and prediction need to know of P and S; once, at the start. */
 void eits_learn_sheet(eits_context *ctx);

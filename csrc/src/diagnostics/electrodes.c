@@ -11,14 +11,14 @@ typedef struct limits {
 
 static limits limits_of(const eits_context *ctx)
 {
-    const eits_real share = EITS_ROW_SIGNIFICANT * ctx->baseline.v0_rms,
-                    noise = EITS_ROW_DEAD_NOISE * ctx->baseline.noise_v;
+    const eits_real share = EITS_ROW_SIGNIFICANT * ctx->reference.v0_rms,
+                    noise = EITS_ROW_DEAD_NOISE * ctx->reference.noise_v;
     return (limits){share > 10 * noise ? share : 10 * noise, noise};
 }
 
 static int judge_row(const eits_context *ctx, const eits_real *frame, limits most, uint32_t i)
 {
-    const eits_real v0 = ctx->baseline.v0[i], size = eits_fabs(v0);
+    const eits_real v0 = ctx->reference.v0[i], size = eits_fabs(v0);
     if (!(size >= most.significant) || (ctx->unusable[i] & EITS_ROW_MASKED) != 0)
         return 0;
     if (ctx->unusable[i] != 0)
@@ -34,8 +34,8 @@ static int judge_row(const eits_context *ctx, const eits_real *frame, limits mos
 /* Far beyond what a touch makes of a row, be its reference ever so small. */
 static int is_grown(const eits_context *ctx, const eits_real *frame, limits most, uint32_t i)
 {
-    const eits_real v0 = eits_fabs(ctx->baseline.v0[i]),
-                    least = EITS_ROW_SMALL * ctx->baseline.v0_rms;
+    const eits_real v0 = eits_fabs(ctx->reference.v0[i]),
+                    least = EITS_ROW_SMALL * ctx->reference.v0_rms;
     return ctx->unusable[i] == 0 &&
            eits_fabs(frame[i]) > eits_fma(EITS_ROW_GROWN, v0 > least ? v0 : least, most.noise);
 }

@@ -102,7 +102,7 @@ static uint64_t learn_stray(eits_context *ctx)
 
 eits_real eits_noise_energy(const eits_context *ctx)
 {
-    const eits_baseline *b = &ctx->baseline;
+    const eits_reference *b = &ctx->reference;
     const eits_real one = b->gain * b->noise_v * (b->gain * b->noise_v);
     eits_real sum = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
@@ -127,7 +127,7 @@ eits_real eits_expected_noise(const eits_context *ctx)
 int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs)
 {
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
-    if (rank >= folds || !(ctx->baseline.noise_v > 0))
+    if (rank >= folds || !(ctx->reference.noise_v > 0))
         return 0;
     const eits_real drift = eits_dot(ctx, ctx->along, ctx->along, folds);
     if (drift > 0 && ctx->stray_stale)

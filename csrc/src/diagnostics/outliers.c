@@ -44,7 +44,7 @@ typedef struct tolerance {
 
 static eits_real most_by_noise(const eits_context *ctx, uint32_t k)
 {
-    const eits_baseline *b = &ctx->baseline;
+    const eits_reference *b = &ctx->reference;
     if (ctx->model->data_kind != EITS_DATA_NORMALISED)
         return EITS_OUTLIER_NOISE * eits_sqrt(R(2.0)) * eits_fabs(b->gain) * b->noise_v;
     const eits_real first = b->noise_v / b->v0[ctx->model->fold[k].first],
@@ -57,7 +57,7 @@ static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)
     if (ctx->basis_for[k] != EITS_SIDE_BOTH)
         return 0;
     const eits_real off = eits_fabs(ctx->apart[k]);
-    if (!(off > (ctx->baseline.noise_v > 0 ? most_by_noise(ctx, k) : most.robust)) ||
+    if (!(off > (ctx->reference.noise_v > 0 ? most_by_noise(ctx, k) : most.robust)) ||
         !(off > most.largest))
         return 0;
     return off > EITS_OUTLIER_FRACTION * eits_fma(R(0.5), off, eits_fabs(ctx->d[k]));
@@ -75,7 +75,7 @@ static tolerance find_tolerance(const eits_context *ctx)
             ctx->list_value[count++] = eits_fabs(ctx->apart[k]);
     }
     most.largest *= EITS_OUTLIER_LARGEST;
-    if (!(ctx->baseline.noise_v > 0) && count > 0) {
+    if (!(ctx->reference.noise_v > 0) && count > 0) {
         const eits_real median = eits_kth(ctx->list_value, count, count / 2);
         most.robust = EITS_OUTLIER_ROBUST * EITS_ROBUST * median;
         if (!(median > 0))

@@ -14,7 +14,7 @@ static void find_unusable(eits_context *ctx, const eits_real *frame)
     const eits_real limit = ctx->options.saturation_v;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const unsigned masked =
-            ctx->bad[i] || !eits_is_finite(ctx->baseline.v0[i]) ? EITS_ROW_MASKED : 0;
+            ctx->bad[i] || !eits_is_finite(ctx->reference.v0[i]) ? EITS_ROW_MASKED : 0;
         const unsigned unknown = !eits_is_finite(frame[i]) ? EITS_ROW_UNKNOWN : 0;
         const unsigned saturated =
             limit > 0 && eits_fabs(frame[i]) >= limit ? EITS_ROW_SATURATED : 0;
@@ -42,7 +42,7 @@ static void clear_diagnostics(eits_context *ctx)
     memset(ctx->electrode, 0, sizeof ctx->electrode);
 }
 
-/* A frame of nothing but zeros is a dead front end, not a quiet skin. */
+/* A frame of nothing but zeros is a dead front end, not a untouched skin. */
 static int is_dead(const eits_context *ctx, const eits_real *frame)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
@@ -57,7 +57,7 @@ static int is_dead(const eits_context *ctx, const eits_real *frame)
 static eits_real log_datum(const eits_context *ctx, eits_real v, eits_real v0)
 {
     const eits_real q = v / v0, low = R(1.0 / 16.0), high = R(16.0);
-    return ctx->baseline.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
+    return ctx->reference.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
 }
 
 /* The datum of one row from its voltage and its reference, in model volts (or without unit where
@@ -72,14 +72,14 @@ static eits_real datum(const eits_context *ctx, eits_real v, eits_real v0)
     case EITS_DATA_LOG_RATIO:
         return log_datum(ctx, v, v0);
     }
-    return ctx->baseline.gain * (v - v0);
+    return ctx->reference.gain * (v - v0);
 }
 
 /* Rows whose reference is all but zero say nothing as a ratio. */
 static int ratio_undefined(const eits_context *ctx, eits_real v0)
 {
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE &&
-           eits_fabs(v0) < R(1e-6) * ctx->baseline.v0_rms;
+           eits_fabs(v0) < R(1e-6) * ctx->reference.v0_rms;
 }
 
 /* A row and its reciprocal that differ by less than rounding of their references agree: quantised
@@ -89,14 +89,14 @@ static int is_apart(const eits_context *ctx, eits_real apart, eits_real v0)
     const eits_real rounding = sizeof(eits_real) == 4 ? R(0x1p-20) : R(0x1p-49);
     return eits_fabs(apart) > rounding * (ctx->model->data_kind == EITS_DATA_NORMALISED
                                               ? 1
-                                              : eits_fabs(ctx->baseline.gain * v0));
+                                              : eits_fabs(ctx->reference.gain * v0));
 }
 
 /* d_k: the mean of a row and its reciprocal, or whichever is usable; apart_k: their difference.
  * Sets basis_for, and says whether any of it changed. */
 static int fold_data(eits_context *ctx, const eits_real *frame)
 {
-    const eits_real *v0 = ctx->baseline.v0;
+    const eits_real *v0 = ctx->reference.v0;
     int changed = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_fold fold = ctx->model->fold[k];
@@ -162,11 +162,11 @@ static uint64_t drift_direction(eits_context *ctx, eits_real *out)
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];
         const uint8_t used = ctx->basis_for[k];
-        const eits_real first = used & EITS_SIDE_FIRST ? ctx->baseline.v0[fold.first] : 0;
+        const eits_real first = used & EITS_SIDE_FIRST ? ctx->reference.v0[fold.first] : 0;
         const eits_real second =
-            used & EITS_SIDE_SECOND ? (eits_real)fold.sign * ctx->baseline.v0[fold.second] : 0;
+            used & EITS_SIDE_SECOND ? (eits_real)fold.sign * ctx->reference.v0[fold.second] : 0;
         const eits_real along =
-            ctx->baseline.gain *
+            ctx->reference.gain *
             (used == EITS_SIDE_BOTH ? R(0.5) * (first + second) : first + second);
         ctx->list_index[k] = k;
         ctx->along[k] =
@@ -187,7 +187,7 @@ static uint64_t rebuild_basis(eits_context *ctx)
         reduction_column(ctx, k, ctx->residual);
         macs += ctx->model->rank + extend_basis(ctx, ctx->residual);
     }
-    if (ctx->options.project_baseline) {
+    if (ctx->options.project_reference) {
         macs += drift_direction(ctx, ctx->residual);
         macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->residual) : 0;
         macs += extend_basis(ctx, ctx->residual);
@@ -215,7 +215,7 @@ static uint32_t reduce(eits_context *ctx, uint64_t *macs)
  * all but zero stay differences. */
 static uint64_t reduce_straight(eits_context *ctx, const eits_real *frame)
 {
-    const eits_real *v0 = ctx->baseline.v0, least = R(1e-6) * ctx->baseline.v0_rms;
+    const eits_real *v0 = ctx->reference.v0, least = R(1e-6) * ctx->reference.v0_rms;
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_fold fold = ctx->model->fold[k];
@@ -267,7 +267,7 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
 {
     const eits_model *model = ctx->model;
     /* without a reference there is nothing to judge by */
-    const int judged = ctx->baseline.ready != 0;
+    const int judged = ctx->reference.ready != 0;
     *macs = 0;
     clear_diagnostics(ctx);
     find_unusable(ctx, frame);
@@ -311,8 +311,8 @@ eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t l
 {
     if (ctx == NULL || frame == NULL || masked == NULL || macs == NULL)
         return EITS_E_ARGUMENT;
-    if (!ctx->baseline.ready)
-        return EITS_E_NO_BASELINE;
+    if (!ctx->reference.ready)
+        return EITS_E_NO_REFERENCE;
     if (length != ctx->model->n_rows)
         return EITS_E_FRAME_LENGTH;
     return eits_frame_data(ctx, frame, masked, macs);

@@ -1,4 +1,4 @@
-/* What the stages (baseline, frame, solve, touch) share inside the library. */
+/* What the stages (reference, frame, solve, touch) share inside the library. */
 #ifndef EITSKIN_STAGES_H
 #define EITSKIN_STAGES_H
 
@@ -12,7 +12,7 @@ uint64_t eits_project(const eits_context *ctx, eits_real *v);
  * multiply-accumulates. */
 uint64_t eits_reduce(eits_context *ctx, uint32_t count, eits_real *out);
 
-/* eits_frame_stage without its checks; the baseline need not be finished. */
+/* eits_frame_stage without its checks; the reference need not be finished. */
 eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t *masked,
                             uint64_t *macs);
 

@@ -1,4 +1,4 @@
-/* The reference frame and its noise, from one frame or learned from many quiet ones. */
+/* The reference frame and its noise, from one frame or learned from many untouched ones. */
 #include "eitskin/frame.h"
 
 #include "base/vec.h"
@@ -7,10 +7,11 @@
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
-enum { MIN_QUIET_FRAMES = 4 };
+enum { MIN_REFERENCE_FRAMES = 4 };
 
-/* A quiet frame must be whole: rows that cannot be used are to be masked first. */
-static eits_status check_quiet(const eits_context *ctx, const eits_real *frame, size_t length)
+/* A reference frame must be whole: rows that cannot be used are to be masked first. */
+static eits_status check_reference_frame(const eits_context *ctx, const eits_real *frame,
+                                         size_t length)
 {
     if (length != ctx->model->n_rows)
         return EITS_E_FRAME_LENGTH;
@@ -27,13 +28,13 @@ static eits_status check_quiet(const eits_context *ctx, const eits_real *frame, 
  * taken. */
 static int has_reference(const eits_context *ctx, uint32_t row)
 {
-    return row != EITS_FOLD_NONE && !ctx->bad[row] && eits_is_finite(ctx->baseline.v0[row]);
+    return row != EITS_FOLD_NONE && !ctx->bad[row] && eits_is_finite(ctx->reference.v0[row]);
 }
 
 /* The reference on one folded row: the mean of both sides in use; 0 where neither is. */
 static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
 {
-    const eits_real *v0 = ctx->baseline.v0;
+    const eits_real *v0 = ctx->reference.v0;
     const int first = has_reference(ctx, fold.first), second = has_reference(ctx, fold.second);
     const eits_real turned = second ? (eits_real)fold.sign * v0[fold.second] : 0;
     return first && second ? R(0.5) * (v0[fold.first] + turned) : (first ? v0[fold.first] : turned);
@@ -44,7 +45,7 @@ static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
 static eits_status fit_to_model(eits_context *ctx)
 {
     const eits_model *model = ctx->model;
-    eits_baseline *b = &ctx->baseline;
+    eits_reference *b = &ctx->reference;
     eits_real largest = 0, largest_ref = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_real v = eits_fabs(folded_reference(ctx, model->fold[k])),
@@ -80,14 +81,14 @@ static eits_status fit_to_model(eits_context *ctx)
     return eits_is_finite(b->gain) && b->gain != 0 ? EITS_OK : EITS_E_FRAME_ZERO;
 }
 
-eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t length)
+eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t length)
 {
     if (ctx == NULL || frame == NULL)
         return EITS_E_ARGUMENT;
-    eits_status status = check_quiet(ctx, frame, length);
+    eits_status status = check_reference_frame(ctx, frame, length);
     if (status != EITS_OK)
         return status;
-    eits_baseline *b = &ctx->baseline;
+    eits_reference *b = &ctx->reference;
     eits_real *old = b->m2; /* keeps the old reference until the new one is known to be good */
     b->wanted = 0;          /* learning, if any was under way, ends here */
     eits_copy(old, b->v0, length);
@@ -112,11 +113,11 @@ eits_status eits_baseline_set(eits_context *ctx, const eits_real *frame, size_t 
     return status;
 }
 
-eits_status eits_baseline_begin(eits_context *ctx, uint32_t count)
+eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
 {
-    if (ctx == NULL || count < MIN_QUIET_FRAMES)
+    if (ctx == NULL || count < MIN_REFERENCE_FRAMES)
         return EITS_E_ARGUMENT;
-    eits_baseline *b = &ctx->baseline;
+    eits_reference *b = &ctx->reference;
     eits_zero(b->v0, ctx->model->n_rows);
     eits_zero(b->m2, ctx->model->n_rows);
     b->wanted = count;
@@ -128,7 +129,7 @@ eits_status eits_baseline_begin(eits_context *ctx, uint32_t count)
     return EITS_OK;
 }
 
-/* How far a quiet frame reaches above nothing: max |S'y| against the mean so far. */
+/* How far a reference frame reaches above nothing: max |S'y| against the mean so far. */
 static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
 {
     uint32_t masked;
@@ -141,8 +142,8 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
         return EITS_E_NOT_FINITE;
     const eits_real seen =
         eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH) / ctx->noise_ratio;
-    if (seen > ctx->baseline.lambda_noise)
-        ctx->baseline.lambda_noise = seen;
+    if (seen > ctx->reference.lambda_noise)
+        ctx->reference.lambda_noise = seen;
     return EITS_OK;
 }
 
@@ -162,7 +163,7 @@ static eits_real unit_for(const eits_context *ctx, const eits_real *frame)
 /* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
 static eits_real noise_so_far(const eits_context *ctx)
 {
-    const eits_baseline *b = &ctx->baseline;
+    const eits_reference *b = &ctx->reference;
     eits_real sum = 0;
     uint32_t used = 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
@@ -179,10 +180,10 @@ static eits_real noise_so_far(const eits_context *ctx)
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
 static void take_in(eits_context *ctx, const eits_real *frame)
 {
-    eits_baseline *b = &ctx->baseline;
+    eits_reference *b = &ctx->reference;
     ++b->count;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* Welford, Technometrics 4 (1962) 419 */
-        if (ctx->bad[i] == EITS_BAD_NOW)
+        if (ctx->bad[i] == EITS_MASKED_NOW)
             continue;
         if (ctx->bad[i])
             b->v0[i] = R(NAN);
@@ -199,17 +200,17 @@ static void keep_second(eits_context *ctx, const eits_real *frame)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (ctx->bad[i])
-            ctx->baseline.v0[i] = R(NAN);
+            ctx->reference.v0[i] = R(NAN);
     }
-    eits_copy(ctx->baseline.m2, frame, ctx->model->n_rows);
-    ctx->baseline.count = 2;
-    ctx->baseline.second_waits = 1;
+    eits_copy(ctx->reference.m2, frame, ctx->model->n_rows);
+    ctx->reference.count = 2;
+    ctx->reference.second_waits = 1;
 }
 
 static void weigh_second(eits_context *ctx, const eits_real *frame)
 {
-    eits_baseline *b = &ctx->baseline;
-    b->outliers += eits_quiet_weigh(ctx, frame);
+    eits_reference *b = &ctx->reference;
+    b->outliers += eits_reference_weigh_second(ctx, frame);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* as take_in */
         const eits_real delta = b->m2[i] - b->v0[i], second = b->m2[i];
         b->m2[i] = 0;
@@ -221,12 +222,12 @@ static void weigh_second(eits_context *ctx, const eits_real *frame)
     b->second_waits = 0;
 }
 
-eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t length)
+eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t length)
 {
-    if (ctx == NULL || frame == NULL || ctx->baseline.count >= ctx->baseline.wanted)
+    if (ctx == NULL || frame == NULL || ctx->reference.count >= ctx->reference.wanted)
         return EITS_E_ARGUMENT;
-    eits_baseline *b = &ctx->baseline;
-    eits_status status = check_quiet(ctx, frame, length);
+    eits_reference *b = &ctx->reference;
+    eits_status status = check_reference_frame(ctx, frame, length);
     if (status != EITS_OK)
         return status;
     const int judged = eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER);
@@ -236,7 +237,7 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
     }
     if (b->second_waits)
         weigh_second(ctx, frame);
-    const uint32_t left = b->count >= 2 && judged ? eits_quiet_leave_out(ctx, frame) : 0;
+    const uint32_t left = b->count >= 2 && judged ? eits_reference_mask_outliers(ctx, frame) : 0;
     if (b->count == b->wanted / 2) {
         status = fit_to_model(ctx);
         /* lambda_noise is learned with the floor that it asks for */
@@ -250,17 +251,17 @@ eits_status eits_baseline_add(eits_context *ctx, const eits_real *frame, size_t 
         take_in(ctx, frame);
         b->outliers += left;
     }
-    eits_quiet_clear(ctx);
+    eits_reference_unmask(ctx);
     return status;
 }
 
-eits_status eits_baseline_finish(eits_context *ctx)
+eits_status eits_reference_finish(eits_context *ctx)
 {
     if (ctx == NULL)
         return EITS_E_ARGUMENT;
-    eits_baseline *b = &ctx->baseline;
-    if (b->count < MIN_QUIET_FRAMES || b->count != b->wanted)
-        return EITS_E_BASELINE_SHORT;
+    eits_reference *b = &ctx->reference;
+    if (b->count < MIN_REFERENCE_FRAMES || b->count != b->wanted)
+        return EITS_E_REFERENCE_SHORT;
     const eits_status status = fit_to_model(ctx);
     if (status != EITS_OK)
         return status;

@@ -1,4 +1,4 @@
-/* Outliers in quiet frames: a reading that its reciprocal does not bear out is left out of the
+/* Outliers in reference frames: a reading that its reciprocal does not bear out is left out of the
  * reference. */
 #include "diagnostics/diagnostics.h"
 
@@ -73,8 +73,8 @@ static eits_real limit_of(const eits_context *ctx, const eits_real *newer, const
     return largest;
 }
 
-uint32_t eits_quiet_odd(eits_context *ctx, const eits_real *newer, const eits_real *older,
-                        uint8_t bit)
+uint32_t eits_reference_compare(eits_context *ctx, const eits_real *newer, const eits_real *older,
+                                uint8_t bit)
 {
     int paired;
     const eits_real limit = limit_of(ctx, newer, older, &paired);
@@ -106,30 +106,30 @@ static uint32_t odd_rows(const eits_context *ctx, uint32_t k, const eits_real *n
     return count;
 }
 
-uint32_t eits_quiet_leave_out(eits_context *ctx, const eits_real *frame)
+uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_real *frame)
 {
     uint32_t left = 0;
-    if (eits_quiet_odd(ctx, frame, ctx->baseline.v0, 1) == 0)
+    if (eits_reference_compare(ctx, frame, ctx->reference.v0, 1) == 0)
         return 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         uint32_t rows[2], count = (ctx->list_index[k] & 1u) != 0
-                                      ? odd_rows(ctx, k, frame, ctx->baseline.v0, rows)
+                                      ? odd_rows(ctx, k, frame, ctx->reference.v0, rows)
                                       : 0;
         left += count;
         while (count > 0)
-            ctx->bad[rows[--count]] = EITS_BAD_NOW;
+            ctx->bad[rows[--count]] = EITS_MASKED_NOW;
     }
     return left;
 }
 
-uint32_t eits_quiet_weigh(eits_context *ctx, const eits_real *frame)
+uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_real *frame)
 {
     enum { WITH_SECOND = 1, FIRST_WITH_THIRD = 2, SECOND_WITH_THIRD = 4 };
-    eits_real *first = ctx->baseline.v0, *second = ctx->baseline.m2;
+    eits_real *first = ctx->reference.v0, *second = ctx->reference.m2;
     uint32_t left = 0;
-    (void)eits_quiet_odd(ctx, second, first, WITH_SECOND);
-    (void)eits_quiet_odd(ctx, frame, first, FIRST_WITH_THIRD);
-    (void)eits_quiet_odd(ctx, frame, second, SECOND_WITH_THIRD);
+    (void)eits_reference_compare(ctx, second, first, WITH_SECOND);
+    (void)eits_reference_compare(ctx, frame, first, FIRST_WITH_THIRD);
+    (void)eits_reference_compare(ctx, frame, second, SECOND_WITH_THIRD);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const uint32_t odd = ctx->list_index[k] & 7u;
         uint32_t rows[2], count = 0;
@@ -147,8 +147,8 @@ uint32_t eits_quiet_weigh(eits_context *ctx, const eits_real *frame)
     return left;
 }
 
-void eits_quiet_clear(eits_context *ctx)
+void eits_reference_unmask(eits_context *ctx)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
-        ctx->bad[i] = ctx->bad[i] == EITS_BAD_NOW ? 0 : ctx->bad[i];
+        ctx->bad[i] = ctx->bad[i] == EITS_MASKED_NOW ? 0 : ctx->bad[i];
 }

@@ -16,7 +16,7 @@ static const eits_real AS_IT_IS = R(1.01);
 /* What the noise asks for. */
 static eits_real least_floor(const eits_context *ctx)
 {
-    const eits_baseline *b = &ctx->baseline;
+    const eits_reference *b = &ctx->reference;
     const eits_real asked =
         b->noise_v > 0 ? ctx->options.floor_noise_factor * (b->noise_v / b->v0_rms) : 0;
     return asked < MOST_FLOOR ? asked : MOST_FLOOR;
@@ -31,8 +31,8 @@ eits_real eits_floor_of_all(const eits_context *ctx)
 eits_real eits_floor_of_rest(const eits_context *ctx, eits_real missing)
 {
     const eits_real left = 1 - missing, cube = left * left * left,
-                    quiet = cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE;
-    const eits_real of_model = quiet * ctx->floor, asked = left * least_floor(ctx),
+                    untouched = cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE;
+    const eits_real of_model = untouched * ctx->floor, asked = left * least_floor(ctx),
                     wanted = asked > of_model ? asked : of_model;
     return wanted > LEAST_FLOOR ? wanted : LEAST_FLOOR;
 }

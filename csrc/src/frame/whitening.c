@@ -243,7 +243,7 @@ static uint64_t measure_noise(eits_context *ctx)
 
 eits_real eits_lambda_noise(const eits_context *ctx)
 {
-    return ctx->noise_ratio * ctx->baseline.lambda_noise;
+    return ctx->noise_ratio * ctx->reference.lambda_noise;
 }
 
 /* No row is left out: the floor alone may differ. */

@@ -105,8 +105,9 @@ static float connected_volts(uint32_t scanning_us)
 void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us,
                      uint32_t scanning_us)
 {
-    const bool quiet = (parts.control & 1u << 8) != 0 || skin.rows == 0;
-    const float volts = quiet ? 0 : connected_volts(scanning_us) * ((float)MPS2_GAIN_PPM * 1e-6f);
+    const bool untouched = (parts.control & 1u << 8) != 0 || skin.rows == 0;
+    const float volts =
+        untouched ? 0 : connected_volts(scanning_us) * ((float)MPS2_GAIN_PPM * 1e-6f);
     const float steps =
         volts * ((float)(MPS2_FULL_SCALE_CODE + 1) / ((float)MPS2_REFERENCE_UV * 1e-6f));
     const uint32_t a_us = parts.tuning * (MPS2_MCLK_HZ / 1000000u),

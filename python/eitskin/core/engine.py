@@ -16,12 +16,12 @@ from eitskin.core.results import (
     SIGNS,
     SOLVERS,
     STOPS,
-    Baseline,
     Info,
+    LearnedReference,
     Options,
     Reconstruction,
     Touch,
-    check_quiet,
+    check_reference_frames,
 )
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
 
@@ -131,33 +131,33 @@ class CoreEngine:
         self._check(self._lib.eits_set_options(self._context, given), "options", UsageError)
         self._saturation_v = float(options.saturation_v)
 
-    def set_baseline(self, frames: npt.NDArray[np.float64]) -> Baseline:
+    def set_reference(self, frames: npt.NDArray[np.float64]) -> LearnedReference:
         """Take the reference from quiet ``frames`` (k, m) volts: one as it is, four or more also
         for the noise.
 
         Raises:
             FrameError: a frame cannot be used.
         """
-        check_quiet(frames, self._masked, self._saturation_v)
+        check_reference_frames(frames, self._masked, self._saturation_v)
         if len(frames) < 4:
             self._frame[:] = frames.mean(axis=0)
             self._check_frame(
-                self._lib.eits_baseline_set(self._context, self._frame_pointer, self.n_rows),
+                self._lib.eits_reference_set(self._context, self._frame_pointer, self.n_rows),
                 "reference frame",
             )
         else:
             self._check_frame(
-                self._lib.eits_baseline_begin(self._context, len(frames)), "reference frames"
+                self._lib.eits_reference_begin(self._context, len(frames)), "reference frames"
             )
             for number, frame in enumerate(frames):
                 self._frame[:] = frame
-                status = self._lib.eits_baseline_add(
+                status = self._lib.eits_reference_add(
                     self._context, self._frame_pointer, self.n_rows
                 )
                 self._check_frame(status, f"reference frame {number} (from 0)")
-            self._check_frame(self._lib.eits_baseline_finish(self._context), "reference frames")
-        b = self._context.baseline
-        return Baseline(
+            self._check_frame(self._lib.eits_reference_finish(self._context), "reference frames")
+        b = self._context.reference
+        return LearnedReference(
             int(b.count),
             b.correlation,
             b.gain,

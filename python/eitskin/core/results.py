@@ -56,7 +56,7 @@ class Options:
     sign: str = "increase"
     solver: str = "fista"
     warm_start: bool = False
-    project_baseline: bool = True
+    project_reference: bool = True
     lambda_abs: float = 0.0
     gap_rel: float = 0.0
     saturation_v: float = 0.0
@@ -104,7 +104,7 @@ def check_options(o: Options) -> None:
                 raise UsageError(
                     f"options: {name} = {value!r} is not known; use one of {', '.join(known)}"
                 )
-        elif name in ("warm_start", "project_baseline", "refine"):
+        elif name in ("warm_start", "project_reference", "refine"):
             if value not in (False, True):
                 raise UsageError(f"options: {name} = {value!r} must be true or false")
         else:
@@ -131,7 +131,7 @@ def _check_number(name: str, value: Any, low: float, high: float) -> None:
         raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
 
 
-def check_quiet(
+def check_reference_frames(
     frames: npt.NDArray[np.float64], masked: npt.NDArray[np.bool_], saturation_v: float
 ) -> None:
     """Refuse quiet ``frames`` (k, m) with an unusable voltage in a row that is not ``masked`` (m,);
@@ -151,7 +151,7 @@ def check_quiet(
 
 
 @dataclass(frozen=True)
-class Baseline:
+class LearnedReference:
     """The reference as learned: ``correlation`` with the model's own, ``gain`` in model volts per
     measured volt, ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was
     given; ``outliers`` readings were left out.

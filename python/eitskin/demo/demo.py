@@ -74,7 +74,7 @@ def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
     score = scorer_for(model).score(frames, 0, results["c"], "increase")
     assert score is not None  # the frames carry their truth
     core = CoreEngine(blob)
-    core.set_baseline(frames.reference_voltage_v)
+    core.set_reference(frames.reference_voltage_v)
     p50, p99 = _times_us(core, frames)
     return Demo(frames, model, results, score, p50, p99, core.kernels)
 

@@ -19,12 +19,12 @@ from eitskin.core.diagnostics import DIAGNOSTICS, with_diagnostics
 from eitskin.core.results import (
     COUPLED,
     STRAIGHT,
-    Baseline,
     Info,
+    LearnedReference,
     Options,
     Reconstruction,
     Touch,
-    check_quiet,
+    check_reference_frames,
 )
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
@@ -136,13 +136,13 @@ class ReferenceEngine:
         self._drift_v0, self._warm = v0, None
         return correlation
 
-    def set_baseline(self, frames: FloatArray) -> Baseline:
-        """Take the reference from quiet ``frames`` (k, m) volts, as CoreEngine.set_baseline does.
+    def set_reference(self, frames: FloatArray) -> LearnedReference:
+        """Take the reference from quiet ``frames`` (k, m) volts, as CoreEngine.set_reference does.
 
         Raises:
             FrameError: a frame cannot be used.
         """
-        check_quiet(frames, self._bad, self.options.saturation_v)
+        check_reference_frames(frames, self._bad, self.options.saturation_v)
         frames = np.where(self._bad, 0.0, frames)
         before, self._without_reference = (self._without_reference, self._noise_v), self._bad.copy()
         lambda_noise, self._noise_v, left = 0.0, 0.0, np.zeros(frames.shape, dtype=np.bool_)
@@ -161,7 +161,7 @@ class ReferenceEngine:
             )
             raise
         self._lambda_noise, self._ready = lambda_noise, True
-        return Baseline(
+        return LearnedReference(
             len(frames),
             correlation,
             self._gain,
@@ -299,7 +299,7 @@ class ReferenceEngine:
 
     def _along(self, folded: Folded) -> FloatArray | None:
         """What drift of the gain makes of the folded data, (k,); None where it is not ignored."""
-        if not self.options.project_baseline or self._drift_v0 is None:
+        if not self.options.project_reference or self._drift_v0 is None:
             return None
         fold, v0, count = self.model.fold, self._drift_v0, folded.first.astype(int) + folded.second
         if self.model.data_kind == "normalised":

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Baseline, Options, Reconstruction, Touch, check_options
+from eitskin.core.results import LearnedReference, Options, Reconstruction, Touch, check_options
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
@@ -84,7 +84,7 @@ class Batch:
         first, *_ = [call(engine) for engine in self._engines]
         return first
 
-    def tare(self, quiet_v: npt.ArrayLike) -> Baseline:
+    def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
         """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
         noise.
 
@@ -98,7 +98,7 @@ class Batch:
                 f" {self._engines[0].n_rows} rows"
             )
         self._last = self._last[:0]
-        return self._on_each(lambda one: one.set_baseline(frames))
+        return self._on_each(lambda one: one.set_reference(frames))
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before

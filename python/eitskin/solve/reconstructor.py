@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from eitskin.config import nearest
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Baseline, Options, Reconstruction, check_options
+from eitskin.core.results import LearnedReference, Options, Reconstruction, check_options
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
@@ -111,7 +111,7 @@ class Reconstructor:
                 " model's order, or build a model with their protocol"
             )
 
-    def tare(self, quiet_v: npt.ArrayLike) -> Baseline:
+    def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
         """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
         noise, and single readings that the others do not bear out are left out (``outliers``).
 
@@ -123,7 +123,7 @@ class Reconstructor:
             raise FrameError(
                 f"reference: has shape {frames.shape}, but the model's protocol has {rows} rows"
             )
-        return self._engine.set_baseline(frames)
+        return self._engine.set_reference(frames)
 
     def mask_rows(self, rows: npt.NDArray[np.bool_]) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before

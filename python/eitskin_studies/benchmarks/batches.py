@@ -61,7 +61,7 @@ def _c_alone(
     calls = []
     for part in parts:
         engine = CoreEngine(blob)
-        engine.set_baseline(quiet[None])
+        engine.set_reference(quiet[None])
         calls.append(engine.bare_block(part))
 
     def run_all() -> None:

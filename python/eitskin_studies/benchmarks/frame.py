@@ -75,7 +75,7 @@ def golden_session() -> tuple[
     warm.set_options(replace(default_options(model), warm_start=True))
     numpy_engine = Reconstructor(model, engine="numpy")
     for engine in (core, warm, portable):
-        engine.set_baseline(quiet)
+        engine.set_reference(quiet)
     numpy_engine.tare(quiet)
     return core, warm, portable, numpy_engine, frames
 

@@ -154,7 +154,7 @@ def _ready(point: Point, cache: Path) -> _Ready:
     quiet = reference + noise * rng.standard_normal((64, len(reference)))
     frames = changed + noise * rng.standard_normal(changed.shape)
     engine = CoreEngine(blob)
-    engine.set_baseline(quiet)
+    engine.set_reference(quiet)
     engine.solve_frame(
         frames[0]
     )  # the first frame after a reference also builds the directions to ignore

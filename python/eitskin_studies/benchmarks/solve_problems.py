@@ -64,7 +64,7 @@ class Problems:
 
 def bench_options(model: Model, **changes: object) -> Options:
     """The model's defaults with the plain problem's lambda and no ignored direction."""
-    plain = replace(default_options(model), project_baseline=False, lambda_rel=LAMBDA_REL)
+    plain = replace(default_options(model), project_reference=False, lambda_rel=LAMBDA_REL)
     return replace(plain, lambda_noise_factor=0.0, gate_factor=0.0, **changes)  # type: ignore[arg-type]
 
 
@@ -96,7 +96,7 @@ def make_problems(name: str, model: Model, blob: bytes, session: Simulated) -> P
             engine.set_options(
                 bench_options(model, solver="active-set", sign=sign, iterations=1000)
             )
-            engine.set_baseline(session.quiet_v)
+            engine.set_reference(session.quiet_v)
             result = engine.reconstruct(frame, touches=False)
             y, lam = engine.reduced_data()[: model.rank].astype(np.float64), result.info.lambda_
             if sign == "both":

@@ -91,7 +91,7 @@ CDEF_MUTATIONS = [
         "struct eits_options",
     ),
     ("    eits_real x_mm, y_mm;", "    eits_real x_mm;", "struct eits_touch"),
-    ("    eits_real *v0;\n", "    float *v0;\n", "struct eits_baseline"),
+    ("    eits_real *v0;\n", "    float *v0;\n", "struct eits_reference"),
     ("    uint8_t *unusable;\n", "    uint32_t *unusable;\n", "struct eits_context"),
     ("    uint32_t basis_count;\n", "    uint32_t basis_counts;\n", "struct eits_context"),
     (

@@ -137,7 +137,7 @@ def test_enums_are_the_headers(enum: type[IntEnum] | type[IntFlag], name: str, p
 def test_flags_stages_and_limits_are_the_headers() -> None:
     lib = core.lib
     assert (pk.RawFlags.QUIET, pk.RawFlags.RECIPROCAL, pk.RawFlags.CHECK) == (
-        lib.EITS_RAW_QUIET, lib.EITS_RAW_RECIPROCAL, lib.EITS_RAW_CHECK
+        lib.EITS_RAW_REFERENCE, lib.EITS_RAW_RECIPROCAL, lib.EITS_RAW_CHECK
     )  # fmt: skip
     assert (pk.Stream.RAW, pk.Stream.IMAGE, pk.Stream.TOUCHES) == (
         lib.EITS_STREAM_RAW, lib.EITS_STREAM_IMAGE, lib.EITS_STREAM_TOUCHES

@@ -100,7 +100,7 @@ def test_the_same_bits_as_the_host(
     host = CoreEngine(blob)
     options = replace(default_options(model), warm_start=warm, solver=solver)
     host.set_options(options)
-    host.set_baseline(quiet.astype(np.float32).astype(np.float64))
+    host.set_reference(quiet.astype(np.float32).astype(np.float64))
     board = run(program, tmp_path, blob, quiet, frames, options)
     for frame, emulated in zip(frames, board, strict=True):
         expected = host.reconstruct(frame.astype(np.float32))
@@ -127,7 +127,7 @@ def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
     random, host = simulated_session(), CoreEngine(blob)
     quiet, frames, options = random.quiet_v, random.frames_v[:6], default_options(model)
     host.set_options(options)
-    host.set_baseline(quiet.astype(np.float32).astype(np.float64))
+    host.set_reference(quiet.astype(np.float32).astype(np.float64))
     results = [host.reconstruct(frame.astype(np.float32)) for frame in frames]
     assert [one.touches for one in run(program, tmp_path, blob, quiet, frames, options)] == [
         as_printed(one) for one in results
@@ -248,7 +248,7 @@ def test_the_other_signs_too(program: Path, tmp_path: Path, sign: str) -> None:
     host = CoreEngine(blob)
     options = replace(default_options(model), sign=sign)
     host.set_options(options)
-    host.set_baseline(quiet.astype(np.float32).astype(np.float64))
+    host.set_reference(quiet.astype(np.float32).astype(np.float64))
     for frame, emulated in zip(
         frames, run(program, tmp_path, blob, quiet, frames, options), strict=True
     ):
@@ -271,7 +271,7 @@ def test_ranks_that_no_block_fits(
     options = replace(default_options(model), solver=solver, warm_start=True)
     host = CoreEngine(blob)
     host.set_options(options)
-    host.set_baseline(quiet.astype(np.float32).astype(np.float64))
+    host.set_reference(quiet.astype(np.float32).astype(np.float64))
     for frame, emulated in zip(
         frames, run(program, tmp_path, blob, quiet, frames, options), strict=True
     ):

@@ -123,7 +123,7 @@ def test_the_same_bits_as_the_host(run: Run) -> None:
     host = CoreEngine(blob)
     host.set_options(board_options(model))
     raws = of(RawFrame, run.packets)
-    host.set_baseline(np.array([raw.voltage_v for raw in raws if raw.quiet], dtype=np.float64))
+    host.set_reference(np.array([raw.voltage_v for raw in raws if raw.quiet], dtype=np.float64))
     images = {one.solved.frame: one for one in of(SolvedImage, run.packets)}
     touches = {one.solved.frame: one for one in of(SolvedTouches, run.packets)}
     assert len(images) >= 8 and images.keys() == touches.keys()

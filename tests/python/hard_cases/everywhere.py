@@ -67,14 +67,14 @@ class Host(CoreEngine):
             return 0
         count, status = len(step.quiet_v), 0
         if count >= 4:
-            status = self._lib.eits_baseline_begin(self._context, count)
+            status = self._lib.eits_reference_begin(self._context, count)
         for frame in step.quiet_v:
             if status == 0:
                 self._frame[:] = frame
-                take = self._lib.eits_baseline_add if count >= 4 else self._lib.eits_baseline_set
+                take = self._lib.eits_reference_add if count >= 4 else self._lib.eits_reference_set
                 status = take(self._context, self._frame_pointer, self.n_rows)
         if status == 0 and count >= 4:
-            status = self._lib.eits_baseline_finish(self._context)
+            status = self._lib.eits_reference_finish(self._context)
         return int(status)
 
     def outcome(self, numbers: np.ndarray, reduced: bool = False) -> Outcome:

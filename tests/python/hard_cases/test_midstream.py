@@ -14,7 +14,7 @@ from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, S
 from margins import Margins
 from small_models import small, small_blob, small_model
 
-NO_BASELINE = -13
+NO_REFERENCE = -13
 
 
 def of_the_frame(one: Outcome) -> tuple[object, ...]:
@@ -67,7 +67,7 @@ def test_model_swapped(same_everywhere: SameEverywhere, margins: Margins) -> Non
     after = streamed[2:]
     before_tare, taken = after[::3], [one for k, one in enumerate(after) if k % 3]
     assert all(
-        one.status == NO_BASELINE and not one.image.any() and one.touches == ()
+        one.status == NO_REFERENCE and not one.image.any() and one.touches == ()
         for one in before_tare
     )
     assert all(one.image.any() for one in taken)
@@ -87,7 +87,7 @@ def changes() -> list[Options]:
         replace(usual, sign=sign) for sign in SIGNS
     ]
     named += [
-        replace(usual, project_baseline=False),
+        replace(usual, project_reference=False),
         replace(usual, lambda_rel=0.3),
         replace(usual, lambda_abs=1e-3),
     ]
@@ -172,7 +172,7 @@ def test_tare_in_midstream(same_everywhere: SameEverywhere, margins: Margins) ->
         ]
     )
     assert [status == 0 for status in statuses] == [True] * 5 + [False, True]
-    assert outcomes[9].status == NO_BASELINE and not outcomes[9].image.any()
+    assert outcomes[9].status == NO_REFERENCE and not outcomes[9].image.any()
     after = [*outcomes[3:9], *outcomes[10:13]]
     margins.everywhere(
         "time/tare-in-midstream",

@@ -182,7 +182,7 @@ def test_saturation_in_touch(same_everywhere: SameEverywhere, margins: Margins) 
     )
 
 
-def test_saturation_in_baseline(same_everywhere: SameEverywhere) -> None:
+def test_saturation_in_the_reference(same_everywhere: SameEverywhere) -> None:
     """A saturated quiet frame is no reference, whether the touch saturates too or not; the same
     status everywhere."""
     quiet, limit = quiet_frames(0), float(np.abs(quiet_frames(0)).max())

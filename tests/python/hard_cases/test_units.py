@@ -122,7 +122,7 @@ def reduced(
     """y (r,) as the solver sees it."""
     engine = CoreEngine(blob)
     engine.set_options(options)
-    engine.set_baseline(as_float32(quiet).astype(np.float64))
+    engine.set_reference(as_float32(quiet).astype(np.float64))
     engine.solve_frame(as_float32(frame))
     return engine.reduced_data()[: model.rank].astype(np.float64)
 
@@ -191,7 +191,7 @@ def test_the_noise_has_the_units_of_the_frames(margins: Margins, width: str) -> 
     truth = float(np.sqrt(quiet.var(axis=0, ddof=1).mean()))
     for e in EXPONENTS:
         engine = CoreEngine(small_blob(), width)
-        baseline = engine.set_baseline(quiet * 10.0**e)
+        baseline = engine.set_reference(quiet * 10.0**e)
         off = abs(baseline.noise_v / (truth * 10.0**e) - 1)
         target = "host f32" if width == "float32" else "host f64"
         # a quiet voltage is rounded by u |v0|, 1e3 u of a deviation of 1e-3 |v0|; at worst

@@ -97,7 +97,7 @@ def agree(
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("drift", [True, False], ids=["project", "keep"])
 def test_same_images(storage: str, data_kind: str, drift: bool, solver: str) -> None:
-    made = engines(storage, data_kind, solver, project_baseline=drift)
+    made = engines(storage, data_kind, solver, project_reference=drift)
     for seed, sign in enumerate(SIGNS):
         for reconstructor in made.values():
             reconstructor.with_options(sign=sign, lambda_abs=0.0)
@@ -256,7 +256,7 @@ def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_same_facts(data_kind: str, solver: str) -> None:
-    """Baseline and info of float64 C are the reference's."""
+    """LearnedReference and info of float64 C are the reference's."""
     made = engines("f16", data_kind, solver)
     quiet = small().quiet(3, 21)
     baselines = {name: reconstructor.tare(quiet) for name, reconstructor in made.items()}

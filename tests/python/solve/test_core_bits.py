@@ -54,7 +54,7 @@ def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> 
         for engine in built:
             chosen = default_options(small_model(storage, data_kind))
             engine.set_options(replace(chosen, solver=solver, sign=sign, warm_start=True))
-            engine.set_baseline(s.quiet(31, 8))
+            engine.set_reference(s.quiet(31, 8))
             engine.forget()
             results.append([engine.reconstruct(frame) for frame in frames])
         for k in range(len(frames)):
@@ -73,7 +73,7 @@ def test_a_noisy_tare(solver: str, width: str) -> None:
     ]
     for engine in built:
         engine.set_options(replace(default_options(small_model("i8")), solver=solver))
-        engine.set_baseline(s.quiet(32, 8, noise=0.01))
+        engine.set_reference(s.quiet(32, 8, noise=0.01))
     for frame in s.frames(33, 4, noise=0.01):
         results = [engine.reconstruct(frame) for engine in built]
         same(results)
@@ -90,7 +90,7 @@ def test_touches_of_simulated_frames(width: str) -> None:
         for prepared, portable in BUILDS
     ]
     for engine in built:
-        engine.set_baseline(frames.reference_voltage_v)
+        engine.set_reference(frames.reference_voltage_v)
     for frame in frames.voltage_v:
         results = [engine.reconstruct(frame) for engine in built]
         same(results)
@@ -124,7 +124,7 @@ def test_units_of_the_frames_do_not_matter(scale: float) -> None:
     frames, images = session().as_frames(), []
     for factor in (1.0, scale):
         engine = CoreEngine(blob)
-        engine.set_baseline(frames.reference_voltage_v * factor)
+        engine.set_reference(frames.reference_voltage_v * factor)
         images.append(engine.reconstruct(frames.voltage_v[0] * factor).image)
     assert np.abs(images[1] - images[0]).max() < 1e-4 * images[0].max()
 
@@ -134,7 +134,7 @@ def macs_of(iterations: int, **options: object) -> int:
     model, blob = prebuilt()
     frames, engine = session().as_frames(), CoreEngine(blob)
     engine.set_options(replace(default_options(model), iterations=iterations, **options))
-    engine.set_baseline(frames.reference_voltage_v)
+    engine.set_reference(frames.reference_voltage_v)
     return engine.reconstruct(frames.voltage_v[0]).info.macs
 
 
@@ -173,7 +173,7 @@ def test_a_solver_takes_nothing_over_from_the_one_before(storage: str, prepared:
         default_options(small_model(storage, "difference")),
     )
     used = CoreEngine(blob, prepared=prepared)
-    used.set_baseline(s.quiet(31, 8))
+    used.set_reference(s.quiet(31, 8))
     for before in SOLVERS:
         for after in SOLVERS:
             used.set_options(replace(chosen, solver=before))
@@ -181,7 +181,7 @@ def test_a_solver_takes_nothing_over_from_the_one_before(storage: str, prepared:
             used.set_options(replace(chosen, solver=after))
             used.forget()
             fresh = CoreEngine(blob, prepared=prepared)
-            fresh.set_baseline(s.quiet(31, 8))
+            fresh.set_reference(s.quiet(31, 8))
             fresh.set_options(replace(chosen, solver=after))
             one, other = used.reconstruct(frames[1]), fresh.reconstruct(frames[1])
             assert (one.image == other.image).all() and one.info.gap == other.info.gap, (

@@ -53,9 +53,9 @@ def problem(
     """S, y and basis of one small frame, and a lambda that is ``share`` of lambda_max."""
     model, s = small_model(), small()
     engine = Reconstructor(
-        model, engine="numpy", options=options(sign, project_baseline=drift)
+        model, engine="numpy", options=options(sign, project_reference=drift)
     )._engine
-    engine.set_baseline(s.linear.v0_v[None])
+    engine.set_reference(s.linear.v0_v[None])
     y, basis, _ = engine.frame_stage(s.frames(seed, 1, sign)[0])
     correlation = model.sensitivity.T @ y
     top = {
@@ -141,11 +141,11 @@ def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
         solver=solver,
         iterations=100_000,
         gap_rel=gap_rel,
-        project_baseline=False,
+        project_reference=False,
     )
     engine.set_options(chosen)
     frames = session().as_frames()
-    engine.set_baseline(frames.reference_voltage_v)
+    engine.set_reference(frames.reference_voltage_v)
     for frame in frames.voltage_v[:5]:
         result = engine.reconstruct(frame, touches=False)
         assert result.info.stop == "gap" and result.info.gap_rel <= gap_rel
@@ -167,7 +167,7 @@ def test_the_core_stops_at_the_gap(solver: str, width: str) -> None:
 
 def test_a_fixed_number_of_iterations_is_exactly_that() -> None:
     engine = CoreEngine(small_blob())
-    engine.set_baseline(small().quiet(1, 8))
+    engine.set_reference(small().quiet(1, 8))
     for iterations in (1, 7, 60, 333):
         engine.set_options(replace(default_options(small_model()), iterations=iterations))
         info = engine.reconstruct(small().frames(3, 1)[0]).info

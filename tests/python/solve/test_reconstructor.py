@@ -249,7 +249,7 @@ def test_drift_of_the_gain_costs_little(engine: str) -> None:
     of it without."""
     lost = {}
     for project in (True, False):
-        reconstructor = made(engine, project_baseline=project)
+        reconstructor = made(engine, project_reference=project)
         worst = 0.0
         for frame in session().frames_v[:10]:
             image = reconstructor.reconstruct(frame).image
@@ -355,7 +355,7 @@ BAD_OPTIONS = [
     ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),
     ({"solver": "newton"}, "solver = 'newton' is not known; use one of fista, working-set"),
     ({"warm_start": 2}, "warm_start"),
-    ({"project_baseline": "yes"}, "project_baseline"),
+    ({"project_reference": "yes"}, "project_reference"),
     ({"lambda_abs": -1.0}, "lambda_abs"),
     ({"lambda_rel": 1.5}, "lambda_rel = 1.5 is out of range; use 0 to 1"),
     ({"lambda_rel": float("nan")}, "lambda_rel"),

@@ -25,7 +25,7 @@ def reference(model: Model, **options: object) -> ReferenceEngine:
     """An engine with its reference set to the skin's own."""
     engine = ReferenceEngine(model)
     engine.set_options(replace(default_options(model), **options))
-    engine.set_baseline(small().linear.v0_v[None])
+    engine.set_reference(small().linear.v0_v[None])
     return engine
 
 
@@ -79,7 +79,7 @@ def test_data_have_the_units_of_the_model_whatever_the_gain(data_kind: str) -> N
     ys = []
     for gain in (1.0, -0.02, 1e3):
         engine = ReferenceEngine(small_model("f32", data_kind))
-        baseline = engine.set_baseline(gain * s.linear.v0_v[None])
+        baseline = engine.set_reference(gain * s.linear.v0_v[None])
         assert baseline.gain == pytest.approx(1 / gain, rel=1e-5)
         assert baseline.correlation == pytest.approx(np.sign(gain))
         ys.append(engine.frame_stage(gain * frame)[0])
@@ -98,7 +98,7 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
     )
     damaged = s.frames(4, 1)[0]
     damaged[fold.first[lost]] = damaged[fold.second[lost]] = np.nan
-    engine = reference(model, project_baseline=False, diagnostics=0)
+    engine = reference(model, project_reference=False, diagnostics=0)
     y, basis, masked = engine.frame_stage(damaged)
     known = np.ones(len(fold.first), dtype=bool)
     known[lost] = False
@@ -130,11 +130,11 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
     engine = reference(
         small_model(), diagnostics=0
     )  # of discs this strong some rows count as outliers
-    learned = engine.set_baseline(quiet)
+    learned = engine.set_reference(quiet)
     floor = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
     settings = BuildSettings(rank=37, floor=floor)
     other = reference(make_model(s.skin, s.protocol, s.linear, settings), diagnostics=0)
-    other.set_baseline(quiet)
+    other.set_reference(quiet)
     scale = (1 + floor) / 1.01
     y, expected = engine.frame_stage(frame)[0], other.frame_stage(frame)[0]
     assert engine.seen.T @ engine.seen == pytest.approx(scale * other.seen.T @ other.seen, abs=1e-5)
@@ -156,7 +156,7 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
 def test_the_floor_stays_where_noise_is_little_or_unknown(quiet_frames: int) -> None:
     s = small()
     engine = reference(small_model(), diagnostics=0)
-    engine.set_baseline(s.quiet(6, quiet_frames, noise=1.5e-3 if quiet_frames > 1 else 0.1))
+    engine.set_reference(s.quiet(6, quiet_frames, noise=1.5e-3 if quiet_frames > 1 else 0.1))
     assert engine.reconstruct(s.frames(4, 1)[0]).info.floor == pytest.approx(0.01, rel=1e-4)
     assert engine.seen is small_model().sensitivity
 
@@ -179,11 +179,11 @@ def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
     s, model = small(), small_model()
     quiet = s.quiet(5, 10)
     engine = ReferenceEngine(model)
-    baseline = engine.set_baseline(quiet)
+    baseline = engine.set_reference(quiet)
     seen = []
     for k in range(5, 10):
         probe = ReferenceEngine(model)
-        probe.set_baseline(quiet[:5].mean(axis=0)[None])
+        probe.set_reference(quiet[:5].mean(axis=0)[None])
         direction = probe.frame_stage(quiet[k])[1]
         d = probe._gain * (quiet[k] - quiet[:k].mean(axis=0))
         fold = model.fold
@@ -194,7 +194,7 @@ def test_lambda_noise_is_the_greatest_of_the_second_half() -> None:
     assert baseline.lambda_noise == pytest.approx(max(seen), rel=1e-9)
     assert baseline.noise_v == pytest.approx(quiet.std(axis=0, ddof=1).mean(), rel=0.1)
     assert (
-        baseline.frames == 10 and ReferenceEngine(model).set_baseline(quiet[:3]).lambda_noise == 0
+        baseline.frames == 10 and ReferenceEngine(model).set_reference(quiet[:3]).lambda_noise == 0
     )
 
 

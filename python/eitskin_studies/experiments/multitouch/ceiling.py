@@ -57,7 +57,7 @@ class Told(ReferenceEngine):
 def core_told(model: Model, measured: Measured, scenes: Sequence[Scene]) -> list[bool]:
     """Whether the core's fit that begins at the truth is exact, for each scene."""
     engine = Told(model)
-    engine.set_baseline(measured.quiet_v)
+    engine.set_reference(measured.quiet_v)
     exact = []
     for frame_v, scene in zip(measured.frames_v[:, -1], scenes, strict=True):
         engine.forget()

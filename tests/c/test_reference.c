@@ -1,4 +1,4 @@
-/* The reference frame: from one frame, and learned from quiet frames. */
+/* The reference frame: from one frame, and learned from reference frames. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { QUIET = 20 };
+enum { UNTOUCHED = 20 };
 
 typedef struct bench {
     small_model made;
@@ -32,7 +32,7 @@ static void tear_down(bench *b)
 
 /* Frames around `gain` times the model's reference: relative noise `noise`, each channel with an
  * own error of 1 %. */
-static void quiet_frame(bench *b, double gain, double noise, uint64_t *state)
+static void reference_frame(bench *b, double gain, double noise, uint64_t *state)
 {
     uint64_t channels = 4;
     small_reference(&b->c.model, gain, b->frame);
@@ -48,22 +48,22 @@ static void gain_and_correlation(void)
     static const double gains[] = {1, 2.5, -0.75, 1e-6, -1e6};
     for (size_t g = 0; g < sizeof gains / sizeof gains[0]; ++g) {
         small_reference(&b.c.model, gains[g], b.frame);
-        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         double squares = 0;
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
             squares += pow((double)b.c.model.v_ref[k], 2);
-        CHECK_NEAR(ctx->baseline.gain * (eits_real)gains[g], 1, 8 * EPS);
-        CHECK_NEAR(ctx->baseline.correlation, gains[g] > 0 ? 1 : -1, 8 * EPS);
-        CHECK_NEAR(ctx->baseline.v0_rms / (eits_real)fabs(gains[g]), sqrt(squares / SMALL_FOLDED),
+        CHECK_NEAR(ctx->reference.gain * (eits_real)gains[g], 1, 8 * EPS);
+        CHECK_NEAR(ctx->reference.correlation, gains[g] > 0 ? 1 : -1, 8 * EPS);
+        CHECK_NEAR(ctx->reference.v0_rms / (eits_real)fabs(gains[g]), sqrt(squares / SMALL_FOLDED),
                    8 * EPS);
-        CHECK(ctx->baseline.noise_v == 0 && ctx->baseline.lambda_noise == 0);
-        CHECK(ctx->baseline.ready == 1 && ctx->baseline.count == 1);
+        CHECK(ctx->reference.noise_v == 0 && ctx->reference.lambda_noise == 0);
+        CHECK(ctx->reference.ready == 1 && ctx->reference.count == 1);
     }
     uint64_t state = 3;
     double vv = 0, rr = 0, vr = 0; /* an arbitrary frame, against the formulas */
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = (eits_real)small_random(&state);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         const eits_fold fold = b.c.model.fold[k];
         const double first = (double)b.frame[fold.first], r = (double)b.c.model.v_ref[k];
@@ -72,9 +72,9 @@ static void gain_and_correlation(void)
                              : 0.5 * (first + fold.sign * (double)b.frame[fold.second]);
         vv += v * v, rr += r * r, vr += v * r;
     }
-    CHECK_NEAR(ctx->baseline.correlation, vr / sqrt(vv * rr), 20 * EPS);
-    CHECK_NEAR(ctx->baseline.gain, copysign(sqrt(rr / vv), vr), 20 * EPS * sqrt(rr / vv));
-    CHECK_NEAR(ctx->baseline.v0_rms, sqrt(vv / SMALL_FOLDED), 20 * EPS);
+    CHECK_NEAR(ctx->reference.correlation, vr / sqrt(vv * rr), 20 * EPS);
+    CHECK_NEAR(ctx->reference.gain, copysign(sqrt(rr / vv), vr), 20 * EPS * sqrt(rr / vv));
+    CHECK_NEAR(ctx->reference.v0_rms, sqrt(vv / SMALL_FOLDED), 20 * EPS);
     tear_down(&b);
 }
 
@@ -83,36 +83,36 @@ static void refused_frames(void)
     bench b;
     eits_context *ctx = set_up(&b);
     small_reference(&b.c.model, 1, b.frame);
-    CHECK_EQUAL(eits_baseline_set(NULL, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_baseline_set(ctx, NULL, SMALL_ROWS), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS - 1), EITS_E_FRAME_LENGTH);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS + 1), EITS_E_FRAME_LENGTH);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, 0), EITS_E_FRAME_LENGTH);
-    CHECK(!ctx->baseline.ready);
+    CHECK_EQUAL(eits_reference_set(NULL, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_set(ctx, NULL, SMALL_ROWS), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS - 1), EITS_E_FRAME_LENGTH);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS + 1), EITS_E_FRAME_LENGTH);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, 0), EITS_E_FRAME_LENGTH);
+    CHECK(!ctx->reference.ready);
     for (int i = 0; i < SMALL_ROWS; ++i) {
         small_reference(&b.c.model, 1, b.frame);
         b.frame[i] = (eits_real)(i % 3 == 0 ? NAN : (i % 3 == 1 ? INFINITY : -INFINITY));
-        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
     }
     small_reference(&b.c.model, 1, b.frame);
     b.frame[7] = (eits_real)INFINITY;
-    CHECK(!ctx->baseline.ready);
+    CHECK(!ctx->reference.ready);
     CHECK_EQUAL(eits_mask_row(ctx, 7, 1), EITS_OK);
     /* masked, it does not matter */
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
-    CHECK_NEAR(ctx->baseline.gain, 1, 8 * EPS);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_NEAR(ctx->reference.gain, 1, 8 * EPS);
     CHECK_EQUAL(eits_mask_row(ctx, 7, 0), EITS_OK);
     eits_options o = ctx->options;
     o.saturation_v = R(1.2);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     small_reference(&b.c.model, 1, b.frame); /* its greatest number is above 1.2 */
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
     small_reference(&b.c.model, -1, b.frame);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
     small_reference(&b.c.model, 0.7, b.frame);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     b.frame[3] = R(-1.2); /* at the limit counts as beyond it */
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
     tear_down(&b);
 }
 
@@ -123,29 +123,30 @@ static void all_zero_keeps_the_old(void)
     eits_context *ctx = set_up(&b);
     eits_real frame[SMALL_ROWS], wrong[SMALL_ROWS] = {0}, before[16], after[16], v0[SMALL_ROWS];
     uint64_t state = 8;
-    CHECK_EQUAL(eits_baseline_set(ctx, wrong, SMALL_ROWS), EITS_E_FRAME_ZERO);
-    CHECK(!ctx->baseline.ready);
-    CHECK_EQUAL(eits_reconstruct(ctx, wrong, SMALL_ROWS, NULL, NULL), EITS_E_NO_BASELINE);
-    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-    for (int k = 0; k < QUIET; ++k) {
-        quiet_frame(&b, 1.5, 1e-3, &state);
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, wrong, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK(!ctx->reference.ready);
+    CHECK_EQUAL(eits_reconstruct(ctx, wrong, SMALL_ROWS, NULL, NULL), EITS_E_NO_REFERENCE);
+    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+    for (int k = 0; k < UNTOUCHED; ++k) {
+        reference_frame(&b, 1.5, 1e-3, &state);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-    quiet_frame(&b, 1.5, 0.05, &state);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+    reference_frame(&b, 1.5, 0.05, &state);
     memcpy(frame, b.frame, sizeof frame);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, before, NULL), EITS_OK);
-    memcpy(v0, ctx->baseline.v0, sizeof v0);
-    const eits_baseline kept = ctx->baseline;
+    memcpy(v0, ctx->reference.v0, sizeof v0);
+    const eits_reference kept = ctx->reference;
     /* nothing, and so little that it cannot be divided by */
     static const double sizes[] = {0, BOTH_WIDTHS(1e-40, 1e-310)};
     for (int s = 0; s < 2; ++s) {
         small_reference(&b.c.model, sizes[s], wrong);
-        CHECK_EQUAL(eits_baseline_set(ctx, wrong, SMALL_ROWS), EITS_E_FRAME_ZERO);
-        CHECK(ctx->baseline.gain == kept.gain && ctx->baseline.correlation == kept.correlation);
-        CHECK(ctx->baseline.v0_rms == kept.v0_rms && ctx->baseline.noise_v == kept.noise_v);
-        CHECK(ctx->baseline.lambda_noise == kept.lambda_noise && ctx->baseline.count == kept.count);
-        CHECK(memcmp(v0, ctx->baseline.v0, sizeof v0) == 0);
+        CHECK_EQUAL(eits_reference_set(ctx, wrong, SMALL_ROWS), EITS_E_FRAME_ZERO);
+        CHECK(ctx->reference.gain == kept.gain && ctx->reference.correlation == kept.correlation);
+        CHECK(ctx->reference.v0_rms == kept.v0_rms && ctx->reference.noise_v == kept.noise_v);
+        CHECK(ctx->reference.lambda_noise == kept.lambda_noise &&
+              ctx->reference.count == kept.count);
+        CHECK(memcmp(v0, ctx->reference.v0, sizeof v0) == 0);
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, after, NULL), EITS_OK);
         CHECK(memcmp(before, after, sizeof before) == 0);
     }
@@ -157,51 +158,51 @@ static void order_of_learning(void)
     bench b;
     eits_context *ctx = set_up(&b);
     uint64_t state = 9;
-    quiet_frame(&b, 1, 1e-3, &state);
-    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT); /* before begin */
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_E_BASELINE_SHORT);
-    CHECK_EQUAL(eits_baseline_begin(NULL, 8), EITS_E_ARGUMENT);
+    reference_frame(&b, 1, 1e-3, &state);
+    CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT); /* before begin */
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_E_REFERENCE_SHORT);
+    CHECK_EQUAL(eits_reference_begin(NULL, 8), EITS_E_ARGUMENT);
     for (uint32_t few = 0; few < 4; ++few)
-        CHECK_EQUAL(eits_baseline_begin(ctx, few), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(ctx, few), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     /* a single reference is not learned further */
-    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_baseline_begin(ctx, 6), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_begin(ctx, 6), EITS_OK);
     /* the old one is gone */
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_NO_BASELINE);
-    CHECK_EQUAL(eits_baseline_add(NULL, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_baseline_add(ctx, NULL, SMALL_ROWS), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_baseline_finish(NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_NO_REFERENCE);
+    CHECK_EQUAL(eits_reference_add(NULL, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_add(ctx, NULL, SMALL_ROWS), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_finish(NULL), EITS_E_ARGUMENT);
     for (uint32_t k = 0; k < 6; ++k) {
-        CHECK_EQUAL(ctx->baseline.count, k);
-        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_E_BASELINE_SHORT);
+        CHECK_EQUAL(ctx->reference.count, k);
+        CHECK_EQUAL(eits_reference_finish(ctx), EITS_E_REFERENCE_SHORT);
         /* refused frames do not count */
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS - 1), EITS_E_FRAME_LENGTH);
-        quiet_frame(&b, 1, 1e-3, &state);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS - 1), EITS_E_FRAME_LENGTH);
+        reference_frame(&b, 1, 1e-3, &state);
         const eits_real good = b.frame[5];
         b.frame[5] = (eits_real)NAN;
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
         b.frame[5] = good;
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT); /* one too many */
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT); /* one too many */
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     /* nor after a learned one was replaced */
-    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_baseline_begin(ctx, 8), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK); /* in place of learning */
-    CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_reference_begin(ctx, 8), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK); /* in place of learning */
+    CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     eits_real zero[SMALL_ROWS] = {0};
-    CHECK_EQUAL(eits_baseline_begin(ctx, 4), EITS_OK);
-    CHECK_EQUAL(eits_baseline_add(ctx, zero, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_baseline_add(ctx, zero, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(ctx, 4), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(ctx, zero, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(ctx, zero, SMALL_ROWS), EITS_OK);
     /* the first half must be a reference */
-    CHECK_EQUAL(eits_baseline_add(ctx, zero, SMALL_ROWS), EITS_E_FRAME_ZERO);
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_E_BASELINE_SHORT);
-    CHECK(!ctx->baseline.ready);
+    CHECK_EQUAL(eits_reference_add(ctx, zero, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_E_REFERENCE_SHORT);
+    CHECK(!ctx->reference.ready);
     tear_down(&b);
 }
 
@@ -212,27 +213,27 @@ static void learned_numbers(int project)
     bench b;
     eits_context *ctx = set_up(&b);
     dense d = dense_of(&b.c.model);
-    static eits_real frames[QUIET][SMALL_ROWS];
+    static eits_real frames[UNTOUCHED][SMALL_ROWS];
     eits_options o = ctx->options;
     uint64_t state = 10;
-    o.project_baseline = (uint32_t)project;
+    o.project_reference = (uint32_t)project;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     const eits_fold whole = b.c.model.fold[0];
     const uint32_t masked[3] = {11, whole.first, whole.second};
     for (int k = 0; k < 3; ++k)
         CHECK_EQUAL(eits_mask_row(ctx, masked[k], 1), EITS_OK);
-    CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
     double mean[SMALL_ROWS] = {0}, half[SMALL_ROWS] = {0}, squares = 0, lambda_noise = 0, gain = 0;
     uint8_t out[SMALL_ROWS] = {0};
     for (int k = 0; k < 3; ++k)
         out[masked[k]] = 1;
     CHECK(whole.first != 11 && whole.second < SMALL_ROWS);
-    for (uint32_t k = 0; k < QUIET; ++k) {
-        quiet_frame(&b, -2, 2e-3, &state);
+    for (uint32_t k = 0; k < UNTOUCHED; ++k) {
+        reference_frame(&b, -2, 2e-3, &state);
         memcpy(frames[k], b.frame, sizeof frames[k]);
         frames[k][11] = frames[k][whole.first] = frames[k][whole.second] =
             (eits_real)(k % 2 == 0 ? NAN : 1e9);
-        if (k == QUIET / 2) {
+        if (k == UNTOUCHED / 2) {
             double vv = 0, rr = 0;
             memcpy(half, mean, sizeof half);
             for (uint32_t f = 0; f < SMALL_FOLDED; ++f) {
@@ -247,7 +248,7 @@ static void learned_numbers(int project)
             }
             gain = -sqrt(rr / vv);
         }
-        if (k >= QUIET / 2) {
+        if (k >= UNTOUCHED / 2) {
             double y[12], c[16];
             dense_frame(&b.c.model, &d, mean, gain, project ? half : NULL, frames[k], out, y);
             dense_correlate(&d, y, c);
@@ -256,30 +257,31 @@ static void learned_numbers(int project)
         }
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             mean[i] += out[i] ? 0 : ((double)frames[k][i] - mean[i]) / (k + 1);
-        CHECK_EQUAL(eits_baseline_add(ctx, frames[k], SMALL_ROWS), EITS_OK);
-        CHECK_NEAR(ctx->baseline.lambda_noise, lambda_noise, 2e-3 * lambda_noise);
+        CHECK_EQUAL(eits_reference_add(ctx, frames[k], SMALL_ROWS), EITS_OK);
+        CHECK_NEAR(ctx->reference.lambda_noise, lambda_noise, 2e-3 * lambda_noise);
     }
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     memset(mean, 0, sizeof mean);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
-        for (uint32_t k = 0; k < QUIET && !out[i]; ++k)
-            mean[i] += (double)frames[k][i] / QUIET;
-        for (uint32_t k = 0; k < QUIET && !out[i]; ++k)
+        for (uint32_t k = 0; k < UNTOUCHED && !out[i]; ++k)
+            mean[i] += (double)frames[k][i] / UNTOUCHED;
+        for (uint32_t k = 0; k < UNTOUCHED && !out[i]; ++k)
             squares += pow((double)frames[k][i] - mean[i], 2);
         if (!out[i])
-            CHECK_NEAR(ctx->baseline.v0[i], mean[i], 10 * EPS * fabs(mean[i]));
+            CHECK_NEAR(ctx->reference.v0[i], mean[i], 10 * EPS * fabs(mean[i]));
     }
-    const double noise = sqrt(squares / ((SMALL_ROWS - 3) * (QUIET - 1.0)));
+    const double noise = sqrt(squares / ((SMALL_ROWS - 3) * (UNTOUCHED - 1.0)));
     CHECK(noise > 1e-3 && noise < 1e-2);
-    CHECK_NEAR(ctx->baseline.noise_v, noise, BOTH_WIDTHS(2e-4, 1e-10) * noise);
-    CHECK(lambda_noise > 1e-5 && ctx->baseline.lambda_noise > 0);
-    CHECK_NEAR(ctx->baseline.gain, gain, 1e-3);
-    CHECK_EQUAL(ctx->baseline.count, QUIET);
+    CHECK_NEAR(ctx->reference.noise_v, noise, BOTH_WIDTHS(2e-4, 1e-10) * noise);
+    CHECK(lambda_noise > 1e-5 && ctx->reference.lambda_noise > 0);
+    CHECK_NEAR(ctx->reference.gain, gain, 1e-3);
+    CHECK_EQUAL(ctx->reference.count, UNTOUCHED);
     dense_free(&d);
     tear_down(&b);
 }
 
-/* A row masked in any of the quiet frames has no reference, and does not disturb the others' noise.
+/* A row masked in any of the reference frames has no reference, and does not disturb the others'
+ * noise.
  */
 static void masked_while_learning(void)
 {
@@ -288,22 +290,22 @@ static void masked_while_learning(void)
         bench b;
         eits_context *ctx = set_up(&b);
         uint64_t state = 33;
-        CHECK_EQUAL(eits_baseline_begin(ctx, QUIET), EITS_OK);
-        for (int k = 0; k < QUIET; ++k) {
+        CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
+        for (int k = 0; k < UNTOUCHED; ++k) {
             CHECK_EQUAL(eits_mask_row(ctx, 4, masked && (k == 3 || k == 13)), EITS_OK);
-            quiet_frame(&b, 1, 1e-3, &state);
+            reference_frame(&b, 1, 1e-3, &state);
             if (masked && (k == 3 || k == 13))
                 b.frame[4] = R(1e20);
-            CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
         }
-        CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
-        noise[masked] = (double)ctx->baseline.noise_v;
+        CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
+        noise[masked] = (double)ctx->reference.noise_v;
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(ctx->info.masked, masked);
-        CHECK(ctx->unusable[4] == masked && isnan((double)ctx->baseline.v0[4]) == masked);
-        CHECK_NEAR(ctx->baseline.correlation, 1, 1e-3);
+        CHECK(ctx->unusable[4] == masked && isnan((double)ctx->reference.v0[4]) == masked);
+        CHECK_NEAR(ctx->reference.correlation, 1, 1e-3);
         /* until the next reference */
-        CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(ctx->info.masked, 0);
         tear_down(&b);
@@ -322,26 +324,26 @@ static void nothing_to_compare(void)
     o.max_masked = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_mask_row(ctx, 2, 1), EITS_OK);
-    CHECK_EQUAL(eits_baseline_begin(ctx, 4), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(ctx, 4), EITS_OK);
     /* the second half runs the frame stage, which allows no masked row */
     for (int k = 0; k < 4; ++k) {
-        quiet_frame(&b, 1, 1e-3, &state);
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS),
+        reference_frame(&b, 1, 1e-3, &state);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS),
                     k < 2 ? EITS_OK : EITS_E_FRAME_CHANNELS);
     }
-    CHECK_EQUAL(ctx->baseline.count, 2);
+    CHECK_EQUAL(ctx->reference.count, 2);
     o.max_masked = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     for (int k = 0; k < 2; ++k)
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         CHECK_EQUAL(eits_mask_row(ctx, i, 1), EITS_OK);
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_E_FRAME_ZERO);
-    CHECK(!ctx->baseline.ready);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_E_FRAME_ZERO);
+    CHECK(!ctx->reference.ready);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         CHECK_EQUAL(eits_mask_row(ctx, i, 0), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     tear_down(&b);
     /* a model that is zero on all rows but one fold's */
     small_model made = small_model_make((small_spec){.rank = 12, .side = 4});
@@ -352,12 +354,12 @@ static void nothing_to_compare(void)
     small_context_open(&c, &made, 0);
     CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].first, 1), EITS_OK);
     CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].second, 1), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_reference_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
     CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].first, 0), EITS_OK);
-    CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(&c.ctx, b.frame, SMALL_ROWS), EITS_OK);
     /* and one that is zero throughout, read in place */
     small_put_f32(small_model_section(&made, "VREF", NULL), 0);
-    CHECK_EQUAL(eits_baseline_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_reference_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
     small_context_close(&c);
     small_model_free(&made);
 }
@@ -370,14 +372,14 @@ static void noise_on_a_large_offset(void)
     uint64_t state = 21;
     double squares = 0;
     static double frames[64][SMALL_ROWS];
-    CHECK_EQUAL(eits_baseline_begin(ctx, 64), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(ctx, 64), EITS_OK);
     for (int k = 0; k < 64; ++k) {
-        quiet_frame(&b, 1000, 3e-5, &state);
+        reference_frame(&b, 1000, 3e-5, &state);
         for (int i = 0; i < SMALL_ROWS; ++i)
             frames[k][i] = (double)b.frame[i];
-        CHECK_EQUAL(eits_baseline_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_baseline_finish(ctx), EITS_OK);
+    CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     for (int i = 0; i < SMALL_ROWS; ++i) {
         double mean = 0;
         for (int k = 0; k < 64; ++k)
@@ -386,7 +388,7 @@ static void noise_on_a_large_offset(void)
             squares += pow(frames[k][i] - mean, 2);
     }
     const double noise = sqrt(squares / (SMALL_ROWS * 63.0));
-    CHECK_NEAR(ctx->baseline.noise_v, noise, BOTH_WIDTHS(0.02, 1e-9) * noise);
+    CHECK_NEAR(ctx->reference.noise_v, noise, BOTH_WIDTHS(0.02, 1e-9) * noise);
     tear_down(&b);
 }
 
@@ -401,5 +403,5 @@ int main(void)
     masked_while_learning();
     nothing_to_compare();
     noise_on_a_large_offset();
-    return checks_report("baseline");
+    return checks_report("reference");
 }
