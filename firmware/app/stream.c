@@ -111,7 +111,7 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
         for (uint32_t k = 0; k < count; ++k) {
             const eits_touch t = touches[k];
             body[k] = (eits_packet_touch){
-                t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n};
+                t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n};
         }
         head->count = (uint16_t)count;
         head->age_us = fw_now_us(instrument) - frame->end_us;

@@ -288,7 +288,7 @@ def write(outcome: Outcome, output: Path | None, picture: Path | None) -> None:
 def to_text(outcome: Outcome) -> str:
     """A table of the touches, then what they cost and how true they are."""
     results, scores = outcome.results, outcome.scores
-    weighed = any(touch.load_n for result in results.values() for touch in result.touches)
+    weighed = any(touch.force_n for result in results.values() for touch in result.touches)
     lines = [
         f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'    load g' * weighed}  "
         " error mm  solve"
@@ -327,7 +327,7 @@ def _lines(
     errors = {} if score is None else score.errors_mm
     for k, touch in enumerate(result.touches):
         error = 10 * " " if score is None else f"{errors[k]:10.2f}" if k in errors else "     false"
-        grams = f"{touch.load_n / NEWTONS_PER_GRAM:10.1f}" if weighed else ""
+        grams = f"{touch.force_n / NEWTONS_PER_GRAM:10.1f}" if weighed else ""
         yield (
             f"{'' if k else label:11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f}"
             f" {touch.radius_mm:9.2f} {touch.strength_s_per_m_mm2:16.3f}{grams}  {error}"

@@ -349,7 +349,7 @@ small_model small_model_make(small_spec spec)
     return made;
 }
 
-small_model small_model_with_load(const small_model *model, const void *section, uint32_t size)
+small_model small_model_with_force(const small_model *model, const void *section, uint32_t size)
 {
     const uint32_t padded = (size + 15u) & ~15u;
     small_model made = {.size = model->size + padded};
@@ -432,5 +432,5 @@ int small_same_touch(const eits_touch *a, const eits_touch *b)
 {
     return a->id == b->id && a->x_mm == b->x_mm && a->y_mm == b->y_mm &&
            a->radius_mm == b->radius_mm && a->strength_s_per_m_mm2 == b->strength_s_per_m_mm2 &&
-           a->confidence == b->confidence && a->load_n == b->load_n;
+           a->confidence == b->confidence && a->force_n == b->force_n;
 }

@@ -55,7 +55,7 @@ small_model small_model_make(small_spec spec);
 void small_model_free(small_model *model);
 
 /* A copy with a section LOAD in place of the one that readers skip; `model` has float storage. */
-small_model small_model_with_load(const small_model *model, const void *section, uint32_t size);
+small_model small_model_with_force(const small_model *model, const void *section, uint32_t size);
 
 /* Write the checksum anew after bytes were changed. */
 void small_model_seal(small_model *model);

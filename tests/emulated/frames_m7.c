@@ -207,7 +207,7 @@ static void print_touches(const eits_touch *touches, uint32_t found)
         printf(" %lu:%08lx:%08lx:%08lx:%08lx:%08lx:%08lx", (unsigned long)touches[t].id,
                bits_of(touches[t].x_mm), bits_of(touches[t].y_mm), bits_of(touches[t].radius_mm),
                bits_of(touches[t].strength_s_per_m_mm2), bits_of(touches[t].confidence),
-               bits_of(touches[t].load_n));
+               bits_of(touches[t].force_n));
     printf("\n");
 }
 

@@ -68,7 +68,7 @@ void fuzz_check_touches(const eits_context *ctx, const eits_touch *touches, uint
     MUST(count == ctx->info.touches);
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = touches + k;
-        MUST(eits_is_finite(t->load_n) && t->load_n >= 0);
+        MUST(eits_is_finite(t->force_n) && t->force_n >= 0);
         MUST(eits_is_finite(t->x_mm) && eits_is_finite(t->y_mm) &&
              eits_is_finite(t->strength_s_per_m_mm2));
         MUST(t->radius_mm >= ctx->options.touch_min_radius_mm &&

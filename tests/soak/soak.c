@@ -176,8 +176,8 @@ static void check_touches(const eits_touch *touches, uint32_t count)
         CHECK(eits_is_finite(t->strength_s_per_m_mm2) && t->confidence >= 0 && t->confidence <= 1);
         for (uint32_t l = 0; l < k; ++l)
             CHECK(touches[l].id != t->id);
-        const eits_real numbers[] = {t->x_mm,       t->y_mm,  t->radius_mm, t->strength_s_per_m_mm2,
-                                     t->confidence, t->load_n};
+        const eits_real numbers[] = {
+            t->x_mm, t->y_mm, t->radius_mm, t->strength_s_per_m_mm2, t->confidence, t->force_n};
         crc = eits_crc32(crc, &t->id, sizeof t->id);
         crc = eits_crc32(crc, numbers, sizeof numbers);
     }

@@ -153,8 +153,8 @@ typedef struct eits_touch {
     /* share of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
      * not found in this frame and is held */
     eits_real confidence;
-    /* how hard it presses, N; 0 where the model is not calibrated (load.h) */
-    eits_real load_n;
+    /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
+    eits_real force_n;
 } eits_touch;
 
 /* A touch that is followed (track.h). */

@@ -201,7 +201,7 @@ typedef struct eits_packet_solved {
 typedef struct eits_packet_touch {
     uint32_t id;
     float x_mm, y_mm, radius_mm, strength_s_per_m_mm2, confidence;
-    float load_n; /* 0 where the model is not calibrated */
+    float force_n; /* 0 where the model is not calibrated */
 } eits_packet_touch;
 
 /* Stages that are timed, in microseconds. */

@@ -114,27 +114,27 @@ typedef struct eits_golden {
     const float *image;     /* n_pixels, S/m, bits as the float32 core gives them */
 } eits_golden;
 
-#define EITS_MAX_LOAD_POINTS 64
-#define EITS_MAX_LOAD_ORDER  4
+#define EITS_MAX_FORCE_POINTS 64
+#define EITS_MAX_FORCE_ORDER  4
 
-/* How strength and place of a touch tell its load: what a calibration with known weights found
- * (load.h). */
-typedef struct eits_load_head {
-    uint32_t points;   /* of the table, 2 to EITS_MAX_LOAD_POINTS */
-    uint32_t order;    /* of the gain's polynomial, at most EITS_MAX_LOAD_ORDER */
+/* How strength and place of a touch tell its force: what a calibration with known weights found
+ * (force.h). */
+typedef struct eits_force_head {
+    uint32_t points;   /* of the table, 2 to EITS_MAX_FORCE_POINTS */
+    uint32_t order;    /* of the gain's polynomial, at most EITS_MAX_FORCE_ORDER */
     float radius_mm;   /* u = x / radius_mm, v = y / radius_mm */
     float reach;       /* sqrt(u^2 + v^2) of the outermost place that was calibrated */
-    float uncertainty; /* of a load, relative: 95 % of those left out of the fit were within it */
+    float uncertainty; /* of a force, relative: 95 % of those left out of the fit were within it */
     uint32_t reserved[3];
-} eits_load_head;
+} eits_force_head;
 
-typedef struct eits_load {
-    const eits_load_head *head; /* NULL: the model is not calibrated */
-    const float *strength;      /* points, from 0 ascending: S/m mm^2 where the gain is 1 */
-    const float *load_n;        /* points, from 0 ascending: N */
+typedef struct eits_force {
+    const eits_force_head *head; /* NULL: the model is not calibrated */
+    const float *strength;       /* points, from 0 ascending: S/m mm^2 where the gain is 1 */
+    const float *force_n;        /* points, from 0 ascending: N */
     /* (order + 1)(order + 2) / 2 coefficients: 1, u, v, u^2, u v, v^2... */
     const float *gain;
-} eits_load;
+} eits_force;
 
 typedef struct eits_model {
     uint32_t n_electrodes;
@@ -162,7 +162,7 @@ typedef struct eits_model {
     const eits_pixel *pixel; /* n_pixels, ordered by iy, then ix */
     const eits_defaults *defaults;
     eits_golden golden;
-    eits_load load;
+    eits_force force;
     const char *meta; /* JSON, not terminated by 0; NULL if absent */
     uint32_t meta_size;
 } eits_model;

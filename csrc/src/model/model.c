@@ -20,7 +20,7 @@ typedef struct section {
 } section;
 
 typedef struct sections {
-    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, load;
+    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, force;
 } sections;
 
 static uint32_t read_u32(const uint8_t *bytes)
@@ -115,7 +115,7 @@ static section *find_slot(sections *found, const uint8_t *tag)
     static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOAD";
     section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref, &found->redu,
                         &found->sens, &found->scal, &found->colw, &found->grid, &found->defs,
-                        &found->gold, &found->meta, &found->flds, &found->load};
+                        &found->gold, &found->meta, &found->flds, &found->force};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];
@@ -333,28 +333,28 @@ static int ascends_from_zero(const float *values, uint32_t count)
     return values[0] == 0.0f;
 }
 
-/* The optional calibration of loads. */
-static eits_status read_load(eits_load *load, const section *found)
+/* The optional calibration of forces. */
+static eits_status read_force(eits_force *force, const section *found)
 {
     if (found->data == NULL)
         return EITS_OK;
-    if (found->size < sizeof(eits_load_head))
+    if (found->size < sizeof(eits_force_head))
         return EITS_E_MODEL_SECTION;
-    const eits_load_head *head = (const eits_load_head *)(const void *)found->data;
-    if (head->points < 2 || head->points > EITS_MAX_LOAD_POINTS ||
-        head->order > EITS_MAX_LOAD_ORDER || !between(head->radius_mm, 1e-6f, 1e30f) ||
+    const eits_force_head *head = (const eits_force_head *)(const void *)found->data;
+    if (head->points < 2 || head->points > EITS_MAX_FORCE_POINTS ||
+        head->order > EITS_MAX_FORCE_ORDER || !between(head->radius_mm, 1e-6f, 1e30f) ||
         !between(head->reach, 0, 1e3f) || !between(head->uncertainty, 0, 1e30f))
         return EITS_E_MODEL_VALUE;
     const uint32_t terms = (head->order + 1) * (head->order + 2) / 2;
     if (found->size != sizeof *head + (2 * head->points + terms) * 4)
         return EITS_E_MODEL_SECTION;
     const float *numbers = (const float *)(const void *)(head + 1);
-    *load = (eits_load){head, numbers, numbers + head->points, numbers + 2 * head->points};
-    if (!ascends_from_zero(load->strength, head->points) ||
-        !ascends_from_zero(load->load_n, head->points))
+    *force = (eits_force){head, numbers, numbers + head->points, numbers + 2 * head->points};
+    if (!ascends_from_zero(force->strength, head->points) ||
+        !ascends_from_zero(force->force_n, head->points))
         return EITS_E_MODEL_VALUE;
     for (uint32_t k = 0; k < terms; ++k) {
-        if (!between(load->gain[k], -1e6f, 1e6f))
+        if (!between(force->gain[k], -1e6f, 1e6f))
             return EITS_E_MODEL_VALUE;
     }
     return EITS_OK;
@@ -404,7 +404,7 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     if (status == EITS_OK)
         status = read_fields(&opened, &found.flds);
     if (status == EITS_OK)
-        status = read_load(&opened.load, &found.load);
+        status = read_force(&opened.force, &found.force);
     if (status == EITS_OK)
         *model = opened;
     return status;

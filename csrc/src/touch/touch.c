@@ -1,7 +1,7 @@
 /* Peaks of the image start discs; the discs are fitted to the reduced data off the grid; those that
  * explain nothing go. */
 #include "eitskin/touch.h"
-#include "eitskin/load.h"
+#include "eitskin/force.h"
 
 #include "base/vec.h"
 #include "diagnostics/diagnostics.h"
@@ -189,8 +189,8 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const uint32_t told = eits_track(ctx, found, finite);
     ctx->info.touches = told;
     for (uint32_t k = 0; k < told; ++k)
-        found[k].load_n =
-            eits_load_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
+        found[k].force_n =
+            eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     if (ctx->options.refine && ctx->options.mac_limit == 0 && f.count > 1 &&
         f.data == ctx->y_coupled)
         eits_solve_again(ctx, ctx->y_coupled);

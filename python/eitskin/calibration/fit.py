@@ -132,7 +132,7 @@ class Calibration:
             "error_worst": float(np.abs(self.left_out).max()),
             "scatter_before": self.scatter[0],
             "scatter_after": self.scatter[1],
-            "greatest_load_n": float(self.law.load_n[-1]),
+            "greatest_load_n": float(self.law.force_n[-1]),
             "notes": list(self.notes),
         }
 
@@ -150,9 +150,9 @@ def places_of(place_mm: FloatArray) -> IntArray:
     return np.unique(label, return_inverse=True)[1].astype(np.int64)
 
 
-def weights_of(load_n: FloatArray) -> FloatArray:
+def weights_of(force_n: FloatArray) -> FloatArray:
     """The different loads, ascending."""
-    ascending = np.sort(load_n)
+    ascending = np.sort(force_n)
     return np.asarray(
         ascending[np.concatenate([[True], ascending[1:] > SAME_WEIGHT * ascending[:-1]])]
     )
@@ -169,7 +169,7 @@ def check_presses(presses: Presses) -> None:
             f"calibration: {len(presses)} presses are too few; record at least {LEAST_PRESSES} that"
             " show a touch"
         )
-    weights = weights_of(presses.load_n)
+    weights = weights_of(presses.force_n)
     if len(weights) < LEAST_WEIGHTS:
         raise FrameError(
             f"calibration: {len(weights)} different weights are too few; use at least"
@@ -208,7 +208,7 @@ def calibrate(
     forms = [
         name
         for name, shape in FORMS.items()
-        if len(weights_of(presses.load_n)) >= shape.least_weights
+        if len(weights_of(presses.force_n)) >= shape.least_weights
     ]
     middle = min(max(orders), LAW_ORDER)
     tried = {(form, middle): _left_out(presses, radius_mm, fold, form, middle) for form in forms}
@@ -221,12 +221,12 @@ def calibrate(
     tried = {(form, order): others.get(order, tried[form, middle]) for order in orders}
     _, order = _best(tried)
     fitted = fit(presses, radius_mm, form, order)
-    if _steepness(fitted, presses.load_n) < LEAST_STEEPNESS:
+    if _steepness(fitted, presses.force_n) < LEAST_STEEPNESS:
         raise FrameError(
             "calibration: strength does not grow with load; look at the list of weights, and at the"
             " touches of each"
         )
-    if form != "power" and fitted.numbers[1] > 0.9 * MOST_F0 * presses.load_n.max():
+    if form != "power" and fitted.numbers[1] > 0.9 * MOST_F0 * presses.force_n.max():
         notes.append(
             "the strength shows no saturation: beyond the greatest weight the law is a guess"
         )
@@ -240,9 +240,9 @@ def calibrate(
     )  # fmt: skip
 
 
-def _steepness(fitted: Fitted, load_n: FloatArray) -> float:
+def _steepness(fitted: Fitted, force_n: FloatArray) -> float:
     """The exponent of load that strength grows with between the least and the greatest weight."""
-    ends = np.array([load_n.min(), load_n.max()])
+    ends = np.array([force_n.min(), force_n.max()])
     low, high = np.log(np.maximum(FORMS[fitted.form].strength(ends, *fitted.numbers), 1e-300))
     return float((high - low) / np.log(ends[1] / ends[0]))
 
@@ -257,7 +257,7 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
         from scipy.optimize import least_squares
     except ImportError:
         raise missing_extra("model", "scipy") from None
-    shape, most = FORMS[form], float(presses.load_n.max())
+    shape, most = FORMS[form], float(presses.force_n.max())
     u, v = presses.place_mm.T / radius_mm
     terms, log_strength = monomials(u, v, order)[:, 1:], np.log(presses.strength)
 
@@ -269,7 +269,7 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
 
     def misfit(p: FloatArray) -> FloatArray:
         gain = np.maximum(1 + terms @ p[count:], 0.05)
-        expected = np.maximum(shape.strength(presses.load_n, *np.exp(p[:count])), 1e-300)
+        expected = np.maximum(shape.strength(presses.force_n, *np.exp(p[:count])), 1e-300)
         return np.concatenate([log_strength + np.log(gain) - np.log(expected), RIDGE * p[count:]])
 
     def slope(p: FloatArray) -> FloatArray:
@@ -281,7 +281,7 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
                 np.exp(p[:count] - STEP * (np.arange(count) == k)),
             )
             up, down = (
-                np.log(np.maximum(shape.strength(presses.load_n, *at), 1e-300)) for at in step
+                np.log(np.maximum(shape.strength(presses.force_n, *at), 1e-300)) for at in step
             )
             jacobian[: len(log_strength), k] = (down - up) / (2 * STEP)
         jacobian[: len(log_strength), count:] = terms / gain[:, None]
@@ -303,7 +303,7 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
 def law_of(fitted: Fitted, presses: Presses, radius_mm: float, uncertainty: float) -> LoadLaw:
     """``fitted`` as a model holds it: the law as a table up to the greatest load of ``presses``,
     evenly by strength."""
-    shape, most = FORMS[fitted.form], float(presses.load_n.max())
+    shape, most = FORMS[fitted.form], float(presses.force_n.max())
     top = float(shape.strength(np.array(most), *fitted.numbers))
     strength = np.linspace(0.0, top, TABLE_POINTS)
     load = shape.load(strength[:-1], *fitted.numbers)
@@ -326,7 +326,7 @@ def _left_out(
         kept = presses.take(~out)
         law = law_of(fit(kept, radius_mm, form, order), kept, radius_mm, 0.0)
         errors[out] = (
-            law.loads_at(presses.place_mm[out], presses.strength[out]) / presses.load_n[out] - 1
+            law.loads_at(presses.place_mm[out], presses.strength[out]) / presses.force_n[out] - 1
         )
     return errors
 
@@ -355,7 +355,7 @@ def _interval(
     for _ in range(resamples):
         rows = np.concatenate([members[k] for k in generator.integers(0, count, count)])
         sample = presses.take(rows)
-        if len(weights_of(sample.load_n)) >= 2:
+        if len(weights_of(sample.force_n)) >= 2:
             drawn.append(fit(sample, radius_mm, fitted.form, fitted.order).numbers)
     ends = np.quantile(np.array(drawn or [fitted.numbers]), [0.025, 0.975], axis=0)
     return tuple((float(low), float(high)) for low, high in ends.T)
@@ -366,8 +366,8 @@ def _scatter(presses: Presses, errors: FloatArray) -> float:
     own mean."""
     residual = 1 + errors
     squares, count = 0.0, 0
-    for weight in weights_of(presses.load_n):
-        of_it = residual[np.abs(np.log(presses.load_n / weight)) < np.log(SAME_WEIGHT)]
+    for weight in weights_of(presses.force_n):
+        of_it = residual[np.abs(np.log(presses.force_n / weight)) < np.log(SAME_WEIGHT)]
         squares += float(((of_it / of_it.mean() - 1) ** 2).sum())
         count += len(of_it) - 1
     return float(np.sqrt(squares / max(count, 1)))

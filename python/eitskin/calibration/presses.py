@@ -21,25 +21,25 @@ NEAR_MM = 25.0  # a touch that far from where the weight is said to be is not it
 
 @dataclass(frozen=True, eq=False)
 class Presses:
-    """k presses: ``load_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over
+    """k presses: ``force_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over
     the press's frames, and ``place_mm`` (k, 2) as found, medians too."""
 
-    load_n: FloatArray
+    force_n: FloatArray
     strength: FloatArray
     place_mm: FloatArray
 
     def __len__(self) -> int:
-        return len(self.load_n)
+        return len(self.force_n)
 
     def take(self, rows: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Presses:
         """Some of them."""
-        return Presses(self.load_n[rows], self.strength[rows], self.place_mm[rows])
+        return Presses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 
 
 def joined(parts: Sequence[Presses]) -> Presses:
     """All of several recordings."""
     return Presses(
-        np.concatenate([part.load_n for part in parts]),
+        np.concatenate([part.force_n for part in parts]),
         np.concatenate([part.strength for part in parts]),
         np.concatenate([part.place_mm for part in parts]),
     )
@@ -82,7 +82,7 @@ def find_presses(
             unseen.append(f"{name}: {len(touches)} of {len(rows)} show the weight; left out")
             continue
         found = np.median([(abs(t.strength_s_per_m_mm2), t.x_mm, t.y_mm) for t in touches], axis=0)
-        seen.append((weight.load_n, *found.tolist()))
+        seen.append((weight.force_n, *found.tolist()))
     table = np.array(seen, dtype=np.float64).reshape(-1, 4)
     return Presses(table[:, 0], table[:, 1], table[:, 2:]), unseen
 

@@ -14,19 +14,19 @@ from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.errors import ConfigError
 from eitskin.fileio import read_bytes
 
-KEYS = ("first", "last", "load_g", "load_n", "x_mm", "y_mm")
+KEYS = ("first", "last", "load_g", "force_n", "x_mm", "y_mm")
 MOST_FRAMES = 2**32 - 1
 MOST_LOAD_N = 1e6
 
 
 @dataclass(frozen=True)
 class Weight:
-    """One weight on the skin: frames ``first`` to ``last``, both included; ``load_n`` N; its place
+    """One weight on the skin: frames ``first`` to ``last``, both included; ``force_n`` N; its place
     in mm, where known."""
 
     first: int
     last: int
-    load_n: float
+    force_n: float
     place_mm: tuple[float, float] | None = None
 
 
@@ -89,23 +89,23 @@ def _number(cell: str, name: str, where: str) -> float:
 
 def _weight(row: Mapping[str, Any], where: str) -> Weight:
     check_keys(row, KEYS, where)
-    if ("load_g" in row) == ("load_n" in row):
+    if ("load_g" in row) == ("force_n" in row):
         raise ConfigError(
-            f"{where}: give the load as load_g (grams) or as load_n (newtons), one of them"
+            f"{where}: give the load as load_g (grams) or as force_n (newtons), one of them"
         )
     if ("x_mm" in row) != ("y_mm" in row):
         raise ConfigError(f"{where}: a place needs x_mm and y_mm; give both or none")
     first = integer(row, "first", None, where, low=0, high=MOST_FRAMES)
     last = integer(row, "last", first, where, low=first, high=MOST_FRAMES)
     if "load_g" in row:
-        load_n = NEWTONS_PER_GRAM * number(
+        force_n = NEWTONS_PER_GRAM * number(
             row, "load_g", None, where, low=0, high=MOST_LOAD_N / NEWTONS_PER_GRAM, open_low=True
         )
     else:
-        load_n = number(row, "load_n", None, where, low=0, high=MOST_LOAD_N, open_low=True)
+        force_n = number(row, "force_n", None, where, low=0, high=MOST_LOAD_N, open_low=True)
     place = (
         (number(row, "x_mm", None, where), number(row, "y_mm", None, where))
         if "x_mm" in row
         else None
     )
-    return Weight(first, last, load_n, place)
+    return Weight(first, last, force_n, place)

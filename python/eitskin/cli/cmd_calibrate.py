@@ -139,7 +139,7 @@ def _frames(path: Path, model: Path | None) -> tuple[Frames, list[int]]:
 
 def _lines(found: Calibration) -> list[str]:
     from eitskin.calibration.fit import FORMS
-    from eitskin.core.results import load_text
+    from eitskin.core.results import force_text
 
     facts, law = found.as_dict(), found.law
     names = {
@@ -151,7 +151,7 @@ def _lines(found: Calibration) -> list[str]:
     lines = [
         (
             f"{facts['presses']} presses at {facts['places']} place{'s' * (found.groups > 1)}, "
-            f"{load_text(found.law.load_n[-1])} the greatest"
+            f"{force_text(found.law.force_n[-1])} the greatest"
         ),
         f"law                 strength = {FORMS[found.fitted.form].text}",
     ]

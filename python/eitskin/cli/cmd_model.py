@@ -152,13 +152,14 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
 
 
 def _calibration_text(model: Model) -> str:
-    from eitskin.core.results import load_text
+    from eitskin.core.results import force_text
 
     if model.load is None:
         return "none; touches have no load"
     law = model.load
     return (
-        f"loads to {load_text(law.load_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain of"
+        f"loads to {force_text(law.force_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain"
+        f" of"
         f" order {law.order}"
     )
 

@@ -380,4 +380,4 @@ def _bits(word: int) -> tuple[int, ...]:
 
 
 def _touch(t: Any) -> Touch:
-    return Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n)
+    return Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)

@@ -169,7 +169,7 @@ class LearnedReference:
 @dataclass(frozen=True)
 class Touch:
     """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from
-    frame to frame. One that is held while it is not found has confidence 0. ``load_n`` is how hard
+    frame to frame. One that is held while it is not found has confidence 0. ``force_n`` is how hard
     it presses, in newtons, where the model is calibrated (docs/guide/calibration.md), else 0."""
 
     id: int
@@ -178,15 +178,15 @@ class Touch:
     radius_mm: float
     strength_s_per_m_mm2: float
     confidence: float
-    load_n: float = 0.0
+    force_n: float = 0.0
 
 
 NEWTONS_PER_GRAM = 9.80665e-3  # grams-force, by the standard acceleration of free fall
 
 
-def load_text(load_n: float) -> str:
+def force_text(force_n: float) -> str:
     """A load in words: grams (of force), as weights are marked."""
-    return f"{load_n / NEWTONS_PER_GRAM:.1f} g"
+    return f"{force_n / NEWTONS_PER_GRAM:.1f} g"
 
 
 @dataclass(frozen=True)

@@ -31,14 +31,15 @@ def monomials(u: FloatArray, v: FloatArray, order: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class LoadLaw:
-    """A calibration. ``strength`` (p,) S/m mm^2 and ``load_n`` (p,) N both ascend from 0: the table
-    where the gain is 1. ``gain`` (t,) are coefficients of :func:`terms_of` (``order``) in u = x /
+    """A calibration. ``strength`` (p,) S/m mm^2 and ``force_n`` (p,) N both ascend from 0: the
+    table where the gain is 1. ``gain`` (t,) are coefficients of :func:`terms_of` (``order``) in u =
+    x /
     ``radius_mm``, v = y / ``radius_mm``, trusted to ``reach`` = sqrt(u^2 + v^2); ``uncertainty`` is
     relative: 95 % of the loads that were left out of the fit were within it. float32 all.
     """
 
     strength: npt.NDArray[np.float32]
-    load_n: npt.NDArray[np.float32]
+    force_n: npt.NDArray[np.float32]
     gain: npt.NDArray[np.float32]
     order: int
     radius_mm: float
@@ -56,10 +57,10 @@ class LoadLaw:
 
     def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
         """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the
-        table by its last slope, to twice its greatest load. What eits_load_n in
+        table by its last slope, to twice its greatest load. What eits_force_n in
         csrc/src/model/force.c gives."""
         seen = np.abs(strength) * self.gains_at(place_mm)
-        s, n = self.strength.astype(np.float64), self.load_n.astype(np.float64)
+        s, n = self.strength.astype(np.float64), self.force_n.astype(np.float64)
         k = np.clip(np.searchsorted(s, seen), 1, len(s) - 1)
         return np.asarray(
             np.minimum(
@@ -76,7 +77,7 @@ def encode_load(law: LoadLaw) -> bytes:
     """
     head = HEAD.pack(len(law.strength), law.order, law.radius_mm, law.reach, law.uncertainty)
     content = head + b"".join(
-        part.astype("<f4").tobytes() for part in (law.strength, law.load_n, law.gain)
+        part.astype("<f4").tobytes() for part in (law.strength, law.force_n, law.gain)
     )
     decode_load(content, "calibration")
     return content
@@ -103,12 +104,12 @@ def decode_load(content: bytes, where: str) -> LoadLaw:
     )
     if not in_range or len(content) != HEAD.size + 4 * (2 * points + len(terms_of(order))):
         raise wrong
-    strength, load_n, gain = np.split(
+    strength, force_n, gain = np.split(
         np.frombuffer(content, dtype="<f4", offset=HEAD.size), [points, 2 * points]
     )
-    for ascending in (strength, load_n):
+    for ascending in (strength, force_n):
         if ascending[0] != 0 or not ascending[-1] <= HUGE or not (np.diff(ascending) > 0).all():
             raise wrong
     if not (np.abs(gain) <= MOST_COEFFICIENT).all():
         raise wrong
-    return LoadLaw(strength, load_n, gain, order, radius_mm, reach, uncertainty)
+    return LoadLaw(strength, force_n, gain, order, radius_mm, reach, uncertainty)

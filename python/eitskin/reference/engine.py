@@ -407,7 +407,9 @@ class ReferenceEngine:
         loads = self.model.load.loads_at(
             places, np.array([t.strength_s_per_m_mm2 for t in touches])
         )
-        return tuple(replace(t, load_n=float(load)) for t, load in zip(touches, loads, strict=True))
+        return tuple(
+            replace(t, force_n=float(load)) for t, load in zip(touches, loads, strict=True)
+        )
 
     def _image(self, result: Result) -> FloatArray:
         return np.asarray(result.x * self.model.column_weight.astype(np.float64))

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.diagnostics import words
-from eitskin.core.results import load_text, solve_text
+from eitskin.core.results import force_text, solve_text
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import quality_text
@@ -134,7 +134,7 @@ def _touches_text(seen: Seen) -> str:
     found = [
         f"#{t.id} ({t.x_mm:.1f}, {t.y_mm:.1f}) mm, radius {t.radius_mm:.1f} mm,"
         f" {t.strength_s_per_m_mm2:.2f} S/m"
-        f" mm2{', ' + load_text(t.load_n) if t.load_n else ''}{_error(seen, k)}"
+        f" mm2{', ' + force_text(t.force_n) if t.force_n else ''}{_error(seen, k)}"
         for k, t in enumerate(seen.frame.touches.touches)
     ]
     return " | ".join(found) or "no touch"

@@ -11,8 +11,8 @@ RADIUS_MM = 97.0
 LOADS_N = np.array([0.5, 0.8, 1.0, 1.5, 2.0])
 
 
-def saturating(load_n: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    return np.asarray(-4.0 * np.expm1(-load_n / 1.5))
+def saturating(force_n: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return np.asarray(-4.0 * np.expm1(-force_n / 1.5))
 
 
 def places(count: int) -> npt.NDArray[np.float64]:

@@ -47,14 +47,14 @@ def test_a_flat_skin_needs_no_gain() -> None:
 @pytest.mark.parametrize("exponent", [0.6, 1.3])
 def test_powers_are_told_as_well(exponent: float) -> None:
     known = presses(noise=0.002, bent=False)
-    strength = 2.0 * known.load_n**exponent * known.strength / saturating(known.load_n)
+    strength = 2.0 * known.force_n**exponent * known.strength / saturating(known.force_n)
     found = calibrate(replace_strength(known, strength), RADIUS_MM, resamples=0)
     seen = 2.0 * np.array([0.7, 1.9]) ** exponent
     assert found.law.loads_at(np.zeros((2, 2)), seen) == pytest.approx([0.7, 1.9], rel=0.01)
 
 
 def replace_strength(known: Presses, strength: np.ndarray) -> Presses:
-    return Presses(known.load_n, strength, known.place_mm)
+    return Presses(known.force_n, strength, known.place_mm)
 
 
 def test_the_table_is_the_law() -> None:
@@ -121,7 +121,7 @@ def test_too_little_is_refused(rows: object, text: str) -> None:
 
 def test_weights_too_alike_are_refused() -> None:
     known = presses()
-    alike = Presses(1 + 0.1 * known.load_n, known.strength, known.place_mm)
+    alike = Presses(1 + 0.1 * known.force_n, known.strength, known.place_mm)
     with pytest.raises(
         FrameError,
         match=r"1\.14 times the least, which cannot show a law; use a range of 1\.5 times or more",
@@ -132,7 +132,7 @@ def test_weights_too_alike_are_refused() -> None:
 def test_strength_that_falls_is_refused() -> None:
     known = presses()
     with pytest.raises(FrameError, match="strength does not grow with load"):
-        calibrate(replace_strength(known, 1 / known.load_n), RADIUS_MM)
+        calibrate(replace_strength(known, 1 / known.force_n), RADIUS_MM)
 
 
 def test_places_and_weights_are_told_apart() -> None:
@@ -147,6 +147,6 @@ def test_places_and_weights_are_told_apart() -> None:
 
 def test_a_straight_line_is_told_to_have_no_end() -> None:
     known = presses(noise=0.0, bent=False)
-    found = calibrate(replace_strength(known, 2 * known.load_n), RADIUS_MM, resamples=0)
+    found = calibrate(replace_strength(known, 2 * known.force_n), RADIUS_MM, resamples=0)
     assert "no saturation" in " ".join(found.notes) or found.fitted.form == "power"
     assert replace(found, notes=()).as_dict()["error_rms"] < 0.01

@@ -40,9 +40,9 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("first,load_g\n0,0\n", "load_g = 0.0 is out of range; it must be above 0"),
         (
             "first,load_g\n0,\n",
-            "give the load as load_g (grams) or as load_n (newtons), one of them",
+            "give the load as load_g (grams) or as force_n (newtons), one of them",
         ),
-        ("first,load_g,load_n\n0,1,1\n", "one of them"),
+        ("first,load_g,force_n\n0,1,1\n", "one of them"),
         ("first,load_g,x_mm\n0,1,1\n", "a place needs x_mm and y_mm; give both or none"),
         ("first,load_g\n-1,5\n", "first = -1.0 is out of range"),
         ("first,last,load_g\n5,4,5\n", "last = 4.0 is out of range; it must be at least 5"),

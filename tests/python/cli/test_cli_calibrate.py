@@ -82,7 +82,7 @@ def test_presses_that_it_never_saw_read_their_load(folder: Path, done: Done) -> 
     for frame, (place, grams) in zip(told["frames"], NEW, strict=True):
         (touch,) = frame["touches"]
         assert np.hypot(touch["x_mm"] - place[0], touch["y_mm"] - place[1]) < 1
-        assert touch["load_n"] / NEWTONS_PER_GRAM == pytest.approx(grams, rel=SOME)
+        assert touch["force_n"] / NEWTONS_PER_GRAM == pytest.approx(grams, rel=SOME)
     text = done("reconstruct", folder / "new.npz", "--model", folder / "skin.eitm")
     assert "load g" in text.splitlines()[0]
     assert "load g" not in done("reconstruct", folder / "new.npz").splitlines()[0]
@@ -125,7 +125,7 @@ def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
 def test_a_board_with_that_model_sends_the_same_load_bits(folder: Path, tmp_path: Path) -> None:
     live = recorded(folder, (folder / "skin.eitm").read_bytes(), tmp_path / "run.eits")
     told = [
-        t.load_n / NEWTONS_PER_GRAM
+        t.force_n / NEWTONS_PER_GRAM
         for frame in live
         if frame.touches is not None
         for t in frame.touches.touches

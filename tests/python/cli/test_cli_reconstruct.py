@@ -25,7 +25,7 @@ from small_models import prebuilt, session
 Done = Callable[..., str]
 
 PNG = b"\x89PNG\r\n\x1a\n"
-TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence", "load_n"}
+TOUCH = {"id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "confidence", "force_n"}
 INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs",
     "lambda", "lambda_max",

@@ -60,7 +60,9 @@ def as_printed(result: Reconstruction) -> str:
     words = [
         f" {t.id}:"
         + ":".join(
-            map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n))
+            map(
+                bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)
+            )
         )
         for t in result.touches
     ]
@@ -132,7 +134,7 @@ def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
     assert [one.touches for one in run(program, tmp_path, blob, quiet, frames, options)] == [
         as_printed(one) for one in results
     ]
-    assert sum(touch.load_n > 0 for one in results for touch in one.touches) >= len(frames)
+    assert sum(touch.force_n > 0 for one in results for touch in one.touches) >= len(frames)
 
 
 def test_instructions_are_counted_exactly(program: Path, tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def test_every_field(tmp_path: Path, results: dict[int, Reconstruction]) -> None
         ("radius_mm",) * 2,
         ("strength_s_per_m_mm2",) * 2,
         ("confidence",) * 2,
-        ("load_n",) * 2,
+        ("force_n",) * 2,
     ):
         assert saved[f"touch_{name}"].tolist() == [getattr(touch, field) for _, touch in touches]
     info = json.loads(str(saved["info"]))

@@ -46,7 +46,14 @@ class Outcome:
         """Whether every number that comes out is."""
         numbers = [getattr(self.info, name) for name in NUMBERS]
         for t in self.touches:
-            numbers += [t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n]
+            numbers += [
+                t.x_mm,
+                t.y_mm,
+                t.radius_mm,
+                t.strength_s_per_m_mm2,
+                t.confidence,
+                t.force_n,
+            ]
         return bool(
             np.isfinite(self.image).all()
             and np.isfinite(self.coefficients).all()
@@ -89,7 +96,9 @@ class Host(CoreEngine):
         )
         each = (self._touches[k] for k in range(self._touch_count[0]))
         found = tuple(
-            Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n)
+            Touch(
+                t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n
+            )
             for t in each
         )
         return Outcome(status, self._image.copy(), self.coefficients(), found, self.last_info())
@@ -167,7 +176,9 @@ def as_printed(outcome: Outcome) -> tuple[object, ...]:
     words = [
         f" {t.id}:"
         + ":".join(
-            map(bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.load_n))
+            map(
+                bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)
+            )
         )
         for t in outcome.touches
     ]

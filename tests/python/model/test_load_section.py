@@ -52,15 +52,15 @@ def test_touches_carry_the_load_of_strength_and_place(engine: str) -> None:
     for frame in session().frames_v[:6]:
         touches, without = skin.reconstruct(frame).touches, bare.reconstruct(frame).touches
         assert touches == tuple(
-            replace(t, load_n=touches[k].load_n) for k, t in enumerate(without)
+            replace(t, force_n=touches[k].force_n) for k, t in enumerate(without)
         )  # nothing else differs
         for touch in touches:
             expected = law().loads_at(
                 np.array([(touch.x_mm, touch.y_mm)]), np.array([touch.strength_s_per_m_mm2])
             )[0]
-            assert touch.load_n == pytest.approx(expected, rel=1e-5) and touch.load_n > 0
+            assert touch.force_n == pytest.approx(expected, rel=1e-5) and touch.force_n > 0
             seen += 1
-        assert all(touch.load_n == 0 for touch in without)
+        assert all(touch.force_n == 0 for touch in without)
     assert seen >= 6
 
 

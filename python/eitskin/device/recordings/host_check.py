@@ -224,7 +224,7 @@ def _numbers(touch: Touch) -> bytes:
         touch.radius_mm,
         touch.strength_s_per_m_mm2,
         touch.confidence,
-        touch.load_n,
+        touch.force_n,
     )
     return np.array(values, dtype="<f4").tobytes()
 

@@ -1,6 +1,6 @@
 /* eitskin: how hard a touch presses, on a skin that was calibrated with known weights. */
-#ifndef EITSKIN_LOAD_H
-#define EITSKIN_LOAD_H
+#ifndef EITSKIN_FORCE_H
+#define EITSKIN_FORCE_H
 
 #include "eitskin/model.h"
 
@@ -8,13 +8,14 @@
 extern "C" {
 #endif
 
-/* The load in newtons of a touch of this strength (S/m mm^2, of either sign) at (x, y), by the
+/* The force in newtons of a touch of this strength (S/m mm^2, of either sign) at (x, y), by the
  * section LOAD of an open model; 0 where it has none. The strength times the gain of the place is
  * looked up in the table, straight between its points; beyond the last, the last slope goes on to
- * twice the greatest load; a place further out than was calibrated counts as on the calibrated rim.
+ * twice the greatest force; a place further out than was calibrated counts as on the calibrated
+ * rim.
  */
-eits_real eits_load_n(const eits_model *model, eits_real x_mm, eits_real y_mm,
-                      eits_real strength_s_per_m_mm2);
+eits_real eits_force_n(const eits_model *model, eits_real x_mm, eits_real y_mm,
+                       eits_real strength_s_per_m_mm2);
 
 #ifdef __cplusplus
 }

@@ -32,7 +32,7 @@ static eits_status open_with(const uint8_t *bytes, uint32_t size, eits_model *mo
                              small_model *kept)
 {
     small_model bare = small_model_make(TINY);
-    *kept = small_model_with_load(&bare, bytes, size);
+    *kept = small_model_with_force(&bare, bytes, size);
     small_model_free(&bare);
     return eits_model_open(model, kept->blob, kept->size);
 }
@@ -71,9 +71,9 @@ static double gain_by_hand(const float *c, uint32_t order, double u, double v)
     return fmin(fmax(gain, 0.25), 4.0);
 }
 
-static void loads_are_those_of_the_table(void)
+static void forces_are_those_of_the_table(void)
 {
-    for (uint32_t order = 0; order <= EITS_MAX_LOAD_ORDER; ++order) {
+    for (uint32_t order = 0; order <= EITS_MAX_FORCE_ORDER; ++order) {
         uint8_t bytes[MOST];
         eits_model model;
         small_model kept;
@@ -82,37 +82,37 @@ static void loads_are_those_of_the_table(void)
             /* of either sign */
             const double x = -16 + 0.064 * i, y = 12 * sin(i), strength = 6 * cos(0.37 * i);
             const double away = hypot(x, y) / 10, inward = away > 1.5 ? 1.5 / away : 1;
-            const double s = fabs(strength) *
-                             gain_by_hand(model.load.gain, order, x / 10 * inward, y / 10 * inward);
-            const double load = fmin(s <= 2 ? s / 2 : 1 + 4 * (s - 2), 10);
+            const double s = fabs(strength) * gain_by_hand(model.force.gain, order, x / 10 * inward,
+                                                           y / 10 * inward);
+            const double force = fmin(s <= 2 ? s / 2 : 1 + 4 * (s - 2), 10);
             const double got =
-                (double)eits_load_n(&model, (eits_real)x, (eits_real)y, (eits_real)strength);
-            CHECK_NEAR(got, load, 200 * EPS * fmax(load, 1));
+                (double)eits_force_n(&model, (eits_real)x, (eits_real)y, (eits_real)strength);
+            CHECK_NEAR(got, force, 200 * EPS * fmax(force, 1));
         }
-        CHECK(eits_load_n(&model, 3, 4, 0) == 0);
+        CHECK(eits_force_n(&model, 3, 4, 0) == 0);
         const eits_real ends[] = {R(1e30), R(-1e30), BOTH_WIDTHS(FLT_MAX, (eits_real)DBL_MAX)};
         for (int k = 0; k < 3; ++k) { /* finite whatever is asked */
-            CHECK(eits_load_n(&model, 0, 0, ends[k]) == 10);
-            const eits_real out = eits_load_n(&model, ends[k], -ends[k], 2);
+            CHECK(eits_force_n(&model, 0, 0, ends[k]) == 10);
+            const eits_real out = eits_force_n(&model, ends[k], -ends[k], 2);
             CHECK(out >= 0 && out <= 10);
         }
         small_model_free(&kept);
     }
 }
 
-static void no_calibration_no_load(void)
+static void no_calibration_no_force(void)
 {
     small_model made = small_model_make(TINY);
     eits_model model;
     CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
-    CHECK(model.load.head == NULL && eits_load_n(&model, 1, 2, 3) == 0);
+    CHECK(model.force.head == NULL && eits_force_n(&model, 1, 2, 3) == 0);
     small_model_free(&made);
 }
 
 static void sections_of_another_size(void)
 {
     uint8_t bytes[MOST];
-    for (uint32_t order = 0; order <= EITS_MAX_LOAD_ORDER; ++order) {
+    for (uint32_t order = 0; order <= EITS_MAX_FORCE_ORDER; ++order) {
         const uint32_t size = section_of(bytes, order);
         CHECK_EQUAL(refused(bytes, size), EITS_OK);
         CHECK_EQUAL(refused(bytes, size - 4), EITS_E_MODEL_SECTION);
@@ -137,7 +137,7 @@ static void numbers_out_of_range(void)
     CHECK_EQUAL(with_number(12, 1001.0f), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_number(16, -0.1f), EITS_E_MODEL_VALUE);
     CHECK_EQUAL(with_number(16, INFINITY), EITS_E_MODEL_VALUE);
-    for (uint32_t k = 0; k < 3; ++k) { /* strengths, loads */
+    for (uint32_t k = 0; k < 3; ++k) { /* strengths, forces */
         for (uint32_t list = 0; list < 2; ++list) {
             const uint32_t at = HEAD + 12 * list + 4 * k;
             const float wrong[] = {-1.0f, NAN, INFINITY, 2e30f, k == 0 ? 0.5f : 0.0f};
@@ -154,13 +154,13 @@ static void numbers_out_of_range(void)
     }
 }
 
-/* Touches carry the load of their own place and strength. */
-static void touches_have_loads(void)
+/* Touches carry the force of their own place and strength. */
+static void touches_have_forces(void)
 {
     uint8_t bytes[MOST];
     const small_spec spec = {.rank = 24, .side = 12, .shape = SMALL_WAVES};
     small_model bare = small_model_make(spec),
-                made = small_model_with_load(&bare, bytes, section_of(bytes, 2));
+                made = small_model_with_force(&bare, bytes, section_of(bytes, 2));
     small_context c;
     eits_touch touches[EITS_MAX_TOUCHES];
     eits_real frame[SMALL_ROWS];
@@ -179,8 +179,8 @@ static void touches_have_loads(void)
     CHECK(count > 0);
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = &touches[k];
-        CHECK(t->load_n > 0 &&
-              t->load_n == eits_load_n(&c.model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
+        CHECK(t->force_n > 0 &&
+              t->force_n == eits_force_n(&c.model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2));
     }
     small_context_close(&c);
     small_model_free(&made);
@@ -189,10 +189,10 @@ static void touches_have_loads(void)
 
 int main(void)
 {
-    loads_are_those_of_the_table();
-    no_calibration_no_load();
+    forces_are_those_of_the_table();
+    no_calibration_no_force();
     sections_of_another_size();
     numbers_out_of_range();
-    touches_have_loads();
-    return checks_report("load");
+    touches_have_forces();
+    return checks_report("force");
 }
