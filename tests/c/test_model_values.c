@@ -240,7 +240,7 @@ static void defaults(void)
                     solver <= EITS_SOLVER_ACTIVE_SET ? EITS_OK : EITS_E_MODEL_VALUE);
     for (uint32_t bits = 0; bits < 9; ++bits)
         CHECK_EQUAL(with_word(TINY, "DEFS", 60, bits),
-                    bits <= EITS_SEARCH_ALL ? EITS_OK : EITS_E_MODEL_VALUE);
+                    bits <= EITS_TOUCH_FIT_ALL ? EITS_OK : EITS_E_MODEL_VALUE);
 }
 
 /* Whatever opens has defaults that its own context accepts again, runs, and never shows a number
@@ -258,7 +258,7 @@ static void use(const small_model *made)
     eits_options options = ctx.options;
     CHECK_EQUAL(eits_set_options(&ctx, &options), EITS_OK);
     options.iterations = options.iterations < 25 ? options.iterations : 25;
-    options.refine = 1;
+    options.second_pass = 1;
     CHECK_EQUAL(eits_set_options(&ctx, &options), EITS_OK);
     eits_real difference = 0;
     (void)eits_self_test(&ctx, &difference);

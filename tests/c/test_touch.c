@@ -152,7 +152,7 @@ static void both_signs(void)
     tear_down(&b);
 }
 
-static void apart_and_merged(void)
+static void two_touches_and_one(void)
 {
     bench b;
     (void)set_up(&b, EITS_STORAGE_F32, 0);
@@ -401,7 +401,7 @@ int main(void)
 {
     one_touch_anywhere();
     both_signs();
-    apart_and_merged();
+    two_touches_and_one();
     dropped_and_limited();
     many_peaks();
     gate_by_noise();

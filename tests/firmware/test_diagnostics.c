@@ -44,7 +44,7 @@ static void test_open_while_nobody_looks(uint16_t every)
     bench_stop(&b);
 }
 
-/* Two electrodes that are joined: both named, each with the other. */
+/* Two electrodes that are merged: both named, each with the other. */
 static double bridged(void *user, const uint8_t e[4], uint64_t at_ns)
 {
     (void)at_ns;

@@ -169,8 +169,8 @@ static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
     else if (k == WHOLE + REAL) {
         const uint8_t bits = fuzz_u8(in);
         o->sign = (eits_sign)(bits % 4);
-        o->refine = bits / 4 % 2;
-        o->touch_search = EITS_SEARCH_ALL ^ (bits / 8u % 16u); /* beyond all: refused */
+        o->second_pass = bits / 4 % 2;
+        o->touch_fit = EITS_TOUCH_FIT_ALL ^ (bits / 8u % 16u); /* beyond all: refused */
     } else
         o->solver = (eits_solver)(fuzz_u8(in) % 5);
 }

@@ -57,7 +57,7 @@ static void use(const eits_model *model)
     frame_of(model, model->golden.frame, 1.0f, frame);
     reconstruct(&ctx, frame);
     options.sign = EITS_SIGN_BOTH;
-    options.refine = 1;
+    options.second_pass = 1;
     options.solver = (eits_solver)((model->defaults->solver + 1u) % 4u);
     MUST(eits_set_options(&ctx, &options) == EITS_OK);
     frame_of(model, model->golden.frame, 1.5f, frame);

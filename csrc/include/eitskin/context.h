@@ -25,18 +25,18 @@ typedef enum eits_sign {
     EITS_SIGN_BOTH = 2
 } eits_sign;
 
-/* What the search for touches does beyond fitting discs to the image's peaks. */
-typedef enum eits_search {
+/* What the touch fit for touches does beyond fitting discs to the image's peaks. */
+typedef enum eits_touch_fit {
     /* first to v0 log(v / v0), which strong touches bend less; models of differences */
-    EITS_SEARCH_STRAIGHT = 1,
-    /* discs that are one touch are joined, those that are two are parted; where data are
-     * straight or coupled, for what bends them looks like more touches */
-    EITS_SEARCH_REGROUP = 2,
+    EITS_TOUCH_FIT_LOG_DATA = 1,
+    /* discs that are one touch are merged, those that are two are split; where data are
+     * linear or corrected for interaction, for what bends them looks like more touches */
+    EITS_TOUCH_FIT_SPLIT_MERGE = 2,
     /* what touches do to each other's field is taken out of the data; models of differences with
      * fields */
-    EITS_SEARCH_COUPLED = 4
-} eits_search;
-#define EITS_SEARCH_ALL 7u
+    EITS_TOUCH_FIT_INTERACTION = 4
+} eits_touch_fit;
+#define EITS_TOUCH_FIT_ALL 7u
 
 typedef struct eits_options {
     uint32_t iterations; /* at most so many; exactly so many where gap_rel is 0 */
@@ -76,10 +76,10 @@ typedef struct eits_options {
     uint32_t mac_limit;
     /* bits of eits_diagnostic that are looked for; EITS_DIAGNOSTICS_ALL by default */
     uint32_t diagnostics;
-    uint32_t touch_search; /* bits of eits_search; EITS_SEARCH_ALL by default */
-    /* 1: once more than one touch is found, eits_find_touches solves again with their interplay
-     * taken out of the data; image and info are then the refined image's. Not with a mac_limit */
-    uint32_t refine;
+    uint32_t touch_fit; /* bits of eits_touch_fit; EITS_TOUCH_FIT_ALL by default */
+    /* 1: once more than one touch is found, eits_find_touches solves again with their interaction
+     * taken out of the data; image and info are then the second image's. Not with a mac_limit */
+    uint32_t second_pass;
     /* a doubtful touch is told of once it was found in so many frames on end; 0, 1: at once */
     uint32_t track_confirm;
     /* a touch that is not found keeps its id for so many frames, and is told of if it was faint
@@ -219,9 +219,9 @@ typedef struct eits_context {
     /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
     uint32_t sheet_known;
     eits_real *y; /* stride: reduced data, projected */
-    /* stride each: of v0 log(v / v0); y less the touches' interplay */
-    eits_real *y_straight, *y_coupled;
-    uint32_t straight; /* 1: y_straight is this frame's */
+    /* stride each: of v0 log(v / v0); y less the touches' interaction */
+    eits_real *y_log, *y_separate;
+    uint32_t has_y_log; /* 1: y_log is this frame's */
     /* orthonormal directions to ignore, up to rank of them, stride apart; where rewhitened, at
      * most one, and behind it two triangles (observed.c) */
     eits_real *basis;

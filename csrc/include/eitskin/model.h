@@ -103,8 +103,9 @@ typedef struct eits_defaults {
     float follow_mm;
     float touch_radius_weight;
     uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
-    /* bits of eits_search (context.h) that are not set by default; files before 1.2 have 0 here */
-    uint32_t search_left_out;
+    /* bits of eits_touch_fit (context.h) that are not set by default; files before 1.2 have 0 here
+     */
+    uint32_t touch_fit_left_out;
 } eits_defaults;
 
 /* The self-test inside a model: frames, and what a float32 solve with the defaults must give. */

@@ -47,8 +47,8 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .touch_radius_weight = (eits_real)d->touch_radius_weight,
         .follow_mm = (eits_real)d->follow_mm,
         .diagnostics = EITS_DIAGNOSTICS_ALL,
-        .touch_search = EITS_SEARCH_ALL & ~d->search_left_out,
-        .refine = 0,
+        .touch_fit = EITS_TOUCH_FIT_ALL & ~d->touch_fit_left_out,
+        .second_pass = 0,
         .track_confirm = 0,
         .track_hold = 0,
         .track_smooth = 0,
@@ -116,8 +116,8 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->sheet_inverse = take_reals(a, stride);
     ctx->sheet_shrink = take_reals(a, stride);
     ctx->y = take_reals(a, stride);
-    ctx->y_straight = take_reals(a, stride);
-    ctx->y_coupled = take_reals(a, stride);
+    ctx->y_log = take_reals(a, stride);
+    ctx->y_separate = take_reals(a, stride);
     ctx->basis = take_reals(a, stride + 2 * EITS_PADDED_TRIANGLE(ctx->model->rank));
     ctx->row_scale = take_reals(a, stride);
     ctx->row_strength = take_reals(a, stride);
@@ -197,8 +197,8 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&
         in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
         in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 &&
-        o->diagnostics <= EITS_DIAGNOSTICS_ALL && o->touch_search <= EITS_SEARCH_ALL &&
-        o->refine <= 1 && o->track_confirm <= EITS_MOST_TRACK_FRAMES &&
+        o->diagnostics <= EITS_DIAGNOSTICS_ALL && o->touch_fit <= EITS_TOUCH_FIT_ALL &&
+        o->second_pass <= 1 && o->track_confirm <= EITS_MOST_TRACK_FRAMES &&
         o->track_hold <= EITS_MOST_TRACK_FRAMES && in_range(o->track_smooth, 0, huge) &&
         in_range(o->floor_noise_factor, 0, huge);
     if (!right)

@@ -4,8 +4,8 @@
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* A linear score of what the search found, the logarithm of the odds that every touch is found and
- * nothing else: fitted on mixed tuning scenes of 1 to 12 touches at 40, 60 and 80 dB by eitskin
+/* A linear score of what the touch fit found, the logarithm of the odds that every touch is found
+ * and nothing else: fitted on mixed tuning scenes of 1 to 12 touches at 40, 60 and 80 dB by eitskin
  * study multitouch, whose page has how well it is calibrated. */
 static const eits_real OFFSET = R(-0.3583);
 /* each, with so many electrodes */

@@ -211,9 +211,9 @@ static uint32_t reduce(eits_context *ctx, uint64_t *macs)
     return count;
 }
 
-/* y_straight: the same of v0 log(v / v0), for the first places of touches. Rows whose reference is
+/* y_log: the same of v0 log(v / v0), for the first places of touches. Rows whose reference is
  * all but zero stay differences. */
-static uint64_t reduce_straight(eits_context *ctx, const eits_real *frame)
+static uint64_t reduce_log(eits_context *ctx, const eits_real *frame)
 {
     const eits_real *v0 = ctx->reference.v0, least = R(1e-6) * ctx->reference.v0_rms;
     uint32_t count = 0;
@@ -233,7 +233,7 @@ static uint64_t reduce_straight(eits_context *ctx, const eits_real *frame)
         ctx->list_value[count] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
         count += used != EITS_SIDE_NONE;
     }
-    return eits_reduce(ctx, count, ctx->y_straight);
+    return eits_reduce(ctx, count, ctx->y_log);
 }
 
 /* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew.
@@ -297,9 +297,9 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
     }
     *macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->y) : 0;
     *macs += eits_project(ctx, ctx->y);
-    ctx->straight = judged && model->data_kind == EITS_DATA_DIFFERENCE &&
-                    (ctx->options.touch_search & EITS_SEARCH_STRAIGHT) != 0;
-    *macs += ctx->straight ? reduce_straight(ctx, frame) : 0;
+    ctx->has_y_log = judged && model->data_kind == EITS_DATA_DIFFERENCE &&
+                     (ctx->options.touch_fit & EITS_TOUCH_FIT_LOG_DATA) != 0;
+    *macs += ctx->has_y_log ? reduce_log(ctx, frame) : 0;
     const uint32_t directions = ctx->rewhitened && count < model->rank ? count : model->rank;
     if (ctx->basis_count >= directions) /* no direction is left: what is there is rounding */
         eits_zero(ctx->y, model->rank);

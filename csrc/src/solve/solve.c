@@ -147,12 +147,12 @@ void eits_solve_again(eits_context *ctx, const eits_real *y)
 {
     const eits_info before = ctx->info;
     const size_t stride = EITS_STRIDE(ctx->model->rank);
-    eits_copy(ctx->y_straight, ctx->y, stride); /* of no more use for this frame */
-    ctx->straight = 0;
+    eits_copy(ctx->y_log, ctx->y, stride); /* of no more use for this frame */
+    ctx->has_y_log = 0;
     eits_copy(ctx->y, y, stride);
     (void)solve(ctx, 0);
     if (!ctx->warm) { /* it came to nothing, or to no number */
-        eits_copy(ctx->y, ctx->y_straight, stride);
+        eits_copy(ctx->y, ctx->y_log, stride);
         (void)solve(ctx, 0);
     }
     ctx->info.iterations += before.iterations;

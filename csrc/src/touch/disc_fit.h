@@ -1,5 +1,5 @@
-/* Discs fitted off the grid to reduced data: strengths, places, radii; which to keep; which to join
- * or to part. */
+/* Discs fitted off the grid to reduced data: strengths, places, radii; which to keep; which to
+ * merge or to split. */
 #ifndef EITSKIN_FIT_H
 #define EITSKIN_FIT_H
 
@@ -14,7 +14,7 @@ typedef struct eits_fit {
     eits_real whole; /* |y|^2 */
     /* of that, what noise is expected to give; 0 where none was learned */
     eits_real noise;
-    /* options.touch_radius_weight, times what the stage of the search asks for */
+    /* options.touch_radius_weight, times what the stage of the touch fit asks for */
     eits_real radius_weight;
     uint32_t count;
     uint64_t macs;
@@ -31,7 +31,7 @@ static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
     return v < low ? low : (v > high ? high : v);
 }
 
-/* fit.c */
+/* disc_fit.c */
 
 /* All strengths at once by coordinate descent, from none. */
 void eits_fit_strengths(eits_context *ctx, eits_fit *f);
@@ -51,17 +51,17 @@ eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc);
 void eits_fit_move(eits_context *ctx, eits_fit *f, uint32_t first, uint32_t last, uint32_t sweeps);
 void eits_fit_move_all(eits_context *ctx, eits_fit *f, uint32_t sweeps);
 
-/* keep.c: drop the weakest while it explains too little or does not stand out of the noise; the
+/* prune.c: drop the weakest while it explains too little or does not stand out of the noise; the
  * others take up what it leaves. */
-void eits_fit_keep_real(eits_context *ctx, eits_fit *f);
+void eits_fit_prune(eits_context *ctx, eits_fit *f);
 
-/* regroup.c */
+/* split_merge.c */
 
 /* Overlapping or nearly touching discs become one where that explains as much. Returns 1 where any
  * did. */
-int eits_fit_join(eits_context *ctx, eits_fit *f);
+int eits_fit_merge(eits_context *ctx, eits_fit *f);
 
 /* A disc becomes two where they explain clearly more. Returns 1 where any did. */
-int eits_fit_part(eits_context *ctx, eits_fit *f);
+int eits_fit_split(eits_context *ctx, eits_fit *f);
 
 #endif

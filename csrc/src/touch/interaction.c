@@ -5,7 +5,7 @@
 #include "frame/projection.h"
 #include "kernels/kernels.h"
 
-static const eits_real MOST = R(0.25); /* of |y|^2: what interplay may add */
+static const eits_real MOST = R(0.25); /* of |y|^2: what interaction may add */
 static const eits_real PI = R(3.14159265358979323846);
 
 typedef struct complex_number {
@@ -29,10 +29,10 @@ static complex_number inverse_square(complex_number a)
     return product(inverse, inverse);
 }
 
-int eits_couples(const eits_context *ctx)
+int eits_has_interaction(const eits_context *ctx)
 {
     return ctx->model->fields.at.data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE &&
-           (ctx->options.touch_search & EITS_SEARCH_COUPLED) != 0;
+           (ctx->options.touch_fit & EITS_TOUCH_FIT_INTERACTION) != 0;
 }
 
 /* The change of the disc's conductivity times the area that its covers add up to. */
@@ -44,8 +44,8 @@ static eits_real moment(const eits_context *ctx, const eits_disc *disc)
 
 /* What disc j, in `source`, adds to the field of each electrode's current at disc i: into `bent`, L
  * numbers for x, then L for y, as the fields are. */
-static void bend(const eits_context *ctx, const eits_disc *i, const eits_disc *j,
-                 const eits_real *source, eits_real *bent)
+static void add_induced(const eits_context *ctx, const eits_disc *i, const eits_disc *j,
+                        const eits_real *source, eits_real *induced)
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
     const eits_real s = moment(ctx, j) * (eits_real)ctx->model->fields.per_sheet;
@@ -66,21 +66,22 @@ static void bend(const eits_context *ctx, const eits_disc *i, const eits_disc *j
     const complex_number by_y = {-(s * (direct.im + mirrored.im)), s * (direct.re + mirrored.re)};
     for (uint32_t e = 0; e < electrodes; ++e) {
         const eits_real x = source[e], y = source[electrodes + e];
-        bent[e] = eits_fma(by_x.re, x, eits_fma(by_y.re, y, bent[e]));
-        bent[electrodes + e] = eits_fma(-by_x.im, x, eits_fma(-by_y.im, y, bent[electrodes + e]));
+        induced[e] = eits_fma(by_x.re, x, eits_fma(by_y.re, y, induced[e]));
+        induced[electrodes + e] =
+            eits_fma(-by_x.im, x, eits_fma(-by_y.im, y, induced[electrodes + e]));
     }
 }
 
 /* Add to each fold's `sum` what disc `i` answers to the `bent` field, measured in its own. */
 static void answer(const eits_context *ctx, const eits_disc *i, const eits_real *own,
-                   const eits_real *bent, eits_real *sum)
+                   const eits_real *induced, eits_real *sum)
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
     const eits_real factor = -((eits_real)ctx->model->fields.volts * moment(ctx, i));
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
-        const eits_real x = bent[row[0]] - bent[row[1]],
-                        y = bent[electrodes + row[0]] - bent[electrodes + row[1]];
+        const eits_real x = induced[row[0]] - induced[row[1]],
+                        y = induced[electrodes + row[0]] - induced[electrodes + row[1]];
         const eits_real u = own[row[2]] - own[row[3]],
                         v = own[electrodes + row[2]] - own[electrodes + row[3]];
         sum[k] = eits_fma(factor, eits_fma(x, u, y * v), sum[k]);
@@ -99,25 +100,26 @@ static uint64_t reduce(eits_context *ctx, eits_real *out)
     return eits_reduce(ctx, count, out);
 }
 
-uint64_t eits_couple(eits_context *ctx, const eits_disc *disc, uint32_t count, eits_real *data)
+uint64_t eits_remove_interaction(eits_context *ctx, const eits_disc *disc, uint32_t count,
+                                 eits_real *data)
 {
     const eits_model *model = ctx->model;
     const size_t stride = model->fields.at.stride, room = model->rank * EITS_STRIDE(model->rank);
     eits_copy(data, ctx->y, EITS_STRIDE(model->rank));
-    if (count < 2 || !eits_couples(ctx) || (count + 1) * stride > room)
+    if (count < 2 || !eits_has_interaction(ctx) || (count + 1) * stride > room)
         return 0;
     uint64_t macs = 0;
-    eits_real *field = ctx->factor, *bent = ctx->factor + stride * count;
+    eits_real *field = ctx->factor, *induced = ctx->factor + stride * count;
     for (uint32_t i = 0; i < count; ++i)
         macs += eits_disc_field(ctx, &disc[i], field + stride * i);
     eits_zero(ctx->list_value, model->n_folded);
     for (uint32_t i = 0; i < count; ++i) {
-        eits_zero(bent, stride);
+        eits_zero(induced, stride);
         for (uint32_t j = 0; j < count; ++j) {
             if (j != i)
-                bend(ctx, &disc[i], &disc[j], field + stride * j, bent);
+                add_induced(ctx, &disc[i], &disc[j], field + stride * j, induced);
         }
-        answer(ctx, &disc[i], field + stride * i, bent, ctx->list_value);
+        answer(ctx, &disc[i], field + stride * i, induced, ctx->list_value);
     }
     macs += (uint64_t)count * ((count - 1u) * 4u * model->n_electrodes + 3u * model->n_folded);
     macs += reduce(ctx, ctx->sx);

@@ -9,18 +9,19 @@
  * area_i dE_i(drive) . E_i(measure), dE_i the field that the others add at disc i. With x + iy for
  * vectors, conj(dE) = s (E / r^2 - conj(E) / D^2), D = a - b z of the place z, where a and b
  * describe the mirror at the source's place (docs/reference/eitm-format.md, "FLDS"). */
-#ifndef EITSKIN_COUPLING_H
-#define EITSKIN_COUPLING_H
+#ifndef EITSKIN_INTERACTION_H
+#define EITSKIN_INTERACTION_H
 
 #include "touch/disc.h"
 
-/* Whether this frame's touches can be coupled: the model has the fields, its data are differences,
- * the option asks for it. */
-int eits_couples(const eits_context *ctx);
+/* Whether this frame's touches can be corrected for interaction: the model has the fields, its data
+ * are differences, the option asks for it. */
+int eits_has_interaction(const eits_context *ctx);
 
-/* `data` (stride numbers) = ctx->y less what the interplay of the discs adds to it, so that the
+/* `data` (stride numbers) = ctx->y less what the interaction of the discs adds to it, so that the
  * discs' own answers are left. Uses the factor, sx and the list. Returns the multiply-accumulates.
  */
-uint64_t eits_couple(eits_context *ctx, const eits_disc *disc, uint32_t count, eits_real *data);
+uint64_t eits_remove_interaction(eits_context *ctx, const eits_disc *disc, uint32_t count,
+                                 eits_real *data);
 
 #endif

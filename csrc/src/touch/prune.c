@@ -10,7 +10,7 @@ enum { DROP_SWEEPS = 3 };
 
 /* What each disc alone explains: change^2 / (G^-1)_kk of the atoms' Gram matrix G, by Cholesky and
  * its inverse. */
-static void judge(eits_context *ctx, eits_fit *f)
+static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank, n = f->count;
     eits_real l[EITS_MAX_TOUCHES][EITS_MAX_TOUCHES] = {{0}}, norm[EITS_MAX_TOUCHES];
@@ -91,10 +91,10 @@ static void drop(eits_context *ctx, eits_fit *f, uint32_t k)
     }
 }
 
-void eits_fit_keep_real(eits_context *ctx, eits_fit *f)
+void eits_fit_prune(eits_context *ctx, eits_fit *f)
 {
     while (f->count > 0) {
-        judge(ctx, f);
+        leave_one_out_gains(ctx, f);
         uint32_t weakest = 0;
         for (uint32_t k = 1; k < f->count; ++k)
             weakest = f->explained[k] < f->explained[weakest] ? k : weakest;

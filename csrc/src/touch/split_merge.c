@@ -9,19 +9,19 @@
 /* edges nearer than this share of the smaller radius: one touch, perhaps, */
 static const eits_real NEAR = R(0.7);
 /* if one disc leaves at most so much more of |y|^2, */
-static const eits_real JOIN_WHOLE = R(0.002);
-static const eits_real JOIN_LEFT = R(0.5);    /* so much more of what is left */
-static const eits_real NOISE = R(20.0);       /* and so many directions of noise */
-static const eits_real PART_WHOLE = R(0.001); /* with less than this share of |y|^2 left */
-static const eits_real PART_NOISE = R(1.3);   /* beyond so much noise there is nothing to part */
+static const eits_real MERGE_TOTAL = R(0.002);
+static const eits_real MERGE_LEFT = R(0.5);    /* so much more of what is left */
+static const eits_real NOISE = R(20.0);        /* and so many directions of noise */
+static const eits_real SPLIT_TOTAL = R(0.001); /* with less than this share of |y|^2 left */
+static const eits_real SPLIT_NOISE = R(1.3);   /* beyond so much noise there is nothing to part */
 /* two discs in their first places may leave so many times as much, */
-static const eits_real PART_FIRST = R(2.0);
-static const eits_real PART_GAIN = R(0.85); /* fitted so little of it, */
+static const eits_real SPLIT_FIRST = R(2.0);
+static const eits_real SPLIT_GAIN = R(0.85); /* fitted so little of it, */
 /* their edges so many times the smaller radius apart */
-static const eits_real PART_APART = R(-0.1);
+static const eits_real SPLIT_DISTANCE = R(-0.1);
 /* of the disc's radius: where the two begin, and how large */
-static const eits_real PART_OFFSET = R(1.3), PART_RADIUS = R(0.7);
-enum { DIRECTIONS = 4, JOIN_SWEEPS = 3, PART_SWEEPS = 4 };
+static const eits_real SPLIT_OFFSET = R(1.3), SPLIT_RADIUS = R(0.7);
+enum { DIRECTIONS = 4, MERGE_SWEEPS = 3, SPLIT_SWEEPS = 4 };
 
 typedef struct saved {
     eits_disc disc[EITS_MAX_TOUCHES];
@@ -54,24 +54,24 @@ static eits_real lesser(eits_real a, eits_real b)
 }
 
 /* How far apart two discs' edges are, in the smaller radius. */
-static eits_real edges_apart(const eits_disc *a, const eits_disc *b)
+static eits_real edge_distance(const eits_disc *a, const eits_disc *b)
 {
     const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm;
     return (eits_sqrt(eits_fma(dx, dx, dy * dy)) - a->radius_mm - b->radius_mm) /
            lesser(a->radius_mm, b->radius_mm);
 }
 
-/* ---- joining ---- */
+/* ---- merging ---- */
 
 typedef struct pair {
-    eits_real apart;
+    eits_real distance;
     uint32_t i, j;
 } pair;
 
 static int comes_after(const pair *a, const pair *b)
 {
-    if (a->apart != b->apart)
-        return a->apart > b->apart;
+    if (a->distance != b->distance)
+        return a->distance > b->distance;
     return a->i != b->i ? a->i > b->i : a->j > b->j;
 }
 
@@ -82,8 +82,8 @@ static int next_pair(const eits_fit *f, const pair *last, pair *next)
     int found = 0;
     for (uint32_t i = 0; i < f->count; ++i) {
         for (uint32_t j = i + 1u; j < f->count; ++j) {
-            const pair here = {edges_apart(&f->disc[i], &f->disc[j]), i, j};
-            if (f->disc[i].polarity != f->disc[j].polarity || !(here.apart < NEAR) ||
+            const pair here = {edge_distance(&f->disc[i], &f->disc[j]), i, j};
+            if (f->disc[i].polarity != f->disc[j].polarity || !(here.distance < NEAR) ||
                 (last != NULL && !comes_after(&here, last)))
                 continue;
             if (!found || comes_after(next, &here))
@@ -95,7 +95,7 @@ static int next_pair(const eits_fit *f, const pair *last, pair *next)
 }
 
 /* One disc in the middle of both, weighted by strength, of their area. */
-static eits_disc joined(const eits_options *o, const eits_disc *a, const eits_disc *b)
+static eits_disc merged(const eits_options *o, const eits_disc *a, const eits_disc *b)
 {
     const eits_real of_a = eits_fabs(a->change) * a->radius_mm * a->radius_mm,
                     of_b = eits_fabs(b->change) * b->radius_mm * b->radius_mm;
@@ -111,11 +111,11 @@ static eits_disc joined(const eits_options *o, const eits_disc *a, const eits_di
 }
 
 /* Make the pair one disc; 1 if that is kept. */
-static int try_join(eits_context *ctx, eits_fit *f, const pair *p)
+static int try_merge(eits_context *ctx, eits_fit *f, const pair *p)
 {
     const uint32_t rank = ctx->model->rank;
     const saved before = save(ctx, f);
-    f->disc[p->i] = joined(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
+    f->disc[p->i] = merged(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
     --f->count;
     for (uint32_t k = p->j; k < f->count; ++k)
         f->disc[k] = f->disc[k + 1u];
@@ -124,23 +124,24 @@ static int try_join(eits_context *ctx, eits_fit *f, const pair *p)
         eits_best_change(ctx, &f->disc[p->i], eits_atom(ctx, p->i), ctx->residual);
     eits_axpy(ctx, ctx->residual, -f->disc[p->i].change, eits_atom(ctx, p->i), rank);
     f->macs += 3u * rank;
-    eits_fit_move(ctx, f, p->i, p->i, JOIN_SWEEPS);
+    eits_fit_move(ctx, f, p->i, p->i, MERGE_SWEEPS);
     eits_fit_move_all(ctx, f, 1);
-    const eits_real more = eits_fma(
-        JOIN_WHOLE, f->whole, eits_fma(JOIN_LEFT, before.left, NOISE * f->noise / (eits_real)rank));
+    const eits_real more =
+        eits_fma(MERGE_TOTAL, f->whole,
+                 eits_fma(MERGE_LEFT, before.left, NOISE * f->noise / (eits_real)rank));
     if (left_over(ctx) <= before.left + more)
         return 1;
     restore(ctx, f, &before);
     return 0;
 }
 
-int eits_fit_join(eits_context *ctx, eits_fit *f)
+int eits_fit_merge(eits_context *ctx, eits_fit *f)
 {
     int any = 0;
     pair next, last;
     const pair *after = NULL;
     while (next_pair(f, after, &next)) {
-        if (try_join(ctx, f, &next)) {
+        if (try_merge(ctx, f, &next)) {
             any = 1;
             after = NULL;
         } else {
@@ -151,7 +152,7 @@ int eits_fit_join(eits_context *ctx, eits_fit *f)
     return any;
 }
 
-/* ---- parting ---- */
+/* ---- splitting ---- */
 
 typedef struct two {
     eits_disc disc[2];
@@ -191,15 +192,15 @@ static two best_two(eits_context *ctx, eits_fit *f, uint32_t k)
         {-R(0.70710678118654752440), R(0.70710678118654752440)}};
     const uint32_t rank = ctx->model->rank;
     const eits_disc one = f->disc[k];
-    const eits_real radius = PART_RADIUS * one.radius_mm,
+    const eits_real radius = SPLIT_RADIUS * one.radius_mm,
                     smallest = ctx->options.touch_min_radius_mm;
     eits_real *target = ctx->sz, *const atom[2] = {ctx->slope[0], ctx->slope[1]};
     two best = {.left = -1};
     eits_copy(target, ctx->residual, EITS_STRIDE(rank));
     eits_axpy(ctx, target, one.change, eits_atom(ctx, k), rank);
     for (int d = 0; d < DIRECTIONS; ++d) {
-        const eits_real dx = PART_OFFSET * one.radius_mm * along[d][0],
-                        dy = PART_OFFSET * one.radius_mm * along[d][1];
+        const eits_real dx = SPLIT_OFFSET * one.radius_mm * along[d][0],
+                        dy = SPLIT_OFFSET * one.radius_mm * along[d][1];
         two here = {.disc = {one, one}};
         for (int side = 0; side < 2; ++side) {
             here.disc[side].x_mm += side ? -dx : dx;
@@ -223,38 +224,38 @@ static two best_two(eits_context *ctx, eits_fit *f, uint32_t k)
 }
 
 /* Make disc k two; 1 if that is kept. */
-static int try_part(eits_context *ctx, eits_fit *f, uint32_t k)
+static int try_split(eits_context *ctx, eits_fit *f, uint32_t k)
 {
     const uint32_t last = f->count;
     const saved before = save(ctx, f);
     const two begin = best_two(ctx, f, k);
-    if (begin.left < 0 || begin.left > PART_FIRST * before.left)
+    if (begin.left < 0 || begin.left > SPLIT_FIRST * before.left)
         return 0;
     f->disc[k] = begin.disc[0];
     f->disc[last] = begin.disc[1];
     ++f->count;
     eits_fit_restart(ctx, f);
-    for (int sweep = 0; sweep < PART_SWEEPS; ++sweep) {
+    for (int sweep = 0; sweep < SPLIT_SWEEPS; ++sweep) {
         eits_fit_move(ctx, f, k, k, 1);
         eits_fit_move(ctx, f, last, last, 1);
     }
     eits_fit_move_all(ctx, f, 1);
     const eits_real left = left_over(ctx),
-                    least = eits_fma(PART_WHOLE, f->whole,
+                    least = eits_fma(SPLIT_TOTAL, f->whole,
                                      NOISE * f->noise / (eits_real)ctx->model->rank);
-    if (left <= PART_GAIN * before.left && before.left - left >= least &&
-        edges_apart(&f->disc[k], &f->disc[last]) > PART_APART)
+    if (left <= SPLIT_GAIN * before.left && before.left - left >= least &&
+        edge_distance(&f->disc[k], &f->disc[last]) > SPLIT_DISTANCE)
         return 1;
     restore(ctx, f, &before);
     return 0;
 }
 
-int eits_fit_part(eits_context *ctx, eits_fit *f)
+int eits_fit_split(eits_context *ctx, eits_fit *f)
 {
     uint8_t looked[EITS_MAX_TOUCHES] = {0};
-    const eits_real enough = eits_fma(PART_WHOLE, f->whole, PART_NOISE * f->noise);
+    const eits_real enough = eits_fma(SPLIT_TOTAL, f->whole, SPLIT_NOISE * f->noise);
     int any = 0;
-    /* those that come by parting are not parted again at once */
+    /* those that come by splitting are not split again at once */
     const uint32_t before = f->count;
     for (uint32_t turn = 0; turn < before; ++turn) {
         if (f->count >= ctx->options.max_touches || left_over(ctx) < enough)
@@ -265,7 +266,7 @@ int eits_fit_part(eits_context *ctx, eits_fit *f)
                 k = i;
         }
         looked[k] = 1;
-        any |= try_part(ctx, f, k);
+        any |= try_split(ctx, f, k);
     }
     return any;
 }

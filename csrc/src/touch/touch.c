@@ -12,8 +12,8 @@
 #include "touch/tracker.h"
 
 /* The radius that strength suggests counts for more while it is open which discs there are, and for
- * less once the discs' interplay is known and the data are right to a thousandth. */
-static const eits_real SEARCH_RADIUS = R(2.0), FINAL_RADIUS = R(0.4);
+ * less once the discs' interaction is known and the data are right to a thousandth. */
+static const eits_real EARLY_RADIUS = R(2.0), FINAL_RADIUS = R(0.4);
 enum { ROUNDS = 2, LATER_SWEEPS = 2 };
 
 /* ---- peaks ---- */
@@ -72,7 +72,7 @@ static void seed(const eits_context *ctx, eits_fit *f)
     }
 }
 
-/* ---- the search ---- */
+/* ---- the touch fit ---- */
 
 /* Later sweeps: few, for they begin near their end. */
 static uint32_t later(const eits_context *ctx)
@@ -80,16 +80,17 @@ static uint32_t later(const eits_context *ctx)
     return ctx->options.touch_sweeps < LATER_SWEEPS ? ctx->options.touch_sweeps : LATER_SWEEPS;
 }
 
-/* From here on the discs are to explain the data less their interplay, as far as that is known. */
-static void couple(eits_context *ctx, eits_fit *f)
+/* From here on the discs are to explain the data less their interaction, as far as that is known.
+ */
+static void remove_interaction(eits_context *ctx, eits_fit *f)
 {
     const eits_real *before = f->data;
     f->data = ctx->y;
-    if (f->count > 1 && eits_couples(ctx)) {
-        f->macs += eits_couple(ctx, f->disc, f->count, ctx->y_coupled);
-        f->data = ctx->y_coupled;
+    if (f->count > 1 && eits_has_interaction(ctx)) {
+        f->macs += eits_remove_interaction(ctx, f->disc, f->count, ctx->y_separate);
+        f->data = ctx->y_separate;
     }
-    if (f->data != before || f->data == ctx->y_coupled)
+    if (f->data != before || f->data == ctx->y_separate)
         eits_fit_restart(ctx, f);
 }
 
@@ -97,7 +98,7 @@ static void couple(eits_context *ctx, eits_fit *f)
 static void begin(eits_context *ctx, eits_fit *f)
 {
     const eits_options *o = &ctx->options;
-    f->data = ctx->straight && o->touch_sweeps > 0 ? ctx->y_straight : ctx->y;
+    f->data = ctx->has_y_log && o->touch_sweeps > 0 ? ctx->y_log : ctx->y;
     seed(ctx, f);
     eits_fit_strengths(ctx, f);
     if (o->touch_change_s_per_m > 0) {
@@ -106,37 +107,37 @@ static void begin(eits_context *ctx, eits_fit *f)
         eits_fit_strengths(ctx, f);
     }
     eits_fit_move_all(ctx, f, o->touch_sweeps - later(ctx));
-    eits_fit_keep_real(ctx, f);
+    eits_fit_prune(ctx, f);
 }
 
-static void search(eits_context *ctx, eits_fit *f)
+static void fit_touches(eits_context *ctx, eits_fit *f)
 {
-    const int couples = eits_couples(ctx),
-              straight = ctx->straight || ctx->model->data_kind == EITS_DATA_LOG_RATIO;
-    const int regroups =
-        (ctx->options.touch_search & EITS_SEARCH_REGROUP) != 0 && (straight || couples);
-    f->radius_weight = ctx->options.touch_radius_weight * (couples ? SEARCH_RADIUS : 1);
+    const int interacts = eits_has_interaction(ctx),
+              linear = ctx->has_y_log || ctx->model->data_kind == EITS_DATA_LOG_RATIO;
+    const int splits_merges =
+        (ctx->options.touch_fit & EITS_TOUCH_FIT_SPLIT_MERGE) != 0 && (linear || interacts);
+    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EARLY_RADIUS : 1);
     begin(ctx, f);
     if (ctx->options.touch_sweeps == 0)
         return;
-    if (regroups)
-        (void)eits_fit_join(ctx, f);
-    for (int round = 0; couples && f->count > 1 && round < ROUNDS; ++round) {
-        couple(ctx, f);
+    if (splits_merges)
+        (void)eits_fit_merge(ctx, f);
+    for (int round = 0; interacts && f->count > 1 && round < ROUNDS; ++round) {
+        remove_interaction(ctx, f);
         eits_fit_move_all(ctx, f, later(ctx));
     }
-    for (int round = 0; regroups && round < ROUNDS; ++round) {
-        const int joined = eits_fit_join(ctx, f), parted = eits_fit_part(ctx, f);
-        if (!joined && !parted)
+    for (int round = 0; splits_merges && round < ROUNDS; ++round) {
+        const int merged = eits_fit_merge(ctx, f), split = eits_fit_split(ctx, f);
+        if (!merged && !split)
             break;
-        couple(ctx, f);
+        remove_interaction(ctx, f);
         eits_fit_move_all(ctx, f, later(ctx));
-        eits_fit_keep_real(ctx, f);
+        eits_fit_prune(ctx, f);
     }
-    f->radius_weight = ctx->options.touch_radius_weight * (couples ? FINAL_RADIUS : 1);
-    couple(ctx, f);
+    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? FINAL_RADIUS : 1);
+    remove_interaction(ctx, f);
     eits_fit_move_all(ctx, f, later(ctx));
-    eits_fit_keep_real(ctx, f);
+    eits_fit_prune(ctx, f);
 }
 
 /* ---- the report ---- */
@@ -182,7 +183,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const int looked =
         stop != EITS_STOP_GATE && stop != EITS_STOP_ZERO && stop != EITS_STOP_DIVERGED;
     if (looked)
-        search(ctx, &f);
+        fit_touches(ctx, &f);
     const uint32_t finite = report(ctx, &f, found);
     ctx->info.touch_macs = f.macs;
     eits_check_crowd(ctx, looked, found, finite);
@@ -191,9 +192,9 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     for (uint32_t k = 0; k < told; ++k)
         found[k].force_n =
             eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
-    if (ctx->options.refine && ctx->options.mac_limit == 0 && f.count > 1 &&
-        f.data == ctx->y_coupled)
-        eits_solve_again(ctx, ctx->y_coupled);
+    if (ctx->options.second_pass && ctx->options.mac_limit == 0 && f.count > 1 &&
+        f.data == ctx->y_separate)
+        eits_solve_again(ctx, ctx->y_separate);
     for (uint32_t k = 0; k < told && k < room; ++k)
         touches[k] = found[k];
     if (count != NULL)

@@ -118,7 +118,7 @@ static void scan_has_begun(sim_board *sim)
     ++sim->scene.untouched_shown;
 }
 
-/* Between V+ and V-, amplitude; 0 where the electrodes that are joined are no row of the table. */
+/* Between V+ and V-, amplitude; 0 where the electrodes that are merged are no row of the table. */
 static float volts_now(sim_board *sim)
 {
     const eits_model *model = &sim->instrument.engine.model;

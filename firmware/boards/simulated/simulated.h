@@ -2,7 +2,7 @@
  * memory.
  *
  * The generator and the multiplexers are decoded from what the drivers write to them, just far
- * enough: which electrodes are joined, at which frequency. The converter has 16 bits and no noise;
+ * enough: which electrodes are merged, at which frequency. The converter has 16 bits and no noise;
  * its range is that of the frames that are shown, and 1 uV until then. What it measures are frames
  * that the host has simulated: a frame is one scan, and which one it is is decided when a scan
  * begins.

@@ -63,7 +63,7 @@ class Options:
     touch_sweeps: int = 6
     mac_limit: int = 0
     diagnostics: int = ALL_DIAGNOSTICS
-    touch_search: int = ALL_SEARCH
+    touch_fit: int = ALL_SEARCH
     refine: bool = False
     track_confirm: int = 0
     track_hold: int = 0
@@ -84,7 +84,7 @@ WHOLE = {
     "touch_sweeps": (0, 1000),
     "mac_limit": (0, 2**32 - 1),
     "diagnostics": (0, ALL_DIAGNOSTICS),
-    "touch_search": (0, ALL_SEARCH),
+    "touch_fit": (0, ALL_SEARCH),
     "track_confirm": (0, MOST_TRACK_FRAMES),
     "track_hold": (0, MOST_TRACK_FRAMES),
 }

@@ -96,7 +96,7 @@ def encode_model(model: Model) -> bytes:
 
 def _encode_defaults(defaults: Defaults) -> bytes:
     return DEFAULTS.pack(
-        *astuple(defaults)[:-2], SOLVERS.index(defaults.solver), defaults.search_left_out
+        *astuple(defaults)[:-2], SOLVERS.index(defaults.solver), defaults.touch_fit_left_out
     )
 
 
@@ -341,7 +341,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     )
     in_range = (
         1 <= d.iterations <= MAX_ITERATIONS
-        and d.search_left_out <= ALL_SEARCH
+        and d.touch_fit_left_out <= ALL_SEARCH
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
         and LEAST_RADIUS_MM

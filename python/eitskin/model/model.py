@@ -24,8 +24,8 @@ class Defaults:
     each does.
 
     Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t
-    max(x); ``solver`` is one of ``core.results.SOLVERS``; ``search_left_out``: bits of
-    ``Options.touch_search`` that are not set.
+    max(x); ``solver`` is one of ``core.results.SOLVERS``; ``touch_fit_left_out``: bits of
+    ``Options.touch_fit`` that are not set.
     """
 
     iterations: int = 60
@@ -43,7 +43,7 @@ class Defaults:
     follow_mm: float = 25.0
     touch_radius_weight: float = 1e-3
     solver: str = "working-set"
-    search_left_out: int = 0
+    touch_fit_left_out: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -258,7 +258,7 @@ class ReferenceEngine:
         model = self.model
         if (
             model.data_kind != "difference"
-            or not self.options.touch_search & STRAIGHT
+            or not self.options.touch_fit & STRAIGHT
             or not self._ready
         ):
             return None
@@ -421,7 +421,7 @@ class ReferenceEngine:
         return (
             model.fields is not None
             and model.data_kind == "difference"
-            and bool(self.options.touch_search & COUPLED)
+            and bool(self.options.touch_fit & COUPLED)
         )
 
     def _interplay(self, basis: FloatArray, known: BoolArray, discs: Sequence[Disc]) -> FloatArray:

@@ -9,13 +9,13 @@ import numpy as np
 
 from eitskin.reference.disc_fit import Disc, Fit
 
-NEAR, JOIN_WHOLE, JOIN_LEFT, NOISE = 0.7, 0.002, 0.5, 20.0
-PART_WHOLE, PART_NOISE, PART_FIRST, PART_GAIN, PART_APART = 0.001, 1.3, 2.0, 0.85, -0.1
-PART_OFFSET, PART_RADIUS = 1.3, 0.7
-DIRECTIONS, JOIN_SWEEPS, PART_SWEEPS = 4, 3, 4
+NEAR, MERGE_TOTAL, MERGE_LEFT, NOISE = 0.7, 0.002, 0.5, 20.0
+SPLIT_TOTAL, SPLIT_NOISE, SPLIT_FIRST, SPLIT_GAIN, SPLIT_DISTANCE = 0.001, 1.3, 2.0, 0.85, -0.1
+SPLIT_OFFSET, SPLIT_RADIUS = 1.3, 0.7
+DIRECTIONS, MERGE_SWEEPS, SPLIT_SWEEPS = 4, 3, 4
 
 
-def edges_apart(a: Disc, b: Disc) -> float:
+def edge_distance(a: Disc, b: Disc) -> float:
     """How far apart two discs' edges are, in the smaller radius."""
     distance = float(np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm))
     return (distance - a.radius_mm - b.radius_mm) / min(a.radius_mm, b.radius_mm)
@@ -35,7 +35,7 @@ def join(fit: Fit) -> bool:
 
 def _near_pairs(discs: list[Disc]) -> list[tuple[float, int, int]]:
     pairs = [
-        (edges_apart(a, discs[j]), i, j)
+        (edge_distance(a, discs[j]), i, j)
         for i, a in enumerate(discs)
         for j in range(i + 1, len(discs))
     ]
@@ -53,9 +53,9 @@ def _try_join(fit: Fit, i: int, j: int) -> bool:
     fit.discs[i] = one
     del fit.discs[j]
     fit.discs[i] = replace(one, change=fit.best_change(one, fit.answers(one)[0], fit.residual()))
-    fit.settle([i], JOIN_SWEEPS)
+    fit.settle([i], MERGE_SWEEPS)
     fit.move_all(1)
-    if fit.left() <= left + JOIN_WHOLE * fit.whole + JOIN_LEFT * left + NOISE * fit.noise:
+    if fit.left() <= left + MERGE_TOTAL * fit.whole + MERGE_LEFT * left + NOISE * fit.noise:
         return True
     fit.discs = before
     return False
@@ -63,7 +63,7 @@ def _try_join(fit: Fit, i: int, j: int) -> bool:
 
 def part(fit: Fit) -> bool:
     """Part discs, the largest first, where two explain clearly more; whether any were."""
-    enough = PART_WHOLE * fit.whole + PART_NOISE * fit.noise * fit.model.rank
+    enough = SPLIT_TOTAL * fit.whole + SPLIT_NOISE * fit.noise * fit.model.rank
     any_parted = False
     left_to_look = list(range(len(fit.discs)))
     while left_to_look and len(fit.discs) < fit.options.max_touches and fit.left() >= enough:
@@ -76,17 +76,17 @@ def part(fit: Fit) -> bool:
 def _try_part(fit: Fit, k: int) -> bool:
     before, left, last = list(fit.discs), fit.left(), len(fit.discs)
     best = min(_pairs_for(fit, k), key=lambda found: found[0], default=None)
-    if best is None or best[0] > PART_FIRST * left:
+    if best is None or best[0] > SPLIT_FIRST * left:
         return False
     fit.discs[k] = best[1]
     fit.discs.append(best[2])
-    for _ in range(PART_SWEEPS):
+    for _ in range(SPLIT_SWEEPS):
         fit.settle([k], 1)
         fit.settle([last], 1)
     fit.move_all(1)
     now = fit.left()
-    gained = now <= PART_GAIN * left and left - now >= PART_WHOLE * fit.whole + NOISE * fit.noise
-    if gained and edges_apart(fit.discs[k], fit.discs[last]) > PART_APART:
+    gained = now <= SPLIT_GAIN * left and left - now >= SPLIT_TOTAL * fit.whole + NOISE * fit.noise
+    if gained and edge_distance(fit.discs[k], fit.discs[last]) > SPLIT_DISTANCE:
         return True
     fit.discs = before
     return False
@@ -95,12 +95,12 @@ def _try_part(fit: Fit, k: int) -> bool:
 def _pairs_for(fit: Fit, k: int) -> list[tuple[float, Disc, Disc]]:
     """Pairs that could take the place of disc k, with what they would leave, squared."""
     one, target = fit.discs[k], fit.residual(leave_out=k)
-    radius = max(PART_RADIUS * one.radius_mm, fit.options.touch_min_radius_mm)
+    radius = max(SPLIT_RADIUS * one.radius_mm, fit.options.touch_min_radius_mm)
     found = []
     for angle in np.arange(DIRECTIONS) * np.pi / DIRECTIONS:
         dx, dy = (
-            PART_OFFSET * one.radius_mm * np.cos(angle),
-            PART_OFFSET * one.radius_mm * np.sin(angle),
+            SPLIT_OFFSET * one.radius_mm * np.cos(angle),
+            SPLIT_OFFSET * one.radius_mm * np.sin(angle),
         )
         two = [
             replace(one, x_mm=one.x_mm + s * dx, y_mm=one.y_mm + s * dy, radius_mm=radius)

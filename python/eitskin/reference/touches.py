@@ -17,7 +17,7 @@ from eitskin.reference.split_merge import join, part
 FloatArray = npt.NDArray[np.float64]
 Interplay = Callable[[Sequence[Disc]], FloatArray]
 
-SEARCH_RADIUS, FINAL_RADIUS = 2.0, 0.4
+EARLY_RADIUS, FINAL_RADIUS = 2.0, 0.4
 ROUNDS, LATER_SWEEPS = 2, 2
 MOST_INTERPLAY = 0.25
 
@@ -31,7 +31,7 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
         min(o.touch_sweeps, LATER_SWEEPS),
         frame.straight is not None or fit.model.data_kind == "log-ratio",
     )
-    regroups = bool(o.touch_search & REGROUP) and (straight or interplay is not None)
+    regroups = bool(o.touch_fit & REGROUP) and (straight or interplay is not None)
 
     def couple() -> None:
         added = (
@@ -41,7 +41,7 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
         )
         fit.data = frame.y - added if added @ added <= MOST_INTERPLAY * fit.whole else frame.y
 
-    fit.radius_weight = o.touch_radius_weight * (SEARCH_RADIUS if interplay is not None else 1.0)
+    fit.radius_weight = o.touch_radius_weight * (EARLY_RADIUS if interplay is not None else 1.0)
     fit.data = frame.straight if frame.straight is not None and o.touch_sweeps > 0 else frame.y
     fit.seed(image)
     fit.fit_strengths()

@@ -31,7 +31,7 @@ def default_options(model: Model) -> Options:
         touch_radius_weight=d.touch_radius_weight,
         follow_mm=d.follow_mm,
         solver=d.solver,
-        touch_search=ALL_SEARCH & ~d.search_left_out,
+        touch_fit=ALL_SEARCH & ~d.touch_fit_left_out,
     )
 
 

@@ -89,7 +89,7 @@ class Configuration:
             "lambda_rel": self.lambda_rel,
             "warm_start": self.warm_start,
             "touch_sweeps": self.touch_sweeps,
-            "touch_search": self.search,
+            "touch_fit": self.search,
         }
         settings |= {"refine": True} if self.refine else {}
         return settings | ({"mac_limit": self.mac_limit} if self.mac_limit else {})
@@ -172,7 +172,7 @@ def build_settings(
         solver=one.solver,
         iterations=one.iterations,
         lambda_rel=one.lambda_rel,
-        search_left_out=left_out,
+        touch_fit_left_out=left_out,
     )
     if mask_threshold is not None:
         defaults = replace(defaults, mask_threshold=mask_threshold)

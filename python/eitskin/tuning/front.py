@@ -29,7 +29,7 @@ SHORT_CELL = (
     "image.mean", "image.low", "image.high", "image.worst_tenth", "discs.mean", "exact_count",
     "solve_macs", "touch_macs", "most_macs",
 )  # fmt: skip
-MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_search"}  # of the solver's settings
+MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_fit"}  # of the solver's settings
 
 
 @dataclass(frozen=True)

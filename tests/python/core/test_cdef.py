@@ -100,9 +100,9 @@ CDEF_MUTATIONS = [
         "enum eits_sign",
     ),
     (
-        "EITS_SEARCH_STRAIGHT, EITS_SEARCH_REGROUP",
-        "EITS_SEARCH_REGROUP, EITS_SEARCH_STRAIGHT",
-        "enum eits_search",
+        "EITS_TOUCH_FIT_LOG_DATA, EITS_TOUCH_FIT_SPLIT_MERGE",
+        "EITS_TOUCH_FIT_SPLIT_MERGE, EITS_TOUCH_FIT_LOG_DATA",
+        "enum eits_touch_fit",
     ),
     ("EITS_STOP_GAP, ", "", "enum eits_stop"),
     ("EITS_E_NOT_FINITE, ... }", "... }", "enum eits_status"),

@@ -180,7 +180,7 @@ def test_what_a_frame_costs_at_most(program: Path, tmp_path: Path, warm: bool, s
     model, blob = load_prebuilt()
     random = simulated_session()
     for quiet, frames in (moving_touches(), (random.quiet_v, random.frames_v)):
-        options = replace(default_options(model), warm_start=warm, touch_search=search)
+        options = replace(default_options(model), warm_start=warm, touch_fit=search)
         board = run(program, tmp_path, blob, quiet, frames, options)
         costs = [result.solve_instructions + result.touch_instructions for result in board]
         print(

@@ -26,7 +26,7 @@ def searches() -> list[Options]:
     be."""
     own = replace(default_options(prebuilt()[0]), max_touches=MOST, refine=True)
     parts = [
-        replace(own, touch_search=bits)
+        replace(own, touch_fit=bits)
         for bits in (ALL_SEARCH, 0, STRAIGHT, REGROUP, COUPLED, REGROUP | COUPLED)
     ]
     return [

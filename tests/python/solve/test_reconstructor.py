@@ -349,8 +349,8 @@ BAD_OPTIONS = [
     ({"max_masked": -1}, "max_masked"),
     ({"mac_limit": -1}, "mac_limit"),
     ({"diagnostics": 256}, "diagnostics = 256 is out of range; use 0 to 255"),
-    ({"touch_search": 8}, "touch_search = 8 is out of range; use 0 to 7"),
-    ({"touch_search": -1}, "touch_search"),
+    ({"touch_fit": 8}, "touch_fit = 8 is out of range; use 0 to 7"),
+    ({"touch_fit": -1}, "touch_fit"),
     ({"refine": 2}, "refine = 2 must be true or false"),
     ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),
     ({"solver": "newton"}, "solver = 'newton' is not known; use one of fista, working-set"),
@@ -413,7 +413,7 @@ EDGES = {
     "follow_mm": 0.0, "lambda_abs": 1e29,
     "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
     "floor_noise_factor": 0.0,
-    "touch_search": 7, "refine": True,
+    "touch_fit": 7, "refine": True,
 }  # fmt: skip
 
 

@@ -58,7 +58,7 @@ def test_what_coupling_explains_and_refining_costs(done: tuple[Path, Outcome]) -
 
 
 def test_the_default_is_among_them() -> None:
-    assert {one.options["touch_search"] for one in SEARCHES if one.name == "all (the default)"} == {
+    assert {one.options["touch_fit"] for one in SEARCHES if one.name == "all (the default)"} == {
         ALL_SEARCH
     }
 

@@ -24,7 +24,7 @@ class Lever:
 
 
 def _searching(name: str, bits: int, **options: Any) -> Lever:
-    return Lever(name, options={"touch_search": bits, **options})
+    return Lever(name, options={"touch_fit": bits, **options})
 
 
 SEARCHES = (

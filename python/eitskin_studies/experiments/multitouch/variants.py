@@ -45,7 +45,7 @@ class Variant:
 # the first is what is usual: pictures and the doubt are of it
 VARIANTS = (
     Variant("default"),
-    Variant("peaks alone", options={"touch_search": 0}),
+    Variant("peaks alone", options={"touch_fit": 0}),
     Variant("log-ratio", BuildSettings(data_kind="log-ratio")),
 )
 

@@ -1,5 +1,5 @@
-/* Discs that are one touch are joined, those that are two are parted; the image solved again
- * without the touches' interplay. */
+/* Discs that are one touch are merged, those that are two are split; the image solved again
+ * without the touches' interaction. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
@@ -83,12 +83,12 @@ static void two_halves_become_one(void)
     halves[0].x_mm -= 4, halves[2].x_mm += 4;
     halves[0].change = halves[2].change = R(0.025);
     eits_fit f = begin(ctx, halves, 3);
-    CHECK_EQUAL(eits_fit_join(ctx, &f), 1);
+    CHECK_EQUAL(eits_fit_merge(ctx, &f), 1);
     CHECK_EQUAL(f.count, 2);
     CHECK(has(&f, &one, 0.5) && has(&f, &far, 0.5));
     check_residual(ctx, &f);
     CHECK(f.macs > 0);
-    CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+    CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
     dense_bench_close(&b);
 }
 
@@ -103,7 +103,7 @@ static void two_touches_stay_two(void)
                                     {distances[d] / 2, 3, 9, R(0.04), 1}};
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 2);
-        CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
         CHECK_EQUAL(f.count, 2);
         /* only those within 0.7 of a radius are tried: 9 x 0.7 + 18 = 24.3 mm */
         CHECK((f.macs > 0) == (d < 2));
@@ -124,7 +124,7 @@ static void opposite_signs_are_never_one(void)
     const eits_disc truth[2] = {{-3, 3, 9, R(0.05), 1}, {3, 3, 9, R(-0.05), -1}};
     press(ctx, truth, 2);
     eits_fit f = begin(ctx, truth, 2);
-    CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+    CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
     CHECK_EQUAL(f.count, 2);
     CHECK_EQUAL(f.macs, 0);
     dense_bench_close(&b);
@@ -142,7 +142,7 @@ static void three_thirds_become_one(void)
     for (int k = 0; k < 3; ++k)
         thirds[k].x_mm += R(5.0) * (eits_real)(k - 1), thirds[k].change /= 3;
     eits_fit f = begin(ctx, thirds, 3);
-    CHECK_EQUAL(eits_fit_join(ctx, &f), 1);
+    CHECK_EQUAL(eits_fit_merge(ctx, &f), 1);
     CHECK_EQUAL(f.count, 1);
     CHECK(has(&f, &one, 2));
     dense_bench_close(&b);
@@ -169,23 +169,23 @@ static void one_disc_over_two_touches_becomes_two(void)
         o.max_touches = 2;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         eits_fit full = f;
-        CHECK_EQUAL(eits_fit_part(ctx, &full), 0); /* no room for a third */
+        CHECK_EQUAL(eits_fit_split(ctx, &full), 0); /* no room for a third */
         CHECK_EQUAL(full.count, 2);
         o.max_touches = 3;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         eits_fit_restart(ctx, &f);
-        CHECK_EQUAL(eits_fit_part(ctx, &f), 1);
+        CHECK_EQUAL(eits_fit_split(ctx, &f), 1);
         CHECK_EQUAL(f.count, 3);
         for (int k = 0; k < 3; ++k)
             CHECK(has(&f, &truth[k], 2.0));
         check_residual(ctx, &f);
-        CHECK_EQUAL(eits_fit_join(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
         dense_bench_close(&b);
     }
 }
 
 /* Two explain more than one, but little of what is left: that may as well be something else. */
-static void little_is_gained_by_parting(void)
+static void a_split_that_gains_little_is_undone(void)
 {
     dense_bench b;
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
@@ -204,7 +204,7 @@ static void little_is_gained_by_parting(void)
             eits_axpy(ctx, ctx->y, eits_sqrt(10 * left / eits_dot(ctx, rest, rest, RANK)), rest,
                       RANK);
         f = begin(ctx, f.disc, 1);
-        CHECK_EQUAL(eits_fit_part(ctx, &f), !noisy);
+        CHECK_EQUAL(eits_fit_split(ctx, &f), !noisy);
         CHECK_EQUAL(f.count, noisy ? 1 : 2);
     }
     dense_bench_close(&b);
@@ -220,14 +220,14 @@ static void one_large_touch_stays_one(void)
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 1);
         const eits_disc before = f.disc[0];
-        CHECK_EQUAL(eits_fit_part(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_split(ctx, &f), 0);
         CHECK_EQUAL(f.count, 1);
         CHECK((f.macs > 0) == (rest > 0)); /* nothing left: nothing is tried */
         CHECK(memcmp(&before, &f.disc[0], sizeof before) == 0);
         check_residual(ctx, &f);
         f.noise = f.whole; /* all that is left may be noise */
         f.macs = 0;
-        CHECK_EQUAL(eits_fit_part(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_split(ctx, &f), 0);
         CHECK_EQUAL(f.macs, 0);
         dense_bench_close(&b);
     }
@@ -239,7 +239,7 @@ static uint32_t found(eits_context *ctx, uint32_t bits, eits_touch *touch)
 {
     uint32_t count = 0;
     eits_options o = ctx->options;
-    o.touch_search = bits;
+    o.touch_fit = bits;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count), EITS_OK);
     return count;
@@ -258,15 +258,15 @@ static void one_peak_two_touches(void)
         ctx->image[j] =
             b.c.model.pixel[j].ix == SIDE / 2 && b.c.model.pixel[j].iy == SIDE / 2 ? 1 : 0;
     /* of bent data, as far as it knows: two peaks' worth of bend is no touch */
-    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 1);
-    eits_copy(ctx->y_straight, ctx->y, EITS_STRIDE(RANK));
-    ctx->straight = 1;
-    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL - EITS_SEARCH_REGROUP, touch), 1);
-    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 2);
+    CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 1);
+    eits_copy(ctx->y_log, ctx->y, EITS_STRIDE(RANK));
+    ctx->has_y_log = 1;
+    CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL - EITS_TOUCH_FIT_SPLIT_MERGE, touch), 1);
+    CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 2);
     eits_options o = ctx->options;
     o.max_touches = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 1);
+    CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 1);
     dense_bench_close(&b);
 }
 
@@ -274,13 +274,14 @@ static void one_peak_two_touches(void)
 
 static const eits_disc PAIR[2] = {{-21, 9, 9, R(0.05), 1}, {21, 3, 9, R(0.05), 1}};
 
-static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t refine, uint32_t mac_limit)
+static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t second_pass,
+                               uint32_t mac_limit)
 {
     eits_context *ctx = dense_bench_open(b, spec, 0);
     eits_options o = ctx->options;
-    o.refine = refine;
+    o.second_pass = second_pass;
     o.mac_limit = mac_limit;
-    b->c.model.fields.volts *= 0.01f; /* the interplay some percent of the data */
+    b->c.model.fields.volts *= 0.01f; /* the interaction some percent of the data */
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     memset(ctx->basis_for, EITS_SIDE_BOTH, b->c.model.n_folded); /* all folds are in use */
     press(ctx, PAIR, 2);
@@ -288,19 +289,19 @@ static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t refine,
     return ctx;
 }
 
-static void the_refined_image_is_that_of_coupled_data(void)
+static void the_second_pass_solves_the_separate_data(void)
 {
     dense_bench b, plain;
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0),
                  *other = open_pair(&plain, WITH_FIELDS, 0, 0);
-    CHECK_EQUAL(found(ctx, EITS_SEARCH_ALL, touch), 2);
-    CHECK_EQUAL(found(other, EITS_SEARCH_ALL, touch), 2);
+    CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 2);
+    CHECK_EQUAL(found(other, EITS_TOUCH_FIT_ALL, touch), 2);
     const eits_info first = other->info;
     CHECK_EQUAL(ctx->info.touch_macs, first.touch_macs);
-    CHECK(memcmp(other->y, other->y_coupled, RANK * sizeof *other->y) != 0);
-    CHECK(memcmp(ctx->y, other->y_coupled, RANK * sizeof *ctx->y) == 0);
-    eits_copy(other->y, other->y_coupled, RANK);
+    CHECK(memcmp(other->y, other->y_separate, RANK * sizeof *other->y) != 0);
+    CHECK(memcmp(ctx->y, other->y_separate, RANK * sizeof *ctx->y) == 0);
+    eits_copy(other->y, other->y_separate, RANK);
     eits_forget(other);
     CHECK_EQUAL(eits_solve(other), EITS_OK);
     CHECK(memcmp(ctx->image, other->image, b.c.model.n_pixels * sizeof *ctx->image) == 0);
@@ -317,22 +318,24 @@ static void the_refined_image_is_that_of_coupled_data(void)
 
 /* One solve more than without: not for one touch, without fields, uncoupled, or with a limit of
  * multiply-accumulates. */
-static void when_it_is_not_refined(void)
+static void when_there_is_no_second_pass(void)
 {
     static const struct {
         small_spec spec;
         uint32_t bits, mac_limit, touches;
-    } cases[] = {
-        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES}, EITS_SEARCH_ALL, 0, 2},
-        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1},
-         EITS_SEARCH_ALL - EITS_SEARCH_COUPLED,
-         0,
-         2},
-        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1},
-         EITS_SEARCH_ALL,
-         2000000000u,
-         2},
-        {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1}, EITS_SEARCH_ALL, 0, 1}};
+    } cases[] = {{{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES}, EITS_TOUCH_FIT_ALL, 0, 2},
+                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1},
+                  EITS_TOUCH_FIT_ALL - EITS_TOUCH_FIT_INTERACTION,
+                  0,
+                  2},
+                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1},
+                  EITS_TOUCH_FIT_ALL,
+                  2000000000u,
+                  2},
+                 {{.rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1},
+                  EITS_TOUCH_FIT_ALL,
+                  0,
+                  1}};
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
         dense_bench b;
         eits_touch touch[EITS_MAX_TOUCHES];
@@ -365,7 +368,7 @@ static void nothing_comes_of_it(void)
     CHECK(ctx->info.stop == before.stop && ctx->info.data_norm == before.data_norm &&
           ctx->info.diagnostics == 4);
     CHECK_EQUAL(ctx->info.iterations, 2 * before.iterations);
-    CHECK_EQUAL(ctx->straight, 0);
+    CHECK_EQUAL(ctx->has_y_log, 0);
     eits_solve_again(ctx, infinite);
     CHECK(memcmp(y, ctx->y, sizeof y) == 0 && memcmp(image, ctx->image, sizeof image) == 0);
     dense_bench_close(&b);
@@ -379,7 +382,7 @@ static void images_of_a_batch(void)
     eits_touch touch[2][EITS_MAX_TOUCHES], alone[EITS_MAX_TOUCHES];
     eits_result result[2];
     uint64_t state = 4;
-    uint32_t count, refined = 0;
+    uint32_t count, after_second_pass = 0;
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
     small_reference(&b.c.model, 1, frame[0]);
     CHECK_EQUAL(eits_reference_set(ctx, frame[0], SMALL_ROWS), EITS_OK);
@@ -397,12 +400,12 @@ static void images_of_a_batch(void)
         CHECK_EQUAL(eits_reconstruct(ctx, frame[k], SMALL_ROWS, NULL, NULL), EITS_OK);
         const uint64_t macs = ctx->info.macs;
         CHECK_EQUAL(eits_find_touches(ctx, alone, EITS_MAX_TOUCHES, &count), EITS_OK);
-        refined += ctx->info.macs > macs;
+        after_second_pass += ctx->info.macs > macs;
         CHECK_EQUAL(result[k].count, count);
         CHECK_EQUAL(result[k].info.macs, ctx->info.macs);
         CHECK(memcmp(image[k], ctx->image, sizeof image[k]) == 0);
     }
-    CHECK(refined > 0);
+    CHECK(after_second_pass > 0);
     dense_bench_close(&b);
 }
 
@@ -412,17 +415,18 @@ static void options_have_ranges(void)
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     eits_options o;
     CHECK_EQUAL(eits_options_default(&b.c.model, &o), EITS_OK);
-    CHECK(o.touch_search == EITS_SEARCH_ALL && EITS_SEARCH_ALL == 7 && o.refine == 0);
+    CHECK(o.touch_fit == EITS_TOUCH_FIT_ALL && EITS_TOUCH_FIT_ALL == 7 && o.second_pass == 0);
     for (uint32_t bits = 0; bits < 10; ++bits) {
-        o.touch_search = bits;
-        CHECK_EQUAL(eits_set_options(ctx, &o), bits <= EITS_SEARCH_ALL ? EITS_OK : EITS_E_ARGUMENT);
+        o.touch_fit = bits;
+        CHECK_EQUAL(eits_set_options(ctx, &o),
+                    bits <= EITS_TOUCH_FIT_ALL ? EITS_OK : EITS_E_ARGUMENT);
     }
-    o.touch_search = 0;
-    o.refine = 1;
+    o.touch_fit = 0;
+    o.second_pass = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    o.refine = 2;
+    o.second_pass = 2;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
-    CHECK_EQUAL(ctx->options.refine, 1);
+    CHECK_EQUAL(ctx->options.second_pass, 1);
     dense_bench_close(&b);
 }
 
@@ -433,11 +437,11 @@ int main(void)
     opposite_signs_are_never_one();
     three_thirds_become_one();
     one_disc_over_two_touches_becomes_two();
-    little_is_gained_by_parting();
+    a_split_that_gains_little_is_undone();
     one_large_touch_stays_one();
     one_peak_two_touches();
-    the_refined_image_is_that_of_coupled_data();
-    when_it_is_not_refined();
+    the_second_pass_solves_the_separate_data();
+    when_there_is_no_second_pass();
     nothing_comes_of_it();
     images_of_a_batch();
     options_have_ranges();

@@ -87,9 +87,10 @@ static double complex direct(double complex e, double complex at, double complex
     return s / (reach * reach) * (2 * (creal(e) * creal(u) + cimag(e) * cimag(u)) * u - e);
 }
 
-/* P of the interplay, rows of folds that are left out ignored; folds' second rows give the same. */
-static void dense_interplay(const eits_context *ctx, const dense *d, const eits_disc *disc,
-                            uint32_t count, double *added)
+/* P of the interaction, rows of folds that are left out ignored; folds' second rows give the same.
+ */
+static void dense_interaction(const eits_context *ctx, const dense *d, const eits_disc *disc,
+                              uint32_t count, double *added)
 {
     const eits_model *m = ctx->model;
     seen s[4];
@@ -102,19 +103,19 @@ static void dense_interplay(const eits_context *ctx, const dense *d, const eits_
         const uint8_t *row = m->protocol + 4 * (size_t)m->fold[k].first;
         double datum = 0;
         for (uint32_t i = 0; i < count; ++i) {
-            double complex bent = 0;
+            double complex induced = 0;
             for (uint32_t j = 0; j < count; ++j) {
                 const double complex e = s[j].field[row[0]] - s[j].field[row[1]],
                                      far = s[j].a - s[j].b * s[i].place;
                 const double per = s[j].moment * (double)m->fields.per_sheet;
                 if (i != j)
-                    bent += direct(e, s[i].place, s[j].place, per,
-                                   (double)(disc[i].radius_mm + disc[j].radius_mm)) -
-                            conj(per * conj(e) / (far * far));
+                    induced += direct(e, s[i].place, s[j].place, per,
+                                      (double)(disc[i].radius_mm + disc[j].radius_mm)) -
+                               conj(per * conj(e) / (far * far));
             }
             const double complex measured = s[i].field[row[2]] - s[i].field[row[3]];
             datum -= (double)m->fields.volts * s[i].moment *
-                     (creal(bent) * creal(measured) + cimag(bent) * cimag(measured));
+                     (creal(induced) * creal(measured) + cimag(induced) * cimag(measured));
         }
         const int used = ctx->basis_for[k] != EITS_SIDE_NONE;
         for (uint32_t i = 0; i < d->rank; ++i) {
@@ -127,12 +128,13 @@ static void dense_interplay(const eits_context *ctx, const dense *d, const eits_
     free(directions);
 }
 
-/* ctx->y less what eits_couple leaves of it, |y| made so great that no limit is reached. */
+/* ctx->y less what eits_remove_interaction leaves of it, |y| made so great that no limit is
+ * reached. */
 static void interplay(eits_context *ctx, const eits_disc *disc, uint32_t count, double *added,
                       uint64_t *macs)
 {
     eits_real data[RANK + 8];
-    *macs = eits_couple(ctx, disc, count, data);
+    *macs = eits_remove_interaction(ctx, disc, count, data);
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         added[i] = (double)ctx->y[i] - (double)data[i];
 }
@@ -151,7 +153,7 @@ static void as_computed_densely(void)
         uint64_t macs;
         eits_context *ctx = open_bench(&b, WITH_FIELDS, left_out, frame);
         for (uint32_t count = 2; count <= 3; ++count) {
-            dense_interplay(ctx, &b.d, THREE, count, expected);
+            dense_interaction(ctx, &b.d, THREE, count, expected);
             interplay(ctx, THREE, count, added, &macs);
             CHECK(size_of(expected) > 1e-3);
             for (int i = 0; i < RANK; ++i)
@@ -257,7 +259,7 @@ static void distance_and_overlap(void)
 static int left_alone(eits_context *ctx, const eits_disc *disc, uint32_t count)
 {
     eits_real data[RANK + 8];
-    (void)eits_couple(ctx, disc, count, data);
+    (void)eits_remove_interaction(ctx, disc, count, data);
     return memcmp(data, ctx->y, ctx->model->rank * sizeof *data) == 0;
 }
 
@@ -266,7 +268,7 @@ static void when_it_is_left_alone(void)
     dense_bench b;
     eits_real frame[SMALL_ROWS];
     eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
-    CHECK(eits_couples(ctx) && !left_alone(ctx, THREE, 2));
+    CHECK(eits_has_interaction(ctx) && !left_alone(ctx, THREE, 2));
     CHECK(left_alone(ctx, THREE, 1) && left_alone(ctx, THREE, 0));
     eits_disc strong[2] = {THREE[0], THREE[2]};
     double added[RANK], y[RANK];
@@ -282,9 +284,9 @@ static void when_it_is_left_alone(void)
     strong[0].change *= R(1.02);
     CHECK(left_alone(ctx, strong, 2));
     eits_options o = ctx->options;
-    o.touch_search = EITS_SEARCH_STRAIGHT | EITS_SEARCH_REGROUP;
+    o.touch_fit = EITS_TOUCH_FIT_LOG_DATA | EITS_TOUCH_FIT_SPLIT_MERGE;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK(!eits_couples(ctx) && left_alone(ctx, THREE, 2));
+    CHECK(!eits_has_interaction(ctx) && left_alone(ctx, THREE, 2));
     dense_bench_close(&b);
     static const small_spec others[] = {
         {.rank = RANK, .side = SIDE},
@@ -293,7 +295,8 @@ static void when_it_is_left_alone(void)
     for (int k = 0; k < 3; ++k) {
         ctx = open_bench(&b, others[k], -1, frame);
         /* differences need no fields */
-        CHECK(!eits_couples(ctx) && left_alone(ctx, THREE, 3) && ctx->straight == (k == 0));
+        CHECK(!eits_has_interaction(ctx) && left_alone(ctx, THREE, 3) &&
+              ctx->has_y_log == (k == 0));
         dense_bench_close(&b);
     }
     /* fields of three discs and one more do not fit into the factor of rank 9: 9 x 16 numbers hold
@@ -311,9 +314,9 @@ static void when_it_is_left_alone(void)
     dense_bench_close(&b);
 }
 
-/* The straight data of a model of differences are the data of the same matrices' model of log
+/* The linear data of a model of differences are the data of the same matrices' model of log
  * ratios. */
-static void straight_data(void)
+static void log_data(void)
 {
     for (int left_out = -1; left_out < 9; left_out += 3) {
         dense_bench b, log_bench;
@@ -322,17 +325,17 @@ static void straight_data(void)
         const small_spec spec = {
             .rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO};
         eits_context *log_ctx = open_bench(&log_bench, spec, left_out, frame);
-        CHECK_EQUAL(ctx->straight, 1);
-        CHECK(memcmp(ctx->y_straight, log_ctx->y, RANK * sizeof *ctx->y) == 0);
+        CHECK_EQUAL(ctx->has_y_log, 1);
+        CHECK(memcmp(ctx->y_log, log_ctx->y, RANK * sizeof *ctx->y) == 0);
         CHECK(memcmp(ctx->y, log_ctx->y, RANK * sizeof *ctx->y) != 0);
         uint32_t masked;
         uint64_t with = 0, without = 0;
         CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with), EITS_OK);
         eits_options o = ctx->options;
-        o.touch_search = EITS_SEARCH_REGROUP | EITS_SEARCH_COUPLED;
+        o.touch_fit = EITS_TOUCH_FIT_SPLIT_MERGE | EITS_TOUCH_FIT_INTERACTION;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without), EITS_OK);
-        CHECK_EQUAL(ctx->straight, 0);
+        CHECK_EQUAL(ctx->has_y_log, 0);
         const uint32_t folds = SMALL_FOLDED - (left_out >= 0);
         CHECK(with - without >= folds * RANK && with - without <= (folds + 2) * RANK);
         dense_bench_close(&log_bench);
@@ -342,7 +345,7 @@ static void straight_data(void)
 
 /* Where the reference is all but zero there is no ratio: differences stay, halved over both sides.
  */
-static void straight_data_without_a_ratio(void)
+static void log_data_without_a_ratio(void)
 {
     dense_bench b;
     eits_real frame[SMALL_ROWS], y[RANK];
@@ -361,7 +364,7 @@ static void straight_data_without_a_ratio(void)
     eits_copy(y, ctx->y, RANK);
     CHECK(eits_dot(ctx, y, y, RANK) > 0);
     for (int i = 0; i < RANK; ++i)
-        CHECK_NEAR(ctx->y_straight[i], y[i], 4 * EPS * fabs((double)y[i]));
+        CHECK_NEAR(ctx->y_log[i], y[i], 4 * EPS * fabs((double)y[i]));
     dense_bench_close(&b);
 }
 
@@ -372,7 +375,7 @@ int main(void)
     reciprocals_give_the_same();
     distance_and_overlap();
     when_it_is_left_alone();
-    straight_data();
-    straight_data_without_a_ratio();
+    log_data();
+    log_data_without_a_ratio();
     return checks_report("coupling");
 }
