@@ -163,7 +163,7 @@ static void set_tracking(const fw_instrument *instrument, eits_options *options,
 {
     eits_options usual;
     (void)eits_options_default(&instrument->engine.model, &usual);
-    options->gate_factor = usual.gate_factor;
+    options->detection_factor = usual.detection_factor;
     options->track_confirm = usual.track_confirm;
     options->track_hold = usual.track_hold;
     options->track_smooth = usual.track_smooth;

@@ -138,7 +138,7 @@ static inline void solve_what_is_seen(bench *b, int sign)
     eits_options o = ctx->options;
     o.sign = (eits_sign)sign;
     o.lambda_rel = R(0.05);
-    o.gate_factor = 0;
+    o.detection_factor = 0;
     /* the active set first: its gap bounds the optimum from below */
     for (int solver = 3; solver >= 0; --solver) {
         o.solver = (eits_solver)solver;

@@ -108,7 +108,7 @@ static void exercise(eits_context *ctx, uint64_t *state)
     }
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     eits_options o = ctx->options;
-    o.touch_share = 0;
+    o.touch_min_fraction = 0;
     o.touch_threshold = 0;
     o.max_touches = EITS_MAX_TOUCHES;
     o.warm_start = 1;
@@ -208,9 +208,9 @@ static void default_options(void)
     CHECK(o.lambda_abs == 0 && o.gap_rel == 0 && o.saturation_v == 0 && o.touch_sweeps >= 1);
     CHECK_NEAR(o.lambda_rel, 0.03f, 0);
     CHECK_NEAR(o.lambda_noise_factor, 0.3f, 0);
-    CHECK_NEAR(o.gate_factor, 1.2f, 0);
+    CHECK_NEAR(o.detection_factor, 1.2f, 0);
     CHECK_NEAR(o.touch_threshold, 0.2f, 0);
-    CHECK_NEAR(o.touch_share, 0.003f, 0);
+    CHECK_NEAR(o.touch_min_fraction, 0.003f, 0);
     CHECK_NEAR(o.touch_min_radius_mm, 3, 0);
     CHECK_NEAR(o.touch_max_radius_mm, 40, 0);
     CHECK_NEAR(o.touch_seed_radius_mm, 9, 0);
@@ -221,9 +221,9 @@ static void default_options(void)
     const eits_options usual = o;
     CHECK_EQUAL(eits_options_track(NULL), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_options_track(&o), EITS_OK);
-    CHECK_NEAR(o.gate_factor, 0.75 * 1.2f, 1e-7);
+    CHECK_NEAR(o.detection_factor, 0.75 * 1.2f, 1e-7);
     CHECK(o.track_confirm == 2 && o.track_hold == 2 && o.track_smooth == R(0.66));
-    o.gate_factor = usual.gate_factor; /* and nothing else */
+    o.detection_factor = usual.detection_factor; /* and nothing else */
     o.track_confirm = o.track_hold = 0;
     o.track_smooth = 0;
     const size_t padded = offsetof(eits_options, touch_sweeps) + sizeof o.touch_sweeps,
@@ -258,14 +258,14 @@ static void options_out_of_range(void)
         REAL_WRONG(lambda_rel),
         REAL(lambda_rel, 1.001),
         REAL_WRONG(lambda_noise_factor),
-        REAL_WRONG(gate_factor),
+        REAL_WRONG(detection_factor),
         REAL_WRONG(gap_rel),
         REAL(gap_rel, 1.001),
         REAL_WRONG(saturation_v),
         REAL_WRONG(touch_threshold),
         REAL(touch_threshold, 1.001),
-        REAL_WRONG(touch_share),
-        REAL(touch_share, 1.001),
+        REAL_WRONG(touch_min_fraction),
+        REAL(touch_min_fraction, 1.001),
         REAL_WRONG(touch_min_radius_mm),
         REAL(touch_min_radius_mm, 0),
         REAL(touch_min_radius_mm, 9.1),
@@ -304,8 +304,8 @@ static void options_out_of_range(void)
     o.touch_sweeps = 1000;
     o.track_confirm = o.track_hold = EITS_MOST_TRACK_FRAMES;
     o.track_smooth = R(1e30);
-    o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_share = 1;
-    o.lambda_abs = o.gate_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm =
+    o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_min_fraction = 1;
+    o.lambda_abs = o.detection_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm =
         o.touch_change_s_per_m = R(1e30);
     o.floor_noise_factor = R(1e30);
     o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);

@@ -256,7 +256,7 @@ static void hidden_columns(void)
     o.solver = EITS_SOLVER_ACTIVE_SET;
     o.diagnostics = o.project_reference = 0;
     o.max_masked = SMALL_ROWS;
-    o.gate_factor = o.gap_rel = 0;
+    o.detection_factor = o.gap_rel = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_real frame[SMALL_ROWS];
     small_reference(ctx->model, 1, frame);

@@ -168,7 +168,7 @@ static void touches_have_forces(void)
     small_context_open(&c, &made, 0);
     eits_options options = c.ctx.options;
     options.sign = EITS_SIGN_BOTH;
-    options.gate_factor = 0;
+    options.detection_factor = 0;
     CHECK_EQUAL(eits_set_options(&c.ctx, &options), EITS_OK);
     small_reference(&c.model, 1, frame);
     CHECK_EQUAL(eits_reference_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);

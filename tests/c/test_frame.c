@@ -303,7 +303,7 @@ static void refused_frames_clear_the_image(void)
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, length[wrong], again, &info), expected[wrong]);
         for (int j = 0; j < SIDE * SIDE; ++j)
             CHECK(again[j] == 0 && ctx->image[j] == 0 && ctx->x[j] == 0);
-        CHECK(info.nonzeros == 0 && info.iterations == 0 && info.stop == EITS_STOP_GATE);
+        CHECK(info.nonzeros == 0 && info.iterations == 0 && info.stop == EITS_STOP_BELOW_THRESHOLD);
         CHECK_EQUAL(info.masked, wrong == 0 ? 4 : 0);
         uint32_t count = 9;
         CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);

@@ -318,7 +318,7 @@ static void noise_of_any_size(void)
     eits_options o = ctx->options;
     o.lambda_rel = R(1e-3);
     o.lambda_noise_factor = R(0.5);
-    o.gate_factor = 0;
+    o.detection_factor = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_solve(ctx), EITS_OK);
     CHECK(ctx->info.lambda == R(0.125) && ctx->info.lambda_noise == R(0.25));

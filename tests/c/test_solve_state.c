@@ -1,5 +1,5 @@
-/* What the solver takes from outside one frame: gate and lambda rule, warm start, a wrong step,
- * units. */
+/* What the solver takes from outside one frame: detection threshold and lambda rule, warm start, a
+ * wrong step, units. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
@@ -49,17 +49,17 @@ static eits_info solve(eits_context *ctx)
     return ctx->info;
 }
 
-static void gate_and_lambda_rule(void)
+static void detection_threshold_and_lambda_rule(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, RANDOM);
     fill_y(&b, 1, 0, 0);
     eits_options o = ctx->options;
-    o.gate_factor = R(1.5);
+    o.detection_factor = R(1.5);
     o.lambda_rel = R(0.1);
     o.lambda_noise_factor = R(0.5);
     set_options(ctx, o);
-    eits_info info = solve(ctx); /* the noise is not known: nothing is gated */
+    eits_info info = solve(ctx); /* the noise is not known: nothing is below a threshold */
     const double top = (double)info.lambda_max;
     CHECK(top > 0.1 && info.stop == EITS_STOP_ITERATIONS);
     CHECK_NEAR(info.lambda, 0.1 * top, 2 * EPS * top);
@@ -75,19 +75,19 @@ static void gate_and_lambda_rule(void)
     info = solve(ctx);
     CHECK_NEAR(info.lambda, 0.6 * top, 2 * EPS * top);
     CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
-    /* just below the gate, then just above */
+    /* just below the detection threshold, then just above */
     ctx->reference.lambda_noise = (eits_real)(top / 1.49);
     info = solve(ctx);
-    CHECK(info.stop == EITS_STOP_GATE && info.iterations == 0 && info.nonzeros == 0);
+    CHECK(info.stop == EITS_STOP_BELOW_THRESHOLD && info.iterations == 0 && info.nonzeros == 0);
     for (int j = 0; j < N; ++j)
         CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
     ctx->reference.lambda_noise = (eits_real)(top / 1.51);
     info = solve(ctx);
     CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros > 0);
-    o.gate_factor = 0;
+    o.detection_factor = 0;
     set_options(ctx, o);
     ctx->reference.lambda_noise = (eits_real)(100 * top);
-    /* no gate, and lambda_abs does not look at the noise */
+    /* no threshold, and lambda_abs does not look at the noise */
     CHECK_EQUAL(solve(ctx).stop, EITS_STOP_ITERATIONS);
     dense_bench_close(&b);
 }
@@ -372,7 +372,7 @@ static void units_do_not_matter(void)
 
 int main(void)
 {
-    gate_and_lambda_rule();
+    detection_threshold_and_lambda_rule();
     warm_start_saves_iterations();
     no_ghost_after_lift_off();
     warm_start_is_forgotten();

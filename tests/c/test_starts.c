@@ -229,7 +229,7 @@ static void steps_that_end_at_zero(void)
             eits_options o = ctx->options;
             o.solver = EITS_SOLVER_FISTA;
             o.lambda_rel = R(0.1);
-            o.gate_factor = 0;
+            o.detection_factor = 0;
             o.gap_every = every;
             o.iterations = 60;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);

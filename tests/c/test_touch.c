@@ -192,12 +192,12 @@ static void dropped_and_limited(void)
     CHECK_EQUAL(b.count, 2);
     const double share = (double)b.found[1].confidence;
     CHECK_NEAR(share, 0.09 / 1.09, 0.02); /* energies go with the square of the strengths */
-    o.touch_share = (eits_real)(1.2 * share);
+    o.touch_min_fraction = (eits_real)(1.2 * share);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 1);
     (void)check_found(&b, two[0], 2, 0.1);
-    o.touch_share = (eits_real)(0.8 * share);
+    o.touch_min_fraction = (eits_real)(0.8 * share);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
@@ -227,7 +227,7 @@ static void many_peaks(void)
     eits_options o = ctx->options;
     o.touch_sweeps = 0;
     o.touch_threshold = 0;
-    o.touch_share = 0;
+    o.touch_min_fraction = 0;
     o.touch_seed_radius_mm = o.touch_min_radius_mm = R(3.0);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     for (uint32_t most = 1; most <= EITS_MAX_TOUCHES; most += 5) {
@@ -262,14 +262,14 @@ static void many_peaks(void)
     tear_down(&b);
 }
 
-static void gate_by_noise(void)
+static void no_touch_below_the_detection_threshold(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger two[2] = {{-25, 0, 9, 0.05}, {25, 5, 9, 0.015}};
     eits_options o = ctx->options;
     o.lambda_noise_factor = 0;
-    o.gate_factor = 1;
+    o.detection_factor = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, two + 1, 1, 0);
     const eits_real weak = ctx->info.lambda_max;
@@ -284,8 +284,8 @@ static void gate_by_noise(void)
     CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
     CHECK_EQUAL(b.count, 1);
     CHECK(b.found[0].x_mm < 0);
-    press(&b, two + 1, 1, 0); /* alone it does not even pass the frame's gate */
-    CHECK(ctx->info.stop == EITS_STOP_GATE && b.count == 0 && ctx->info.touch_macs == 0);
+    press(&b, two + 1, 1, 0); /* alone it does not even pass the frame's detection threshold */
+    CHECK(ctx->info.stop == EITS_STOP_BELOW_THRESHOLD && b.count == 0 && ctx->info.touch_macs == 0);
     tear_down(&b);
 }
 
@@ -404,7 +404,7 @@ int main(void)
     two_touches_and_one();
     dropped_and_limited();
     many_peaks();
-    gate_by_noise();
+    no_touch_below_the_detection_threshold();
     without_sweeps();
     radius_by_strength();
     at_rim_and_corner();

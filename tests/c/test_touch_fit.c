@@ -67,7 +67,7 @@ static void work_is_counted(void)
     (void)press(ctx, 1);
     CHECK_EQUAL(touch_macs(ctx, 2), 2 * strengths + 3 * RANK);
     (void)press(ctx, 0);
-    /* a gate: the 3 x 3 pixels around it, two products each */
+    /* a detection threshold: the 3 x 3 pixels around it, two products each */
     ctx->reference.lambda_noise = R(1e-6);
     CHECK_EQUAL(touch_macs(ctx, 1), strengths + RANK + 9 * 2 * RANK);
     ctx->reference.lambda_noise = 0;
@@ -186,7 +186,7 @@ static void confidence_is_what_leaving_out_costs(void)
 
 /* A touch must stand out of the noise at its own place: at the greatest S_j'(its part) of the 3 x 3
  * pixels around it. */
-static void gate_of_one_touch(void)
+static void each_touch_must_exceed_the_detection_threshold(void)
 {
     small_model made;
     small_context c;
@@ -194,9 +194,9 @@ static void gate_of_one_touch(void)
     dense d = dense_of(&c.model);
     eits_options o = ctx->options;
     o.touch_sweeps = 0;
-    o.touch_share = 0;
+    o.touch_min_fraction = 0;
     o.lambda_noise_factor = 0;
-    o.gate_factor = 1;
+    o.detection_factor = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     const eits_disc weak = {33, -3, 9, R(0.02), 1};
     eits_real atom[RANK];
@@ -222,7 +222,7 @@ static void gate_of_one_touch(void)
 int main(void)
 {
     confidence_is_what_leaving_out_costs();
-    gate_of_one_touch();
+    each_touch_must_exceed_the_detection_threshold();
     work_is_counted();
     units_do_not_matter();
     return checks_report("touch_fit");

@@ -206,7 +206,7 @@ static void test_solver(void)
     REPLY(solver_with(c), EITS_REPLY_RANGE, 40, 1);
     const eits_options *options = &b.host.instrument.engine.ctx.options;
     CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
-    CHECK_NEAR(options->gate_factor, 0.75 * 1.2f, 1e-7);
+    CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
     CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->mac_limit, 0);
     CHECK_EQUAL(options->iterations, 30);
@@ -221,7 +221,7 @@ static void test_solver(void)
     CHECK_EQUAL(options->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
     CHECK_EQUAL(options->mac_limit, 123456);
     CHECK(options->track_confirm == 0 && options->track_hold == 0 && options->track_smooth == 0);
-    CHECK_NEAR(options->gate_factor, 1.2f, 0);
+    CHECK_NEAR(options->detection_factor, 1.2f, 0);
     c = good;
     c.track = 1;
     for (int k = 0; k < 2; ++k) { /* as after a start, and not a quarter lower each time */
@@ -229,7 +229,7 @@ static void test_solver(void)
         c.iterations += 1; /* another command, not the last one again */
     }
     CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
-    CHECK_NEAR(options->gate_factor, 0.75 * 1.2f, 1e-7);
+    CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
 }
 
 static void test_mask_row(void)

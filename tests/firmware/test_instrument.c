@@ -59,7 +59,7 @@ static void mirror_touches(const host_packet *packet)
     const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count = 0;
-    if (mirror.ctx.info.stop != EITS_STOP_GATE || head->status == 0)
+    if (mirror.ctx.info.stop != EITS_STOP_BELOW_THRESHOLD || head->status == 0)
         CHECK_EQUAL(eits_find_touches(&mirror.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
     ++mirror.touches;
     mirror.different +=

@@ -55,13 +55,14 @@ typedef struct eits_options {
     /* lambda = max(lambda_rel lambda_max, lambda_noise_factor lambda_noise) */
     eits_real lambda_rel;
     eits_real lambda_noise_factor;
-    eits_real gate_factor;  /* no touch where lambda_max < gate_factor lambda_noise; 0: no gate */
-    eits_real gap_rel;      /* > 0: stop once gap <= gap_rel |y|^2 / 2 */
-    eits_real saturation_v; /* > 0: a channel at or beyond +-saturation_v is unusable */
+    eits_real detection_factor; /* no touch where lambda_max < detection_factor lambda_noise; 0: no
+                                   threshold */
+    eits_real gap_rel;          /* > 0: stop once gap <= gap_rel |y|^2 / 2 */
+    eits_real saturation_v;     /* > 0: a channel at or beyond +-saturation_v is unusable */
     /* a local maximum below this share of the greatest starts no touch */
     eits_real touch_threshold;
     /* a touch that explains less than this share of |y|^2 beside the others is dropped */
-    eits_real touch_share;
+    eits_real touch_min_fraction;
     eits_real touch_min_radius_mm, touch_max_radius_mm, touch_seed_radius_mm;
     /* expected conductivity change under a touch: tells radius from strength; 0: unknown */
     eits_real touch_change_s_per_m;
@@ -96,7 +97,8 @@ typedef struct eits_options {
 typedef enum eits_stop {
     EITS_STOP_ITERATIONS = 0, /* the given number of iterations was done */
     EITS_STOP_GAP = 1,        /* the duality gap was small enough */
-    EITS_STOP_GATE = 2,       /* lambda_max lies within the noise: no touch, the image is zero */
+    EITS_STOP_BELOW_THRESHOLD =
+        2, /* lambda_max lies within the noise: no touch, the image is zero */
     /* lambda >= lambda_max: zero is the exact optimum; or |y| < 2^-51 (4.4e-16; double: 1e-146),
      * whose square says nothing */
     EITS_STOP_ZERO = 3,
@@ -124,8 +126,8 @@ typedef struct eits_info {
     eits_real lambda;
     eits_real lambda_max;
     eits_real lambda_noise; /* the reference's, times what rows left out add */
-    /* duality gap at the result, absolute; 0 where stop is GATE, ZERO or DIVERGED, and where
-     * MACS came before anything was known */
+    /* duality gap at the result, absolute; 0 where stop is BELOW_THRESHOLD, ZERO or DIVERGED, and
+     * where MACS came before anything was known */
     eits_real gap;
     eits_real gap_rel;    /* gap / (|y|^2 / 2) */
     eits_real residual;   /* |y - S x| */
@@ -314,9 +316,9 @@ size_t eits_workspace_size(const eits_model *model, int prepared);
 eits_status eits_options_default(const eits_model *model, eits_options *options);
 
 /* Change `options` to what suits frames that follow one another, 48 or 96 a second
- * (docs/guide/tracking.md): the gate a quarter lower, and the touches that come of it followed in
- * time, so that those of noise are not told of. A frame by itself then misses faint touches: each
- * needs those before it. Errors: EITS_E_ARGUMENT. */
+ * (docs/guide/tracking.md): the detection threshold a quarter lower, and the touches that come of
+ * it followed in time, so that those of noise are not told of. A frame by itself then misses faint
+ * touches: each needs those before it. Errors: EITS_E_ARGUMENT. */
 eits_status eits_options_track(eits_options *options);
 
 /* Lay out `ctx` in `workspace`, set the model's default options. With room for it (see `prepared`

@@ -26,9 +26,9 @@
 extern "C" {
 #endif
 
-/* Take one frame as the reference; noise and lambda_noise stay unknown (0), so nothing is gated.
- * Errors: EITS_E_ARGUMENT, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO. The old
- * reference then stays. */
+/* Take one frame as the reference; noise and lambda_noise stay unknown (0), so nothing is below a
+ * threshold. Errors: EITS_E_ARGUMENT, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS,
+ * EITS_E_FRAME_ZERO. The old reference then stays. */
 eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t length);
 
 /* Learn reference and noise from `count` >= 4 reference frames: begin, add each, finish. The first

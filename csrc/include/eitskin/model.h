@@ -92,10 +92,10 @@ typedef struct eits_defaults {
     uint32_t max_touches;
     float lambda_rel;          /* lambda >= lambda_rel * lambda_max */
     float lambda_noise_factor; /* lambda >= lambda_noise_factor * lambda_noise */
-    float gate_factor;         /* no touch where lambda_max < gate_factor * lambda_noise */
+    float detection_factor;    /* no touch where lambda_max < detection_factor * lambda_noise */
     float mask_threshold;      /* t of the mask x > t max(x), chosen on training scenes */
     float touch_threshold;     /* see eits_options for this and the following */
-    float touch_share;
+    float touch_min_fraction;
     float touch_min_radius_mm;
     float touch_max_radius_mm;
     float touch_seed_radius_mm;

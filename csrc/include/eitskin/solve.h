@@ -35,9 +35,9 @@
 extern "C" {
 #endif
 
-/* One frame to an image: frame stage, gate, solver. `image` (n_pixels, S/m) and `info` may be NULL;
- * both are in ctx as well. On an error the image is cleared, never NaN. Errors: those of
- * eits_frame_stage, EITS_E_NOT_FINITE. */
+/* One frame to an image: frame stage, detection threshold, solver. `image` (n_pixels, S/m) and
+ * `info` may be NULL; both are in ctx as well. On an error the image is cleared, never NaN. Errors:
+ * those of eits_frame_stage, EITS_E_NOT_FINITE. */
 eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length,
                              eits_real *image, eits_info *info);
 

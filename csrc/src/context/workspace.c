@@ -33,12 +33,12 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .lambda_abs = 0,
         .lambda_rel = (eits_real)d->lambda_rel,
         .lambda_noise_factor = (eits_real)d->lambda_noise_factor,
-        .gate_factor = (eits_real)d->gate_factor,
+        .detection_factor = (eits_real)d->detection_factor,
         .gap_rel = 0,
         .mac_limit = 0,
         .saturation_v = 0,
         .touch_threshold = (eits_real)d->touch_threshold,
-        .touch_share = (eits_real)d->touch_share,
+        .touch_min_fraction = (eits_real)d->touch_min_fraction,
         .touch_min_radius_mm = (eits_real)d->touch_min_radius_mm,
         .touch_max_radius_mm = (eits_real)d->touch_max_radius_mm,
         .touch_seed_radius_mm = (eits_real)d->touch_seed_radius_mm,
@@ -62,7 +62,7 @@ eits_status eits_options_track(eits_options *options)
 {
     if (options == NULL)
         return EITS_E_ARGUMENT;
-    options->gate_factor *= R(0.75);
+    options->detection_factor *= R(0.75);
     options->track_confirm = 2;
     options->track_hold = 2;
     options->track_smooth = R(0.66);
@@ -189,9 +189,9 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         (uint32_t)o->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET && o->warm_start <= 1 &&
         o->project_reference <= 1 && in_range(o->lambda_abs, 0, huge) &&
         in_range(o->lambda_rel, 0, 1) && in_range(o->lambda_noise_factor, 0, huge) &&
-        in_range(o->gate_factor, 0, huge) && in_range(o->gap_rel, 0, 1) &&
+        in_range(o->detection_factor, 0, huge) && in_range(o->gap_rel, 0, 1) &&
         in_range(o->saturation_v, 0, huge) && in_range(o->touch_threshold, 0, 1) &&
-        in_range(o->touch_share, 0, 1) && in_range(o->touch_change_s_per_m, 0, huge) &&
+        in_range(o->touch_min_fraction, 0, 1) && in_range(o->touch_change_s_per_m, 0, huge) &&
         in_range(o->touch_radius_weight, 0, huge) &&
         in_range(o->touch_min_radius_mm, R(1e-6), huge) &&
         in_range(o->touch_max_radius_mm, o->touch_min_radius_mm, huge) &&

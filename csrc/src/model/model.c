@@ -277,8 +277,8 @@ static int defaults_in_range(const eits_defaults *d)
            d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET &&
            d->touch_fit_left_out <= MAX_TOUCH_FIT && between(d->lambda_rel, 0, 1) &&
            between(d->mask_threshold, 0, 1) && between(d->touch_threshold, 0, 1) &&
-           between(d->touch_share, 0, 1) && between(d->lambda_noise_factor, 0, huge) &&
-           between(d->gate_factor, 0, huge) && between(d->touch_change_s_per_m, 0, huge) &&
+           between(d->touch_min_fraction, 0, 1) && between(d->lambda_noise_factor, 0, huge) &&
+           between(d->detection_factor, 0, huge) && between(d->touch_change_s_per_m, 0, huge) &&
            between(d->follow_mm, 0, huge) && between(d->touch_radius_weight, 0, huge) &&
            between(d->touch_min_radius_mm, 1e-6f, huge) &&
            between(d->touch_max_radius_mm, d->touch_min_radius_mm, huge) &&

@@ -1,4 +1,4 @@
-/* One frame's solve: lambda, gate, start, image; the solvers iterate. */
+/* One frame's solve: lambda, detection threshold, start, image; the solvers iterate. */
 #include "eitskin/solve.h"
 
 #include "base/vec.h"
@@ -108,8 +108,9 @@ static eits_status solve(eits_context *ctx, int from_last)
         return EITS_E_NOT_FINITE;
     }
     eits_check_stale_reference(ctx);
-    if (o->gate_factor > 0 && ctx->info.lambda_max < o->gate_factor * ctx->info.lambda_noise) {
-        answer_zero(ctx, EITS_STOP_GATE);
+    if (o->detection_factor > 0 &&
+        ctx->info.lambda_max < o->detection_factor * ctx->info.lambda_noise) {
+        answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
         return EITS_OK;
     }
     if (!(ctx->info.lambda_max > ctx->info.lambda) || square < LEAST_SQUARE) {
@@ -170,7 +171,7 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
     if (status == EITS_OK)
         status = solve(ctx, ctx->options.warm_start != 0);
     else
-        answer_zero(ctx, EITS_STOP_GATE);
+        answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
     if (image != NULL)
         eits_copy(image, ctx->image, ctx->model->n_pixels);
     if (info != NULL)

@@ -50,7 +50,7 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
  * discs) at its pixel. */
 static int stands_out(eits_context *ctx, eits_fit *f, uint32_t k)
 {
-    const eits_real least = ctx->options.gate_factor * eits_lambda_noise(ctx);
+    const eits_real least = ctx->options.detection_factor * eits_lambda_noise(ctx);
     const uint32_t rank = ctx->model->rank;
     if (!(least > 0))
         return 1;
@@ -100,7 +100,7 @@ void eits_fit_prune(eits_context *ctx, eits_fit *f)
             weakest = f->explained[k] < f->explained[weakest] ? k : weakest;
         const int alone = f->count == 1;
         const int enough =
-            alone ? f->explained[0] > 0 : f->explained[weakest] >= ctx->options.touch_share;
+            alone ? f->explained[0] > 0 : f->explained[weakest] >= ctx->options.touch_min_fraction;
         if (enough && stands_out(ctx, f, weakest))
             return;
         drop(ctx, f, weakest);

@@ -181,7 +181,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     eits_touch found[EITS_MAX_TOUCHES];
     const eits_stop stop = ctx->info.stop;
     const int looked =
-        stop != EITS_STOP_GATE && stop != EITS_STOP_ZERO && stop != EITS_STOP_DIVERGED;
+        stop != EITS_STOP_BELOW_THRESHOLD && stop != EITS_STOP_ZERO && stop != EITS_STOP_DIVERGED;
     if (looked)
         fit_touches(ctx, &f);
     const uint32_t finite = report(ctx, &f, found);

@@ -43,9 +43,9 @@ class Options:
     max_masked: int
     lambda_rel: float
     lambda_noise_factor: float
-    gate_factor: float
+    detection_factor: float
     touch_threshold: float
-    touch_share: float
+    touch_min_fraction: float
     touch_min_radius_mm: float
     touch_max_radius_mm: float
     touch_seed_radius_mm: float
@@ -88,7 +88,7 @@ WHOLE = {
     "track_confirm": (0, MOST_TRACK_FRAMES),
     "track_hold": (0, MOST_TRACK_FRAMES),
 }
-SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_share")
+SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_min_fraction")
 
 
 def check_options(o: Options) -> None:

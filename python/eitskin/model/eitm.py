@@ -331,10 +331,10 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     d = Defaults(
         **{**values, "solver": SOLVERS[values["solver"]]}
     )  # files of 1.0 have 0 there: FISTA
-    shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_share)
+    shares = (d.lambda_rel, d.mask_threshold, d.touch_threshold, d.touch_min_fraction)
     sizes = (
         d.lambda_noise_factor,
-        d.gate_factor,
+        d.detection_factor,
         d.touch_change_s_per_m,
         d.follow_mm,
         d.touch_radius_weight,

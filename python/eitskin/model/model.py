@@ -32,10 +32,10 @@ class Defaults:
     max_touches: int = 12
     lambda_rel: float = 0.03
     lambda_noise_factor: float = 0.3
-    gate_factor: float = 1.2
+    detection_factor: float = 1.2
     mask_threshold: float = 0.26
     touch_threshold: float = 0.15
-    touch_share: float = 0.003
+    touch_min_fraction: float = 0.003
     touch_min_radius_mm: float = 3.0
     touch_max_radius_mm: float = 30.0
     touch_seed_radius_mm: float = 9.0

@@ -57,7 +57,7 @@ class Fit:
             float(frame.y @ frame.y),
             frame.noise / model.rank,
         )
-        self.gate = options.gate_factor * frame.lambda_noise
+        self.gate = options.detection_factor * frame.lambda_noise
         self.radius_weight = options.touch_radius_weight
         self.centres = model.grid.centres_mm()
         weight = model.column_weight.astype(np.float64)
@@ -244,7 +244,7 @@ class Fit:
             enough = (
                 explained[0] > 0
                 if len(self.discs) == 1
-                else explained[weakest] >= self.options.touch_share
+                else explained[weakest] >= self.options.touch_min_fraction
             )
             if enough and self.stands_out(weakest):
                 return explained

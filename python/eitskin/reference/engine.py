@@ -437,7 +437,7 @@ class ReferenceEngine:
         lambda_max = greatest(self.seen.T @ y, o.sign)
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
         nothing, zero = Certificate(0.0, 0.5 * norm**2, norm), np.zeros(self.model.grid.n_pixels)
-        if o.gate_factor > 0 and lambda_max < o.gate_factor * lambda_noise:
+        if o.detection_factor > 0 and lambda_max < o.detection_factor * lambda_noise:
             return Result(zero, 0, "gate", nothing, 0), lam, lambda_max
         if not lambda_max > lam or norm**2 < LEAST_SQUARE:
             return Result(zero, 0, "zero", nothing, 0), lam, lambda_max

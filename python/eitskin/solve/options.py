@@ -9,7 +9,12 @@ import numpy as np
 from eitskin.core.results import ALL_SEARCH, MAX_TOUCHES, Options
 from eitskin.model.model import Model
 
-TRACKING = ("gate_factor", "track_confirm", "track_hold", "track_smooth")  # what tracking changes
+TRACKING = (
+    "detection_factor",
+    "track_confirm",
+    "track_hold",
+    "track_smooth",
+)  # what tracking changes
 
 
 def default_options(model: Model) -> Options:
@@ -21,9 +26,9 @@ def default_options(model: Model) -> Options:
         max_masked=model.protocol.n_rows // 2,
         lambda_rel=d.lambda_rel,
         lambda_noise_factor=d.lambda_noise_factor,
-        gate_factor=d.gate_factor,
+        detection_factor=d.detection_factor,
         touch_threshold=d.touch_threshold,
-        touch_share=d.touch_share,
+        touch_min_fraction=d.touch_min_fraction,
         touch_min_radius_mm=d.touch_min_radius_mm,
         touch_max_radius_mm=d.touch_max_radius_mm,
         touch_seed_radius_mm=d.touch_seed_radius_mm,
@@ -39,10 +44,10 @@ def tracking(options: Options) -> Options:
     """``options``, of :func:`default_options`, for frames that follow one another: as
     eits_options_track in the C core sets them, to the bit in float32. docs/guide/tracking.md says
     what that is worth."""
-    gate = float(np.float32(options.gate_factor) * np.float32(0.75))
+    gate = float(np.float32(options.detection_factor) * np.float32(0.75))
     return replace(
         options,
-        gate_factor=gate,
+        detection_factor=gate,
         track_confirm=2,
         track_hold=2,
         track_smooth=float(np.float32(0.66)),

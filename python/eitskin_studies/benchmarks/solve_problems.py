@@ -65,7 +65,7 @@ class Problems:
 def bench_options(model: Model, **changes: object) -> Options:
     """The model's defaults with the plain problem's lambda and no ignored direction."""
     plain = replace(default_options(model), project_reference=False, lambda_rel=LAMBDA_REL)
-    return replace(plain, lambda_noise_factor=0.0, gate_factor=0.0, **changes)  # type: ignore[arg-type]
+    return replace(plain, lambda_noise_factor=0.0, detection_factor=0.0, **changes)  # type: ignore[arg-type]
 
 
 def sessions(scenes: int, seed: int, role: str = "test") -> Simulated:

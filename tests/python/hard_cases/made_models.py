@@ -92,7 +92,12 @@ def plain_options(s: np.ndarray, **changes: object) -> Options:
     base = default_options(made_model(s))
     return replace(
         base,
-        **{"gate_factor": 0.0, "lambda_noise_factor": 0.0, "project_reference": False, **changes},
+        **{
+            "detection_factor": 0.0,
+            "lambda_noise_factor": 0.0,
+            "project_reference": False,
+            **changes,
+        },
     )  # type: ignore[arg-type]
 
 

@@ -32,7 +32,7 @@ def searches() -> list[Options]:
     return [
         *parts,
         replace(own, sign="both"),
-        replace(own, touch_share=0.0, gate_factor=0.0, touch_threshold=0.05),
+        replace(own, touch_min_fraction=0.0, detection_factor=0.0, touch_threshold=0.05),
     ]
 
 

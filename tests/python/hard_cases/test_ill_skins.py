@@ -78,7 +78,7 @@ def test_ill_conditioned_skins(
     S is the whole problem, a sound result; and to a small gap, float32 what float64 gives."""
     h = hard_skin(name)
     usual = default_options(h.model)
-    sound = replace(usual, project_reference=False, gate_factor=0.0)
+    sound = replace(usual, project_reference=False, detection_factor=0.0)
     precise = replace(sound, solver="active-set", iterations=300, gap_rel=1e-5)
     chosen = [usual, *(replace(sound, solver=solver) for solver in SOLVERS), precise]
     _, outcomes = same_everywhere.steps(

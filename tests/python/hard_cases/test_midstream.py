@@ -100,7 +100,7 @@ def changes() -> list[Options]:
         *named,
         replace(usual, touch_sweeps=0),
         replace(usual, max_touches=1),
-        replace(usual, gate_factor=100.0),
+        replace(usual, detection_factor=100.0),
         usual,
     ]
 

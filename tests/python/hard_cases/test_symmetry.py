@@ -127,7 +127,7 @@ def check_alike(
     """
     options = replace(
         default_options(models[0]), solver="active-set", iterations=500, gap_rel=1e-5,
-        project_reference=False, gate_factor=0.0,
+        project_reference=False, detection_factor=0.0,
         lambda_noise_factor=0.0,
     )  # fmt: skip
     both = zip(models, frames, strict=True)

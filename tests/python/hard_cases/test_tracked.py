@@ -49,7 +49,7 @@ def ids(outcomes: list[Outcome]) -> list[tuple[int, ...]]:
 def test_noise_that_flickers(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Quiet frames at half of the gate: without tracking many of them have a touch, and each that
     comes is another; with it a touch has to come twice to one place."""
-    low = options(gate_factor=0.6)
+    low = options(detection_factor=0.6)
     quiet = frames_of([None] * 40, 0, 132)
     _, bare = same_everywhere.steps(
         [*head(replace(low, track_confirm=0, track_hold=0, track_smooth=0.0)), Play(quiet)]

@@ -36,7 +36,7 @@ def engines(
     """One of each, without a gate."""
     made = {name: Reconstructor(small_model(storage, data_kind), engine=name) for name in ENGINES}
     for reconstructor in made.values():
-        reconstructor.with_options(iterations=60, gate_factor=0.0, solver=solver, **options)
+        reconstructor.with_options(iterations=60, detection_factor=0.0, solver=solver, **options)
     return made
 
 
@@ -182,7 +182,7 @@ def test_same_facts_without_an_electrode(data_kind: str, solver: str) -> None:
         for reconstructor in made.values():
             reconstructor.mask_rows(masked)
             reconstructor.tare(s.quiet(3, 21))
-            reconstructor.with_options(lambda_abs=0.0, lambda_rel=0.05, gate_factor=1.2)
+            reconstructor.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
         results = {name: reconstructor.reconstruct(frame) for name, reconstructor in made.items()}
         expected = results["numpy"]
         assert expected.touches and expected.info.stop in SOLVED
@@ -237,7 +237,7 @@ def test_same_recovery_from_a_step_too_long(factor: float, halvings: int, solver
     model, frame, results = decode_model(sealed_blob, "x"), small().frames(9, 1)[0], {}
     for name in ENGINES:
         made = Reconstructor(model, engine=name, blob=sealed_blob)
-        made.with_options(iterations=300, gap_every=5, gate_factor=0.0, solver=solver)
+        made.with_options(iterations=300, gap_every=5, detection_factor=0.0, solver=solver)
         made.tare(small().linear.v0_v)
         results[name] = made.reconstruct(frame)
     expected = results["numpy"]
@@ -261,7 +261,7 @@ def test_same_facts(data_kind: str, solver: str) -> None:
     quiet = small().quiet(3, 21)
     baselines = {name: reconstructor.tare(quiet) for name, reconstructor in made.items()}
     for reconstructor in made.values():
-        reconstructor.with_options(lambda_abs=0.0, lambda_rel=0.05, gate_factor=1.2)
+        reconstructor.with_options(lambda_abs=0.0, lambda_rel=0.05, detection_factor=1.2)
     frame = small().frames(4, 1)[0]
     infos = {name: reconstructor.reconstruct(frame).info for name, reconstructor in made.items()}
     for name, bound in (("c64", 1e-10), ("c", 1e-4)):

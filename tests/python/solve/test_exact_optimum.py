@@ -42,7 +42,7 @@ def options(sign: str, **changes: object) -> Options:
         sign=sign,
         iterations=100_000,
         gap_rel=GAP_REL,
-        gate_factor=0.0,
+        detection_factor=0.0,
         **changes,
     )
 

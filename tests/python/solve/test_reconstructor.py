@@ -360,11 +360,11 @@ BAD_OPTIONS = [
     ({"lambda_rel": 1.5}, "lambda_rel = 1.5 is out of range; use 0 to 1"),
     ({"lambda_rel": float("nan")}, "lambda_rel"),
     ({"lambda_noise_factor": float("inf")}, "lambda_noise_factor"),
-    ({"gate_factor": -0.1}, "gate_factor"),
+    ({"detection_factor": -0.1}, "detection_factor"),
     ({"gap_rel": 1.01}, "gap_rel"),
     ({"saturation_v": -3.0}, "saturation_v"),
     ({"touch_threshold": 2.0}, "touch_threshold"),
-    ({"touch_share": -1.0}, "touch_share"),
+    ({"touch_min_fraction": -1.0}, "touch_min_fraction"),
     ({"touch_min_radius_mm": 0.0}, "touch radii of 0, 9 and 30 mm"),
     ({"touch_max_radius_mm": 5.0}, "touch radii"),
     ({"touch_seed_radius_mm": 31.0}, "touch radii"),
@@ -407,8 +407,8 @@ def test_the_core_refuses_them_by_itself(changes: dict[str, object]) -> None:
 EDGES = {
     "iterations": 1, "gap_every": 2**32 - 1, "max_touches": 16, "max_masked": 0, "lambda_rel": 1.0,
     "gap_rel": 1.0,
-    "lambda_noise_factor": 1e29, "gate_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0,
-    "touch_share": 1.0,
+    "lambda_noise_factor": 1e29, "detection_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0,
+    "touch_min_fraction": 1.0,
     "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000,
     "follow_mm": 0.0, "lambda_abs": 1e29,
     "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
@@ -436,7 +436,7 @@ def test_what_options_do(engine: str) -> None:
     sparse = made(engine, lambda_rel=0.5).reconstruct(frame)
     assert sparse.info.nonzeros < base.info.nonzeros
     assert made(engine, lambda_rel=1.0).reconstruct(frame).info.stop == "zero"
-    assert made(engine, gate_factor=1e6).reconstruct(frame).info.stop == "gate"
+    assert made(engine, detection_factor=1e6).reconstruct(frame).info.stop == "gate"
     assert made(engine, lambda_abs=base.info.lambda_max * 2).reconstruct(frame).info.stop == "zero"
     assert len(made(engine, max_touches=1).reconstruct(frame).touches) == 1
     assert made(engine, max_touches=0).reconstruct(frame).touches == ()

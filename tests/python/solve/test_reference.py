@@ -144,7 +144,7 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
     images = []
     for one in (engine, other):
         one.set_options(
-            replace(one.options, solver="active-set", lambda_noise_factor=0.0, gate_factor=0.0)
+            replace(one.options, solver="active-set", lambda_noise_factor=0.0, detection_factor=0.0)
         )
         result = one.reconstruct(frame)
         assert result.info.floor == pytest.approx(floor, rel=1e-4)

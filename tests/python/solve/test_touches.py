@@ -69,7 +69,12 @@ def test_both_signs_and_dropouts() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("touch_sweeps", 0), ("touch_change_s_per_m", 0.0), ("max_touches", 1), ("gate_factor", 0.0)],
+    [
+        ("touch_sweeps", 0),
+        ("touch_change_s_per_m", 0.0),
+        ("max_touches", 1),
+        ("detection_factor", 0.0),
+    ],
 )
 def test_other_options(name: str, value: float) -> None:
     frames = session(scenes=40).as_frames()

@@ -75,7 +75,9 @@ def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> N
     quiet_v, frames_v = stream()
     chosen = options(**changes)
     bare = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1])
-    bare.set_options(replace(default_options(prebuilt()[0]), gate_factor=chosen.gate_factor))
+    bare.set_options(
+        replace(default_options(prebuilt()[0]), detection_factor=chosen.detection_factor)
+    )
     bare.tare(quiet_v)
     tracker, most = Tracker(prebuilt()[0].grid), 0
     for frame, expected in zip(frames_v, told(chosen), strict=True):
@@ -107,8 +109,8 @@ def test_the_core_follows_as_the_reference_does(changes: dict[str, object]) -> N
 
 
 def test_tracking_tells_fewer_false_touches_and_fewer_ids() -> None:
-    low = replace(default_options(prebuilt()[0]), gate_factor=0.7)
-    bare, tracked = told(low), told(replace(options(), gate_factor=0.7))
+    low = replace(default_options(prebuilt()[0]), detection_factor=0.7)
+    bare, tracked = told(low), told(replace(options(), detection_factor=0.7))
     ids = [len({touch.id for touches in some for touch in touches}) for some in (bare, tracked)]
     assert 3 <= ids[1] < ids[0]
     assert sum(map(len, tracked)) < sum(map(len, bare))
@@ -120,10 +122,10 @@ def test_what_a_board_sets_is_what_python_sets() -> None:
     ffi, lib = engine._ffi, engine._lib
     there = ffi.new("eits_options *")
     usual = default_options(prebuilt()[0])
-    there.gate_factor = usual.gate_factor
+    there.detection_factor = usual.detection_factor
     assert lib.eits_options_track(there) == 0
     here = tracking(usual)
-    assert np.float32(here.gate_factor) == np.float32(there.gate_factor)
+    assert np.float32(here.detection_factor) == np.float32(there.detection_factor)
     assert np.float32(here.track_smooth) == np.float32(there.track_smooth)
     assert (here.track_confirm, here.track_hold) == (there.track_confirm, there.track_hold)
     assert here.tracks and not usual.tracks

@@ -40,7 +40,7 @@ def ways(model: Model) -> tuple[Way, ...]:
     """Tracking off, its parts, all of it."""
     off = default_options(model)
     whole = tracking(off)
-    low = replace(off, gate_factor=whole.gate_factor)
+    low = replace(off, detection_factor=whole.detection_factor)
     return (
         Way("off", off),
         Way("starts confirmed", replace(off, track_confirm=whole.track_confirm)),
@@ -48,7 +48,7 @@ def ways(model: Model) -> tuple[Way, ...]:
         Way("places smoothed", replace(off, track_smooth=whole.track_smooth)),
         Way("lower threshold alone", low),
         Way("lower threshold, starts confirmed", replace(low, track_confirm=whole.track_confirm)),
-        Way("all, usual threshold", replace(whole, gate_factor=off.gate_factor)),
+        Way("all, usual threshold", replace(whole, detection_factor=off.detection_factor)),
         Way("all", whole),
     )
 
@@ -56,7 +56,7 @@ def ways(model: Model) -> tuple[Way, ...]:
 def choices(model: Model) -> tuple[Way, ...]:
     """All, and each part chosen otherwise."""
     whole = tracking(default_options(model))
-    gate = default_options(model).gate_factor
+    gate = default_options(model).detection_factor
     return (
         Way("as chosen", whole),
         *(Way(f"confirm {n}", replace(whole, track_confirm=n)) for n in (1, 3, 4)),
@@ -66,7 +66,7 @@ def choices(model: Model) -> tuple[Way, ...]:
             for pixels in (0.0, 0.33, 1.32)
         ),
         *(
-            Way(f"threshold {share:g}", replace(whole, gate_factor=share * gate))
+            Way(f"threshold {share:g}", replace(whole, detection_factor=share * gate))
             for share in (1.0, 0.87, 0.6)
         ),
     )
@@ -124,7 +124,7 @@ class Measurer:
         self, stream: Stream, snr_db: float, pairing: Pairing
     ) -> list[tuple[Touch, ...]]:
         whole = tracking(default_options(self.model))
-        single = replace(default_options(self.model), gate_factor=whole.gate_factor)
+        single = replace(default_options(self.model), detection_factor=whole.detection_factor)
         tracker, told = Tracker(self.model.grid, pairing), []
         for frame in self._start(stream, snr_db, single):
             result = self._skin.reconstruct(frame)
