@@ -8,7 +8,7 @@ set(EITSKIN_CORE_SOURCES
     model/model.c model/force.c
     context/column_cache.c context/workspace.c
     frame/projection.c frame/reference.c frame/frame.c frame/regularisation.c frame/whitening.c
-    frame/map.c frame/reference_outliers.c
+    frame/whitening_products.c frame/reference_outliers.c
     diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c
     diagnostics/crowded.c
     solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c solve/coordinate_descent.c

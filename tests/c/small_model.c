@@ -134,7 +134,7 @@ static double wave(uint32_t order, uint32_t place, uint32_t side)
 /* w_i of P = diag(w) U' and S = diag(s w) V'. */
 static double whitening(uint32_t i)
 {
-    return 1 / sqrt(pow(SMALL_DECAY, 2.0 * i) + SMALL_FLOOR);
+    return 1 / sqrt(pow(SMALL_DECAY, 2.0 * i) + SMALL_REGULARISATION);
 }
 
 /* S (column after column, rank numbers each) in double. */

@@ -7,8 +7,8 @@
 
 /* 8 electrodes, adjacent: 40 rows in 19 reciprocal pairs, every fifth measured the other way round,
  * and 2 single rows. */
-#define SMALL_DECAY 0.75
-#define SMALL_FLOOR 0.01
+#define SMALL_DECAY          0.75
+#define SMALL_REGULARISATION 0.01
 enum {
     SMALL_ELECTRODES = 8,
     SMALL_ROWS = 40,
@@ -26,8 +26,8 @@ typedef enum small_shape {
     /* the rows of S are orthonormal cosines over the image, the lowest first: discs can be
      * fitted */
     SMALL_WAVES,
-    /* as the builder whitens: the same, singular values SMALL_DECAY^i, floor SMALL_FLOOR, and
-     * P's rows likewise */
+    /* as the builder whitens: the same, singular values SMALL_DECAY^i, regularisation
+     * SMALL_REGULARISATION, and P's rows likewise */
     SMALL_WHITENED
 } small_shape;
 

@@ -277,7 +277,7 @@ static void options_out_of_range(void)
         REAL_WRONG(touch_change_s_per_m),
         REAL_WRONG(touch_radius_weight),
         REAL_WRONG(follow_mm),
-        REAL_WRONG(floor_noise_factor),
+        REAL_WRONG(regularisation_noise_factor),
         WORD(track_confirm, 1001),
         WORD(track_hold, 1001),
         REAL_WRONG(track_smooth),
@@ -307,7 +307,7 @@ static void options_out_of_range(void)
     o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_min_fraction = 1;
     o.lambda_abs = o.detection_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm =
         o.touch_change_s_per_m = R(1e30);
-    o.floor_noise_factor = R(1e30);
+    o.regularisation_noise_factor = R(1e30);
     o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);
     CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
     CHECK(memcmp(&c.ctx.options, &o, sizeof o) == 0);

@@ -171,7 +171,7 @@ static void mismatches(void)
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
     CHECK(ctx->sheet_known);
     for (int i = 0; i < RANK; ++i) { /* the ridge: s^2 / (s^2 + 1e-4 s_1^2), over |P_i|^2 */
-        const double s2 = pow(SMALL_DECAY, 2.0 * i), inverse = s2 + SMALL_FLOOR;
+        const double s2 = pow(SMALL_DECAY, 2.0 * i), inverse = s2 + SMALL_REGULARISATION;
         CHECK_NEAR(ctx->sheet_shrink[i], s2 / (s2 + 1e-4) * inverse, 1e-4 * inverse);
         CHECK_NEAR(ctx->sheet_inverse[i], inverse, 1e-5);
     }

@@ -358,7 +358,7 @@ static void work_is_counted(void)
                 reduce + 2 * 16 /* direction, normalised */ + 2 * (reduce + project) + whole);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     CHECK_EQUAL(ctx->info.macs, 2 * (reduce + project) + whole); /* the basis is kept */
-    /* one column of P less, and its rows whitened anew: the rows left out once into the products,
+    /* one column of P less, and its rows whitened again: the rows left out once into the products,
      * three factors, eight probes of the noise; the data and the drift's direction by three
      * triangles; F' y */
     const uint64_t triangle = 16 * 17 / 2, cubic = 15 * 16 * 17 / 6;
@@ -366,12 +366,12 @@ static void work_is_counted(void)
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     const uint64_t built =
         triangle + cubic + (2 * cubic + 2 * triangle - triangle) + cubic + 8 * 2 * triangle;
-    CHECK(ctx->rewhitened);
+    CHECK(ctx->masked_whitening);
     CHECK_EQUAL(ctx->basis_count, 1);
     CHECK_EQUAL(ctx->info.macs, built + (reduce + 3 * triangle + 2 * 16) +
                                     2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    /* the map is kept */
+    /* the whitening is kept */
     CHECK_EQUAL(ctx->info.macs, 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
     o.project_reference = 0; /* each residual is mapped, there and back */
     o.warm_start = 0;

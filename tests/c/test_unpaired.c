@@ -42,7 +42,7 @@ static void shape_reduction(small_model *made)
 {
     uint8_t *p = small_model_section(made, "REDU", NULL);
     for (uint32_t i = 0; i < RANK; ++i) {
-        const double weight = 1 / sqrt(pow(SMALL_DECAY, 2.0 * i) + SMALL_FLOOR);
+        const double weight = 1 / sqrt(pow(SMALL_DECAY, 2.0 * i) + SMALL_REGULARISATION);
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
             small_put_f32(p + 4 * (RANK * k + i),
                           block_of(k) == i ? (float)(i < BLOCKS ? weight / sqrt(3) : weight)

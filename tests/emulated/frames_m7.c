@@ -127,7 +127,7 @@ static const option option_table[] = {
     WHOLE(track_confirm),
     WHOLE(track_hold),
     REAL(track_smooth),
-    REAL(floor_noise_factor),
+    REAL(regularisation_noise_factor),
 };
 
 /* An option by its name; 0 for one that is none. */

@@ -18,8 +18,8 @@ static void make_burst(uint32_t samples, double rate_hz, double hz, double ampli
                        double turns, double lsb_v, double middle)
 {
     for (uint32_t k = 0; k < samples; ++k)
-        burst[k] = (uint16_t)floor(amplitude_v / lsb_v * cos(TURN * (turns + hz * k / rate_hz)) +
-                                   middle + 0.5);
+        burst[k] = (uint16_t)floor(
+            amplitude_v / lsb_v * cos(TURN * (turns + hz * k / rate_hz)) + middle + 0.5);
 }
 
 static void test_turns(void)

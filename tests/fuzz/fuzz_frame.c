@@ -159,7 +159,7 @@ static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
                          &o->touch_radius_weight,
                          &o->follow_mm,
                          &o->track_smooth,
-                         &o->floor_noise_factor};
+                         &o->regularisation_noise_factor};
     enum { WHOLE = sizeof whole / sizeof whole[0], REAL = sizeof real / sizeof real[0] };
     const uint32_t k = which % (WHOLE + REAL + 2);
     if (k < WHOLE)

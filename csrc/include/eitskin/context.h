@@ -89,8 +89,9 @@ typedef struct eits_options {
     /* > 0: follow places, radii and strengths in time; how uncertain the place of a touch is
      * whose S'y is as great as noise gives, in pixels */
     eits_real track_smooth;
-    /* > 0: the whitening's floor is at least this times noise_v / v0_rms, where both are known */
-    eits_real floor_noise_factor;
+    /* > 0: the whitening's regularisation is at least this times noise_v / v0_rms, where both are
+     * known */
+    eits_real regularisation_noise_factor;
 } eits_options;
 
 /* Why the solver stopped. */
@@ -144,7 +145,7 @@ typedef struct eits_info {
     /* bit e: electrode e, of the first 64; ctx->electrode has all */
     uint64_t open_electrodes, bridged_electrodes, noisy_electrodes;
     /* of the whitening, over s_1^2, as this frame was reduced; 0 where the model does not tell */
-    eits_real floor;
+    eits_real regularisation;
 } eits_info;
 
 typedef struct eits_touch {
@@ -215,34 +216,37 @@ typedef struct eits_context {
     uint32_t stray_stale;
     /* stride each: 1 / |P_i|^2, and so much of it as predicts d (mismatch.c) */
     eits_real *sheet_inverse, *sheet_shrink;
-    /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where the floor is raised */
+    /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where the regularisation is
+     * raised */
     eits_real sheet_energy;
-    eits_real sheet_energy_stored; /* as with the model's floor */
+    eits_real sheet_energy_stored; /* as with the model's regularisation */
     /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
     uint32_t sheet_known;
     eits_real *y; /* stride: reduced data, projected */
     /* stride each: of v0 log(v / v0); y less the touches' interaction */
     eits_real *y_log, *y_separate;
     uint32_t has_y_log; /* 1: y_log is this frame's */
-    /* orthonormal directions to ignore, up to rank of them, stride apart; where rewhitened, at
-     * most one, and behind it two triangles (observed.c) */
+    /* orthonormal directions to ignore, up to rank of them, stride apart; where masked_whitening,
+     * at most one, and behind it two triangles (whitening.c) */
     eits_real *basis;
     uint32_t basis_count;
     uint32_t basis_stale;
-    /* 1: the model's P and S have the builder's form, so that rows left out can be whitened anew */
-    uint32_t rewhitens;
-    /* other than 0: for basis_for, or for the noise, the solver's S is F S (observed.h) */
-    uint32_t rewhitened;
+    /* 1: the model's P and S have the builder's form, so that rows left out can be whitened again
+     */
+    uint32_t can_whiten_masked;
+    /* other than 0: for basis_for, or for the noise, the solver's S is F S (whitening.h) */
+    uint32_t masked_whitening;
     /* stride: s_1 of the scaled Jacobian over that of each direction, and over w s_1 of the
      * first */
     eits_real *row_scale;
-    eits_real *row_strength;    /* stride: (s_i / s_1)^2 */
-    eits_real strongest;        /* s_1, in the units of 1 / P */
-    eits_real strongest_square; /* |S_1|^2 */
-    eits_real floor;            /* mu, by which the model was whitened */
-    eits_real floor_in_force;   /* mu' of the frames as basis_for has them */
-    eits_real map_square;       /* what F'F is scaled by */
-    /* how much more noise max(S'y) has so than with all rows; 1 where nothing is re-whitened */
+    eits_real *row_strength;           /* stride: (s_i / s_1)^2 */
+    eits_real strongest;               /* s_1, in the units of 1 / P */
+    eits_real strongest_square;        /* |S_1|^2 */
+    eits_real regularisation;          /* mu, by which the model was whitened */
+    eits_real regularisation_in_force; /* mu' of the frames as basis_for has them */
+    eits_real whitening_square;        /* what F'F is scaled by */
+    /* how much more noise max(S'y) has so than with all rows; 1 where nothing is whitened for
+     * masked rows */
     eits_real noise_ratio;
     eits_real *adjoint;           /* stride: F' of the residual, and scratch */
     eits_real *residual;          /* stride */

@@ -6,16 +6,16 @@
  * carries no news, is projected away.
  *
  * Rows left out: of a reciprocal pair the other row stands for both. Where both are out, what is
- * left is whitened anew: the solver then meets the data by F S instead of S, as the reduction would
- * have had it without those rows (docs/reference/eitm-format.md, "Rows left out"), the floor lower
- * the fewer rows there are; lambda_noise grows with the noise that this lets through. That needs a
- * model of the builder's form, P's rows orthogonal and S whitened by them, which eits_init finds
- * out. Of any other model, the rows' values are minimised over: the span of their columns of P is
- * projected away, too, which loses much of what the rows left know.
+ * left is whitened again: the solver then meets the data by F S instead of S, as the reduction
+ * would have had it without those rows (docs/reference/eitm-format.md, "Rows left out"), the
+ * regularisation lower the fewer rows there are; lambda_noise grows with the noise that this lets
+ * through. That needs a model of the builder's form, P's rows orthogonal and S whitened by them,
+ * which eits_init finds out. Of any other model, the rows' values are minimised over: the span of
+ * their columns of P is projected away, too, which loses much of what the rows left know.
  *
- * Noise: a floor that suits 60 dB lets too much of it through at 40. What the tare learned raises
- * it (floor_noise_factor): with no row out F is a weight for each row of S then
- * (docs/reference/eitm-format.md, "Noise and the floor"). Else there is no F, and no cost.
+ * Noise: a regularisation that suits 60 dB lets too much of it through at 40. What the tare learned
+ * raises it (regularisation_noise_factor): with no row out F is a weight for each row of S then
+ * (docs/reference/eitm-format.md, "Noise and the regularisation"). Else there is no F, and no cost.
  */
 #ifndef EITSKIN_FRAME_H
 #define EITSKIN_FRAME_H
@@ -33,8 +33,8 @@ eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t
 
 /* Learn reference and noise from `count` >= 4 reference frames: begin, add each, finish. The first
  * half gives a first mean; the second half also gives lambda_noise, the greatest max(S'y) that a
- * reference frame showed, told as with the model's own floor; the mean of all is the reference.
- * Until finish returns EITS_OK there is no reference. Single readings that neither their
+ * reference frame showed, told as with the model's own regularisation; the mean of all is the
+ * reference. Until finish returns EITS_OK there is no reference. Single readings that neither their
  * reciprocals nor the other frames bear out are left out of it, and counted (reference.outliers).
  * Errors as above; EITS_E_REFERENCE_SHORT if frames are missing, EITS_E_NOT_FINITE if S'y of a
  * frame would not be finite. A frame that is refused does not count. */

@@ -52,7 +52,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         .track_confirm = 0,
         .track_hold = 0,
         .track_smooth = 0,
-        .floor_noise_factor = EITS_FLOOR_NOISE_FACTOR,
+        .regularisation_noise_factor = EITS_REGULARISATION_NOISE_FACTOR,
     };
     *options = chosen;
     return EITS_OK;
@@ -169,7 +169,7 @@ eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspac
     arena a = {workspace};
     lay_out(ctx, &a, size >= eits_workspace_size(model, 1));
     eits_learn_sheet(ctx);
-    eits_observed_init(ctx);
+    eits_whitening_init(ctx);
     return eits_options_default(model, &ctx->options);
 }
 
@@ -200,13 +200,13 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         o->diagnostics <= EITS_DIAGNOSTICS_ALL && o->touch_fit <= EITS_TOUCH_FIT_ALL &&
         o->second_pass <= 1 && o->track_confirm <= EITS_MOST_TRACK_FRAMES &&
         o->track_hold <= EITS_MOST_TRACK_FRAMES && in_range(o->track_smooth, 0, huge) &&
-        in_range(o->floor_noise_factor, 0, huge);
+        in_range(o->regularisation_noise_factor, 0, huge);
     if (!right)
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)
         ctx->warm = 0;
     if (o->project_reference != ctx->options.project_reference ||
-        o->floor_noise_factor != ctx->options.floor_noise_factor)
+        o->regularisation_noise_factor != ctx->options.regularisation_noise_factor)
         ctx->basis_stale = 1;
     ctx->options = *o;
     return EITS_OK;

@@ -178,18 +178,18 @@ static uint64_t drift_direction(eits_context *ctx, eits_real *out)
 
 static uint64_t rebuild_basis(eits_context *ctx)
 {
-    uint64_t macs = eits_observed_build(ctx);
+    uint64_t macs = eits_whitening_build(ctx);
     ctx->basis_count = 0;
     eits_zero(ctx->along, ctx->model->n_folded);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->rewhitened || ctx->basis_for[k] != EITS_SIDE_NONE)
+        if (ctx->masked_whitening || ctx->basis_for[k] != EITS_SIDE_NONE)
             continue;
         reduction_column(ctx, k, ctx->residual);
         macs += ctx->model->rank + extend_basis(ctx, ctx->residual);
     }
     if (ctx->options.project_reference) {
         macs += drift_direction(ctx, ctx->residual);
-        macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->residual) : 0;
+        macs += ctx->masked_whitening ? eits_whiten_data(ctx, ctx->residual) : 0;
         macs += extend_basis(ctx, ctx->residual);
     }
     ctx->basis_stale = 0;
@@ -295,12 +295,12 @@ eits_status eits_frame_data(eits_context *ctx, const eits_real *frame, uint32_t 
             *macs += rebuild_basis(ctx);
         count = reduce(ctx, macs);
     }
-    *macs += ctx->rewhitened ? eits_observed_data(ctx, ctx->y) : 0;
+    *macs += ctx->masked_whitening ? eits_whiten_data(ctx, ctx->y) : 0;
     *macs += eits_project(ctx, ctx->y);
     ctx->has_y_log = judged && model->data_kind == EITS_DATA_DIFFERENCE &&
                      (ctx->options.touch_fit & EITS_TOUCH_FIT_LOG_DATA) != 0;
     *macs += ctx->has_y_log ? reduce_log(ctx, frame) : 0;
-    const uint32_t directions = ctx->rewhitened && count < model->rank ? count : model->rank;
+    const uint32_t directions = ctx->masked_whitening && count < model->rank ? count : model->rank;
     if (ctx->basis_count >= directions) /* no direction is left: what is there is rounding */
         eits_zero(ctx->y, model->rank);
     return eits_is_finite(eits_dot(ctx, ctx->y, ctx->y, model->rank)) ? EITS_OK : EITS_E_NOT_FINITE;

@@ -18,7 +18,7 @@ uint64_t eits_project(const eits_context *ctx, eits_real *v)
 uint64_t eits_reduce(eits_context *ctx, uint32_t count, eits_real *out)
 {
     ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, count, out);
-    const uint64_t macs = ctx->rewhitened ? eits_observed_data(ctx, out) : 0;
+    const uint64_t macs = ctx->masked_whitening ? eits_whiten_data(ctx, out) : 0;
     return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, out);
 }
 

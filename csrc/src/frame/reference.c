@@ -240,7 +240,7 @@ eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t
     const uint32_t left = b->count >= 2 && judged ? eits_reference_mask_outliers(ctx, frame) : 0;
     if (b->count == b->wanted / 2) {
         status = fit_to_model(ctx);
-        /* lambda_noise is learned with the floor that it asks for */
+        /* lambda_noise is learned with the regularisation that it asks for */
         b->noise_v = noise_so_far(ctx);
     }
     if (status == EITS_OK && b->count >= b->wanted / 2)

@@ -2,74 +2,78 @@
 
 #include "base/vec.h"
 
-/* The model's floor for the rows left, over that for all: fewer rows speak of fewer directions, and
- * what is left of the weak ones is to be heard. Chosen on training scenes with one to three
- * electrodes out. */
-static const eits_real LEAST_FLOOR_SHARE = R(0.1);
+/* The model's regularisation for the rows left, over that for all: fewer rows speak of fewer
+ * directions, and what is left of the weak ones is to be heard. Chosen on training scenes with one
+ * to three electrodes out. */
+static const eits_real MIN_REGULARISATION_FRACTION = R(0.1);
 /* of s_1^2, where rows are left out: what float32 needs */
-static const eits_real LEAST_FLOOR = R(1e-4);
+static const eits_real MIN_REGULARISATION = R(1e-4);
 /* of s_1^2: beyond, all directions weigh as they are seen already */
-static const eits_real MOST_FLOOR = R(1.0);
+static const eits_real MAX_REGULARISATION = R(1.0);
 /* what a lift by less would change cannot be seen */
 static const eits_real AS_IT_IS = R(1.01);
 
 /* What the noise asks for. */
-static eits_real least_floor(const eits_context *ctx)
+static eits_real asked_regularisation(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
     const eits_real asked =
-        b->noise_v > 0 ? ctx->options.floor_noise_factor * (b->noise_v / b->v0_rms) : 0;
-    return asked < MOST_FLOOR ? asked : MOST_FLOOR;
+        b->noise_v > 0 ? ctx->options.regularisation_noise_factor * (b->noise_v / b->v0_rms) : 0;
+    return asked < MAX_REGULARISATION ? asked : MAX_REGULARISATION;
 }
 
-eits_real eits_floor_of_all(const eits_context *ctx)
+eits_real eits_regularisation_of_all(const eits_context *ctx)
 {
-    const eits_real asked = least_floor(ctx);
-    return asked > AS_IT_IS * ctx->floor ? asked : ctx->floor;
+    const eits_real asked = asked_regularisation(ctx);
+    return asked > AS_IT_IS * ctx->regularisation ? asked : ctx->regularisation;
 }
 
-eits_real eits_floor_of_rest(const eits_context *ctx, eits_real missing)
+eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing)
 {
     const eits_real left = 1 - missing, cube = left * left * left,
-                    untouched = cube > LEAST_FLOOR_SHARE ? cube : LEAST_FLOOR_SHARE;
-    const eits_real of_model = untouched * ctx->floor, asked = left * least_floor(ctx),
+                    untouched =
+                        cube > MIN_REGULARISATION_FRACTION ? cube : MIN_REGULARISATION_FRACTION;
+    const eits_real of_model = untouched * ctx->regularisation,
+                    asked = left * asked_regularisation(ctx),
                     wanted = asked > of_model ? asked : of_model;
-    return wanted > LEAST_FLOOR ? wanted : LEAST_FLOOR;
+    return wanted > MIN_REGULARISATION ? wanted : MIN_REGULARISATION;
 }
 
 /* D_i, so scaled that the strongest direction keeps its weight. None exceeds 1, so the model's
  * Lipschitz constant holds, whatever rounding made of the stored matrices. */
-static eits_real weight_of(const eits_context *ctx, eits_real floor, uint32_t i)
+static eits_real weight_of(const eits_context *ctx, eits_real regularisation, uint32_t i)
 {
-    const eits_real square = ctx->strongest_square * (1 + floor) / (ctx->row_strength[i] + floor);
+    const eits_real square =
+        ctx->strongest_square * (1 + regularisation) / (ctx->row_strength[i] + regularisation);
     const eits_real weight = eits_sqrt(square) * ctx->row_scale[i];
     return weight < 1 ? weight : 1;
 }
 
 /* White noise on the rows has the covariance diag(w^2) in P d, so in S'D D P d, as a mean square
  * over S's columns, the sum of |S_i|^2 w_i^2 D_i^4: s_i^2 w_i^4 D_i^4. */
-eits_real eits_floor_noise(const eits_context *ctx, eits_real floor)
+eits_real eits_regularisation_noise(const eits_context *ctx, eits_real regularisation)
 {
     eits_real sum = 0, whole = 0;
-    if (!(floor > ctx->floor))
+    if (!(regularisation > ctx->regularisation))
         return 1;
     for (uint32_t i = 0; i < ctx->model->rank; ++i) {
         const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]),
                         square = ctx->row_strength[i] * w2 * w2;
-        const eits_real weight = weight_of(ctx, floor, i), w2_kept = weight * weight;
+        const eits_real weight = weight_of(ctx, regularisation, i), w2_kept = weight * weight;
         whole += square;
         sum = eits_fma(square * w2_kept, w2_kept, sum);
     }
     return eits_sqrt(sum / whole);
 }
 
-eits_real eits_floor_weights(const eits_context *ctx, eits_real floor, eits_real *weight)
+eits_real eits_regularisation_weights(const eits_context *ctx, eits_real regularisation,
+                                      eits_real *weight)
 {
     eits_real energy = 0, whole = 0;
     eits_zero(weight, EITS_STRIDE(ctx->model->rank));
     for (uint32_t i = 0; i < ctx->model->rank; ++i) {
         const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
-        weight[i] = weight_of(ctx, floor, i);
+        weight[i] = weight_of(ctx, regularisation, i);
         energy = eits_fma(weight[i] * weight[i], w2, energy);
         whole += w2;
     }

@@ -1,29 +1,31 @@
-/* The floor mu of the whitening, raised where the reference was noisy. The builder's w = (s^2 + mu
- * s_1^2)^-1/2 lets weak directions speak, and with them the noise. A model of the floor mu' > mu
- * has each row of P and S multiplied by D_i = sqrt((s_i^2 + mu s_1^2) / (s_i^2 + mu' s_1^2)), but
- * for a common factor: the map F = D of observed.h, where no row is left out. */
-#ifndef EITSKIN_FLOOR_H
-#define EITSKIN_FLOOR_H
+/* The regularisation mu of the whitening, raised where the reference was noisy. The builder's w =
+ * (s^2 + mu s_1^2)^-1/2 lets weak directions speak, and with them the noise. A model of the
+ * regularisation mu' > mu has each row of P and S multiplied by D_i = sqrt((s_i^2 + mu s_1^2) /
+ * (s_i^2 + mu' s_1^2)), but for a common factor: the whitening F = D of whitening.h, where no row
+ * is left out. */
+#ifndef EITSKIN_REGULARISATION_H
+#define EITSKIN_REGULARISATION_H
 
 #include "eitskin/context.h"
 
-/* The usual floor_noise_factor: chosen on training scenes at 30 to 55 dB, of one to three touches,
- * six, light ones and drift. */
-#define EITS_FLOOR_NOISE_FACTOR R(5.0)
+/* The usual regularisation_noise_factor: chosen on training scenes at 30 to 55 dB, of one to three
+ * touches, six, light ones and drift. */
+#define EITS_REGULARISATION_NOISE_FACTOR R(5.0)
 
-/* mu' with all rows in use: the model's, or floor_noise_factor times the noise over the reference's
- * rms where that is more. */
-eits_real eits_floor_of_all(const eits_context *ctx);
+/* mu' with all rows in use: the model's, or regularisation_noise_factor times the noise over the
+ * reference's rms where that is more. */
+eits_real eits_regularisation_of_all(const eits_context *ctx);
 
 /* mu' where the share `missing` of the folded rows is left out. */
-eits_real eits_floor_of_rest(const eits_context *ctx, eits_real missing);
+eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing);
 
-/* How much noise of the rows max(S'y) has with the floor mu' and all rows, over that with the
- * model's; for models of the builder's form. */
-eits_real eits_floor_noise(const eits_context *ctx, eits_real floor);
+/* How much noise of the rows max(S'y) has with the regularisation mu' and all rows, over that with
+ * the model's; for models of the builder's form. */
+eits_real eits_regularisation_noise(const eits_context *ctx, eits_real regularisation);
 
 /* D (stride numbers); returns how much noise of the rows |y|^2 has so, over that with the model's
- * floor. */
-eits_real eits_floor_weights(const eits_context *ctx, eits_real floor, eits_real *weight);
+ * regularisation. */
+eits_real eits_regularisation_weights(const eits_context *ctx, eits_real regularisation,
+                                      eits_real *weight);
 
 #endif

@@ -1,4 +1,4 @@
-/* The triangles of rows left out (observed.h), where they are kept and how they are laid out. */
+/* The triangles of rows left out (whitening.h), where they are kept and how they are laid out. */
 #ifndef EITSKIN_TRIANGLE_H
 #define EITSKIN_TRIANGLE_H
 
@@ -35,14 +35,14 @@ static inline void add_row(const eits_context *ctx, uint32_t i, eits_real *out, 
 }
 
 /* F, or where it is diagonal its diagonal; behind the basis' one direction */
-static inline eits_real *map_of(const eits_context *ctx)
+static inline eits_real *whitening_of(const eits_context *ctx)
 {
     return ctx->basis + EITS_STRIDE(ctx->model->rank);
 }
 
 static inline eits_real *metric_of(const eits_context *ctx) /* G */
 {
-    return map_of(ctx) + EITS_PADDED_TRIANGLE(ctx->model->rank);
+    return whitening_of(ctx) + EITS_PADDED_TRIANGLE(ctx->model->rank);
 }
 
 static inline uint64_t triangle_macs(const eits_context *ctx)

@@ -12,8 +12,8 @@ static const eits_real LOST = R(0.01);
 static const eits_real ORTHOGONAL = R(1e-5); /* cosine between rows of P */
 /* |S_i|^2 + mu s_1^2 w_i^2 is 1 within this: S is rounded to 8 bits at worst */
 static const eits_real FORM = R(0.01);
-/* Rounding makes the rows of S a little less than orthogonal, and F with a lower floor must not
- * exceed the stated constant. */
+/* Rounding makes the rows of S a little less than orthogonal, and F with a lower regularisation
+ * must not exceed the stated constant. */
 static const eits_real STEP_MARGIN = R(0.995);
 
 /* ---- the model's form ---- */
@@ -33,7 +33,7 @@ static eits_real greatest_entry(const eits_matrix *p, eits_real *copy)
 static int orthogonal_rows(eits_context *ctx, eits_real greatest, eits_real *square)
 {
     const eits_matrix *p = &ctx->model->reduction;
-    eits_real *gram = map_of(ctx), *v = ctx->sz;
+    eits_real *gram = whitening_of(ctx), *v = ctx->sz;
     eits_zero(gram, EITS_PADDED_TRIANGLE(p->rows));
     for (uint32_t k = 0; k < p->cols; ++k) {
         const eits_real *column = eits_column(p, k, v);
@@ -88,26 +88,27 @@ static int take_form(eits_context *ctx, eits_real greatest)
     if (!(ctx->strongest > R(1e-30)) || !(ctx->strongest < R(1e30)))
         return 0;
     ctx->strongest_square = top;
-    ctx->floor = per_square > 0 ? per_square * top_w2 / top : 0;
+    ctx->regularisation = per_square > 0 ? per_square * top_w2 / top : 0;
     for (uint32_t i = 0; i < rank; ++i) {
         s2[i] = s2[i] / w2[i] * (top_w2 / top);
         w2[i] = eits_sqrt(top_w2 / w2[i]) / eits_sqrt(top);
     }
-    return eits_all_finite(w2, rank) && eits_all_finite(s2, rank) && eits_is_finite(ctx->floor);
+    return eits_all_finite(w2, rank) && eits_all_finite(s2, rank) &&
+           eits_is_finite(ctx->regularisation);
 }
 
-void eits_observed_init(eits_context *ctx)
+void eits_whitening_init(eits_context *ctx)
 {
     const eits_real greatest = greatest_entry(&ctx->model->reduction, ctx->sz);
     if (!(greatest > 0) || !eits_is_finite(1 / greatest) ||
         !orthogonal_rows(ctx, greatest, ctx->row_scale))
         return;
     squares_of_rows(ctx, ctx->row_strength);
-    ctx->rewhitens = (uint32_t)take_form(ctx, greatest);
+    ctx->can_whiten_masked = (uint32_t)take_form(ctx, greatest);
     ctx->sheet_energy_stored = ctx->sheet_energy;
 }
 
-/* ---- the map ---- */
+/* ---- the whitening ---- */
 
 static int in_use(const eits_context *ctx, uint32_t k)
 {
@@ -161,8 +162,9 @@ static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_re
     return macs;
 }
 
-/* G G' = R diag(s^2) R' + floor I, from the last row up. */
-static uint64_t factor_metric(eits_context *ctx, eits_real floor, eits_real *r, eits_real *g)
+/* G G' = R diag(s^2) R' + regularisation I, from the last row up. */
+static uint64_t factor_metric(eits_context *ctx, eits_real regularisation, eits_real *r,
+                              eits_real *g)
 {
     const uint32_t rank = ctx->model->rank;
     eits_real *scaled = ctx->sz;
@@ -179,7 +181,7 @@ static uint64_t factor_metric(eits_context *ctx, eits_real floor, eits_real *r, 
             if (j > i)
                 row[j] = left / row_of(ctx, g, j)[j];
             else
-                row[i] = eits_sqrt(left > 0 ? left + floor : floor);
+                row[i] = eits_sqrt(left > 0 ? left + regularisation : regularisation);
             macs += 2u * (rank - j) - 1u;
         }
     }
@@ -187,7 +189,8 @@ static uint64_t factor_metric(eits_context *ctx, eits_real floor, eits_real *r, 
 }
 
 /* F = G^-1 R diag(share / w) in R's place, from the last row up. */
-static uint64_t finish_map(const eits_context *ctx, eits_real share, eits_real *g, eits_real *r)
+static uint64_t finish_whitening(const eits_context *ctx, eits_real share, eits_real *g,
+                                 eits_real *r)
 {
     const uint32_t rank = ctx->model->rank;
     uint64_t macs = 0;
@@ -227,7 +230,7 @@ static uint64_t measure_noise(eits_context *ctx)
             const eits_real size = eits_sqrt(ctx->row_strength[i]) / ctx->row_scale[i];
             v[i] = odd ? -size : size;
         }
-        (void)eits_map(ctx, v);
+        (void)eits_whiten(ctx, v);
         solve_transposed(ctx, metric_of(ctx), v);
         sum += eits_dot(ctx, v, v, rank);
     }
@@ -235,8 +238,8 @@ static uint64_t measure_noise(eits_context *ctx)
         const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
         whole = eits_fma(ctx->row_strength[i] * w2, w2, whole);
     }
-    const eits_real of_all = eits_floor_noise(ctx, eits_floor_of_all(ctx));
-    const eits_real ratio = eits_sqrt(ctx->map_square * sum / (PROBES * whole)) / of_all;
+    const eits_real of_all = eits_regularisation_noise(ctx, eits_regularisation_of_all(ctx));
+    const eits_real ratio = eits_sqrt(ctx->whitening_square * sum / (PROBES * whole)) / of_all;
     ctx->noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));
     return PROBES * 2u * triangle_macs(ctx);
 }
@@ -246,57 +249,59 @@ eits_real eits_lambda_noise(const eits_context *ctx)
     return ctx->noise_ratio * ctx->reference.lambda_noise;
 }
 
-/* No row is left out: the floor alone may differ. */
-static void raise_floor(eits_context *ctx)
+/* No row is left out: the regularisation alone may differ. */
+static void raise_regularisation(eits_context *ctx)
 {
-    const eits_real floor = eits_floor_of_all(ctx), noise = eits_floor_noise(ctx, floor);
+    const eits_real regularisation = eits_regularisation_of_all(ctx),
+                    noise = eits_regularisation_noise(ctx, regularisation);
     /* a model's rows may be of any size */
-    if (!(floor > ctx->floor) || !(noise > 0) || !eits_is_finite(noise))
+    if (!(regularisation > ctx->regularisation) || !(noise > 0) || !eits_is_finite(noise))
         return;
-    ctx->rewhitened = EITS_BY_ROW;
-    ctx->floor_in_force = floor;
+    ctx->masked_whitening = EITS_WHITENING_DIAGONAL;
+    ctx->regularisation_in_force = regularisation;
     ctx->noise_ratio = noise;
-    ctx->sheet_energy = ctx->sheet_energy_stored * eits_floor_weights(ctx, floor, map_of(ctx));
+    ctx->sheet_energy = ctx->sheet_energy_stored *
+                        eits_regularisation_weights(ctx, regularisation, whitening_of(ctx));
 }
 
-static uint64_t build_triangle(eits_context *ctx, eits_real floor, uint32_t missing)
+static uint64_t build_triangle(eits_context *ctx, eits_real regularisation, uint32_t missing)
 {
-    const eits_real lost = LOST * floor;
-    ctx->map_square = STEP_MARGIN * ctx->strongest_square * (1 + floor) / (1 + lost);
-    eits_real *f = map_of(ctx), *g = metric_of(ctx);
+    const eits_real lost = LOST * regularisation;
+    ctx->whitening_square = STEP_MARGIN * ctx->strongest_square * (1 + regularisation) / (1 + lost);
+    eits_real *f = whitening_of(ctx), *g = metric_of(ctx);
     uint64_t macs = sum_products(ctx, missing, lost, f);
     macs += factor_products(ctx, lost, f);
-    macs += factor_metric(ctx, floor, f, g);
-    macs += finish_map(ctx, eits_sqrt(ctx->map_square), g, f);
-    ctx->rewhitened = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))
-                          ? EITS_BY_TRIANGLE
-                          : EITS_AS_STORED;
-    if (ctx->rewhitened)
+    macs += factor_metric(ctx, regularisation, f, g);
+    macs += finish_whitening(ctx, eits_sqrt(ctx->whitening_square), g, f);
+    ctx->masked_whitening = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))
+                                ? EITS_WHITENING_TRIANGLE
+                                : EITS_WHITENING_STORED;
+    if (ctx->masked_whitening)
         macs += measure_noise(ctx);
     if (!(ctx->noise_ratio > 0) || !eits_is_finite(ctx->noise_ratio)) {
-        ctx->rewhitened = EITS_AS_STORED;
+        ctx->masked_whitening = EITS_WHITENING_STORED;
         ctx->noise_ratio = 1;
     }
-    ctx->floor_in_force = ctx->rewhitened ? floor : ctx->floor;
+    ctx->regularisation_in_force = ctx->masked_whitening ? regularisation : ctx->regularisation;
     return macs;
 }
 
-uint64_t eits_observed_build(eits_context *ctx)
+uint64_t eits_whitening_build(eits_context *ctx)
 {
     const uint32_t folded = ctx->model->n_folded;
     uint32_t missing = 0;
     for (uint32_t k = 0; k < folded; ++k)
         missing += !in_use(ctx, k);
-    ctx->rewhitened = EITS_AS_STORED;
+    ctx->masked_whitening = EITS_WHITENING_STORED;
     ctx->noise_ratio = 1;
-    if (!ctx->rewhitens)
+    if (!ctx->can_whiten_masked)
         return 0;
-    ctx->floor_in_force = ctx->floor;
+    ctx->regularisation_in_force = ctx->regularisation;
     ctx->sheet_energy = ctx->sheet_energy_stored;
     if (missing > 0)
-        return build_triangle(ctx, eits_floor_of_rest(ctx, (eits_real)missing / (eits_real)folded),
-                              missing);
-    raise_floor(ctx);
+        return build_triangle(
+            ctx, eits_regularisation_of_rest(ctx, (eits_real)missing / (eits_real)folded), missing);
+    raise_regularisation(ctx);
     return 0;
 }
 
@@ -321,13 +326,13 @@ static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_
 
 /* R'^-1 is had from what is kept: R = G F diag(w) but for F's scale, so y = G^-1 G'^-1 F'^-1
  * diag(1/w^2) P_o d_o. */
-uint64_t eits_observed_data(eits_context *ctx, eits_real *v)
+uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
 {
-    if (ctx->rewhitened == EITS_BY_ROW)
-        return eits_map(ctx, v);
+    if (ctx->masked_whitening == EITS_WHITENING_DIAGONAL)
+        return eits_whiten(ctx, v);
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        v[i] *= ctx->map_square * ctx->row_scale[i] * ctx->row_scale[i];
-    solve_transposed(ctx, map_of(ctx), v);
+        v[i] *= ctx->whitening_square * ctx->row_scale[i] * ctx->row_scale[i];
+    solve_transposed(ctx, whitening_of(ctx), v);
     solve_transposed(ctx, metric_of(ctx), v);
     solve(ctx, metric_of(ctx), v);
     return 3u * triangle_macs(ctx);

@@ -1,44 +1,45 @@
 /* Rows left out of a frame: the reduction that the model would have had without them, in the stored
- * model's coordinates; and with all rows that of a higher floor (floor.h), where F is diagonal.
+ * model's coordinates; and with all rows that of a higher regularisation (regularisation.h), where
+ * F is diagonal.
  *
  * The builder makes P = diag(w) U' and S = diag(s w) V' with w = (s^2 + mu s_1^2)^-1/2
  * (docs/reference/eitm-format.md, "Reduction"; "Rows left out"). Of U the rows U_o are left, U_o'
  * U_o + e I = R'R with R upper triangular, and G G' = R diag(s^2) R' + mu' s_1^2 I,   F = G^-1 R
  * diag(1/w),   y = G^-1 R'^-1 diag(1/w) P_o d_o: |y - F S x|^2 is the residual that a reduction of
- * those rows with the floor mu' would have. F and G are upper triangular, too. */
-#ifndef EITSKIN_OBSERVED_H
-#define EITSKIN_OBSERVED_H
+ * those rows with the regularisation mu' would have. F and G are upper triangular, too. */
+#ifndef EITSKIN_WHITENING_H
+#define EITSKIN_WHITENING_H
 
 #include "eitskin/context.h"
 
 /* Whether the model has the builder's form, and with what numbers: w and s from the rows of P and
  * S, mu from how they relate. Otherwise rows left out are minimised over instead (frame.c). Uses
  * ctx->basis and ctx->sz as scratch. */
-void eits_observed_init(eits_context *ctx);
+void eits_whitening_init(eits_context *ctx);
 
-/* What ctx->rewhitened says of F. */
+/* What ctx->masked_whitening says of F. */
 enum {
-    /* there is none: no row is left out and the floor is the model's, or the model has not the
-     * form, or numbers overflow */
-    EITS_AS_STORED = 0,
-    EITS_BY_TRIANGLE = 1, /* rows are left out */
-    EITS_BY_ROW = 2       /* none is, but the floor is raised */
+    /* there is none: no row is left out and the regularisation is the model's, or the model has not
+     * the form, or numbers overflow */
+    EITS_WHITENING_STORED = 0,
+    EITS_WHITENING_TRIANGLE = 1, /* rows are left out */
+    EITS_WHITENING_DIAGONAL = 2  /* none is, but the regularisation is raised */
 };
 
-/* Make the map for the folded rows that ctx->basis_for has; sets ctx->rewhitened. Returns the
- * multiply-accumulates. Uses ctx->sz as scratch. */
-uint64_t eits_observed_build(eits_context *ctx);
+/* Make the whitening for the folded rows that ctx->basis_for has; sets ctx->masked_whitening.
+ * Returns the multiply-accumulates. Uses ctx->sz as scratch. */
+uint64_t eits_whitening_build(eits_context *ctx);
 
 /* lambda_noise for the rows in use. */
 eits_real eits_lambda_noise(const eits_context *ctx);
 
-/* While ctx->rewhitened: P d of the rows in use (stride numbers) becomes the data that F S x is to
- * meet. */
-uint64_t eits_observed_data(eits_context *ctx, eits_real *v);
+/* While ctx->masked_whitening: P d of the rows in use (stride numbers) becomes the data that F S x
+ * is to meet. */
+uint64_t eits_whiten_data(eits_context *ctx, eits_real *v);
 
-/* v = F v (stride numbers); v as it is where nothing is re-whitened. Returns the
+/* v = F v (stride numbers); v as it is where nothing is whitened for masked rows. Returns the
  * multiply-accumulates. */
-uint64_t eits_map(const eits_context *ctx, eits_real *v);
+uint64_t eits_whiten(const eits_context *ctx, eits_real *v);
 
 /* out = y - Q F sx (stride numbers each), y being projected already. Returns the
  * multiply-accumulates of F and Q. */
@@ -50,7 +51,7 @@ uint64_t eits_forward(const eits_context *ctx, eits_real *v);
 uint64_t eits_forward_macs(const eits_context *ctx);
 
 /* F' v, in `room` (stride numbers), for a v within Q's directions; v itself where nothing is
- * re-whitened. */
+ * whitened for masked rows. */
 const eits_real *eits_adjoint(const eits_context *ctx, const eits_real *v, eits_real *room);
 uint64_t eits_adjoint_macs(const eits_context *ctx);
 

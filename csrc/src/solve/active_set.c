@@ -90,7 +90,7 @@ static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
         a->column[i] = scale * from[i];
     const eits_real before = eits_dot(ctx, a->column, a->column, rank);
     ctx->info.macs += rank;
-    if (ctx->basis_count == 0 && !ctx->rewhitened)
+    if (ctx->basis_count == 0 && !ctx->masked_whitening)
         return before;
     ctx->info.macs += rank + eits_forward(ctx, a->column);
     const eits_real square = eits_dot(ctx, a->column, a->column, rank);

@@ -3,7 +3,8 @@
  * or whose correlation with the residual exceeds lambda; then without those that stayed at zero.
  * The residual is kept within the directions that count, so a column's correlation needs no
  * projection; where at most one direction is ignored its part is kept apart and costs nothing
- * either. Where rows left out are whitened anew (observed.h) what is kept is F' of the residual. */
+ * either. Where rows left out are whitened again (whitening.h) what is kept is F' of the residual.
+ */
 #include "base/vec.h"
 #include "frame/projection.h"
 #include "frame/whitening.h"
@@ -20,7 +21,7 @@ typedef struct descent {
     eits_real along;
     eits_real *norm;  /* |s_j|^2; negative: not known yet */
     eits_real *slant; /* s_j along the direction ignored */
-    int apart;        /* at most one direction is ignored, and nothing is re-whitened */
+    int apart; /* at most one direction is ignored, and nothing is whitened for masked rows */
 } descent;
 
 static eits_real *scratch(const eits_context *ctx)
@@ -31,7 +32,7 @@ static eits_real *scratch(const eits_context *ctx)
 static uint64_t macs_of_a_visit(const eits_context *ctx, const descent *d)
 {
     const uint64_t rank = ctx->model->rank;
-    if (ctx->rewhitened)
+    if (ctx->masked_whitening)
         return 3u * rank + 2u * eits_forward_macs(ctx) + eits_adjoint_macs(ctx);
     return rank * (d->apart ? 4u : 3u + 2u * ctx->basis_count);
 }
@@ -50,7 +51,7 @@ static eits_real *see(eits_context *ctx, const eits_real *column, eits_real scal
     eits_real *seen = ctx->sx_next;
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         seen[i] = scale * column[i];
-    ctx->info.macs += eits_map(ctx, seen);
+    ctx->info.macs += eits_whiten(ctx, seen);
     return seen;
 }
 
@@ -58,7 +59,7 @@ static void measure(eits_context *ctx, descent *d, uint32_t j, const eits_real *
                     eits_real scale)
 {
     const uint32_t rank = ctx->model->rank;
-    if (ctx->rewhitened) {
+    if (ctx->masked_whitening) {
         const eits_real *seen = see(ctx, column, scale);
         d->norm[j] = eits_dot(ctx, seen, seen, rank);
         ctx->info.macs += rank;
@@ -96,7 +97,7 @@ static eits_real visit(eits_context *ctx, descent *d, uint32_t j)
     ctx->x[j] = after;
     ctx->info.nonzeros += (uint32_t)(after != 0) - (uint32_t)(before != 0);
     ctx->info.macs += rank;
-    if (ctx->rewhitened) {
+    if (ctx->masked_whitening) {
         eits_real *seen = see(ctx, column, scale);
         ctx->info.macs += eits_project(ctx, seen) + eits_adjoint_macs(ctx);
         eits_axpy(ctx, ctx->residual, -step, eits_adjoint(ctx, seen, ctx->adjoint), rank);
@@ -189,7 +190,7 @@ void eits_run_coordinate(eits_context *ctx, eits_real lambda, int gradient_known
     descent d = {.lambda = lambda,
                  .norm = ctx->z,
                  .slant = ctx->x_next,
-                 .apart = !ctx->rewhitened && ctx->basis_count <= 1};
+                 .apart = !ctx->masked_whitening && ctx->basis_count <= 1};
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         d.norm[j] = -1;
     eits_certificate c = {0};

@@ -15,7 +15,7 @@ typedef struct eits_certificate {
  * ctx->working[k]. */
 typedef enum eits_layout { EITS_LAYOUT_FULL = 0, EITS_LAYOUT_WORKING = 1 } eits_layout;
 
-/* residual = Q (y - F sx), with y projected already and F as in observed.h; returns the
+/* residual = Q (y - F sx), with y projected already and F as in whitening.h; returns the
  * multiply-accumulates. */
 uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx);
 

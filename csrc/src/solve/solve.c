@@ -93,7 +93,7 @@ static eits_status solve(eits_context *ctx, int from_last)
     const eits_real square = eits_dot(ctx, ctx->y, ctx->y, rank);
     ctx->info.data_norm = eits_sqrt(square);
     ctx->info.lambda_noise = eits_lambda_noise(ctx);
-    ctx->info.floor = ctx->floor_in_force;
+    ctx->info.regularisation = ctx->regularisation_in_force;
     if (!eits_affords(ctx, (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx))) {
         answer_zero(ctx, EITS_STOP_MACS);
         return EITS_OK;

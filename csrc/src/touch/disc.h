@@ -12,7 +12,7 @@ typedef struct eits_disc {
 } eits_disc;
 
 /* A pixel is covered by clamp(1/2 + (radius - distance) / pixel): exact for a straight edge that
- * crosses it squarely. `atom` (stride numbers) gets Q F S w (observed.h), w the covers over the
+ * crosses it squarely. `atom` (stride numbers) gets Q F S w (whitening.h), w the covers over the
  * column weights, that is the answer to a change of 1 S/m; with `slope` not NULL, its three arrays
  * get the derivatives by x, y and radius. Uses z, x_next and gradient as scratch. Returns the
  * multiply-accumulates. */

@@ -34,7 +34,8 @@ class Options:
     ``DIAGNOSTICS``. ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow
     touches in time; all 0: each frame by itself (``solve.options.tracking`` sets them,
     docs/guide/tracking.md).
-    ``floor_noise_factor``: the whitening's floor is at least this times the tare's noise over
+    ``regularisation_noise_factor``: the whitening's floor is at least this times the tare's noise
+    over
         rms(V0); 0: as the model has it.
     """
 
@@ -68,7 +69,7 @@ class Options:
     track_confirm: int = 0
     track_hold: int = 0
     track_smooth: float = 0.0
-    floor_noise_factor: float = 5.0
+    regularisation_noise_factor: float = 5.0
 
     @property
     def tracks(self) -> bool:

@@ -320,7 +320,7 @@ class ReferenceEngine:
 
     def _leave_out(self, known: BoolArray) -> None:
         """Whiten anew for the folded rows (k,) that are known, and for the noise."""
-        asked = self.options.floor_noise_factor * self._noise_v / self._v0_rms
+        asked = self.options.regularisation_noise_factor * self._noise_v / self._v0_rms
         self._whitening = None if self._form is None else whiten(self._form, known, asked)
         self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
 

@@ -13,9 +13,9 @@ BoolArray = npt.NDArray[np.bool_]
 
 ORTHOGONAL = 1e-5
 FORM = 0.01
-LEAST_FLOOR_SHARE, LEAST_FLOOR = 0.1, 1e-4
+MIN_REGULARISATION_FRACTION, MIN_REGULARISATION = 0.1, 1e-4
 LOST = 0.01
-MOST_FLOOR, AS_IT_IS = 1.0, 1.01
+MAX_REGULARISATION, AS_IT_IS = 1.0, 1.01
 STEP_MARGIN = 0.995
 PROBES, NOISE_POWER = 8, 1.25
 
@@ -78,11 +78,13 @@ def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
 def whiten(form: Form, known: BoolArray, asked: float) -> Whitening | None:
     """The whitening of the folded rows where ``known`` (k,), the noise asking for a floor of at
     least ``asked`` for all of them: None for the model's own."""
-    least = min(asked, MOST_FLOOR)
+    least = min(asked, MAX_REGULARISATION)
     of_all = least if least > AS_IT_IS * form.floor else form.floor
     if not known.all():
         left = float(known.mean())
-        floor = max(form.floor * max(left**3, LEAST_FLOOR_SHARE), left * least, LEAST_FLOOR)
+        floor = max(
+            form.floor * max(left**3, MIN_REGULARISATION_FRACTION), left * least, MIN_REGULARISATION
+        )
         return _of_rest(form, known, floor, _noise_of_all(form, of_all))
     return _raised(form, of_all) if of_all > form.floor else None
 

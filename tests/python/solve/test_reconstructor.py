@@ -375,7 +375,7 @@ BAD_OPTIONS = [
     ({"track_confirm": 1001}, "track_confirm = 1001 is out of range; use 0 to 1000"),
     ({"track_hold": 1001}, "track_hold"),
     ({"track_smooth": float("nan")}, "track_smooth"),
-    ({"floor_noise_factor": -0.5}, "floor_noise_factor"),
+    ({"regularisation_noise_factor": -0.5}, "regularisation_noise_factor"),
     ({"iteration": 5}, "'iteration' is unknown; did you mean 'iterations'"),
 ]
 
@@ -412,7 +412,7 @@ EDGES = {
     "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000,
     "follow_mm": 0.0, "lambda_abs": 1e29,
     "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
-    "floor_noise_factor": 0.0,
+    "regularisation_noise_factor": 0.0,
     "touch_fit": 7, "refine": True,
 }  # fmt: skip
 

@@ -1,6 +1,6 @@
-/* The floor of the whitening, raised with the noise of the reference: the map against the formula
- * in double, the noise that it lets through, and when nothing is raised. */
-#include "observed_bench.h"
+/* The regularisation of the whitening, raised with the noise of the reference: the whitening
+ * against the formula in double, the noise that it lets through, and when nothing is raised. */
+#include "dense_whitening.h"
 
 #include "eitskin/frame.h"
 #include "eitskin/touch.h"
@@ -11,7 +11,7 @@ static const double FACTOR = 5, MOST = 1;
 static void choose_factor(eits_context *ctx, double factor)
 {
     eits_options o = ctx->options;
-    o.floor_noise_factor = (eits_real)factor;
+    o.regularisation_noise_factor = (eits_real)factor;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
 
@@ -19,10 +19,11 @@ static void choose_factor(eits_context *ctx, double factor)
 static double weight(int i, double mu)
 {
     const double square = pow(SMALL_DECAY, 2 * i);
-    return sqrt((square + SMALL_FLOOR) / (square + mu) * (1 + mu) / (1 + SMALL_FLOOR));
+    return sqrt((square + SMALL_REGULARISATION) / (square + mu) * (1 + mu) /
+                (1 + SMALL_REGULARISATION));
 }
 
-/* F is D, and y is D P d, of the floor that the noise asks for. */
+/* F is D, and y is D P d, of the regularisation that the noise asks for. */
 static void the_formula(void)
 {
     const double noises[] = {2.1e-3, 0.01, 0.1, 0.9};
@@ -36,8 +37,8 @@ static void the_formula(void)
         ctx->basis[STRIDE + RANK] = R(NAN); /* as a map that overflowed may leave it */
         pretend_noise(ctx, noises[n]);
         (void)stage(&b);
-        CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
-        CHECK_NEAR(ctx->floor_in_force, mu, 1e-5 * mu);
+        CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
+        CHECK_NEAR(ctx->regularisation_in_force, mu, 1e-5 * mu);
         CHECK_EQUAL(eits_adjoint_macs(ctx), RANK);
         CHECK_EQUAL(eits_forward_macs(ctx), RANK);
         eits_real v[STRIDE];
@@ -45,7 +46,7 @@ static void the_formula(void)
             v[i] = 1; /* also in the padding, which no map may bring in */
         eits_real once[STRIDE];
         memcpy(once, v, sizeof once);
-        CHECK_EQUAL(eits_map(ctx, once), RANK);
+        CHECK_EQUAL(eits_whiten(ctx, once), RANK);
         const eits_real *back = eits_adjoint(ctx, v, ctx->adjoint);
         for (int i = 0; i < STRIDE; ++i) {
             CHECK_NEAR(once[i], i < RANK ? weight(i, mu) : 0, bound);
@@ -95,7 +96,7 @@ static void solvers_solve_the_seen_problem(void)
             eits_context *ctx = set_up(&b, spec, storage % 2);
             pretend_noise(ctx, storage < 2 ? 0.02 : 0.1);
             (void)stage(&b);
-            CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+            CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
             CHECK_EQUAL(ctx->basis_count, storage % 2);
             solve_what_is_seen(&b, sign);
             dense_bench_close(&b.b);
@@ -116,22 +117,23 @@ static void only_where_asked_for(void)
     eits_real plain[N], image[N], raised[N];
     eits_context *ctx = set_up(&b, WHITENED, 1);
     reconstruct(&b, plain);
-    CHECK(ctx->info.floor == ctx->floor);
-    CHECK_NEAR(ctx->floor, SMALL_FLOOR, 1e-5);
-    const double little[] = {1e-4, SMALL_FLOOR / FACTOR, 1.009 * SMALL_FLOOR / FACTOR};
+    CHECK(ctx->info.regularisation == ctx->regularisation);
+    CHECK_NEAR(ctx->regularisation, SMALL_REGULARISATION, 1e-5);
+    const double little[] = {1e-4, SMALL_REGULARISATION / FACTOR,
+                             1.009 * SMALL_REGULARISATION / FACTOR};
     for (size_t k = 0; k < sizeof little / sizeof little[0]; ++k) {
         pretend_noise(ctx, little[k]);
         reconstruct(&b, image);
-        CHECK(!ctx->rewhitened && ctx->info.floor == ctx->floor &&
+        CHECK(!ctx->masked_whitening && ctx->info.regularisation == ctx->regularisation &&
               memcmp(image, plain, sizeof image) == 0);
     }
-    pretend_noise(ctx, 1.012 * SMALL_FLOOR / FACTOR);
+    pretend_noise(ctx, 1.012 * SMALL_REGULARISATION / FACTOR);
     reconstruct(&b, image);
-    CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+    CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
     CHECK(memcmp(image, plain, sizeof image) != 0);
     pretend_noise(ctx, 0.02);
     reconstruct(&b, raised);
-    CHECK_NEAR(ctx->info.floor, 0.1, 1e-5);
+    CHECK_NEAR(ctx->info.regularisation, 0.1, 1e-5);
     choose_factor(ctx, 0);
     reconstruct(&b, image);
     CHECK(memcmp(image, plain, sizeof image) == 0);
@@ -140,7 +142,7 @@ static void only_where_asked_for(void)
     CHECK(memcmp(image, raised, sizeof image) == 0);
     choose_factor(ctx, 1e29);
     reconstruct(&b, image);
-    CHECK(ctx->info.floor == R(1.0));
+    CHECK(ctx->info.regularisation == R(1.0));
     eits_context *portable = set_up(&other, WHITENED, 1);
     pretend_noise(portable, 0.02);
     CHECK_EQUAL(eits_use_portable_kernels(portable, 1), EITS_OK);
@@ -155,7 +157,7 @@ static void only_where_asked_for(void)
 }
 
 /* Models of another form stay as they are, and so do those whose numbers overflow; one without a
- * floor gets one. */
+ * regularisation gets one. */
 static void models_of_other_forms(void)
 {
     bench b;
@@ -165,26 +167,27 @@ static void models_of_other_forms(void)
     pretend_noise(ctx, 0.1);
     (void)stage(&b);
     reconstruct(&b, NULL);
-    CHECK(!ctx->rewhitened && ctx->info.floor == 0);
+    CHECK(!ctx->masked_whitening && ctx->info.regularisation == 0);
     dense_bench_close(&b.b);
-    spec.shape = SMALL_IDENTITY; /* whitened with no floor at all; all directions are alike */
+    spec.shape =
+        SMALL_IDENTITY; /* whitened with no regularisation at all; all directions are alike */
     ctx = set_up(&b, spec, 0);
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
-    CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
-    CHECK_NEAR(ctx->info.floor, 0.5, 1e-6);
+    CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
+    CHECK_NEAR(ctx->info.regularisation, 0.5, 1e-6);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->y[i], ctx->d[i], 1e-5);
     /* as of a row of P that is far greater than the others */
     ctx->row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160));
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
-    CHECK(!ctx->rewhitened && ctx->noise_ratio == 1 && ctx->info.floor == 0);
+    CHECK(!ctx->masked_whitening && ctx->noise_ratio == 1 && ctx->info.regularisation == 0);
     dense_bench_close(&b.b);
 }
 
-/* The reference frames' own noise raises the floor for the second half of them already, and
- * lambda_noise is as with the model's. */
+/* The reference frames' own noise raises the regularisation for the second half of them already,
+ * and lambda_noise is as with the model's. */
 static void learned_with_it(void)
 {
     enum { UNTOUCHED = 4 };
@@ -212,7 +215,7 @@ static void learned_with_it(void)
     pretend_noise(ctx, noise / (double)ctx->reference.v0_rms);
     memcpy(b.frame, untouched[2], sizeof b.frame);
     (void)stage(&b);
-    CHECK_EQUAL(ctx->rewhitened, EITS_BY_ROW);
+    CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
     double *back = dense_copy(eits_adjoint(ctx, ctx->y, ctx->adjoint), RANK), most = 0;
     for (int j = 0; j < N; ++j)
         most = fmax(most, fabs(dense_dot(b.b.d.s + j * RANK, back, RANK)));

@@ -1,11 +1,11 @@
-/* Rows left out of a frame: the reduction whitened anew, against the formula in double; and what it
- * must never do. */
-#include "observed_bench.h"
+/* Rows left out of a frame: the reduction whitened again, against the formula in double; and what
+ * it must never do. */
+#include "dense_whitening.h"
 
 #include "eitskin/touch.h"
 
-/* What the core states of its numbers: the floor's law, how little a lost direction counts, the
- * margin of the step. */
+/* What the core states of its numbers: the regularisation's law, how little a lost direction
+ * counts, the margin of the step. */
 static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1, NOISE_FACTOR = 5, MOST = 1;
 
 /* In place, by Gauss-Jordan; the matrix is positive definite. */
@@ -39,12 +39,13 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
         left += !b->out[f] / (double)SMALL_FOLDED;
     const double asked =
         fmin(NOISE_FACTOR * (double)(ctx->reference.noise_v / ctx->reference.v0_rms), MOST);
-    const double mu = fmax(SMALL_FLOOR * fmax(left * left * left, LEAST_SHARE), left * asked),
+    const double mu = fmax(SMALL_REGULARISATION * fmax(left * left * left, LEAST_SHARE),
+                           left * asked),
                  lost = LOST * mu;
-    const double scale = MARGIN / (1 + SMALL_FLOOR) * (1 + mu) / (1 + lost);
+    const double scale = MARGIN / (1 + SMALL_REGULARISATION) * (1 + mu) / (1 + lost);
     for (int i = 0; i < RANK; ++i) {
         s[i] = pow(SMALL_DECAY, i);
-        w[i] = 1 / sqrt(s[i] * s[i] + SMALL_FLOOR);
+        w[i] = 1 / sqrt(s[i] * s[i] + SMALL_REGULARISATION);
     }
     for (int i = 0; i < RANK; ++i) {
         for (int j = 0; j < RANK; ++j) {
@@ -73,15 +74,15 @@ static void the_reduction_without_those_rows(double noise)
 {
     bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
-    CHECK(ctx->rewhitens);
+    CHECK(ctx->can_whiten_masked);
     (void)stage(&b);
-    CHECK(!ctx->rewhitened && eits_adjoint(ctx, ctx->y, ctx->adjoint) == ctx->y);
+    CHECK(!ctx->masked_whitening && eits_adjoint(ctx, ctx->y, ctx->adjoint) == ctx->y);
     pretend_noise(ctx, noise);
     for (uint32_t count = 1; count < SMALL_FOLDED; ++count) {
         double m[RANK][RANK], right[RANK];
         leave_out(&b, (5 * count) % SMALL_FOLDED);
         (void)stage(&b);
-        CHECK_EQUAL(ctx->rewhitened, EITS_BY_TRIANGLE);
+        CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_TRIANGLE);
         CHECK_EQUAL(ctx->basis_count, 0);
         by_formula(&b, m, right);
         /* P is stored as float: orthogonal to its rounding */
@@ -90,7 +91,7 @@ static void the_reduction_without_those_rows(double noise)
             double unit[RANK] = {0}, column[RANK];
             eits_real f_unit[STRIDE] = {0};
             unit[j] = 1;
-            map_column(ctx, unit, 0, column);
+            whitening_column(ctx, unit, 0, column);
             for (int i = 0; i < RANK; ++i)
                 f_unit[i] = (eits_real)column[i];
             const eits_real *back = eits_adjoint(ctx, f_unit, ctx->adjoint);
@@ -104,8 +105,9 @@ static void the_reduction_without_those_rows(double noise)
     dense_bench_close(&b.b);
 }
 
-/* White noise on the rows that are left, in the correlations: that with all rows and the floor that
- * the noise asks for, times the root mean square over that to the power 1.25. */
+/* White noise on the rows that are left, in the correlations: that with all rows and the
+ * regularisation that the noise asks for, times the root mean square over that to the power 1.25.
+ */
 static void noise_in_the_correlations(double noise)
 {
     bench b;
@@ -117,7 +119,7 @@ static void noise_in_the_correlations(double noise)
     pretend_noise(ctx, noise);
     (void)stage(&b);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
-        all += energy_of_row(&b, k, !ctx->rewhitened);
+        all += energy_of_row(&b, k, !ctx->masked_whitening);
     for (uint32_t count = 1; count < 16; ++count) {
         double sum = 0, whole = 0;
         leave_out(&b, (5 * count) % SMALL_FOLDED);
@@ -145,7 +147,7 @@ static void solvers_solve_the_seen_problem(void)
             for (uint32_t k = 0; k < 7; ++k)
                 leave_out(&b, 3 * k % 20);
             (void)stage(&b);
-            CHECK(ctx->rewhitened);
+            CHECK(ctx->masked_whitening);
             CHECK_EQUAL(ctx->basis_count, storage % 2);
             solve_what_is_seen(&b, sign);
             dense_bench_close(&b.b);
@@ -187,7 +189,7 @@ static void until_nothing_is_left(void)
         }
         memcpy(b.frame, good, sizeof good);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
-        CHECK(!ctx->rewhitened && memcmp(whole, image, sizeof whole) == 0);
+        CHECK(!ctx->masked_whitening && memcmp(whole, image, sizeof whole) == 0);
         dense_bench_close(&b.b);
     }
 }
@@ -211,7 +213,7 @@ static void rows_out_do_not_count(void)
         (void)stage(&b);
         memcpy(seen[round], ctx->y, sizeof seen[round]);
     }
-    CHECK(ctx->rewhitened && memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
+    CHECK(ctx->masked_whitening && memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
     for (int i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = b.reference[i] * R(1.3);
     (void)stage(&b);
@@ -220,10 +222,10 @@ static void rows_out_do_not_count(void)
     dense_bench_close(&b.b);
 }
 
-/* Change a row of P, or all, and see whether frames with rows left out are whitened anew: where the
- * model counts as the builder's and numbers suffice. */
-static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows,
-                               eits_real first_of_map[RANK])
+/* Change a row of P, or all, and see whether frames with rows left out are whitened again: where
+ * the model counts as the builder's and numbers suffice. */
+static uint32_t can_whiten_masked_with(uint32_t row, double factor, int all_rows,
+                                       eits_real first_of_whitening[RANK])
 {
     bench b;
     memset(&b, 0, sizeof b);
@@ -247,15 +249,16 @@ static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows,
     leave_out(&b, 4);
     leave_out(&b, 9);
     (void)stage(&b);
-    const uint32_t rewhitens = ctx->rewhitened;
-    CHECK(rewhitens <= ctx->rewhitens);
-    CHECK(rewhitens ? ctx->basis_count == 1 : ctx->basis_count <= 3 && ctx->noise_ratio == 1);
+    const uint32_t can_whiten_masked = ctx->masked_whitening;
+    CHECK(can_whiten_masked <= ctx->can_whiten_masked);
+    CHECK(can_whiten_masked ? ctx->basis_count == 1
+                            : ctx->basis_count <= 3 && ctx->noise_ratio == 1);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    for (uint32_t i = 0; i < RANK && rewhitens; ++i)
-        first_of_map[i] = ctx->basis[STRIDE + i];
+    for (uint32_t i = 0; i < RANK && can_whiten_masked; ++i)
+        first_of_whitening[i] = ctx->basis[STRIDE + i];
     small_context_close(&b.b.c);
     small_model_free(&b.b.made);
-    return rewhitens;
+    return can_whiten_masked;
 }
 
 /* Any other P keeps the projection: rows of another size, zero rows, rows that overflow; the unit
@@ -263,28 +266,28 @@ static uint32_t rewhitens_with(uint32_t row, double factor, int all_rows,
 static void models_of_another_form(void)
 {
     eits_real plain[RANK], scaled[RANK];
-    CHECK(rewhitens_with(0, 1, 0, plain));
-    CHECK(!rewhitens_with(2, 1.2, 0, scaled));
-    CHECK(!rewhitens_with(2, 0, 0, scaled));
-    CHECK(!rewhitens_with(0, 0, 1, scaled) || !"a zero P");
-    CHECK(rewhitens_with(0, 1099511627776.0, 1, scaled));
+    CHECK(can_whiten_masked_with(0, 1, 0, plain));
+    CHECK(!can_whiten_masked_with(2, 1.2, 0, scaled));
+    CHECK(!can_whiten_masked_with(2, 0, 0, scaled));
+    CHECK(!can_whiten_masked_with(0, 0, 1, scaled) || !"a zero P");
+    CHECK(can_whiten_masked_with(0, 1099511627776.0, 1, scaled));
     CHECK(memcmp(plain, scaled, sizeof plain) == 0);
-    CHECK(rewhitens_with(0, 1 / 1099511627776.0, 1, scaled));
+    CHECK(can_whiten_masked_with(0, 1 / 1099511627776.0, 1, scaled));
     CHECK(memcmp(plain, scaled, sizeof plain) == 0);
-    CHECK(!rewhitens_with(0, 1e-31, 1, scaled));
+    CHECK(!can_whiten_masked_with(0, 1e-31, 1, scaled));
     /* the noise overflows there */
-    CHECK_EQUAL(rewhitens_with(0, 3e-19, 0, scaled), BOTH_WIDTHS(0, 1));
+    CHECK_EQUAL(can_whiten_masked_with(0, 3e-19, 0, scaled), BOTH_WIDTHS(0, 1));
     bench b;
     small_spec other = WHITENED;
     other.shape = SMALL_RANDOM;
-    CHECK(!set_up(&b, other, 0)->rewhitens);
+    CHECK(!set_up(&b, other, 0)->can_whiten_masked);
     dense_bench_close(&b.b);
-    other.shape = SMALL_IDENTITY; /* whitened with no floor at all */
+    other.shape = SMALL_IDENTITY; /* whitened with no regularisation at all */
     eits_context *ctx = set_up(&b, other, 0);
-    CHECK(ctx->rewhitens && ctx->floor == 0);
+    CHECK(ctx->can_whiten_masked && ctx->regularisation == 0);
     leave_out(&b, 1);
     (void)stage(&b);
-    CHECK(ctx->rewhitened);
+    CHECK(ctx->masked_whitening);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->y[i], i == 1 ? 0 : sqrt(MARGIN) * (double)ctx->d[i], 1e-4);
     dense_bench_close(&b.b);

@@ -1,7 +1,7 @@
 /* A small whitened model, a frame, and what the core's map makes of S: for tests of rows left out
- * and of the floor. */
-#ifndef EITSKIN_TEST_OBSERVED_BENCH_H
-#define EITSKIN_TEST_OBSERVED_BENCH_H
+ * and of the regularisation. */
+#ifndef EITSKIN_TEST_DENSE_WHITENING_H
+#define EITSKIN_TEST_DENSE_WHITENING_H
 
 #include "check.h"
 #include "dense.h"
@@ -70,7 +70,8 @@ static inline uint32_t stage(bench *b)
 }
 
 /* Column j of F, or of F S: by the core's own map. */
-static inline void map_column(eits_context *ctx, const double *column, int project, double *out)
+static inline void whitening_column(eits_context *ctx, const double *column, int project,
+                                    double *out)
 {
     eits_real v[STRIDE] = {0};
     for (int i = 0; i < RANK; ++i)
@@ -78,7 +79,7 @@ static inline void map_column(eits_context *ctx, const double *column, int proje
     if (project)
         (void)eits_forward(ctx, v);
     else
-        (void)eits_map(ctx, v);
+        (void)eits_whiten(ctx, v);
     for (int i = 0; i < RANK; ++i)
         out[i] = (double)v[i];
 }
@@ -92,7 +93,7 @@ static inline double energy_of_row(bench *b, uint32_t k, int whole)
     for (int i = 0; i < RANK; ++i)
         y[i] = (eits_real)b->b.d.p[k * RANK + (uint32_t)i];
     if (!whole)
-        (void)eits_observed_data(ctx, y);
+        (void)eits_whiten_data(ctx, y);
     double *back = dense_copy(whole ? y : eits_adjoint(ctx, y, ctx->adjoint), RANK), sum = 0;
     for (int j = 0; j < N; ++j) {
         const double c = dense_dot(b->b.d.s + j * RANK, back, RANK);
@@ -129,10 +130,10 @@ static inline void solve_what_is_seen(bench *b, int sign)
     eits_context *ctx = &b->b.c.ctx;
     double greatest;
     for (int j = 0; j < N; ++j)
-        map_column(ctx, b->b.d.s + j * RANK, 1, b->b.d.s + j * RANK);
+        whitening_column(ctx, b->b.d.s + j * RANK, 1, b->b.d.s + j * RANK);
     greatest = greatest_eigenvalue(b->b.d.s);
     CHECK(greatest <= (double)b->b.c.model.lipschitz);
-    if (ctx->basis_count == 0 && ctx->rewhitened == EITS_BY_ROW)
+    if (ctx->basis_count == 0 && ctx->masked_whitening == EITS_WHITENING_DIAGONAL)
         CHECK_NEAR(greatest, b->b.c.model.lipschitz, 1e-3);
     double *y = dense_copy(ctx->y, RANK), least = 0;
     eits_options o = ctx->options;
