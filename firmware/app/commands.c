@@ -217,9 +217,9 @@ static fw_answer on_mask_row(fw_instrument *instrument, const void *payload, siz
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
     if (outside(&bad, offsetof(eits_command_mask_row, row), c.row, 0,
                 instrument->engine.model.n_rows - 1) ||
-        outside(&bad, offsetof(eits_command_mask_row, bad), c.bad, 0, 1))
+        outside(&bad, offsetof(eits_command_mask_row, masked), c.masked, 0, 1))
         return bad;
-    (void)eits_mask_row(&instrument->engine.ctx, c.row, c.bad);
+    (void)eits_mask_row(&instrument->engine.ctx, c.row, c.masked);
     return ok();
 }
 

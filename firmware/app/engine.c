@@ -52,7 +52,7 @@ static void lay_out(fw_engine *engine)
     engine->sides = take(&next, engine->model.n_folded);
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
     /* not cleared: it may hold what is to be restored */
-    engine->kept.bad = end - EITS_ALIGN16(rows);
+    engine->kept.masked = end - EITS_ALIGN16(rows);
     engine->kept.v0 = (float *)(void *)(end - kept_bytes(&engine->model));
 }
 
@@ -134,7 +134,7 @@ void fw_engine_keep(fw_engine *engine)
 {
     fw_kept *kept = &engine->kept;
     memcpy(kept->v0, engine->ctx.reference.v0, engine->model.n_rows * sizeof(float));
-    memcpy(kept->bad, engine->ctx.bad, engine->model.n_rows);
+    memcpy(kept->masked, engine->ctx.masked, engine->model.n_rows);
     kept->reference = engine->ctx.reference;
     kept->options = engine->ctx.options;
     kept->next_id = engine->ctx.next_id;
@@ -153,7 +153,7 @@ void fw_engine_restore(fw_engine *engine)
     engine->ctx.reference.m2 = m2;
     engine->ctx.options = kept->options;
     memcpy(v0, kept->v0, engine->model.n_rows * sizeof(float));
-    memcpy(engine->ctx.bad, kept->bad, engine->model.n_rows);
+    memcpy(engine->ctx.masked, kept->masked, engine->model.n_rows);
     engine->ctx.next_id = kept->next_id;
     engine->ctx.basis_stale = 1;
     eits_forget(&engine->ctx);

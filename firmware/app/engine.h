@@ -14,7 +14,7 @@ typedef struct fw_kept {
     eits_options options;
     uint32_t next_id; /* of touches: ids are not used twice */
     float *v0;        /* n_rows */
-    uint8_t *bad;     /* n_rows */
+    uint8_t *masked;  /* n_rows */
     float cosine, sine;
     bool tared, angle_known;
 } fw_kept;

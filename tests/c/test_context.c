@@ -37,7 +37,7 @@ static void sizes_agree(void)
                     uint8_t *workspace = small_aligned(&memory, size);
                     CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
                     const uint8_t *held_end =
-                        (uint8_t *)ctx.working_slot + EITS_ALIGN16(EITS_HELD(m.n_pixels) * 4);
+                        (uint8_t *)ctx.working_slot + EITS_ALIGN16(EITS_CACHED(m.n_pixels) * 4);
                     const uint8_t *end =
                         prepared ? (uint8_t *)ctx.working_panels +
                                        EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank)

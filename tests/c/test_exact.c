@@ -1,4 +1,4 @@
-/* Coordinate descent and active set: the optimum as a certificate written apart from the core sees
+/* Coordinate descent and active set: the optimum as a duality gap written apart from the core sees
  * it, whatever the columns are like; the same bits in every layout; whatever they start from. */
 #include "check.h"
 #include "dense.h"

@@ -93,7 +93,7 @@ static void an_outlier_in_the_reference(void)
         CHECK_NEAR(ctx->reference.noise_v, noise, 0.05 * (double)noise);
         CHECK_NEAR(ctx->reference.lambda_noise, lambda_noise, 0.3 * (double)lambda_noise);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            CHECK_EQUAL(ctx->bad[i], 0);
+            CHECK_EQUAL(ctx->masked[i], 0);
         look_for(ctx, 0);
         CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
         for (int k = 0; k < UNTOUCHED; ++k)

@@ -146,7 +146,7 @@ static void a_wild_run_ends_as_zero(void)
     }
 }
 
-/* Asked for a gap, or given time: the certificate holds over all columns, also those that no
+/* Asked for a gap, or given time: the duality gap holds over all columns, also those that no
  * iteration touched. */
 static void the_optimum_is_that_of_all_columns(void)
 {

@@ -234,13 +234,13 @@ static void test_solver(void)
 
 static void test_mask_row(void)
 {
-    eits_command_mask_row c = {.row = 208, .bad = 1};
+    eits_command_mask_row c = {.row = 208, .masked = 1};
     REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_RANGE, 4, 207);
     c.row = 207;
-    c.bad = 2;
+    c.masked = 2;
     REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_RANGE, 6, 1);
     for (uint16_t bad = 1; bad < 2; --bad) {
-        c.bad = bad;
+        c.masked = bad;
         REPLY(host_command(&b.host, EITS_PACKET_MASK_ROW, &c, sizeof c), EITS_REPLY_OK, 0, 0);
         REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 2), EITS_REPLY_OK, 0, 0);
         host_run(&b.host, 70);

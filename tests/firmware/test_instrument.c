@@ -140,7 +140,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     touch(4, -2, 3);
     host_run(&b.host, ms);
     mirror_follow();
-    eits_command_mask_row mask = {.row = 17, .bad = 1};
+    eits_command_mask_row mask = {.row = 17, .masked = 1};
     CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
                 EITS_REPLY_OK);
     host_run(&b.host, ms);

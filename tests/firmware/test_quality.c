@@ -194,7 +194,7 @@ static void test_masked_row_is_not_judged(void)
     tare();
     for (uint16_t i = 0; i < 208; ++i) {
         const uint8_t *row = b.open.protocol + 4 * (size_t)i;
-        eits_command_mask_row mask = {.row = i, .bad = 1};
+        eits_command_mask_row mask = {.row = i, .masked = 1};
         if (row[0] == 5 && row[2] == 8)
             CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
                         EITS_REPLY_OK);

@@ -198,7 +198,8 @@ static void test_reciprocal(const skin_spec *spec)
         CHECK(every == 0 ? checks == 0 : checks >= 1);
         /* a row that is masked has no say and no value; its reciprocal has */
         const eits_fold masked = b.open.fold[3];
-        eits_command_mask_row mask = {.row = every == 0 ? masked.second : masked.first, .bad = 1};
+        eits_command_mask_row mask = {.row = every == 0 ? masked.second : masked.first,
+                                      .masked = 1};
         CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
                     EITS_REPLY_OK);
         host_run(&b.host, 60);
@@ -211,7 +212,7 @@ static void test_reciprocal(const skin_spec *spec)
         CHECK_EQUAL(quality[masked.first], every == 0 ? 0 : EITS_QUALITY_MASKED);
         CHECK_EQUAL(quality[masked.second],
                     EITS_QUALITY_COPIED | (every == 0 ? EITS_QUALITY_MASKED : 0));
-        mask.bad = 0;
+        mask.masked = 0;
         CHECK_EQUAL(host_command(&b.host, EITS_PACKET_MASK_ROW, &mask, sizeof mask).status,
                     EITS_REPLY_OK);
     }

@@ -154,7 +154,7 @@ typedef struct eits_touch {
     eits_real radius_mm;
     eits_real strength_s_per_m_mm2; /* conductivity change integrated over the touch: S/m mm^2 */
     /* share of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
-     * not found in this frame and is held */
+     * not found in this frame and is cached */
     eits_real confidence;
     /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
     eits_real force_n;
@@ -201,7 +201,7 @@ typedef struct eits_context {
     const struct eits_kernels *kernels;
     eits_options options;
     eits_reference reference;
-    uint8_t *bad; /* n_rows: masked by the caller */
+    uint8_t *masked; /* n_rows: masked by the caller */
     /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
     uint8_t *unusable;
     uint8_t electrode[EITS_MOST_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
@@ -268,24 +268,25 @@ typedef struct eits_context {
     uint16_t *cell;
     eits_real *panels;         /* S again, in panels of EITS_PANEL columns; NULL: not prepared */
     eits_real *working_panels; /* the working set's columns likewise; NULL: not prepared */
-    /* EITS_HELD(n_pixels) x stride: columns of S in use, unpacked (columns.h) */
-    float *held;
-    uint16_t *held_at;      /* n_pixels: where a column is held; EITS_NO_PIXEL: nowhere */
-    uint16_t *held_column;  /* EITS_HELD(n_pixels): which column is held there */
-    uint8_t *held_wanted;   /* as many: scratch */
-    uint32_t held_next;     /* where to look for room */
-    uint32_t *working_slot; /* EITS_HELD(n_pixels): where the working set's columns are held */
-    uint32_t working_held;  /* 1: all of them are */
+    /* EITS_CACHED(n_pixels) x stride: columns of S in use, unpacked (column_cache.h) */
+    float *cache;
+    uint16_t *cache_slot;    /* n_pixels: where a column is cached; EITS_NO_PIXEL: nowhere */
+    uint16_t *cache_column;  /* EITS_CACHED(n_pixels): which column is cached there */
+    uint8_t *cache_wanted;   /* as many: scratch */
+    uint32_t cache_next;     /* where to look for room */
+    uint32_t *working_slot;  /* EITS_CACHED(n_pixels): where the working set's columns are cached */
+    uint32_t working_cached; /* 1: all of them are */
     eits_followed followed[EITS_MAX_TOUCHES];
     uint32_t followed_count, next_id;
     uint32_t warm;  /* x holds the last frame's coefficients */
     eits_info info; /* of the last frame */
 } eits_context;
 
-#define EITS_PANEL          32u
-#define EITS_NO_PIXEL       0xFFFFu
-#define EITS_MOST_HELD      256u
-#define EITS_HELD(n_pixels) ((size_t)((n_pixels) < EITS_MOST_HELD ? (n_pixels) : EITS_MOST_HELD))
+#define EITS_PANEL      32u
+#define EITS_NO_PIXEL   0xFFFFu
+#define EITS_MAX_CACHED 256u
+#define EITS_CACHED(n_pixels) \
+    ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
 #define EITS_LINE                                                                                \
     64u /* bytes: panels start at a multiple, where no vector of theirs lies across two lines of \
            the cache */
@@ -307,9 +308,9 @@ typedef struct eits_context {
      5 * EITS_REALS(n_pixels) + EITS_REALS(EITS_LIST(n_pixels, n_folded)) +                        \
      EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 4u) +    \
      EITS_ALIGN16((size_t)(n_cells) * 2u) +                                                        \
-     EITS_ALIGN16(EITS_HELD(n_pixels) * EITS_STRIDE(rank) * 4u) +                                  \
-     EITS_ALIGN16((size_t)(n_pixels) * 2u) + EITS_ALIGN16(EITS_HELD(n_pixels) * 2u) +              \
-     EITS_ALIGN16(EITS_HELD(n_pixels)) + EITS_ALIGN16(EITS_HELD(n_pixels) * 4u) +                  \
+     EITS_ALIGN16(EITS_CACHED(n_pixels) * EITS_STRIDE(rank) * 4u) +                                \
+     EITS_ALIGN16((size_t)(n_pixels) * 2u) + EITS_ALIGN16(EITS_CACHED(n_pixels) * 2u) +            \
+     EITS_ALIGN16(EITS_CACHED(n_pixels)) + EITS_ALIGN16(EITS_CACHED(n_pixels) * 4u) +              \
      ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) + EITS_LINE - 16u \
                  : 0u))
 

@@ -42,10 +42,10 @@ eits_status eits_reference_begin(eits_context *ctx, uint32_t count);
 eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t length);
 eits_status eits_reference_finish(eits_context *ctx);
 
-/* Leave row `row` of the protocol out of every frame (bad = 1) or use it again (0). A row that was
- * left out while the reference was taken has none, and stays out until the next reference. Errors:
- * EITS_E_ARGUMENT. */
-eits_status eits_mask_row(eits_context *ctx, uint32_t row, int bad);
+/* Leave row `row` of the protocol out of every frame (masked = 1) or use it again (0). A row that
+ * was left out while the reference was taken has none, and stays out until the next reference.
+ * Errors: EITS_E_ARGUMENT. */
+eits_status eits_mask_row(eits_context *ctx, uint32_t row, int masked);
 
 /* The frame stage alone: fills ctx->d, ctx->y, ctx->basis (and F), ctx->unusable and returns the
  * number of rows left out in `masked`. Errors: EITS_E_NO_REFERENCE, EITS_E_FRAME_LENGTH,

@@ -299,7 +299,7 @@ typedef struct eits_command_get_stats {
 } eits_command_get_stats;
 typedef struct eits_command_mask_row {
     uint32_t request;
-    uint16_t row, bad;
+    uint16_t row, masked;
 } eits_command_mask_row;
 
 /* ---- codec ---- */

@@ -106,7 +106,7 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     const size_t stride = EITS_STRIDE(ctx->model->rank);
     ctx->reference.v0 = take_reals(a, rows);
     ctx->reference.m2 = take_reals(a, rows);
-    ctx->bad = take_bytes(a, rows);
+    ctx->masked = take_bytes(a, rows);
     ctx->unusable = take_bytes(a, rows);
     ctx->basis_for = take_bytes(a, folded);
     ctx->d = take_reals(a, folded);
@@ -140,13 +140,13 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->atoms = take_reals(a, EITS_MAX_TOUCHES * stride);
     ctx->cell = (uint16_t *)(void *)take_bytes(a, (size_t)ctx->model->nx * ctx->model->ny * 2);
     map_cells(ctx);
-    const size_t room = EITS_HELD(pixels);
-    ctx->held = (float *)(void *)take_bytes(a, room * stride * 4);
-    ctx->held_at = (uint16_t *)(void *)take_bytes(a, pixels * 2);
-    ctx->held_column = (uint16_t *)(void *)take_bytes(a, room * 2);
-    ctx->held_wanted = take_bytes(a, room);
+    const size_t room = EITS_CACHED(pixels);
+    ctx->cache = (float *)(void *)take_bytes(a, room * stride * 4);
+    ctx->cache_slot = (uint16_t *)(void *)take_bytes(a, pixels * 2);
+    ctx->cache_column = (uint16_t *)(void *)take_bytes(a, room * 2);
+    ctx->cache_wanted = take_bytes(a, room);
     ctx->working_slot = (uint32_t *)(void *)take_bytes(a, room * 4);
-    eits_drop_columns(ctx);
+    eits_clear_column_cache(ctx);
     if (prepared) {
         a->next += (EITS_LINE - (uintptr_t)a->next % EITS_LINE) % EITS_LINE;
         ctx->panels = take_reals(a, EITS_PANEL_COLUMNS(pixels) * ctx->model->rank);

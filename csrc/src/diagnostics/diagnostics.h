@@ -88,7 +88,7 @@ int eits_find_outliers(eits_context *ctx, uint64_t *macs);
  * fold left out, ctx->sheet_known. */
 int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs);
 
-/* A row of ctx->bad that is left out of the reference frame at hand only. */
+/* A row of ctx->masked that is left out of the reference frame at hand only. */
 enum { EITS_MASKED_NOW = 2 };
 
 /* The reference frame `newer` against `older`: how many folds do not agree (0 where they are too

@@ -14,7 +14,7 @@ static void find_unusable(eits_context *ctx, const eits_real *frame)
     const eits_real limit = ctx->options.saturation_v;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const unsigned masked =
-            ctx->bad[i] || !eits_is_finite(ctx->reference.v0[i]) ? EITS_ROW_MASKED : 0;
+            ctx->masked[i] || !eits_is_finite(ctx->reference.v0[i]) ? EITS_ROW_MASKED : 0;
         const unsigned unknown = !eits_is_finite(frame[i]) ? EITS_ROW_UNKNOWN : 0;
         const unsigned saturated =
             limit > 0 && eits_fabs(frame[i]) >= limit ? EITS_ROW_SATURATED : 0;
@@ -318,10 +318,10 @@ eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t l
     return eits_frame_data(ctx, frame, masked, macs);
 }
 
-eits_status eits_mask_row(eits_context *ctx, uint32_t row, int bad)
+eits_status eits_mask_row(eits_context *ctx, uint32_t row, int masked)
 {
     if (ctx == NULL || row >= ctx->model->n_rows)
         return EITS_E_ARGUMENT;
-    ctx->bad[row] = bad != 0;
+    ctx->masked[row] = masked != 0;
     return EITS_OK;
 }

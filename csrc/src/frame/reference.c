@@ -17,7 +17,7 @@ static eits_status check_reference_frame(const eits_context *ctx, const eits_rea
         return EITS_E_FRAME_LENGTH;
     const eits_real limit = ctx->options.saturation_v;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (!ctx->bad[i] &&
+        if (!ctx->masked[i] &&
             (!eits_is_finite(frame[i]) || (limit > 0 && eits_fabs(frame[i]) >= limit)))
             return EITS_E_FRAME_CHANNELS;
     }
@@ -28,7 +28,7 @@ static eits_status check_reference_frame(const eits_context *ctx, const eits_rea
  * taken. */
 static int has_reference(const eits_context *ctx, uint32_t row)
 {
-    return row != EITS_FOLD_NONE && !ctx->bad[row] && eits_is_finite(ctx->reference.v0[row]);
+    return row != EITS_FOLD_NONE && !ctx->masked[row] && eits_is_finite(ctx->reference.v0[row]);
 }
 
 /* The reference on one folded row: the mean of both sides in use; 0 where neither is. */
@@ -94,7 +94,7 @@ eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t
     eits_copy(old, b->v0, length);
     eits_copy(b->v0, frame, length);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (ctx->bad[i])
+        if (ctx->masked[i])
             b->v0[i] = R(NAN);
     }
     status = fit_to_model(ctx);
@@ -152,7 +152,7 @@ static eits_real unit_for(const eits_context *ctx, const eits_real *frame)
 {
     eits_real largest = 0, unit = 1;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
-        largest = !ctx->bad[i] && eits_fabs(frame[i]) > largest ? eits_fabs(frame[i]) : largest;
+        largest = !ctx->masked[i] && eits_fabs(frame[i]) > largest ? eits_fabs(frame[i]) : largest;
     while (unit <= R(0.5) * largest)
         unit *= 2;
     while (unit > largest && unit > R(0x1p-125))
@@ -183,9 +183,9 @@ static void take_in(eits_context *ctx, const eits_real *frame)
     eits_reference *b = &ctx->reference;
     ++b->count;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* Welford, Technometrics 4 (1962) 419 */
-        if (ctx->bad[i] == EITS_MASKED_NOW)
+        if (ctx->masked[i] == EITS_MASKED_NOW)
             continue;
-        if (ctx->bad[i])
+        if (ctx->masked[i])
             b->v0[i] = R(NAN);
         if (!eits_is_finite(b->v0[i]))
             continue;
@@ -199,7 +199,7 @@ static void take_in(eits_context *ctx, const eits_real *frame)
 static void keep_second(eits_context *ctx, const eits_real *frame)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (ctx->bad[i])
+        if (ctx->masked[i])
             ctx->reference.v0[i] = R(NAN);
     }
     eits_copy(ctx->reference.m2, frame, ctx->model->n_rows);

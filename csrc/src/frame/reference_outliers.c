@@ -13,7 +13,7 @@ static const eits_real OWN_LEAST = R(0.05);
 
 static int in_use(const eits_context *ctx, uint32_t row, const eits_real *older)
 {
-    return row != EITS_FOLD_NONE && !ctx->bad[row] && eits_is_finite(older[row]);
+    return row != EITS_FOLD_NONE && !ctx->masked[row] && eits_is_finite(older[row]);
 }
 
 static eits_real change(const eits_context *ctx, uint32_t row, const eits_real *newer,
@@ -117,7 +117,7 @@ uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_real *frame)
                                       : 0;
         left += count;
         while (count > 0)
-            ctx->bad[rows[--count]] = EITS_MASKED_NOW;
+            ctx->masked[rows[--count]] = EITS_MASKED_NOW;
     }
     return left;
 }
@@ -150,5 +150,5 @@ uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_real *frame)
 void eits_reference_unmask(eits_context *ctx)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
-        ctx->bad[i] = ctx->bad[i] == EITS_MASKED_NOW ? 0 : ctx->bad[i];
+        ctx->masked[i] = ctx->masked[i] == EITS_MASKED_NOW ? 0 : ctx->masked[i];
 }

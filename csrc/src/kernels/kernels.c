@@ -85,9 +85,9 @@ void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real
     if (ctx->working_panels != NULL) {
         ctx->kernels->mul_t_panels(s, ctx->working_panels, ctx->working, ctx->working_count, v,
                                    out);
-    } else if (ctx->working_held) {
-        const eits_matrix held = eits_held_columns(ctx);
-        ctx->kernels->mul_t(&held, ctx->working_slot, ctx->working_count, v, out);
+    } else if (ctx->working_cached) {
+        const eits_matrix cached = eits_cached_columns(ctx);
+        ctx->kernels->mul_t(&cached, ctx->working_slot, ctx->working_count, v, out);
         scale_listed(s, ctx->working, ctx->working_count, out);
     } else {
         ctx->kernels->mul_t(s, ctx->working, ctx->working_count, v, out);
@@ -112,10 +112,10 @@ uint32_t eits_apply_working(const eits_context *ctx, const eits_real *x, eits_re
         count += x[k] != 0;
     }
     scale_listed(s, ctx->list_index, count, ctx->list_value);
-    if (ctx->working_held) {
-        const eits_matrix held = eits_held_columns(ctx);
-        eits_slots_of(ctx, ctx->list_index, count, ctx->list_index);
-        ctx->kernels->mul(&held, ctx->list_index, ctx->list_value, count, out);
+    if (ctx->working_cached) {
+        const eits_matrix cached = eits_cached_columns(ctx);
+        eits_cache_slots(ctx, ctx->list_index, count, ctx->list_index);
+        ctx->kernels->mul(&cached, ctx->list_index, ctx->list_value, count, out);
     } else {
         ctx->kernels->mul(s, ctx->list_index, ctx->list_value, count, out);
     }
@@ -125,9 +125,9 @@ uint32_t eits_apply_working(const eits_context *ctx, const eits_real *x, eits_re
 void eits_pack_panels(eits_context *ctx)
 {
     const uint32_t rows = ctx->model->rank;
-    ctx->working_held = eits_hold_columns(ctx, ctx->working, ctx->working_count);
-    if (ctx->working_held)
-        eits_slots_of(ctx, ctx->working, ctx->working_count, ctx->working_slot);
+    ctx->working_cached = eits_cache_columns(ctx, ctx->working, ctx->working_count);
+    if (ctx->working_cached)
+        eits_cache_slots(ctx, ctx->working, ctx->working_count, ctx->working_slot);
     if (ctx->working_panels == NULL)
         return;
     for (uint32_t k = 0; k < EITS_PANEL_COLUMNS(ctx->working_count); ++k) {

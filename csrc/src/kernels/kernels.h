@@ -80,7 +80,7 @@ void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real
  * list. */
 uint32_t eits_apply_working(const eits_context *ctx, const eits_real *x, eits_real *out);
 
-/* Keep the working set's columns at hand: those of S that are not held yet are unpacked, and in a
+/* Keep the working set's columns at hand: those of S that are not cached yet are unpacked, and in a
  * prepared context their panels copied. Needed after each change of ctx->working. */
 void eits_pack_panels(eits_context *ctx);
 

@@ -1,11 +1,11 @@
 /* Active set: the exact optimum over a few columns by Newton's step on a factor of their products,
  * which grows and shrinks with them; then those columns join whose correlation exceeds lambda and
  * is the greatest among their neighbours in the image; and again until none is missing; between two
- * looks at every column, looks beside those held so far (Lawson and Hanson, Solving Least Squares
- * Problems, 1974, chapter 23, with several columns at a time). Each step keeps signs and lowers the
- * objective. A column that depends on those held moves with them, along what leaves S x as it is,
- * until one of them is zero and makes room: the factor never has more rows than there are
- * directions. */
+ * looks at every column, looks beside the active ones so far (Lawson and Hanson, Solving Least
+ * Squares Problems, 1974, chapter 23, with several columns at a time). Each step keeps signs and
+ * lowers the objective. A column that depends on the active ones moves with them, along what leaves
+ * S x as it is, until one of them is zero and makes room: the factor never has more rows than there
+ * are directions. */
 #include "base/vec.h"
 #include "frame/projection.h"
 #include "frame/whitening.h"
@@ -20,17 +20,17 @@ typedef struct active {
     eits_real lambda;
     eits_real tolerance; /* a correlation beyond lambda by no more than this is rounding */
     uint32_t most;       /* columns that can be independent */
-    /* of each column held: its correlation less lambda times its sign; zero at the optimum */
+    /* of each active column: its correlation less lambda times its sign; zero at the optimum */
     eits_real *pull;
-    /* of each column held: that of its coefficient, or of the correlation that brought it in */
+    /* of each active column: that of its coefficient, or of the correlation that brought it in */
     eits_real *sign;
     eits_real *work;
     eits_real *step;
-    eits_real *reach;  /* of each column held: what share of the step it can go */
+    eits_real *reach;  /* of each active column: what share of the step it can go */
     eits_real *column; /* the new column's part that counts */
-    eits_nearby near;  /* columns beside those held, now or before */
+    eits_nearby near;  /* columns beside the active ones, now or before */
     int limited;       /* the next step is not to be had for the MACs */
-    int loose;         /* a column is held that the factor does not have */
+    int loose;         /* a column is active that the factor does not have */
     int broken;        /* the factor is of no use */
     int moved;         /* x is not as it was before the last columns were taken in */
 } active;
@@ -56,7 +56,7 @@ static int affords(const eits_context *ctx, active *a, uint64_t macs)
     return !a->limited;
 }
 
-/* The last column held takes the place. Uses a->work and a->step. */
+/* The last active column takes the place. Uses a->work and a->step. */
 static void drop(eits_context *ctx, active *a, uint32_t place)
 {
     const uint32_t count = ctx->working_count, last = count - 1;
@@ -73,7 +73,7 @@ static void drop(eits_context *ctx, active *a, uint32_t place)
 
 /* Hold column j without a row of the factor's: only where the solve ends or another solver goes on.
  */
-static void hold_loosely(eits_context *ctx, uint32_t j, eits_real x)
+static void activate_dependent(eits_context *ctx, uint32_t j, eits_real x)
 {
     ctx->working[ctx->working_count] = j;
     ctx->x[ctx->working_count++] = x;
@@ -97,8 +97,8 @@ static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
     return square > INDEPENDENT * before ? square : 0;
 }
 
-/* a->step = the combination of the columns held that comes nearest to the new one; returns what it
- * leaves of its square. */
+/* a->step = the combination of the active columns that comes nearest to the new one; returns what
+ * it leaves of its square. */
 static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
 {
     const uint32_t count = ctx->working_count;
@@ -110,8 +110,8 @@ static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
     return square - eits_dot(ctx, a->work, a->work, count);
 }
 
-static void hold(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_real sign,
-                 eits_real pull, eits_real left)
+static void activate(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_real sign,
+                     eits_real pull, eits_real left)
 {
     const uint32_t k = ctx->working_count++;
     eits_factor_append(ctx, k, a->step, left);
@@ -121,9 +121,9 @@ static void hold(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_rea
     a->pull[k] = pull;
 }
 
-/* The new column depends on those held (a->step as above). Move along what leaves S x as it is, if
- * that lowers the objective, until a coefficient is zero, and drop that; returns by how much the
- * new one moved, 0 where there is no such way. */
+/* The new column depends on the active ones (a->step as above). Move along what leaves S x as it
+ * is, if that lowers the objective, until a coefficient is zero, and drop that; returns by how much
+ * the new one moved, 0 where there is no such way. */
 static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_real pull)
 {
     const uint32_t count = ctx->working_count;
@@ -164,7 +164,7 @@ static void add(eits_context *ctx, active *a, uint32_t j)
             return;
         const eits_real left = what_is_left(ctx, a, square);
         if (count < a->most && left > INDEPENDENT * square) {
-            hold(ctx, a, j, sign * x, sign, pull, left);
+            activate(ctx, a, j, sign * x, sign, pull, left);
             return;
         }
         const eits_real moved = exchange(ctx, a, sign, pull);
@@ -174,7 +174,7 @@ static void add(eits_context *ctx, active *a, uint32_t j)
     }
     if (x == 0)
         return;
-    hold_loosely(ctx, j, sign * x);
+    activate_dependent(ctx, j, sign * x);
     a->loose = 1;
 }
 
@@ -187,8 +187,8 @@ static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
     return x == 0 ? 0 : -x / a->step[k];
 }
 
-/* Newton's step to the optimum of the columns held, again and again without those that would change
- * sign. */
+/* Newton's step to the optimum of the active columns, again and again without those that would
+ * change sign. */
 static void settle(eits_context *ctx, active *a)
 {
     while (ctx->working_count > 0) {
@@ -223,8 +223,8 @@ static void settle(eits_context *ctx, active *a)
     }
 }
 
-/* The pull of the columns held, from ctx->gradient, which is zero for them afterwards; returns the
- * greatest. */
+/* The pull of the active columns, from ctx->gradient, which is zero for them afterwards; returns
+ * the greatest. */
 static eits_real take_pulls(eits_context *ctx, active *a)
 {
     eits_real greatest = 0;
@@ -237,22 +237,22 @@ static eits_real take_pulls(eits_context *ctx, active *a)
     return greatest;
 }
 
-static eits_certificate certify(eits_context *ctx, const active *a)
+static eits_duality_gap check_gap(eits_context *ctx, const active *a)
 {
     ctx->info.nonzeros = eits_apply_working(ctx, ctx->x, ctx->sx);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
-    return eits_certify(ctx, a->lambda, EITS_LAYOUT_WORKING);
+    return eits_find_duality_gap(ctx, a->lambda, EITS_LAYOUT_WORKING);
 }
 
 /* From a warm start's coefficients: a factor of their columns, without those that depend on the
  * others. Returns 0, nothing changed, where that is not to be had for the MACs. */
 static int begin_warm(eits_context *ctx, active *a)
 {
-    const uint64_t held = ctx->info.nonzeros, rank = ctx->model->rank;
-    if (!eits_affords(
-            ctx, held * ((held + 2u) * rank + eits_forward_macs(ctx) + eits_adjoint_macs(ctx)) +
-                     held * eits_factor_macs((uint32_t)held) + held * (rank + held) +
-                     2u * eits_gradient_macs(ctx)))
+    const uint64_t active_count = ctx->info.nonzeros, rank = ctx->model->rank;
+    if (!eits_affords(ctx, active_count * ((active_count + 2u) * rank + eits_forward_macs(ctx) +
+                                           eits_adjoint_macs(ctx)) +
+                               active_count * eits_factor_macs((uint32_t)active_count) +
+                               active_count * (rank + active_count) + 2u * eits_gradient_macs(ctx)))
         return 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
         const eits_real x = ctx->x[j];
@@ -262,7 +262,7 @@ static int begin_warm(eits_context *ctx, active *a)
             continue;
         const eits_real left = what_is_left(ctx, a, square);
         if (left > INDEPENDENT * square)
-            hold(ctx, a, j, x, x > 0 ? 1 : -1, 0, left);
+            activate(ctx, a, j, x, x > 0 ? 1 : -1, 0, left);
     }
     return 1;
 }
@@ -287,8 +287,8 @@ static int take_in(eits_context *ctx, active *a, uint32_t missing)
     return a->moved;
 }
 
-/* What joins next is mostly beside what is or was held: look there only. *objective is the last one
- * known. Returns whether anything moved. */
+/* What joins next is mostly beside what is or was active: look there only. *objective is the last
+ * one known. Returns whether anything moved. */
 static int look_nearby(eits_context *ctx, active *a, eits_real *objective)
 {
     const uint64_t rank = ctx->model->rank;
@@ -312,12 +312,12 @@ static int look_nearby(eits_context *ctx, active *a, eits_real *objective)
         return 0;
     eits_take_gradient_nearby(ctx, &a->near);
     (void)take_pulls(ctx, a);
-    const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, &a->near);
+    const uint32_t missing = eits_list_violations(ctx, a->lambda + a->tolerance, &a->near);
     return missing > 0 && take_in(ctx, a, missing);
 }
 
-/* One round; *c becomes the certificate after it. */
-static int round_of(eits_context *ctx, active *a, uint32_t missing, eits_certificate *c)
+/* One round; *c becomes the duality gap after it. */
+static int round_of(eits_context *ctx, active *a, uint32_t missing, eits_duality_gap *c)
 {
     eits_real objective = c->objective;
     ++ctx->info.iterations;
@@ -325,12 +325,12 @@ static int round_of(eits_context *ctx, active *a, uint32_t missing, eits_certifi
     for (int looks = 0; moved && looks < LOOKS_NEARBY && look_nearby(ctx, a, &objective); ++looks)
         ;
     if (moved)
-        *c = certify(ctx, a);
+        *c = check_gap(ctx, a);
     return moved;
 }
 
 /* Rounds until something ends them; 0 where another solver has to go on. */
-static int rounds(eits_context *ctx, active *a, eits_certificate *c)
+static int rounds(eits_context *ctx, active *a, eits_duality_gap *c)
 {
     const eits_options *o = &ctx->options;
     const eits_real enough = o->gap_rel * R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
@@ -344,7 +344,7 @@ static int rounds(eits_context *ctx, active *a, eits_certificate *c)
             return 1;
         }
         const eits_real pull = take_pulls(ctx, a), before = c->objective;
-        const uint32_t missing = eits_list_missing(ctx, a->lambda + a->tolerance, NULL);
+        const uint32_t missing = eits_list_violations(ctx, a->lambda + a->tolerance, NULL);
         if (stalls == 2 || (missing == 0 && pull <= a->tolerance)) {
             ctx->info.stop = EITS_STOP_OPTIMUM;
             return 1;
@@ -357,7 +357,7 @@ static int rounds(eits_context *ctx, active *a, eits_certificate *c)
             return 1;
         }
         stalls = c->objective < before * (1 - EPSILON) ? 0 : stalls + 1;
-        if (!moved) /* the gradient is as it was, but for the columns held */
+        if (!moved) /* the gradient is as it was, but for the columns active_count */
             stalls = 2;
     }
 }
@@ -371,21 +371,21 @@ void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known
     a.pull = ctx->slope[0], a.sign = ctx->slope[1], a.work = ctx->slope[2], a.step = ctx->sz;
     a.reach = ctx->x_next, a.column = ctx->sx_next;
     a.near = eits_nearby_none(ctx);
-    eits_certificate c;
-    /* the set changes column by column here: none are held unpacked */
-    ctx->working_count = ctx->working_held = 0;
+    eits_duality_gap c;
+    /* the set changes column by column here: none are active unpacked */
+    ctx->working_count = ctx->working_cached = 0;
     if (gradient_known) {
         eits_copy(ctx->residual, ctx->y, EITS_STRIDE(ctx->model->rank));
-        c = eits_evaluate(ctx, lambda, EITS_LAYOUT_WORKING);
+        c = eits_duality_gap_of(ctx, lambda, EITS_LAYOUT_WORKING);
     } else if (begin_warm(ctx, &a)) {
-        c = certify(ctx, &a);
+        c = check_gap(ctx, &a);
         if (!(c.objective < eits_ceiling(ctx))) {
             start_over_from_zero(ctx);
-            c = eits_certify(ctx, lambda, EITS_LAYOUT_WORKING);
+            c = eits_find_duality_gap(ctx, lambda, EITS_LAYOUT_WORKING);
         }
     } else {
         ctx->info.stop = EITS_STOP_MACS;
-        eits_report(ctx, eits_certify(ctx, lambda, EITS_LAYOUT_FULL));
+        eits_report_duality_gap(ctx, eits_find_duality_gap(ctx, lambda, EITS_LAYOUT_FULL));
         return;
     }
     const int done = rounds(ctx, &a, &c);
@@ -393,12 +393,13 @@ void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known
         start_over_from_zero(ctx);
     eits_working_set_end(ctx);
     if (done) {
-        eits_report(ctx, c);
+        eits_report_duality_gap(ctx, c);
         return;
     }
     if (!eits_affords(ctx, macs_to_finish(ctx, ctx->info.nonzeros + 1))) {
         ctx->info.stop = EITS_STOP_MACS;
-        eits_report(ctx, ctx->info.nonzeros == 0 ? eits_certify_zero(ctx, lambda) : c);
+        eits_report_duality_gap(ctx, ctx->info.nonzeros == 0 ? eits_duality_gap_at_zero(ctx, lambda)
+                                                             : c);
         return;
     }
     eits_run_coordinate(ctx, lambda, 0);

@@ -134,12 +134,12 @@ static sweep_end sweep(eits_context *ctx, descent *d, eits_real *worth)
 }
 
 /* Take S x, the residual and the gradient of every column anew. */
-static eits_certificate look(eits_context *ctx, descent *d)
+static eits_duality_gap look(eits_context *ctx, descent *d)
 {
     ctx->info.nonzeros = eits_apply(ctx, ctx->x, ctx->sx);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
     d->along = 0;
-    return eits_certify(ctx, d->lambda, EITS_LAYOUT_FULL);
+    return eits_find_duality_gap(ctx, d->lambda, EITS_LAYOUT_FULL);
 }
 
 static void choose(eits_context *ctx, const descent *d)
@@ -193,10 +193,10 @@ void eits_run_coordinate(eits_context *ctx, eits_real lambda, int gradient_known
                  .apart = !ctx->masked_whitening && ctx->basis_count <= 1};
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         d.norm[j] = -1;
-    eits_certificate c = {0};
+    eits_duality_gap c = {0};
     if (gradient_known) {
         eits_copy(ctx->residual, ctx->y, EITS_STRIDE(ctx->model->rank));
-        c = eits_evaluate(ctx, lambda, EITS_LAYOUT_FULL);
+        c = eits_duality_gap_of(ctx, lambda, EITS_LAYOUT_FULL);
     } else {
         c = look(ctx, &d);
     }
@@ -228,5 +228,5 @@ void eits_run_coordinate(eits_context *ctx, eits_real lambda, int gradient_known
         }
         interval = o->gap_rel > 0 || interval > UINT32_MAX / 12 ? interval : 6 * interval;
     }
-    eits_report(ctx, c);
+    eits_report_duality_gap(ctx, c);
 }

@@ -44,7 +44,7 @@ eits_real eits_ceiling(const eits_context *ctx)
  * a sum of terms that are not negative, so that nothing cancels (from Kim et al., IEEE J. Sel. Top.
  * Signal Process. 1 (2007) 606, doi 10.1109/JSTSP.2007.910971, with |y|^2 / 2 - |y - s r|^2 / 2
  * written out). */
-eits_certificate eits_evaluate(const eits_context *ctx, eits_real lambda, eits_layout layout)
+eits_duality_gap eits_duality_gap_of(const eits_context *ctx, eits_real lambda, eits_layout layout)
 {
     const eits_real largest =
         eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, ctx->options.sign);
@@ -52,35 +52,35 @@ eits_certificate eits_evaluate(const eits_context *ctx, eits_real lambda, eits_l
     const uint32_t count =
         layout == EITS_LAYOUT_WORKING ? ctx->working_count : ctx->model->n_pixels;
     eits_real lane[8] = {0}, lane_l1[8] = {0};
-    for (uint32_t k = 0; k < count; ++k) { /* columns that are not held add zero to their lanes */
+    for (uint32_t k = 0; k < count; ++k) { /* columns that are not cached add zero to their lanes */
         const uint32_t j = layout == EITS_LAYOUT_WORKING ? ctx->working[k] : k;
         const eits_real weight = lambda * eits_fabs(ctx->x[k]);
         const eits_real slack = eits_fma(-s * ctx->x[k], ctx->gradient[j], weight);
         lane[j % 8] += slack > 0 ? slack : 0; /* below zero by rounding only */
         lane_l1[j % 8] += weight;
     }
-    eits_certificate c;
+    eits_duality_gap c;
     c.residual_squared = eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
     c.gap = eits_fma(R(0.5) * (1 - s) * (1 - s), c.residual_squared, eits_tree8(lane));
     c.objective = eits_fma(R(0.5), c.residual_squared, eits_tree8(lane_l1));
     return c;
 }
 
-eits_certificate eits_certify(eits_context *ctx, eits_real lambda, eits_layout layout)
+eits_duality_gap eits_find_duality_gap(eits_context *ctx, eits_real lambda, eits_layout layout)
 {
     eits_take_gradient(ctx, ctx->sx);
-    return eits_evaluate(ctx, lambda, layout);
+    return eits_duality_gap_of(ctx, lambda, layout);
 }
 
-eits_certificate eits_certify_zero(const eits_context *ctx, eits_real lambda)
+eits_duality_gap eits_duality_gap_at_zero(const eits_context *ctx, eits_real lambda)
 {
     const eits_real half = half_square_of_data(ctx),
                     s = ctx->info.lambda_max > lambda ? lambda / ctx->info.lambda_max : 1;
-    return (eits_certificate){(1 - s) * (1 - s) * half, half,
+    return (eits_duality_gap){(1 - s) * (1 - s) * half, half,
                               ctx->info.data_norm * ctx->info.data_norm};
 }
 
-void eits_report(eits_context *ctx, eits_certificate c)
+void eits_report_duality_gap(eits_context *ctx, eits_duality_gap c)
 {
     ctx->info.gap = c.gap;
     const eits_real half = half_square_of_data(ctx);

@@ -1,15 +1,15 @@
 /* What all solvers share: the gradient of every column, the duality gap, and whether a step is
  * still to be had for the MACs. */
-#ifndef EITSKIN_CERTIFICATE_H
-#define EITSKIN_CERTIFICATE_H
+#ifndef EITSKIN_DUALITY_GAP_H
+#define EITSKIN_DUALITY_GAP_H
 
 #include "eitskin/context.h"
 
-typedef struct eits_certificate {
+typedef struct eits_duality_gap {
     eits_real gap;
     eits_real objective;
     eits_real residual_squared;
-} eits_certificate;
+} eits_duality_gap;
 
 /* Where a solver keeps its coefficients: ctx->x[j] for each column, or ctx->x[k] for column
  * ctx->working[k]. */
@@ -25,13 +25,13 @@ void eits_take_gradient(eits_context *ctx, const eits_real *sx);
 
 /* Objective and gap at ctx->x from ctx->residual and ctx->gradient as eits_take_gradient leaves
  * them. */
-eits_certificate eits_evaluate(const eits_context *ctx, eits_real lambda, eits_layout layout);
+eits_duality_gap eits_duality_gap_of(const eits_context *ctx, eits_real lambda, eits_layout layout);
 
 /* Both in one. */
-eits_certificate eits_certify(eits_context *ctx, eits_real lambda, eits_layout layout);
+eits_duality_gap eits_find_duality_gap(eits_context *ctx, eits_real lambda, eits_layout layout);
 
 /* The same at x = 0, of what info knows: no product is needed. */
-eits_certificate eits_certify_zero(const eits_context *ctx, eits_real lambda);
+eits_duality_gap eits_duality_gap_at_zero(const eits_context *ctx, eits_real lambda);
 
 /* Multiply-accumulates of eits_take_gradient, ctx->sx being known. */
 uint64_t eits_gradient_macs(const eits_context *ctx);
@@ -44,6 +44,6 @@ int eits_affords(const eits_context *ctx, uint64_t macs);
 eits_real eits_ceiling(const eits_context *ctx);
 
 /* Gap and residual into ctx->info. */
-void eits_report(eits_context *ctx, eits_certificate c);
+void eits_report_duality_gap(eits_context *ctx, eits_duality_gap c);
 
 #endif

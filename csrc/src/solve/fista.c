@@ -15,7 +15,7 @@ static int by_working_set(const eits_context *ctx)
 }
 
 /* How many coefficients x, x_next and z hold. */
-static uint32_t held(const eits_context *ctx)
+static uint32_t working_size(const eits_context *ctx)
 {
     return by_working_set(ctx) ? ctx->working_count : ctx->model->n_pixels;
 }
@@ -30,7 +30,7 @@ static void take_working_gradient(eits_context *ctx, const eits_real *sx)
 /* The extrapolated point starts at x, momentum forgotten. */
 static void restart_momentum(eits_context *ctx)
 {
-    eits_copy(ctx->z, ctx->x, held(ctx));
+    eits_copy(ctx->z, ctx->x, working_size(ctx));
     eits_copy(ctx->sz, ctx->sx, EITS_STRIDE(ctx->model->rank));
 }
 
@@ -56,7 +56,7 @@ static int affords_product(const eits_context *ctx)
     if (ctx->options.mac_limit == 0)
         return 1;
     uint64_t count = 0;
-    for (uint32_t k = 0; k < held(ctx); ++k)
+    for (uint32_t k = 0; k < working_size(ctx); ++k)
         count += ctx->x_next[k] != 0;
     return eits_affords(ctx, count * ctx->model->rank + eits_gradient_macs(ctx));
 }
@@ -69,7 +69,7 @@ static int iterate(eits_context *ctx, eits_real lambda, eits_real step, eits_rea
     const eits_real beta = (*t - 1) / t_next;
     const eits_prox how = {
         .step = step, .threshold = step * lambda, .beta = beta, .sign = ctx->options.sign};
-    ctx->kernels->prox(&how, held(ctx), ctx->gradient, ctx->x, ctx->x_next, ctx->z);
+    ctx->kernels->prox(&how, working_size(ctx), ctx->gradient, ctx->x, ctx->x_next, ctx->z);
     if (!affords_product(ctx))
         return 0;
     ctx->info.nonzeros = by_working_set(ctx) ? eits_apply_working(ctx, ctx->x_next, ctx->sx_next)
@@ -135,8 +135,8 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
     const eits_real scale = R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
     const eits_real ceiling = eits_ceiling(ctx);
     eits_real step = 1 / (eits_real)ctx->model->lipschitz, t = 1;
-    eits_certificate c = {0};
-    int certified = 0; /* c is that of x as it is */
+    eits_duality_gap c = {0};
+    int gap_known = 0; /* c is that of x as it is */
     schedule looks = {.next_look = 1, .interval = o->gap_every};
     restart_momentum(ctx);
     ctx->info.stop = EITS_STOP_ITERATIONS;
@@ -151,15 +151,15 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
             break;
         }
         ctx->info.iterations = k;
-        certified = 0;
+        gap_known = 0;
         if (k != o->iterations && k % o->gap_every != 0)
             continue;
         const int none = ctx->info.nonzeros == 0;
         if (k != o->iterations && !(o->gap_rel > 0) && !none &&
             eits_dot(ctx, ctx->sx, ctx->sx, ctx->model->rank) <= 4 * 2 * scale)
             continue; /* |Sx| <= 2 |y| wherever the objective is below its value at zero */
-        c = eits_certify(ctx, lambda, layout);
-        certified = 1;
+        c = eits_find_duality_gap(ctx, lambda, layout);
+        gap_known = 1;
         /* too long a step may also throw all coefficients beyond their sign, to zero: then the gap
          * is that of the start */
         if (!(c.objective <= ceiling) || (none && c.gap > R(1e-3) * scale)) {
@@ -172,7 +172,7 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
             t = 1;
             start_over_from_zero(ctx);
             looks = (schedule){.next_look = k + 1, .interval = o->gap_every};
-            c = eits_certify_zero(ctx, lambda);
+            c = eits_duality_gap_at_zero(ctx, lambda);
             continue;
         }
         if (o->gap_rel > 0 && c.gap <= o->gap_rel * scale) {
@@ -180,13 +180,14 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
             break;
         }
     }
-    if (ctx->info.stop == EITS_STOP_MACS && !certified) {
-        c = ctx->info.iterations == 0 && gradient_known ? eits_certify_zero(ctx, lambda)
-                                                        : eits_certify(ctx, lambda, layout);
+    if (ctx->info.stop == EITS_STOP_MACS && !gap_known) {
+        c = ctx->info.iterations == 0 && gradient_known
+                ? eits_duality_gap_at_zero(ctx, lambda)
+                : eits_find_duality_gap(ctx, lambda, layout);
         if (!(c.objective <= ceiling))
             ctx->info.stop = EITS_STOP_DIVERGED;
     }
-    eits_report(ctx, c);
+    eits_report_duality_gap(ctx, c);
 }
 
 void eits_run_fista(eits_context *ctx, eits_real lambda, int gradient_known)

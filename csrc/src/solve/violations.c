@@ -4,8 +4,8 @@
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
-/* How far the correlations lie beyond zero under the sign rule. */
-static const eits_real *beyond(const eits_context *ctx)
+/* How far the correlations lie violation zero under the sign rule. */
+static const eits_real *violation(const eits_context *ctx)
 {
     const eits_real *g = ctx->gradient;
     const uint32_t n = ctx->model->n_pixels;
@@ -70,9 +70,9 @@ static inline uint32_t place_of(const eits_pixel *pixel)
     return place;
 }
 
-/* Of BLOCK columns from v and p on, which are beyond `least` and no less than their neighbours in
- * the row; returns whether any is. The columns before and after are there too. Without a branch, so
- * that compilers make vectors of it. */
+/* Of BLOCK columns from v and p on, which are violation `least` and no less than their neighbours
+ * in the row; returns whether any is. The columns before and after are there too. Without a branch,
+ * so that compilers make vectors of it. */
 static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real least,
                               uint32_t flag[BLOCK])
 {
@@ -110,9 +110,9 @@ static uint32_t of_all(const eits_context *ctx, const eits_real *v, eits_real le
     return count;
 }
 
-uint32_t eits_list_missing(const eits_context *ctx, eits_real least, const eits_nearby *near)
+uint32_t eits_list_violations(const eits_context *ctx, eits_real least, const eits_nearby *near)
 {
-    const eits_real *v = beyond(ctx);
+    const eits_real *v = violation(ctx);
     if (near == NULL)
         return of_all(ctx, v, least);
     uint32_t above = 0, count = 0, *list = ctx->list_index;

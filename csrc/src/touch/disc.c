@@ -11,7 +11,7 @@
 typedef struct covered {
     uint32_t count;
     uint32_t *index;
-    eits_matrix matrix; /* whose columns `index` lists: S, or the held columns */
+    eits_matrix matrix; /* whose columns `index` lists: S, or the cached columns */
     eits_real *cover;
     eits_real *ramp;                /* minus the derivative */
     eits_real *toward_x, *toward_y; /* unit vector from centre to pixel; later the derivatives */
@@ -77,9 +77,9 @@ static void weigh(eits_context *ctx, covered *c)
         c->cover[k] *= factor;
         c->ramp[k] *= factor / pixel;
     }
-    if (eits_hold_columns(ctx, c->index, c->count)) {
-        eits_slots_of(ctx, c->index, c->count, c->index);
-        c->matrix = eits_held_columns(ctx);
+    if (eits_cache_columns(ctx, c->index, c->count)) {
+        eits_cache_slots(ctx, c->index, c->count, c->index);
+        c->matrix = eits_cached_columns(ctx);
     }
 }
 

@@ -34,7 +34,7 @@ def coordinate(
     x = np.zeros(p.n) if start is None else start.copy()
     norms = np.einsum("ij,ij->j", p.s, p.s)
     least = 64 * EPSILON**2 * float(p.y @ p.y)
-    certificate, gradient = p.certify(x)
+    certificate, gradient = p.check_gap(x)
     sweeps, stop, interval = done, "iterations", options.gap_every
     while sweeps < options.iterations:
         listed = np.flatnonzero((x != 0) | (shrink(gradient, lam, p.sign) != 0))
@@ -55,7 +55,7 @@ def coordinate(
                 worth += norms[j] * step * step
             listed, sweeps = np.array(kept, dtype=np.int64), sweeps + 1
             first = worth if first == np.inf else first
-        certificate, gradient = p.certify(x)
+        certificate, gradient = p.check_gap(x)
         if not certificate.objective <= p.ceiling:
             return Result(x, sweeps, "diverged", certificate, 0)
         if options.gap_rel > 0 and certificate.gap <= options.gap_rel * p.scale:
@@ -225,10 +225,10 @@ class ActiveSet:
         p, o, held = self.p, self.options, self.held
         if start is not None:
             self._begin(start)
-        c, gradient = p.certify(held.spread(p.n))
+        c, gradient = p.check_gap(held.spread(p.n))
         if start is not None and not c.objective < p.ceiling:
             self.held = held = Held()
-            c, gradient = p.certify(np.zeros(p.n))
+            c, gradient = p.check_gap(np.zeros(p.n))
         rounds, stalls = 0, 0
         while True:
             if o.gap_rel > 0 and c.gap <= o.gap_rel * p.scale:
@@ -250,7 +250,7 @@ class ActiveSet:
                 objective, more, failed = self._look_nearby(objective)
                 looks, more = looks + 1, more and not failed
             if moved:
-                c, gradient = p.certify(held.spread(p.n))
+                c, gradient = p.check_gap(held.spread(p.n))
             if failed or not c.objective <= before * (1 + 1e-3):
                 x = held.spread(p.n)
                 return coordinate(p, o, x if c.objective <= p.ceiling else None, rounds)

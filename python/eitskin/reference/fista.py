@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from eitskin.core.results import Options
-from eitskin.reference.problem import Certificate, FloatArray, Result, certify, project, shrink
+from eitskin.reference.problem import Certificate, FloatArray, Result, check_gap, project, shrink
 
 MAX_STEP_HALVINGS = 8
 PRUNE_EVERY, LOOK_GROWTH = 5, 6
@@ -55,7 +55,7 @@ def fista(
         none = not x.any()
         if not last and options.gap_rel == 0 and not none and float(sx @ sx) <= 8 * scale:
             continue
-        certificate = certify(s, y, x, sx, lam, sign, basis)
+        certificate = check_gap(s, y, x, sx, lam, sign, basis)
         if not certificate.objective <= scale * (1 + 1e-3) or (
             none and certificate.gap > 1e-3 * scale
         ):

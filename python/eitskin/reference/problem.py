@@ -40,7 +40,7 @@ class Certificate(NamedTuple):
     residual: float
 
 
-def certify(
+def check_gap(
     s: FloatArray,
     y: FloatArray,
     x: FloatArray,
@@ -96,9 +96,9 @@ class Problem:
         """Q (y - S x)."""
         return project(self.y - self.s @ x, self.basis)
 
-    def certify(self, x: FloatArray) -> tuple[Certificate, FloatArray]:
+    def check_gap(self, x: FloatArray) -> tuple[Certificate, FloatArray]:
         """The certificate at ``x`` and the correlation of every column."""
-        certificate = certify(self.s, self.y, x, self.s @ x, self.lam, self.sign, self.basis)
+        certificate = check_gap(self.s, self.y, x, self.s @ x, self.lam, self.sign, self.basis)
         return certificate, self.s.T @ self.residual(x)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from certified import check_sound, judged
 from everywhere import SameEverywhere
+from gap_known import check_sound, judged
 from made_models import made_blob, plain_options
 from random_problems import RandomProblem, gaussian, rounded, smooth, whitened, with_data
 
@@ -71,7 +71,7 @@ PROBLEMS = {
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """Whatever the columns, the result is sound (certified.check_sound); a zero column stays at
+    """Whatever the columns, the result is sound (gap_known.check_sound); a zero column stays at
     zero; where the data have fewer directions than there are columns, the active set's support is
     no larger than they are."""
     steps: list[Step] = []

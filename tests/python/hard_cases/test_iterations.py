@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from certified import Judged, U, check_sound, judged
 from everywhere import Outcome, SameEverywhere, on_host
+from gap_known import Judged, U, check_sound, judged
 from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import RandomProblem, gaussian, optimum_of, smooth, whitened
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from certified import check_sound, judged
 from everywhere import SameEverywhere
+from gap_known import check_sound, judged
 from made_models import made_blob, plain_options
 from random_problems import RANK, gaussian
 

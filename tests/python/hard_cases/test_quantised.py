@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from certified import check_sound, judged, objective_of
 from everywhere import SameEverywhere, on_host
+from gap_known import check_sound, judged, objective_of
 from made_models import made_blob, made_model, plain_options
 from random_problems import RandomProblem, gaussian, rounded, smooth, with_data
 

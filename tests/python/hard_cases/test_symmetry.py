@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from certified import U, judged
 from everywhere import Host, SameEverywhere, as_float32
+from gap_known import U, judged
 from made_models import made_blob, plain_options
 from random_problems import gaussian
 

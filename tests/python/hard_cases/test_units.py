@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from certified import Judged, U, check_sound, judged
 from everywhere import SameEverywhere, as_float32
+from gap_known import Judged, U, check_sound, judged
 from made_models import made_blob, made_model, plain_options
 from random_problems import gaussian, rounded
 

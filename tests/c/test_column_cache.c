@@ -1,5 +1,5 @@
 /* Columns held in the workspace: the right numbers wherever they stand, each unpacked once while it
- * is held, products with the same bits as from S itself. */
+ * is cached, products with the same bits as from S itself. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
@@ -52,60 +52,60 @@ static void list(uint32_t first, uint32_t step, uint32_t count, uint32_t *index)
         index[k] = first + step * k;
 }
 
-static void check_held(const eits_context *ctx, const uint32_t *index, uint32_t count)
+static void check_cached(const eits_context *ctx, const uint32_t *index, uint32_t count)
 {
     uint32_t slot[ROOM];
-    const eits_matrix held = eits_held_columns(ctx), *s = &ctx->model->sensitivity;
-    CHECK(held.scale == NULL && held.storage == EITS_STORAGE_F32 && held.rows == RANK &&
-          held.cols == ROOM);
-    eits_slots_of(ctx, index, count, slot);
+    const eits_matrix cached = eits_cached_columns(ctx), *s = &ctx->model->sensitivity;
+    CHECK(cached.scale == NULL && cached.storage == EITS_STORAGE_F32 && cached.rows == RANK &&
+          cached.cols == ROOM);
+    eits_cache_slots(ctx, index, count, slot);
     for (uint32_t k = 0; k < count; ++k) {
         CHECK(slot[k] < ROOM);
-        for (uint32_t i = 0; i < held.stride; ++i) {
+        for (uint32_t i = 0; i < cached.stride; ++i) {
             const float expected = i < RANK ? (float)dense_entry(s, index[k], i) : 0.0f;
-            CHECK(((const float *)held.data)[(size_t)held.stride * slot[k] + i] == expected);
+            CHECK(((const float *)cached.data)[(size_t)cached.stride * slot[k] + i] == expected);
         }
     }
 }
 
-static void held_once_and_given_up(eits_storage storage)
+static void unpacked_once_and_replaced(eits_storage storage)
 {
     bench b;
     eits_context *ctx = set_up(&b, storage, 0);
     uint32_t index[N];
     list(3, 1, 100, index);
-    CHECK_EQUAL(eits_hold_columns(ctx, index, 100), 1);
+    CHECK_EQUAL(eits_cache_columns(ctx, index, 100), 1);
     CHECK_EQUAL(unpacked, 100);
-    CHECK_EQUAL(eits_hold_columns(ctx, index + 20, 60), 1); /* all there */
+    CHECK_EQUAL(eits_cache_columns(ctx, index + 20, 60), 1); /* all there */
     CHECK_EQUAL(unpacked, 100);
     list(53, 1, 200, index); /* 50 there, 150 new: 250 in all */
-    CHECK_EQUAL(eits_hold_columns(ctx, index, 200), 1);
+    CHECK_EQUAL(eits_cache_columns(ctx, index, 200), 1);
     CHECK_EQUAL(unpacked, 250);
-    check_held(ctx, index, 200);
+    check_cached(ctx, index, 200);
     list(3, 1, 50, index); /* the first ones still are */
-    CHECK_EQUAL(eits_hold_columns(ctx, index, 50), 1);
+    CHECK_EQUAL(eits_cache_columns(ctx, index, 50), 1);
     CHECK_EQUAL(unpacked, 250);
     list(0, 1, ROOM, index); /* 253 of 256 are there; those that are wanted do not give way */
-    CHECK_EQUAL(eits_hold_columns(ctx, index, ROOM), 1);
+    CHECK_EQUAL(eits_cache_columns(ctx, index, ROOM), 1);
     CHECK_EQUAL(unpacked, 256);
-    check_held(ctx, index, ROOM);
+    check_cached(ctx, index, ROOM);
     list(N - 10, 1, 10, index);
-    CHECK_EQUAL(eits_hold_columns(ctx, index, 10), 1);
+    CHECK_EQUAL(eits_cache_columns(ctx, index, 10), 1);
     CHECK_EQUAL(unpacked, 266);
-    check_held(ctx, index, 10);
+    check_cached(ctx, index, 10);
     list(0, 1, ROOM + 1, index);
-    CHECK_EQUAL(eits_hold_columns(ctx, index, ROOM + 1), 0); /* too many */
+    CHECK_EQUAL(eits_cache_columns(ctx, index, ROOM + 1), 0); /* too many */
     CHECK_EQUAL(unpacked, 266);
-    CHECK_EQUAL(eits_hold_columns(ctx, index, 0), 1);
-    eits_drop_columns(ctx);
+    CHECK_EQUAL(eits_cache_columns(ctx, index, 0), 1);
+    eits_clear_column_cache(ctx);
     list(0, 2, 5, index);
-    CHECK_EQUAL(eits_hold_columns(ctx, index, 5), 1);
+    CHECK_EQUAL(eits_cache_columns(ctx, index, 5), 1);
     CHECK_EQUAL(unpacked, 271);
-    check_held(ctx, index, 5);
+    check_cached(ctx, index, 5);
     tear_down(&b);
 }
 
-/* The working set's products from held columns and from S. */
+/* The working set's products from cached columns and from S. */
 static void same_products(eits_storage storage, int prepared)
 {
     bench b;
@@ -115,9 +115,9 @@ static void same_products(eits_storage storage, int prepared)
         list(1, 1, count, ctx->working);
         ctx->working_count = count;
         eits_pack_panels(ctx);
-        CHECK_EQUAL(ctx->working_held, count <= ROOM);
-        eits_real v[EITS_STRIDE(RANK)] = {0}, x[N], by_held[N], by_s[N],
-                  sum_held[EITS_STRIDE(RANK)], sum_s[EITS_STRIDE(RANK)];
+        CHECK_EQUAL(ctx->working_cached, count <= ROOM);
+        eits_real v[EITS_STRIDE(RANK)] = {0}, x[N], by_cached[N], by_s[N],
+                  sum_cached[EITS_STRIDE(RANK)], sum_s[EITS_STRIDE(RANK)];
         for (uint32_t i = 0; i < RANK; ++i)
             v[i] = (eits_real)small_random(&state);
         for (uint32_t k = 0; k < count; ++k)
@@ -125,14 +125,14 @@ static void same_products(eits_storage storage, int prepared)
         eits_real *const panels = ctx->working_panels;
         eits_apply_t_working(ctx, v, by_s);
         ctx->working_panels = NULL;
-        eits_apply_t_working(ctx, v, by_held);
-        CHECK(memcmp(by_s, by_held, count * sizeof *by_s) == 0);
-        CHECK(eits_apply_working(ctx, x, sum_held) <= count);
-        ctx->working_held = 0;
+        eits_apply_t_working(ctx, v, by_cached);
+        CHECK(memcmp(by_s, by_cached, count * sizeof *by_s) == 0);
+        CHECK(eits_apply_working(ctx, x, sum_cached) <= count);
+        ctx->working_cached = 0;
         eits_apply_t_working(ctx, v, by_s);
-        CHECK(memcmp(by_s, by_held, count * sizeof *by_s) == 0);
+        CHECK(memcmp(by_s, by_cached, count * sizeof *by_s) == 0);
         (void)eits_apply_working(ctx, x, sum_s);
-        CHECK(memcmp(sum_s, sum_held, sizeof sum_s) == 0);
+        CHECK(memcmp(sum_s, sum_cached, sizeof sum_s) == 0);
         ctx->working_panels = panels;
     }
     tear_down(&b);
@@ -141,7 +141,7 @@ static void same_products(eits_storage storage, int prepared)
 int main(void)
 {
     for (int storage = 0; storage < 4; ++storage) {
-        held_once_and_given_up((eits_storage)storage);
+        unpacked_once_and_replaced((eits_storage)storage);
         same_products((eits_storage)storage, 0);
         same_products((eits_storage)storage, 1);
     }
