@@ -5,13 +5,13 @@
 #include <string.h>
 
 enum {
-    MOST_ITERATIONS = 1000,
-    MOST_SETTLE_US = 50000,
-    MOST_PERIOD_US = 600000000,
-    LEAST_SAMPLES = 4,
-    LEAST_MODEL = 64
+    MAX_ITERATIONS = 1000,
+    MAX_SETTLE_US = 50000,
+    MAX_PERIOD_US = 600000000,
+    MIN_SAMPLES = 4,
+    MIN_MODEL = 64
 };
-enum { LEAST_EXCITATION_MILLIHZ = 1000, MOST_EXCITATION_MILLIHZ = 250000000 };
+enum { MIN_EXCITATION_MILLIHZ = 1000, MAX_EXCITATION_MILLIHZ = 250000000 };
 
 static fw_answer answer(eits_reply_status status, int32_t a, int32_t b)
 {
@@ -32,7 +32,7 @@ static bool outside(fw_answer *out, size_t offset, uint32_t value, uint32_t low,
     return true;
 }
 
-static bool share_outside(fw_answer *out, size_t offset, float value)
+static bool fraction_outside(fw_answer *out, size_t offset, float value)
 {
     if (value >= 0 && value <= 1)
         return false;
@@ -92,8 +92,8 @@ static fw_answer on_tare(fw_instrument *instrument, const void *payload, size_t 
     (void)size;
     memcpy(&c, payload, sizeof c);
     const size_t at = offsetof(eits_command_tare, frames);
-    if (outside(&bad, at, c.frames, 1, FW_TARE_MOST) ||
-        (c.frames > 1 && outside(&bad, at, c.frames, 4, FW_TARE_MOST)))
+    if (outside(&bad, at, c.frames, 1, FW_TARE_MAX) ||
+        (c.frames > 1 && outside(&bad, at, c.frames, 4, FW_TARE_MAX)))
         return bad;
     if (!instrument->engine.open)
         return answer(EITS_REPLY_NO_MODEL, 0, 0);
@@ -107,15 +107,15 @@ static fw_answer check_scan(const fw_instrument *instrument, const eits_command_
 {
     fw_answer bad;
     if (outside(&bad, offsetof(eits_command_scan, excitation_millihz), c->excitation_millihz,
-                LEAST_EXCITATION_MILLIHZ, MOST_EXCITATION_MILLIHZ) ||
+                MIN_EXCITATION_MILLIHZ, MAX_EXCITATION_MILLIHZ) ||
         outside(&bad, offsetof(eits_command_scan, sample_rate_hz), c->sample_rate_hz,
-                FW_LEAST_RATE_HZ, FW_MOST_RATE_HZ) ||
-        outside(&bad, offsetof(eits_command_scan, samples), c->samples, LEAST_SAMPLES,
+                FW_MIN_RATE_HZ, FW_MAX_RATE_HZ) ||
+        outside(&bad, offsetof(eits_command_scan, samples), c->samples, MIN_SAMPLES,
                 FW_MAX_SAMPLES) ||
-        outside(&bad, offsetof(eits_command_scan, settle_us), c->settle_us, 0, MOST_SETTLE_US) ||
+        outside(&bad, offsetof(eits_command_scan, settle_us), c->settle_us, 0, MAX_SETTLE_US) ||
         outside(&bad, offsetof(eits_command_scan, reserved), c->reserved, 0, 0) ||
         outside(&bad, offsetof(eits_command_scan, frame_period_us), c->frame_period_us, 0,
-                MOST_PERIOD_US))
+                MAX_PERIOD_US))
         return bad;
     const uint64_t half_rate_millihz = (uint64_t)c->sample_rate_hz * 500u;
     if (c->excitation_millihz >= half_rate_millihz) /* more than two samples a period */
@@ -123,7 +123,7 @@ static fw_answer check_scan(const fw_instrument *instrument, const eits_command_
                       (int32_t)(half_rate_millihz - 1));
     if (fw_ad9833_tuning(instrument->board->mclk_hz, c->excitation_millihz) == 0)
         return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
-                      LEAST_EXCITATION_MILLIHZ);
+                      MIN_EXCITATION_MILLIHZ);
     if (!fw_whole_periods(c->excitation_millihz, c->sample_rate_hz, c->samples))
         return answer(
             EITS_REPLY_PERIODS,
@@ -142,10 +142,10 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     const fw_scan_settings settings = {c.excitation_millihz, c.sample_rate_hz, c.samples,
                                        c.settle_us,          c.check_every,    c.frame_period_us};
     const fw_scan_table table = fw_engine_table(&instrument->engine);
-    const uint64_t least_us = (uint64_t)fw_scan_rows(&settings, &table) * fw_slot_us(&settings);
+    const uint64_t min_us = (uint64_t)fw_scan_rows(&settings, &table) * fw_slot_us(&settings);
     if (instrument->engine.open && settings.frame_period_us != 0 &&
-        settings.frame_period_us < least_us)
-        return answer(EITS_REPLY_TOO_FAST, least_us > INT32_MAX ? INT32_MAX : (int32_t)least_us, 0);
+        settings.frame_period_us < min_us)
+        return answer(EITS_REPLY_TOO_FAST, min_us > INT32_MAX ? INT32_MAX : (int32_t)min_us, 0);
     fw_stop_scan(instrument);
     if (fw_scan_configure(&instrument->scan, &settings) == FW_OK) {
         instrument->settings = settings;
@@ -177,14 +177,13 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
     fw_answer bad;
     (void)size;
     memcpy(&c, payload, sizeof c);
-    if (outside(&bad, offsetof(eits_command_solver, iterations), c.iterations, 1,
-                MOST_ITERATIONS) ||
+    if (outside(&bad, offsetof(eits_command_solver, iterations), c.iterations, 1, MAX_ITERATIONS) ||
         outside(&bad, offsetof(eits_command_solver, max_touches), c.max_touches, 0,
                 EITS_MAX_TOUCHES) ||
         outside(&bad, offsetof(eits_command_solver, warm_start), c.warm_start, 0, 1) ||
         outside(&bad, offsetof(eits_command_solver, sign), c.sign, 0, EITS_SIGN_BOTH) ||
-        share_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
-        share_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
+        fraction_outside(&bad, offsetof(eits_command_solver, lambda_rel), c.lambda_rel) ||
+        fraction_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
         outside(&bad, offsetof(eits_command_solver, solver), c.solver, 0, EITS_SOLVER_ACTIVE_SET) ||
         outside(&bad, offsetof(eits_command_solver, diagnostics), c.diagnostics, 0,
                 EITS_DIAGNOSTICS_ALL) ||
@@ -228,9 +227,9 @@ static fw_answer on_model_begin(fw_instrument *instrument, const void *payload, 
     eits_command_model_begin c;
     (void)size;
     memcpy(&c, payload, sizeof c);
-    if (c.bytes < LEAST_MODEL)
+    if (c.bytes < MIN_MODEL)
         return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_model_begin, bytes),
-                      LEAST_MODEL);
+                      MIN_MODEL);
     return fw_upload_begin(instrument, c.bytes, c.crc);
 }
 

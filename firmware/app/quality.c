@@ -73,20 +73,20 @@ static void weigh(const fw_engine *engine, const fw_frame *frame, uint32_t row, 
 static uint32_t find_open(const fw_engine *engine, const fw_frame *frame)
 {
     const eits_model *model = &engine->model;
-    const float expected_rms = rms_expected(model), least = FW_OPEN_SIGNIFICANT * expected_rms;
-    const float share =
-        expected_rms > 0 ? FW_OPEN_SHARE * rms_of_z(engine, frame) / expected_rms : 0;
+    const float expected_rms = rms_expected(model), min = FW_OPEN_SIGNIFICANT * expected_rms;
+    const float fraction =
+        expected_rms > 0 ? FW_OPEN_FRACTION * rms_of_z(engine, frame) / expected_rms : 0;
     evidence found = {.alive = 0};
     uint32_t open = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const float expected2 = model->v_ref[k] * model->v_ref[k];
-        if (!(expected2 > least * least))
+        if (!(expected2 > min * min))
             continue;
-        weigh(engine, frame, model->fold[k].first, share * share * expected2, &found);
-        weigh(engine, frame, model->fold[k].second, share * share * expected2, &found);
+        weigh(engine, frame, model->fold[k].first, fraction * fraction * expected2, &found);
+        weigh(engine, frame, model->fold[k].second, fraction * fraction * expected2, &found);
     }
     for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
-        if (found.significant[e] >= FW_OPEN_LEAST_ROWS && (found.alive & 1u << e) == 0)
+        if (found.significant[e] >= FW_OPEN_MIN_ROWS && (found.alive & 1u << e) == 0)
             open |= 1u << e;
     }
     return open;
@@ -114,13 +114,13 @@ static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_judge
             ((frame->quality[fold.first] | frame->quality[fold.second]) & UNUSABLE) != 0)
             continue;
         const float off = frame->volts[fold.first] - (float)fold.sign * frame->volts[fold.second];
-        const float share = (off < 0 ? -off : off) / all;
-        if (share > FW_RECIPROCITY_SHARE) {
+        const float fraction = (off < 0 ? -off : off) / all;
+        if (fraction > FW_RECIPROCITY_FRACTION) {
             frame->quality[fold.first] |= EITS_QUALITY_RECIPROCITY;
             frame->quality[fold.second] |= EITS_QUALITY_RECIPROCITY;
         }
-        if (share > worst) {
-            worst = share;
+        if (fraction > worst) {
+            worst = fraction;
             judged->worst_row = fold.first;
         }
     }

@@ -20,12 +20,12 @@ uint32_t fw_burst_us(const fw_scan_settings *s)
 
 uint32_t fw_slot_us(const fw_scan_settings *s)
 {
-    const uint32_t least = fw_burst_us(s) + s->settle_us + FW_SWITCH_US;
-    for (uint32_t us = least; us <= least + least / 4; ++us) {
+    const uint32_t min = fw_burst_us(s) + s->settle_us + FW_SWITCH_US;
+    for (uint32_t us = min; us <= min + min / 4; ++us) {
         if ((uint64_t)us * s->excitation_millihz % 1000000000u == 0)
             return us;
     }
-    return least;
+    return min;
 }
 
 uint32_t fw_scan_rows(const fw_scan_settings *settings, const fw_scan_table *table)
@@ -107,7 +107,7 @@ static void on_burst(void *user, const fw_burst *burst)
     const bool settled = scan->switched && (int32_t)(burst->start_us - scan->switched_us) >
                                                (int32_t)scan->settings.settle_us;
     const bool good = settled && !burst->lost;
-    if (!good && scan->tries < FW_MOST_TRIES) {
+    if (!good && scan->tries < FW_MAX_TRIES) {
         ++scan->tries;
         atomic_fetch_add_explicit(&scan->slots_repeated, 1, memory_order_relaxed);
         if (!scan->switched) {

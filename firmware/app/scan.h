@@ -13,10 +13,10 @@
 
 #include <stdatomic.h>
 
-#define FW_SWITCH_US     3u /* allowance in a slot for interrupt latency and break before make */
-#define FW_MOST_TRIES    8u /* of one row, before it is given up as unsettled */
-#define FW_LEAST_RATE_HZ 1000u
-#define FW_MOST_RATE_HZ  5000000u
+#define FW_SWITCH_US   3u /* allowance in a slot for interrupt latency and break before make */
+#define FW_MAX_TRIES   8u /* of one row, before it is given up as unsettled */
+#define FW_MIN_RATE_HZ 1000u
+#define FW_MAX_RATE_HZ 5000000u
 
 typedef struct fw_scan_settings {
     uint32_t excitation_millihz, sample_rate_hz;

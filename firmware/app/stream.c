@@ -16,7 +16,7 @@ static void tell_scan(fw_instrument *instrument, const fw_frame *frame, const fw
     if (!judged->checked)
         return;
     /* one frame in which a touch moves has reciprocals that disagree too */
-    const bool doubtful = (float)judged->worst_permille > 1000.0f * FW_RECIPROCITY_SHARE;
+    const bool doubtful = (float)judged->worst_permille > 1000.0f * FW_RECIPROCITY_FRACTION;
     instrument->doubtful = doubtful ? instrument->doubtful + 1 : 0;
     instrument->agreeing = doubtful ? 0 : instrument->agreeing + 1;
     detail.index = (int32_t)judged->worst_row;

@@ -5,7 +5,7 @@
 
 #include "app/engine.h"
 
-#define FW_TARE_MOST 1024u
+#define FW_TARE_MAX 1024u
 #define FW_TARE_REFUSED \
     16u /* reference frames that may be refused (a saturated row...) before the tare fails */
 
@@ -23,7 +23,7 @@ typedef enum fw_tare_step {
     FW_TARE_FAILED /* status says why; the last reference is back */
 } fw_tare_step;
 
-/* 1 frame, or 4 to FW_TARE_MOST. */
+/* 1 frame, or 4 to FW_TARE_MAX. */
 void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames,
                    uint32_t now_us);
 

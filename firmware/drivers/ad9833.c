@@ -9,20 +9,20 @@ enum {
     ADDRESS_PHASE0 = 0xC000
 };
 
-#define MOST_MCLK_HZ 64000000u /* so that 2^28 times it in millihertz fits 64 bits */
-#define FULL_TURN    ((uint64_t)1 << 28)
+#define MAX_MCLK_HZ 64000000u /* so that 2^28 times it in millihertz fits 64 bits */
+#define FULL_TURN   ((uint64_t)1 << 28)
 
 uint32_t fw_ad9833_tuning(uint32_t mclk_hz, uint64_t millihertz)
 {
     const uint64_t mclk_millihertz = (uint64_t)mclk_hz * 1000u;
-    if (mclk_hz == 0 || mclk_hz > MOST_MCLK_HZ || millihertz > mclk_millihertz / 2)
+    if (mclk_hz == 0 || mclk_hz > MAX_MCLK_HZ || millihertz > mclk_millihertz / 2)
         return 0;
     return (uint32_t)((millihertz * FULL_TURN + mclk_millihertz / 2) / mclk_millihertz);
 }
 
 uint64_t fw_ad9833_millihertz(uint32_t mclk_hz, uint32_t tuning)
 {
-    if (mclk_hz > MOST_MCLK_HZ)
+    if (mclk_hz > MAX_MCLK_HZ)
         return 0;
     return ((uint64_t)(tuning & (FULL_TURN - 1)) * mclk_hz * 1000u + FULL_TURN / 2) / FULL_TURN;
 }

@@ -12,7 +12,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { MOST_CASES = 64, MOST_ROUNDS = 200, FEW_COLUMNS = 48 };
+enum { MAX_CASES = 64, MAX_ROUNDS = 200, FEW_COLUMNS = 48 };
 
 #ifdef EITS_DOUBLE
 enum { LANES = 4 };
@@ -46,10 +46,10 @@ typedef struct bench_case {
     eits_storage which;
     uint32_t columns;
     size_t read_bytes;
-    double ns[MOST_ROUNDS];
+    double ns[MAX_ROUNDS];
 } bench_case;
 
-static bench_case cases[MOST_CASES];
+static bench_case cases[MAX_CASES];
 static int case_count;
 
 static double now_ns(void)
@@ -162,7 +162,7 @@ static void call_prox(work *w)
 static bench_case *add(const char *name, const char *storage, void (*call)(work *), double macs,
                        double bytes)
 {
-    if (case_count == MOST_CASES)
+    if (case_count == MAX_CASES)
         exit(1);
     cases[case_count] = (bench_case){.name = name,
                                      .storage = storage,
@@ -214,7 +214,7 @@ int main(int count, char **argument)
                    cols = count == 4 ? (uint32_t)atoi(argument[2]) : 0;
     const int rounds = count == 4 ? atoi(argument[3]) : 0;
     if (rows < 8 || rows > 1024 || cols < FEW_COLUMNS || cols > 20000 || rounds < 1 ||
-        rounds > MOST_ROUNDS) {
+        rounds > MAX_ROUNDS) {
         fprintf(stderr, "usage: bench_kernels RANK COLUMNS ROUNDS\n");
         return 2;
     }

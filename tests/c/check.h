@@ -1,4 +1,4 @@
-/* A few words to test with: each failed CHECK says where (the first MOST_SHOWN of them); main
+/* A few words to test with: each failed CHECK says where (the first MAX_SHOWN of them); main
  * returns checks_report(). */
 #ifndef EITSKIN_TEST_CHECK_H
 #define EITSKIN_TEST_CHECK_H
@@ -16,7 +16,7 @@
 #define BOTH_WIDTHS(narrow, wide) (narrow)
 #endif
 
-enum { MOST_SHOWN = 20 };
+enum { MAX_SHOWN = 20 };
 static int checks_failed = 0;
 static int checks_made = 0;
 
@@ -26,7 +26,7 @@ static inline void check_that(int right, const char *file, int line, const char 
     ++checks_made;
     if (right)
         return;
-    if (++checks_failed <= MOST_SHOWN)
+    if (++checks_failed <= MAX_SHOWN)
         printf("%s:%d: not true: %s\n", file, line, what);
 }
 
@@ -37,7 +37,7 @@ static inline void check_near(double got, double want, double tolerance, const c
     ++checks_made;
     if (off <= tolerance) /* false for NaN */
         return;
-    if (++checks_failed <= MOST_SHOWN)
+    if (++checks_failed <= MAX_SHOWN)
         printf("%s:%d: %s = %.9g, expected %.9g within %.3g\n", file, line, what, got, want,
                tolerance);
 }
@@ -48,7 +48,7 @@ static inline void check_equal(long long got, long long want, const char *file, 
     ++checks_made;
     if (got == want)
         return;
-    if (++checks_failed <= MOST_SHOWN)
+    if (++checks_failed <= MAX_SHOWN)
         printf("%s:%d: %s = %lld, expected %lld\n", file, line, what, got, want);
 }
 

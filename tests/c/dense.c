@@ -90,13 +90,13 @@ double dense_dot(const double *a, const double *b, size_t count)
 
 double dense_greatest_difference(const double *a, const eits_real *b, size_t count)
 {
-    double most = 0;
+    double max = 0;
     for (size_t i = 0; i < count; ++i) {
         const double off = fabs(a[i] - (double)b[i]);
-        if (!(off <= most))
-            most = off; /* NaN stays */
+        if (!(off <= max))
+            max = off; /* NaN stays */
     }
-    return most;
+    return max;
 }
 
 double dense_objective(const dense *d, const double *y, const double *x, double lambda)

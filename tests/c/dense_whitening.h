@@ -135,7 +135,7 @@ static inline void solve_what_is_seen(bench *b, int sign)
     CHECK(greatest <= (double)b->b.c.model.lipschitz);
     if (ctx->basis_count == 0 && ctx->masked_whitening == EITS_WHITENING_DIAGONAL)
         CHECK_NEAR(greatest, b->b.c.model.lipschitz, 1e-3);
-    double *y = dense_copy(ctx->y, RANK), least = 0;
+    double *y = dense_copy(ctx->y, RANK), min = 0;
     eits_options o = ctx->options;
     o.sign = (eits_sign)sign;
     o.lambda_rel = R(0.05);
@@ -157,10 +157,10 @@ static inline void solve_what_is_seen(bench *b, int sign)
         if (solver == 3) {
             CHECK(info.stop == EITS_STOP_GAP || info.stop == EITS_STOP_OPTIMUM);
             CHECK(info.gap <= BOTH_WIDTHS(1e-5, 1e-9) * scale);
-            least = objective - (double)info.gap - room;
+            min = objective - (double)info.gap - room;
         }
-        CHECK(objective >= least &&
-              objective <= least + (double)info.gap + BOTH_WIDTHS(1.2e-4, 1e-8) * scale);
+        CHECK(objective >= min &&
+              objective <= min + (double)info.gap + BOTH_WIDTHS(1.2e-4, 1e-8) * scale);
         CHECK(info.gap <= R(1e-3) * (eits_real)scale);
         free(got);
     }

@@ -302,7 +302,7 @@ static void options_out_of_range(void)
     o.max_touches = 0;
     o.max_masked = UINT32_MAX;
     o.touch_sweeps = 1000;
-    o.track_confirm = o.track_hold = EITS_MOST_TRACK_FRAMES;
+    o.track_confirm = o.track_hold = EITS_MAX_TRACK_FRAMES;
     o.track_smooth = R(1e30);
     o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_min_fraction = 1;
     o.lambda_abs = o.detection_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm =

@@ -36,8 +36,8 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
             (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
         const double dy =
             (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
-        const double share = 0.5 + ((double)disc->radius_mm - sqrt(dx * dx + dy * dy)) / pixel;
-        const double cover = fmin(1, fmax(0, share)) / (double)m->column_weight[j];
+        const double fraction = 0.5 + ((double)disc->radius_mm - sqrt(dx * dx + dy * dy)) / pixel;
+        const double cover = fmin(1, fmax(0, fraction)) / (double)m->column_weight[j];
         covered += cover > 0;
         for (uint32_t i = 0; i < RANK; ++i)
             atom[i] += cover * b->d.s[(size_t)j * RANK + i];
@@ -159,8 +159,9 @@ static int smooth_around(const bench *b, const eits_disc *disc, double step)
         const double dy =
             (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
         const double from = sqrt(dx * dx + dy * dy),
-                     share = 0.5 + ((double)disc->radius_mm - from) / pixel;
-        if (fabs(share) < 2 * step / pixel || fabs(share - 1) < 2 * step / pixel || from < 0.1)
+                     fraction = 0.5 + ((double)disc->radius_mm - from) / pixel;
+        if (fabs(fraction) < 2 * step / pixel || fabs(fraction - 1) < 2 * step / pixel ||
+            from < 0.1)
             return 0;
     }
     return 1;

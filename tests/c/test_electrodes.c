@@ -89,7 +89,7 @@ static void what_a_dead_row_is(void)
     for (int way = 0; way < 6; ++way) {
         bench b;
         eits_context *ctx = set_up(&b, 0);
-        const eits_real share = way < 2 ? (way ? R(0.025) : R(0.015)) : 0,
+        const eits_real fraction = way < 2 ? (way ? R(0.025) : R(0.015)) : 0,
                         small = way == 4 ? R(0.4) : R(0.2);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) *
@@ -101,7 +101,7 @@ static void what_a_dead_row_is(void)
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
             if (row_uses(ctx, i, 6) && (way < 4 || !row_uses(ctx, i, 2)))
                 b.frame[i] = way == 2 || way == 3 ? (way == 2 ? R(0.028) : R(0.033)) * b.frame[i]
-                                                  : share * b.frame[i];
+                                                  : fraction * b.frame[i];
         }
         reconstruct(&b);
         CHECK_EQUAL(ctx->info.open_electrodes, way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);

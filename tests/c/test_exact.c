@@ -42,7 +42,7 @@ static void tear_down(bench *b)
     small_model_free(&b->made);
 }
 
-/* lambda: a share of the greatest correlation. */
+/* lambda: a fraction of the greatest correlation. */
 static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign,
                        double lambda, double gap)
 {
@@ -60,7 +60,7 @@ static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iteration
 }
 
 /* The gap at the result, in double. */
-static void check_gap(const eits_context *ctx, double most_rel)
+static void check_gap(const eits_context *ctx, double max_rel)
 {
     dense d = dense_of(ctx->model);
     const uint32_t n = ctx->model->n_pixels, rank = ctx->model->rank;
@@ -68,7 +68,7 @@ static void check_gap(const eits_context *ctx, double most_rel)
     const double gap = dense_gap(&d, y, x, (double)ctx->info.lambda, ctx->options.sign),
                  scale = 0.5 * dense_dot(y, y, rank);
     CHECK_NEAR(gap, ctx->info.gap, 300 * EPS * scale);
-    CHECK(gap <= most_rel * scale);
+    CHECK(gap <= max_rel * scale);
     for (uint32_t j = 0; j < n; ++j)
         CHECK(ctx->options.sign == EITS_SIGN_BOTH ||
               (ctx->options.sign == EITS_SIGN_INCREASE ? x[j] >= 0 : x[j] <= 0));

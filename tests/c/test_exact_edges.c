@@ -36,7 +36,7 @@ static eits_context *set_up(dense_bench *b, double off)
     return &b->c.ctx;
 }
 
-static void check_result(const dense_bench *b, double most)
+static void check_result(const dense_bench *b, double max)
 {
     const eits_context *ctx = &b->c.ctx;
     double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
@@ -46,7 +46,7 @@ static void check_result(const dense_bench *b, double most)
         nonzeros += x[j] != 0;
     }
     CHECK_EQUAL(ctx->info.nonzeros, nonzeros);
-    CHECK(dense_objective(&b->d, y, x, (double)ctx->info.lambda) <= most);
+    CHECK(dense_objective(&b->d, y, x, (double)ctx->info.lambda) <= max);
     free(x), free(y);
 }
 

@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { SIDE = 4, N = SIDE * SIDE, MOST_RANK = 40 };
+enum { SIDE = 4, N = SIDE * SIDE, MAX_RANK = 40 };
 static const double GREATEST = BOTH_WIDTHS((double)FLT_MAX, DBL_MAX);
 
 typedef struct bench {
@@ -121,12 +121,12 @@ static void correlations_that_overflow(void)
 static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_limit)
 {
     bench b;
-    make(&b, MOST_RANK);
-    set_columns(&b, MOST_RANK, 3.75e-23f, 2.6e-23f);
+    make(&b, MAX_RANK);
+    set_columns(&b, MAX_RANK, 3.75e-23f, 2.6e-23f);
     /* the least that a model may state */
     small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 1.2e-38f);
     eits_context *ctx = open_made(&b);
-    for (int i = 0; i < MOST_RANK; ++i)
+    for (int i = 0; i < MAX_RANK; ++i)
         ctx->y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
     eits_options o = ctx->options;
     o.solver = solver;
@@ -151,8 +151,8 @@ static void columns_whose_squares_vanish(void)
             const eits_info info = solve_vanishing((eits_solver)solver, sizes[s], 0);
             CHECK_EQUAL(info.stop, BOTH_WIDTHS(EITS_STOP_DIVERGED, EITS_STOP_OPTIMUM));
             CHECK(sizeof(eits_real) == 4 || info.residual < R(0.02) * info.data_norm);
-            for (uint32_t limit = MOST_RANK; sizeof(eits_real) == 4 && limit < info.macs;
-                 limit += limit < 2000 ? MOST_RANK : limit / 3) {
+            for (uint32_t limit = MAX_RANK; sizeof(eits_real) == 4 && limit < info.macs;
+                 limit += limit < 2000 ? MAX_RANK : limit / 3) {
                 const eits_info limited = solve_vanishing((eits_solver)solver, sizes[s], limit);
                 CHECK(limited.macs <= limit &&
                       (limited.stop == EITS_STOP_MACS || limited.stop == EITS_STOP_DIVERGED));

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const small_spec TINY = {.rank = 3, .side = 3};
-enum { HEAD = 32, MOST = 1024 };
+enum { HEAD = 32, MAX = 1024 };
 
 /* A section of 3 points with an order, and its bytes. */
 static uint32_t section_of(uint8_t *bytes, uint32_t order)
@@ -17,7 +17,7 @@ static uint32_t section_of(uint8_t *bytes, uint32_t order)
     static const float gain[] = {0.9f,   0.25f, -0.125f, 3.5f,   -0.3f, 0.2f,  0.05f, 0.1f,
                                  -0.15f, 0.35f, 0.4f,    -0.45f, 0.11f, 0.21f, -0.31f};
     const uint32_t terms = (order + 1) * (order + 2) / 2;
-    memset(bytes, 0, MOST);
+    memset(bytes, 0, MAX);
     small_put_u32(bytes, 3);
     small_put_u32(bytes + 4, order);
     small_put_f32(bytes + 8, 10.0f);
@@ -48,7 +48,7 @@ static eits_status refused(const uint8_t *bytes, uint32_t size)
 
 static eits_status with_word(uint32_t order, uint32_t at, uint32_t word)
 {
-    uint8_t bytes[MOST];
+    uint8_t bytes[MAX];
     const uint32_t size = section_of(bytes, order);
     small_put_u32(bytes + at, word);
     return refused(bytes, size);
@@ -74,7 +74,7 @@ static double gain_by_hand(const float *c, uint32_t order, double u, double v)
 static void forces_are_those_of_the_table(void)
 {
     for (uint32_t order = 0; order <= EITS_MAX_FORCE_ORDER; ++order) {
-        uint8_t bytes[MOST];
+        uint8_t bytes[MAX];
         eits_model model;
         small_model kept;
         CHECK_EQUAL(open_with(bytes, section_of(bytes, order), &model, &kept), EITS_OK);
@@ -111,7 +111,7 @@ static void no_calibration_no_force(void)
 
 static void sections_of_another_size(void)
 {
-    uint8_t bytes[MOST];
+    uint8_t bytes[MAX];
     for (uint32_t order = 0; order <= EITS_MAX_FORCE_ORDER; ++order) {
         const uint32_t size = section_of(bytes, order);
         CHECK_EQUAL(refused(bytes, size), EITS_OK);
@@ -157,7 +157,7 @@ static void numbers_out_of_range(void)
 /* Touches carry the force of their own place and strength. */
 static void touches_have_forces(void)
 {
-    uint8_t bytes[MOST];
+    uint8_t bytes[MAX];
     const small_spec spec = {.rank = 24, .side = 12, .shape = SMALL_WAVES};
     small_model bare = small_model_make(spec),
                 made = small_model_with_force(&bare, bytes, section_of(bytes, 2));

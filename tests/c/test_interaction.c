@@ -60,8 +60,8 @@ static seen look(const eits_model *m, const eits_disc *disc)
     for (uint32_t j = 0; j < m->n_pixels; ++j) {
         const double x = (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * PIXEL,
                      y = (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * PIXEL;
-        const double share = 0.5 + ((double)disc->radius_mm - cabs(x + I * y - s.place)) / PIXEL;
-        const double cover = share < 0 ? 0 : share > 1 ? 1 : share;
+        const double fraction = 0.5 + ((double)disc->radius_mm - cabs(x + I * y - s.place)) / PIXEL;
+        const double cover = fraction < 0 ? 0 : fraction > 1 ? 1 : fraction;
         whole += cover;
         for (uint32_t r = 0; r < 2 * L + 4; ++r)
             rows[r] += cover * dense_entry(&m->fields.at, j, r);
@@ -277,9 +277,9 @@ static void when_it_is_left_alone(void)
     for (int i = 0; i < RANK; ++i)
         y[i] = (double)ctx->y[i];
     /* a quarter of |y|^2; it grows as the product of the changes */
-    const double most = 0.5 * size_of(y) / size_of(added);
-    CHECK(most > 1);
-    strong[0].change *= (eits_real)(0.99 * most);
+    const double max = 0.5 * size_of(y) / size_of(added);
+    CHECK(max > 1);
+    strong[0].change *= (eits_real)(0.99 * max);
     CHECK(!left_alone(ctx, strong, 2));
     strong[0].change *= R(1.02);
     CHECK(left_alone(ctx, strong, 2));

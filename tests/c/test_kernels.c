@@ -121,9 +121,11 @@ static void check_mul(const sample *s, uint64_t *state)
     eits_real *x = reals(m->cols), *value = reals(m->cols),
               *out[2] = {reals(m->stride), reals(m->stride)};
     uint32_t *index = memory_of(m->cols * sizeof *index);
-    for (int share = 0; share <= 4; ++share) { /* of zeros: all, three quarters, ... none */
-        fill(x, m->cols, 1 - 0.25 * share, state);
-        const uint32_t count = eits_list_nonzeros(builds[share % build_count], m, x, index, value);
+    for (int fraction = 0; fraction <= 4;
+         ++fraction) { /* of zeros: all, three quarters, ... none */
+        fill(x, m->cols, 1 - 0.25 * fraction, state);
+        const uint32_t count =
+            eits_list_nonzeros(builds[fraction % build_count], m, x, index, value);
         uint32_t seen = 0;
         for (uint32_t j = 0; j < m->cols; ++j) {
             if (x[j] == 0)
@@ -340,22 +342,22 @@ static void the_greatest(void)
     uint64_t state = 16;
     for (size_t count = 0; count <= 70; ++count) {
         for (int kind = 0; kind < 3; ++kind) { /* of both signs, none above zero, none below */
-            eits_real *a = reals(count), most[3] = {0};
+            eits_real *a = reals(count), max[3] = {0};
             fill(a, count, 0.1, &state);
             for (size_t i = 0; i < count; ++i) {
                 a[i] = kind == 0 ? a[i] : kind == 1 ? -eits_fabs(a[i]) : eits_fabs(a[i]);
                 const eits_real as[3] = {a[i], -a[i], eits_fabs(a[i])};
                 for (int sign = 0; sign < 3; ++sign)
-                    most[sign] = as[sign] > most[sign] ? as[sign] : most[sign];
+                    max[sign] = as[sign] > max[sign] ? as[sign] : max[sign];
             }
             for (int b = 0; b < build_count; ++b) {
                 for (int sign = 0; sign < 3; ++sign)
-                    CHECK(builds[b]->greatest(a, count, (eits_sign)sign) == most[sign]);
+                    CHECK(builds[b]->greatest(a, count, (eits_sign)sign) == max[sign]);
             }
             if (count > 0)
                 a[count / 2] = R(NAN); /* is never the greatest */
             for (int b = 0; b < build_count; ++b)
-                CHECK(builds[b]->greatest(a, count, EITS_SIGN_BOTH) <= most[2]);
+                CHECK(builds[b]->greatest(a, count, EITS_SIGN_BOTH) <= max[2]);
             free(a);
         }
     }

@@ -7,10 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST = (int)EITS_LINK_MAX_PAYLOAD, ROOM = (int)EITS_LINK_ENCODED(EITS_LINK_MAX_PAYLOAD) };
+enum { MAX = (int)EITS_LINK_MAX_PAYLOAD, ROOM = (int)EITS_LINK_ENCODED(EITS_LINK_MAX_PAYLOAD) };
 
 static _Alignas(8) uint8_t buffer[EITS_LINK_MAX_PACKET];
-static uint8_t payload[MOST], wire[ROOM], other[ROOM];
+static uint8_t payload[MAX], wire[ROOM], other[ROOM];
 
 static uint32_t state = 1;
 
@@ -130,17 +130,17 @@ static void round_trips(void)
         }
     }
     for (int kind = 0; kind < 4; ++kind) {
-        fill((size_t)MOST, kind);
-        one_round_trip((size_t)MOST, 0);
-        one_round_trip((size_t)MOST, (size_t)MOST);
-        one_round_trip((size_t)MOST - 1, 16);
+        fill((size_t)MAX, kind);
+        one_round_trip((size_t)MAX, 0);
+        one_round_trip((size_t)MAX, (size_t)MAX);
+        one_round_trip((size_t)MAX - 1, 16);
     }
 }
 
 static void limits_of_room(void)
 {
-    fill((size_t)MOST, 1);
-    CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, (size_t)MOST, payload, 1), 0);
+    fill((size_t)MAX, 1);
+    CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, (size_t)MAX, payload, 1), 0);
     CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, SIZE_MAX, payload, 2), 0);
     CHECK_EQUAL(eits_link_encode(wire, sizeof wire, 1, 1, payload, 2, payload, SIZE_MAX), 0);
     CHECK_EQUAL(eits_link_encode(NULL, sizeof wire, 1, 1, payload, 1, NULL, 0), 0);
@@ -348,9 +348,9 @@ static void by_bytes_and_by_blocks(void)
     size_t at = 0, by_bytes = 0;
     while (at < length) {
         eits_link_packet packet, single = {.payload = NULL};
-        const size_t most = 1 + next_random() % 700;
+        const size_t max = 1 + next_random() % 700;
         const size_t taken =
-            eits_link_feed(&blocks, line + at, at + most < length ? most : length - at, &packet);
+            eits_link_feed(&blocks, line + at, at + max < length ? max : length - at, &packet);
         for (size_t k = 0; k < taken; ++k) {
             CHECK_EQUAL(eits_link_feed(&bytes, line + at + k, 1, &single), 1);
             CHECK(k + 1 == taken || !single.payload);

@@ -164,7 +164,7 @@ static void of_a_whole_frame(void)
         for (int i = 0; i < SMALL_ROWS; ++i)
             frame[i] = reference[i] * (eits_real)(1 + 0.3 * small_random(&state));
         CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
-        uint64_t least = 0;
+        uint64_t min = 0;
         for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
             eits_options o = ctx->options;
             o.solver = (eits_solver)solver;
@@ -172,8 +172,8 @@ static void of_a_whole_frame(void)
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
             eits_info info;
             CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, &info), EITS_OK);
-            least = limit == 2 ? info.macs : least; /* the first frame also builds the basis */
-            CHECK(limit <= 2 || info.macs <= (limit > least ? limit : least));
+            min = limit == 2 ? info.macs : min; /* the first frame also builds the basis */
+            CHECK(limit <= 2 || info.macs <= (limit > min ? limit : min));
         }
         dense_bench_close(&b);
     }

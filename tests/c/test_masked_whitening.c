@@ -6,7 +6,7 @@
 
 /* What the core states of its numbers: the regularisation's law, how little a lost direction
  * counts, the margin of the step. */
-static const double LOST = 0.01, MARGIN = 0.995, LEAST_SHARE = 0.1, NOISE_FACTOR = 5, MOST = 1;
+static const double LOST = 0.01, MARGIN = 0.995, MIN_FRACTION = 0.1, NOISE_FACTOR = 5, MAX = 1;
 
 /* In place, by Gauss-Jordan; the matrix is positive definite. */
 static void invert(double a[RANK][RANK])
@@ -38,8 +38,8 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
     for (int f = 0; f < SMALL_FOLDED; ++f)
         left += !b->out[f] / (double)SMALL_FOLDED;
     const double asked =
-        fmin(NOISE_FACTOR * (double)(ctx->reference.noise_v / ctx->reference.v0_rms), MOST);
-    const double mu = fmax(SMALL_REGULARISATION * fmax(left * left * left, LEAST_SHARE),
+        fmin(NOISE_FACTOR * (double)(ctx->reference.noise_v / ctx->reference.v0_rms), MAX);
+    const double mu = fmax(SMALL_REGULARISATION * fmax(left * left * left, MIN_FRACTION),
                            left * asked),
                  lost = LOST * mu;
     const double scale = MARGIN / (1 + SMALL_REGULARISATION) * (1 + mu) / (1 + lost);
@@ -179,7 +179,7 @@ static void until_nothing_is_left(void)
             if (left <= (uint32_t)project)
                 CHECK(ctx->info.stop == EITS_STOP_ZERO && ctx->info.nonzeros == 0 && count == 0);
             norm = k == 0 ? ctx->info.data_norm : norm;
-            CHECK(ctx->info.data_norm < 4 * norm); /* 1 / sqrt(LEAST_SHARE), and some */
+            CHECK(ctx->info.data_norm < 4 * norm); /* 1 / sqrt(MIN_FRACTION), and some */
             eits_context *other = set_up(&fresh, WHITENED, project);
             CHECK_EQUAL(eits_use_portable_kernels(other, 1), EITS_OK);
             CHECK_EQUAL(eits_reconstruct(other, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);

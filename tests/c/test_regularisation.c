@@ -6,7 +6,7 @@
 #include "eitskin/touch.h"
 #include "frame/regularisation.h"
 
-static const double FACTOR = 5, MOST = 1;
+static const double FACTOR = 5, MAX = 1;
 
 static void choose_factor(eits_context *ctx, double factor)
 {
@@ -29,7 +29,7 @@ static void the_formula(void)
     const double noises[] = {2.1e-3, 0.01, 0.1, 0.9};
     for (size_t n = 0; n < sizeof noises / sizeof noises[0]; ++n) {
         /* P and S are stored as float */
-        const double mu = fmin(FACTOR * noises[n], MOST), bound = BOTH_WIDTHS(1e-5, 1e-6);
+        const double mu = fmin(FACTOR * noises[n], MAX), bound = BOTH_WIDTHS(1e-5, 1e-6);
         bench b;
         eits_context *ctx = set_up(&b, WHITENED, 0);
         (void)stage(&b);
@@ -216,10 +216,10 @@ static void learned_with_it(void)
     memcpy(b.frame, untouched[2], sizeof b.frame);
     (void)stage(&b);
     CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
-    double *back = dense_copy(eits_adjoint(ctx, ctx->y, ctx->adjoint), RANK), most = 0;
+    double *back = dense_copy(eits_adjoint(ctx, ctx->y, ctx->adjoint), RANK), max = 0;
     for (int j = 0; j < N; ++j)
-        most = fmax(most, fabs(dense_dot(b.b.d.s + j * RANK, back, RANK)));
-    CHECK_NEAR(learned, most / (double)ctx->noise_ratio, 1e-4 * learned);
+        max = fmax(max, fabs(dense_dot(b.b.d.s + j * RANK, back, RANK)));
+    CHECK_NEAR(learned, max / (double)ctx->noise_ratio, 1e-4 * learned);
     CHECK(ctx->noise_ratio < R(0.8));
     free(back);
     dense_bench_close(&b.b);

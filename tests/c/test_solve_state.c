@@ -64,7 +64,7 @@ static void detection_threshold_and_lambda_rule(void)
     CHECK(top > 0.1 && info.stop == EITS_STOP_ITERATIONS);
     CHECK_NEAR(info.lambda, 0.1 * top, 2 * EPS * top);
     ctx->reference.lambda_noise = (eits_real)(0.1 * top);
-    info = solve(ctx); /* 0.05 of lambda_max by the noise, 0.1 by the share */
+    info = solve(ctx); /* 0.05 of lambda_max by the noise, 0.1 by the fraction */
     CHECK_NEAR(info.lambda, 0.1 * top, 2 * EPS * top);
     CHECK_NEAR(info.lambda_noise, 0.1 * top, 2 * EPS * top);
     ctx->reference.lambda_noise = (eits_real)(0.5 * top);

@@ -36,7 +36,7 @@ static void press(eits_context *ctx, const eits_disc *disc, uint32_t count)
 static eits_fit begin(eits_context *ctx, const eits_disc *disc, uint32_t count)
 {
     eits_fit f = {.data = ctx->y,
-                  .whole = eits_dot(ctx, ctx->y, ctx->y, RANK),
+                  .total = eits_dot(ctx, ctx->y, ctx->y, RANK),
                   .radius_weight = ctx->options.touch_radius_weight};
     f.count = count;
     memcpy(f.disc, disc, count * sizeof *disc);
@@ -67,7 +67,7 @@ static void check_residual(eits_context *ctx, const eits_fit *f)
         (void)eits_disc_atom(ctx, &f->disc[k], atom, NULL);
         eits_axpy(ctx, left, -f->disc[k].change, atom, RANK);
     }
-    const double size = sqrt((double)f->whole);
+    const double size = sqrt((double)f->total);
     for (int i = 0; i < RANK; ++i)
         CHECK_NEAR(ctx->residual[i], left[i], 100 * EPS * size);
 }
@@ -225,7 +225,7 @@ static void one_large_touch_stays_one(void)
         CHECK((f.macs > 0) == (rest > 0)); /* nothing left: nothing is tried */
         CHECK(memcmp(&before, &f.disc[0], sizeof before) == 0);
         check_residual(ctx, &f);
-        f.noise = f.whole; /* all that is left may be noise */
+        f.noise = f.total; /* all that is left may be noise */
         f.macs = 0;
         CHECK_EQUAL(eits_fit_split(ctx, &f), 0);
         CHECK_EQUAL(f.macs, 0);

@@ -77,9 +77,10 @@ static double strength(finger f)
     return f.change * PI * f.radius * f.radius;
 }
 
-/* The touch nearest to the finger must lie within `apart` mm and have its strength within `share`.
+/* The touch nearest to the finger must lie within `apart` mm and have its strength within
+ * `fraction`.
  */
-static const eits_touch *check_found(const bench *b, finger f, double apart, double share)
+static const eits_touch *check_found(const bench *b, finger f, double apart, double fraction)
 {
     const eits_touch *best = NULL;
     double nearest = 1e9;
@@ -93,7 +94,7 @@ static const eits_touch *check_found(const bench *b, finger f, double apart, dou
     CHECK(best != NULL);
     CHECK_NEAR(nearest, 0, apart);
     if (best != NULL)
-        CHECK_NEAR(best->strength_s_per_m_mm2, strength(f), share * fabs(strength(f)));
+        CHECK_NEAR(best->strength_s_per_m_mm2, strength(f), fraction * fabs(strength(f)));
     return best;
 }
 
@@ -190,14 +191,14 @@ static void dropped_and_limited(void)
     eits_options o = defaults;
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
-    const double share = (double)b.found[1].confidence;
-    CHECK_NEAR(share, 0.09 / 1.09, 0.02); /* energies go with the square of the strengths */
-    o.touch_min_fraction = (eits_real)(1.2 * share);
+    const double fraction = (double)b.found[1].confidence;
+    CHECK_NEAR(fraction, 0.09 / 1.09, 0.02); /* energies go with the square of the strengths */
+    o.touch_min_fraction = (eits_real)(1.2 * fraction);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 1);
     (void)check_found(&b, two[0], 2, 0.1);
-    o.touch_min_fraction = (eits_real)(0.8 * share);
+    o.touch_min_fraction = (eits_real)(0.8 * fraction);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
@@ -207,12 +208,12 @@ static void dropped_and_limited(void)
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 1);
     o = defaults;
-    for (uint32_t most = 0; most <= 2; ++most) {
-        o.max_touches = most;
+    for (uint32_t max = 0; max <= 2; ++max) {
+        o.max_touches = max;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         press(&b, two, 2, 0);
-        CHECK_EQUAL(b.count, most);
-        if (most == 1)
+        CHECK_EQUAL(b.count, max);
+        if (max == 1)
             CHECK(b.found[0].x_mm < 0); /* the strongest */
     }
     tear_down(&b);
@@ -230,8 +231,8 @@ static void many_peaks(void)
     o.touch_min_fraction = 0;
     o.touch_seed_radius_mm = o.touch_min_radius_mm = R(3.0);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    for (uint32_t most = 1; most <= EITS_MAX_TOUCHES; most += 5) {
-        o.max_touches = most;
+    for (uint32_t max = 1; max <= EITS_MAX_TOUCHES; max += 5) {
+        o.max_touches = max;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         memset(ctx->y, 0, RANK * sizeof *ctx->y);
         CHECK_EQUAL(eits_solve(ctx), EITS_OK);
@@ -250,13 +251,13 @@ static void many_peaks(void)
         eits_touch found[EITS_MAX_TOUCHES];
         uint32_t count;
         CHECK_EQUAL(eits_find_touches(ctx, found, EITS_MAX_TOUCHES, &count), EITS_OK);
-        CHECK(count >= 1 && count <= most);
-        for (uint32_t k = 0; k < count; ++k) { /* each at one of the `most` highest peaks */
+        CHECK(count >= 1 && count <= max);
+        for (uint32_t k = 0; k < count; ++k) { /* each at one of the `max` highest peaks */
             const uint32_t ix = (uint32_t)lround(((double)found[k].x_mm + 57) / PIXEL),
                            iy = (uint32_t)lround(((double)found[k].y_mm + 57) / PIXEL);
             CHECK_NEAR(found[k].x_mm, -57 + PIXEL * ix, 1e-4);
             CHECK(ix % 2 == 0 && iy % 2 == 0);
-            CHECK((37 * (10 * (iy / 2) + ix / 2)) % 100 >= 100 - most);
+            CHECK((37 * (10 * (iy / 2) + ix / 2)) % 100 >= 100 - max);
         }
     }
     tear_down(&b);

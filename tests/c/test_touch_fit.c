@@ -133,9 +133,9 @@ static double unexplained(const double *y, const double *atoms, uint32_t count, 
     return dense_dot(rest, rest, RANK);
 }
 
-/* Confidence is the share of |y|^2 that leaving the touch out leaves unexplained, the others taking
- * up what they can: for discs that overlap, at pixel centres, with their strengths alone fitted.
- * One peak of the image has nothing behind it. */
+/* Confidence is the fraction of |y|^2 that leaving the touch out leaves unexplained, the others
+ * taking up what they can: for discs that overlap, at pixel centres, with their strengths alone
+ * fitted. One peak of the image has nothing behind it. */
 static void confidence_is_what_leaving_out_costs(void)
 {
     /* x, y mm, change */
@@ -169,16 +169,16 @@ static void confidence_is_what_leaving_out_costs(void)
     uint32_t count;
     CHECK_EQUAL(eits_find_touches(ctx, found, 4, &count), EITS_OK);
     CHECK_EQUAL(count, 3);
-    const double all = unexplained(y, atoms + RANK, 3, -1), whole = dense_dot(y, y, RANK);
+    const double all = unexplained(y, atoms + RANK, 3, -1), total = dense_dot(y, y, RANK);
     for (uint32_t t = 0; t < count && t < 4; ++t) {
         int k = 1;
         while (k < 3 && hypot(places[k][0] - (double)found[t].x_mm,
                               places[k][1] - (double)found[t].y_mm) > 0.1)
             ++k;
-        const double share = (unexplained(y, atoms + RANK, 3, k - 1) - all) / whole;
-        CHECK(share > 0.03 && share < 0.6);
+        const double fraction = (unexplained(y, atoms + RANK, 3, k - 1) - all) / total;
+        CHECK(fraction > 0.03 && fraction < 0.6);
         /* strengths come by ten passes, not exactly */
-        CHECK_NEAR(found[t].confidence, share, 0.01 * share);
+        CHECK_NEAR(found[t].confidence, fraction, 0.01 * fraction);
     }
     small_context_close(&c);
     small_model_free(&made);
@@ -201,15 +201,15 @@ static void each_touch_must_exceed_the_detection_threshold(void)
     const eits_disc weak = {33, -3, 9, R(0.02), 1};
     eits_real atom[RANK];
     (void)eits_disc_atom(ctx, &weak, atom, NULL);
-    double *part = dense_copy(atom, RANK), most = 0;
+    double *part = dense_copy(atom, RANK), max = 0;
     for (int iy = 8; iy <= 10; ++iy) { /* pixel (15, 9) */
         for (int ix = 14; ix <= 16; ++ix)
-            most = fmax(most, 0.02 * dense_dot(d.s + (iy * SIDE + ix) * RANK, part, RANK));
+            max = fmax(max, 0.02 * dense_dot(d.s + (iy * SIDE + ix) * RANK, part, RANK));
     }
     for (int k = 0; k < 2; ++k) {
         ctx->reference.lambda_noise = 0;
         (void)press(ctx, 1);
-        ctx->reference.lambda_noise = (eits_real)(most * (k == 0 ? 0.999 : 1.001));
+        ctx->reference.lambda_noise = (eits_real)(max * (k == 0 ? 0.999 : 1.001));
         CHECK(ctx->info.lambda_max > R(1.5) * ctx->reference.lambda_noise);
         (void)touch_macs(ctx, k == 0 ? 2 : 1);
     }

@@ -82,7 +82,7 @@ static void births(void)
     CHECK_EQUAL(one(ctx, t, 0, 0.06), 1); /* it was that touch itself: no need to wait */
     CHECK_EQUAL(t[0].id, 3);
     eits_forget(ctx);
-    ctx->info.lambda_noise = 5; /* a large share of a frame that is little more than noise */
+    ctx->info.lambda_noise = 5; /* a large fraction of a frame that is little more than noise */
     CHECK_EQUAL(one(ctx, t, 0, 0.2), 0);
     eits_forget(ctx);
     ctx->info.lambda_noise = 2; /* 1.2 times noise: not faint, and not sure either */
@@ -201,12 +201,12 @@ static void smoothing(void)
     eits_context *ctx = set_up(&b, 0, 2, 0.66);
     jitter(ctx, 0, 0.02, &found, &still);
     CHECK(still < 0.8 * found);
-    const double share = still / found;
+    const double fraction = still / found;
     /* 80 mm/s at 48 frames a second: no lag once it goes at a constant speed */
     jitter(ctx, 1.7, 0.02, &found, &moving);
     CHECK(moving < 0.8 * found);
     jitter(ctx, 0, 1, &found, &clear); /* the surer a place, the less it is smoothed */
-    CHECK(clear / found > share);
+    CHECK(clear / found > fraction);
     eits_touch t[EITS_MAX_TOUCHES];
     eits_forget(ctx);
     /* no noise: places are as found, but for the hundredth of a pixel that none is surer than */

@@ -1,5 +1,5 @@
 /* Outliers where the other folds tell what is right: half scans, whose second rows are copies, and
- * which side of a fold is wrong; and channels: many folds that share a pair. */
+ * which side of a fold is wrong; and channels: many folds that fraction a pair. */
 #include "check.h"
 #include "small_model.h"
 
@@ -364,7 +364,8 @@ static void several_wrong_sides(void)
     tear_down(&b);
 }
 
-/* The thresholds, from both sides: noise, the share of the largest datum, the share of their own.
+/* The thresholds, from both sides: noise, the fraction of the largest datum, the fraction of their
+ * own.
  */
 static void what_sides_may_differ_by(void)
 {
@@ -409,7 +410,7 @@ static int uses_either(const eits_context *ctx, uint32_t i)
 }
 
 /* The channel of one pair: the rows measured across it go, their reciprocals stay. Of two
- * electrodes that share no channel, all. */
+ * electrodes that fraction no channel, all. */
 static void noisy_channel(void)
 {
     for (int crossed = 0; crossed < 2; ++crossed) {

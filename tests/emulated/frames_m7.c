@@ -21,11 +21,11 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MOST_MODEL = 2048 * 1024, MOST_WORKSPACE = 1024 * 1024, MOST_ROWS = 4096 };
+enum { MAX_MODEL = 2048 * 1024, MAX_WORKSPACE = 1024 * 1024, MAX_ROWS = 4096 };
 
-static _Alignas(16) uint8_t model_bytes[MOST_MODEL];
-static _Alignas(16) uint8_t workspace[MOST_WORKSPACE];
-static float frame[MOST_ROWS];
+static _Alignas(16) uint8_t model_bytes[MAX_MODEL];
+static _Alignas(16) uint8_t workspace[MAX_WORKSPACE];
+static float frame[MAX_ROWS];
 static eits_model model;
 static eits_context ctx;
 static eits_options options;
@@ -164,7 +164,7 @@ static int load(const char *name)
     eits_status status = eits_model_open(&model, model_bytes, size);
     if (status == EITS_OK) {
         need = eits_workspace_size(&model, 0);
-        status = need <= sizeof workspace && model.n_rows <= MOST_ROWS
+        status = need <= sizeof workspace && model.n_rows <= MAX_ROWS
                      ? eits_init(&ctx, &model, workspace, need)
                      : EITS_E_WORKSPACE;
     }
@@ -179,8 +179,7 @@ static int load(const char *name)
 
 static int read_numbers(float *to, uint32_t count)
 {
-    return numbers != NULL && count <= MOST_ROWS &&
-           fread(to, sizeof to[0], count, numbers) == count;
+    return numbers != NULL && count <= MAX_ROWS && fread(to, sizeof to[0], count, numbers) == count;
 }
 
 /* All of `count` frames are read, also where one is refused. */

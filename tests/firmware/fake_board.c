@@ -7,7 +7,7 @@
 
 enum {
     OFF_NS = 140 /* the data sheet's, not the driver's */,
-    MOST_WAIT_NS = 1000000,
+    MAX_WAIT_NS = 1000000,
     ERASE_STEPS = 2
 };
 
@@ -229,9 +229,9 @@ void fake_advance(fake_board *f, uint64_t ns)
 
 void fake_wait(fake_board *f)
 {
-    const uint64_t next = next_interrupt_ns(f), limit = f->now_ns + MOST_WAIT_NS;
+    const uint64_t next = next_interrupt_ns(f), limit = f->now_ns + MAX_WAIT_NS;
     fake_advance(f, next < limit && next > f->now_ns ? next - f->now_ns
-                                                     : (next <= f->now_ns ? 0 : MOST_WAIT_NS));
+                                                     : (next <= f->now_ns ? 0 : MAX_WAIT_NS));
 }
 
 /* ---- flash ---- */

@@ -11,16 +11,16 @@ const skin_spec SKIN_ADJACENT = {
 const skin_spec SKIN_OPPOSITE = {
     .electrodes = 16, .drive_step = 8, .measure_step = 1, .rank = 20, .side = 8};
 
-enum { MOST_ROWS = 4096, SECTIONS = 11 };
+enum { MAX_ROWS = 4096, SECTIONS = 11 };
 static const char TAGS[SECTIONS][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS",
                                        "COLW", "GRID", "DEFS", "GOLD", "META"};
 enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, META };
 
 typedef struct draft {
     uint32_t n_rows, n_folded;
-    uint8_t rows[MOST_ROWS][4];
-    eits_fold fold[MOST_ROWS];
-    float volts[MOST_ROWS], touched[MOST_ROWS];
+    uint8_t rows[MAX_ROWS][4];
+    eits_fold fold[MAX_ROWS];
+    float volts[MAX_ROWS], touched[MAX_ROWS];
 } draft;
 
 static int same_pair(const uint8_t *a, const uint8_t *b) /* 1, -1 turned, or 0 */
@@ -36,7 +36,7 @@ static void draft_rows(draft *d, const skin_spec *spec)
             uint8_t row[4] = {(uint8_t)i, (uint8_t)((i + spec->drive_step) % n), (uint8_t)k,
                               (uint8_t)((k + spec->measure_step) % n)};
             if (row[0] == row[2] || row[0] == row[3] || row[1] == row[2] || row[1] == row[3] ||
-                d->n_rows == MOST_ROWS)
+                d->n_rows == MAX_ROWS)
                 continue;
             if (spec->turned != 0 && d->n_rows % spec->turned == spec->turned - 1) {
                 row[2] = row[3];
@@ -45,7 +45,7 @@ static void draft_rows(draft *d, const skin_spec *spec)
             memcpy(d->rows[d->n_rows++], row, 4);
         }
     }
-    uint8_t taken[MOST_ROWS] = {0};
+    uint8_t taken[MAX_ROWS] = {0};
     for (uint32_t i = 0; i < d->n_rows; ++i) {
         if (taken[i])
             continue;

@@ -7,7 +7,7 @@
 #include "base/vec.h"
 #include "small_model.h"
 
-enum { MODELS = 16, STEPS = 8, MOST_ITERATIONS = 24, MOST_SWEEPS = 2 };
+enum { MODELS = 16, STEPS = 8, MAX_ITERATIONS = 24, MAX_SWEEPS = 2 };
 
 /* ---- models ---- */
 
@@ -187,8 +187,8 @@ static void change_options(twins *t, fuzz_bytes *in)
     MUST(status == EITS_OK || same_bits(&before, &t->ctx[0].options, sizeof before));
     if (status != EITS_OK)
         return;
-    wanted.iterations = 1 + (wanted.iterations - 1) % MOST_ITERATIONS;
-    wanted.touch_sweeps %= MOST_SWEEPS + 1;
+    wanted.iterations = 1 + (wanted.iterations - 1) % MAX_ITERATIONS;
+    wanted.touch_sweeps %= MAX_SWEEPS + 1;
     for (int k = 0; k < t->count; ++k)
         MUST(eits_set_options(&t->ctx[k], &wanted) == EITS_OK);
 }

@@ -3,11 +3,11 @@
  * encoding gives, and every stretch between zeros must be counted once. */
 #include "fuzz.h"
 
-enum { ROOM = 600, MOST_PACKETS = 64, MOST_WIRE = 4096 };
+enum { ROOM = 600, MAX_PACKETS = 64, MAX_WIRE = 4096 };
 
 typedef struct heard {
     uint32_t packets;
-    uint32_t digest[MOST_PACKETS]; /* of type, sequence number and payload */
+    uint32_t digest[MAX_PACKETS]; /* of type, sequence number and payload */
     eits_link_decoder decoder;
 } heard;
 
@@ -64,8 +64,8 @@ static void hear(heard *h, uint8_t *buffer, size_t room, const uint8_t *bytes, s
                 continue;
             }
             MUST(bytes[at + taken - 1] == 0);
-            MUST(h->packets < MOST_PACKETS * (uint32_t)MOST_WIRE);
-            if (h->packets < MOST_PACKETS) {
+            MUST(h->packets < MAX_PACKETS * (uint32_t)MAX_WIRE);
+            if (h->packets < MAX_PACKETS) {
                 check_packet(&h->decoder, &packet);
                 h->digest[h->packets] = digest_of(&packet);
             }
@@ -106,7 +106,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     MUST(whole.packets == cut.packets && whole.packets == a->packets);
     MUST(memcmp(whole.digest, cut.digest,
                 sizeof whole.digest[0] *
-                    (whole.packets < MOST_PACKETS ? whole.packets : MOST_PACKETS)) == 0);
+                    (whole.packets < MAX_PACKETS ? whole.packets : MAX_PACKETS)) == 0);
     MUST(a->packets == b->packets && a->crc_errors == b->crc_errors &&
          a->framing_errors == b->framing_errors);
     MUST(a->overruns == b->overruns && a->version_errors == b->version_errors &&
@@ -123,11 +123,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
 static size_t mutate_packet(uint8_t *data, size_t size, size_t room, uint32_t seed)
 {
-    static _Alignas(8) uint8_t buffer[MOST_WIRE];
-    static uint8_t made[EITS_LINK_ENCODED(MOST_WIRE)];
+    static _Alignas(8) uint8_t buffer[MAX_WIRE];
+    static uint8_t made[EITS_LINK_ENCODED(MAX_WIRE)];
     eits_link_decoder decoder;
     eits_link_packet packet = {.payload = NULL};
-    if (size > MOST_WIRE || eits_link_decoder_init(&decoder, buffer, sizeof buffer) != EITS_OK)
+    if (size > MAX_WIRE || eits_link_decoder_init(&decoder, buffer, sizeof buffer) != EITS_OK)
         return size;
     size_t from = 2, to = 2;
     for (uint32_t skip = seed % 4; to < size; from = to) { /* one of the first packets */
@@ -135,7 +135,7 @@ static size_t mutate_packet(uint8_t *data, size_t size, size_t room, uint32_t se
         if (packet.payload != NULL && skip-- == 0)
             break;
     }
-    uint8_t type = (uint8_t)(seed >> 8), payload[MOST_WIRE];
+    uint8_t type = (uint8_t)(seed >> 8), payload[MAX_WIRE];
     uint32_t sequence = seed >> 12;
     size_t bytes = 0;
     if (packet.payload != NULL) {

@@ -4,7 +4,7 @@
 
 #include "base/vec.h"
 
-enum { MOST_BYTES = 1 << 15, MOST_WORK = 20000, MOST_ITERATIONS = 30, MOST_ROWS = 512 };
+enum { MAX_BYTES = 1 << 15, MAX_WORK = 20000, MAX_ITERATIONS = 30, MAX_ROWS = 512 };
 
 static void frame_of(const eits_model *model, const float *volts, float factor, eits_real *frame)
 {
@@ -28,26 +28,26 @@ static void reconstruct(eits_context *ctx, const eits_real *frame)
 static void use(const eits_model *model)
 {
     static eits_context ctx;
-    static eits_real frame[MOST_ROWS];
+    static eits_real frame[MAX_ROWS];
     eits_options options;
     eits_real difference;
     const size_t size = eits_workspace_size(model, 1);
     const uint64_t work = (uint64_t)model->n_pixels * model->rank;
-    if (size > FUZZ_WORKSPACE || model->n_rows > MOST_ROWS || work > MOST_WORK)
+    if (size > FUZZ_WORKSPACE || model->n_rows > MAX_ROWS || work > MAX_WORK)
         return;
     const int prepared = model->meta_size % 2 == 0;
     MUST(eits_init(&ctx, model, fuzz_workspace(0),
                    prepared ? size : eits_workspace_size(model, 0)) == EITS_OK);
     MUST(eits_options_default(model, &options) == EITS_OK);
     MUST(eits_set_options(&ctx, &options) == EITS_OK); /* its own defaults are always good ones */
-    if (options.iterations <= MOST_ITERATIONS) {
+    if (options.iterations <= MAX_ITERATIONS) {
         const eits_status status = eits_self_test(&ctx, &difference);
         /* infinite where the golden image is not of this world, never NaN */
         MUST(difference >= 0);
         if (ctx.reference.ready)
             fuzz_check_result(&ctx, status, 0);
     }
-    options.iterations = 1 + (options.iterations - 1) % MOST_ITERATIONS;
+    options.iterations = 1 + (options.iterations - 1) % MAX_ITERATIONS;
     options.touch_sweeps = 2;
     options.warm_start = 1;
     MUST(eits_set_options(&ctx, &options) == EITS_OK);
@@ -66,12 +66,12 @@ static void use(const eits_model *model)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static _Alignas(16) uint8_t room[MOST_BYTES];
+    static _Alignas(16) uint8_t room[MAX_BYTES];
     eits_model model, before;
-    if (size > MOST_BYTES)
+    if (size > MAX_BYTES)
         return 0;
     /* a read too far runs out of `room`, but for 15 bytes */
-    uint8_t *blob = room + MOST_BYTES - ((size + 15u) & ~(size_t)15u);
+    uint8_t *blob = room + MAX_BYTES - ((size + 15u) & ~(size_t)15u);
     memcpy(blob, data, size);
     memset(&model, 0x5A, sizeof model);
     memcpy(&before, &model, sizeof model);

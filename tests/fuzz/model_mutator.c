@@ -6,7 +6,7 @@ enum {
     HEADER = 64,
     ENTRY = 16,
     SECTIONS = 12 /* that every model is laid out with */,
-    MOST = 1 << 14
+    MAX = 1 << 14
 };
 enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META, LOAD };
 static const char TAGS[] = "DIMSPROTFOLDVREFREDUSENSCOLWGRIDDEFSGOLDSCALMETALOAD";
@@ -104,7 +104,7 @@ static void point_right(uint8_t *at[SECTIONS], const uint32_t d[10])
 
 static size_t lay_out_anew(uint8_t *data, size_t size, size_t room, uint32_t seed)
 {
-    static uint8_t made[MOST];
+    static uint8_t made[MAX];
     uint32_t bytes[SECTIONS], have = 0, d[10];
     const uint8_t *dims = find(data, size, DIMS, &have);
     if (dims == NULL || have != 64)
@@ -121,7 +121,7 @@ static size_t lay_out_anew(uint8_t *data, size_t size, size_t room, uint32_t see
     d[8] = (seed >> 22) % 4;
     d[9] = (seed >> 24) % 3;
     const size_t total = sizes_for(d, bytes);
-    if (total > MOST || total > room)
+    if (total > MAX || total > room)
         return size;
     memset(made, 0, total);
     memcpy(made, data, HEADER);

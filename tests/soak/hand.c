@@ -66,7 +66,7 @@ static void solve(const hand *h, eits_real *y)
 
 int hand_begin(hand *h, const eits_model *model)
 {
-    if (model->n_rows > MOST_ROWS || model->n_folded > MOST_FOLDED || model->rank > MOST_RANK ||
+    if (model->n_rows > MAX_ROWS || model->n_folded > MAX_FOLDED || model->rank > MAX_RANK ||
         model->data_kind != EITS_DATA_DIFFERENCE)
         return 0;
     *h = (hand){.model = model, .random = 20260};
@@ -119,7 +119,7 @@ static void press(const hand *h, uint64_t k, uint32_t f, eits_real *y)
                         dy = (eits_real)m->pixel[j].iy + R(0.5) - yy;
         if (dx * dx + dy * dy > radius * radius)
             continue;
-        eits_real column[MOST_RANK];
+        eits_real column[MAX_RANK];
         eits_read_column(&m->sensitivity, j, column);
         const eits_real scale =
             m->sensitivity.scale != NULL ? (eits_real)m->sensitivity.scale[j] : 1;
@@ -131,7 +131,7 @@ static void press(const hand *h, uint64_t k, uint32_t f, eits_real *y)
 void hand_frame(hand *h, uint64_t k, eits_real gain, int touched, eits_real *frame)
 {
     const eits_model *m = h->model;
-    eits_real y[MOST_RANK] = {0};
+    eits_real y[MAX_RANK] = {0};
     for (uint32_t f = 0; touched && f < FINGERS; ++f)
         press(h, k, f, y);
     solve(h, y);

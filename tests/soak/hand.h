@@ -6,13 +6,13 @@
 
 #include "eitskin/context.h"
 
-enum { MOST_ROWS = 512, MOST_FOLDED = 256, MOST_RANK = 128, FINGERS = 3 };
+enum { MAX_ROWS = 512, MAX_FOLDED = 256, MAX_RANK = 128, FINGERS = 3 };
 
 typedef struct hand {
     const eits_model *model;
-    eits_real factor[MOST_RANK][MOST_RANK]; /* Cholesky's, of P P' */
-    eits_real untouched[MOST_ROWS];         /* the untouched skin, V */
-    eits_real rms;                          /* of that */
+    eits_real factor[MAX_RANK][MAX_RANK]; /* Cholesky's, of P P' */
+    eits_real untouched[MAX_ROWS];        /* the untouched skin, V */
+    eits_real rms;                        /* of that */
     uint32_t random;
 } hand;
 

@@ -17,9 +17,9 @@
 #include <string.h>
 
 enum {
-    MOST_MODEL = 1024 * 1024,
-    MOST_WORKSPACE = 640 * 1024,
-    MOST_PIXELS = 4096,
+    MAX_MODEL = 1024 * 1024,
+    MAX_WORKSPACE = 640 * 1024,
+    MAX_PIXELS = 4096,
     GUARD = 64,
     REFERENCE_FRAMES = 8,
     PAINT = 0xA5
@@ -30,16 +30,16 @@ static const uint32_t FIRST_ID = UINT32_MAX - 5; /* so that ids come round */
 
 typedef struct guarded {
     _Alignas(16) uint8_t before[GUARD];
-    _Alignas(16) uint8_t workspace[MOST_WORKSPACE];
+    _Alignas(16) uint8_t workspace[MAX_WORKSPACE];
     uint8_t after[GUARD];
     eits_context ctx;
 } guarded;
 
-static _Alignas(16) uint8_t model_bytes[MOST_MODEL];
+static _Alignas(16) uint8_t model_bytes[MAX_MODEL];
 static guarded run, fresh;
 static hand fingers;
 static eits_model model;
-static eits_real frame[MOST_ROWS], held_frame[MOST_ROWS];
+static eits_real frame[MAX_ROWS], held_frame[MAX_ROWS];
 
 /* The reference that is in force: how to take it again. */
 static uint32_t tare_random;
@@ -50,7 +50,7 @@ static uint64_t frame_number;
 static uint32_t crc;
 static struct counts {
     unsigned long refused, tares, touches, probes;
-    uint64_t most_macs;
+    uint64_t max_macs;
 } counts;
 
 static void check_at(int right, int line, const char *what)
@@ -200,7 +200,7 @@ static void reconstruct(eits_status expected, uint32_t masked)
     check_touches(touches, count);
     crc = eits_crc32(crc, run.ctx.image, model.n_pixels * sizeof run.ctx.image[0]);
     counts.touches += count;
-    counts.most_macs = run.ctx.info.macs > counts.most_macs ? run.ctx.info.macs : counts.most_macs;
+    counts.max_macs = run.ctx.info.macs > counts.max_macs ? run.ctx.info.macs : counts.max_macs;
 }
 
 static void one_frame(uint64_t k)
@@ -311,7 +311,7 @@ static void open_model(const char *path)
     if (file != NULL)
         fclose(file);
     CHECK(eits_model_open(&model, model_bytes, size) == EITS_OK);
-    CHECK(model.n_pixels <= MOST_PIXELS && hand_begin(&fingers, &model));
+    CHECK(model.n_pixels <= MAX_PIXELS && hand_begin(&fingers, &model));
 }
 
 static void soak(uint64_t frames, int portable)
@@ -358,7 +358,7 @@ int main(int argc, char **argv)
     printf("%lu frames, %lu refused, %lu tares, %lu touches, %lu probes, most MACs %lu, kernels "
            "%s, next id %lu, crc %08lx\n",
            (unsigned long)frames, counts.refused, counts.tares, counts.touches, counts.probes,
-           (unsigned long)counts.most_macs, eits_kernels_name(&run.ctx),
+           (unsigned long)counts.max_macs, eits_kernels_name(&run.ctx),
            (unsigned long)run.ctx.next_id, (unsigned long)crc);
     return 0;
 }

@@ -18,7 +18,7 @@ from error_branches import Missed, Site, find_missed, sites_below
 from gcov_counts import FileCounts, read_counts
 
 ROOT = Path(__file__).resolve().parents[2]
-LEAST_LINES_PERCENT = 95.0
+MIN_LINES_PERCENT = 95.0
 SOURCES = "csrc/src"
 LIBRARIES = "/eitskin_f"  # the objects of both libraries, not the tests'
 NOT_COMPILED = {
@@ -107,9 +107,9 @@ def report(counts: dict[str, FileCounts], sites: Sequence[Site]) -> list[str]:
     if unrun:
         print("lines never run:", *unrun, sep="\n  ")
     reached, whole = _total(rows).lines
-    if 100 * reached < LEAST_LINES_PERCENT * whole:
+    if 100 * reached < MIN_LINES_PERCENT * whole:
         wrong.append(
-            f"{100 * reached / whole:.1f} % of lines were run; at least {LEAST_LINES_PERCENT:g} %"
+            f"{100 * reached / whole:.1f} % of lines were run; at least {MIN_LINES_PERCENT:g} %"
             " must be"
         )
     return wrong

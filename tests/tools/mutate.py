@@ -31,7 +31,7 @@ import mutate_python
 from mutants import ROOT, Mutant, mutants_of
 
 TOOLS = Path(__file__).resolve().parent
-LEAST_KILL_PERCENT = 95.0
+MIN_KILL_PERCENT = 95.0
 NO_MUTANT = ("refused", "same")
 
 
@@ -155,11 +155,11 @@ def main() -> int:
     picked = [mistake for mistake in read_mistakes() if options.only in f"{mistake}"]
     right = [
         report("picked by hand", try_c(picked, len(picked), options.workers), 100),
-        report("made in C", try_c(in_c, options.sample, options.workers), LEAST_KILL_PERCENT),
+        report("made in C", try_c(in_c, options.sample, options.workers), MIN_KILL_PERCENT),
         report(
             "made in Python",
             try_python(in_python, options.python, options.workers),
-            LEAST_KILL_PERCENT,
+            MIN_KILL_PERCENT,
         ),
     ]
     return 0 if all(right) and not stale else 1

@@ -1,7 +1,7 @@
 /* eitskin: one reconstruction context in memory that the caller owns.
  *
  * Order of calls: eits_model_open, eits_init, a reference frame (eits_reference_*), then
- * eits_reconstruct and, if touches are wanted, eits_find_touches for each frame. Contexts share
+ * eits_reconstruct and, if touches are wanted, eits_find_touches for each frame. Contexts fraction
  * nothing; one context is used by one thread at a time.
  */
 #ifndef EITSKIN_CONTEXT_H
@@ -15,8 +15,8 @@
 extern "C" {
 #endif
 
-#define EITS_MAX_TOUCHES       16
-#define EITS_MOST_TRACK_FRAMES 1000u
+#define EITS_MAX_TOUCHES      16
+#define EITS_MAX_TRACK_FRAMES 1000u
 
 /* Which conductivity changes are looked for. */
 typedef enum eits_sign {
@@ -59,9 +59,9 @@ typedef struct eits_options {
                                    threshold */
     eits_real gap_rel;          /* > 0: stop once gap <= gap_rel |y|^2 / 2 */
     eits_real saturation_v;     /* > 0: a channel at or beyond +-saturation_v is unusable */
-    /* a local maximum below this share of the greatest starts no touch */
+    /* a local maximum below this fraction of the greatest starts no touch */
     eits_real touch_threshold;
-    /* a touch that explains less than this share of |y|^2 beside the others is dropped */
+    /* a touch that explains less than this fraction of |y|^2 beside the others is dropped */
     eits_real touch_min_fraction;
     eits_real touch_min_radius_mm, touch_max_radius_mm, touch_seed_radius_mm;
     /* expected conductivity change under a touch: tells radius from strength; 0: unknown */
@@ -136,10 +136,10 @@ typedef struct eits_info {
     uint32_t diagnostics; /* bits of eits_diagnostic; CROWDED is set by eits_find_touches */
     uint32_t saturated;   /* rows, masked ones apart */
     uint32_t outliers;    /* rows left out as outliers */
-    /* share of |d| beyond noise that the model's sheet cannot give, 0 to 1; 0 where it was not
+    /* fraction of |d| beyond noise that the model's sheet cannot give, 0 to 1; 0 where it was not
      * judged */
     eits_real model_mismatch;
-    /* share of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
+    /* fraction of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
      * for */
     eits_real unexplained;
     /* bit e: electrode e, of the first 64; ctx->electrode has all */
@@ -153,7 +153,7 @@ typedef struct eits_touch {
     eits_real x_mm, y_mm;
     eits_real radius_mm;
     eits_real strength_s_per_m_mm2; /* conductivity change integrated over the touch: S/m mm^2 */
-    /* share of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
+    /* fraction of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
      * not found in this frame and is cached */
     eits_real confidence;
     /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
@@ -204,7 +204,7 @@ typedef struct eits_context {
     uint8_t *masked; /* n_rows: masked by the caller */
     /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
     uint8_t *unusable;
-    uint8_t electrode[EITS_MOST_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
+    uint8_t electrode[EITS_MAX_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
     /* n_folded: which rows of each fold were in use when the basis below was built; 0: neither */
     uint8_t *basis_for;
     eits_real *d; /* n_folded: data of this frame */

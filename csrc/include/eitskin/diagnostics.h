@@ -28,7 +28,8 @@ typedef enum eits_diagnostic {
     EITS_DIAGNOSTIC_BRIDGED = 4,
     /* single rows that nothing else bears out: left out; info.outliers counts them */
     EITS_DIAGNOSTIC_OUTLIER = 8,
-    /* info.noisy_electrodes: too many outliers share them; all rows that use them are left out */
+    /* info.noisy_electrodes: too many outliers fraction them; all rows that use them are left out
+     */
     EITS_DIAGNOSTIC_ELECTRODE_NOISY = 16,
     /* no sheet of the model's gives such data; info.mismatch says how much of them. Imaged as is */
     EITS_DIAGNOSTIC_MODEL_MISMATCH = 32,
@@ -58,7 +59,7 @@ typedef enum eits_electrode_state {
 } eits_electrode_state;
 
 /* An electrode's place in a row of the protocol takes a byte. */
-#define EITS_MOST_ELECTRODES 256u
+#define EITS_MAX_ELECTRODES 256u
 
 /* A name for one bit of eits_diagnostic ("electrode open", "outlier"...), never NULL. */
 const char *eits_diagnostic_text(eits_diagnostic diagnostic);

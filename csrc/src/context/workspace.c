@@ -198,8 +198,8 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
         in_range(o->touch_seed_radius_mm, o->touch_min_radius_mm, o->touch_max_radius_mm) &&
         in_range(o->follow_mm, 0, huge) && o->touch_sweeps <= 1000 &&
         o->diagnostics <= EITS_DIAGNOSTICS_ALL && o->touch_fit <= EITS_TOUCH_FIT_ALL &&
-        o->second_pass <= 1 && o->track_confirm <= EITS_MOST_TRACK_FRAMES &&
-        o->track_hold <= EITS_MOST_TRACK_FRAMES && in_range(o->track_smooth, 0, huge) &&
+        o->second_pass <= 1 && o->track_confirm <= EITS_MAX_TRACK_FRAMES &&
+        o->track_hold <= EITS_MAX_TRACK_FRAMES && in_range(o->track_smooth, 0, huge) &&
         in_range(o->regularisation_noise_factor, 0, huge);
     if (!right)
         return EITS_E_ARGUMENT;

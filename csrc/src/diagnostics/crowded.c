@@ -14,14 +14,14 @@ static const eits_real TOUCHES = R(-0.2429), OF_ELECTRODES = R(16.0);
 static const eits_real NEAREST = R(3.645), FAR = R(2.0);
 /* the greatest radius over the seed's */
 static const eits_real WIDEST = R(-4.607);
-/* the root of the share of |y|^2 that is left */
+/* the root of the fraction of |y|^2 that is left */
 static const eits_real LEFT = R(-3.659);
 /* the weakest touch over noise, at most this */
 static const eits_real WEAKEST = R(0.1329), STRONG = R(10.0);
 /* it over what is left, at most this */
 static const eits_real CLEAREST = R(0.7892), CLEAR = R(3.0);
 /* below it the count is a guess */
-static const eits_real LEAST = R(1.078);
+static const eits_real MIN = R(1.078);
 /* max(S'y) over that of noise: below it what is there may be noise, and no crowd */
 static const eits_real FAINT = R(3.0);
 
@@ -34,22 +34,22 @@ static eits_real lesser(eits_real a, eits_real b)
 static eits_real unexplained(const eits_context *ctx)
 {
     const uint32_t rank = ctx->model->rank;
-    const eits_real whole = eits_dot(ctx, ctx->y, ctx->y, rank);
-    return whole > 0 ? eits_dot(ctx, ctx->residual, ctx->residual, rank) / whole : 0;
+    const eits_real total = eits_dot(ctx, ctx->y, ctx->y, rank);
+    return total > 0 ? eits_dot(ctx, ctx->residual, ctx->residual, rank) / total : 0;
 }
 
 static eits_real nearest(const eits_touch *touches, uint32_t count)
 {
-    eits_real least = FAR;
+    eits_real min = FAR;
     for (uint32_t k = 0; k < count; ++k) {
         for (uint32_t l = 0; l < k; ++l) {
             const eits_real dx = touches[k].x_mm - touches[l].x_mm,
                             dy = touches[k].y_mm - touches[l].y_mm;
-            least = lesser(least, eits_sqrt(eits_fma(dx, dx, dy * dy)) /
-                                      (touches[k].radius_mm + touches[l].radius_mm));
+            min = lesser(min, eits_sqrt(eits_fma(dx, dx, dy * dy)) /
+                                  (touches[k].radius_mm + touches[l].radius_mm));
         }
     }
-    return least;
+    return min;
 }
 
 /* Of at least one touch. */
@@ -80,6 +80,6 @@ void eits_check_crowd(eits_context *ctx, int looked, const eits_touch *touches, 
     if (count == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) ||
         ctx->info.lambda_max < FAINT * ctx->info.lambda_noise)
         return;
-    if (count >= ctx->options.max_touches || score(ctx, touches, count) < LEAST)
+    if (count >= ctx->options.max_touches || score(ctx, touches, count) < MIN)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_CROWDED;
 }

@@ -11,14 +11,14 @@ enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_
 /* Thresholds; docs/reference/diagnostics.md says what they were chosen on. */
 #define EITS_ROW_SIGNIFICANT \
     R(0.3) /* of the reference's rms: rows that tell whether an electrode lives */
-#define EITS_ROW_DEAD_SHARE R(0.02) /* of the reference */
+#define EITS_ROW_DEAD_FRACTION R(0.02) /* of the reference */
 #define EITS_ROW_DEAD_NOISE \
     R(5.0) /* times the noise; a significant row's reference is at least ten times that */
 #define EITS_ROWS_TO_JUDGE                                                                         \
     3u /* so many significant rows of an electrode or a pair must agree; so many turned ones are a \
           mismatch */
 #define EITS_ROW_GROWN \
-    R(8.0) /* times the reference, or times this share of its rms where that is more: */
+    R(8.0) /* times the reference, or times this fraction of its rms where that is more: */
 #define EITS_ROW_SMALL R(0.05)
 #define EITS_ROBUST \
     R(1.4826) /* the deviation of a normal distribution over the median of its magnitudes */
@@ -28,9 +28,10 @@ enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_
     R(16.0) /* the same where no noise was learned, of the robust deviation of all such \
                differences, */
 #define EITS_OUTLIER_LARGEST \
-    R(0.03) /* and by this share of the largest datum: common modes scale with that, */
-#define EITS_OUTLIER_FRACTION \
-    R(0.25) /* and by this share of the larger: channel gains that differ scale with the change */
+    R(0.03) /* and by this fraction of the largest datum: common modes scale with that, */
+#define EITS_OUTLIER_FRACTION                                                                      \
+    R(0.25) /* and by this fraction of the larger: channel gains that differ scale with the change \
+             */
 #define EITS_OUTLIER_NEARER \
     R(0.5) /* the side stays that is at most so many times as far from what the others predict */
 #define EITS_OUTLIER_MAX   8u      /* folds; more are no outliers */
@@ -39,8 +40,8 @@ enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_
     R(1e-4) /* of the prediction, relative to the greatest squared singular value */
 #define EITS_OUTLIER_UNPAIRED \
     R(16.0) /* without reciprocals: so many times the robust deviation of the prediction errors */
-#define EITS_OUTLIER_ENERGY    R(0.5)  /* of all that is not predicted is in that fold */
-#define EITS_NOISY_SHARE       R(0.9)  /* of the folds that are flagged share a noisy electrode */
+#define EITS_OUTLIER_ENERGY    R(0.5) /* of all that is not predicted is in that fold */
+#define EITS_NOISY_FRACTION    R(0.9) /* of the folds that are flagged fraction a noisy electrode */
 #define EITS_MISMATCH_FRACTION R(0.05) /* of |d| */
 #define EITS_MISMATCH_NOISE \
     R(3.0) /* and so many times what noise leaves outside of the model's sheet */

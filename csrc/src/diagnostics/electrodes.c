@@ -11,20 +11,20 @@ typedef struct limits {
 
 static limits limits_of(const eits_context *ctx)
 {
-    const eits_real share = EITS_ROW_SIGNIFICANT * ctx->reference.v0_rms,
+    const eits_real fraction = EITS_ROW_SIGNIFICANT * ctx->reference.v0_rms,
                     noise = EITS_ROW_DEAD_NOISE * ctx->reference.noise_v;
-    return (limits){share > 10 * noise ? share : 10 * noise, noise};
+    return (limits){fraction > 10 * noise ? fraction : 10 * noise, noise};
 }
 
-static int judge_row(const eits_context *ctx, const eits_real *frame, limits most, uint32_t i)
+static int judge_row(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
     const eits_real v0 = ctx->reference.v0[i], size = eits_fabs(v0);
-    if (!(size >= most.significant) || (ctx->unusable[i] & EITS_ROW_MASKED) != 0)
+    if (!(size >= lim.significant) || (ctx->unusable[i] & EITS_ROW_MASKED) != 0)
         return 0;
     if (ctx->unusable[i] != 0)
         return DEAD;
-    const eits_real share = EITS_ROW_DEAD_SHARE * size,
-                    limit = share > most.noise ? share : most.noise;
+    const eits_real fraction = EITS_ROW_DEAD_FRACTION * size,
+                    limit = fraction > lim.noise ? fraction : lim.noise;
     const eits_real along = v0 < 0 ? -frame[i] : frame[i];
     if (along >= limit)
         return ALIVE;
@@ -32,12 +32,12 @@ static int judge_row(const eits_context *ctx, const eits_real *frame, limits mos
 }
 
 /* Far beyond what a touch makes of a row, be its reference ever so small. */
-static int is_grown(const eits_context *ctx, const eits_real *frame, limits most, uint32_t i)
+static int is_grown(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
     const eits_real v0 = eits_fabs(ctx->reference.v0[i]),
-                    least = EITS_ROW_SMALL * ctx->reference.v0_rms;
+                    min = EITS_ROW_SMALL * ctx->reference.v0_rms;
     return ctx->unusable[i] == 0 &&
-           eits_fabs(frame[i]) > eits_fma(EITS_ROW_GROWN, v0 > least ? v0 : least, most.noise);
+           eits_fabs(frame[i]) > eits_fma(EITS_ROW_GROWN, v0 > min ? v0 : min, lim.noise);
 }
 
 static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
@@ -50,11 +50,11 @@ static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
 
 /* Every significant row of an open electrode is dead. Were that so for all of them, it would not be
  * the electrodes. Returns whether any electrode is alive; `alive` says which. */
-static int find_open(eits_context *ctx, const eits_real *frame, limits most, uint8_t *alive)
+static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint8_t *alive)
 {
-    uint8_t rows[EITS_MOST_ELECTRODES] = {0};
+    uint8_t rows[EITS_MAX_ELECTRODES] = {0};
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        const int state = judge_row(ctx, frame, most, i);
+        const int state = judge_row(ctx, frame, lim, i);
         if (state == 0)
             continue;
         for (uint32_t k = 0; k < 4; ++k) {
@@ -87,7 +87,7 @@ int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f)
 
 /* Whether all significant rows that drive or measure across (e, f), and use no open electrode, are
  * dead, and enough of them. */
-static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits most, uint8_t e,
+static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits lim, uint8_t e,
                         uint8_t f)
 {
     uint32_t dead = 0;
@@ -96,7 +96,7 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
         if ((!eits_is_pair(row, e, f) && !eits_is_pair(row + 2, e, f)) ||
             uses(ctx, i, EITS_ELECTRODE_OPEN))
             continue;
-        const int state = judge_row(ctx, frame, most, i);
+        const int state = judge_row(ctx, frame, lim, i);
         if ((state & ALIVE) != 0)
             return 0;
         dead += state == DEAD;
@@ -105,16 +105,16 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
 }
 
 /* Both of a bridged pair are alive in rows that use one of them alone. */
-static void find_bridged(eits_context *ctx, const eits_real *frame, limits most,
+static void find_bridged(eits_context *ctx, const eits_real *frame, limits lim,
                          const uint8_t *alive)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (judge_row(ctx, frame, most, i) != DEAD || uses(ctx, i, EITS_ELECTRODE_OPEN))
+        if (judge_row(ctx, frame, lim, i) != DEAD || uses(ctx, i, EITS_ELECTRODE_OPEN))
             continue;
         for (uint32_t k = 0; k < 4; k += 2) {
             const uint8_t e = eits_row(ctx, i)[k], f = eits_row(ctx, i)[k + 1];
             const unsigned known = ctx->electrode[e] & ctx->electrode[f] & EITS_ELECTRODE_BRIDGED;
-            if (known != 0 || !alive[e] || !alive[f] || !pair_is_dead(ctx, frame, most, e, f))
+            if (known != 0 || !alive[e] || !alive[f] || !pair_is_dead(ctx, frame, lim, e, f))
                 continue;
             ctx->electrode[e] |= EITS_ELECTRODE_BRIDGED;
             ctx->electrode[f] |= EITS_ELECTRODE_BRIDGED;
@@ -151,38 +151,38 @@ void eits_leave_outlier(eits_context *ctx, uint32_t i)
 }
 
 /* Rows that no sheet gives, if they are few; more of them are a mismatch. */
-static void leave_impossible(eits_context *ctx, const eits_real *frame, limits most)
+static void leave_impossible(eits_context *ctx, const eits_real *frame, limits lim)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if ((judge_row(ctx, frame, most, i) & TURNED) != 0 || is_grown(ctx, frame, most, i))
+        if ((judge_row(ctx, frame, lim, i) & TURNED) != 0 || is_grown(ctx, frame, lim, i))
             eits_leave_outlier(ctx, i);
     }
 }
 
 int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
 {
-    const limits most = limits_of(ctx);
+    const limits lim = limits_of(ctx);
     /* silent: dead, though they can be used */
     uint32_t dead = 0, silent = 0, turned = 0, grown = 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        const int state = judge_row(ctx, frame, most, i);
+        const int state = judge_row(ctx, frame, lim, i);
         dead += state == DEAD;
         silent += state == DEAD && ctx->unusable[i] == 0;
         turned += (state & TURNED) != 0;
-        grown += (uint32_t)is_grown(ctx, frame, most, i);
+        grown += (uint32_t)is_grown(ctx, frame, lim, i);
     }
     if (turned >= EITS_ROWS_TO_JUDGE && eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH))
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_MODEL_MISMATCH;
     if (turned + grown > 0 && turned + grown < EITS_ROWS_TO_JUDGE &&
         eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER))
-        leave_impossible(ctx, frame, most);
+        leave_impossible(ctx, frame, lim);
     if (dead < EITS_ROWS_TO_JUDGE)
         return 1;
-    uint8_t alive[EITS_MOST_ELECTRODES] = {0};
-    if (!find_open(ctx, frame, most, alive))
+    uint8_t alive[EITS_MAX_ELECTRODES] = {0};
+    if (!find_open(ctx, frame, lim, alive))
         return silent < EITS_ROWS_TO_JUDGE;
     if (eits_wants(ctx, EITS_DIAGNOSTIC_BRIDGED))
-        find_bridged(ctx, frame, most, alive);
+        find_bridged(ctx, frame, lim, alive);
     if ((ctx->info.diagnostics & (EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED)) == 0)
         return 1;
     eits_name_electrodes(ctx);

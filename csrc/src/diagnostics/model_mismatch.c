@@ -51,7 +51,7 @@ static int is_orthogonal(eits_context *ctx, uint32_t period)
 static void make_shrink(eits_context *ctx)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
-    eits_real most = 0;
+    eits_real max = 0;
     for (uint32_t j = 0; j < s->cols; ++j) {
         const eits_real *column = eits_column(s, j, ctx->sx), scale = eits_column_scale(s, j);
         for (uint32_t i = 0; i < s->rows; ++i) {
@@ -61,13 +61,13 @@ static void make_shrink(eits_context *ctx)
     }
     for (uint32_t i = 0; i < s->rows; ++i) {
         ctx->sheet_shrink[i] /= ctx->sheet_inverse[i];
-        most = ctx->sheet_shrink[i] > most ? ctx->sheet_shrink[i] : most;
+        max = ctx->sheet_shrink[i] > max ? ctx->sheet_shrink[i] : max;
     }
     for (uint32_t i = 0; i < s->rows; ++i) {
         const eits_real squared = ctx->sheet_shrink[i];
         ctx->sheet_inverse[i] = 1 / ctx->sheet_inverse[i];
         ctx->sheet_shrink[i] =
-            squared / eits_fma(EITS_OUTLIER_RIDGE, most, squared) * ctx->sheet_inverse[i];
+            squared / eits_fma(EITS_OUTLIER_RIDGE, max, squared) * ctx->sheet_inverse[i];
     }
     ctx->sheet_known =
         eits_all_finite(ctx->sheet_shrink, s->rows) && eits_all_finite(ctx->sheet_inverse, s->rows);
@@ -134,21 +134,21 @@ int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs)
         *macs += learn_stray(ctx);
     for (uint32_t i = 0; i < rank; ++i)
         ctx->sz[i] = ctx->sheet_inverse[i] * ctx->y[i];
-    eits_real whole = eits_dot(ctx, ctx->d, ctx->d, folds),
-              off = whole - eits_dot(ctx, ctx->sz, ctx->y, rank);
+    eits_real total = eits_dot(ctx, ctx->d, ctx->d, folds),
+              off = total - eits_dot(ctx, ctx->sz, ctx->y, rank);
     if (drift > 0) { /* how far it drifted is no news */
         const eits_real along = eits_dot(ctx, ctx->d, ctx->along, folds),
                         astray = eits_dot(ctx, ctx->d, ctx->stray, folds);
         const eits_real stray = eits_dot(ctx, ctx->stray, ctx->stray, folds);
-        whole -= along * along / drift;
+        total -= along * along / drift;
         off -= stray > 0 ? astray * astray / stray : 0;
     }
     const eits_real noise = eits_noise_energy(ctx) * (eits_real)(folds - rank) / (eits_real)folds;
-    if (!(off > noise) || !(whole > 0))
+    if (!(off > noise) || !(total > 0))
         return 0;
-    const eits_real share = eits_sqrt((off - noise) / whole);
-    ctx->info.model_mismatch = share < 1 ? share : 1;
-    return share > EITS_MISMATCH_FRACTION &&
+    const eits_real fraction = eits_sqrt((off - noise) / total);
+    ctx->info.model_mismatch = fraction < 1 ? fraction : 1;
+    return fraction > EITS_MISMATCH_FRACTION &&
            off > EITS_MISMATCH_NOISE * EITS_MISMATCH_NOISE * noise;
 }
 
@@ -159,7 +159,7 @@ void eits_check_stale_reference(eits_context *ctx)
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
     const eits_real against = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, other);
-    const eits_real least = EITS_STALE_NOISE * ctx->info.lambda_noise;
-    if (least > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > least)
+    const eits_real min = EITS_STALE_NOISE * ctx->info.lambda_noise;
+    if (min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
 }

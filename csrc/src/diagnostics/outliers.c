@@ -1,5 +1,5 @@
 /* Outliers: rows that their reciprocals, or all the other folds, do not bear out; too many that
- * share an electrode: a noisy one. */
+ * fraction an electrode: a noisy one. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
@@ -39,10 +39,10 @@ eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k)
 typedef struct tolerance {
     /* > 0 where no noise was learned: the most by the differences of all folds */
     eits_real robust;
-    eits_real largest; /* share of the largest datum */
+    eits_real largest; /* fraction of the largest datum */
 } tolerance;
 
-static eits_real most_by_noise(const eits_context *ctx, uint32_t k)
+static eits_real max_by_noise(const eits_context *ctx, uint32_t k)
 {
     const eits_reference *b = &ctx->reference;
     if (ctx->model->data_kind != EITS_DATA_NORMALISED)
@@ -52,13 +52,13 @@ static eits_real most_by_noise(const eits_context *ctx, uint32_t k)
     return EITS_OUTLIER_NOISE * eits_sqrt(eits_fma(first, first, second * second));
 }
 
-static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)
+static int is_flagged(const eits_context *ctx, uint32_t k, tolerance tol)
 {
     if (ctx->basis_for[k] != EITS_SIDE_BOTH)
         return 0;
     const eits_real off = eits_fabs(ctx->apart[k]);
-    if (!(off > (ctx->reference.noise_v > 0 ? most_by_noise(ctx, k) : most.robust)) ||
-        !(off > most.largest))
+    if (!(off > (ctx->reference.noise_v > 0 ? max_by_noise(ctx, k) : tol.robust)) ||
+        !(off > tol.largest))
         return 0;
     return off > EITS_OUTLIER_FRACTION * eits_fma(R(0.5), off, eits_fabs(ctx->d[k]));
 }
@@ -66,22 +66,22 @@ static int is_flagged(const eits_context *ctx, uint32_t k, tolerance most)
 /* The median of the folds' differences is 0 where they are copies: then nothing is flagged. */
 static tolerance find_tolerance(const eits_context *ctx)
 {
-    tolerance most = {0, 0};
+    tolerance tol = {0, 0};
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_real datum = eits_fabs(ctx->d[k]);
-        most.largest = datum > most.largest ? datum : most.largest;
+        tol.largest = datum > tol.largest ? datum : tol.largest;
         if (ctx->basis_for[k] == EITS_SIDE_BOTH)
             ctx->list_value[count++] = eits_fabs(ctx->apart[k]);
     }
-    most.largest *= EITS_OUTLIER_LARGEST;
+    tol.largest *= EITS_OUTLIER_LARGEST;
     if (!(ctx->reference.noise_v > 0) && count > 0) {
         const eits_real median = eits_kth(ctx->list_value, count, count / 2);
-        most.robust = EITS_OUTLIER_ROBUST * EITS_ROBUST * median;
+        tol.robust = EITS_OUTLIER_ROBUST * EITS_ROBUST * median;
         if (!(median > 0))
-            most.robust = R(INFINITY);
+            tol.robust = R(INFINITY);
     }
-    return most;
+    return tol;
 }
 
 static void leave_row(eits_context *ctx, uint32_t row)
@@ -172,7 +172,7 @@ static void choose_sides(eits_context *ctx, const uint32_t *flagged, uint32_t n,
 
 /* ---- too many to be outliers ---- */
 
-/* Where one pair is what the flagged folds share, it is its channel: the rows measured across it
+/* Where one pair is what the flagged folds fraction, it is its channel: the rows measured across it
  * go, their reciprocals stay. */
 static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
 {
@@ -184,10 +184,10 @@ static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
 
 /* Whether each flagged fold drives across (e, f) on one side and measures across it on the other.
  */
-static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance most)
+static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance tol)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (!is_flagged(ctx, k, most))
+        if (!is_flagged(ctx, k, tol))
             continue;
         const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
         if (!eits_is_pair(row, e, f) && !eits_is_pair(row + 2, e, f))
@@ -197,18 +197,18 @@ static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance
 }
 
 /* Electrodes that nearly all flagged folds use. */
-static void find_noisy(eits_context *ctx, uint32_t count, tolerance most)
+static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
 {
-    uint16_t shared[EITS_MOST_ELECTRODES] = {0};
+    uint16_t shared[EITS_MAX_ELECTRODES] = {0};
     uint32_t found[2] = {0}, any = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (!is_flagged(ctx, k, most))
+        if (!is_flagged(ctx, k, tol))
             continue;
         for (uint32_t p = 0; p < 4; ++p)
             ++shared[eits_row(ctx, ctx->model->fold[k].first)[p]];
     }
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
-        if (!((eits_real)shared[e] >= EITS_NOISY_SHARE * (eits_real)count))
+        if (!((eits_real)shared[e] >= EITS_NOISY_FRACTION * (eits_real)count))
             continue;
         found[any < 2 ? any : 1] = e;
         ++any;
@@ -221,11 +221,12 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance most)
     if (!eits_wants(ctx, EITS_DIAGNOSTIC_ELECTRODE_NOISY))
         return;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e)
-        ctx->electrode[e] |=
-            (eits_real)shared[e] >= EITS_NOISY_SHARE * (eits_real)count ? EITS_ELECTRODE_NOISY : 0;
+        ctx->electrode[e] |= (eits_real)shared[e] >= EITS_NOISY_FRACTION * (eits_real)count
+                                 ? EITS_ELECTRODE_NOISY
+                                 : 0;
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_ELECTRODE_NOISY;
     eits_name_electrodes(ctx);
-    if (any == 2 && is_channel(ctx, found[0], found[1], most))
+    if (any == 2 && is_channel(ctx, found[0], found[1], tol))
         leave_channel(ctx, found[0], found[1]);
     else
         eits_leave_electrodes(ctx, EITS_ELECTRODE_NOISY, EITS_ROW_NOISY);
@@ -271,9 +272,9 @@ int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs)
 int eits_find_outliers(eits_context *ctx, uint64_t *macs)
 {
     uint32_t flagged[EITS_OUTLIER_MAX], count = 0;
-    const tolerance most = find_tolerance(ctx);
+    const tolerance tol = find_tolerance(ctx);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (!is_flagged(ctx, k, most))
+        if (!is_flagged(ctx, k, tol))
             continue;
         if (count < EITS_OUTLIER_MAX)
             flagged[count] = k;
@@ -282,7 +283,7 @@ int eits_find_outliers(eits_context *ctx, uint64_t *macs)
     if (count == 0)
         return 0;
     if (count > EITS_OUTLIER_MAX)
-        find_noisy(ctx, count, most);
+        find_noisy(ctx, count, tol);
     else if (eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER))
         choose_sides(ctx, flagged, count, macs);
     return (ctx->info.diagnostics & (EITS_DIAGNOSTIC_OUTLIER | EITS_DIAGNOSTIC_ELECTRODE_NOISY)) !=

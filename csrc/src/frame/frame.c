@@ -215,7 +215,7 @@ static uint32_t reduce(eits_context *ctx, uint64_t *macs)
  * all but zero stay differences. */
 static uint64_t reduce_log(eits_context *ctx, const eits_real *frame)
 {
-    const eits_real *v0 = ctx->reference.v0, least = R(1e-6) * ctx->reference.v0_rms;
+    const eits_real *v0 = ctx->reference.v0, min = R(1e-6) * ctx->reference.v0_rms;
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_fold fold = ctx->model->fold[k];
@@ -225,8 +225,8 @@ static uint64_t reduce_log(eits_context *ctx, const eits_real *frame)
             const uint32_t i = side == 0 ? fold.first : fold.second;
             if (!(used & (side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND)))
                 continue;
-            const eits_real value = eits_fabs(v0[i]) < least ? datum(ctx, frame[i], v0[i])
-                                                             : log_datum(ctx, frame[i], v0[i]);
+            const eits_real value = eits_fabs(v0[i]) < min ? datum(ctx, frame[i], v0[i])
+                                                           : log_datum(ctx, frame[i], v0[i]);
             sum += side == 1 && fold.sign < 0 ? -value : value;
         }
         ctx->list_index[count] = k;

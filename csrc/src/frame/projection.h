@@ -1,4 +1,4 @@
-/* What the stages (reference, frame, solve, touch) share inside the library. */
+/* What the stages (reference, frame, solve, touch) fraction inside the library. */
 #ifndef EITSKIN_STAGES_H
 #define EITSKIN_STAGES_H
 

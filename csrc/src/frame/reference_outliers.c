@@ -5,11 +5,11 @@
 #include "base/vec.h"
 
 /* robust deviations; and of the greatest voltage */
-static const eits_real PAIRED = R(12.0), PAIRED_LEAST = R(1e-3);
+static const eits_real PAIRED = R(12.0), PAIRED_MIN = R(1e-3);
 /* the same where rows have no reciprocals, or copied ones */
-static const eits_real UNPAIRED = R(16.0), UNPAIRED_LEAST = R(1e-2);
+static const eits_real UNPAIRED = R(16.0), UNPAIRED_MIN = R(1e-2);
 /* and of the row's own voltage: noise may go with that */
-static const eits_real OWN_LEAST = R(0.05);
+static const eits_real OWN_MIN = R(0.05);
 
 static int in_use(const eits_context *ctx, uint32_t row, const eits_real *older)
 {
@@ -66,8 +66,8 @@ static eits_real limit_of(const eits_context *ctx, const eits_real *newer, const
         *paired = way;
         const eits_real spread = EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2);
         const eits_real limit = way ? PAIRED * spread : UNPAIRED * spread,
-                        least = (way ? PAIRED_LEAST : UNPAIRED_LEAST) * largest;
-        return limit > least ? limit : least;
+                        min = (way ? PAIRED_MIN : UNPAIRED_MIN) * largest;
+        return limit > min ? limit : min;
     }
     *paired = 0;
     return largest;
@@ -81,7 +81,7 @@ uint32_t eits_reference_compare(eits_context *ctx, const eits_real *newer, const
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_real off = oddity(ctx, k, newer, older, paired);
-        const int odd = off > limit && off > OWN_LEAST * size_of(ctx, k, older);
+        const int odd = off > limit && off > OWN_MIN * size_of(ctx, k, older);
         ctx->list_index[k] = (ctx->list_index[k] & ~(uint32_t)bit) | (odd ? bit : 0u);
         count += (uint32_t)odd;
     }

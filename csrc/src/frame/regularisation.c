@@ -53,29 +53,29 @@ static eits_real weight_of(const eits_context *ctx, eits_real regularisation, ui
  * over S's columns, the sum of |S_i|^2 w_i^2 D_i^4: s_i^2 w_i^4 D_i^4. */
 eits_real eits_regularisation_noise(const eits_context *ctx, eits_real regularisation)
 {
-    eits_real sum = 0, whole = 0;
+    eits_real sum = 0, total = 0;
     if (!(regularisation > ctx->regularisation))
         return 1;
     for (uint32_t i = 0; i < ctx->model->rank; ++i) {
         const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]),
                         square = ctx->row_strength[i] * w2 * w2;
         const eits_real weight = weight_of(ctx, regularisation, i), w2_kept = weight * weight;
-        whole += square;
+        total += square;
         sum = eits_fma(square * w2_kept, w2_kept, sum);
     }
-    return eits_sqrt(sum / whole);
+    return eits_sqrt(sum / total);
 }
 
 eits_real eits_regularisation_weights(const eits_context *ctx, eits_real regularisation,
                                       eits_real *weight)
 {
-    eits_real energy = 0, whole = 0;
+    eits_real energy = 0, total = 0;
     eits_zero(weight, EITS_STRIDE(ctx->model->rank));
     for (uint32_t i = 0; i < ctx->model->rank; ++i) {
         const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
         weight[i] = weight_of(ctx, regularisation, i);
         energy = eits_fma(weight[i] * weight[i], w2, energy);
-        whole += w2;
+        total += w2;
     }
-    return energy / whole;
+    return energy / total;
 }

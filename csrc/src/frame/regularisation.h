@@ -16,7 +16,7 @@
  * reference's rms where that is more. */
 eits_real eits_regularisation_of_all(const eits_context *ctx);
 
-/* mu' where the share `missing` of the folded rows is left out. */
+/* mu' where the fraction `missing` of the folded rows is left out. */
 eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing);
 
 /* How much noise of the rows max(S'y) has with the regularisation mu' and all rows, over that with

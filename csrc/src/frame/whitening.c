@@ -149,11 +149,11 @@ static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_re
     for (uint32_t i = 0; i < rank; ++i) {
         eits_real *r = row_of(ctx, n, i);
         const eits_real left = r[i] > R(0.5) * lost ? r[i] : R(0.5) * lost, pivot = eits_sqrt(left),
-                        share = 1 / pivot;
+                        fraction = 1 / pivot;
         eits_zero(r + first_of(i), i - first_of(i));
         r[i] = pivot;
         for (uint32_t j = i + 1; j < rank; ++j)
-            r[j] *= share;
+            r[j] *= fraction;
         for (uint32_t j = i + 1; j < rank; ++j) {
             add_row(ctx, j, row_of(ctx, n, j), -r[j], r);
             macs += rank - j;
@@ -188,8 +188,8 @@ static uint64_t factor_metric(eits_context *ctx, eits_real regularisation, eits_
     return macs;
 }
 
-/* F = G^-1 R diag(share / w) in R's place, from the last row up. */
-static uint64_t finish_whitening(const eits_context *ctx, eits_real share, eits_real *g,
+/* F = G^-1 R diag(fraction / w) in R's place, from the last row up. */
+static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, eits_real *g,
                                  eits_real *r)
 {
     const uint32_t rank = ctx->model->rank;
@@ -206,7 +206,7 @@ static uint64_t finish_whitening(const eits_context *ctx, eits_real share, eits_
     }
     for (uint32_t i = 0; i < rank; ++i) {
         for (uint32_t k = i; k < rank; ++k)
-            row_of(ctx, r, i)[k] *= share * ctx->row_scale[k];
+            row_of(ctx, r, i)[k] *= fraction * ctx->row_scale[k];
     }
     return macs;
 }
@@ -223,7 +223,7 @@ enum { PROBES = 8 };
 static uint64_t measure_noise(eits_context *ctx)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_real *v = ctx->sz, sum = 0, whole = 0;
+    eits_real *v = ctx->sz, sum = 0, total = 0;
     for (uint32_t p = 0; p < PROBES; ++p) {
         for (uint32_t i = 0; i < rank; ++i) {
             const uint32_t both = i & p, odd = (both ^ both >> 1 ^ both >> 2) & 1u;
@@ -236,10 +236,10 @@ static uint64_t measure_noise(eits_context *ctx)
     }
     for (uint32_t i = 0; i < rank; ++i) {
         const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
-        whole = eits_fma(ctx->row_strength[i] * w2, w2, whole);
+        total = eits_fma(ctx->row_strength[i] * w2, w2, total);
     }
     const eits_real of_all = eits_regularisation_noise(ctx, eits_regularisation_of_all(ctx));
-    const eits_real ratio = eits_sqrt(ctx->whitening_square * sum / (PROBES * whole)) / of_all;
+    const eits_real ratio = eits_sqrt(ctx->whitening_square * sum / (PROBES * total)) / of_all;
     ctx->noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));
     return PROBES * 2u * triangle_macs(ctx);
 }

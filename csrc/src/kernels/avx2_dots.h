@@ -135,14 +135,14 @@ static eits_real avx2_greatest(const eits_real *a, size_t count, eits_sign sign)
 {
     const vector minus = SET1(-R(0.0)), flip = sign == EITS_SIGN_DECREASE ? minus : ZERO();
     const vector clear = sign == EITS_SIGN_BOTH ? minus : ZERO();
-    vector most[4] = {ZERO(), ZERO(), ZERO(), ZERO()};
+    vector max[4] = {ZERO(), ZERO(), ZERO(), ZERO()};
     size_t i = 0;
     for (; i + 4 * LANES <= count; i += 4 * LANES) {
         for (int k = 0; k < 4; ++k)
-            most[k] = MAX(ANDNOT(clear, XOR(LOAD(a + i + (size_t)(k * LANES)), flip)), most[k]);
+            max[k] = MAX(ANDNOT(clear, XOR(LOAD(a + i + (size_t)(k * LANES)), flip)), max[k]);
     }
     eits_real lane[LANES], greatest = 0;
-    STORE(lane, MAX(MAX(most[0], most[1]), MAX(most[2], most[3])));
+    STORE(lane, MAX(MAX(max[0], max[1]), MAX(max[2], max[3])));
     for (int l = 0; l < LANES; ++l)
         greatest = lane[l] > greatest ? lane[l] : greatest;
     for (; i < count; ++i) {

@@ -255,7 +255,7 @@ static uint32_t NAME(nonzeros)(const eits_real *a, uint32_t count, uint32_t *pla
 
 #ifndef KERNELS_OWN_GREATEST
 /* Eight at a time: which of them is the greatest does not depend on the order. */
-static eits_real NAME(most)(const eits_real *a, size_t count)
+static eits_real NAME(maximum)(const eits_real *a, size_t count)
 {
     eits_real lane[8] = {0};
     size_t i = 0;
@@ -270,7 +270,7 @@ static eits_real NAME(most)(const eits_real *a, size_t count)
     return lane[0];
 }
 
-static eits_real NAME(least)(const eits_real *a, size_t count)
+static eits_real NAME(minimum)(const eits_real *a, size_t count)
 {
     eits_real lane[8] = {0};
     size_t i = 0;
@@ -287,8 +287,8 @@ static eits_real NAME(least)(const eits_real *a, size_t count)
 
 static eits_real NAME(greatest)(const eits_real *a, size_t count, eits_sign sign)
 {
-    const eits_real high = sign != EITS_SIGN_DECREASE ? NAME(most)(a, count) : 0;
-    const eits_real low = sign != EITS_SIGN_INCREASE ? -NAME(least)(a, count) : 0;
+    const eits_real high = sign != EITS_SIGN_DECREASE ? NAME(maximum)(a, count) : 0;
+    const eits_real low = sign != EITS_SIGN_INCREASE ? -NAME(minimum)(a, count) : 0;
     return low > high ? low : high;
 }
 #endif

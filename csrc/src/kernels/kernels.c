@@ -1,4 +1,5 @@
-/* What the kernels' builds share: choosing one, listing non-zeros, reading columns, making panels.
+/* What the kernels' builds fraction: choosing one, listing non-zeros, reading columns, making
+ * panels.
  */
 #include "kernels/kernels.h"
 

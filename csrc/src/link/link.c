@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-enum { CHECKSUM = 4, LEAST = (int)EITS_LINK_HEAD + CHECKSUM, LONGEST_BLOCK = 0xFF };
+enum { CHECKSUM = 4, MIN = (int)EITS_LINK_HEAD + CHECKSUM, LONGEST_BLOCK = 0xFF };
 
 /* Payloads are copied as they lie in memory: sizes and places are the wire's. */
 #define SIZE(type, bytes) _Static_assert(sizeof(type) == (bytes), #type " is not as on the wire")
@@ -142,7 +142,7 @@ static uint32_t get_u32(const uint8_t *bytes)
 
 eits_status eits_link_decoder_init(eits_link_decoder *decoder, uint8_t *buffer, size_t room)
 {
-    if (!decoder || !buffer || (uintptr_t)buffer % 8u != 0 || room < (size_t)LEAST)
+    if (!decoder || !buffer || (uintptr_t)buffer % 8u != 0 || room < (size_t)MIN)
         return EITS_E_ARGUMENT;
     memset(decoder, 0, sizeof *decoder);
     decoder->buffer = buffer;
@@ -179,11 +179,11 @@ static void finish(eits_link_decoder *d, eits_link_packet *packet)
 {
     if (d->broken)
         return;
-    if (d->left > 0 || d->used < (size_t)LEAST) {
+    if (d->left > 0 || d->used < (size_t)MIN) {
         ++d->framing_errors;
         return;
     }
-    const size_t size = d->used - (size_t)LEAST;
+    const size_t size = d->used - (size_t)MIN;
     if (eits_crc32(0, d->buffer, d->used - CHECKSUM) != get_u32(d->buffer + d->used - CHECKSUM)) {
         ++d->crc_errors;
     } else if (d->buffer[0] != EITS_LINK_VERSION) {

@@ -6,7 +6,7 @@
 
 /* A polynomial is trusted near what it was fitted to only: its gain is kept within a factor of so
  * much of 1. */
-static const eits_real MOST_GAIN = R(4.0);
+static const eits_real MAX_GAIN = R(4.0);
 
 /* The place in units of the calibration's radius, no further out than it was calibrated. */
 static void place_of(const eits_force *force, eits_real x_mm, eits_real y_mm, eits_real *u,
@@ -37,7 +37,7 @@ static eits_real gain_at(const eits_force *force, eits_real u, eits_real v)
         for (uint32_t b = 0; b <= degree; ++b)
             power[b] *= u;
     }
-    return gain > 1 / MOST_GAIN ? (gain < MOST_GAIN ? gain : MOST_GAIN) : 1 / MOST_GAIN;
+    return gain > 1 / MAX_GAIN ? (gain < MAX_GAIN ? gain : MAX_GAIN) : 1 / MAX_GAIN;
 }
 
 eits_real eits_force_n(const eits_model *model, eits_real x_mm, eits_real y_mm,
@@ -56,7 +56,7 @@ eits_real eits_force_n(const eits_model *model, eits_real x_mm, eits_real y_mm,
     const eits_real s0 = (eits_real)force->strength[k - 1], s1 = (eits_real)force->strength[k];
     const eits_real n0 = (eits_real)force->force_n[k - 1], n1 = (eits_real)force->force_n[k];
     const eits_real found = eits_fma((strength - s0) / (s1 - s0), n1 - n0, n0),
-                    most = 2 * (eits_real)force->force_n[last];
+                    max = 2 * (eits_real)force->force_n[last];
     /* beyond the table: its last slope, to twice its greatest force */
-    return found < most ? found : most;
+    return found < max ? found : max;
 }

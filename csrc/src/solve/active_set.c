@@ -19,14 +19,14 @@
 typedef struct active {
     eits_real lambda;
     eits_real tolerance; /* a correlation beyond lambda by no more than this is rounding */
-    uint32_t most;       /* columns that can be independent */
+    uint32_t max;        /* columns that can be independent */
     /* of each active column: its correlation less lambda times its sign; zero at the optimum */
     eits_real *pull;
     /* of each active column: that of its coefficient, or of the correlation that brought it in */
     eits_real *sign;
     eits_real *work;
     eits_real *step;
-    eits_real *reach;  /* of each active column: what share of the step it can go */
+    eits_real *reach;  /* of each active column: what fraction of the step it can go */
     eits_real *column; /* the new column's part that counts */
     eits_nearby near;  /* columns beside the active ones, now or before */
     int limited;       /* the next step is not to be had for the MACs */
@@ -36,10 +36,10 @@ typedef struct active {
 } active;
 
 static const eits_real EPSILON = (eits_real)(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
-/* least share of a column's square */
+/* least fraction of a column's square */
 static const eits_real INDEPENDENT = (eits_real)(sizeof(eits_real) == 4 ? 1e-5 : 1e-10);
 
-/* a share of the objective: what a look nearby must have won to be followed by one */
+/* a fraction of the objective: what a look nearby must have won to be followed by one */
 static const eits_real WORTHWHILE = R(1e-6);
 enum { LOOKS_NEARBY = 20 };
 
@@ -163,7 +163,7 @@ static void add(eits_context *ctx, active *a, uint32_t j)
         if (first && !((square = read_column(ctx, a, j)) > 0))
             return;
         const eits_real left = what_is_left(ctx, a, square);
-        if (count < a->most && left > INDEPENDENT * square) {
+        if (count < a->max && left > INDEPENDENT * square) {
             activate(ctx, a, j, sign * x, sign, pull, left);
             return;
         }
@@ -201,19 +201,19 @@ static void settle(eits_context *ctx, active *a)
             a->broken = 1;
             return;
         }
-        eits_real share = 1;
+        eits_real fraction = 1;
         for (uint32_t k = 0; k < count; ++k) {
             a->reach[k] = reach(ctx, a, k);
-            share = a->reach[k] < share ? a->reach[k] : share;
+            fraction = a->reach[k] < fraction ? a->reach[k] : fraction;
         }
         for (uint32_t k = 0; k < count; ++k) {
-            ctx->x[k] += share * a->step[k];
-            a->pull[k] *= 1 - share;
+            ctx->x[k] += fraction * a->step[k];
+            a->pull[k] *= 1 - fraction;
         }
-        a->moved = a->moved || share > 0;
+        a->moved = a->moved || fraction > 0;
         uint32_t dropped = 0;
         for (uint32_t k = count; k-- > 0;) {
-            if (a->reach[k] <= share) { /* the last, which takes the place, is not among them */
+            if (a->reach[k] <= fraction) { /* the last, which takes the place, is not among them */
                 drop(ctx, a, k);
                 ++dropped;
             }
@@ -256,8 +256,7 @@ static int begin_warm(eits_context *ctx, active *a)
         return 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
         const eits_real x = ctx->x[j];
-        const eits_real square =
-            x != 0 && ctx->working_count < a->most ? read_column(ctx, a, j) : 0;
+        const eits_real square = x != 0 && ctx->working_count < a->max ? read_column(ctx, a, j) : 0;
         if (!(square > 0))
             continue;
         const eits_real left = what_is_left(ctx, a, square);
@@ -365,8 +364,7 @@ static int rounds(eits_context *ctx, active *a, eits_duality_gap *c)
 void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known)
 {
     const uint32_t free = ctx->model->rank - ctx->basis_count;
-    active a = {.lambda = lambda,
-                .most = free < ctx->model->n_pixels ? free : ctx->model->n_pixels};
+    active a = {.lambda = lambda, .max = free < ctx->model->n_pixels ? free : ctx->model->n_pixels};
     a.tolerance = 2 * EPSILON * eits_sqrt((eits_real)ctx->model->lipschitz) * ctx->info.data_norm;
     a.pull = ctx->slope[0], a.sign = ctx->slope[1], a.work = ctx->slope[2], a.step = ctx->sz;
     a.reach = ctx->x_next, a.column = ctx->sx_next;

@@ -1,4 +1,4 @@
-/* What all solvers share: the gradient of every column, the duality gap, and whether a step is
+/* What all solvers fraction: the gradient of every column, the duality gap, and whether a step is
  * still to be had for the MACs. */
 #ifndef EITSKIN_DUALITY_GAP_H
 #define EITSKIN_DUALITY_GAP_H

@@ -100,10 +100,10 @@ static int looks_at_every_column(const eits_context *ctx, uint32_t k, const sche
 /* Whether the gradient for iteration k, and the gap after it, are still to be had. */
 static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule *s)
 {
-    const uint64_t whole = eits_gradient_macs(ctx);
+    const uint64_t total = eits_gradient_macs(ctx);
     const uint64_t some = (uint64_t)ctx->working_count * ctx->model->rank + eits_forward_macs(ctx) +
                           eits_adjoint_macs(ctx);
-    return eits_affords(ctx, whole + (looks_at_every_column(ctx, k, s) ? whole : some));
+    return eits_affords(ctx, total + (looks_at_every_column(ctx, k, s) ? total : some));
 }
 
 /* The gradient at z for iteration k (from 1): of every column, or of the working set as it is then.

@@ -19,12 +19,12 @@ void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, ei
 
 void eits_factor_append(eits_context *ctx, uint32_t count, const eits_real *d, eits_real left)
 {
-    const eits_real share = 1 / eits_sqrt(left);
+    const eits_real fraction = 1 / eits_sqrt(left);
     eits_real *r = row(ctx, count);
     eits_zero(r, EITS_STRIDE(ctx->model->rank));
     for (uint32_t k = 0; k < count; ++k)
-        r[k] = -share * d[k];
-    r[count] = share;
+        r[k] = -fraction * d[k];
+    r[count] = fraction;
 }
 
 void eits_factor_drop(eits_context *ctx, uint32_t count, uint32_t place, eits_real *scratch,

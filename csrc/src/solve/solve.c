@@ -82,7 +82,7 @@ static void run(eits_context *ctx, int gradient_known)
 }
 
 /* Data whose square is hardly a number any more: objective and gap would be rounding. */
-static const eits_real LEAST_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
+static const eits_real MIN_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
 
 /* ctx->info holds what the frame stage counted, and zeros; `from_last`: start from the last
  * coefficients. */
@@ -113,7 +113,7 @@ static eits_status solve(eits_context *ctx, int from_last)
         answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
         return EITS_OK;
     }
-    if (!(ctx->info.lambda_max > ctx->info.lambda) || square < LEAST_SQUARE) {
+    if (!(ctx->info.lambda_max > ctx->info.lambda) || square < MIN_SQUARE) {
         answer_zero(ctx, EITS_STOP_ZERO);
         return EITS_OK;
     }

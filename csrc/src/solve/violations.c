@@ -70,17 +70,17 @@ static inline uint32_t place_of(const eits_pixel *pixel)
     return place;
 }
 
-/* Of BLOCK columns from v and p on, which are violation `least` and no less than their neighbours
+/* Of BLOCK columns from v and p on, which are violation `min` and no less than their neighbours
  * in the row; returns whether any is. The columns before and after are there too. Without a branch,
  * so that compilers make vectors of it. */
-static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real least,
+static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real min,
                               uint32_t flag[BLOCK])
 {
     const eits_pixel one = {.ix = 1};
     const uint32_t next = place_of(&one);
     uint32_t any = 0;
     for (uint32_t l = 0; l < BLOCK; ++l)
-        any |= v[l] > least;
+        any |= v[l] > min;
     if (!any)
         return 0;
     any = 0;
@@ -88,37 +88,37 @@ static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real
         const uint32_t before =
             (place_of(p + l) - place_of(p + l - 1) == next) & (v[l - 1] >= v[l]);
         const uint32_t after = (place_of(p + l + 1) - place_of(p + l) == next) & (v[l + 1] > v[l]);
-        any |= flag[l] = (v[l] > least) & (before == 0) & (after == 0);
+        any |= flag[l] = (v[l] > min) & (before == 0) & (after == 0);
     }
     return any;
 }
 
-static uint32_t of_all(const eits_context *ctx, const eits_real *v, eits_real least)
+static uint32_t of_all(const eits_context *ctx, const eits_real *v, eits_real min)
 {
     const uint32_t n = ctx->model->n_pixels;
     uint32_t count = 0, flag[BLOCK];
     for (uint32_t first = 0; first < n; first += BLOCK) {
         const uint32_t end = first + BLOCK < n ? first + BLOCK : n;
         const int whole = first > 0 && first + BLOCK < n;
-        if (whole && !peaks_of_rows(v + first, ctx->model->pixel + first, least, flag))
+        if (whole && !peaks_of_rows(v + first, ctx->model->pixel + first, min, flag))
             continue;
         for (uint32_t j = first; j < end; ++j) {
-            if (whole ? flag[j - first] : v[j] > least)
+            if (whole ? flag[j - first] : v[j] > min)
                 count = consider(ctx, v, j, count);
         }
     }
     return count;
 }
 
-uint32_t eits_list_violations(const eits_context *ctx, eits_real least, const eits_nearby *near)
+uint32_t eits_list_violations(const eits_context *ctx, eits_real min, const eits_nearby *near)
 {
     const eits_real *v = violation(ctx);
     if (near == NULL)
-        return of_all(ctx, v, least);
+        return of_all(ctx, v, min);
     uint32_t above = 0, count = 0, *list = ctx->list_index;
     for (uint32_t k = 0; k < near->count; ++k) { /* no branch that would be guessed wrong */
         list[above] = near->column[k];
-        above += v[near->column[k]] > least;
+        above += v[near->column[k]] > min;
     }
     for (uint32_t k = 0; k < above; ++k) /* there are never more peaks than columns read */
         count = consider(ctx, v, list[k], count);

@@ -22,10 +22,10 @@ void eits_nearby_add(const eits_context *ctx, eits_nearby *near);
  * Uses ctx->list_value. */
 void eits_take_gradient_nearby(eits_context *ctx, const eits_nearby *near);
 
-/* List in ctx->list_index the columns whose correlation is beyond `least` and no less than that of
+/* List in ctx->list_index the columns whose correlation is beyond `min` and no less than that of
  * their up to eight neighbours in the image, greatest first; returns their number. ctx->gradient of
  * the active columns is zero. Of all columns, or with `near` of those, ctx->gradient being zero
  * elsewhere. Uses ctx->list_value. */
-uint32_t eits_list_violations(const eits_context *ctx, eits_real least, const eits_nearby *near);
+uint32_t eits_list_violations(const eits_context *ctx, eits_real min, const eits_nearby *near);
 
 #endif

@@ -52,13 +52,13 @@ static covered cover(eits_context *ctx, const eits_disc *disc)
                 continue;
             const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y;
             const eits_real distance = eits_sqrt(eits_fma(dx, dx, dy * dy));
-            const eits_real share = R(0.5) + (radius - distance);
-            if (!(share > 0))
+            const eits_real fraction = R(0.5) + (radius - distance);
+            if (!(fraction > 0))
                 continue;
             const eits_real from = distance > R(1e-6) ? 1 / distance : 0;
             ctx->list_index[c.count] = j;
-            c.cover[c.count] = share < 1 ? share : 1;
-            c.ramp[c.count] = share < 1 ? 1 : 0;
+            c.cover[c.count] = fraction < 1 ? fraction : 1;
+            c.ramp[c.count] = fraction < 1 ? 1 : 0;
             c.toward_x[c.count] = dx * from;
             c.toward_y[c.count] = dy * from;
             ++c.count;
@@ -137,8 +137,8 @@ eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc)
             if (j == EITS_NO_PIXEL || model->column_weight[j] == 0.0f)
                 continue;
             const eits_real dx = (eits_real)ix + R(0.5) - x, dy = (eits_real)iy + R(0.5) - y;
-            const eits_real share = reach - eits_sqrt(eits_fma(dx, dx, dy * dy));
-            pixels += share > 0 ? (share < 1 ? share : 1) : 0;
+            const eits_real fraction = reach - eits_sqrt(eits_fma(dx, dx, dy * dy));
+            pixels += fraction > 0 ? (fraction < 1 ? fraction : 1) : 0;
         }
     }
     return pixels * pixel * pixel;

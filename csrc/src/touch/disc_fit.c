@@ -11,7 +11,7 @@ enum { STRENGTH_PASSES = 10 };
 static const eits_real RADIUS_DEVIATION = R(0.12);
 static const eits_real DAMPING = R(1e-3);
 static const eits_real SETTLED_PIXELS = R(1.0 / 256.0);
-static const eits_real MOST_RADIUS_STEP_PIXELS = R(0.5);
+static const eits_real MAX_RADIUS_STEP_PIXELS = R(0.5);
 
 eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const eits_real *atom,
                            const eits_real *target)
@@ -138,17 +138,17 @@ static eits_real move_disc(eits_context *ctx, eits_fit *f, uint32_t k)
     f->macs += 17u * rank;
     damped_step((const eits_real(*)[4])h, g, step);
     const eits_real reach = (eits_real)ctx->model->pixel_mm,
-                    radius_reach = MOST_RADIUS_STEP_PIXELS * reach;
+                    radius_reach = MAX_RADIUS_STEP_PIXELS * reach;
     const eits_real off = disc->radius_mm - expected;
     const eits_real cost = eits_dot(ctx, left, left, rank) + weight * off * off;
-    eits_real moved = 0, share = 1;
-    for (int attempt = 0; attempt < 3; ++attempt, share *= R(0.5)) {
+    eits_real moved = 0, fraction = 1;
+    for (int attempt = 0; attempt < 3; ++attempt, fraction *= R(0.5)) {
         eits_disc trial = *disc;
-        trial.x_mm += share * eits_clamp(step[0], -reach, reach);
-        trial.y_mm += share * eits_clamp(step[1], -reach, reach);
-        trial.radius_mm =
-            eits_clamp(disc->radius_mm + share * eits_clamp(step[2], -radius_reach, radius_reach),
-                       o->touch_min_radius_mm, o->touch_max_radius_mm);
+        trial.x_mm += fraction * eits_clamp(step[0], -reach, reach);
+        trial.y_mm += fraction * eits_clamp(step[1], -reach, reach);
+        trial.radius_mm = eits_clamp(
+            disc->radius_mm + fraction * eits_clamp(step[2], -radius_reach, radius_reach),
+            o->touch_min_radius_mm, o->touch_max_radius_mm);
         if (!eits_disc_on_skin(ctx, &trial))
             continue;
         f->macs += eits_disc_atom(ctx, &trial, trial_atom, NULL) + 3u * rank;

@@ -11,7 +11,7 @@ typedef struct eits_fit {
     eits_real explained[EITS_MAX_TOUCHES];
     /* stride: what the discs are to explain; ctx->residual is what they leave of it */
     const eits_real *data;
-    eits_real whole; /* |y|^2 */
+    eits_real total; /* |y|^2 */
     /* of that, what noise is expected to give; 0 where none was learned */
     eits_real noise;
     /* options.touch_radius_weight, times what the stage of the touch fit asks for */

@@ -5,7 +5,7 @@
 #include "frame/projection.h"
 #include "kernels/kernels.h"
 
-static const eits_real MOST = R(0.25); /* of |y|^2: what interaction may add */
+static const eits_real MAX = R(0.25); /* of |y|^2: what interaction may add */
 static const eits_real PI = R(3.14159265358979323846);
 
 typedef struct complex_number {
@@ -56,9 +56,9 @@ static void add_induced(const eits_context *ctx, const eits_disc *i, const eits_
      * touch */
     const eits_real distance = eits_sqrt(eits_fma(apart.re, apart.re, apart.im * apart.im)),
                     touching = i->radius_mm + j->radius_mm;
-    const eits_real share = distance < touching ? distance / touching : 1;
-    const complex_number whole = inverse_square(apart),
-                         direct = {share * share * whole.re, share * share * whole.im};
+    const eits_real fraction = distance < touching ? distance / touching : 1;
+    const complex_number total = inverse_square(apart),
+                         direct = {fraction * fraction * total.re, fraction * fraction * total.im};
     const complex_number mirrored =
         inverse_square((complex_number){mirror[0] - b_z.re, mirror[1] - b_z.im});
     /* conj(dE) = s ((direct - mirrored) E_x + i (direct + mirrored) E_y) */
@@ -123,9 +123,9 @@ uint64_t eits_remove_interaction(eits_context *ctx, const eits_disc *disc, uint3
     }
     macs += (uint64_t)count * ((count - 1u) * 4u * model->n_electrodes + 3u * model->n_folded);
     macs += reduce(ctx, ctx->sx);
-    const eits_real whole = eits_dot(ctx, ctx->y, ctx->y, model->rank),
+    const eits_real total = eits_dot(ctx, ctx->y, ctx->y, model->rank),
                     added = eits_dot(ctx, ctx->sx, ctx->sx, model->rank);
-    if (!(added <= MOST * whole)) /* far beyond the second order: discs that are no touches */
+    if (!(added <= MAX * total)) /* far beyond the second order: discs that are no touches */
         return macs + 2u * model->rank;
     for (uint32_t i = 0; i < model->rank; ++i)
         data[i] -= ctx->sx[i];

@@ -42,7 +42,7 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
             squared = eits_fma(column[i], column[i], squared);
         }
         const eits_real size = f->disc[k].change * norm[k];
-        f->explained[k] = f->whole > 0 ? size * size / (squared * f->whole) : 0;
+        f->explained[k] = f->total > 0 ? size * size / (squared * f->total) : 0;
     }
 }
 
@@ -50,9 +50,9 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
  * discs) at its pixel. */
 static int stands_out(eits_context *ctx, eits_fit *f, uint32_t k)
 {
-    const eits_real least = ctx->options.detection_factor * eits_lambda_noise(ctx);
+    const eits_real min = ctx->options.detection_factor * eits_lambda_noise(ctx);
     const uint32_t rank = ctx->model->rank;
-    if (!(least > 0))
+    if (!(min > 0))
         return 1;
     const eits_disc *disc = &f->disc[k];
     const eits_real *atom = eits_adjoint(ctx, eits_atom(ctx, k), ctx->slope[0]);
@@ -77,7 +77,7 @@ static int stands_out(eits_context *ctx, eits_fit *f, uint32_t k)
         f->macs += 2u * rank;
         best = seen * disc->polarity > best ? seen * disc->polarity : best;
     }
-    return best >= least;
+    return best >= min;
 }
 
 static void drop(eits_context *ctx, eits_fit *f, uint32_t k)

@@ -6,13 +6,13 @@
 
 /* Chosen on scenes of 2 to 8 touches at 60 and 80 dB; eitskin study levers tells what they are
  * worth. */
-/* edges nearer than this share of the smaller radius: one touch, perhaps, */
+/* edges nearer than this fraction of the smaller radius: one touch, perhaps, */
 static const eits_real NEAR = R(0.7);
 /* if one disc leaves at most so much more of |y|^2, */
 static const eits_real MERGE_TOTAL = R(0.002);
 static const eits_real MERGE_LEFT = R(0.5);    /* so much more of what is left */
 static const eits_real NOISE = R(20.0);        /* and so many directions of noise */
-static const eits_real SPLIT_TOTAL = R(0.001); /* with less than this share of |y|^2 left */
+static const eits_real SPLIT_TOTAL = R(0.001); /* with less than this fraction of |y|^2 left */
 static const eits_real SPLIT_NOISE = R(1.3);   /* beyond so much noise there is nothing to part */
 /* two discs in their first places may leave so many times as much, */
 static const eits_real SPLIT_FIRST = R(2.0);
@@ -127,7 +127,7 @@ static int try_merge(eits_context *ctx, eits_fit *f, const pair *p)
     eits_fit_move(ctx, f, p->i, p->i, MERGE_SWEEPS);
     eits_fit_move_all(ctx, f, 1);
     const eits_real more =
-        eits_fma(MERGE_TOTAL, f->whole,
+        eits_fma(MERGE_TOTAL, f->total,
                  eits_fma(MERGE_LEFT, before.left, NOISE * f->noise / (eits_real)rank));
     if (left_over(ctx) <= before.left + more)
         return 1;
@@ -241,9 +241,9 @@ static int try_split(eits_context *ctx, eits_fit *f, uint32_t k)
     }
     eits_fit_move_all(ctx, f, 1);
     const eits_real left = left_over(ctx),
-                    least = eits_fma(SPLIT_TOTAL, f->whole,
-                                     NOISE * f->noise / (eits_real)ctx->model->rank);
-    if (left <= SPLIT_GAIN * before.left && before.left - left >= least &&
+                    min = eits_fma(SPLIT_TOTAL, f->total,
+                                   NOISE * f->noise / (eits_real)ctx->model->rank);
+    if (left <= SPLIT_GAIN * before.left && before.left - left >= min &&
         edge_distance(&f->disc[k], &f->disc[last]) > SPLIT_DISTANCE)
         return 1;
     restore(ctx, f, &before);
@@ -253,7 +253,7 @@ static int try_split(eits_context *ctx, eits_fit *f, uint32_t k)
 int eits_fit_split(eits_context *ctx, eits_fit *f)
 {
     uint8_t looked[EITS_MAX_TOUCHES] = {0};
-    const eits_real enough = eits_fma(SPLIT_TOTAL, f->whole, SPLIT_NOISE * f->noise);
+    const eits_real enough = eits_fma(SPLIT_TOTAL, f->total, SPLIT_NOISE * f->noise);
     int any = 0;
     /* those that come by splitting are not split again at once */
     const uint32_t before = f->count;

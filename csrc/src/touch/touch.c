@@ -44,11 +44,11 @@ static void seed(const eits_context *ctx, eits_fit *f)
     const eits_model *model = ctx->model;
     const eits_options *o = &ctx->options;
     eits_real height[EITS_MAX_TOUCHES];
-    const eits_real least =
+    const eits_real min =
         o->touch_threshold * eits_greatest(ctx, ctx->image, model->n_pixels, EITS_SIGN_BOTH);
     for (uint32_t j = 0; j < model->n_pixels; ++j) {
         const eits_real here = eits_fabs(ctx->image[j]);
-        if (!(here > 0) || here < least || !is_peak(ctx, j))
+        if (!(here > 0) || here < min || !is_peak(ctx, j))
             continue;
         uint32_t place = f->count;
         while (place > 0 && here > height[place - 1])
@@ -176,7 +176,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
 {
     if (ctx == NULL || (touches == NULL && room > 0))
         return EITS_E_ARGUMENT;
-    eits_fit f = {.whole = eits_dot(ctx, ctx->y, ctx->y, ctx->model->rank),
+    eits_fit f = {.total = eits_dot(ctx, ctx->y, ctx->y, ctx->model->rank),
                   .noise = eits_expected_noise(ctx)};
     eits_touch found[EITS_MAX_TOUCHES];
     const eits_stop stop = ctx->info.stop;

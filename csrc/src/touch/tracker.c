@@ -8,7 +8,7 @@
 
 /* Chosen on tuning streams, docs/guide/tracking.md. */
 /* a touch that explains less of |y|^2 may be half of another */
-static const eits_real SURE_SHARE = R(0.05);
+static const eits_real SURE_FRACTION = R(0.05);
 /* and one whose own S'y is below so many times that of noise may be noise */
 static const eits_real SURE_CLEARNESS = R(1.5);
 /* of follow_mm, for touches that are not told of yet */
@@ -17,7 +17,7 @@ static const eits_real NEWBORN_REACH = R(0.6);
 static const eits_real SPEED_CHANGE = R(0.028);
 /* of follow_mm: rms of a new touch's velocity, a frame */
 static const eits_real FIRST_SPEED = R(0.12);
-static const eits_real LEAST_DEVIATION = R(0.01); /* of a pixel: no place is surer than this */
+static const eits_real MIN_DEVIATION = R(0.01); /* of a pixel: no place is surer than this */
 /* a touch that was found more often is told of while it is held */
 enum { KNOWN_FRAMES = 4 };
 enum { NONE = EITS_MAX_TOUCHES };
@@ -27,7 +27,7 @@ static eits_real square(eits_real value)
     return value * value;
 }
 
-/* What S'y this touch has by itself, about: the whole frame's by its share of the energy. */
+/* What S'y this touch has by itself, about: the whole frame's by its fraction of the energy. */
 static eits_real own_lambda(const eits_context *ctx, const eits_touch *touch)
 {
     return ctx->info.lambda_max * eits_sqrt(touch->confidence);
@@ -67,7 +67,7 @@ static eits_real place_variance(const eits_context *ctx, const eits_touch *found
     const eits_real pixel = (eits_real)ctx->model->pixel_mm, own = own_lambda(ctx, found);
     const eits_real noise = own > 0 ? ctx->info.lambda_noise / own : 0;
     return eits_fma(square(ctx->options.track_smooth * noise), square(pixel),
-                    square(LEAST_DEVIATION * pixel));
+                    square(MIN_DEVIATION * pixel));
 }
 
 static eits_followed newborn(const eits_context *ctx, const eits_touch *found)
@@ -103,13 +103,13 @@ static eits_followed met(const eits_context *ctx, const eits_followed *before,
     eits_followed next = newborn(ctx, found);
     next.touch.id = before->touch.id;
     next.seen =
-        before->seen < KNOWN_FRAMES + EITS_MOST_TRACK_FRAMES ? before->seen + 1 : before->seen;
+        before->seen < KNOWN_FRAMES + EITS_MAX_TRACK_FRAMES ? before->seen + 1 : before->seen;
     if (!(ctx->options.track_smooth > 0))
         return next;
     const eits_followed anew = next;
     const eits_touch *old = &before->touch;
-    const eits_real whole = before->place_mm2 + next.place_mm2;
-    const eits_real gain = before->place_mm2 / whole, speed_gain = before->both_mm2 / whole;
+    const eits_real total = before->place_mm2 + next.place_mm2;
+    const eits_real gain = before->place_mm2 / total, speed_gain = before->both_mm2 / total;
     const eits_real dx = found->x_mm - old->x_mm, dy = found->y_mm - old->y_mm;
     next.touch.x_mm = eits_fma(gain, dx, old->x_mm);
     next.touch.y_mm = eits_fma(gain, dy, old->y_mm);
@@ -160,7 +160,7 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
 static void name(eits_context *ctx, eits_followed *f)
 {
     const int clear = own_lambda(ctx, &f->touch) >= SURE_CLEARNESS * ctx->info.lambda_noise &&
-                      f->touch.confidence >= SURE_SHARE;
+                      f->touch.confidence >= SURE_FRACTION;
     if (f->touch.id != 0 || (f->seen < ctx->options.track_confirm && !clear))
         return;
     f->touch.id = ctx->next_id;

@@ -5,9 +5,9 @@
 
 #include <string.h>
 
-enum { MOST_BYTES = 768 * 1024 };
+enum { MAX_BYTES = 768 * 1024 };
 
-static uint8_t input[MOST_BYTES];
+static uint8_t input[MAX_BYTES];
 static size_t input_bytes, at, left; /* left: of the record that is being given */
 static bool over;
 static FILE *output;

@@ -11,11 +11,11 @@
 #include <math.h>
 #include <string.h>
 
-enum { MOST_BYTES = 1024 * 1024, LINES = 20 };
+enum { MAX_BYTES = 1024 * 1024, LINES = 20 };
 #define PHASE_BITS 28
 #define LATE_RAD   0.7f /* of the voltages against the generator: cables, filters, skin */
 
-static _Alignas(4) uint8_t file_bytes[MOST_BYTES];
+static _Alignas(4) uint8_t file_bytes[MAX_BYTES];
 static struct {
     uint32_t rows, frames, frame_us;
     const uint8_t *electrodes;

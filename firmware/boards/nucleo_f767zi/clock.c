@@ -2,11 +2,11 @@
  * time shares one source. */
 #include "nucleo.h"
 
-enum { MOST_TRIES = 1000000 }; /* of a read at 16 MHz: about 0.5 s */
+enum { MAX_TRIES = 1000000 }; /* of a read at 16 MHz: about 0.5 s */
 
 static bool becomes(volatile uint32_t *reg, uint32_t mask, uint32_t value)
 {
-    for (uint32_t k = 0; k < MOST_TRIES; ++k)
+    for (uint32_t k = 0; k < MAX_TRIES; ++k)
         if ((*reg & mask) == value)
             return true;
     return false;

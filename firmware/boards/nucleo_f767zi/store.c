@@ -21,11 +21,11 @@ static const uint8_t *bank_start(void *ctx, uint32_t bank)
     return (const uint8_t *)(BANKS_START + bank * NUCLEO_BANK_BYTES);
 }
 
-static fw_status finished(uint32_t most_us)
+static fw_status finished(uint32_t max_us)
 {
     const uint32_t start = nucleo_time_us(NULL);
     while ((FLASH_SR & FLASH_SR_BSY) != 0)
-        if (nucleo_time_us(NULL) - start > most_us)
+        if (nucleo_time_us(NULL) - start > max_us)
             return FW_E_TIMEOUT;
     return (FLASH_SR & ERRORS) == 0 ? FW_OK : FW_E_FLASH;
 }

@@ -25,7 +25,7 @@ from eitskin.model.force_law import MAX_ORDER, LoadLaw, monomials
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-LEAST_PRESSES, LEAST_WEIGHTS, LEAST_RATIO = 4, 3, 1.5
+MIN_PRESSES, MIN_WEIGHTS, MIN_RATIO = 4, 3, 1.5
 SAME_WEIGHT = 1.005  # loads nearer than that are one
 PLACE_MM = 12.0  # presses whose links are nearer than that are at one place
 PLACES_FOR_ORDER = (1, 5, 8, 13, 19)
@@ -35,9 +35,9 @@ RIDGE = 0.02 / 0.5  # strengths scatter by about 0.02, coefficients are of the o
 TABLE_POINTS = 33
 RESAMPLES = 200
 STEP = 1e-5  # of a law's numbers, relative, for their derivatives
-LEAST_EXPONENT = 0.02
-LEAST_STEEPNESS = 0.05  # a law as flat as that tells no loads
-MOST_F0 = 30.0  # times the greatest load: beyond, a saturating law is a straight line
+MIN_EXPONENT = 0.02
+MIN_STEEPNESS = 0.05  # a law as flat as that tells no loads
+MAX_F0 = 30.0  # times the greatest load: beyond, a saturating law is a straight line
 
 
 @dataclass(frozen=True)
@@ -64,19 +64,19 @@ FORMS = {
         lambda f, most, f0: np.asarray(-most * np.expm1(-f / f0)),
         lambda s, most, f0: np.asarray(-f0 * np.log1p(-s / most)),
         ("s_max_s_per_m_mm2", "f0_n"), "s_max (1 - exp(-F / F0))", 3, (2.0, 2.0), (1e-9, 0.05),
-        (1e9, MOST_F0),
+        (1e9, MAX_F0),
     ),
     "power": Form(
         lambda f, c, p: np.asarray(c * f**p),
         lambda s, c, p: np.asarray((s / c) ** (1 / p)),
-        ("c_s_per_m_mm2_at_1_n", "exponent"), "c F^p", 3, (1.0, 0.9), (1e-9, LEAST_EXPONENT),
+        ("c_s_per_m_mm2_at_1_n", "exponent"), "c F^p", 3, (1.0, 0.9), (1e-9, MIN_EXPONENT),
         (1e9, 20.0),
     ),
     "stretched": Form(
         lambda f, most, f0, p: np.asarray(-most * np.expm1(-((f / f0) ** p))),
         lambda s, most, f0, p: np.asarray(f0 * (-np.log1p(-s / most)) ** (1 / p)),
         ("s_max_s_per_m_mm2", "f0_n", "exponent"), "s_max (1 - exp(-(F / F0)^p))", 4,
-        (2.0, 2.0, 1.0), (1e-9, 0.05, LEAST_EXPONENT), (1e9, MOST_F0, 20.0),
+        (2.0, 2.0, 1.0), (1e-9, 0.05, MIN_EXPONENT), (1e9, MAX_F0, 20.0),
     ),
 }  # fmt: skip
 
@@ -164,22 +164,21 @@ def check_presses(presses: Presses) -> None:
     Raises:
         FrameError: too few presses or weights, or weights too much alike.
     """
-    if len(presses) < LEAST_PRESSES:
+    if len(presses) < MIN_PRESSES:
         raise FrameError(
-            f"calibration: {len(presses)} presses are too few; record at least {LEAST_PRESSES} that"
+            f"calibration: {len(presses)} presses are too few; record at least {MIN_PRESSES} that"
             " show a touch"
         )
     weights = weights_of(presses.force_n)
-    if len(weights) < LEAST_WEIGHTS:
+    if len(weights) < MIN_WEIGHTS:
         raise FrameError(
-            f"calibration: {len(weights)} different weights are too few; use at least"
-            f" {LEAST_WEIGHTS}"
+            f"calibration: {len(weights)} different weights are too few; use at least {MIN_WEIGHTS}"
         )
     ratio = float(weights[-1] / weights[0])
-    if ratio < LEAST_RATIO:
+    if ratio < MIN_RATIO:
         raise FrameError(
             f"calibration: the greatest weight is {ratio:.2f} times the least, which cannot show a"
-            f" law; use a range of {LEAST_RATIO:g} times or more"
+            f" law; use a range of {MIN_RATIO:g} times or more"
         )
 
 
@@ -203,7 +202,7 @@ def calibrate(
             f"{places}: the gain is taken to be the same everywhere; press at {PLACES_FOR_ORDER[1]}"
             " or more"
         )
-    by_place = groups >= LEAST_PRESSES
+    by_place = groups >= MIN_PRESSES
     fold = place if by_place else np.arange(len(presses))
     forms = [
         name
@@ -221,12 +220,12 @@ def calibrate(
     tried = {(form, order): others.get(order, tried[form, middle]) for order in orders}
     _, order = _best(tried)
     fitted = fit(presses, radius_mm, form, order)
-    if _steepness(fitted, presses.force_n) < LEAST_STEEPNESS:
+    if _steepness(fitted, presses.force_n) < MIN_STEEPNESS:
         raise FrameError(
             "calibration: strength does not grow with load; look at the list of weights, and at the"
             " touches of each"
         )
-    if form != "power" and fitted.numbers[1] > 0.9 * MOST_F0 * presses.force_n.max():
+    if form != "power" and fitted.numbers[1] > 0.9 * MAX_F0 * presses.force_n.max():
         notes.append(
             "the strength shows no saturation: beyond the greatest weight the law is a guess"
         )

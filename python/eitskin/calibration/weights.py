@@ -15,8 +15,8 @@ from eitskin.errors import ConfigError
 from eitskin.fileio import read_bytes
 
 KEYS = ("first", "last", "load_g", "force_n", "x_mm", "y_mm")
-MOST_FRAMES = 2**32 - 1
-MOST_LOAD_N = 1e6
+MAX_FRAMES = 2**32 - 1
+MAX_LOAD_N = 1e6
 
 
 @dataclass(frozen=True)
@@ -95,14 +95,14 @@ def _weight(row: Mapping[str, Any], where: str) -> Weight:
         )
     if ("x_mm" in row) != ("y_mm" in row):
         raise ConfigError(f"{where}: a place needs x_mm and y_mm; give both or none")
-    first = integer(row, "first", None, where, low=0, high=MOST_FRAMES)
-    last = integer(row, "last", first, where, low=first, high=MOST_FRAMES)
+    first = integer(row, "first", None, where, low=0, high=MAX_FRAMES)
+    last = integer(row, "last", first, where, low=first, high=MAX_FRAMES)
     if "load_g" in row:
         force_n = NEWTONS_PER_GRAM * number(
-            row, "load_g", None, where, low=0, high=MOST_LOAD_N / NEWTONS_PER_GRAM, open_low=True
+            row, "load_g", None, where, low=0, high=MAX_LOAD_N / NEWTONS_PER_GRAM, open_low=True
         )
     else:
-        force_n = number(row, "force_n", None, where, low=0, high=MOST_LOAD_N, open_low=True)
+        force_n = number(row, "force_n", None, where, low=0, high=MAX_LOAD_N, open_low=True)
     place = (
         (number(row, "x_mm", None, where), number(row, "y_mm", None, where))
         if "x_mm" in row

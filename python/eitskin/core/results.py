@@ -16,8 +16,8 @@ SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
 STRAIGHT, REGROUP, COUPLED = 1, 2, 4
 ALL_SEARCH = STRAIGHT | REGROUP | COUPLED
-MOST_TRACK_FRAMES = 1000
-LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
+MAX_TRACK_FRAMES = 1000
+MIN_RADIUS_MM, HUGE = 1e-6, 1e30
 STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
 
 
@@ -86,8 +86,8 @@ WHOLE = {
     "mac_limit": (0, 2**32 - 1),
     "diagnostics": (0, ALL_DIAGNOSTICS),
     "touch_fit": (0, ALL_SEARCH),
-    "track_confirm": (0, MOST_TRACK_FRAMES),
-    "track_hold": (0, MOST_TRACK_FRAMES),
+    "track_confirm": (0, MAX_TRACK_FRAMES),
+    "track_hold": (0, MAX_TRACK_FRAMES),
 }
 SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_min_fraction")
 
@@ -111,7 +111,7 @@ def check_options(o: Options) -> None:
         else:
             _check_number(name, value, *WHOLE.get(name, (0, 1) if name in SHARES else (0, HUGE)))
     if (
-        not LEAST_RADIUS_MM
+        not MIN_RADIUS_MM
         <= o.touch_min_radius_mm
         <= o.touch_seed_radius_mm
         <= o.touch_max_radius_mm

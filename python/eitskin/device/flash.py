@@ -21,7 +21,7 @@ FIRMWARE_ADDRESS = 0x0800_0000
 FIRMWARE_ROOM = 0x4_0000
 BANK_ADDRESS = 0x0804_0000
 SECOND_BANK_ADDRESS = 0x080C_0000
-LEAST_IMAGE = 512
+MIN_IMAGE = 512
 RAM = (0x2000_0000, 0x2008_0000)
 TOOLS = ("openocd", "st-flash", "pyocd")
 INSTALL = "install one:  apt install openocd  or  apt install stlink-tools  or  pip install pyocd"
@@ -111,7 +111,7 @@ def check_image(path: Path, image: bytes) -> None:
             f"{path}: {len(image)} bytes, but firmware has room for {FIRMWARE_ROOM}; is this the"
             " right file?"
         )
-    stack, start = struct.unpack("<II", image[:8]) if len(image) >= LEAST_IMAGE else (0, 0)
+    stack, start = struct.unpack("<II", image[:8]) if len(image) >= MIN_IMAGE else (0, 0)
     in_flash = FIRMWARE_ADDRESS <= start < FIRMWARE_ADDRESS + len(image) and start & 1
     if not (RAM[0] < stack <= RAM[1] and stack % 8 == 0 and in_flash):
         raise DeviceError(

@@ -15,7 +15,7 @@ from eitskin.device.transport import Transport
 from eitskin.errors import UsageError
 
 SCHEMES = ("auto", "serial", "sim", "emu", "file")
-MOST_BAUD = 20_000_000
+MAX_BAUD = 20_000_000
 
 
 def open_device(
@@ -98,6 +98,6 @@ def _path_and_baud(url: str, rest: str) -> tuple[str, int]:
     if not query:
         return path, BAUD
     match = re.fullmatch(r"baud=(\d{1,9})", query)
-    if not match or not 0 < int(match.group(1)) <= MOST_BAUD or not path:
-        raise UsageError(f"device {url!r}: what follows '?' must be baud=N, N up to {MOST_BAUD}")
+    if not match or not 0 < int(match.group(1)) <= MAX_BAUD or not path:
+        raise UsageError(f"device {url!r}: what follows '?' must be baud=N, N up to {MAX_BAUD}")
     return path, int(match.group(1))

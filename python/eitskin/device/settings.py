@@ -11,7 +11,7 @@ from eitskin.device.known_model import board_options
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
 
-MOST_TARE = 1024
+MAX_TARE = 1024
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ def check_tare_frames(frames: int) -> int:
     Raises:
         UsageError: it cannot.
     """
-    if frames != 1 and not 4 <= frames <= MOST_TARE:
-        raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to {MOST_TARE}")
+    if frames != 1 and not 4 <= frames <= MAX_TARE:
+        raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to {MAX_TARE}")
     return frames
 
 

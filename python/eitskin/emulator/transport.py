@@ -19,7 +19,7 @@ START_TICKS = (
     TICKS_PER_S  # that a board may take until it speaks: a command that comes earlier is lost
 )
 # of one read: an emulated second takes some five, and an image that hangs must not hang its user
-MOST_WALL_S = 120.0
+MAX_WALL_S = 120.0
 
 
 class EmulatedTransport:
@@ -44,12 +44,12 @@ class EmulatedTransport:
         board, line = self.board, self.board.line
         self._check_open()
         until = board.clock.now + max(round(timeout_s * TICKS_PER_S), 1)
-        give_up = time.monotonic() + MOST_WALL_S
+        give_up = time.monotonic() + MAX_WALL_S
 
         def enough() -> bool:
             if time.monotonic() > give_up:
                 raise DeviceError(
-                    f"{self.name}: the emulated board said nothing in {MOST_WALL_S:.0f} s; its"
+                    f"{self.name}: the emulated board said nothing in {MAX_WALL_S:.0f} s; its"
                     " firmware hangs, or this computer is too slow for it"
                 )
             return line.up_next_end() <= board.clock.now

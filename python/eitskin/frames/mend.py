@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SIGNS = ("signed", "reversed", "magnitude")
-LEAST_GAIN = 0.05
+MIN_GAIN = 0.05
 
 
 def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> FloatArray:
@@ -107,7 +107,7 @@ def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArra
     """
     ratio = reference / prediction
     relative = ratio / np.median(ratio)
-    weak = np.flatnonzero(~(relative > LEAST_GAIN))
+    weak = np.flatnonzero(~(relative > MIN_GAIN))
     if len(weak):
         raise FrameError(
             f"channel {weak[0]} has {relative[weak[0]]:.3g} of its predicted reference ({len(weak)}"

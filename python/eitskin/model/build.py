@@ -32,7 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 
 LIPSCHITZ_MARGIN = 1e-4
 FIELD_PEAK = 1024.0
-LEAST_RATIO_REFERENCE = 1e-6
+MIN_RATIO_REFERENCE = 1e-6
 # a disc of contrast c in a sheet of conductivity s answers as a change of 2 (c - 1) / (c + 1) s:
 # for c = 3 to 10, 1.0 to 1.64 s
 TOUCH_CHANGE_RATIO = 1.35
@@ -108,7 +108,7 @@ def make_model(
     if settings.data_kind == "normalised":
         # a row whose reference is all but zero says nothing as a ratio; the solver leaves it out as
         # well
-        silent = np.abs(v_ref) < LEAST_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
+        silent = np.abs(v_ref) < MIN_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
         jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
     rank = settings.rank or min(64, *jacobian.shape)
     reduction = reduce_jacobian(

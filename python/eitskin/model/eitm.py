@@ -40,9 +40,9 @@ SCALED = ("i16", "i8")
 MAX_SECTIONS = 256
 MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
 MAX_ITERATIONS = 100_000
-LEAST_RADIUS_MM, HUGE = 1e-6, 1e30
+MIN_RADIUS_MM, HUGE = 1e-6, 1e30
 NEARER = "choose units nearer to volts and siemens per metre"
-LEAST_LIPSCHITZ, MOST_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
+MIN_LIPSCHITZ, MAX_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
 
 Sections = dict[str, bytes]
 
@@ -111,9 +111,9 @@ def _check_floats(model: Model) -> None:
         "the current": model.protocol.current_a,
     }  # fmt: skip
     for name, value in numbers.items():
-        if not abs(value) <= MOST_FLOAT32:
+        if not abs(value) <= MAX_FLOAT32:
             raise ModelError(f"model: {name} of {value:g} does not fit float32; {NEARER}")
-    if model.lipschitz < LEAST_LIPSCHITZ:
+    if model.lipschitz < MIN_LIPSCHITZ:
         raise ModelError(
             f"model: the Lipschitz constant of {model.lipschitz:g} is too small for float32;"
             f" {NEARER}"
@@ -267,7 +267,7 @@ def _read_dims(content: bytes, where: str) -> _Dims:
     numbers = (d.pixel_mm, d.origin_x_mm, d.origin_y_mm, d.current_a, d.lipschitz, d.noise_gain)
     if not all(map(isfinite, numbers)) or min(d.pixel_mm, d.current_a) <= 0 or d.noise_gain < 0:
         _refuse(where, "a number in section 'DIMS' that is out of range")
-    if d.lipschitz < LEAST_LIPSCHITZ:
+    if d.lipschitz < MIN_LIPSCHITZ:
         _refuse(where, "a matrix whose squares are too small for float32; scale it up")
     return d
 
@@ -344,7 +344,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
         and d.touch_fit_left_out <= ALL_SEARCH
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
-        and LEAST_RADIUS_MM
+        and MIN_RADIUS_MM
         <= d.touch_min_radius_mm
         <= d.touch_seed_radius_mm
         <= d.touch_max_radius_mm

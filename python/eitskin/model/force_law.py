@@ -15,8 +15,8 @@ FloatArray = npt.NDArray[np.float64]
 
 HEAD = struct.Struct("<IIfff12x")
 MAX_POINTS, MAX_ORDER = 64, 4
-MOST_GAIN = 4.0  # csrc/src/model/force.c
-LEAST_RADIUS_MM, HUGE, MOST_REACH, MOST_COEFFICIENT = 1e-6, 1e30, 1e3, 1e6
+MAX_GAIN = 4.0  # csrc/src/model/force.c
+MIN_RADIUS_MM, HUGE, MAX_REACH, MAX_COEFFICIENT = 1e-6, 1e30, 1e3, 1e6
 
 
 def terms_of(order: int) -> list[tuple[int, int]]:
@@ -53,7 +53,7 @@ class LoadLaw:
         away = np.hypot(u, v)
         inward = np.where(away > self.reach, self.reach / np.maximum(away, 1e-300), 1.0)
         value = monomials(u * inward, v * inward, self.order) @ self.gain.astype(np.float64)
-        return np.asarray(np.clip(value, 1 / MOST_GAIN, MOST_GAIN))
+        return np.asarray(np.clip(value, 1 / MAX_GAIN, MAX_GAIN))
 
     def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
         """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the
@@ -98,8 +98,8 @@ def decode_load(content: bytes, where: str) -> LoadLaw:
     in_range = (
         2 <= points <= MAX_POINTS
         and order <= MAX_ORDER
-        and LEAST_RADIUS_MM <= radius_mm <= HUGE
-        and 0 <= reach <= MOST_REACH
+        and MIN_RADIUS_MM <= radius_mm <= HUGE
+        and 0 <= reach <= MAX_REACH
         and 0 <= uncertainty <= HUGE
     )
     if not in_range or len(content) != HEAD.size + 4 * (2 * points + len(terms_of(order))):
@@ -110,6 +110,6 @@ def decode_load(content: bytes, where: str) -> LoadLaw:
     for ascending in (strength, force_n):
         if ascending[0] != 0 or not ascending[-1] <= HUGE or not (np.diff(ascending) > 0).all():
             raise wrong
-    if not (np.abs(gain) <= MOST_COEFFICIENT).all():
+    if not (np.abs(gain) <= MAX_COEFFICIENT).all():
         raise wrong
     return LoadLaw(strength, force_n, gain, order, radius_mm, reach, uncertainty)

@@ -39,7 +39,7 @@ OUTLIER_PIVOT, OUTLIER_RIDGE, OUTLIER_UNPAIRED, OUTLIER_ENERGY, NOISY_SHARE = (
     0.9,
 )
 MISMATCH_FRACTION, MISMATCH_NOISE, STALE_RATIO, STALE_NOISE = 0.05, 3.0, 1.7, 5.0
-CROWD_WEIGHTS, CROWD_OFFSET, CROWD_LEAST = (
+CROWD_WEIGHTS, CROWD_OFFSET, CROWD_MIN = (
     (-0.2429, 3.645, -4.607, -3.659, 0.1329, 0.7892),
     -0.3583,
     1.078,
@@ -410,7 +410,7 @@ class Examiner:
         )
         if (
             count >= options.max_touches
-            or np.dot(CROWD_WEIGHTS, features) + CROWD_OFFSET < CROWD_LEAST
+            or np.dot(CROWD_WEIGHTS, features) + CROWD_OFFSET < CROWD_MIN
         ):
             self.found.names.add("crowded")
 

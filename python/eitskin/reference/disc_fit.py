@@ -19,7 +19,7 @@ DROP_SWEEPS = 3
 RADIUS_DEVIATION = 0.12
 DAMPING = 1e-3
 SETTLED_PIXELS = 1 / 256
-MOST_RADIUS_STEP_PIXELS = 0.5
+MAX_RADIUS_STEP_PIXELS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +171,7 @@ class Fit:
         g[2] += weight * (expected - disc.radius_mm)
         step = damped_step(h, g)
         reach = self.model.grid.pixel_mm
-        limit = reach * np.array([1.0, 1.0, MOST_RADIUS_STEP_PIXELS])
+        limit = reach * np.array([1.0, 1.0, MAX_RADIUS_STEP_PIXELS])
         step = np.clip(step[:3], -limit, limit)
         cost = float(left @ left) + weight * (disc.radius_mm - expected) ** 2
         for share in (1.0, 0.5, 0.25):

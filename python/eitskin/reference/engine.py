@@ -44,7 +44,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 ROUNDING = 2.0**-49
 BASIS_TOLERANCE = 1e-6
-LEAST_SQUARE = 2.0**-969
+MIN_SQUARE = 2.0**-969
 SOLVED = ("iterations", "gap", "optimum")
 DEAD = "all voltages are zero; is the skin driven and connected?"
 
@@ -439,7 +439,7 @@ class ReferenceEngine:
         nothing, zero = Certificate(0.0, 0.5 * norm**2, norm), np.zeros(self.model.grid.n_pixels)
         if o.detection_factor > 0 and lambda_max < o.detection_factor * lambda_noise:
             return Result(zero, 0, "gate", nothing, 0), lam, lambda_max
-        if not lambda_max > lam or norm**2 < LEAST_SQUARE:
+        if not lambda_max > lam or norm**2 < MIN_SQUARE:
             return Result(zero, 0, "zero", nothing, 0), lam, lambda_max
         result = self._run(Problem(self.seen, y, lam, o.sign, basis), start)
         if result.stop == "diverged":

@@ -12,7 +12,7 @@ from eitskin.skin.protocol import Reciprocity
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-PAIRED, PAIRED_LEAST, UNPAIRED, UNPAIRED_LEAST, OWN_LEAST = 12.0, 1e-3, 16.0, 1e-2, 0.05
+PAIRED, PAIRED_MIN, UNPAIRED, UNPAIRED_MIN, OWN_MIN = 12.0, 1e-3, 16.0, 1e-2, 0.05
 
 
 def odd_rows(
@@ -29,12 +29,12 @@ def odd_rows(
     largest = float(np.abs(older[used]).max(initial=0.0))
     rows = np.zeros(len(newer), dtype=np.bool_)
     if paired.any():
-        off, limit = paired, max(PAIRED * robust(paired), PAIRED_LEAST * largest)
+        off, limit = paired, max(PAIRED * robust(paired), PAIRED_MIN * largest)
     else:
-        off, limit = greater, max(UNPAIRED * robust(greater), UNPAIRED_LEAST * largest)
+        off, limit = greater, max(UNPAIRED * robust(greater), UNPAIRED_MIN * largest)
     size = np.where(used, np.abs(older), 0.0)
     own = np.maximum(size[fold.first], np.where(has_second, size[fold.second], 0.0))
-    odd = (off > limit) & (off > OWN_LEAST * own)
+    odd = (off > limit) & (off > OWN_MIN * own)
     if odd.sum() > OUTLIER_MAX:
         odd[:] = False
     rows[fold.first[odd & (np.abs(first) > 0) & (np.abs(first) >= np.abs(second) / 2)]] = True

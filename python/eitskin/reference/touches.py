@@ -19,7 +19,7 @@ Interplay = Callable[[Sequence[Disc]], FloatArray]
 
 EARLY_RADIUS, FINAL_RADIUS = 2.0, 0.4
 ROUNDS, LATER_SWEEPS = 2, 2
-MOST_INTERPLAY = 0.25
+MAX_INTERPLAY = 0.25
 
 
 def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | None) -> FloatArray:
@@ -39,7 +39,7 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
             if interplay is not None and len(fit.discs) > 1
             else np.zeros_like(frame.y)
         )
-        fit.data = frame.y - added if added @ added <= MOST_INTERPLAY * fit.whole else frame.y
+        fit.data = frame.y - added if added @ added <= MAX_INTERPLAY * fit.whole else frame.y
 
     fit.radius_weight = o.touch_radius_weight * (EARLY_RADIUS if interplay is not None else 1.0)
     fit.data = frame.straight if frame.straight is not None and o.touch_sweeps > 0 else frame.y

@@ -22,7 +22,7 @@ SURE_CLEARNESS = 1.5
 NEWBORN_REACH = 0.6
 SPEED_CHANGE = 0.028
 FIRST_SPEED = 0.12
-LEAST_DEVIATION = 0.01
+MIN_DEVIATION = 0.01
 KNOWN_FRAMES = 4
 
 
@@ -115,7 +115,7 @@ class _Frame:
         own = self.lambda_max * math.sqrt(touch.confidence)
         noise = self.lambda_noise / own if own > 0 else 0.0
         place = self.grid.pixel_mm**2 * (
-            (self.options.track_smooth * noise) ** 2 + LEAST_DEVIATION**2
+            (self.options.track_smooth * noise) ** 2 + MIN_DEVIATION**2
         )
         speed = (FIRST_SPEED * self.options.follow_mm) ** 2
         return Followed(

@@ -14,7 +14,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 SUBDIVISION = 8
-LEAST_FACTOR = 1e-3
+MIN_FACTOR = 1e-3
 
 
 class Cover:
@@ -53,7 +53,7 @@ class Cover:
             elements, part = self.of(touch)
             change[elements] += part * (touch.contrast - 1.0)
         elements = np.flatnonzero(change)
-        return elements, np.maximum(1.0 + change[elements], LEAST_FACTOR)
+        return elements, np.maximum(1.0 + change[elements], MIN_FACTOR)
 
 
 def _sub_triangle_weights(subdivision: int) -> FloatArray:

@@ -40,7 +40,7 @@ from eitskin.skin.skin import skin_to_table
 FORMAT = "eitskin-dataset"
 VERSION = 1
 DEFAULT_CHUNK = 100
-MOST_SCENES = 100_000_000
+MAX_SCENES = 100_000_000
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 Progress: TypeAlias = Callable[[Iterable[int], int], Iterable[int]]
@@ -104,7 +104,7 @@ def job_of(
         FileError, ConfigError: the ranges cannot be read, or do not suit the scene.
     """
     for name, value, low, high in (
-        ("--count", count, 1, MOST_SCENES),
+        ("--count", count, 1, MAX_SCENES),
         ("--chunk", chunk, 1, 100_000),
     ):
         if not low <= value <= high:

@@ -18,7 +18,7 @@ from eitskin.scene.random_touches import Touch
 
 FloatArray = npt.NDArray[np.float64]
 
-MOST_CELLS = 500_000_000
+MAX_CELLS = 500_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +76,10 @@ def _rasters(
     compiled: Compiled, numbers: npt.NDArray[np.int64], pixels: int
 ) -> tuple[npt.NDArray[np.int8], npt.NDArray[np.float32], tuple[float, float, float, float]]:
     grid, mesh = grid_for(compiled.skin.outline, pixels), compiled.model.mesh
-    if len(numbers) * grid.nx * grid.ny > MOST_CELLS:
+    if len(numbers) * grid.nx * grid.ny > MAX_CELLS:
         raise UsageError(
             f"truth of {len(numbers)} frames with {grid.nx} x {grid.ny} cells each is over"
-            f" {MOST_CELLS} cells; use fewer --truth-pixels, or 0 for none"
+            f" {MAX_CELLS} cells; use fewer --truth-pixels, or 0 for none"
         )
     x0, y0 = grid.origin_mm
     x_mm, y_mm = np.meshgrid(

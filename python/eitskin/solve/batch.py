@@ -20,8 +20,8 @@ from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
 
-MOST_THREADS = 256
-MOST_IN_BLOCK = 32
+MAX_THREADS = 256
+MAX_IN_BLOCK = 32
 T = TypeVar("T")
 
 
@@ -38,10 +38,10 @@ def check_threads(threads: int | None) -> int:
                 if hasattr(os, "sched_getaffinity")
                 else os.cpu_count() or 1
             ),
-            MOST_THREADS,
+            MAX_THREADS,
         )
-    if not 1 <= threads <= MOST_THREADS:
-        raise UsageError(f"{threads} threads cannot be; use 1 to {MOST_THREADS}")
+    if not 1 <= threads <= MAX_THREADS:
+        raise UsageError(f"{threads} threads cannot be; use 1 to {MAX_THREADS}")
     return threads
 
 
@@ -120,7 +120,7 @@ class Batch:
                 f"frames: have shape {frames.shape}, but the model's protocol has"
                 f" {self._engines[0].n_rows} rows"
             )
-        size = max(1, min(MOST_IN_BLOCK, len(frames) // (4 * self.threads)))
+        size = max(1, min(MAX_IN_BLOCK, len(frames) // (4 * self.threads)))
         free: SimpleQueue[CoreEngine] = SimpleQueue()
         for engine in self._engines[1:]:
             free.put(engine)
@@ -130,9 +130,7 @@ class Batch:
                 free.get() if start > 0 else self._engines[0]
             )  # a fresh one for the first frame of all
             try:
-                engine.follow(
-                    np.vstack([self._last, frames[max(0, start - MOST_IN_BLOCK) : start]])
-                )
+                engine.follow(np.vstack([self._last, frames[max(0, start - MAX_IN_BLOCK) : start]]))
                 return engine.reconstruct_block(frames[start : start + size], touches=touches)
             finally:
                 free.put(engine)

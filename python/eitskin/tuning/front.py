@@ -23,7 +23,7 @@ F767_RAM = 256 * 1024  # the linker script promises the workspace as much
 BOARDS = ("f767", "host")
 JUDGED = ("image", "discs")
 DEFAULT_PERIOD_US = 20_800  # of the default scan
-LEAST_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost of the discs
+MIN_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost of the discs
 MEASURED = ("threshold", "force_scale", "costs", "instructions", "host_us")
 SHORT_CELL = (
     "image.mean", "image.low", "image.high", "image.worst_tenth", "discs.mean", "exact_count",
@@ -298,7 +298,7 @@ def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") ->
             one.cost(wish.unit, wish.board, wish.where, wish.worst),
             one.accuracy(wish.where),
         )
-        usable = one.configuration.touch_sweeps >= LEAST_SWEEPS and (
+        usable = one.configuration.touch_sweeps >= MIN_SWEEPS and (
             wish.board == "host" or one.fits_f767
         )
         if cost is not None and accuracy is not None and usable:

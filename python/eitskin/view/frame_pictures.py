@@ -11,7 +11,7 @@ from eitskin.model.model import Model
 from eitskin.scoring.score import FrameScore
 from eitskin.view.pictures import Mark, Panel, draw_panels
 
-MOST_PANELS = 36
+MAX_PANELS = 36
 
 
 def true_marks(frames: Frames, number: int) -> tuple[Mark, ...]:
@@ -52,7 +52,7 @@ def draw_results(
         FileError: the file cannot be written.
     """
     panels = []
-    for number, result in list(results.items())[:MOST_PANELS]:
+    for number, result in list(results.items())[:MAX_PANELS]:
         heading = frames.frame_name[number]
         if number in scores:
             heading += (
@@ -60,8 +60,8 @@ def draw_results(
             )
         panels.append(Panel(heading, result.image, true_marks(frames, number), found_marks(result)))
     note = "circles: true touches; crosses and dashed circles: found"
-    if len(results) > MOST_PANELS:
-        note += f"; the first {MOST_PANELS} of {len(results)} frames"
+    if len(results) > MAX_PANELS:
+        note += f"; the first {MAX_PANELS} of {len(results)} frames"
     draw_panels(
         path, model.skin, model.grid, panels, ceil(sqrt(len(panels))), title=title, note=note
     )

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TIME_COLOURS = "viridis"
-MOST_OUTLINES = 12
+MAX_OUTLINES = 12
 
 
 def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
@@ -63,9 +63,7 @@ def _draw_touches(axes: Axes, scene: Scene) -> None:
             continue
         axes.plot(one.x_mm[there], one.y_mm[there], color=INK, linewidth=0.8, alpha=0.6, zorder=3)
         most = float(np.abs(one.contrast[there] - 1).max())
-        for k in there[
-            np.unique(np.linspace(0, len(there) - 1, MOST_OUTLINES).round().astype(int))
-        ]:
+        for k in there[np.unique(np.linspace(0, len(there) - 1, MAX_OUTLINES).round().astype(int))]:
             colour = colours(k / max(scene.frames - 1, 1))
             press = 0.15 + 0.85 * abs(float(one.contrast[k]) - 1) / most
             style: dict[str, Any] = {

@@ -11,8 +11,8 @@ from eitskin.model.model import Model
 from eitskin.scoring.stream_check import Seen, spread
 from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels
 
-MOST_PANELS = 36
-MOST_KEPT = 20 * MOST_PANELS
+MAX_PANELS = 36
+MAX_KEPT = 20 * MAX_PANELS
 
 
 class Album:
@@ -28,7 +28,7 @@ class Album:
         """Another frame."""
         if self._count % self._step == 0:
             self._kept.append(seen)
-            if len(self._kept) >= MOST_KEPT:
+            if len(self._kept) >= MAX_KEPT:
                 self._kept, self._step = self._kept[::2], 2 * self._step
         self._count += 1
         self._last = seen
@@ -41,7 +41,7 @@ class Album:
             if self._last is None or self._kept[-1] is self._last
             else [*self._kept, self._last]
         )
-        return spread(kept, MOST_PANELS)
+        return spread(kept, MAX_PANELS)
 
     @property
     def count(self) -> int:

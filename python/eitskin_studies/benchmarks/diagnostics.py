@@ -39,7 +39,7 @@ BoolArray = npt.NDArray[np.bool_]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
 SNRS_DB, HEADLINE_DB, BETWEEN_DB = (40.0, 60.0, 80.0), 60.0, 50.0
-MOST_TOUCHES, SPACINGS = 12, (2.5, 4.0)  # radii
+MAX_TOUCHES, SPACINGS = 12, (2.5, 4.0)  # radii
 IMPERFECT_DB = 60.0
 NORMAL_95 = 1.96
 
@@ -302,7 +302,7 @@ def crowds(
     """``frames`` scenes of 1 to 12 touches of radius 9 mm and contrast 5, half of them at least
     2.5, half 4 radii apart."""
     outline, found = paper_skin().outline, []
-    for count in progress(range(1, MOST_TOUCHES + 1)):
+    for count in progress(range(1, MAX_TOUCHES + 1)):
         scenes = [s for k, spacing in enumerate(SPACINGS)
                   for s in spaced_touches(outline, seed, (frames + 1 - k) // 2, count,
                   spacing).scenes]  # fmt: skip

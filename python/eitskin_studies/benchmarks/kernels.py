@@ -24,7 +24,7 @@ from eitskin_studies.harness.sections import Filling, text_table
 
 WIDTHS = ("f32", "f64")
 PEAKS = ("fma", "chain", "read")
-MOST_TIMES = 3.0
+MAX_TIMES = 3.0
 BEYOND = 64 << 20
 
 
@@ -218,7 +218,7 @@ def missed(result: KernelTimes, hot: bool) -> list[str]:
         f"{j.timing.name} {j.timing.storage} ({width.width}) {j.times:.1f}"
         for width in result.widths
         for j in width.judged
-        if j.times > MOST_TIMES and j.hot == hot
+        if j.times > MAX_TIMES and j.hot == hot
     ]
 
 
@@ -240,7 +240,7 @@ def for_page(result: KernelTimes, command: str) -> Filling:
         f"By `{command}`: {result.columns} columns of {result.rank} numbers,"
         f" {result.widths[0].kernels} kernels, one thread, medians of {result.rounds} rounds in"
         f" turns; {result.machine}. Peaks, measured in the same rounds:\n\n{peaks}\n\n"
-        f"Of what a prepared context calls, beyond {MOST_TIMES:g} times its limit:"
+        f"Of what a prepared context calls, beyond {MAX_TIMES:g} times its limit:"
         f" {'; '.join(hot) or 'nothing'}."
     )
     return {"kernels-run": run}, {"kernels": (HEAD, rows(result))}

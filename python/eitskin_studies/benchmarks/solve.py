@@ -29,7 +29,7 @@ from eitskin_studies.benchmarks.solve_problems import Problems, make_problems, m
 
 LEVELS = (1e-2, 1e-4, 1e-6)
 EQUAL_ITERATIONS = (30, 60, 200)
-MOST_S = 3.0
+MAX_S = 3.0
 """A solver that needs longer for one problem has not reached the level."""
 
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
@@ -81,7 +81,7 @@ def _least_effort(
         for level in levels:
             if reached <= level and level not in found:
                 found[level] = (setting, reached)
-        if len(found) == len(levels) or took > MOST_S:
+        if len(found) == len(levels) or took > MAX_S:
             break
     return found
 

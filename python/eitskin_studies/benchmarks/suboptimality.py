@@ -24,7 +24,7 @@ from eitskin_studies.compare.run import truth_masks
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[Sequence[Any]], Iterable[Any]]
 
-LEAST = 1e-7
+MIN = 1e-7
 """Below this float32 says no more; shown as this."""
 STEPS: dict[str, tuple[dict[str, int], ...]] = {
     "fista": tuple({"iterations": n} for n in (10, 20, 30, 60, 120, 250, 500, 1000, 2500, 6000)),
@@ -122,7 +122,7 @@ def text(curves: Curves) -> str:
     for s in curves.stops:
         effort = "optimum" if s.solver == "active-set" and s.effort == 0 else f"{s.effort}"
         lines.append(
-            f"{s.solver:13} {effort:>12} {max(s.suboptimality, LEAST):14.1e} {s.miou:6.3f}"
+            f"{s.solver:13} {effort:>12} {max(s.suboptimality, MIN):14.1e} {s.miou:6.3f}"
             f" {s.worst_tenth:12.3f} {s.macs / 1e3:8.0f} {s.threshold:5.2f}"
         )
     return "\n".join(lines)

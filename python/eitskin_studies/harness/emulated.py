@@ -32,7 +32,7 @@ from eitskin_studies.harness.emulated_steps import (
 BUILD_TOOLS = ("arm-none-eabi-gcc", "cmake", "ninja")
 QEMU = "qemu-system-arm"
 PROGRAM = Path("tests") / "emulated" / "frames_m7.elf"
-MOST_SECONDS = 300
+MAX_SECONDS = 300
 STATUS = re.compile(r"(model|choose|quiet) status (-?\d+)(?: workspace (\d+) kernels (\S+))?")
 LINE = re.compile(
     r"frame (\d+) status (-?\d+) stop (\d+) iterations (\d+) macs (\d+) touchmacs (\d+) solve (\d+)"
@@ -195,12 +195,12 @@ def run_steps(
             cwd=folder,
             capture_output=True,
             text=True,
-            timeout=MOST_SECONDS,
+            timeout=MAX_SECONDS,
             check=False,
             stdin=subprocess.DEVNULL,
         )
     except subprocess.TimeoutExpired:
-        raise UsageError(f"the emulated board did not end within {MOST_SECONDS} s") from None
+        raise UsageError(f"the emulated board did not end within {MAX_SECONDS} s") from None
     lines = done.stdout.splitlines()
     heads = [match for match in map(STATUS.match, lines) if match is not None]
     found = [match for match in map(LINE.match, lines) if match is not None]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
-from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, LEAST, MOST, NARROW, RING, WIDE
+from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, MAX, MIN, NARROW, RING, WIDE
 from eitskin_studies.experiments.multitouch.counts import Score, Share, auc, roc, share_of
 from eitskin_studies.experiments.multitouch.doubt import Judged
 from eitskin_studies.experiments.multitouch.doubt_tables import found_some, reliabilities
@@ -59,8 +59,8 @@ def draw_counts(path: str | Path, counted: Counted) -> None:
             for column, geometry in enumerate(GEOMETRIES):
                 axes = figure.add_subplot(len(NAMES), 3, 3 * row + column + 1)
                 for place, (name, snr_db, colour, label) in enumerate(lines):
-                    points = [(k, counted.scores[geometry, k, name, snr_db]) for k in range(LEAST,
-                        MOST + 1)
+                    points = [(k, counted.scores[geometry, k, name, snr_db]) for k in range(MIN,
+                        MAX + 1)
                               if (geometry, k, name, snr_db) in counted.scores]  # fmt: skip
                     if points:
                         _line(axes, points, (place - len(lines) / 2) * 0.06, colour, label)
@@ -69,7 +69,7 @@ def draw_counts(path: str | Path, counted: Counted) -> None:
                 axes.set(
                     xlabel="touches" if row == len(NAMES) - 1 else "",
                     ylim=(-0.03, 1.12),
-                    xticks=range(LEAST, MOST + 1),
+                    xticks=range(MIN, MAX + 1),
                 )
                 axes.set_title(f"{variant}: {TITLES[geometry]}")
                 axes.grid(linewidth=0.4, alpha=0.5)

@@ -23,7 +23,7 @@ from eitskin.view.pictures import (
     save_png,
 )
 
-LEAST_LOG10 = -3.0
+MIN_LOG10 = -3.0
 MISSED = "#c62828"
 
 
@@ -75,7 +75,7 @@ def draw_shapes(path: str | Path, shapes: Sequence[Shape]) -> None:
             extent = (x0, x0 + grid.nx * grid.pixel_mm, y0, y0 + grid.ny * grid.pixel_mm)
             colours = {
                 "cmap": "viridis",
-                "vmin": LEAST_LOG10,
+                "vmin": MIN_LOG10,
                 "vmax": 0.0,
                 "interpolation": "nearest",
             }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from eitskin.view.pictures import load_matplotlib, save_png
-from eitskin_studies.benchmarks.suboptimality import LEAST, Curves
+from eitskin_studies.benchmarks.suboptimality import MIN, Curves
 
 COLOURS = {
     "fista": "#777777",
@@ -33,7 +33,7 @@ def draw(path: Path, curves: Curves) -> None:
     axes = figure.add_subplot()
     for solver, colour in COLOURS.items():
         stops = [s for s in curves.stops if s.solver == solver]
-        x, y = [max(s.suboptimality, LEAST) for s in stops], [s.miou for s in stops]
+        x, y = [max(s.suboptimality, MIN) for s in stops], [s.miou for s in stops]
         front = 1 if solver == "fista" else 2
         axes.plot(
             x, y, "o-", color=colour, label=NAMES[solver], markersize=4, linewidth=1.3, zorder=front

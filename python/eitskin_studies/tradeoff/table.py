@@ -7,10 +7,10 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from eitskin.tuning.front import LEAST_SWEEPS, Front, Point, Where
+from eitskin.tuning.front import MIN_SWEEPS, Front, Point, Where
 from eitskin_studies.tradeoff.fronts import pareto
 
-LEAST_GAIN = 0.002  # of MIoU: a fifth of the 95 % interval of 180 scenes
+MIN_GAIN = 0.002  # of MIoU: a fifth of the 95 % interval of 180 scenes
 COSTS = ("flash_bytes", "ram_bytes", "pixels_kept", "acquisition_us")
 
 
@@ -25,13 +25,13 @@ def x_of(point: Point, where: Where) -> float | None:
 
 def best_points(points: Sequence[Point], where: Where) -> list[Point]:
     """The Pareto front of points that begin each frame anew and fit touches fully, in steps of
-    ``LEAST_GAIN`` or more."""
+    ``MIN_GAIN`` or more."""
     alike = [
         one
         for one in points
-        if not one.configuration.warm_start and one.configuration.touch_sweeps >= LEAST_SWEEPS
+        if not one.configuration.warm_start and one.configuration.touch_sweeps >= MIN_SWEEPS
     ]
-    return pareto(alike, lambda p: x_of(p, where), lambda p: p.accuracy(where), LEAST_GAIN)
+    return pareto(alike, lambda p: x_of(p, where), lambda p: p.accuracy(where), MIN_GAIN)
 
 
 def to_csv(front: Front) -> str:
@@ -132,7 +132,7 @@ def to_text(front: Front, where: Where) -> str:
     lines += [
         "",
         (
-            f"* on the front: nothing that costs no more is as accurate to {LEAST_GAIN}, but for"
+            f"* on the front: nothing that costs no more is as accurate to {MIN_GAIN}, but for"
             " warm and half fitted ones"
         ),
     ]

@@ -34,7 +34,7 @@ SCENES = 160
 SEED = 78
 QUIET = 16
 ELECTRODES = 16
-MOST_LOSS = 0.03
+MAX_LOSS = 0.03
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -166,7 +166,7 @@ def test_a_detached_electrode(judge: Judge) -> None:
     loss = whole - damaged
     print(f"whole {whole}, an electrode off {damaged}, loss {loss}")
     assert whole[0] >= 0.84 and whole[1] >= 0.88
-    assert loss.max() <= MOST_LOSS
+    assert loss.max() <= MAX_LOSS
 
 
 def test_each_further_electrode_costs_a_little(judge: Judge) -> None:

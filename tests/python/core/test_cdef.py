@@ -107,7 +107,7 @@ CDEF_MUTATIONS = [
     ("EITS_STOP_GAP, ", "", "enum eits_stop"),
     ("EITS_E_NOT_FINITE, ... }", "... }", "enum eits_status"),
     ("EITS_STORAGE_F32,", "EITS_STORAGE_F32 = 1,", "enum eits_storage"),
-    ("#define EITS_MAX_TOUCHES ...", "#define EITS_MOST_TOUCHES ...", "macro EITS_MOST_TOUCHES"),
+    ("#define EITS_MAX_TOUCHES ...", "#define EITS_MAX_TOUCHES ...", "macro EITS_MAX_TOUCHES"),
     ("typedef struct {", "typedef union {", "not understood"),
 ]
 HEADER_MUTATIONS = [

@@ -168,11 +168,11 @@ def moving_touches() -> tuple[np.ndarray, np.ndarray]:
     return simulated.quiet_v, simulated.frames_v
 
 
-MOST_INSTRUCTIONS = {0: 2_500_000, ALL_SEARCH: 4_000_000}
+MAX_INSTRUCTIONS = {0: 2_500_000, ALL_SEARCH: 4_000_000}
 
 
 @pytest.mark.parametrize("warm", [False, True])
-@pytest.mark.parametrize("search", MOST_INSTRUCTIONS)
+@pytest.mark.parametrize("search", MAX_INSTRUCTIONS)
 def test_what_a_frame_costs_at_most(program: Path, tmp_path: Path, warm: bool, search: int) -> None:
     """Solve and touches, with peaks alone and with the whole search; each frame, also the first and
     those where a touch comes: moving touches, and 20 random scenes that follow each other without
@@ -188,14 +188,14 @@ def test_what_a_frame_costs_at_most(program: Path, tmp_path: Path, warm: bool, s
             " instructions"
         )
         assert all(result.touches[0] in "123" for result in board)
-        assert max(costs) <= MOST_INSTRUCTIONS[search]
+        assert max(costs) <= MAX_INSTRUCTIONS[search]
 
 
 def in_storage(model: Model, storage: str) -> bytes:
     return encode_model(replace(model, stored=store(model.sensitivity, storage)))
 
 
-MOST_TIMES_F32 = {"f32": 1.0, "f16": 1.2, "i16": 1.4, "i8": 1.45}
+MAX_TIMES_F32 = {"f32": 1.0, "f16": 1.2, "i16": 1.4, "i8": 1.45}
 
 
 def test_every_storage_costs_little_more_than_f32(program: Path, tmp_path: Path) -> None:
@@ -218,8 +218,8 @@ def test_every_storage_costs_little_more_than_f32(program: Path, tmp_path: Path)
             f"{storage}: {mean[storage]:.0f} instructions, {mean[storage] / mean['f32']:.2f} times"
             " those of f32"
         )
-        assert mean[storage] <= MOST_INSTRUCTIONS[ALL_SEARCH]
-        assert mean[storage] <= MOST_TIMES_F32[storage] * mean["f32"]
+        assert mean[storage] <= MAX_INSTRUCTIONS[ALL_SEARCH]
+        assert mean[storage] <= MAX_TIMES_F32[storage] * mean["f32"]
 
 
 @pytest.mark.parametrize("storage", STORAGES)

@@ -28,7 +28,7 @@ from eitskin.skin.protocol import Protocol
 from emulated import clean, power_up
 
 BOOT_S, ANSWER_S, SCAN_S = 0.1, 0.15, 0.075
-MOST_INTERRUPTS = 10_000  # of a session; a sound image takes about 3,000
+MAX_INTERRUPTS = 10_000  # of a session; a sound image takes about 3,000
 EXCITATION_HZ, SETTLE_US = 50_000.0, 16
 
 
@@ -81,7 +81,7 @@ class Impatient(EmulatedTransport):
     """Gives up a board that does little but take interrupts."""
 
     def read(self, timeout_s: float) -> bytes:
-        if self.board.record.interrupts.total() > MOST_INTERRUPTS:
+        if self.board.record.interrupts.total() > MAX_INTERRUPTS:
             raise DeviceError("an interrupt that does not end")
         return super().read(min(timeout_s, 0.005))
 
@@ -101,7 +101,7 @@ def run_session(image: bytes) -> Session:
     session.link = PumpedLink(Impatient("mutant", board))
     try:
         board.run_until(
-            round(BOOT_S * TICKS_PER_S), lambda: board.record.interrupts.total() > MOST_INTERRUPTS
+            round(BOOT_S * TICKS_PER_S), lambda: board.record.interrupts.total() > MAX_INTERRUPTS
         )
         session.ask(commands.GetInfo())
         session.ask(commands.StreamCommand(int(Stream.RAW)))

@@ -70,7 +70,7 @@ def test_an_image_that_hangs_does_not_hang_its_user(
     transport = open_emulated("two_touch", image=built)
     while transport.read(0.001):
         pass
-    monkeypatch.setattr(transport_module, "MOST_WALL_S", -1.0)
+    monkeypatch.setattr(transport_module, "MAX_WALL_S", -1.0)
     with pytest.raises(DeviceError, match="said nothing"):
         transport.read(1.0)
 

@@ -37,7 +37,7 @@ RETURN, CALLBACK, SCRATCH = 0x20070000, 0x20070100, 0x20071000
 BX_LR = b"\x70\x47"
 DMA1, DMA2 = 0x40026000, 0x40026400
 ARGUMENTS = (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3)
-MOST_INSTRUCTIONS = 2_000_000
+MAX_INSTRUCTIONS = 2_000_000
 
 
 class BareImage:
@@ -101,7 +101,7 @@ class BareImage:
             self._uc.reg_write(register, value)
         self._uc.reg_write(UC_ARM_REG_SP, self.symbols["stack_top"])
         self._uc.reg_write(UC_ARM_REG_LR, RETURN | 1)
-        self._uc.emu_start(address | 1, RETURN, count=MOST_INSTRUCTIONS)
+        self._uc.emu_start(address | 1, RETURN, count=MAX_INSTRUCTIONS)
         assert self._uc.reg_read(UC_ARM_REG_PC) == RETURN, f"{function} does not return"
         value = int(self._uc.reg_read(UC_ARM_REG_R0))
         return value - 2**32 if value >= 2**31 else value

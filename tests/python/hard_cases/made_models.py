@@ -18,7 +18,7 @@ from eitskin.solve.options import default_options
 ELECTRODES = 8
 ROWS, FOLDED = 40, 20
 SIDE = 8
-MOST_COLUMNS = SIDE * SIDE
+MAX_COLUMNS = SIDE * SIDE
 
 
 @cache

@@ -18,13 +18,13 @@ from margins import Margins
 from small_models import prebuilt
 
 CASE = "physics/entangled"
-MOST = 16
+MAX = 16
 
 
 def searches() -> list[Options]:
     """All and each part of the search, images refined, any sign, as many touches as there may
     be."""
-    own = replace(default_options(prebuilt()[0]), max_touches=MOST, refine=True)
+    own = replace(default_options(prebuilt()[0]), max_touches=MAX, refine=True)
     parts = [
         replace(own, touch_fit=bits)
         for bits in (ALL_SEARCH, 0, STRAIGHT, REGROUP, COUPLED, REGROUP | COUPLED)
@@ -50,7 +50,7 @@ def test_touches_in_each_others_field(same_everywhere: SameEverywhere, margins: 
         assert one.status == 0 and one.finite()
         options = chosen[k // len(frames)]
         margins.everywhere(
-            CASE, "touches beyond max_touches", max(0, len(one.touches) - MOST), 0, "touches"
+            CASE, "touches beyond max_touches", max(0, len(one.touches) - MAX), 0, "touches"
         )
         margins.everywhere(
             CASE, "touches beyond the skin", sum(not on_skin(t) for t in one.touches), 0, "touches"

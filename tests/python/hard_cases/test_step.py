@@ -15,7 +15,7 @@ from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 from margins import Margins
 
 CASE = "problem/step-too-long"
-MOST_HALVINGS = 8
+MAX_HALVINGS = 8
 FACTORS = (0.1, 1.0, 2.0, 10.0, 100.0, 1e3, 1e6, 1e20)
 PROBLEMS = {"gaussian": gaussian(31), "smooth": smooth(32), "whitened": whitened(33)}
 
@@ -44,7 +44,7 @@ def test_step_too_long(
         problem = PROBLEMS[name]
         point = judged(problem.s, problem.y, sign, one)
         check_sound(margins, CASE, point, one)
-        assert one.info.step_halvings <= MOST_HALVINGS
+        assert one.info.step_halvings <= MAX_HALVINGS
         halved += one.info.step_halvings > 0
         gave_up += one.info.stop == "diverged"
         if one.info.stop == "diverged":
@@ -62,7 +62,7 @@ def test_step_too_long(
         if solver not in ("fista", "working-set"):
             assert one.info.step_halvings == 0
         elif iterations == 300:
-            assert factor > 2**MOST_HALVINGS or one.info.stop != "diverged", (factor, one.info)
+            assert factor > 2**MAX_HALVINGS or one.info.stop != "diverged", (factor, one.info)
             assert factor < 1e6 or one.info.stop == "diverged", (factor, one.info)
         assert one.image.any() or one.info.stop == "diverged", (name, factor, sign)
     if solver in ("fista", "working-set"):

@@ -24,7 +24,7 @@ from small_models import DATA_KINDS, small, small_blob, small_model
 
 CASE, FRAMES_CASE = "problem/units", "problem/units-of-frames"
 EXPONENTS = tuple(range(-30, 31, 5))
-LEAST_DATA, MOST_DATA = (
+MIN_DATA, MAX_DATA = (
     2.0**-51,
     2.0**63,
 )  # |y| whose square float32 holds with 24 bits to spare, and |y|^2 below its end
@@ -43,9 +43,9 @@ def refused(s: np.ndarray) -> bool:
 
 def expected_end(size: float) -> str:
     """What becomes of data of norm ``size``."""
-    if size < LEAST_DATA:
+    if size < MIN_DATA:
         return "zero"
-    return "solved" if size < MOST_DATA else "refused"
+    return "solved" if size < MAX_DATA else "refused"
 
 
 def check_scaled(

@@ -14,7 +14,7 @@ from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Solved, SolvedImage
 from eitskin.scene.random_touches import Touch
 from eitskin.scoring.stream_check import Seen
-from eitskin.view.stream_picture import MOST_KEPT, MOST_PANELS, Album, draw_stream
+from eitskin.view.stream_picture import MAX_KEPT, MAX_PANELS, Album, draw_stream
 from small_models import prebuilt
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -47,9 +47,9 @@ def test_pictures(count: int, tmp_path: Path) -> None:
 
 
 def test_a_long_stream_is_thinned_and_its_last_frame_kept() -> None:
-    long = album(5 * MOST_KEPT + 3)
+    long = album(5 * MAX_KEPT + 3)
     numbers = [one.frame.number for one in long.frames]
-    assert len(numbers) == MOST_PANELS and numbers[0] == 0 and numbers[-1] == 5 * MOST_KEPT + 2
-    assert len(long._kept) < MOST_KEPT and long.count == 5 * MOST_KEPT + 3
+    assert len(numbers) == MAX_PANELS and numbers[0] == 0 and numbers[-1] == 5 * MAX_KEPT + 2
+    assert len(long._kept) < MAX_KEPT and long.count == 5 * MAX_KEPT + 3
     steps = np.diff(numbers)
     assert steps.max() < 2 * steps.min() + 20

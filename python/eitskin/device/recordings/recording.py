@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FORMAT = "eits"
 VERSION = 1
 CHUNK = 1 << 16
-MOST_HEAD = 4096
+MAX_HEAD = 4096
 
 
 class Recorder:
@@ -153,7 +153,7 @@ def read_head(path: str | Path) -> dict[str, Any]:
     """
     try:
         with Path(path).open("rb") as stream:
-            data = stream.read(MOST_HEAD)
+            data = stream.read(MAX_HEAD)
     except FileNotFoundError:
         raise FileError(f"{path}: no such recording; check the path") from None
     except OSError as error:

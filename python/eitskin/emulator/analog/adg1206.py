@@ -16,7 +16,7 @@ from eitskin.emulator.clocktime import TICKS_PER_S
 
 NAMES = ("I+", "I-", "V+", "V-")
 OFF_TICKS = 140 * TICKS_PER_S // 10**9  # the longest tOFF(EN), -40 to 125 C on +-15 V (table 1)
-MOST_LOGGED = 20_000
+MAX_LOGGED = 20_000
 
 
 @dataclass(frozen=True)
@@ -73,10 +73,10 @@ class Multiplexers:
             self.joined = joined
             self.changes += 1
             one = Switching(at, joined)
-            if len(self.log) < MOST_LOGGED:
+            if len(self.log) < MAX_LOGGED:
                 self.log.append(one)
             self.switched(one)
 
     def _violation(self, at: int, what: str) -> None:
-        if len(self.violations) < MOST_LOGGED:
+        if len(self.violations) < MAX_LOGGED:
             self.violations.append(f"{at / TICKS_PER_S * 1e6:.3f} us: {what}")

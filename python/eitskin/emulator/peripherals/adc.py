@@ -42,7 +42,7 @@ SCAN, EOCIE, OVRIE = 1 << 8, 1 << 5, 1 << 26
 TRIGGER_TIM2 = 0b1011  # EXTSEL, table 99
 SAMPLING_CYCLES = (3, 15, 28, 56, 84, 112, 144, 480)
 CONVERSION_CYCLES = 12
-MOST_HZ = 36_000_000
+MAX_HZ = 36_000_000
 IRQ = 18
 
 Codes = npt.NDArray[np.uint16]
@@ -272,7 +272,7 @@ class Adc(Registers):
                 self.unmodelled("CR1: scan, resolution, injected or watchdog")
             elif offset == SQR1 and value >> 20 & 0xF:
                 self.unmodelled("a sequence of several channels")
-            elif offset == CCR and self._rcc.apb_hz(2) // (2 + 2 * (value >> 16 & 3)) > MOST_HZ:
+            elif offset == CCR and self._rcc.apb_hz(2) // (2 + 2 * (value >> 16 & 3)) > MAX_HZ:
                 self.hazard("its clock is above 36 MHz")
         self._line()
         self._plan()

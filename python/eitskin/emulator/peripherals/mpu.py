@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from eitskin.emulator.memory import ITCM_BYTES, RAM, RAM_BYTES, Memories
 
 REGIONS = 8
-MOST_WATCHED = 4096
+MAX_WATCHED = 4096
 
 
 @dataclass
@@ -138,7 +138,7 @@ class Mpu:
             if (
                 region.attributes & 1
                 and region.denies
-                and region.size <= MOST_WATCHED
+                and region.size <= MAX_WATCHED
                 and 0 <= at < RAM_BYTES
             ):
                 self._watched.append((at, bytes(self._memories.ram[at : at + region.size])))

@@ -20,7 +20,7 @@ HSE_READY_TICKS, PLL_READY_TICKS = 4 * TICKS_PER_US, 100 * TICKS_PER_US
 ENABLES = {"AHB1ENR": 0x30, "AHB2ENR": 0x34, "AHB3ENR": 0x38, "APB1ENR": 0x40, "APB2ENR": 0x44}
 RESET_OFFSET = 0x20  # from an enable register back to its reset register
 CAUSES = {"pin": 26, "power": 27, "software": 28, "watchdog": 29}
-MOST_HZ_WITHOUT_OVERDRIVE, HZ_A_WAIT_STATE = 180_000_000, 30_000_000
+MAX_HZ_WITHOUT_OVERDRIVE, HZ_A_WAIT_STATE = 180_000_000, 30_000_000
 RESET_VALUES = {
     **{CR: 0x83, PLLCFGR: 0x24003010, CFGR: 0, 0x0C: 0},
     **{0x10: 0, 0x14: 0, 0x18: 0, 0x20: 0, 0x24: 0},
@@ -161,7 +161,7 @@ class Rcc(Registers):
         for _, after_change in self.listeners:
             after_change()
         self.mco_changed()
-        if self.sysclk_hz > MOST_HZ_WITHOUT_OVERDRIVE and not self.over_drive():
+        if self.sysclk_hz > MAX_HZ_WITHOUT_OVERDRIVE and not self.over_drive():
             self.hazard("above 180 MHz without over-drive")
         if self.hclk_hz > HZ_A_WAIT_STATE * (self.wait_states() + 1) + HZ_A_WAIT_STATE // 5:
             self.hazard("too few wait states of the flash")

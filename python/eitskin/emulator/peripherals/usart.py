@@ -27,7 +27,7 @@ EIE, DMAR, DMAT = 1 << 0, 1 << 6, 1 << 7
 FE, ORE, IDLE, RXNE, TC, TXE = 1 << 1, 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7
 CLEARABLE = FE | ORE | IDLE | TC | 1 << 0 | 1 << 2
 FRAME_BITS = 10
-MOST_BEHIND = 50  # bytes that may have left before they are put on the line
+MAX_BEHIND = 50  # bytes that may have left before they are put on the line
 IRQ = 39
 RESET_VALUES = {
     CR1: 0,
@@ -213,7 +213,7 @@ class Usart(Registers):
                 soonest = (
                     first
                     if number == 1
-                    else start + (min(number - 2, MOST_BEHIND)) * self.frame_ticks
+                    else start + (min(number - 2, MAX_BEHIND)) * self.frame_ticks
                 )
             for enabled, at in ((TXEIE, self._room_at()), (TCIE, self._shift_free_at)):
                 if control & enabled and at > self._clock.now:

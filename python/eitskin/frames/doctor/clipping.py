@@ -11,10 +11,10 @@ from eitskin.frames.doctor.case import BoolArray, Case, FloatArray, numbers
 from eitskin.frames.doctor.remedy import channel_remedy
 from eitskin.frames.doctor.report import FAULT, Finding, Outcome
 
-LEAST_TIES = 4
+MIN_TIES = 4
 TIES_PER_USUAL = 4.0
 SAME = 1e-9
-LEAST_QUIET = 4
+MIN_QUIET = 4
 
 
 def check_clipping(case: Case) -> tuple[Case, Outcome]:
@@ -65,7 +65,7 @@ def at_rail(frames: FloatArray) -> BoolArray:
     """Which readings (f, m) stand exactly at the greatest or the least value, where far more do
     than at any other.
 
-    A rail is a value in the outer half of the range of magnitudes that at least LEAST_TIES readings
+    A rail is a value in the outer half of the range of magnitudes that at least MIN_TIES readings
     share, and TIES_PER_USUAL times as many as share a usual value of that half; equal readings of a
     noiseless or coarsely digitised frame are no rail.
     """
@@ -84,7 +84,7 @@ def at_rail(frames: FloatArray) -> BoolArray:
             rest.size / max(len(np.unique(np.round(rest / (SAME * top)))), 1) if rest.size else 1.0
         )
         channels = int(hits.any(axis=0).sum())
-        if hits.sum() >= max(LEAST_TIES, TIES_PER_USUAL * usual) and (
+        if hits.sum() >= max(MIN_TIES, TIES_PER_USUAL * usual) and (
             rest.size or channels < frames.shape[1]
         ):
             found |= hits
@@ -92,9 +92,9 @@ def at_rail(frames: FloatArray) -> BoolArray:
 
 
 def _stuck(quiet: FloatArray) -> BoolArray:
-    """Channels (m,) without any change over at least LEAST_QUIET quiet frames, where most channels
+    """Channels (m,) without any change over at least MIN_QUIET quiet frames, where most channels
     do change."""
-    if len(quiet) < LEAST_QUIET:
+    if len(quiet) < MIN_QUIET:
         return np.zeros(quiet.shape[1], dtype=bool)
     still = np.ptp(np.nan_to_num(quiet), axis=0) == 0
     return still if still.mean() < 0.5 else np.zeros_like(still)

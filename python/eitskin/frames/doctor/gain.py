@@ -34,7 +34,7 @@ PAIR_AGREE = 0.75
 PAIR_SPREADS = 3.0
 MANY = 0.5
 FOREIGN_BELOW = 0.9
-LEAST_CHANNELS = 8
+MIN_CHANNELS = 8
 UNIT_OFF = 30.0
 
 
@@ -58,7 +58,7 @@ def check_resemblance(case: Case) -> Outcome:
     """Whether the reference looks like a homogeneous skin at all."""
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     size = np.abs(predicted)
-    if size.size < LEAST_CHANNELS or np.ptp(size) <= SAME * size.max():
+    if size.size < MIN_CHANNELS or np.ptp(size) <= SAME * size.max():
         return Outcome(
             untold=("whether this is a homogeneous skin: too few channels, or all alike",)
         )

@@ -23,11 +23,11 @@ from eitskin.frames.doctor.remedy import channel_remedy
 from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
 from eitskin.frames.orders import touching
 
-LEAST_QUIET = 4
+MIN_QUIET = 4
 NOISY_TIMES = 4.0
 SNR_NOTE_DB = 45.0
 SNR_FAULT_DB = 30.0
-MOST_OF_ELECTRODE = 0.4
+MAX_OF_ELECTRODE = 0.4
 DRIFT_NOTE = 0.005
 DRIFT_FAULT = 0.02
 DRIFT_SIGMAS = 6.0
@@ -42,12 +42,12 @@ def check_noise(case: Case) -> Outcome:
     """Noisy channels, a low SNR, drift."""
     quiet = case.frames.reference_voltage_v
     quiet = quiet[np.isfinite(quiet[:, case.trusted]).all(axis=1)]
-    if len(quiet) < LEAST_QUIET:
+    if len(quiet) < MIN_QUIET:
         return Outcome(
             untold=(
                 (
                     f"noise, SNR and drift: {len(quiet)} quiet frame(s), they need at least"
-                    f" {LEAST_QUIET}"
+                    f" {MIN_QUIET}"
                 ),
             )
         )
@@ -144,6 +144,6 @@ def _common_electrode(case: Case, channels: IntArray) -> int | None:
     """The electrode that is in all of ``channels``, where those are most of its channels."""
     for electrode in range(case.n_electrodes):
         using = touching(case.rows, [electrode]) & case.trusted
-        if using[channels].all() and len(channels) >= MOST_OF_ELECTRODE * np.count_nonzero(using):
+        if using[channels].all() and len(channels) >= MAX_OF_ELECTRODE * np.count_nonzero(using):
             return electrode
     return None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from eitskin.frames.doctor.case import Case, FloatArray, cosine, rms
-from eitskin.frames.doctor.noise import LEAST_QUIET, channel_noise
+from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
 from eitskin.frames.doctor.numbering import Numbering, ranked, renumbered_frames
 from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
 from eitskin.frames.homogeneous import touch_transfer
@@ -130,7 +130,7 @@ def _drowned(case: Case, measured: list[FloatArray], weight: FloatArray) -> bool
     """Whether the weighted changes are less than AUDIBLE times the weighted noise of one frame,
     where that is known."""
     quiet = case.frames.reference_voltage_v
-    if len(quiet) < LEAST_QUIET:
+    if len(quiet) < MIN_QUIET:
         return False
     noise = rms((np.nan_to_num(channel_noise(quiet)) * weight)[case.trusted])
     return rms(np.array([(change * weight)[case.trusted] for change in measured])) < AUDIBLE * noise

@@ -12,7 +12,7 @@ from eitskin.errors import FileError, missing_extra
 from eitskin.fileio import write_beside
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.gain import channel_gains
-from eitskin.frames.doctor.noise import LEAST_QUIET, channel_noise
+from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
 from eitskin.frames.doctor.report import FAULT, Report
 
 MEASURED, EXPECTED, BAD = "#1f5f99", "#b0b7bd", "#c2410c"
@@ -125,7 +125,7 @@ def _reciprocity(panel: Any, case: Case) -> None:
 
 def _noise_or_change(panel: Any, case: Case) -> None:
     quiet = case.frames.reference_voltage_v
-    if len(quiet) >= LEAST_QUIET:
+    if len(quiet) >= MIN_QUIET:
         noise = 1e6 * channel_noise(np.nan_to_num(quiet))
         panel.semilogy(np.maximum(noise, 1e-6), ".", color=MEASURED, markersize=4)
         panel.axhline(

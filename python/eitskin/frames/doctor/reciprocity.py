@@ -16,7 +16,7 @@ PAIR_TIMES_USUAL = 6.0
 RMS_NOTE = 0.05
 RMS_FAULT = 0.08
 MEDIAN_NOTE = 0.03
-LEAST_PAIRS = 8
+MIN_PAIRS = 8
 WORST = 5
 
 
@@ -71,7 +71,7 @@ def check_reciprocity(case: Case) -> Outcome:
             )
         )
     fault = overall >= RMS_FAULT
-    if fault or (overall >= RMS_NOTE and usual >= MEDIAN_NOTE and len(first) >= LEAST_PAIRS):
+    if fault or (overall >= RMS_NOTE and usual >= MEDIAN_NOTE and len(first) >= MIN_PAIRS):
         findings.append(
             Finding(
                 "reciprocity",

@@ -24,7 +24,7 @@ WORTH_TRYING = 0.05
 STEP = 0.97
 GOOD = 0.2
 BETTER_TIMES = 2.0
-MOST_SWAPS = 6
+MAX_SWAPS = 6
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def best_exchange(case: Case) -> Exchange:
     rows = case.rows
     pairs: list[tuple[int, int]] = []
     before = best = misfit(case, use, True)
-    while best > WORTH_TRYING and len(pairs) < MOST_SWAPS:
+    while best > WORTH_TRYING and len(pairs) < MAX_SWAPS:
         left = misfits(
             case.reference, voltages_of(case.transfer_ohm, exchanged[:, rows]), use, True
         )

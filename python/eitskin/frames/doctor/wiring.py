@@ -20,15 +20,15 @@ from eitskin.frames.doctor.misfit import Joined, best_joined, misfit
 from eitskin.frames.doctor.report import FAULT, Finding, Outcome
 from eitskin.frames.orders import touching
 
-LEAST_OUTLIERS = 4
+MIN_OUTLIERS = 4
 BETTER_TIMES = 2.0
 GOOD = 0.2
 PREFER_JOINED = 1.25
 MOSTLY = 0.8
 LOST = 0.2
 SILENT = 0.1
-MOST_SUSPECTS = 8
-MOST_FAULTS = 4
+MAX_SUSPECTS = 8
+MAX_FAULTS = 4
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ def check_wiring(case: Case) -> tuple[Case, Outcome]:
     Nothing more is sought once a short circuit is found: its frame is known only roughly.
     """
     findings: list[Finding] = []
-    while len(findings) < MOST_FAULTS and (
-        np.count_nonzero(outliers(case)) >= LEAST_OUTLIERS or _suspects(case)
+    while len(findings) < MAX_FAULTS and (
+        np.count_nonzero(outliers(case)) >= MIN_OUTLIERS or _suspects(case)
     ):
         before = misfit(case, case.trusted, case.magnitude)
         enough = min(GOOD, before / BETTER_TIMES)
@@ -73,7 +73,7 @@ def check_lost(case: Case) -> Outcome:
     findings = []
     for electrode in sorted(set(case.rows[:, :2].ravel().tolist())):
         using = (case.rows[:, :2] == electrode).any(axis=1) & usable
-        if using.sum() < LEAST_OUTLIERS or not len(case.frames.voltage_v):
+        if using.sum() < MIN_OUTLIERS or not len(case.frames.voltage_v):
             continue
         driven = np.where(
             np.isfinite(case.frames.voltage_v[:, using]), case.frames.voltage_v[:, using], np.inf
@@ -102,7 +102,7 @@ def _best_dead(case: Case) -> Dead | None:
     """The fewest suspects without which the other channels are well explained: one, or two."""
     suspects = _suspects(case)
     sets = [(e,) for e in suspects] + (
-        list(combinations(suspects, 2)) if len(suspects) <= MOST_SUSPECTS else []
+        list(combinations(suspects, 2)) if len(suspects) <= MAX_SUSPECTS else []
     )
     best: Dead | None = None
     for electrodes in sets:

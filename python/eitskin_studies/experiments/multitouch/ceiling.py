@@ -33,7 +33,7 @@ FloatArray = npt.NDArray[np.float64]
 ELEMENTS = 3000
 STEPS = 12
 STEP_MM = 0.5
-LEAST_RADIUS_MM, MOST_RADIUS_MM = 1.0, 30.0
+MIN_RADIUS_MM, MAX_RADIUS_MM = 1.0, 30.0
 CLEAR_DEVIATIONS = 3.0
 
 
@@ -97,8 +97,8 @@ class Truthful:
         contrasts = [touch.contrast for touch in scene.touches]
         target = frame_v * self._quiet_v / quiet_v
         begin = np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in scene.touches]).ravel()
-        low = np.tile([-np.inf, -np.inf, LEAST_RADIUS_MM], len(contrasts))
-        high = np.tile([np.inf, np.inf, MOST_RADIUS_MM], len(contrasts))
+        low = np.tile([-np.inf, -np.inf, MIN_RADIUS_MM], len(contrasts))
+        high = np.tile([np.inf, np.inf, MAX_RADIUS_MM], len(contrasts))
 
         def residual(parameters: FloatArray) -> FloatArray:
             return np.asarray((self._answer(parameters, contrasts)[0] - target) / noise_v)

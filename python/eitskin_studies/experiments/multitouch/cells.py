@@ -31,10 +31,10 @@ GEOMETRIES = (RING, WIDE, NARROW)
 # the library's scene ring7
 RING_MM, RING_TOUCH_MM, RING_CONTRAST = 60.0, 8.0, 9.0
 
-LEAST, MOST = 2, 12
+MIN, MAX = 2, 12
 USUAL_SCENES, TARGET_SCENES, SINGLE_SCENES, UNEVEN_SCENES = 24, 144, 144, 48
 TARGETED = {(RING, 8), (RING, 10), (WIDE, 6), (WIDE, 8), (NARROW, 3), (NARROW, 5)}
-UNEVEN_MOST = 6
+UNEVEN_MAX = 6
 
 MIXED_SCENES, MIXED_PARTS = 72, 5
 EVEN = TouchRules(radius_mm=(9.0, 9.0), contrast=(5.0, 5.0))
@@ -61,7 +61,7 @@ def counting_cells() -> tuple[Cell, ...]:
     return tuple(
         Cell(geometry, k, TARGET_SCENES if (geometry, k) in TARGETED else USUAL_SCENES)
         for geometry in GEOMETRIES
-        for k in range(LEAST, MOST + 1)
+        for k in range(MIN, MAX + 1)
     )
 
 
@@ -72,7 +72,7 @@ def single_cell() -> Cell:
 
 def uneven_cells() -> tuple[Cell, ...]:
     """Touches of many sizes and strengths at once."""
-    return tuple(Cell(UNEVEN, k, UNEVEN_SCENES) for k in range(LEAST, UNEVEN_MOST + 1))
+    return tuple(Cell(UNEVEN, k, UNEVEN_SCENES) for k in range(MIN, UNEVEN_MAX + 1))
 
 
 def mixed_cells() -> tuple[Cell, ...]:
@@ -116,7 +116,7 @@ def _rings(seed: int, count: int, touches: int) -> TouchSet:
 def _mixed(outline: Outline, seed: int, role: str, number: int) -> Scene:
     """1 to 12 touches in turn, a dozen equal and a dozen uneven; the spacing is drawn, and made
     less until they fit."""
-    touches, uneven = number % MOST + 1, number // MOST % 2 == 1
+    touches, uneven = number % MAX + 1, number // MAX % 2 == 1
     spacing = stream(seed, f"spacing {role}", number).uniform(TIGHTEST_RADII, LOOSEST_RADII)
     usual = TouchRules() if uneven else EVEN
     while True:

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.multitouch.cells import (
     GEOMETRIES,
-    LEAST,
-    MOST,
+    MAX,
+    MIN,
     NARROW,
     RING,
     SINGLE,
     UNEVEN,
-    UNEVEN_MOST,
+    UNEVEN_MAX,
     WIDE,
 )
 from eitskin_studies.experiments.multitouch.counts import Quantile, Score, Share
@@ -47,7 +47,7 @@ ASKED = (
     Asked("ring, 60 dB", RING, 8, 60.0, 0.90, False),
     Asked("ring, 60 dB", RING, 10, 60.0, 0.90, True),
 )
-LEAST_MM, AIM_MM = (1.0, 2.5), (0.5, 1.0)  # median and p95 of one touch at 60 dB
+MIN_MM, AIM_MM = (1.0, 2.5), (0.5, 1.0)  # median and p95 of one touch at 60 dB
 
 
 def percent(share: Share, digits: int = 0) -> str:
@@ -101,7 +101,7 @@ def asked_table(counted: Counted) -> Table:
     for name in NAMES:
         score = counted.scores[SINGLE, 1, name, HEADLINE_DB]
         for at, value, least, aim in zip(
-            ("median", "p95"), (score.median_mm, score.p95_mm), LEAST_MM, AIM_MM, strict=True
+            ("median", "p95"), (score.median_mm, score.p95_mm), MIN_MM, AIM_MM, strict=True
         ):
             for text, asked in (("at least", least), ("aim", aim)):
                 rows.append((
@@ -124,7 +124,7 @@ def exact_table(counted: Counted, geometry: str, name: str) -> Table:
         (method, HEADLINE_DB) for method in CLASSICAL
     ]
     rows = []
-    for k in range(LEAST, MOST + 1):
+    for k in range(MIN, MAX + 1):
         if (geometry, k) in counted.unfit:
             rows.append((str(k), "do not fit on this skin", *[""] * len(columns)))
             continue
@@ -158,7 +158,7 @@ def uneven_table(counted: Counted) -> Table:
     methods = (*NAMES, *CLASSICAL)
     rows = [
         _details(counted.scores[UNEVEN, k, method, HEADLINE_DB], k, method)
-        for k in range(LEAST, UNEVEN_MOST + 1) if (UNEVEN,
+        for k in range(MIN, UNEVEN_MAX + 1) if (UNEVEN,
         k) not in counted.unfit for method in methods
     ]  # fmt: skip
     return Table("uneven", DETAIL_HEAD, tuple(rows))

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Desk
 from eitskin_studies.experiments.multitouch.cells import (
     GEOMETRIES,
-    LEAST,
+    MAX,
+    MIN,
     MIXED_SCENES,
-    MOST,
 )
 from eitskin_studies.experiments.multitouch.counts import Share
 from eitskin_studies.experiments.multitouch.doubt import Judged, calibration
@@ -66,8 +66,8 @@ def _sure(frames: Sequence[Judged]) -> str:
 
 
 def _far(counted: Counted, geometry: str, name: str) -> str:
-    most = LEAST - 1
-    for k in range(LEAST, MOST + 1):
+    most = MIN - 1
+    for k in range(MIN, MAX + 1):
         score = counted.scores.get((geometry, k, name, HEADLINE_DB))
         if score is None or score.exact.mean < GOOD:
             break

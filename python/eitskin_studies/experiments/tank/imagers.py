@@ -29,7 +29,7 @@ TUNED_DISCS = "eitskin, touches as discs, change from simulation"
 KINDS = ("difference", "normalised", "log-ratio")
 TOUCH_CHANGE_RATIO = 2.0  # metal in water: a disc of contrast c answers as 2 (c - 1) / (c + 1)
 CHANGE_RATIOS = (1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0, 3.25, 3.5, 4.0)
-LEAST_RATIO, MOST_RATIO = 1 / 16, 16.0
+MIN_RATIO, MAX_RATIO = 1 / 16, 16.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +135,7 @@ def datum(kind: str, frames_v: FloatArray, reference_v: FloatArray) -> FloatArra
         return frames_v - reference_v
     if kind == "normalised":
         return (frames_v - reference_v) / reference_v
-    return np.asarray(
-        reference_v * np.log(np.clip(frames_v / reference_v, LEAST_RATIO, MOST_RATIO))
-    )
+    return np.asarray(reference_v * np.log(np.clip(frames_v / reference_v, MIN_RATIO, MAX_RATIO)))
 
 
 class BaselineImager:
