@@ -1,4 +1,4 @@
-/* Open electrodes, bridged pairs, dead front ends, and rows that no sheet gives. */
+/* Open electrodes, bridged pairs, dead front ends, and rows that the model cannot give. */
 #include "spoiled_frame.h"
 
 /* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that

@@ -25,7 +25,7 @@ static void one_outlier(void)
             bench b;
             eits_context *ctx = set_up(&b, known);
             const eits_fold fold = b.c.model.fold[k];
-            CHECK(!ctx->sheet_known);
+            CHECK(!ctx->range_known);
             b.frame[fold.first] *= R(1.3);
             reconstruct(&b);
             if (fold.second == EITS_FOLD_NONE) {

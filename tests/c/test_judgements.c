@@ -157,10 +157,10 @@ static int model_mismatch(eits_context *ctx, double off)
         ctx->d[k] = (eits_real)(cos(pi * 2 * (k + 0.5) / SMALL_FOLDED) +
                                 off * cos(pi * (RANK + 2) * (k + 0.5) / SMALL_FOLDED));
         ctx->basis_for[k] = EITS_SIDE_BOTH;
-        ctx->apart[k] = 0;
+        ctx->reciprocity_error[k] = 0;
     }
     ctx->kernels->mul(&ctx->model->reduction, index, ctx->d, SMALL_FOLDED, ctx->y);
-    eits_zero(ctx->along, SMALL_FOLDED);
+    eits_zero(ctx->gain_drift, SMALL_FOLDED);
     ctx->info.model_mismatch = 0;
     return eits_check_model_mismatch(ctx, &macs);
 }
@@ -169,11 +169,11 @@ static void mismatches(void)
 {
     dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
-    CHECK(ctx->sheet_known);
+    CHECK(ctx->range_known);
     for (int i = 0; i < RANK; ++i) { /* the ridge: s^2 / (s^2 + 1e-4 s_1^2), over |P_i|^2 */
         const double s2 = pow(SMALL_DECAY, 2.0 * i), inverse = s2 + SMALL_REGULARISATION;
-        CHECK_NEAR(ctx->sheet_shrink[i], s2 / (s2 + 1e-4) * inverse, 1e-4 * inverse);
-        CHECK_NEAR(ctx->sheet_inverse[i], inverse, 1e-5);
+        CHECK_NEAR(ctx->range_shrink[i], s2 / (s2 + 1e-4) * inverse, 1e-4 * inverse);
+        CHECK_NEAR(ctx->range_inverse[i], inverse, 1e-5);
     }
     CHECK(!model_mismatch(ctx, 0.5) && ctx->info.model_mismatch == 0); /* the noise is not known */
     ctx->reference.noise_v = R(1e-4);
@@ -206,7 +206,7 @@ static void noise_of_the_data(void)
             const int two = k % 3 == 0 && k < SMALL_PAIRS;
             ctx->basis_for[k] = k < SMALL_PAIRS ? (k % 3 == 1 ? EITS_SIDE_SECOND : EITS_SIDE_BOTH)
                                                 : EITS_SIDE_FIRST;
-            ctx->apart[k] = two ? R(0.1) : 0;
+            ctx->reciprocity_error[k] = two ? R(0.1) : 0;
             const double one =
                 kind ? 0.25 / (double)ctx->model->v_ref[k] : 0.25 * (double)ctx->reference.gain;
             sum += one * one / (two ? 2 : 1);

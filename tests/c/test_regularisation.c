@@ -65,7 +65,7 @@ static void noise_through_it(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
-    const double stored = (double)ctx->sheet_energy;
+    const double stored = (double)ctx->reduction_energy;
     double energy = 0, sum = 0, whole = 0;
     ctx->reference.lambda_noise = R(3.0);
     pretend_noise(ctx, 0.01);
@@ -78,10 +78,10 @@ static void noise_through_it(void)
     }
     CHECK_NEAR(eits_lambda_noise(ctx), 3 * sqrt(sum / whole), 1e-4);
     CHECK(sum < 0.7 * whole && energy < 0.7 * stored);
-    CHECK_NEAR(ctx->sheet_energy, energy, 1e-4 * energy);
+    CHECK_NEAR(ctx->reduction_energy, energy, 1e-4 * energy);
     leave_out(&b, 3);
     (void)stage(&b);
-    CHECK_NEAR(ctx->sheet_energy, stored, 0);
+    CHECK_NEAR(ctx->reduction_energy, stored, 0);
     dense_bench_close(&b.b);
 }
 

@@ -134,7 +134,7 @@ static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kin
         CHECK_EQUAL(eits_reference_add(ctx, b->frame, SMALL_ROWS), EITS_OK);
     }
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
-    CHECK(ctx->sheet_known && ctx->reference.noise_v > 0);
+    CHECK(ctx->range_known && ctx->reference.noise_v > 0);
     return ctx;
 }
 
@@ -285,7 +285,7 @@ static void drift_is_no_mismatch(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 0);
-    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) { /* a reference that no sheet gives */
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) { /* a reference that the model cannot give */
         const eits_fold fold = b.c.model.fold[k];
         b.reference[fold.first] *= R(1) + R(0.1) * (eits_real)(k % 3);
         if (fold.second != EITS_FOLD_NONE)

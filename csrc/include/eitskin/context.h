@@ -136,7 +136,7 @@ typedef struct eits_info {
     uint32_t diagnostics; /* bits of eits_diagnostic; CROWDED is set by eits_find_touches */
     uint32_t saturated;   /* rows, masked ones apart */
     uint32_t outliers;    /* rows left out as outliers */
-    /* fraction of |d| beyond noise that the model's sheet cannot give, 0 to 1; 0 where it was not
+    /* fraction of |d| beyond noise that the model's range cannot give, 0 to 1; 0 where it was not
      * judged */
     eits_real model_mismatch;
     /* fraction of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
@@ -209,19 +209,19 @@ typedef struct eits_context {
     uint8_t *basis_for;
     eits_real *d; /* n_folded: data of this frame */
     /* n_folded: what the two rows of each fold differ by; 0 where one is in use */
-    eits_real *apart;
+    eits_real *reciprocity_error;
     /* n_folded: data of a drift of the gain; zeros where it is not ignored */
-    eits_real *along;
-    eits_real *stray; /* n_folded: what of that no sheet gives, unless stale */
-    uint32_t stray_stale;
+    eits_real *gain_drift;
+    eits_real *off_range; /* n_folded: what of that the model cannot give, unless stale */
+    uint32_t off_range_stale;
     /* stride each: 1 / |P_i|^2, and so much of it as predicts d (mismatch.c) */
-    eits_real *sheet_inverse, *sheet_shrink;
+    eits_real *range_inverse, *range_shrink;
     /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where the regularisation is
      * raised */
-    eits_real sheet_energy;
-    eits_real sheet_energy_stored; /* as with the model's regularisation */
-    /* 1: P's rows are orthogonal, so that what no sheet gives can be told */
-    uint32_t sheet_known;
+    eits_real reduction_energy;
+    eits_real reduction_energy_stored; /* as with the model's regularisation */
+    /* 1: P's rows are orthogonal, so that what the model cannot give can be told */
+    uint32_t range_known;
     eits_real *y; /* stride: reduced data, projected */
     /* stride each: of v0 log(v / v0); y less the touches' interaction */
     eits_real *y_log, *y_separate;

@@ -110,7 +110,7 @@ typedef enum eits_fault {
     /* index: electrode; value: its partner, -1 where there are more; words: all, bit e */
     EITS_FAULT_BRIDGED = 11,
     EITS_FAULT_ELECTRODE_NOISY = 12, /* index: electrode */
-    /* value: parts per thousand of the data that no sheet of the model's gives */
+    /* value: parts per thousand of the data that nothing in the range of the model's gives */
     EITS_FAULT_MODEL_MISMATCH = 13,
     EITS_FAULT_STALE_REFERENCE = 14
 } eits_fault;

@@ -110,11 +110,11 @@ static void lay_out(eits_context *ctx, arena *a, int prepared)
     ctx->unusable = take_bytes(a, rows);
     ctx->basis_for = take_bytes(a, folded);
     ctx->d = take_reals(a, folded);
-    ctx->apart = take_reals(a, folded);
-    ctx->along = take_reals(a, folded);
-    ctx->stray = take_reals(a, folded);
-    ctx->sheet_inverse = take_reals(a, stride);
-    ctx->sheet_shrink = take_reals(a, stride);
+    ctx->reciprocity_error = take_reals(a, folded);
+    ctx->gain_drift = take_reals(a, folded);
+    ctx->off_range = take_reals(a, folded);
+    ctx->range_inverse = take_reals(a, stride);
+    ctx->range_shrink = take_reals(a, stride);
     ctx->y = take_reals(a, stride);
     ctx->y_log = take_reals(a, stride);
     ctx->y_separate = take_reals(a, stride);
@@ -168,7 +168,7 @@ eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspac
                           .noise_ratio = 1};
     arena a = {workspace};
     lay_out(ctx, &a, size >= eits_workspace_size(model, 1));
-    eits_learn_sheet(ctx);
+    eits_learn_range(ctx);
     eits_whitening_init(ctx);
     return eits_options_default(model, &ctx->options);
 }

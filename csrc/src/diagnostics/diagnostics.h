@@ -44,7 +44,7 @@ enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_
 #define EITS_NOISY_FRACTION    R(0.9) /* of the folds that are flagged fraction a noisy electrode */
 #define EITS_MISMATCH_FRACTION R(0.05) /* of |d| */
 #define EITS_MISMATCH_NOISE \
-    R(3.0) /* and so many times what noise leaves outside of the model's sheet */
+    R(3.0) /* and so many times what noise leaves outside of the model's range */
 #define EITS_STALE_RATIO R(1.7) /* the change against the sign rule to that along it, */
 #define EITS_STALE_NOISE R(5.0) /* and so many lambda_noise */
 
@@ -79,14 +79,14 @@ void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_r
 int eits_find_electrodes(eits_context *ctx, const eits_real *frame);
 
 /* Single rows that their reciprocals do not bear out, and noisy electrodes. ctx->d holds the folded
- * data, ctx->apart what each fold's two sides differ by (0 where it has one), ctx->basis_for which
- * sides are in use. Marks ctx->unusable; returns 1 where it marked any row. Uses residual, sx, sz
- * and the list. */
+ * data, ctx->reciprocity_error what each fold's two sides differ by (0 where it has one),
+ * ctx->basis_for which sides are in use. Marks ctx->unusable; returns 1 where it marked any row.
+ * Uses residual, sx, sz and the list. */
 int eits_find_outliers(eits_context *ctx, uint64_t *macs);
 
 /* The same for frames that have no reciprocals, or copied ones: the one fold that the others
  * predict worst, if it stands out of their prediction errors. ctx->y is P d, not yet projected, no
- * fold left out, ctx->sheet_known. */
+ * fold left out, ctx->range_known. */
 int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs);
 
 /* A row of ctx->masked that is left out of the reference frame at hand only. */
@@ -109,11 +109,11 @@ void eits_reference_unmask(eits_context *ctx);
 uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_real *frame);
 
 /* What mismatch and prediction need to know of P and S; once, at the start. */
-void eits_learn_sheet(eits_context *ctx);
+void eits_learn_range(eits_context *ctx);
 
-/* How much of ctx->d no sheet gives, into info; returns 1 where that stands out. ctx->y is P d, not
- * yet projected, no fold left out; ctx->along is the drift of the gain (zeros: it is not ignored);
- * ctx->sheet_known. Uses residual, sz and the list. */
+/* How much of ctx->d the model cannot give, into info; returns 1 where that stands out. ctx->y is P
+ * d, not yet projected, no fold left out; ctx->gain_drift is the drift of the gain (zeros: it is
+ * not ignored); ctx->range_known. Uses residual, sz and the list. */
 int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs);
 
 /* Whether the change goes the way touches cannot; ctx->gradient is S'y, info.lambda_max known. */

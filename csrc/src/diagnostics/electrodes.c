@@ -150,7 +150,7 @@ void eits_leave_outlier(eits_context *ctx, uint32_t i)
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_OUTLIER;
 }
 
-/* Rows that no sheet gives, if they are few; more of them are a mismatch. */
+/* Rows that the model cannot give, if they are few; more of them are a mismatch. */
 static void leave_impossible(eits_context *ctx, const eits_real *frame, limits lim)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {

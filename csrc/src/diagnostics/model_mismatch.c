@@ -1,4 +1,4 @@
-/* What of the data no sheet of the model's gives, and a reference that was taken with a touch on
+/* What of the data the model's gives, and a reference that was taken with a touch on
  * the skin. */
 #include "diagnostics/diagnostics.h"
 
@@ -11,14 +11,14 @@
  * Told by two probes: P (P'v) against |P_i|^2 v. */
 static const eits_real ORTHOGONAL = R(1e-3);
 
-/* ctx->sheet_inverse = |P_i|^2 for now. */
+/* ctx->range_inverse = |P_i|^2 for now. */
 static void row_energies(eits_context *ctx)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
         for (uint32_t i = 0; i < ctx->model->rank; ++i)
-            ctx->sheet_inverse[i] = eits_fma(column[i], column[i], ctx->sheet_inverse[i]);
-        ctx->sheet_energy += eits_dot(ctx, column, column, ctx->model->rank);
+            ctx->range_inverse[i] = eits_fma(column[i], column[i], ctx->range_inverse[i]);
+        ctx->reduction_energy += eits_dot(ctx, column, column, ctx->model->rank);
     }
 }
 
@@ -27,9 +27,9 @@ static int is_orthogonal(eits_context *ctx, uint32_t period)
     const uint32_t rank = ctx->model->rank, folds = ctx->model->n_folded;
     eits_zero(ctx->sx, EITS_STRIDE(rank));
     for (uint32_t i = 0; i < rank; ++i) {
-        if (!(ctx->sheet_inverse[i] > 0))
+        if (!(ctx->range_inverse[i] > 0))
             return 0;
-        ctx->sx[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->sheet_inverse[i]);
+        ctx->sx[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->range_inverse[i]);
     }
     for (uint32_t k = 0; k < folds; ++k) {
         ctx->list_index[k] = k;
@@ -39,8 +39,8 @@ static int is_orthogonal(eits_context *ctx, uint32_t period)
     ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, folds,
                       ctx->residual);
     for (uint32_t i = 0; i < rank; ++i) {
-        const eits_real off = ctx->residual[i] - ctx->sheet_inverse[i] * ctx->sx[i];
-        if (!(eits_fabs(off) <= ORTHOGONAL * eits_sqrt(ctx->sheet_inverse[i])))
+        const eits_real off = ctx->residual[i] - ctx->range_inverse[i] * ctx->sx[i];
+        if (!(eits_fabs(off) <= ORTHOGONAL * eits_sqrt(ctx->range_inverse[i])))
             return 0;
     }
     return 1;
@@ -56,24 +56,24 @@ static void make_shrink(eits_context *ctx)
         const eits_real *column = eits_column(s, j, ctx->sx), scale = eits_column_scale(s, j);
         for (uint32_t i = 0; i < s->rows; ++i) {
             const eits_real value = scale * column[i];
-            ctx->sheet_shrink[i] = eits_fma(value, value, ctx->sheet_shrink[i]);
+            ctx->range_shrink[i] = eits_fma(value, value, ctx->range_shrink[i]);
         }
     }
     for (uint32_t i = 0; i < s->rows; ++i) {
-        ctx->sheet_shrink[i] /= ctx->sheet_inverse[i];
-        max = ctx->sheet_shrink[i] > max ? ctx->sheet_shrink[i] : max;
+        ctx->range_shrink[i] /= ctx->range_inverse[i];
+        max = ctx->range_shrink[i] > max ? ctx->range_shrink[i] : max;
     }
     for (uint32_t i = 0; i < s->rows; ++i) {
-        const eits_real squared = ctx->sheet_shrink[i];
-        ctx->sheet_inverse[i] = 1 / ctx->sheet_inverse[i];
-        ctx->sheet_shrink[i] =
-            squared / eits_fma(EITS_OUTLIER_RIDGE, max, squared) * ctx->sheet_inverse[i];
+        const eits_real squared = ctx->range_shrink[i];
+        ctx->range_inverse[i] = 1 / ctx->range_inverse[i];
+        ctx->range_shrink[i] =
+            squared / eits_fma(EITS_OUTLIER_RIDGE, max, squared) * ctx->range_inverse[i];
     }
-    ctx->sheet_known =
-        eits_all_finite(ctx->sheet_shrink, s->rows) && eits_all_finite(ctx->sheet_inverse, s->rows);
+    ctx->range_known =
+        eits_all_finite(ctx->range_shrink, s->rows) && eits_all_finite(ctx->range_inverse, s->rows);
 }
 
-void eits_learn_sheet(eits_context *ctx)
+void eits_learn_range(eits_context *ctx)
 {
     row_energies(ctx);
     if (is_orthogonal(ctx, 3) && is_orthogonal(ctx, 5))
@@ -82,21 +82,21 @@ void eits_learn_sheet(eits_context *ctx)
     eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
 }
 
-/* ctx->stray = what of the drift no sheet gives: along - P' |P_i|^-2 P along, in full, since
- * differences of sums would be rounding. */
-static uint64_t learn_stray(eits_context *ctx)
+/* ctx->off_range = what of the drift the model cannot give: along - P' |P_i|^-2 P along, in full,
+ * since differences of sums would be rounding. */
+static uint64_t learn_off_range(eits_context *ctx)
 {
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     for (uint32_t k = 0; k < folds; ++k)
         ctx->list_index[k] = k;
-    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->along, folds, ctx->sz);
+    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->gain_drift, folds, ctx->sz);
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] *= ctx->sheet_inverse[i];
+        ctx->sz[i] *= ctx->range_inverse[i];
     for (uint32_t k = 0; k < folds; ++k) {
         const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
-        ctx->stray[k] = ctx->along[k] - eits_dot(ctx, column, ctx->sz, rank);
+        ctx->off_range[k] = ctx->gain_drift[k] - eits_dot(ctx, column, ctx->sz, rank);
     }
-    ctx->stray_stale = 0;
+    ctx->off_range_stale = 0;
     return 2u * (uint64_t)folds * rank;
 }
 
@@ -114,14 +114,15 @@ eits_real eits_noise_energy(const eits_context *ctx)
         const eits_real each = ctx->model->data_kind == EITS_DATA_NORMALISED
                                    ? b->noise_v / v0 * (b->noise_v / v0)
                                    : one;
-        sum += ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->apart[k] != 0 ? R(0.5) * each : each;
+        sum += ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->reciprocity_error[k] != 0 ? R(0.5) * each
+                                                                                     : each;
     }
     return sum;
 }
 
 eits_real eits_expected_noise(const eits_context *ctx)
 {
-    return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->sheet_energy;
+    return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->reduction_energy;
 }
 
 int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs)
@@ -129,19 +130,19 @@ int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs)
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     if (rank >= folds || !(ctx->reference.noise_v > 0))
         return 0;
-    const eits_real drift = eits_dot(ctx, ctx->along, ctx->along, folds);
-    if (drift > 0 && ctx->stray_stale)
-        *macs += learn_stray(ctx);
+    const eits_real drift = eits_dot(ctx, ctx->gain_drift, ctx->gain_drift, folds);
+    if (drift > 0 && ctx->off_range_stale)
+        *macs += learn_off_range(ctx);
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] = ctx->sheet_inverse[i] * ctx->y[i];
+        ctx->sz[i] = ctx->range_inverse[i] * ctx->y[i];
     eits_real total = eits_dot(ctx, ctx->d, ctx->d, folds),
               off = total - eits_dot(ctx, ctx->sz, ctx->y, rank);
     if (drift > 0) { /* how far it drifted is no news */
-        const eits_real along = eits_dot(ctx, ctx->d, ctx->along, folds),
-                        astray = eits_dot(ctx, ctx->d, ctx->stray, folds);
-        const eits_real stray = eits_dot(ctx, ctx->stray, ctx->stray, folds);
+        const eits_real along = eits_dot(ctx, ctx->d, ctx->gain_drift, folds),
+                        along_off_range = eits_dot(ctx, ctx->d, ctx->off_range, folds);
+        const eits_real off_range = eits_dot(ctx, ctx->off_range, ctx->off_range, folds);
         total -= along * along / drift;
-        off -= stray > 0 ? astray * astray / stray : 0;
+        off -= off_range > 0 ? along_off_range * along_off_range / off_range : 0;
     }
     const eits_real noise = eits_noise_energy(ctx) * (eits_real)(folds - rank) / (eits_real)folds;
     if (!(off > noise) || !(total > 0))

@@ -56,7 +56,7 @@ static int is_flagged(const eits_context *ctx, uint32_t k, tolerance tol)
 {
     if (ctx->basis_for[k] != EITS_SIDE_BOTH)
         return 0;
-    const eits_real off = eits_fabs(ctx->apart[k]);
+    const eits_real off = eits_fabs(ctx->reciprocity_error[k]);
     if (!(off > (ctx->reference.noise_v > 0 ? max_by_noise(ctx, k) : tol.robust)) ||
         !(off > tol.largest))
         return 0;
@@ -72,7 +72,7 @@ static tolerance find_tolerance(const eits_context *ctx)
         const eits_real datum = eits_fabs(ctx->d[k]);
         tol.largest = datum > tol.largest ? datum : tol.largest;
         if (ctx->basis_for[k] == EITS_SIDE_BOTH)
-            ctx->list_value[count++] = eits_fabs(ctx->apart[k]);
+            ctx->list_value[count++] = eits_fabs(ctx->reciprocity_error[k]);
     }
     tol.largest *= EITS_OUTLIER_LARGEST;
     if (!(ctx->reference.noise_v > 0) && count > 0) {
@@ -110,7 +110,7 @@ static void fit_all(eits_context *ctx, uint64_t *macs)
         ctx->list_index[k] = k;
     ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->d, folds, ctx->sz);
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] *= ctx->sheet_shrink[i];
+        ctx->sz[i] *= ctx->range_shrink[i];
     *macs += (uint64_t)folds * rank;
 }
 
@@ -126,7 +126,7 @@ static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_
         const eits_real *column = eits_column(&ctx->model->reduction, flagged[a], ctx->sx);
         e[a] = ctx->d[flagged[a]] - eits_dot(ctx, column, ctx->sz, rank);
         for (uint32_t i = 0; i < rank; ++i)
-            ctx->residual[i] = ctx->sheet_shrink[i] * column[i];
+            ctx->residual[i] = ctx->range_shrink[i] * column[i];
         for (uint32_t b = 0; b <= a; ++b) {
             const eits_real *other = eits_column(&ctx->model->reduction, flagged[b], ctx->sx);
             eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx, ctx->residual, other, rank);
@@ -157,10 +157,10 @@ static void choose_sides(eits_context *ctx, const uint32_t *flagged, uint32_t n,
 {
     eits_real predicted[EITS_OUTLIER_MAX];
     const int known =
-        ctx->sheet_known && all_known(ctx) && predict(ctx, flagged, n, predicted, macs);
+        ctx->range_known && all_known(ctx) && predict(ctx, flagged, n, predicted, macs);
     for (uint32_t a = 0; a < n; ++a) {
         const eits_fold fold = ctx->model->fold[flagged[a]];
-        const eits_real d = ctx->d[flagged[a]], half = R(0.5) * ctx->apart[flagged[a]];
+        const eits_real d = ctx->d[flagged[a]], half = R(0.5) * ctx->reciprocity_error[flagged[a]];
         const eits_real first = known ? eits_fabs(d + half - predicted[a]) : 1,
                         second = known ? eits_fabs(d - half - predicted[a]) : 1;
         if (!(first <= EITS_OUTLIER_NEARER * second))
@@ -238,11 +238,11 @@ int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs)
 {
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     for (uint32_t k = 0; k < folds; ++k) {
-        if (ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->apart[k] != 0)
+        if (ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->reciprocity_error[k] != 0)
             return 0;
     }
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] = ctx->sheet_shrink[i] * ctx->y[i];
+        ctx->sz[i] = ctx->range_shrink[i] * ctx->y[i];
     eits_real worst = 0, energy = 0;
     uint32_t at = 0;
     for (uint32_t k = 0; k < folds; ++k) {
@@ -250,7 +250,7 @@ int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs)
         eits_real leverage = 0;
         const eits_real off = eits_fabs(ctx->d[k] - eits_dot(ctx, column, ctx->sz, rank));
         for (uint32_t i = 0; i < rank; ++i)
-            leverage = eits_fma(ctx->sheet_shrink[i] * column[i], column[i], leverage);
+            leverage = eits_fma(ctx->range_shrink[i] * column[i], column[i], leverage);
         const eits_real left = 1 - leverage;
         energy = eits_fma(off, off, energy);
         ctx->list_value[k] = left > EITS_OUTLIER_PIVOT ? off / eits_sqrt(left) : 0;

@@ -84,16 +84,16 @@ static int ratio_undefined(const eits_context *ctx, eits_real v0)
 
 /* A row and its reciprocal that differ by less than rounding of their references agree: quantised
  * voltages often do. */
-static int is_apart(const eits_context *ctx, eits_real apart, eits_real v0)
+static int exceeds_rounding(const eits_context *ctx, eits_real difference, eits_real v0)
 {
     const eits_real rounding = sizeof(eits_real) == 4 ? R(0x1p-20) : R(0x1p-49);
-    return eits_fabs(apart) > rounding * (ctx->model->data_kind == EITS_DATA_NORMALISED
-                                              ? 1
-                                              : eits_fabs(ctx->reference.gain * v0));
+    return eits_fabs(difference) > rounding * (ctx->model->data_kind == EITS_DATA_NORMALISED
+                                                   ? 1
+                                                   : eits_fabs(ctx->reference.gain * v0));
 }
 
-/* d_k: the mean of a row and its reciprocal, or whichever is usable; apart_k: their difference.
- * Sets basis_for, and says whether any of it changed. */
+/* d_k: the mean of a row and its reciprocal, or whichever is usable; reciprocity_error_k: their
+ * difference. Sets basis_for, and says whether any of it changed. */
 static int fold_data(eits_context *ctx, const eits_real *frame)
 {
     const eits_real *v0 = ctx->reference.v0;
@@ -101,7 +101,7 @@ static int fold_data(eits_context *ctx, const eits_real *frame)
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_fold fold = ctx->model->fold[k];
         const uint32_t rows[2] = {fold.first, fold.second};
-        eits_real sum = 0, apart = 0;
+        eits_real sum = 0, difference = 0;
         uint8_t used = EITS_SIDE_NONE;
         for (int side = 0; side < 2; ++side) {
             const uint32_t i = rows[side];
@@ -113,12 +113,14 @@ static int fold_data(eits_context *ctx, const eits_real *frame)
                 side == 1 && fold.sign < 0 && ctx->model->data_kind != EITS_DATA_NORMALISED;
             const eits_real measured = datum(ctx, frame[i], v0[i]),
                             value = turn ? -measured : measured;
-            apart = sum - value;
+            difference = sum - value;
             sum += value;
             used |= (uint8_t)(side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND);
         }
         ctx->d[k] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
-        ctx->apart[k] = used == EITS_SIDE_BOTH && is_apart(ctx, apart, v0[fold.first]) ? apart : 0;
+        ctx->reciprocity_error[k] =
+            used == EITS_SIDE_BOTH && exceeds_rounding(ctx, difference, v0[fold.first]) ? difference
+                                                                                        : 0;
         changed |= used != ctx->basis_for[k];
         ctx->basis_for[k] = used;
     }
@@ -169,10 +171,10 @@ static uint64_t drift_direction(eits_context *ctx, eits_real *out)
             ctx->reference.gain *
             (used == EITS_SIDE_BOTH ? R(0.5) * (first + second) : first + second);
         ctx->list_index[k] = k;
-        ctx->along[k] =
+        ctx->gain_drift[k] =
             used != EITS_SIDE_NONE && model->data_kind == EITS_DATA_NORMALISED ? 1 : along;
     }
-    ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->along, model->n_folded, out);
+    ctx->kernels->mul(&model->reduction, ctx->list_index, ctx->gain_drift, model->n_folded, out);
     return (uint64_t)model->n_folded * model->rank;
 }
 
@@ -180,7 +182,7 @@ static uint64_t rebuild_basis(eits_context *ctx)
 {
     uint64_t macs = eits_whitening_build(ctx);
     ctx->basis_count = 0;
-    eits_zero(ctx->along, ctx->model->n_folded);
+    eits_zero(ctx->gain_drift, ctx->model->n_folded);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (ctx->masked_whitening || ctx->basis_for[k] != EITS_SIDE_NONE)
             continue;
@@ -193,7 +195,7 @@ static uint64_t rebuild_basis(eits_context *ctx)
         macs += extend_basis(ctx, ctx->residual);
     }
     ctx->basis_stale = 0;
-    ctx->stray_stale = 1;
+    ctx->off_range_stale = 1;
     return macs;
 }
 
@@ -240,7 +242,7 @@ static uint64_t reduce_log(eits_context *ctx, const eits_real *frame)
  */
 static int examine_reduced(eits_context *ctx, uint64_t *macs)
 {
-    if (!ctx->sheet_known || !eits_check_model_mismatch(ctx, macs))
+    if (!ctx->range_known || !eits_check_model_mismatch(ctx, macs))
         return 0;
     /* by turned rows: then it is no single fold */
     const int known = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0;

@@ -105,7 +105,7 @@ void eits_whitening_init(eits_context *ctx)
         return;
     squares_of_rows(ctx, ctx->row_strength);
     ctx->can_whiten_masked = (uint32_t)take_form(ctx, greatest);
-    ctx->sheet_energy_stored = ctx->sheet_energy;
+    ctx->reduction_energy_stored = ctx->reduction_energy;
 }
 
 /* ---- the whitening ---- */
@@ -260,8 +260,8 @@ static void raise_regularisation(eits_context *ctx)
     ctx->masked_whitening = EITS_WHITENING_DIAGONAL;
     ctx->regularisation_in_force = regularisation;
     ctx->noise_ratio = noise;
-    ctx->sheet_energy = ctx->sheet_energy_stored *
-                        eits_regularisation_weights(ctx, regularisation, whitening_of(ctx));
+    ctx->reduction_energy = ctx->reduction_energy_stored *
+                            eits_regularisation_weights(ctx, regularisation, whitening_of(ctx));
 }
 
 static uint64_t build_triangle(eits_context *ctx, eits_real regularisation, uint32_t missing)
@@ -297,7 +297,7 @@ uint64_t eits_whitening_build(eits_context *ctx)
     if (!ctx->can_whiten_masked)
         return 0;
     ctx->regularisation_in_force = ctx->regularisation;
-    ctx->sheet_energy = ctx->sheet_energy_stored;
+    ctx->reduction_energy = ctx->reduction_energy_stored;
     if (missing > 0)
         return build_triangle(
             ctx, eits_regularisation_of_rest(ctx, (eits_real)missing / (eits_real)folded), missing);
