@@ -127,7 +127,7 @@ static fw_answer check_scan(const fw_instrument *instrument, const eits_command_
     if (!fw_whole_periods(c->excitation_millihz, c->sample_rate_hz, c->samples))
         return answer(
             EITS_REPLY_PERIODS,
-            (int32_t)fw_nearest_whole(c->excitation_millihz, c->sample_rate_hz, c->samples), 0);
+            (int32_t)fw_nearest_integer(c->excitation_millihz, c->sample_rate_hz, c->samples), 0);
     return ok();
 }
 
@@ -149,7 +149,7 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     fw_stop_scan(instrument);
     if (fw_scan_configure(&instrument->scan, &settings) == FW_OK) {
         instrument->settings = settings;
-        instrument->engine.tared = instrument->engine.angle_known = false;
+        instrument->engine.tared = instrument->engine.phase_known = false;
         instrument->stream.what &= EITS_STREAM_RAW;
     } else {
         checked = answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, sample_rate_hz), 0);
@@ -277,7 +277,7 @@ static fw_answer on_clear_faults(fw_instrument *instrument, const void *payload,
     (void)size;
     instrument->doubtful = instrument->agreeing = 0;
     fw_faults_clear(&instrument->faults, instrument->last_frame);
-    fw_tell_no_model(instrument);
+    fw_report_no_model(instrument);
     return ok();
 }
 
@@ -332,12 +332,12 @@ static bool sent_again(fw_instrument *instrument, eits_packet_type type, uint32_
     const eits_packet_reply *last = &instrument->reply;
     if (type == EITS_PACKET_TARE && instrument->tare.active && instrument->tare.request == request)
         return true;
-    if (type == EITS_PACKET_TARE && instrument->tare_answered &&
+    if (type == EITS_PACKET_TARE && instrument->tare_reported &&
         instrument->tare_reply.request == request)
         last = &instrument->tare_reply;
     else if (!instrument->answered || last->command != type || last->request != request)
         return false;
-    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_REPLY, last, sizeof *last, NULL, 0);
+    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_REPLY, last, sizeof *last, NULL, 0);
     return true;
 }
 

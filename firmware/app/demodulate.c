@@ -18,7 +18,7 @@ bool fw_whole_periods(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t sa
     return rate_hz > 0 && samples > 0 && (uint64_t)excitation_millihz * samples % rate_millihz == 0;
 }
 
-uint32_t fw_nearest_whole(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples)
+uint32_t fw_nearest_integer(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples)
 {
     const uint64_t rate_millihz = (uint64_t)rate_hz * 1000u;
     const uint64_t unit = rate_millihz / greatest_divisor(rate_millihz, excitation_millihz);
@@ -53,7 +53,7 @@ fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint
     int64_t sum[2] = {0, 0};
     for (uint32_t k = 0; k < samples; ++k) {
         float c, s;
-        fw_turn_cos_sin((uint32_t)(((uint64_t)k * periods % samples << 32) / samples), &c, &s);
+        fw_sincos((uint32_t)(((uint64_t)k * periods % samples << 32) / samples), &c, &s);
         d->cosine[k] = to_q15(c);
         d->sine[k] = to_q15(s);
         sum[0] += d->cosine[k];
@@ -85,7 +85,7 @@ bool fw_demodulate(const fw_demodulator *d, const uint16_t *samples, uint32_t st
      * sin(phase) */
     const float i = d->scale * (float)in_phase, q = -d->scale * (float)quadrature;
     float c, s;
-    fw_turn_cos_sin(d->turn_per_us * start_us << 4, &c, &s);
+    fw_sincos(d->turn_per_us * start_us << 4, &c, &s);
     out->i = i * c + q * s;
     out->q = q * c - i * s;
     return ends != 0;

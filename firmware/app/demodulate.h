@@ -30,7 +30,7 @@ bool fw_whole_periods(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t sa
 
 /* The number of samples nearest to `samples` that does, at least one such; it may be above
  * FW_MAX_SAMPLES. */
-uint32_t fw_nearest_whole(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples);
+uint32_t fw_nearest_integer(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples);
 
 /* Volts at the electrodes of one step of the converter, in nanovolts, rounded. */
 uint32_t fw_volts_per_code_nv(const fw_capture *capture);

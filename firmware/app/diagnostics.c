@@ -1,7 +1,7 @@
 #include "app/diagnostics.h"
 
-static void tell_electrodes(fw_faults *faults, eits_fault code, uint64_t which,
-                            fw_fault_detail detail)
+static void report_electrodes(fw_faults *faults, eits_fault code, uint64_t which,
+                              fw_fault_detail detail)
 {
     for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
         detail.index = (int32_t)e;
@@ -11,7 +11,7 @@ static void tell_electrodes(fw_faults *faults, eits_fault code, uint64_t which,
 
 void fw_diagnostics_open(fw_faults *faults, uint32_t frame, uint64_t open)
 {
-    tell_electrodes(faults, EITS_FAULT_ELECTRODE_OPEN, open, (fw_fault_detail){.frame = frame});
+    report_electrodes(faults, EITS_FAULT_ELECTRODE_OPEN, open, (fw_fault_detail){.frame = frame});
 }
 
 /* The only other bit than e; -1 where there are more or fewer. */
@@ -26,7 +26,7 @@ static int32_t partner(uint64_t which, uint32_t e)
     return other;
 }
 
-static void tell_bridged(fw_faults *faults, uint32_t frame, uint64_t bridged)
+static void report_bridged(fw_faults *faults, uint32_t frame, uint64_t bridged)
 {
     const uint32_t words[5] = {(uint32_t)bridged, (uint32_t)(bridged >> 32)};
     for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
@@ -42,9 +42,9 @@ void fw_diagnostics_skin(fw_faults *faults, uint32_t frame, const eits_info *inf
 {
     const fw_fault_detail detail = {.frame = frame,
                                     .value = (int32_t)(1000 * info->model_mismatch + 0.5f)};
-    tell_bridged(faults, frame, info->bridged_electrodes);
-    tell_electrodes(faults, EITS_FAULT_ELECTRODE_NOISY, info->noisy_electrodes,
-                    (fw_fault_detail){.frame = frame});
+    report_bridged(faults, frame, info->bridged_electrodes);
+    report_electrodes(faults, EITS_FAULT_ELECTRODE_NOISY, info->noisy_electrodes,
+                      (fw_fault_detail){.frame = frame});
     fw_fault_observe(faults, EITS_FAULT_MODEL_MISMATCH,
                      (info->diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0, detail);
 }
@@ -56,13 +56,13 @@ void fw_diagnostics_reference(fw_faults *faults, uint32_t frame, const eits_info
                      (fw_fault_detail){.frame = frame});
 }
 
-void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info,
-                         const fw_judgement *judged, const eits_options *options)
+void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info, const fw_quality *quality,
+                         const eits_options *options)
 {
     const bool saturated =
-        judged->saturated > 0 && (options->diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0;
+        quality->saturated > 0 && (options->diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0;
     head->diagnostics = info->diagnostics | (saturated ? EITS_DIAGNOSTIC_SATURATED : 0u);
-    head->saturated = (uint16_t)(info->saturated + judged->saturated);
+    head->saturated = (uint16_t)(info->saturated + quality->saturated);
     head->outliers = (uint16_t)info->outliers;
     head->model_mismatch = info->model_mismatch;
     head->open_electrodes = info->open_electrodes;

@@ -17,7 +17,7 @@ void fw_diagnostics_reference(fw_faults *faults, uint32_t frame, const eits_info
 
 /* The head's fields for what was found. The converter knows saturated rows, and the core gets them
  * as no numbers: they are added where `options` names them. */
-void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info,
-                         const fw_judgement *judged, const eits_options *options);
+void fw_diagnostics_head(eits_packet_solved *head, const eits_info *info, const fw_quality *quality,
+                         const eits_options *options);
 
 #endif

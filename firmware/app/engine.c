@@ -52,8 +52,8 @@ static void lay_out(fw_engine *engine)
     engine->sides = take(&next, engine->model.n_folded);
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
     /* not cleared: it may hold what is to be restored */
-    engine->kept.masked = end - EITS_ALIGN16(rows);
-    engine->kept.v0 = (float *)(void *)(end - kept_bytes(&engine->model));
+    engine->saved.masked = end - EITS_ALIGN16(rows);
+    engine->saved.v0 = (float *)(void *)(end - kept_bytes(&engine->model));
 }
 
 /* Rows that no fold names as a second one, in order. Rows that no fold names at all are among them.
@@ -102,7 +102,7 @@ eits_status fw_engine_open(fw_engine *engine, const eits_model *model)
 
 void fw_engine_close(fw_engine *engine)
 {
-    engine->open = engine->tared = engine->angle_known = false;
+    engine->open = engine->tared = engine->phase_known = false;
     engine->cosine = 1;
     engine->sine = 0;
     engine->used_bytes = 0;
@@ -130,37 +130,37 @@ void fw_engine_examine(fw_engine *engine, const float *volts)
     ctx->basis_stale |= stale | (uint32_t)changed;
 }
 
-void fw_engine_keep(fw_engine *engine)
+void fw_engine_save(fw_engine *engine)
 {
-    fw_kept *kept = &engine->kept;
-    memcpy(kept->v0, engine->ctx.reference.v0, engine->model.n_rows * sizeof(float));
-    memcpy(kept->masked, engine->ctx.masked, engine->model.n_rows);
-    kept->reference = engine->ctx.reference;
-    kept->options = engine->ctx.options;
-    kept->next_id = engine->ctx.next_id;
-    kept->cosine = engine->cosine;
-    kept->sine = engine->sine;
-    kept->tared = engine->tared;
-    kept->angle_known = engine->angle_known;
+    fw_saved *saved = &engine->saved;
+    memcpy(saved->v0, engine->ctx.reference.v0, engine->model.n_rows * sizeof(float));
+    memcpy(saved->masked, engine->ctx.masked, engine->model.n_rows);
+    saved->reference = engine->ctx.reference;
+    saved->options = engine->ctx.options;
+    saved->next_id = engine->ctx.next_id;
+    saved->cosine = engine->cosine;
+    saved->sine = engine->sine;
+    saved->tared = engine->tared;
+    saved->phase_known = engine->phase_known;
 }
 
 void fw_engine_restore(fw_engine *engine)
 {
-    const fw_kept *kept = &engine->kept;
+    const fw_saved *saved = &engine->saved;
     float *m2 = engine->ctx.reference.m2, *v0 = engine->ctx.reference.v0;
-    engine->ctx.reference = kept->reference;
+    engine->ctx.reference = saved->reference;
     engine->ctx.reference.v0 = v0;
     engine->ctx.reference.m2 = m2;
-    engine->ctx.options = kept->options;
-    memcpy(v0, kept->v0, engine->model.n_rows * sizeof(float));
-    memcpy(engine->ctx.masked, kept->masked, engine->model.n_rows);
-    engine->ctx.next_id = kept->next_id;
+    engine->ctx.options = saved->options;
+    memcpy(v0, saved->v0, engine->model.n_rows * sizeof(float));
+    memcpy(engine->ctx.masked, saved->masked, engine->model.n_rows);
+    engine->ctx.next_id = saved->next_id;
     engine->ctx.basis_stale = 1;
     eits_forget(&engine->ctx);
-    engine->cosine = kept->cosine;
-    engine->sine = kept->sine;
-    engine->tared = kept->tared;
-    engine->angle_known = kept->angle_known;
+    engine->cosine = saved->cosine;
+    engine->sine = saved->sine;
+    engine->tared = saved->tared;
+    engine->phase_known = saved->phase_known;
 }
 
 eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, float *difference)
@@ -171,8 +171,8 @@ eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, floa
         return EITS_E_WORKSPACE;
     const uint8_t *kept_from = engine->workspace + engine->workspace_bytes;
     if (engine->open) {
-        fw_engine_keep(engine);
-        kept_from = (const uint8_t *)engine->kept.v0;
+        fw_engine_save(engine);
+        kept_from = (const uint8_t *)engine->saved.v0;
     }
     eits_status status = eits_init(&engine->ctx, model, engine->workspace, size);
     if (status == EITS_OK)
@@ -189,6 +189,6 @@ eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, floa
     if (survived)
         fw_engine_restore(engine);
     else
-        engine->tared = engine->angle_known = false;
+        engine->tared = engine->phase_known = false;
     return status;
 }

@@ -9,15 +9,15 @@
 
 /* What a reference and its settings are, apart from the context: to go back to when a tare or a
  * self-test fails. */
-typedef struct fw_kept {
+typedef struct fw_saved {
     eits_reference reference;
     eits_options options;
     uint32_t next_id; /* of touches: ids are not used twice */
     float *v0;        /* n_rows */
     uint8_t *masked;  /* n_rows */
     float cosine, sine;
-    bool tared, angle_known;
-} fw_kept;
+    bool tared, phase_known;
+} fw_saved;
 
 typedef struct fw_engine {
     uint8_t *workspace;
@@ -25,14 +25,14 @@ typedef struct fw_engine {
     eits_model model;
     eits_context ctx;
     bool open, tared;
-    bool angle_known;   /* learned at a tare; else it is estimated from each frame */
+    bool phase_known;   /* learned at a tare; else it is estimated from each frame */
     float cosine, sine; /* of the angle that the voltages' phase has */
     fw_frame frames[2];
     uint16_t *unique; /* rows that are no other's reciprocal */
     uint32_t n_unique;
     uint8_t *flags; /* n_rows: bits of the frame under way */
     uint8_t *sides; /* n_folded: scratch */
-    fw_kept kept;
+    fw_saved saved;
 } fw_engine;
 
 void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes);
@@ -54,7 +54,7 @@ fw_scan_table fw_engine_table(const fw_engine *engine);
 void fw_engine_examine(fw_engine *engine, const float *volts);
 
 /* Keep reference, options, masks and angle; restore puts them back, the warm start forgotten. */
-void fw_engine_keep(fw_engine *engine);
+void fw_engine_save(fw_engine *engine);
 void fw_engine_restore(fw_engine *engine);
 
 /* Run the golden frame of `model`, which may be another than the open one; scanning may go on only

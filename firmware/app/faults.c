@@ -2,12 +2,12 @@
 
 #include <string.h>
 
-void fw_faults_init(fw_faults *faults, fw_outbox *outbox)
+void fw_faults_init(fw_faults *faults, fw_tx_queue *tx_queue)
 {
-    *faults = (fw_faults){.outbox = outbox};
+    *faults = (fw_faults){.tx_queue = tx_queue};
 }
 
-static void tell(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail)
+static void send_fault(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail)
 {
     eits_packet_fault packet = {.code = (uint16_t)code,
                                 .raised = there,
@@ -16,7 +16,7 @@ static void tell(fw_faults *faults, eits_fault code, bool there, fw_fault_detail
                                 .value = detail.value};
     if (detail.words != NULL)
         memcpy(packet.words, detail.words, sizeof packet.words);
-    (void)fw_outbox_send(faults->outbox, EITS_PACKET_FAULT, &packet, sizeof packet, NULL, 0);
+    (void)fw_tx_queue_send(faults->tx_queue, EITS_PACKET_FAULT, &packet, sizeof packet, NULL, 0);
 }
 
 static bool of_electrode(eits_fault code)
@@ -43,17 +43,17 @@ void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detai
         return;
     faults->there[code] = with_bit(faults->there[code], place, there);
     faults->raised = with_bit(faults->raised, code, faults->there[code] != 0);
-    tell(faults, code, there, detail);
+    send_fault(faults, code, there, detail);
 }
 
 void fw_fault_observe(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail)
 {
     const uint32_t place = place_of(code, detail);
     const bool there = (faults->there[code] >> place & 1u) != 0;
-    const uint32_t shown = code >= EITS_FAULT_ELECTRODE_NOISY ? EITS_FAULT_SHOWN_FRAMES : 1;
+    const uint32_t shown = code >= EITS_FAULT_ELECTRODE_NOISY ? EITS_FAULT_RAISE_FRAMES : 1;
     if (found == there)
         faults->run[code][place] = 0;
-    else if (++faults->run[code][place] >= (there ? EITS_FAULT_CLEAN_FRAMES : shown))
+    else if (++faults->run[code][place] >= (there ? EITS_FAULT_CLEAR_FRAMES : shown))
         fw_fault_set(faults, code, found, detail);
 }
 

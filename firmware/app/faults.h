@@ -6,7 +6,7 @@
 #include "app/tx_queue.h"
 
 typedef struct fw_faults {
-    fw_outbox *outbox;
+    fw_tx_queue *tx_queue;
     uint32_t raised;             /* bit k: fault number k */
     uint32_t there[EITS_FAULTS]; /* of an electrode's: bit e; of others: bit 0 */
     /* frames in a row without what is there, or with what is not, by the same bits */
@@ -19,13 +19,13 @@ typedef struct fw_fault_detail {
     const uint32_t *words; /* 5, or NULL */
 } fw_fault_detail;
 
-void fw_faults_init(fw_faults *faults, fw_outbox *outbox);
+void fw_faults_init(fw_faults *faults, fw_tx_queue *tx_queue);
 
 /* The fault is there, or is not: a packet goes out where that changed. */
 void fw_fault_set(fw_faults *faults, eits_fault code, bool there, fw_fault_detail detail);
 
 /* A frame shows the fault, or does not: it rises at once, from ELECTRODE_NOISY on with the
- * EITS_FAULT_SHOWN_FRAMES-th in a row, and goes with the EITS_FAULT_CLEAN_FRAMES-th that does not,
+ * EITS_FAULT_RAISE_FRAMES-th in a row, and goes with the EITS_FAULT_CLEAR_FRAMES-th that does not,
  * so that what comes and goes with the noise does not fill the line. */
 void fw_fault_observe(fw_faults *faults, eits_fault code, bool found, fw_fault_detail detail);
 

@@ -80,7 +80,7 @@ static void watch_scan(fw_instrument *instrument)
 
 /* ---- model ---- */
 
-void fw_tell_no_model(fw_instrument *instrument)
+void fw_report_no_model(fw_instrument *instrument)
 {
     fw_fault_set(&instrument->faults, EITS_FAULT_NO_MODEL, !instrument->engine.open,
                  (fw_fault_detail){.frame = instrument->last_frame,
@@ -122,7 +122,7 @@ void fw_open_newest(fw_instrument *instrument)
         (uint64_t)fw_scan_rows(&instrument->settings, &table) * fw_slot_us(&instrument->settings);
     if (instrument->engine.open && instrument->settings.frame_period_us < min_us)
         instrument->settings.frame_period_us = 0; /* it was for a shorter table */
-    fw_tell_no_model(instrument);
+    fw_report_no_model(instrument);
 }
 
 /* ---- main loop ---- */
@@ -133,8 +133,8 @@ void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
     instrument->board = board;
     instrument->settings = (fw_scan_settings)FW_SCAN_DEFAULT;
     instrument->settings.frame_period_us = board->frame_period_us;
-    fw_outbox_init(&instrument->outbox, board->link);
-    fw_faults_init(&instrument->faults, &instrument->outbox);
+    fw_tx_queue_init(&instrument->tx_queue, board->link);
+    fw_faults_init(&instrument->faults, &instrument->tx_queue);
     fw_ad9833_init(&instrument->generator, board->generator);
     fw_engine_init(&instrument->engine, board->workspace, board->workspace_bytes);
     fw_scan_init(&instrument->scan, board, &instrument->demodulator);
@@ -171,16 +171,16 @@ static void keep_time(fw_instrument *instrument)
     instrument->uptime_us += ms * 1000u;
 }
 
-static void show(const fw_instrument *instrument)
+static void set_leds(const fw_instrument *instrument)
 {
     const fw_board *board = instrument->board;
     uint32_t leds = (instrument->uptime_ms & ALIVE_MS) == 0 ? LED_ALIVE : 0;
     leds |= instrument->touched ? LED_TOUCH : 0;
     leds |= instrument->faults.raised != 0 ? LED_FAULT : 0;
-    board->system->show(board->system_ctx, leds);
+    board->system->set_leds(board->system_ctx, leds);
 }
 
-bool fw_instrument_turn(fw_instrument *instrument)
+bool fw_instrument_step(fw_instrument *instrument)
 {
     const fw_board *board = instrument->board;
     board->system->feed_watchdog(board->system_ctx);
@@ -194,7 +194,7 @@ bool fw_instrument_turn(fw_instrument *instrument)
     }
     watch_scan(instrument);
     fw_upload_check(instrument);
-    show(instrument);
+    set_leds(instrument);
     return worked;
 }
 
@@ -219,7 +219,7 @@ int fw_instrument_run(fw_instrument *instrument, const fw_board *board)
         return 1;
     fw_instrument_init(instrument, board);
     for (;;) {
-        const bool worked = fw_instrument_turn(instrument);
+        const bool worked = fw_instrument_step(instrument);
         if (instrument->reset_wanted) {
             restart(instrument);
             return 2; /* only where reset returns */

@@ -40,7 +40,7 @@ typedef struct fw_upload {
 
 typedef struct fw_instrument {
     const fw_board *board;
-    fw_outbox outbox;
+    fw_tx_queue tx_queue;
     fw_faults faults;
     fw_stats stats;
     fw_ad9833 generator;
@@ -62,9 +62,9 @@ typedef struct fw_instrument {
     uint32_t doubtful, agreeing; /* checked frames in a row */
     uint32_t uptime_ms, uptime_us;
     /* the last answer, to be given again when its command is sent again */
-    bool answered, tare_answered;
+    bool answered, tare_reported;
     eits_packet_reply reply, tare_reply;
-    bool stats_told;
+    bool stats_reported;
     eits_packet_stats last_stats;
     eits_link_decoder decoder;
     _Alignas(8) uint8_t received[(FW_RECEIVE_ROOM + 7u) / 8u * 8u];
@@ -85,7 +85,7 @@ fw_answer fw_model_fits(const fw_instrument *instrument, const eits_model *model
 void fw_instrument_init(fw_instrument *instrument, const fw_board *board);
 
 /* One turn of the main loop; false: nothing was to be done. */
-bool fw_instrument_turn(fw_instrument *instrument);
+bool fw_instrument_step(fw_instrument *instrument);
 int fw_instrument_run(fw_instrument *instrument, const fw_board *board);
 
 uint32_t fw_now_us(const fw_instrument *instrument);
@@ -97,7 +97,7 @@ void fw_stop_scan(fw_instrument *instrument);
 
 /* Open the newest model that can be used; raises NO_MODEL where there is none. */
 void fw_open_newest(fw_instrument *instrument);
-void fw_tell_no_model(fw_instrument *instrument);
+void fw_report_no_model(fw_instrument *instrument);
 
 /* A tare that cannot go on is answered, and the last reference put back. */
 void fw_fail_tare(fw_instrument *instrument, eits_status why);

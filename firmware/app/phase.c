@@ -27,7 +27,7 @@ static float along_model(const fw_engine *engine, const fw_frame *frame)
     return sum;
 }
 
-void fw_angle_learn(fw_engine *engine, const fw_frame *frame)
+void fw_phase_learn(fw_engine *engine, const fw_frame *frame)
 {
     float re = 0, im = 0; /* of the sum of z^2 */
     for (uint32_t i = 0; i < engine->model.n_rows; ++i) {
@@ -56,7 +56,7 @@ void fw_angle_learn(fw_engine *engine, const fw_frame *frame)
     }
 }
 
-void fw_angle_apply(const fw_engine *engine, fw_frame *frame)
+void fw_phase_apply(const fw_engine *engine, fw_frame *frame)
 {
     for (uint32_t i = 0; i < engine->model.n_rows; ++i)
         frame->volts[i] = turned(engine, frame->z[i]);

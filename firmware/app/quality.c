@@ -102,13 +102,13 @@ static void mark_open(const fw_engine *engine, fw_frame *frame, uint32_t open)
     }
 }
 
-static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_judgement *judged)
+static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_quality *quality)
 {
     const eits_model *model = &engine->model;
     const float all = rms_of_z(engine, frame);
     float worst = 0;
-    judged->checked = all > 0;
-    for (uint32_t k = 0; k < model->n_folded && judged->checked; ++k) {
+    quality->checked = all > 0;
+    for (uint32_t k = 0; k < model->n_folded && quality->checked; ++k) {
         const eits_fold fold = model->fold[k];
         if (fold.second == EITS_FOLD_NONE ||
             ((frame->quality[fold.first] | frame->quality[fold.second]) & UNUSABLE) != 0)
@@ -121,10 +121,10 @@ static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_judge
         }
         if (fraction > worst) {
             worst = fraction;
-            judged->worst_row = fold.first;
+            quality->worst_row = fold.first;
         }
     }
-    judged->worst_permille = (uint32_t)(1000 * (worst < 1000 ? worst : 1000) + 0.5f);
+    quality->worst_permille = (uint32_t)(1000 * (worst < 1000 ? worst : 1000) + 0.5f);
 }
 
 /* Second rows get what their first ones measured. */
@@ -141,17 +141,17 @@ static void copy_reciprocals(const fw_engine *engine, fw_frame *frame)
     }
 }
 
-void fw_quality_judge(fw_engine *engine, fw_frame *frame, bool by_model, fw_judgement *judged)
+void fw_quality_check(fw_engine *engine, fw_frame *frame, bool by_model, fw_quality *quality)
 {
     const uint32_t rows = engine->model.n_rows;
-    *judged = (fw_judgement){.open = by_model ? find_open(engine, frame) : 0};
-    mark_open(engine, frame, judged->open);
+    *quality = (fw_quality){.open = by_model ? find_open(engine, frame) : 0};
+    mark_open(engine, frame, quality->open);
     for (uint32_t i = 0; i < rows; ++i) {
         if (engine->ctx.masked[i])
             frame->quality[i] |= EITS_QUALITY_MASKED;
     }
     if ((frame->flags & EITS_RAW_RECIPROCAL) == 0)
-        check_reciprocity(engine, frame, judged);
+        check_reciprocity(engine, frame, quality);
     if ((frame->flags & (EITS_RAW_RECIPROCAL | EITS_RAW_CHECK)) != 0)
         copy_reciprocals(engine, frame);
     for (uint32_t i = 0; i < rows; ++i) {
@@ -159,8 +159,8 @@ void fw_quality_judge(fw_engine *engine, fw_frame *frame, bool by_model, fw_judg
             frame->quality[i] |= EITS_QUALITY_MASKED;
         const bool saturated =
             (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !engine->ctx.masked[i];
-        if (saturated && judged->saturated++ == 0)
-            judged->first_saturated = i;
+        if (saturated && quality->saturated++ == 0)
+            quality->first_saturated = i;
         if ((frame->quality[i] & UNUSABLE) != 0)
             frame->volts[i] = (float)NAN;
     }

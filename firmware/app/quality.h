@@ -17,13 +17,13 @@
  * 0.054); electrodes that are mixed up give far more. */
 #define FW_RECIPROCITY_FRACTION 0.1f
 
-typedef struct fw_judgement {
+typedef struct fw_quality {
     uint32_t saturated, first_saturated; /* rows, masked ones apart */
     /* bit e: electrode e is open, as far as the model tells */
     uint32_t open;
-    bool checked;                       /* reciprocity could be judged */
+    bool checked;                       /* reciprocity could be checked */
     uint32_t worst_row, worst_permille; /* of the frame's rms */
-} fw_judgement;
+} fw_quality;
 
 /* Before all else: notes which rows the frame measured, and clears what the others hold from
  * earlier frames. */
@@ -39,6 +39,6 @@ void fw_quality_prepare(fw_engine *engine, fw_frame *frame);
  * at least three of them. The model tells shares only, the frame itself gives the scale: the limit
  * is 0.6 % of the rms voltage, and noise above a third of that hides an open electrode until there
  * is a tare. */
-void fw_quality_judge(fw_engine *engine, fw_frame *frame, bool by_model, fw_judgement *judged);
+void fw_quality_check(fw_engine *engine, fw_frame *frame, bool by_model, fw_quality *quality);
 
 #endif

@@ -9,7 +9,7 @@ static void copy_text(char *to, size_t room, const char *from)
         to[k] = from[k];
 }
 
-static void tell_model(const fw_instrument *instrument, eits_packet_info *info)
+static void report_model(const fw_instrument *instrument, eits_packet_info *info)
 {
     const eits_model *model = &instrument->engine.model;
     if (!instrument->engine.open)
@@ -54,8 +54,8 @@ void fw_send_info(fw_instrument *instrument, uint32_t request)
                              .volts_per_code_nv = fw_volts_per_code_nv(&board->capture)};
     copy_text(info.board, sizeof info.board - 1, board->name);
     copy_text(info.serial, sizeof info.serial, board->serial);
-    tell_model(instrument, &info);
-    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_INFO, &info, sizeof info, NULL, 0);
+    report_model(instrument, &info);
+    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_INFO, &info, sizeof info, NULL, 0);
 }
 
 static void collect(fw_instrument *instrument, eits_packet_stats *stats)
@@ -65,8 +65,8 @@ static void collect(fw_instrument *instrument, eits_packet_stats *stats)
     *stats = (eits_packet_stats){.uptime_ms = instrument->uptime_ms,
                                  .frames_scanned = instrument->scan.frames_scanned,
                                  .frames_solved = instrument->frames_solved,
-                                 .packets_sent = instrument->outbox.sent,
-                                 .packets_dropped = instrument->outbox.dropped,
+                                 .packets_sent = instrument->tx_queue.sent,
+                                 .packets_dropped = instrument->tx_queue.dropped,
                                  .deadlines_missed = instrument->deadlines_missed,
                                  .slots_repeated = instrument->scan.slots_repeated,
                                  .outliers = instrument->outliers,
@@ -86,14 +86,14 @@ void fw_send_stats(fw_instrument *instrument, uint32_t request, bool reset)
 {
     eits_packet_stats *stats = &instrument->last_stats;
     /* a request sent again gets the same numbers */
-    if (!instrument->stats_told || stats->request != request) {
+    if (!instrument->stats_reported || stats->request != request) {
         collect(instrument, stats);
         stats->request = request;
-        instrument->stats_told = true;
+        instrument->stats_reported = true;
         if (reset)
             fw_stats_clear(&instrument->stats);
     }
-    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_STATS, stats, sizeof *stats, NULL, 0);
+    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_STATS, stats, sizeof *stats, NULL, 0);
 }
 
 static eits_packet_reply make_reply(eits_packet_type command, uint32_t request, fw_answer answer)
@@ -109,14 +109,14 @@ void fw_send_reply(fw_instrument *instrument, eits_packet_type command, uint32_t
 {
     instrument->reply = make_reply(command, request, answer);
     instrument->answered = true;
-    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_REPLY, &instrument->reply,
-                         sizeof instrument->reply, NULL, 0);
+    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_REPLY, &instrument->reply,
+                           sizeof instrument->reply, NULL, 0);
 }
 
 void fw_send_tare_reply(fw_instrument *instrument, fw_answer answer)
 {
     instrument->tare_reply = make_reply(EITS_PACKET_TARE, instrument->tare.request, answer);
-    instrument->tare_answered = true;
-    (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_REPLY, &instrument->tare_reply,
-                         sizeof instrument->tare_reply, NULL, 0);
+    instrument->tare_reported = true;
+    (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_REPLY, &instrument->tare_reply,
+                           sizeof instrument->tare_reply, NULL, 0);
 }

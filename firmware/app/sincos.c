@@ -2,7 +2,7 @@
 
 /* Taylor's series within an eighth of a turn from the nearest quarter: the first term left out is
  * below 3e-8. */
-void fw_turn_cos_sin(uint32_t turn, float *cosine, float *sine)
+void fw_sincos(uint32_t turn, float *cosine, float *sine)
 {
     const uint32_t quarter = (turn + 0x20000000u) >> 30;
     const int32_t rest = (int32_t)(turn - (quarter << 30));

@@ -1,11 +1,11 @@
 /* Angles as fractions of a turn in 32 bits (2^32 is a turn), so that they wrap by themselves. */
-#ifndef FW_TURN_H
-#define FW_TURN_H
+#ifndef FW_SINCOS_H
+#define FW_SINCOS_H
 
 #include <stdint.h>
 
 /* Cosine and sine, each within 2e-7; of plain products and sums, so that every target gives the
  * same bits. */
-void fw_turn_cos_sin(uint32_t turn, float *cosine, float *sine);
+void fw_sincos(uint32_t turn, float *cosine, float *sine);
 
 #endif

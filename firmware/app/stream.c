@@ -1,26 +1,26 @@
-/* What becomes of a frame: judged, given to the tare or to the solver, and sent. */
+/* What becomes of a frame: checked, given to the tare or to the solver, and sent. */
 #include "app/instrument.h"
 #include "app/phase.h"
 
 /* What the scan itself tells. */
-static void tell_scan(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
+static void report_scan(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)
 {
     fw_faults *faults = &instrument->faults;
     fw_fault_detail detail = {.frame = frame->number};
     fw_fault_set(faults, EITS_FAULT_SCAN_STALLED, false, detail);
     detail.value = (int32_t)frame->bus_errors;
     fw_fault_set(faults, EITS_FAULT_BUS, frame->bus_errors > 0, detail);
-    detail.index = (int32_t)judged->first_saturated;
-    detail.value = (int32_t)judged->saturated;
-    fw_fault_observe(faults, EITS_FAULT_SATURATED, judged->saturated > 0, detail);
-    if (!judged->checked)
+    detail.index = (int32_t)quality->first_saturated;
+    detail.value = (int32_t)quality->saturated;
+    fw_fault_observe(faults, EITS_FAULT_SATURATED, quality->saturated > 0, detail);
+    if (!quality->checked)
         return;
     /* one frame in which a touch moves has reciprocals that disagree too */
-    const bool doubtful = (float)judged->worst_permille > 1000.0f * FW_RECIPROCITY_FRACTION;
+    const bool doubtful = (float)quality->worst_permille > 1000.0f * FW_RECIPROCITY_FRACTION;
     instrument->doubtful = doubtful ? instrument->doubtful + 1 : 0;
     instrument->agreeing = doubtful ? 0 : instrument->agreeing + 1;
-    detail.index = (int32_t)judged->worst_row;
-    detail.value = (int32_t)judged->worst_permille;
+    detail.index = (int32_t)quality->worst_row;
+    detail.value = (int32_t)quality->worst_permille;
     if (instrument->doubtful >= FW_RECIPROCITY_FRAMES ||
         instrument->agreeing >= FW_RECIPROCITY_FRAMES)
         fw_fault_set(faults, EITS_FAULT_RECIPROCITY, doubtful, detail);
@@ -38,12 +38,12 @@ static void send_diagnostics(fw_instrument *instrument, const fw_frame *frame, b
 }
 
 /* Look at a frame that is not solved: faults are told whether anything is streamed or not. */
-static void examine(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
+static void examine(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)
 {
     if (instrument->engine.tared)
         fw_engine_examine(&instrument->engine, frame->volts);
     else
-        instrument->engine.ctx.info = (eits_info){.open_electrodes = judged->open};
+        instrument->engine.ctx.info = (eits_info){.open_electrodes = quality->open};
     /* without a reference none is stale */
     send_diagnostics(instrument, frame, !instrument->engine.tared);
 }
@@ -57,8 +57,8 @@ static void send_raw(fw_instrument *instrument, const fw_frame *frame, uint32_t 
                                   .n_rows = (uint16_t)rows,
                                   .flags = (uint16_t)(frame->flags | flags)};
     if ((instrument->stream.what & EITS_STREAM_RAW) != 0)
-        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_RAW, &head, sizeof head, frame->volts,
-                             5 * (size_t)rows);
+        (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_RAW, &head, sizeof head,
+                               frame->volts, 5 * (size_t)rows);
 }
 
 static void take_tare(fw_instrument *instrument, const fw_frame *frame)
@@ -103,8 +103,8 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
     if ((instrument->stream.what & EITS_STREAM_IMAGE) != 0) {
         head->count = (uint16_t)pixels;
         head->age_us = fw_now_us(instrument) - frame->end_us;
-        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_IMAGE, head, sizeof *head, ctx->image,
-                             pixels * sizeof(float));
+        (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_IMAGE, head, sizeof *head,
+                               ctx->image, pixels * sizeof(float));
     }
     if ((instrument->stream.what & EITS_STREAM_TOUCHES) != 0) {
         eits_packet_touch body[EITS_MAX_TOUCHES];
@@ -115,13 +115,13 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
         }
         head->count = (uint16_t)count;
         head->age_us = fw_now_us(instrument) - frame->end_us;
-        (void)fw_outbox_send(&instrument->outbox, EITS_PACKET_TOUCHES, head, sizeof *head, body,
-                             count * sizeof body[0]);
+        (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_TOUCHES, head, sizeof *head, body,
+                               count * sizeof body[0]);
     }
 }
 
 /* Returns the microseconds that the solver took, touches included. */
-static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw_judgement *judged)
+static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)
 {
     eits_context *ctx = &instrument->engine.ctx;
     eits_touch touches[EITS_MAX_TOUCHES];
@@ -152,7 +152,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
                                .gap_rel = info->gap_rel,
                                .residual = info->residual,
                                .data_norm = info->data_norm};
-    fw_diagnostics_head(&head, info, judged, &ctx->options);
+    fw_diagnostics_head(&head, info, quality, &ctx->options);
     fw_stats_add(&instrument->stats, EITS_STAGE_SOLVE, head.solve_us);
     if (wanted)
         fw_stats_add(&instrument->stats, EITS_STAGE_TOUCHES, head.touch_us);
@@ -182,32 +182,32 @@ void fw_process_frame(fw_instrument *instrument, fw_frame *frame)
     const bool untouched = fw_tare_wants(&instrument->tare, frame);
     const bool solved =
         engine->tared && (stream->what & (EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES)) != 0;
-    fw_judgement judged;
+    fw_quality quality;
     instrument->last_frame = frame->number;
     fw_quality_prepare(engine, frame);
-    if (untouched ? fw_tare_first(&instrument->tare) : !engine->angle_known)
-        fw_angle_learn(engine, frame);
-    fw_angle_apply(engine, frame);
-    fw_quality_judge(engine, frame, untouched || !engine->tared, &judged);
-    tell_scan(instrument, frame, &judged);
+    if (untouched ? fw_tare_first(&instrument->tare) : !engine->phase_known)
+        fw_phase_learn(engine, frame);
+    fw_phase_apply(engine, frame);
+    fw_quality_check(engine, frame, untouched || !engine->tared, &quality);
+    report_scan(instrument, frame, &quality);
     fw_stats_add(&instrument->stats, EITS_STAGE_SCAN, frame->scan_us);
     fw_stats_add(&instrument->stats, EITS_STAGE_DEMODULATE, frame->busy_us);
     if (untouched) {
-        fw_diagnostics_open(&instrument->faults, frame->number, judged.open);
+        fw_diagnostics_open(&instrument->faults, frame->number, quality.open);
         take_tare(instrument, frame);
         return;
     }
     if (!due(stream)) {
-        examine(instrument, frame, &judged);
+        examine(instrument, frame, &quality);
         return;
     }
     const uint32_t began_us = fw_now_us(instrument);
     uint32_t solving_us = 0;
     send_raw(instrument, frame, 0);
     if (solved)
-        solving_us = solve(instrument, frame, &judged);
+        solving_us = solve(instrument, frame, &quality);
     else
-        examine(instrument, frame, &judged);
+        examine(instrument, frame, &quality);
     const uint32_t done_us = fw_now_us(instrument);
     fw_stats_add(&instrument->stats, EITS_STAGE_SEND, done_us - began_us - solving_us);
     fw_stats_add(&instrument->stats, EITS_STAGE_FRAME, done_us - frame->time_us);

@@ -3,7 +3,7 @@
 void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t frames,
                    uint32_t now_us)
 {
-    fw_engine_keep(engine);
+    fw_engine_save(engine);
     *tare = (fw_tare){.active = true, .request = request, .wanted = frames, .since_us = now_us};
 }
 
@@ -53,7 +53,7 @@ fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame
     if (++tare->taken < tare->wanted)
         return FW_TARE_TAKEN;
     tare->active = false;
-    engine->tared = engine->angle_known = true;
+    engine->tared = engine->phase_known = true;
     eits_forget(&engine->ctx);
     return FW_TARE_DONE;
 }

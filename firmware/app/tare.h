@@ -31,7 +31,7 @@ void fw_tare_begin(fw_tare *tare, fw_engine *engine, uint32_t request, uint32_t 
 bool fw_tare_wants(const fw_tare *tare, const fw_frame *frame);
 bool fw_tare_first(const fw_tare *tare);
 
-/* Take a judged frame. */
+/* Take a checked frame. */
 fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame,
                          eits_status *status);
 

@@ -1,20 +1,21 @@
 #include "app/tx_queue.h"
 
-void fw_outbox_init(fw_outbox *outbox, fw_link link)
+void fw_tx_queue_init(fw_tx_queue *tx_queue, fw_link link)
 {
-    outbox->link = link;
-    outbox->sequence = outbox->sent = outbox->dropped = 0;
+    tx_queue->link = link;
+    tx_queue->sequence = tx_queue->sent = tx_queue->dropped = 0;
 }
 
-bool fw_outbox_send(fw_outbox *outbox, eits_packet_type type, const void *head, size_t head_size,
-                    const void *body, size_t body_size)
+bool fw_tx_queue_send(fw_tx_queue *tx_queue, eits_packet_type type, const void *head,
+                      size_t head_size, const void *body, size_t body_size)
 {
-    const size_t size = eits_link_encode(outbox->scratch, sizeof outbox->scratch, (uint8_t)type,
-                                         outbox->sequence++, head, head_size, body, body_size);
-    const bool sent = size > 0 && outbox->link.ops->write(outbox->link.ctx, outbox->scratch, size);
+    const size_t size = eits_link_encode(tx_queue->scratch, sizeof tx_queue->scratch, (uint8_t)type,
+                                         tx_queue->sequence++, head, head_size, body, body_size);
+    const bool sent =
+        size > 0 && tx_queue->link.ops->write(tx_queue->link.ctx, tx_queue->scratch, size);
     if (sent)
-        ++outbox->sent;
+        ++tx_queue->sent;
     else
-        ++outbox->dropped;
+        ++tx_queue->dropped;
     return sent;
 }

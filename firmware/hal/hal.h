@@ -115,9 +115,9 @@ typedef struct fw_system_ops {
     uint32_t (*lock)(void *ctx); /* interrupts off; returns what unlock wants */
     void (*unlock)(void *ctx, uint32_t state);
     void (*feed_watchdog)(void *ctx);
-    void (*reset)(void *ctx);               /* does not return */
-    uint32_t (*stack_used)(void *ctx);      /* most bytes so far */
-    void (*show)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
+    void (*reset)(void *ctx);                   /* does not return */
+    uint32_t (*stack_used)(void *ctx);          /* most bytes so far */
+    void (*set_leds)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
 } fw_system_ops;
 
 /* What the start-up code found in memory that survives a reset. */
@@ -134,7 +134,7 @@ typedef struct fw_board {
     uint32_t mclk_hz; /* of the generator */
     uint32_t stack_bytes;
     uint32_t frame_period_us; /* of the scan after a start; 0: as fast as it goes */
-    fw_spi generator; /* AD9833 */
+    fw_spi generator;         /* AD9833 */
     /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
     fw_lines multiplexers;
     fw_capture capture;

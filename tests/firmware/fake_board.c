@@ -366,7 +366,7 @@ static uint32_t stack_used(void *ctx)
     return 1234;
 }
 
-static void system_show(void *ctx, uint32_t leds)
+static void system_set_leds(void *ctx, uint32_t leds)
 {
     ((fake_board *)ctx)->leds = leds;
 }
@@ -377,7 +377,7 @@ static const fw_capture_ops CAPTURE = {capture_configure, capture_start, capture
 static const fw_link_ops LINK = {link_write, link_read, link_ended};
 static const fw_store_ops STORE = {store_bank, store_erase, store_program};
 static const fw_system_ops SYSTEM = {time_us,       system_wait,  system_lock, system_unlock,
-                                     feed_watchdog, system_reset, stack_used,  system_show};
+                                     feed_watchdog, system_reset, stack_used,  system_set_leds};
 
 void fake_restart(fake_board *f)
 {

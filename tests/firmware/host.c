@@ -45,9 +45,9 @@ void host_start(host *h, fake_board *board)
     collect(h);
 }
 
-void host_turn(host *h)
+void host_step(host *h)
 {
-    if (!fw_instrument_turn(&h->instrument))
+    if (!fw_instrument_step(&h->instrument))
         fake_wait(h->board);
     collect(h);
 }
@@ -56,7 +56,7 @@ void host_run(host *h, uint32_t ms)
 {
     const uint64_t until = h->board->now_ns + (uint64_t)ms * 1000000u;
     while (h->board->now_ns < until)
-        host_turn(h);
+        host_step(h);
 }
 
 void host_forget(host *h)
@@ -124,7 +124,7 @@ eits_packet_reply host_reply(host *h, uint32_t request)
             if (reply.request == request)
                 return reply;
         }
-        host_turn(h);
+        host_step(h);
     }
     return (eits_packet_reply){.status = 0xFFFF};
 }
@@ -171,7 +171,7 @@ static void ask(host *h, eits_packet_type command, const void *payload, size_t s
     const uint32_t before = host_count(h, answer);
     host_send(h, (uint8_t)command, payload, size);
     for (int turn = 0; turn < 100000 && host_count(h, answer) == before; ++turn)
-        host_turn(h);
+        host_step(h);
     const host_packet *packet = host_last(h, answer);
     memset(out, 0, room);
     if (packet != NULL && packet->size == room && host_count(h, answer) > before)

@@ -34,7 +34,7 @@ void host_start(host *h, fake_board *board);
 
 /* One turn of the main loop, waiting where there is nothing to do; or for so many milliseconds of
  * the board's time. */
-void host_turn(host *h);
+void host_step(host *h);
 void host_run(host *h, uint32_t ms);
 
 /* Forget the packets so far. */

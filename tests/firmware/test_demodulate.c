@@ -18,22 +18,22 @@ static void make_burst(uint32_t samples, double rate_hz, double hz, double ampli
                        double turns, double lsb_v, double middle)
 {
     for (uint32_t k = 0; k < samples; ++k)
-        burst[k] = (uint16_t)floor(
-            amplitude_v / lsb_v * cos(TURN * (turns + hz * k / rate_hz)) + middle + 0.5);
+        burst[k] = (uint16_t)floor(amplitude_v / lsb_v * cos(TURN * (turns + hz * k / rate_hz)) +
+                                   middle + 0.5);
 }
 
 static void test_turns(void)
 {
     for (uint64_t turn = 0; turn < (uint64_t)1 << 32; turn += 7654321) {
         float c, s;
-        fw_turn_cos_sin((uint32_t)turn, &c, &s);
+        fw_sincos((uint32_t)turn, &c, &s);
         CHECK_NEAR(c, cos(TURN * (double)turn / 4294967296.0), 2e-7);
         CHECK_NEAR(s, sin(TURN * (double)turn / 4294967296.0), 2e-7);
     }
     float c, s;
-    fw_turn_cos_sin(0x80000000u, &c, &s);
+    fw_sincos(0x80000000u, &c, &s);
     CHECK(c == -1 && s == 0);
-    fw_turn_cos_sin(0x40000000u, &c, &s);
+    fw_sincos(0x40000000u, &c, &s);
     CHECK(c == 0 && s == 1);
 }
 
@@ -45,11 +45,11 @@ static void test_whole_periods(void)
     CHECK(!fw_whole_periods(50000012, 1000000, 80));
     CHECK(!fw_whole_periods(50000000, 0, 80));
     CHECK(!fw_whole_periods(50000000, 1000000, 0));
-    CHECK_EQUAL(fw_nearest_whole(50000000, 1000000, 81), 80);
-    CHECK_EQUAL(fw_nearest_whole(50000000, 1000000, 95), 100);
-    CHECK_EQUAL(fw_nearest_whole(50000000, 1000000, 3), 20);
-    CHECK_EQUAL(fw_nearest_whole(50000012, 1000000, 80), 250000000);
-    CHECK_EQUAL(fw_nearest_whole(30000000, 1000000, 80), 100); /* 3 periods in 100 */
+    CHECK_EQUAL(fw_nearest_integer(50000000, 1000000, 81), 80);
+    CHECK_EQUAL(fw_nearest_integer(50000000, 1000000, 95), 100);
+    CHECK_EQUAL(fw_nearest_integer(50000000, 1000000, 3), 20);
+    CHECK_EQUAL(fw_nearest_integer(50000012, 1000000, 80), 250000000);
+    CHECK_EQUAL(fw_nearest_integer(30000000, 1000000, 80), 100); /* 3 periods in 100 */
 }
 
 static void test_scale(void)

@@ -149,7 +149,7 @@ static void test_hysteresis(void)
         }
         CHECK(fw_fault_is(faults, code));
         for (uint32_t again = 0; again < 2; ++again) {
-            for (uint32_t frame = 1; frame < EITS_FAULT_CLEAN_FRAMES; ++frame)
+            for (uint32_t frame = 1; frame < EITS_FAULT_CLEAR_FRAMES; ++frame)
                 fw_fault_observe(faults, code, false, detail);
             CHECK(fw_fault_is(faults, code));
             if (again == 0)

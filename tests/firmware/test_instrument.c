@@ -158,7 +158,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
 
 /* The gain is 1 where the skin is the model's: volts are volts, of either sign and whatever the
  * angle. */
-static void test_angle(void)
+static void test_phase_of_the_voltages(void)
 {
     for (int k = 0; k < 9; ++k) {
         bench_start(&b, &SKIN_ADJACENT);
@@ -220,7 +220,7 @@ static void test_back_pressure(void)
     bench_start(&b, &SKIN_ADJACENT);
     CHECK_EQUAL(host_tare(&b.host, 1).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
-    const uint32_t sent = b.host.instrument.outbox.sent;
+    const uint32_t sent = b.host.instrument.tx_queue.sent;
     b.host.gaps = 0;
     b.board.host_room = 3000;
     host_run(&b.host, 200);
@@ -336,7 +336,7 @@ int main(void)
     test_same_bits(&SKIN_ADJACENT, 1, 2, 1, 0);
     test_same_bits(&SKIN_OPPOSITE, 5, 1, 4, 0);
     test_same_bits(&SKIN_ADJACENT, 4, 1, 1, 50);
-    test_angle();
+    test_phase_of_the_voltages();
     test_streaming();
     test_back_pressure();
     test_failed_tare();

@@ -115,8 +115,8 @@ static void test_open(bool tared, uint16_t check_every)
         host_run(&b.host, 300);
         const eits_packet_fault *gone = host_fault(&b.host, EITS_FAULT_ELECTRODE_OPEN, false, 0);
         CHECK(gone != NULL && gone->index == (int32_t)e);
-        CHECK(gone != NULL && gone->frame + 2 >= back + EITS_FAULT_CLEAN_FRAMES &&
-              gone->frame <= back + EITS_FAULT_CLEAN_FRAMES);
+        CHECK(gone != NULL && gone->frame + 2 >= back + EITS_FAULT_CLEAR_FRAMES &&
+              gone->frame <= back + EITS_FAULT_CLEAR_FRAMES);
         CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_ELECTRODE_OPEN, 0);
     }
     bench_stop(&b);

@@ -119,8 +119,8 @@ typedef enum eits_fault {
 /* ELECTRODE_OPEN, SATURATED and BRIDGED are raised in the frame that shows them, and those after it
  * with the third in a row, since a touch that lands within a scan gives one such frame; all these
  * are gone after so many frames in a row that do not. */
-#define EITS_FAULT_SHOWN_FRAMES 3u
-#define EITS_FAULT_CLEAN_FRAMES 8u
+#define EITS_FAULT_RAISE_FRAMES 3u
+#define EITS_FAULT_CLEAR_FRAMES 8u
 
 /* Bits of eits_packet_raw.flags */
 #define EITS_RAW_REFERENCE  1u /* a frame of a tare */

@@ -121,7 +121,7 @@ static uint32_t stack_used(void *ctx)
     return (uint32_t)(&stack_top - word) * (uint32_t)sizeof *word;
 }
 
-static void show(void *ctx, uint32_t leds)
+static void set_leds(void *ctx, uint32_t leds)
 {
     (void)ctx;
     (void)leds;
@@ -129,7 +129,7 @@ static void show(void *ctx, uint32_t leds)
 
 static const fw_system_ops system_ops = {
     mps2_time_us, spin_until_interrupt, mps2_lock, mps2_unlock, feed_watchdog,
-    restart,      stack_used,           show};
+    restart,      stack_used,           set_leds};
 
 int main(void)
 {

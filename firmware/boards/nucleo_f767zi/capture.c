@@ -156,7 +156,7 @@ static void stop(void *ctx)
 }
 
 /* The burst that was due now is told, and the next one is due. */
-static void tell(uint32_t start_us, uint32_t buffer, uint32_t next_start_us, bool lost)
+static void send_fault(uint32_t start_us, uint32_t buffer, uint32_t next_start_us, bool lost)
 {
     const fw_burst burst = {.samples = buffers[buffer],
                             .start_us = start_us,
@@ -170,7 +170,7 @@ static void next_burst(bool lost)
     const uint32_t start_us = capture.start_us, buffer = capture.buffer;
     capture.start_us += capture.slot_us;
     capture.buffer ^= 1u;
-    tell(start_us, buffer, capture.start_us, lost);
+    send_fault(start_us, buffer, capture.start_us, lost);
 }
 
 /* The buffer that DMA fills now is `filling`: the other one's burst is the last that ended. If this
@@ -198,7 +198,7 @@ static void burst_failed(void)
     const uint32_t now = nucleo_time_us(NULL),
                    slots = (now + LEAD_US - lost_us) / capture.slot_us + 1u;
     arm(lost_us + slots * capture.slot_us);
-    tell(lost_us, 0, capture.start_us, true);
+    send_fault(lost_us, 0, capture.start_us, true);
 }
 
 void nucleo_dma2_stream0_irq(void)

@@ -125,7 +125,7 @@ static uint32_t stack_used(void *ctx)
     return (uint32_t)(stack_top - word) * (uint32_t)sizeof *word;
 }
 
-static void show(void *ctx, uint32_t leds)
+static void set_leds(void *ctx, uint32_t leds)
 {
     (void)ctx;
     const uint32_t on =
@@ -137,4 +137,4 @@ static void show(void *ctx, uint32_t leds)
 const fw_system_ops nucleo_system_ops = {nucleo_time_us,       sleep_until_interrupt,
                                          nucleo_lock,          nucleo_unlock,
                                          nucleo_feed_watchdog, restart,
-                                         stack_used,           show};
+                                         stack_used,           set_leds};

@@ -155,7 +155,7 @@ static fw_status start(void *ctx)
     const uint64_t turn = (uint64_t)sim->tuning * MCLK_HZ;
     for (uint32_t k = 0; k < converter->setup.samples; ++k) {
         const uint64_t phase = turn * k / converter->setup.sample_rate_hz;
-        fw_turn_cos_sin((uint32_t)phase << 4, &converter->cosine[k], &converter->sine[k]);
+        fw_sincos((uint32_t)phase << 4, &converter->cosine[k], &converter->sine[k]);
     }
     converter->slot_us = sim->now_us + LEAD_US;
     converter->running = true;
@@ -175,7 +175,7 @@ static void convert(sim_board *sim, float volts)
         (FULL_SCALE_CODE + 1) / (1e-6f * (float)sim->board.capture.reference_uv);
     const float steps = volts * steps_a_volt;
     float c, s;
-    fw_turn_cos_sin((sim->tuning * (MCLK_HZ / 1000000u) * passed_us) << 4, &c, &s);
+    fw_sincos((sim->tuning * (MCLK_HZ / 1000000u) * passed_us) << 4, &c, &s);
     for (uint32_t k = 0; k < converter->setup.samples; ++k) {
         const float code = 0.5f * (FULL_SCALE_CODE + 1) + 0.5f +
                            steps * (c * converter->sine[k] + s * converter->cosine[k]);
@@ -346,7 +346,7 @@ void sim_start(sim_board *sim)
 
 static void turn(sim_board *sim)
 {
-    (void)fw_instrument_turn(&sim->instrument);
+    (void)fw_instrument_step(&sim->instrument);
     if (sim->instrument.reset_wanted)
         sim_start(sim);
 }

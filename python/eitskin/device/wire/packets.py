@@ -16,9 +16,9 @@ from eitskin.core.diagnostics import names, words
 from eitskin.core.results import Touch
 
 LINK_VERSION = 3
-# EITS_FAULT_SHOWN_FRAMES: in a row, until what a moving touch may look like for a frame is a fault
+# EITS_FAULT_RAISE_FRAMES: in a row, until what a moving touch may look like for a frame is a fault
 SHOWN_FRAMES = 3
-CLEAN_FRAMES = 8  # EITS_FAULT_CLEAN_FRAMES: in a row without it, until what was found is over
+CLEAN_FRAMES = 8  # EITS_FAULT_CLEAR_FRAMES: in a row without it, until what was found is over
 MAX_PAYLOAD = 16384
 STAGES = ("scan", "demodulate", "solve", "touches", "send", "frame")
 
