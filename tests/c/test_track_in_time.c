@@ -1,4 +1,5 @@
-/* Touches followed in time: births that are confirmed, deaths that are waited for, places smoothed.
+/* Touches followed in time: tracks_start_once_confirmed that are confirmed,
+ * tracks_end_after_the_hold that are waited for, places smoothed.
  */
 #include "check.h"
 #include "small_model.h"
@@ -47,19 +48,19 @@ static eits_touch at(double x, double y, double confidence)
                         .confidence = (eits_real)confidence};
 }
 
-static uint32_t none(eits_context *ctx, eits_touch *told)
+static uint32_t none(eits_context *ctx, eits_touch *reported)
 {
-    return eits_track(ctx, told, 0);
+    return eits_track(ctx, reported, 0);
 }
 
-static uint32_t one(eits_context *ctx, eits_touch *told, double x, double confidence)
+static uint32_t one(eits_context *ctx, eits_touch *reported, double x, double confidence)
 {
-    told[0] = at(x, 0, confidence);
-    return eits_track(ctx, told, 1);
+    reported[0] = at(x, 0, confidence);
+    return eits_track(ctx, reported, 1);
 }
 
 /* Sure ones at once, others once they were found as often as is asked, on end. */
-static void births(void)
+static void tracks_start_once_confirmed(void)
 {
     bench b;
     eits_touch t[EITS_MAX_TOUCHES];
@@ -93,7 +94,7 @@ static void births(void)
     tear_down(&b);
 }
 
-/* A newborn has to be found again near by; one that is known may move further. */
+/* A track_start has to be found again near by; one that is known may move further. */
 static void reach(void)
 {
     bench b;
@@ -117,7 +118,7 @@ static void reach(void)
 
 /* A clear touch that is lifted is gone at once, though its id is kept for a while; a faint one is
  * told of meanwhile. */
-static void deaths(void)
+static void tracks_end_after_the_hold(void)
 {
     bench b;
     eits_touch t[EITS_MAX_TOUCHES];
@@ -175,11 +176,11 @@ static void a_full_house(void)
 
 /* Noise of the place that the filter expects; how far it is off on average, found and told. */
 static void jitter(eits_context *ctx, double speed, double confidence, double *found_mm,
-                   double *told_mm)
+                   double *reported_mm)
 {
     uint64_t random = 9;
     eits_touch t[EITS_MAX_TOUCHES];
-    *found_mm = *told_mm = 0;
+    *found_mm = *reported_mm = 0;
     eits_forget(ctx);
     for (int k = 0; k < 60; ++k) {
         const double x = -50 + speed * k, off = 4 * small_random(&random) / (10 * sqrt(confidence));
@@ -187,11 +188,11 @@ static void jitter(eits_context *ctx, double speed, double confidence, double *f
         CHECK_EQUAL(t[0].id, ctx->next_id - 1);
         if (k >= 10) {
             *found_mm += off * off;
-            *told_mm += ((double)t[0].x_mm - x) * ((double)t[0].x_mm - x);
+            *reported_mm += ((double)t[0].x_mm - x) * ((double)t[0].x_mm - x);
         }
     }
     *found_mm = sqrt(*found_mm / 50);
-    *told_mm = sqrt(*told_mm / 50);
+    *reported_mm = sqrt(*reported_mm / 50);
 }
 
 static void smoothing(void)
@@ -323,9 +324,9 @@ static void switched(void)
 
 int main(void)
 {
-    births();
+    tracks_start_once_confirmed();
     reach();
-    deaths();
+    tracks_end_after_the_hold();
     a_full_house();
     smoothing();
     smooth_strengths();

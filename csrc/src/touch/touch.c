@@ -187,17 +187,17 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const uint32_t finite = report(ctx, &f, found);
     ctx->info.touch_macs = f.macs;
     eits_check_crowd(ctx, looked, found, finite);
-    const uint32_t told = eits_track(ctx, found, finite);
-    ctx->info.touches = told;
-    for (uint32_t k = 0; k < told; ++k)
+    const uint32_t reported = eits_track(ctx, found, finite);
+    ctx->info.touches = reported;
+    for (uint32_t k = 0; k < reported; ++k)
         found[k].force_n =
             eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     if (ctx->options.second_pass && ctx->options.mac_limit == 0 && f.count > 1 &&
         f.data == ctx->y_separate)
         eits_solve_again(ctx, ctx->y_separate);
-    for (uint32_t k = 0; k < told && k < room; ++k)
+    for (uint32_t k = 0; k < reported && k < room; ++k)
         touches[k] = found[k];
     if (count != NULL)
-        *count = told;
+        *count = reported;
     return EITS_OK;
 }

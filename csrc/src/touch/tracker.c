@@ -12,7 +12,7 @@ static const eits_real SURE_FRACTION = R(0.05);
 /* and one whose own S'y is below so many times that of noise may be noise */
 static const eits_real SURE_CLEARNESS = R(1.5);
 /* of follow_mm, for touches that are not told of yet */
-static const eits_real NEWBORN_REACH = R(0.6);
+static const eits_real TENTATIVE_REACH = R(0.6);
 /* of follow_mm: rms by which a velocity changes from frame to frame */
 static const eits_real SPEED_CHANGE = R(0.028);
 /* of follow_mm: rms of a new touch's velocity, a frame */
@@ -70,7 +70,7 @@ static eits_real place_variance(const eits_context *ctx, const eits_touch *found
                     square(MIN_DEVIATION * pixel));
 }
 
-static eits_followed newborn(const eits_context *ctx, const eits_touch *found)
+static eits_followed track_start(const eits_context *ctx, const eits_touch *found)
 {
     return (eits_followed){.touch = *found,
                            .place_mm2 = place_variance(ctx, found),
@@ -97,16 +97,16 @@ static void predict(const eits_context *ctx, eits_followed *f)
 
 /* What is known of a touch, with what was found of it. Where that would be no number, or off the
  * skin, it starts anew. */
-static eits_followed met(const eits_context *ctx, const eits_followed *before,
-                         const eits_touch *found)
+static eits_followed updated(const eits_context *ctx, const eits_followed *before,
+                             const eits_touch *found)
 {
-    eits_followed next = newborn(ctx, found);
+    eits_followed next = track_start(ctx, found);
     next.touch.id = before->touch.id;
     next.seen =
         before->seen < KNOWN_FRAMES + EITS_MAX_TRACK_FRAMES ? before->seen + 1 : before->seen;
     if (!(ctx->options.track_smooth > 0))
         return next;
-    const eits_followed anew = next;
+    const eits_followed restarted = next;
     const eits_touch *old = &before->touch;
     const eits_real total = before->place_mm2 + next.place_mm2;
     const eits_real gain = before->place_mm2 / total, speed_gain = before->both_mm2 / total;
@@ -121,20 +121,20 @@ static eits_followed met(const eits_context *ctx, const eits_followed *before,
     next.place_mm2 = eits_fma(-gain, before->place_mm2, before->place_mm2);
     next.both_mm2 = eits_fma(-gain, before->both_mm2, before->both_mm2);
     next.speed_mm2 = eits_fma(-speed_gain, before->both_mm2, before->speed_mm2);
-    return is_finite(&next) && on_skin(ctx, &next.touch) ? next : anew;
+    return is_finite(&next) && on_skin(ctx, &next.touch) ? next : restarted;
 }
 
 /* ---- which is which ---- */
 
 /* Nearest pairs first, among those that were told of or among the others: owner[k] is who the found
  * touch k belongs to. */
-static void pair(const eits_context *ctx, const eits_touch *found, uint32_t count, int told,
+static void pair(const eits_context *ctx, const eits_touch *found, uint32_t count, int reported,
                  uint32_t *owner)
 {
     uint8_t taken[EITS_MAX_TOUCHES] = {0};
     for (;;) { /* at most EITS_MAX_TOUCHES pairs */
         const eits_real reach =
-            square(told ? ctx->options.follow_mm : NEWBORN_REACH * ctx->options.follow_mm);
+            square(reported ? ctx->options.follow_mm : TENTATIVE_REACH * ctx->options.follow_mm);
         eits_real nearest = reach;
         uint32_t from = NONE, to = NONE;
         for (uint32_t k = 0; k < count; ++k) {
@@ -142,7 +142,7 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
                 const eits_touch *one = &ctx->followed[l].touch;
                 const eits_real dx = found[k].x_mm - one->x_mm, dy = found[k].y_mm - one->y_mm;
                 const eits_real squared = eits_fma(dx, dx, dy * dy);
-                if (!taken[l] && (one->id != 0) == told && squared <= nearest) {
+                if (!taken[l] && (one->id != 0) == reported && squared <= nearest) {
                     nearest = squared;
                     from = l;
                     to = k;
@@ -169,13 +169,14 @@ static void name(eits_context *ctx, eits_followed *f)
 
 /* Those that were found, in their order, then those that are waited for, as far as there is room.
  */
-static void renew(eits_context *ctx, const eits_touch *found, uint32_t count, const uint32_t *owner)
+static void update_tracks(eits_context *ctx, const eits_touch *found, uint32_t count,
+                          const uint32_t *owner)
 {
     eits_followed next[EITS_MAX_TOUCHES];
     uint8_t met_again[EITS_MAX_TOUCHES] = {0};
     for (uint32_t k = 0; k < count; ++k) {
-        next[k] = owner[k] == NONE ? newborn(ctx, &found[k])
-                                   : met(ctx, &ctx->followed[owner[k]], &found[k]);
+        next[k] = owner[k] == NONE ? track_start(ctx, &found[k])
+                                   : updated(ctx, &ctx->followed[owner[k]], &found[k]);
         if (owner[k] != NONE)
             met_again[owner[k]] = 1;
         name(ctx, &next[k]);
@@ -196,7 +197,7 @@ static void renew(eits_context *ctx, const eits_touch *found, uint32_t count, co
 
 uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count)
 {
-    uint32_t owner[EITS_MAX_TOUCHES], told = 0;
+    uint32_t owner[EITS_MAX_TOUCHES], reported = 0;
     for (uint32_t k = 0; k < count; ++k) {
         touches[k].id = 0;
         owner[k] = NONE;
@@ -205,18 +206,18 @@ uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count)
         predict(ctx, &ctx->followed[l]);
     pair(ctx, touches, count, 1, owner);
     pair(ctx, touches, count, 0, owner);
-    renew(ctx, touches, count, owner);
+    update_tracks(ctx, touches, count, owner);
     for (uint32_t l = 0; l < ctx->followed_count; ++l) {
         const eits_followed *f = &ctx->followed[l];
-        const int held = f->faint && f->seen >= KNOWN_FRAMES && told < ctx->options.max_touches;
+        const int held = f->faint && f->seen >= KNOWN_FRAMES && reported < ctx->options.max_touches;
         if (f->touch.id == 0 || (f->missed > 0 && !held))
             continue;
-        uint32_t place = told++;
+        uint32_t place = reported++;
         for (; place > 0 && eits_fabs(f->touch.strength_s_per_m_mm2) >
                                 eits_fabs(touches[place - 1].strength_s_per_m_mm2);
              --place)
             touches[place] = touches[place - 1];
         touches[place] = f->touch;
     }
-    return told;
+    return reported;
 }

@@ -1,5 +1,5 @@
-/* Touches followed from frame to frame: births and deaths, ids, places smoothed in time.
- * docs/guide/tracking.md says what each is worth. */
+/* Touches followed from frame to frame: tracks_start_once_confirmed and tracks_end_after_the_hold,
+ * ids, places smoothed in time. docs/guide/tracking.md says what each is worth. */
 #ifndef EITSKIN_TRACK_H
 #define EITSKIN_TRACK_H
 
