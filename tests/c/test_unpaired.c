@@ -280,7 +280,7 @@ static void mismatches_that_are_no_outlier(void)
     tear_down(&b);
 }
 
-/* How far the gain drifted is no news; a outlier beside it is. */
+/* How far the gain drifted is no news; an outlier beside it is. */
 static void drift_is_no_mismatch(void)
 {
     bench b;

@@ -25,7 +25,7 @@ typedef enum eits_sign {
     EITS_SIGN_BOTH = 2
 } eits_sign;
 
-/* What the touch fit for touches does beyond fitting discs to the image's peaks. */
+/* What the touch fit does beyond fitting discs to the image's peaks. */
 typedef enum eits_touch_fit {
     /* first to v0 log(v / v0), which strong touches bend less; models of differences */
     EITS_TOUCH_FIT_LOG_DATA = 1,
@@ -214,7 +214,7 @@ typedef struct eits_context {
     eits_real *gain_drift;
     eits_real *off_range; /* n_folded: what of that the model cannot give, unless stale */
     uint32_t off_range_stale;
-    /* stride each: 1 / |P_i|^2, and so much of it as predicts d (mismatch.c) */
+    /* stride each: 1 / |P_i|^2, and so much of it as predicts d (model_mismatch.c) */
     eits_real *range_inverse, *range_shrink;
     /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where the regularisation is
      * raised */

@@ -31,8 +31,8 @@ typedef enum eits_diagnostic {
     /* info.noisy_electrodes: too many outliers fraction them; all rows that use them are left out
      */
     EITS_DIAGNOSTIC_ELECTRODE_NOISY = 16,
-    /* nothing in the range of the model's gives such data; info.mismatch says how much of them.
-       Imaged as is */
+    /* nothing in the range of the model's gives such data; info.model_mismatch says how much of
+       them. Imaged as is */
     EITS_DIAGNOSTIC_MODEL_MISMATCH = 32,
     /* the change goes the way touches cannot: tare again. Imaged as is */
     EITS_DIAGNOSTIC_STALE_REFERENCE = 64,

@@ -50,7 +50,7 @@ typedef enum eits_status {
      * dead */
     EITS_E_FRAME_ZERO = -12,
     EITS_E_NO_REFERENCE = -13, /* a frame came before the reference frame was set */
-    /* a reference was finished with fewer reference frames than it needs */
+    /* a reference was finished with fewer frames than it needs */
     EITS_E_REFERENCE_SHORT = -14,
     /* a result would not be finite; the outputs were cleared instead */
     EITS_E_NOT_FINITE = -15

@@ -1,5 +1,5 @@
-/* What the stages ask of a frame before and after it is solved: electrodes.c, outlier.c,
- * mismatch.c, reference_outliers.c. */
+/* What the stages ask of a frame before and after it is solved: electrodes.c, outliers.c,
+ * model_mismatch.c, reference_outliers.c. */
 #ifndef EITSKIN_EXAMINE_H
 #define EITSKIN_EXAMINE_H
 
@@ -63,7 +63,7 @@ static inline const uint8_t *eits_row(const eits_context *ctx, uint32_t i)
 /* Whether the two electrodes at `two` are e and f, either way round. */
 int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f);
 
-/* Leave row i, which is in use so far, out of this frame as a outlier, and count it. */
+/* Leave row i, which is in use so far, out of this frame as an outlier, and count it. */
 void eits_leave_outlier(eits_context *ctx, uint32_t i);
 
 /* info names the electrodes in ctx->electrode. */

@@ -42,7 +42,7 @@ static void clear_diagnostics(eits_context *ctx)
     memset(ctx->electrode, 0, sizeof ctx->electrode);
 }
 
-/* A frame of nothing but zeros is a dead front end, not a untouched skin. */
+/* A frame of nothing but zeros is a dead front end, not an untouched skin. */
 static int is_dead(const eits_context *ctx, const eits_real *frame)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {

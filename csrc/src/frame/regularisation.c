@@ -31,9 +31,9 @@ eits_real eits_regularisation_of_all(const eits_context *ctx)
 eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing)
 {
     const eits_real left = 1 - missing, cube = left * left * left,
-                    untouched =
+                    lowered =
                         cube > MIN_REGULARISATION_FRACTION ? cube : MIN_REGULARISATION_FRACTION;
-    const eits_real of_model = untouched * ctx->regularisation,
+    const eits_real of_model = lowered * ctx->regularisation,
                     asked = left * asked_regularisation(ctx),
                     wanted = asked > of_model ? asked : of_model;
     return wanted > MIN_REGULARISATION ? wanted : MIN_REGULARISATION;
