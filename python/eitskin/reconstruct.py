@@ -322,7 +322,7 @@ def _lines(
         info.solve_us + info.touch_us,
     )
     if not result.touches:
-        why = "no change above the noise" if info.stop == "gate" else info.stop
+        why = "no change above the noise" if info.stop == "below-threshold" else info.stop
         yield f"{label:11} none ({why}); {cost}"
     errors = {} if score is None else score.errors_mm
     for k, touch in enumerate(result.touches):

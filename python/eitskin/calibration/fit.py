@@ -132,7 +132,7 @@ class Calibration:
             "error_worst": float(np.abs(self.left_out).max()),
             "scatter_before": self.scatter[0],
             "scatter_after": self.scatter[1],
-            "greatest_load_n": float(self.law.force_n[-1]),
+            "max_force_n": float(self.law.force_n[-1]),
             "notes": list(self.notes),
         }
 
@@ -325,7 +325,7 @@ def _left_out(
         kept = presses.take(~out)
         law = law_of(fit(kept, radius_mm, form, order), kept, radius_mm, 0.0)
         errors[out] = (
-            law.loads_at(presses.place_mm[out], presses.strength[out]) / presses.force_n[out] - 1
+            law.forces_at(presses.place_mm[out], presses.strength[out]) / presses.force_n[out] - 1
         )
     return errors
 

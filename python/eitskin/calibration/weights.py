@@ -14,9 +14,9 @@ from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.errors import ConfigError
 from eitskin.fileio import read_bytes
 
-KEYS = ("first", "last", "load_g", "force_n", "x_mm", "y_mm")
+KEYS = ("first", "last", "weight_g", "force_n", "x_mm", "y_mm")
 MAX_FRAMES = 2**32 - 1
-MAX_LOAD_N = 1e6
+MAX_FORCE_N = 1e6
 
 
 @dataclass(frozen=True)
@@ -89,20 +89,20 @@ def _number(cell: str, name: str, where: str) -> float:
 
 def _weight(row: Mapping[str, Any], where: str) -> Weight:
     check_keys(row, KEYS, where)
-    if ("load_g" in row) == ("force_n" in row):
+    if ("weight_g" in row) == ("force_n" in row):
         raise ConfigError(
-            f"{where}: give the load as load_g (grams) or as force_n (newtons), one of them"
+            f"{where}: give the load as weight_g (grams) or as force_n (newtons), one of them"
         )
     if ("x_mm" in row) != ("y_mm" in row):
         raise ConfigError(f"{where}: a place needs x_mm and y_mm; give both or none")
     first = integer(row, "first", None, where, low=0, high=MAX_FRAMES)
     last = integer(row, "last", first, where, low=first, high=MAX_FRAMES)
-    if "load_g" in row:
+    if "weight_g" in row:
         force_n = NEWTONS_PER_GRAM * number(
-            row, "load_g", None, where, low=0, high=MAX_LOAD_N / NEWTONS_PER_GRAM, open_low=True
+            row, "weight_g", None, where, low=0, high=MAX_FORCE_N / NEWTONS_PER_GRAM, open_low=True
         )
     else:
-        force_n = number(row, "force_n", None, where, low=0, high=MAX_LOAD_N, open_low=True)
+        force_n = number(row, "force_n", None, where, low=0, high=MAX_FORCE_N, open_low=True)
     place = (
         (number(row, "x_mm", None, where), number(row, "y_mm", None, where))
         if "x_mm" in row

@@ -38,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
         default="difference",
     )
     option(build, "--elements", "about how many the mesh has", default=3000)
-    option(build, "--floor", "mu of the whitening", default=0.01)
+    option(build, "--regularisation", "mu of the whitening", default=0.01)
     option(
         build,
         "--touch-change RATIO",
@@ -97,7 +97,7 @@ def run_build(options: argparse.Namespace) -> int:
         pixels_across=options.pixels,
         storage=options.storage,
         data_kind=options.data,
-        floor=options.floor,
+        regularisation=options.regularisation,
         elements=options.elements,
         touch_change_ratio=options.touch_change,
     )

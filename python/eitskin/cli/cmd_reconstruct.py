@@ -46,7 +46,9 @@ def add_parser(subparsers: Any) -> None:
     add_wish(parser)
     option(parser, "--warm", "start each frame from the last one's result")
     option(
-        parser, "--refine", "solve again with what touches do to each other taken out of the data"
+        parser,
+        "--second-pass",
+        "solve again with what touches do to each other taken out of the data",
     )
     option(
         parser,
@@ -73,8 +75,8 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.reconstruct import Settings, reconstruct_frames, to_json, to_text
 
     changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
-    if options.refine:
-        changes["refine"] = True
+    if options.second_pass:
+        changes["second_pass"] = True
     if options.saturation_v is not None:
         if not options.saturation_v > 0:
             raise UsageError(f"--saturation-v {options.saturation_v:g} must be above 0")

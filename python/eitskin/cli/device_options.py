@@ -74,7 +74,7 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
         solver,
         "--ignore FINDING[,FINDING]",
         "do not look for saturated, electrode-open, electrodes-bridged, outlier,"
-        " electrode-noisy, model_mismatch, stale-reference, crowded, or all (default: look for"
+        " electrode-noisy, model-mismatch, stale-reference, crowded, or all (default: look for"
         " all)",
     )
     start = solver.add_mutually_exclusive_group()

@@ -369,7 +369,7 @@ def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
         i.data_norm,
         i.diagnostics, i.saturated, i.outliers, i.model_mismatch, i.unexplained,
         _bits(i.open_electrodes), _bits(i.bridged_electrodes), _bits(i.noisy_electrodes),
-        i.floor,
+        i.regularisation,
         solve_us=solve_ns / 1000, touch_us=touch_ns / 1000,
     )  # fmt: skip
 

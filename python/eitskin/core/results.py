@@ -14,11 +14,11 @@ from eitskin.errors import FrameError, UsageError
 SIGNS = ("increase", "decrease", "both")
 SOLVERS = ("fista", "working-set", "coordinate", "active-set")
 MAX_TOUCHES = 16
-STRAIGHT, REGROUP, COUPLED = 1, 2, 4
-ALL_SEARCH = STRAIGHT | REGROUP | COUPLED
+LOG_DATA, SPLIT_MERGE, INTERACTION = 1, 2, 4
+ALL_TOUCH_FIT = LOG_DATA | SPLIT_MERGE | INTERACTION
 MAX_TRACK_FRAMES = 1000
 MIN_RADIUS_MM, HUGE = 1e-6, 1e30
-STOPS = ("iterations", "gap", "gate", "zero", "diverged", "macs", "optimum")
+STOPS = ("iterations", "gap", "below-threshold", "zero", "diverged", "macs", "optimum")
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Options:
     ``DIAGNOSTICS``. ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow
     touches in time; all 0: each frame by itself (``solve.options.tracking`` sets them,
     docs/guide/tracking.md).
-    ``regularisation_noise_factor``: the whitening's floor is at least this times the tare's noise
-    over
+    ``regularisation_noise_factor``: the whitening's regularisation is at least this times the
+    tare's noise over
         rms(V0); 0: as the model has it.
     """
 
@@ -64,8 +64,8 @@ class Options:
     touch_sweeps: int = 6
     mac_limit: int = 0
     diagnostics: int = ALL_DIAGNOSTICS
-    touch_fit: int = ALL_SEARCH
-    refine: bool = False
+    touch_fit: int = ALL_TOUCH_FIT
+    second_pass: bool = False
     track_confirm: int = 0
     track_hold: int = 0
     track_smooth: float = 0.0
@@ -85,7 +85,7 @@ WHOLE = {
     "touch_sweeps": (0, 1000),
     "mac_limit": (0, 2**32 - 1),
     "diagnostics": (0, ALL_DIAGNOSTICS),
-    "touch_fit": (0, ALL_SEARCH),
+    "touch_fit": (0, ALL_TOUCH_FIT),
     "track_confirm": (0, MAX_TRACK_FRAMES),
     "track_hold": (0, MAX_TRACK_FRAMES),
 }
@@ -105,7 +105,7 @@ def check_options(o: Options) -> None:
                 raise UsageError(
                     f"options: {name} = {value!r} is not known; use one of {', '.join(known)}"
                 )
-        elif name in ("warm_start", "project_reference", "refine"):
+        elif name in ("warm_start", "project_reference", "second_pass"):
             if value not in (False, True):
                 raise UsageError(f"options: {name} = {value!r} must be true or false")
         else:
@@ -220,7 +220,7 @@ class Info:
     open_electrodes: tuple[int, ...] = ()
     bridged_electrodes: tuple[int, ...] = ()
     noisy_electrodes: tuple[int, ...] = ()
-    floor: float = 0.0
+    regularisation: float = 0.0
     solve_us: float = field(default=0.0, compare=False)
     touch_us: float = field(default=0.0, compare=False)
 

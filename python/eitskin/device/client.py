@@ -107,9 +107,9 @@ class Device(Exchange):
             ANSWER_S,
         )  # fmt: skip
 
-    def mask_row(self, row: int, *, bad: bool = True) -> None:
+    def mask_row(self, row: int, *, masked: bool = True) -> None:
         """Leave protocol row ``row`` out of every frame, or use it again from the next tare on."""
-        self.command(commands.MaskRow(row, int(bad)), ANSWER_S)
+        self.command(commands.MaskRow(row, int(masked)), ANSWER_S)
 
     def self_test(self) -> None:
         """Let the board run its model's golden frame.

@@ -12,10 +12,10 @@ from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.packets import (
-    CLEAN_FRAMES,
+    CLEAR_FRAMES,
     DOUBTFUL_FAULTS,
     FOUND_FAULTS,
-    SHOWN_FRAMES,
+    RAISE_FRAMES,
     Fault,
     FaultCode,
     Solved,
@@ -74,13 +74,13 @@ class News:
         self._shown = {key: self._shown.get(key, 0) + 1 for key in now}
         for key, text in now.items():
             if key not in self._clean and self._shown[key] >= (
-                SHOWN_FRAMES if key[0] in _DOUBTFUL else 1
+                RAISE_FRAMES if key[0] in _DOUBTFUL else 1
             ):
                 said.append(f"{text}, frame {solved.frame}")
                 self._clean[key] = 0
         for key in list(self._clean):
             self._clean[key] = 0 if key in now else self._clean[key] + 1
-            if self._clean[key] >= CLEAN_FRAMES:
+            if self._clean[key] >= CLEAR_FRAMES:
                 del self._clean[key]
                 said.append(f"{_plain(key)}: over, frame {solved.frame}")
         return said

@@ -46,7 +46,7 @@ def save_results(
             [touch.strength_s_per_m_mm2 for _, touch in touches]
         ),
         "touch_confidence": np.array([touch.confidence for _, touch in touches]),
-        "touch_load_n": np.array([touch.force_n for _, touch in touches]),
+        "touch_force_n": np.array([touch.force_n for _, touch in touches]),
         "info": np.array(json.dumps([results[number].info.as_dict() for number in numbers])),
     }
     with write_beside(path) as temporary, temporary.open("wb") as stream:

@@ -17,7 +17,7 @@ from eitskin.model.eitm import MAX_PIXELS, MAX_RANK, encode_model
 from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
 from eitskin.model.reduction import (
     DEFAULT_COLUMN_POWER,
-    DEFAULT_FLOOR,
+    DEFAULT_REGULARISATION,
     fold_rows,
     noise_gain,
     reduce_jacobian,
@@ -49,7 +49,7 @@ class BuildSettings:
     pixels_across: int = 32
     storage: str = "f32"
     data_kind: str = "difference"
-    floor: float = DEFAULT_FLOOR
+    regularisation: float = DEFAULT_REGULARISATION
     column_power: float = DEFAULT_COLUMN_POWER
     elements: int = 3000
     touch_change_ratio: float = TOUCH_CHANGE_RATIO
@@ -112,7 +112,7 @@ def make_model(
         jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
     rank = settings.rank or min(64, *jacobian.shape)
     reduction = reduce_jacobian(
-        jacobian, rank, floor=settings.floor, column_power=settings.column_power
+        jacobian, rank, regularisation=settings.regularisation, column_power=settings.column_power
     )
     projection = np.where(silent, 0.0, reduction.projection).astype(np.float32)
     stored = store(reduction.sensitivity, settings.storage)

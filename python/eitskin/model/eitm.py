@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import ALL_SEARCH, SOLVERS
+from eitskin.core.results import ALL_TOUCH_FIT, SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
@@ -341,7 +341,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     )
     in_range = (
         1 <= d.iterations <= MAX_ITERATIONS
-        and d.touch_fit_left_out <= ALL_SEARCH
+        and d.touch_fit_left_out <= ALL_TOUCH_FIT
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
         and MIN_RADIUS_MM

@@ -55,7 +55,7 @@ class LoadLaw:
         value = monomials(u * inward, v * inward, self.order) @ self.gain.astype(np.float64)
         return np.asarray(np.clip(value, 1 / MAX_GAIN, MAX_GAIN))
 
-    def loads_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
+    def forces_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
         """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the
         table by its last slope, to twice its greatest load. What eits_force_n in
         csrc/src/model/force.c gives."""

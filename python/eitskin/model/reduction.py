@@ -7,8 +7,8 @@ With A = J D, D = diag(|j_k|^-p), and its singular value decomposition A = U dia
     S = P A = diag(s_i / sqrt(s_i^2 + mu s_1^2)) V'       the stored matrix
 
 The greatest eigenvalue of S S' is 1 / (1 + mu). So |P d - S g|^2 is the misfit of J D g in a metric
-that lets weak directions speak up to the floor mu, and a first-order solver with step 1 needs few
-iterations. It is Tikhonov-floored whitening, a preconditioner on the data side.
+that lets weak directions speak up to the regularisation mu, and a first-order solver with step 1
+needs few iterations. It is Tikhonov-regularised whitening, a preconditioner on the data side.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from eitskin.skin.protocol import Reciprocity
 
 FloatArray = npt.NDArray[np.float64]
 
-DEFAULT_FLOOR = 1e-2
+DEFAULT_REGULARISATION = 1e-2
 DEFAULT_COLUMN_POWER = 0.5
-MAX_FLOOR = 1e6
+MAX_REGULARISATION = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +54,11 @@ def reduce_jacobian(
     jacobian: npt.ArrayLike,
     rank: int,
     *,
-    floor: float = DEFAULT_FLOOR,
+    regularisation: float = DEFAULT_REGULARISATION,
     column_power: float = DEFAULT_COLUMN_POWER,
 ) -> Reduction:
-    """Reduce a folded Jacobian (k, n) to ``rank`` rows (``floor`` is mu, ``column_power`` is p;
-    both without unit).
+    """Reduce a folded Jacobian (k, n) to ``rank`` rows (``regularisation`` is mu, ``column_power``
+    is p; both without unit).
 
     Raises:
         UsageError: the rank is not within 1 to min(k, n), the Jacobian is zero or not finite, mu or
@@ -72,9 +72,10 @@ def reduce_jacobian(
         )
     if not 1 <= rank <= min(j.shape):
         raise UsageError(f"reduction: rank = {rank} is out of range; use 1 to {min(j.shape)}")
-    if not (0 <= floor <= MAX_FLOOR and 0 <= column_power <= 1):
+    if not (0 <= regularisation <= MAX_REGULARISATION and 0 <= column_power <= 1):
         raise UsageError(
-            f"reduction: the floor must be within 0 to {MAX_FLOOR:g} and the column power within 0"
+            f"reduction: the regularisation must be within 0 to {MAX_REGULARISATION:g} and the"
+            f" column power within 0"
             " to 1"
         )
     norm = np.linalg.norm(j, axis=0)
@@ -83,11 +84,12 @@ def reduce_jacobian(
     # a pixel that no row sees keeps a finite weight: its coefficient stays zero in any case
     weight = np.maximum(norm, 1e-6 * norm.max()) ** -column_power
     u, s, vt = np.linalg.svd(j * weight, full_matrices=False)
-    denominator = np.sqrt(s[:rank] ** 2 + floor * s[0] ** 2)
+    denominator = np.sqrt(s[:rank] ** 2 + regularisation * s[0] ** 2)
     if not denominator.min() > 0:
         raise UsageError(
-            f"reduction: rank = {rank} exceeds the Jacobian's own with a floor of 0; lower it or"
-            " raise the floor"
+            f"reduction: rank = {rank} exceeds the Jacobian's own with a regularisation of 0;"
+            f" lower it or"
+            " raise the regularisation"
         )
     return Reduction(
         projection=u[:, :rank].T / denominator[:, None],

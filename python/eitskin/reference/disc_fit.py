@@ -57,7 +57,7 @@ class Fit:
             float(frame.y @ frame.y),
             frame.noise / model.rank,
         )
-        self.gate = options.detection_factor * frame.lambda_noise
+        self.threshold = options.detection_factor * frame.lambda_noise
         self.radius_weight = options.touch_radius_weight
         self.centres = model.grid.centres_mm()
         weight = model.column_weight.astype(np.float64)
@@ -228,13 +228,13 @@ class Fit:
         return np.asarray(size**2 / np.diag(inverse) / self.whole)
 
     def stands_out(self, k: int) -> bool:
-        """Whether disc k passes the frame's own gate at its place."""
-        if self.gate <= 0:
+        """Whether disc k passes the frame's own threshold at its place."""
+        if self.threshold <= 0:
             return True
         disc, pixel = self.discs[k], self.model.grid.pixel_mm
         near = (np.abs(self.centres - (disc.x_mm, disc.y_mm)) <= pixel).all(axis=1)
         seen = disc.polarity * (self.seen[:, near].T @ self.residual(leave_out=k))
-        return bool(seen.max(initial=0.0) >= self.gate)
+        return bool(seen.max(initial=0.0) >= self.threshold)
 
     def keep_real(self) -> FloatArray:
         """Drop what explains too little or does not stand out; returns what the others explain."""

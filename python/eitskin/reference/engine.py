@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from eitskin.core.diagnostics import DIAGNOSTICS, with_diagnostics
 from eitskin.core.results import (
-    COUPLED,
-    STRAIGHT,
+    INTERACTION,
+    LOG_DATA,
     Info,
     LearnedReference,
     Options,
@@ -183,7 +183,7 @@ class ReferenceEngine:
             self._fit_to_model(frames[:half].mean(axis=0))
             self._noise_v = self._noise_of(
                 frames[:half]
-            )  # lambda_noise is learned with the floor that it asks for
+            )  # lambda_noise is learned with the regularisation that it asks for
             for k in range(half, len(frames)):
                 self._v0 = frames[:k].mean(axis=0)
                 y = self.frame_stage(np.where(left[k], np.nan, frames[k]))[0]
@@ -258,7 +258,7 @@ class ReferenceEngine:
         model = self.model
         if (
             model.data_kind != "difference"
-            or not self.options.touch_fit & STRAIGHT
+            or not self.options.touch_fit & LOG_DATA
             or not self._ready
         ):
             return None
@@ -314,9 +314,9 @@ class ReferenceEngine:
         return 1.0 if self._whitening is None else self._whitening.noise_ratio
 
     @property
-    def _floor(self) -> float:
-        stored = 0.0 if self._form is None else self._form.floor
-        return stored if self._whitening is None else self._whitening.floor
+    def _regularisation(self) -> float:
+        stored = 0.0 if self._form is None else self._form.regularisation
+        return stored if self._whitening is None else self._whitening.regularisation
 
     def _leave_out(self, known: BoolArray) -> None:
         """Whiten anew for the folded rows (k,) that are known, and for the noise."""
@@ -379,7 +379,7 @@ class ReferenceEngine:
             self._examiner.crowd(found, o, clearness)
             many = len(found) > 1
             found = self._loaded(self._tracker.step(found, o, lambda_max, lambda_noise))
-            if o.refine and many and added is not None and o.touch_sweeps > 0:
+            if o.second_pass and many and added is not None and o.touch_sweeps > 0:
                 first = result.iterations
                 result, lam, lambda_max = self._solve(coupled, basis, lambda_noise, None)
                 if result.stop in SOLVED:
@@ -394,7 +394,7 @@ class ReferenceEngine:
             result.step_halvings, len(found), 0, 0,
             lam, lambda_max, lambda_noise, gap, gap / max(0.5 * norm**2, 1e-300),
             result.certificate.residual, norm,
-            **self._examiner.of_frame(), floor=self._floor,
+            **self._examiner.of_frame(), regularisation=self._regularisation,
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(perf_counter_ns() - solved_ns) / 1000,
         )  # fmt: skip
         return Reconstruction(image, result.x, found, info)
@@ -404,7 +404,7 @@ class ReferenceEngine:
         if self.model.load is None:
             return touches
         places = np.array([(t.x_mm, t.y_mm) for t in touches]).reshape(-1, 2)
-        loads = self.model.load.loads_at(
+        loads = self.model.load.forces_at(
             places, np.array([t.strength_s_per_m_mm2 for t in touches])
         )
         return tuple(
@@ -421,7 +421,7 @@ class ReferenceEngine:
         return (
             model.fields is not None
             and model.data_kind == "difference"
-            and bool(self.options.touch_fit & COUPLED)
+            and bool(self.options.touch_fit & INTERACTION)
         )
 
     def _interplay(self, basis: FloatArray, known: BoolArray, discs: Sequence[Disc]) -> FloatArray:
@@ -438,7 +438,7 @@ class ReferenceEngine:
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
         nothing, zero = Certificate(0.0, 0.5 * norm**2, norm), np.zeros(self.model.grid.n_pixels)
         if o.detection_factor > 0 and lambda_max < o.detection_factor * lambda_noise:
-            return Result(zero, 0, "gate", nothing, 0), lam, lambda_max
+            return Result(zero, 0, "below-threshold", nothing, 0), lam, lambda_max
         if not lambda_max > lam or norm**2 < MIN_SQUARE:
             return Result(zero, 0, "zero", nothing, 0), lam, lambda_max
         result = self._run(Problem(self.seen, y, lam, o.sign, basis), start)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import REGROUP, Options, Touch
+from eitskin.core.results import SPLIT_MERGE, Options, Touch
 from eitskin.model.model import Model
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
 from eitskin.reference.split_merge import join, part
@@ -31,7 +31,7 @@ def search(fit: Fit, frame: Reduced, image: FloatArray, interplay: Interplay | N
         min(o.touch_sweeps, LATER_SWEEPS),
         frame.straight is not None or fit.model.data_kind == "log-ratio",
     )
-    regroups = bool(o.touch_fit & REGROUP) and (straight or interplay is not None)
+    regroups = bool(o.touch_fit & SPLIT_MERGE) and (straight or interplay is not None)
 
     def couple() -> None:
         added = (

@@ -1,5 +1,5 @@
-"""The numpy reference of csrc/src/frame/whitening.c and floor.c: the reduction that a model would
-have had without the rows that a frame lacks, or with a higher floor."""
+"""The numpy reference of csrc/src/frame/whitening.c and regularisation.c: the reduction that a
+model would have had without the rows that a frame lacks, or with a higher regularisation."""
 
 from __future__ import annotations
 
@@ -25,30 +25,32 @@ class Form:
     """The builder's P = diag(w) U' and S = diag(s w) V', with w = (s^2 + mu s_1^2)^-1/2, taken
     apart.
 
-    ``left`` U (k, r); ``scale`` 1 / (w s_1) and ``strength`` (s / s_1)^2, both (r,); ``floor`` mu;
+    ``left`` U (k, r); ``scale`` 1 / (w s_1) and ``strength`` (s / s_1)^2, both (r,);
+    ``regularisation`` mu;
     ``square`` |S_1|^2.
     """
 
     left: FloatArray
     scale: FloatArray
     strength: FloatArray
-    floor: float
+    regularisation: float
     square: float
 
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """For some of the rows, or for all and a raised ``floor``: what ``see`` F (r, r) makes of S x
-    is to meet what ``data`` (r, r) makes of P d.
+    """For some of the rows, or for all and a raised ``regularisation``: what ``see`` F (r, r) makes
+    of S x is to meet what ``data`` (r, r) makes of P d.
 
-    ``noise_ratio``: how much more noise max(S'y) has than with all rows and the model's floor;
+    ``noise_ratio``: how much more noise max(S'y) has than with all rows and the model's
+    regularisation;
         ``energy_ratio``: |y|^2 likewise.
     """
 
     see: FloatArray
     data: FloatArray
     noise_ratio: float
-    floor: float
+    regularisation: float
     energy_ratio: float = 1.0
 
 
@@ -60,8 +62,10 @@ def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
     left = (projection / w[:, None]).T
     squares = np.einsum("ij,ij->i", sensitivity, sensitivity)
     weakest = int(np.argmax(w))
-    floor = (1 - squares[weakest]) / w[weakest] ** 2  # mu s_1^2, since |S_i|^2 + mu s_1^2 w_i^2 = 1
-    whitened = bool((np.abs(squares + floor * w**2 - 1) <= FORM).all())
+    regularisation = (1 - squares[weakest]) / w[
+        weakest
+    ] ** 2  # mu s_1^2, since |S_i|^2 + mu s_1^2 w_i^2 = 1
+    whitened = bool((np.abs(squares + regularisation * w**2 - 1) <= FORM).all())
     if not whitened or np.abs(left.T @ left - np.eye(len(w))).max() > ORTHOGONAL:
         return None
     s = np.sqrt(squares) / w
@@ -70,48 +74,58 @@ def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
         left,
         1 / (w * s[first]),
         (s / s[first]) ** 2,
-        max(0.0, floor / s[first] ** 2),
+        max(0.0, regularisation / s[first] ** 2),
         float(squares[first]),
     )
 
 
 def whiten(form: Form, known: BoolArray, asked: float) -> Whitening | None:
-    """The whitening of the folded rows where ``known`` (k,), the noise asking for a floor of at
-    least ``asked`` for all of them: None for the model's own."""
+    """The whitening of the folded rows where ``known`` (k,), the noise asking for a regularisation
+    of at least ``asked`` for all of them: None for the model's own."""
     least = min(asked, MAX_REGULARISATION)
-    of_all = least if least > AS_IT_IS * form.floor else form.floor
+    of_all = least if least > AS_IT_IS * form.regularisation else form.regularisation
     if not known.all():
         left = float(known.mean())
-        floor = max(
-            form.floor * max(left**3, MIN_REGULARISATION_FRACTION), left * least, MIN_REGULARISATION
+        regularisation = max(
+            form.regularisation * max(left**3, MIN_REGULARISATION_FRACTION),
+            left * least,
+            MIN_REGULARISATION,
         )
-        return _of_rest(form, known, floor, _noise_of_all(form, of_all))
-    return _raised(form, of_all) if of_all > form.floor else None
+        return _of_rest(form, known, regularisation, _noise_of_all(form, of_all))
+    return _raised(form, of_all) if of_all > form.regularisation else None
 
 
-def _raised(form: Form, floor: float) -> Whitening:
-    """Of all rows, with a higher floor: a weight for each direction, that of the strongest kept."""
-    weight = _weights(form, floor)
+def _raised(form: Form, regularisation: float) -> Whitening:
+    """Of all rows, with a higher regularisation: a weight for each direction, that of the strongest
+    kept."""
+    weight = _weights(form, regularisation)
     energy = float(np.sum((weight / form.scale) ** 2) / np.sum(1 / form.scale**2))
-    return Whitening(np.diag(weight), np.diag(weight), _noise_of_all(form, floor), floor, energy)
-
-
-def _weights(form: Form, floor: float) -> FloatArray:
-    return np.minimum(
-        np.sqrt(form.square * (1 + floor) / (form.strength + floor)) * form.scale, 1.0
+    return Whitening(
+        np.diag(weight),
+        np.diag(weight),
+        _noise_of_all(form, regularisation),
+        regularisation,
+        energy,
     )
 
 
-def _noise_of_all(form: Form, floor: float) -> float:
-    if not floor > form.floor:
+def _weights(form: Form, regularisation: float) -> FloatArray:
+    return np.minimum(
+        np.sqrt(form.square * (1 + regularisation) / (form.strength + regularisation)) * form.scale,
+        1.0,
+    )
+
+
+def _noise_of_all(form: Form, regularisation: float) -> float:
+    if not regularisation > form.regularisation:
         return 1.0
     square = form.strength / form.scale**4
-    return float(np.sqrt(np.sum(square * _weights(form, floor) ** 4) / np.sum(square)))
+    return float(np.sqrt(np.sum(square * _weights(form, regularisation) ** 4) / np.sum(square)))
 
 
-def _of_rest(form: Form, known: BoolArray, floor: float, noise_of_all: float) -> Whitening:
+def _of_rest(form: Form, known: BoolArray, regularisation: float, noise_of_all: float) -> Whitening:
     """Of some rows; ``noise_of_all``: the noise ratio of all of them."""
-    lost = LOST * floor
+    lost = LOST * regularisation
     unit, missing = np.eye(len(form.scale)), ~known
     # U is orthogonal but for rounding to float32: which rows are summed over shows in the eighth
     # figure
@@ -122,12 +136,12 @@ def _of_rest(form: Form, known: BoolArray, floor: float, noise_of_all: float) ->
         else form.left[known].T @ form.left[known]
     )
     r = np.linalg.cholesky(products + lost * unit).T
-    g = np.linalg.cholesky((r * form.strength) @ r.T + floor * unit)
-    share = np.sqrt(STEP_MARGIN * form.square * (1 + floor) / (1 + lost))
+    g = np.linalg.cholesky((r * form.strength) @ r.T + regularisation * unit)
+    share = np.sqrt(STEP_MARGIN * form.square * (1 + regularisation) / (1 + lost))
     see = share * np.linalg.solve(g, r * form.scale)
     data = share * np.linalg.solve(g, np.linalg.solve(r.T, np.diag(form.scale)))
     by_rows = _noise_ratio(form, np.linalg.solve(g.T, see), share) / noise_of_all
-    return Whitening(see, data, noise_of_all * by_rows**NOISE_POWER, floor)
+    return Whitening(see, data, noise_of_all * by_rows**NOISE_POWER, regularisation)
 
 
 def _noise_ratio(form: Form, spread: FloatArray, share: float) -> float:

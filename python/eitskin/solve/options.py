@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from eitskin.core.results import ALL_SEARCH, MAX_TOUCHES, Options
+from eitskin.core.results import ALL_TOUCH_FIT, MAX_TOUCHES, Options
 from eitskin.model.model import Model
 
 TRACKING = (
@@ -36,7 +36,7 @@ def default_options(model: Model) -> Options:
         touch_radius_weight=d.touch_radius_weight,
         follow_mm=d.follow_mm,
         solver=d.solver,
-        touch_fit=ALL_SEARCH & ~d.touch_fit_left_out,
+        touch_fit=ALL_TOUCH_FIT & ~d.touch_fit_left_out,
     )
 
 
@@ -44,10 +44,10 @@ def tracking(options: Options) -> Options:
     """``options``, of :func:`default_options`, for frames that follow one another: as
     eits_options_track in the C core sets them, to the bit in float32. docs/guide/tracking.md says
     what that is worth."""
-    gate = float(np.float32(options.detection_factor) * np.float32(0.75))
+    detection_factor = float(np.float32(options.detection_factor) * np.float32(0.75))
     return replace(
         options,
-        detection_factor=gate,
+        detection_factor=detection_factor,
         track_confirm=2,
         track_hold=2,
         track_smooth=float(np.float32(0.66)),

@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from eitskin.config import check_keys, choice, integer, number
-from eitskin.core.results import ALL_SEARCH, SOLVERS, Options
+from eitskin.core.results import ALL_TOUCH_FIT, SOLVERS, Options
 from eitskin.errors import ConfigError
 from eitskin.model.model import Defaults
-from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_FLOOR
+from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_REGULARISATION
 from eitskin.model.storage import STORAGES
 from eitskin.scoring.snr import BASE_SAMPLES
 
@@ -32,7 +32,8 @@ class Configuration:
 
     Attributes:
         name: what tables and pictures call it.
-        rank, pixels, storage, floor, column_power: of the model: rows of the reduced Jacobian,
+        rank, pixels, storage, regularisation, column_power: of the model: rows of the reduced
+        Jacobian,
             pixels along the skin's longer side, the type it is stored in, mu and p of the reduction
             (``eitskin.model.reduction``).
         solver, iterations, gap, mac_limit: how the image is found; at most ``iterations``, or until
@@ -43,9 +44,10 @@ class Configuration:
             touches that are held, after others were: what a user sees of touches that rest, not of
             those that land.
         touch_sweeps: of the off-grid fit; 0 leaves touches at the image's peaks.
-        search: parts of the search for touches (``core.results``: straight data 1, regrouping 2,
+        touch_fit: parts of the search for touches (``core.results``: straight data 1, regrouping 2,
             coupling 4).
-        refine: the image is solved again with the touches' interplay taken out of the data; not
+        second_pass: the image is solved again with the touches' interplay taken out of the data;
+        not
             over a board's link.
         samples: of a measurement, at 1 MS/s; white noise falls with the root of them.
         scan: "full" measures every row, "reciprocal" one of each reciprocal pair, in half the time
@@ -56,7 +58,7 @@ class Configuration:
     rank: int = 64
     pixels: int = 32
     storage: str = "f32"
-    floor: float = DEFAULT_FLOOR
+    regularisation: float = DEFAULT_REGULARISATION
     column_power: float = DEFAULT_COLUMN_POWER
     solver: str = Defaults.solver
     iterations: int = Defaults.iterations
@@ -67,8 +69,8 @@ class Configuration:
     touch_sweeps: int = 6
     samples: int = BASE_SAMPLES
     scan: str = "full"
-    refine: bool = False
-    search: int = ALL_SEARCH
+    second_pass: bool = False
+    touch_fit: int = ALL_TOUCH_FIT
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -76,8 +78,8 @@ class Configuration:
 
     @property
     def model_settings(self) -> tuple[int, int, str, float, float]:
-        """What a model is built by: pixels, rank, storage, floor, column power."""
-        return self.pixels, self.rank, self.storage, self.floor, self.column_power
+        """What a model is built by: pixels, rank, storage, regularisation, column power."""
+        return self.pixels, self.rank, self.storage, self.regularisation, self.column_power
 
     @property
     def solver_settings(self) -> dict[str, Any]:
@@ -89,9 +91,9 @@ class Configuration:
             "lambda_rel": self.lambda_rel,
             "warm_start": self.warm_start,
             "touch_sweeps": self.touch_sweeps,
-            "touch_fit": self.search,
+            "touch_fit": self.touch_fit,
         }
-        settings |= {"refine": True} if self.refine else {}
+        settings |= {"second_pass": True} if self.second_pass else {}
         return settings | ({"mac_limit": self.mac_limit} if self.mac_limit else {})
 
     @property
@@ -114,7 +116,7 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
             " pictures"
         )
     where = f"{where} {name!r}"
-    for key in ("warm_start", "refine"):
+    for key in ("warm_start", "second_pass"):
         if not isinstance(table.get(key, False), bool):
             raise ConfigError(f"{where}: {key} must be true or false, not {table[key]!r}")
     one = Configuration(
@@ -122,7 +124,9 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
         rank=integer(table, "rank", Configuration.rank, where, low=1, high=1024),
         pixels=integer(table, "pixels", Configuration.pixels, where, low=4, high=128),
         storage=choice(table, "storage", Configuration.storage, STORAGES, where),
-        floor=number(table, "floor", Configuration.floor, where, low=0, high=1e6),
+        regularisation=number(
+            table, "regularisation", Configuration.regularisation, where, low=0, high=1e6
+        ),
         column_power=number(
             table, "column_power", Configuration.column_power, where, low=0, high=1
         ),
@@ -141,8 +145,10 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
             table, "samples", Configuration.samples, where, low=PERIOD_SAMPLES, high=1020
         ),
         scan=choice(table, "scan", Configuration.scan, SCANS, where),
-        refine=table.get("refine", Configuration.refine),
-        search=integer(table, "search", Configuration.search, where, low=0, high=ALL_SEARCH),
+        second_pass=table.get("second_pass", Configuration.second_pass),
+        touch_fit=integer(
+            table, "touch_fit", Configuration.touch_fit, where, low=0, high=ALL_TOUCH_FIT
+        ),
     )
     if one.mac_limit and "mac_limit" not in {entry.name for entry in fields(Options)}:
         raise ConfigError(
@@ -166,7 +172,7 @@ def build_settings(
     from eitskin.model.build import BuildSettings, scaled_defaults
 
     usual = scaled_defaults(skin, "difference")
-    left_out = ALL_SEARCH & ~one.search
+    left_out = ALL_TOUCH_FIT & ~one.touch_fit
     defaults = replace(
         usual,
         solver=one.solver,
@@ -180,7 +186,7 @@ def build_settings(
         rank=one.rank,
         pixels_across=one.pixels,
         storage=one.storage,
-        floor=one.floor,
+        regularisation=one.regularisation,
         column_power=one.column_power,
         elements=ELEMENTS,
         defaults=defaults,

@@ -61,7 +61,7 @@ def _is_of(one: Configuration, point: Point, model: Model) -> bool:
         return False
     if "pixels_across" not in build and model.grid.n_pixels != point.costs["pixels_kept"]:
         return False
-    reduction = (("floor", one.floor), ("column_power", one.column_power))
+    reduction = (("regularisation", one.regularisation), ("column_power", one.column_power))
     if not all(_same(build.get(name, value), value) for name, value in reduction):
         return False
     return (one.rank, one.storage, "difference") == (

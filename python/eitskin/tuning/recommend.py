@@ -37,8 +37,8 @@ class Recommendation:
             options.append("--warm")
         if one.gap:
             options.append(f"--gap {one.gap:g}")
-        if one.refine:
-            options.append("--refine (of reconstruct)")
+        if one.second_pass:
+            options.append("--second-pass (of reconstruct)")
         return options
 
     def as_dict(self) -> dict[str, Any]:
@@ -88,7 +88,7 @@ class Recommendation:
             ),
             (
                 f"model: rank {one.rank}, {one.pixels} pixels across, {one.storage}, mu"
-                f" {one.floor:g}; {point.costs['flash_bytes'] / 1e3:.0f} kB of flash,"
+                f" {one.regularisation:g}; {point.costs['flash_bytes'] / 1e3:.0f} kB of flash,"
                 f" {point.costs['ram_bytes'] / 1e3:.0f} kB of RAM"
             ),
             f"solver: {one.solver}, {one.iterations} iterations at most, lambda_rel"

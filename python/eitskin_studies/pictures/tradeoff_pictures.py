@@ -21,14 +21,14 @@ KNOBS = {
     "pixels": "pixels along the skin",
     "storage": "storage of the Jacobian",
     "lambda_rel": "lambda / lambda_max, at least",
-    "floor": "mu, the floor of the whitening",
+    "regularisation": "mu, the regularisation of the whitening",
     "touch_sweeps": "sweeps of the off-grid fit",
     "solver": "solver",
 }
 WORDS = ("storage", "touch_sweeps", "solver")
-NOISY_KNOBS = ("rank", "floor", "lambda_rel")
+NOISY_KNOBS = ("rank", "regularisation", "lambda_rel")
 GREY, IMAGE, DISCS = "#9a9a9a", "#1f5fa8", "#b35c00"
-LOGARITHMIC = ("iterations", "lambda_rel", "floor")
+LOGARITHMIC = ("iterations", "lambda_rel", "regularisation")
 
 
 def draw_all(folder: Path, front: Front) -> None:
@@ -239,7 +239,8 @@ def _base_name(group: Sequence[Point]) -> str:
 
 
 def draw_noise(path: Path, front: Front) -> None:
-    """The knobs that noise turns: images and discs at each SNR against rank, floor and lambda."""
+    """The knobs that noise turns: images and discs at each SNR against rank, regularisation and
+    lambda."""
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(12.0, 4.4), layout="constrained")
@@ -264,7 +265,8 @@ def draw_noise(path: Path, front: Front) -> None:
         if columns[0].lines:
             columns[0].legend(frameon=False, fontsize=7)
         figure.suptitle(
-            "What noise asks for: fewer directions, a higher floor; t is that of training scenes at"
+            "What noise asks for: fewer directions, a higher regularisation; t is that of training"
+            " scenes at"
             " 60 dB"
         )
         save_png(figure, path)

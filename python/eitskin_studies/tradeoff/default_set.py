@@ -40,25 +40,29 @@ SCALE = (
     Configuration("good", lambda_rel=0.01),
     Configuration("keen", pixels=28, lambda_rel=0.005, iterations=90),
     FINE,
-    Configuration("finer", pixels=36, floor=0.03, lambda_rel=0.005, iterations=120),
-    Configuration("best", rank=80, pixels=40, floor=0.05, lambda_rel=0.003, iterations=150),
-    Configuration("calm", floor=0.1, lambda_rel=0.01, iterations=120),
-    Configuration("calm light", rank=48, pixels=24, floor=0.1),
+    Configuration("finer", pixels=36, regularisation=0.03, lambda_rel=0.005, iterations=120),
+    Configuration(
+        "best", rank=80, pixels=40, regularisation=0.05, lambda_rel=0.003, iterations=150
+    ),
+    Configuration("calm", regularisation=0.1, lambda_rel=0.01, iterations=120),
+    Configuration("calm light", rank=48, pixels=24, regularisation=0.1),
 )
 
 PLAIN = tuple(
-    replace(one, name=f"{one.name} plain", search=0)
+    replace(one, name=f"{one.name} plain", touch_fit=0)
     for one in SCALE
     if one.name in ("tiny", "mini", "small", "light", "lean", "modest", "quick", "standard")
 )
 REFINABLE = ("quick", "standard", "keen", "fine", "best")
 REFINED = tuple(
-    replace(one, name=f"{one.name} refined", refine=True) for one in SCALE if one.name in REFINABLE
+    replace(one, name=f"{one.name} refined", second_pass=True)
+    for one in SCALE
+    if one.name in REFINABLE
 )
 
 KNOBS = {
-    "search": PLAIN,
-    "refine": REFINED,
+    "touch_fit": PLAIN,
+    "second_pass": REFINED,
     "iterations": (
         *_turned(STANDARD, "iterations", (10, 20, 30, 45, 90, 150, 300), "{} iterations"),
         *_turned(FINE, "iterations", (30, 60, 120, 180, 300), "{} iterations"),
@@ -91,9 +95,9 @@ KNOBS = {
         Configuration("warm 10", warm_start=True, iterations=10),
         Configuration("warm 20", warm_start=True, iterations=20),
     ),
-    "floor": (
-        *_turned(STANDARD, "floor", (0.003, 0.03, 0.1, 0.3), "mu {}"),
-        *_turned(FINE, "floor", (0.003, 0.03), "mu {}"),
+    "regularisation": (
+        *_turned(STANDARD, "regularisation", (0.003, 0.03, 0.1, 0.3), "mu {}"),
+        *_turned(FINE, "regularisation", (0.003, 0.03), "mu {}"),
     ),
     "column_power": _turned(FINE, "column_power", (0.25, 0.75), "p {}"),
 }

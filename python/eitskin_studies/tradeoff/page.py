@@ -61,7 +61,7 @@ def front_table(front: Front) -> Tabular:
         rows.append(
             (
                 point.name,
-                f"{one.rank}, {one.pixels}, {one.floor:g}",
+                f"{one.rank}, {one.pixels}, {one.regularisation:g}",
                 f"{one.iterations}, {one.lambda_rel:g}",
                 f"{_share(image['mean'])} ({_share(image['low'])} to {_share(image['high'])})",
                 _share(image["worst_tenth"]),

@@ -34,7 +34,7 @@ def test_a_known_law_and_gain_are_found() -> None:
     assert found.notes == ()
     new = np.array([(10.0, -70.0), (-60.0, 20.0), (0.0, 0.0), (33.0, 44.0)])
     load = np.array([0.6, 1.2, 1.7, 1.9])
-    told = found.law.loads_at(new, saturating(load) / gain_of(new))
+    told = found.law.forces_at(new, saturating(load) / gain_of(new))
     assert told == pytest.approx(load, rel=0.02)
 
 
@@ -50,7 +50,7 @@ def test_powers_are_told_as_well(exponent: float) -> None:
     strength = 2.0 * known.force_n**exponent * known.strength / saturating(known.force_n)
     found = calibrate(replace_strength(known, strength), RADIUS_MM, resamples=0)
     seen = 2.0 * np.array([0.7, 1.9]) ** exponent
-    assert found.law.loads_at(np.zeros((2, 2)), seen) == pytest.approx([0.7, 1.9], rel=0.01)
+    assert found.law.forces_at(np.zeros((2, 2)), seen) == pytest.approx([0.7, 1.9], rel=0.01)
 
 
 def replace_strength(known: Presses, strength: np.ndarray) -> Presses:
@@ -60,10 +60,10 @@ def replace_strength(known: Presses, strength: np.ndarray) -> Presses:
 def test_the_table_is_the_law() -> None:
     law = calibrate(presses(noise=0.0), RADIUS_MM, resamples=0).law
     load = np.linspace(0.02, 2.0, 50)
-    assert law.loads_at(np.zeros((50, 2)), saturating(load)) == pytest.approx(
+    assert law.forces_at(np.zeros((50, 2)), saturating(load)) == pytest.approx(
         load, rel=2e-3, abs=2e-4
     )
-    beyond = law.loads_at(
+    beyond = law.forces_at(
         np.zeros((3, 2)), np.array([saturating(np.array(2.0)) * 1.02, 100.0, np.inf])
     )
     assert (

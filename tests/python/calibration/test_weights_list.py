@@ -17,7 +17,7 @@ def written(tmp_path: Path, text: str, name: str = "w.csv") -> Path:
 
 
 def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
-    table = written(tmp_path, "first, last, load_g, x_mm, y_mm\n0,3,100,1.5,-2\n\n4,,200,,\n")
+    table = written(tmp_path, "first, last, weight_g, x_mm, y_mm\n0,3,100,1.5,-2\n\n4,,200,,\n")
     first = "[[press]]\nfirst = 0\nlast = 3\nload_n = 0.980665\nx_mm = 1.5\ny_mm = -2\n"
     tables = written(tmp_path, first + "[[press]]\nfirst = 4\nload_g = 200\n", "w.toml")
     one, other = load_weights(table), load_weights(tables)
@@ -32,22 +32,28 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
     ("text", "line"),
     [
         ("", "lists no weight; give frames and load of each"),
-        ("first,load_g\n", "lists no weight"),
-        ("first,load_kg\n0,1\n", "its first line: unknown key 'load_kg'; did you mean 'load_g'?"),
-        ("first,load_g\n0\n", "row 1 below the header: 1 cells under 2 names; give as many"),
-        ("first,load_g\n0,many\n", "row 1 below the header: load_g must be a number, not 'many'"),
-        ("first,load_g\n0,nan\n", "load_g = nan is out of range"),
-        ("first,load_g\n0,0\n", "load_g = 0.0 is out of range; it must be above 0"),
+        ("first,weight_g\n", "lists no weight"),
         (
-            "first,load_g\n0,\n",
-            "give the load as load_g (grams) or as force_n (newtons), one of them",
+            "first,weight_kg\n0,1\n",
+            "its first line: unknown key 'weight_kg'; did you mean 'weight_g'?",
         ),
-        ("first,load_g,force_n\n0,1,1\n", "one of them"),
-        ("first,load_g,x_mm\n0,1,1\n", "a place needs x_mm and y_mm; give both or none"),
-        ("first,load_g\n-1,5\n", "first = -1.0 is out of range"),
-        ("first,last,load_g\n5,4,5\n", "last = 4.0 is out of range; it must be at least 5"),
-        ("load_g\n5\n", "the key 'first' is required"),
-        ("first,load_g\n0.5,5\n", "first = 0.5 must be a whole number"),
+        ("first,weight_g\n0\n", "row 1 below the header: 1 cells under 2 names; give as many"),
+        (
+            "first,weight_g\n0,many\n",
+            "row 1 below the header: weight_g must be a number, not 'many'",
+        ),
+        ("first,weight_g\n0,nan\n", "weight_g = nan is out of range"),
+        ("first,weight_g\n0,0\n", "weight_g = 0.0 is out of range; it must be above 0"),
+        (
+            "first,weight_g\n0,\n",
+            "give the load as weight_g (grams) or as force_n (newtons), one of them",
+        ),
+        ("first,weight_g,force_n\n0,1,1\n", "one of them"),
+        ("first,weight_g,x_mm\n0,1,1\n", "a place needs x_mm and y_mm; give both or none"),
+        ("first,weight_g\n-1,5\n", "first = -1.0 is out of range"),
+        ("first,last,weight_g\n5,4,5\n", "last = 4.0 is out of range; it must be at least 5"),
+        ("weight_g\n5\n", "the key 'first' is required"),
+        ("first,weight_g\n0.5,5\n", "first = 0.5 must be a whole number"),
     ],
 )
 def test_what_is_wrong_is_told_in_a_line(tmp_path: Path, text: str, line: str) -> None:

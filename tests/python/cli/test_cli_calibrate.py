@@ -44,7 +44,7 @@ def bench(name: str, presses: list[tuple[tuple[float, float], int]]) -> tuple[st
         "[effects.noise]",
         "snr_db = 72.0",
     ]
-    weights = ["first,load_g"]
+    weights = ["first,weight_g"]
     for k, ((x, y), grams) in enumerate(presses):
         scene += ["[[touch]]", f"x_mm = {x:.3f}", f"y_mm = {y:.3f}", "radius_mm = 8.0"]
         scene += ['law = "piezoresistive"', f"grams = {grams}"]
@@ -166,7 +166,7 @@ def test_weights_that_do_not_show_are_named(
 
     rows = (folder / "weights.csv").read_text().splitlines()
     elsewhere = [
-        "first,load_g,x_mm,y_mm",
+        "first,weight_g,x_mm,y_mm",
         *(f"{row},," for row in rows[1:-1]),
         f"{rows[-1]},0,0",
     ]  # that one stands near the rim
@@ -184,11 +184,11 @@ def test_refusals(folder: Path, refused: Refused, tmp_path: Path) -> None:
     assert "1 recordings and 2 lists of weights" in refused(
         2, "calibrate", frames, "--weights", listed, "--weights", listed
     )
-    (tmp_path / "w.csv").write_text("first,load_g\n50,10\n")
+    (tmp_path / "w.csv").write_text("first,weight_g\n50,10\n")
     assert "frames 50 to 50 of the list of weights are not there; it has frames 0 to 49" in refused(
         8, "calibrate", frames, "--weights", tmp_path / "w.csv"
     )
-    (tmp_path / "w.csv").write_text("first,load_g\n0,10\n1,20\n")
+    (tmp_path / "w.csv").write_text("first,weight_g\n0,10\n1,20\n")
     assert "2 presses are too few" in refused(
         8, "calibrate", frames, "--weights", tmp_path / "w.csv"
     )

@@ -228,7 +228,7 @@ def test_a_board_on_a_port(scene: Path, capsys: pytest.CaptureFixture[str]) -> N
             and "touch it" in err
         )
         assert all(
-            line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (gate)")
+            line.split(maxsplit=3)[3].startswith("no touch; 0 iterations (below-threshold)")
             for line in out.splitlines()[:3]
         )
         assert (

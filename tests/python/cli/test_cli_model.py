@@ -137,7 +137,7 @@ def test_a_clockwise_outline_is_the_same_skin(done: Done, tmp_path: Path) -> Non
     assert np.corrcoef(a.golden.image, b.golden.image)[0, 1] > 0.99
 
 
-def test_touch_change_and_floor_reach_the_model(done: Done, tmp_path: Path) -> None:
+def test_touch_change_and_regularisation_reach_the_model(done: Done, tmp_path: Path) -> None:
     skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
     facts = json.loads(
         done(
@@ -149,7 +149,7 @@ def test_touch_change_and_floor_reach_the_model(done: Done, tmp_path: Path) -> N
             "--json",
             "--touch-change",
             "2",
-            "--floor",
+            "--regularisation",
             "0.1",
             *QUICK,
         )

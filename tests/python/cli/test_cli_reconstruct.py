@@ -30,7 +30,8 @@ INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs",
     "lambda", "lambda_max",
     "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",
-    "diagnostics", "found", "saturated", "outliers", "model mismatch", "unexplained", "floor",
+    "diagnostics", "found", "saturated", "outliers", "model_mismatch", "unexplained",
+    "regularisation",
     "open_electrodes", "bridged_electrodes", "noisy_electrodes",
 }  # fmt: skip
 SUMMARY = {
@@ -203,7 +204,7 @@ def test_quiet_frames_show_nothing(done: Done, changed_frames: Callable[..., Pat
     assert "against the truth" not in text
     facts = json.loads(done("reconstruct", path, "--json"))
     assert "summary" not in facts and {frame["info"]["stop"] for frame in facts["frames"]} <= {
-        "gate",
+        "below-threshold",
         "iterations",
     }
 

@@ -430,7 +430,7 @@ def test_options_of_reconstruct(
         (["--elements", "600000"], "--elements 600000 is out of range"),
         (["--touch-change", "-1"], "--touch-change -1 is out of range"),
         (["--touch-change", "nan"], "--touch-change nan is out of range"),
-        (["--floor", "-1", "--elements", "800", "--pixels", "8"], "floor"),
+        (["--regularisation", "-1", "--elements", "800", "--pixels", "8"], "regularisation"),
         (["skin.toml"], "name a SKIN.toml, or give --paper, not both"),
     ],
 )

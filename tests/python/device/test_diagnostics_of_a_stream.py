@@ -25,7 +25,7 @@ from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.packets import (
-    CLEAN_FRAMES,
+    CLEAR_FRAMES,
     Fault,
     FaultCode,
     PacketType,
@@ -86,7 +86,7 @@ def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_i
             for head in heads(items)
         ]
         told = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
-        gone = first + UNTIL_FRAME + CLEAN_FRAMES - 1
+        gone = first + UNTIL_FRAME + CLEAR_FRAMES - 1
         assert told == [
             (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME),
             (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
@@ -204,10 +204,10 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
     assert news.lines(solved(1)) == []
     assert news.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
     assert news.lines(solved(3, **outlier)) == []
-    assert [news.lines(solved(4 + k)) for k in range(CLEAN_FRAMES - 1)] == [[]] * (CLEAN_FRAMES - 1)
+    assert [news.lines(solved(4 + k)) for k in range(CLEAR_FRAMES - 1)] == [[]] * (CLEAR_FRAMES - 1)
     assert news.lines(solved(20, **outlier)) == []  # it came back in time
-    said = [news.lines(solved(21 + k)) for k in range(CLEAN_FRAMES)]
-    assert said == [[]] * (CLEAN_FRAMES - 1) + [[f"outlier: over, frame {20 + CLEAN_FRAMES}"]]
+    said = [news.lines(solved(21 + k)) for k in range(CLEAR_FRAMES)]
+    assert said == [[]] * (CLEAR_FRAMES - 1) + [[f"outlier: over, frame {20 + CLEAR_FRAMES}"]]
 
 
 def test_what_fault_and_head_tell_is_said_once() -> None:
@@ -256,7 +256,7 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:
-    news, model_mismatch = News(), {"diagnostics": bits("model mismatch"), "model mismatch": 0.125}
+    news, model_mismatch = News(), {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125}
     told = [
         news.lines(solved(frame, **(model_mismatch if frame in (2, 3, 7, 8, 9, 10) else {})))
         for frame in range(1, 12)

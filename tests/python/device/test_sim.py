@@ -208,7 +208,7 @@ def test_masked_rows_are_left_out() -> None:
         assert np.isfinite(np.delete(raw.voltage_v, 5)).all()
         assert image.solved.masked == 1
         assert np.isfinite(image.image).all()
-        device.mask_row(5, bad=False)
+        device.mask_row(5, masked=False)
         device.tare(4)
         assert by_kind(list(device.stream(ALL, frames=1)), SolvedImage)[0].solved.masked == 0
 

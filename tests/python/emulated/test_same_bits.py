@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import ALL_SEARCH, SOLVERS, Options, Reconstruction
+from eitskin.core.results import ALL_TOUCH_FIT, SOLVERS, Options, Reconstruction
 from eitskin.model.eitm import encode_model
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
@@ -91,7 +91,7 @@ def session(
 def test_the_same_bits_as_the_host(
     program: Path, tmp_path: Path, solver: str, storage: str, warm: bool
 ) -> None:
-    """Warm ones after a noisy tare, which raises the floor."""
+    """Warm ones after a noisy tare, which raises the regularisation."""
     model, _ = load_prebuilt()
     blob = in_storage(model, storage)
     quiet, frames = session(model, 5, 4, noise=1e-2 if warm else 1e-3)
@@ -113,7 +113,7 @@ def test_the_same_bits_as_the_host(
             expected.info.stop,
             expected.info.iterations,
         )
-        assert (expected.info.floor > 0.03) == warm
+        assert (expected.info.regularisation > 0.03) == warm
         assert emulated.macs == expected.info.macs + expected.info.touch_macs
     assert board[0].touches[0] != "0" and board[3].touches == "0"
     assert board[2].image_crc != board[1].image_crc
@@ -168,19 +168,21 @@ def moving_touches() -> tuple[np.ndarray, np.ndarray]:
     return simulated.quiet_v, simulated.frames_v
 
 
-MAX_INSTRUCTIONS = {0: 2_500_000, ALL_SEARCH: 4_000_000}
+MAX_INSTRUCTIONS = {0: 2_500_000, ALL_TOUCH_FIT: 4_000_000}
 
 
 @pytest.mark.parametrize("warm", [False, True])
-@pytest.mark.parametrize("search", MAX_INSTRUCTIONS)
-def test_what_a_frame_costs_at_most(program: Path, tmp_path: Path, warm: bool, search: int) -> None:
+@pytest.mark.parametrize("touch_fit", MAX_INSTRUCTIONS)
+def test_what_a_frame_costs_at_most(
+    program: Path, tmp_path: Path, warm: bool, touch_fit: int
+) -> None:
     """Solve and touches, with peaks alone and with the whole search; each frame, also the first and
     those where a touch comes: moving touches, and 20 random scenes that follow each other without
     any rest."""
     model, blob = load_prebuilt()
     random = simulated_session()
     for quiet, frames in (moving_touches(), (random.quiet_v, random.frames_v)):
-        options = replace(default_options(model), warm_start=warm, touch_fit=search)
+        options = replace(default_options(model), warm_start=warm, touch_fit=touch_fit)
         board = run(program, tmp_path, blob, quiet, frames, options)
         costs = [result.solve_instructions + result.touch_instructions for result in board]
         print(
@@ -188,7 +190,7 @@ def test_what_a_frame_costs_at_most(program: Path, tmp_path: Path, warm: bool, s
             " instructions"
         )
         assert all(result.touches[0] in "123" for result in board)
-        assert max(costs) <= MAX_INSTRUCTIONS[search]
+        assert max(costs) <= MAX_INSTRUCTIONS[touch_fit]
 
 
 def in_storage(model: Model, storage: str) -> bytes:
@@ -218,7 +220,7 @@ def test_every_storage_costs_little_more_than_f32(program: Path, tmp_path: Path)
             f"{storage}: {mean[storage]:.0f} instructions, {mean[storage] / mean['f32']:.2f} times"
             " those of f32"
         )
-        assert mean[storage] <= MAX_INSTRUCTIONS[ALL_SEARCH]
+        assert mean[storage] <= MAX_INSTRUCTIONS[ALL_TOUCH_FIT]
         assert mean[storage] <= MAX_TIMES_F32[storage] * mean["f32"]
 
 

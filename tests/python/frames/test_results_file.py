@@ -19,7 +19,7 @@ FIELDS = {
     "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm",
     "touch_frame", "touch_id",
     "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_confidence",
-    "touch_load_n", "info",
+    "touch_force_n", "info",
 }  # fmt: skip
 
 

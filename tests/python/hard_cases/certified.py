@@ -132,7 +132,7 @@ def check_sound(margins: Margins, case: str, point: Judged, one: Outcome) -> Non
         "|y|^2/2",
     )
     nothing_known = one.info.stop == "macs" and one.info.iterations == 0
-    if one.info.stop not in ("zero", "gate", "diverged") and not nothing_known:
+    if one.info.stop not in ("zero", "below-threshold", "diverged") and not nothing_known:
         said = abs(one.info.gap - point.gap)
         margins.everywhere(
             case, "reported gap off the true one", said / half, point.gap_rounding / half, "|y|^2/2"

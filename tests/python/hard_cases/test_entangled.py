@@ -11,7 +11,7 @@ from everywhere import SameEverywhere
 from test_hard_touches import on_skin
 from touch_scenes import entangled, frames_of
 
-from eitskin.core.results import ALL_SEARCH, COUPLED, REGROUP, STRAIGHT, Options
+from eitskin.core.results import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE, Options
 from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, Tare
 from margins import Margins
@@ -24,10 +24,17 @@ MAX = 16
 def searches() -> list[Options]:
     """All and each part of the search, images refined, any sign, as many touches as there may
     be."""
-    own = replace(default_options(prebuilt()[0]), max_touches=MAX, refine=True)
+    own = replace(default_options(prebuilt()[0]), max_touches=MAX, second_pass=True)
     parts = [
         replace(own, touch_fit=bits)
-        for bits in (ALL_SEARCH, 0, STRAIGHT, REGROUP, COUPLED, REGROUP | COUPLED)
+        for bits in (
+            ALL_TOUCH_FIT,
+            0,
+            LOG_DATA,
+            SPLIT_MERGE,
+            INTERACTION,
+            SPLIT_MERGE | INTERACTION,
+        )
     ]
     return [
         *parts,

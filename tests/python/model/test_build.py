@@ -176,7 +176,7 @@ def test_the_prebuilt_model_is_what_the_builder_makes() -> None:
         ({"rank": 105}, "rank = 105 is out of range; use 1 to 104"),
         ({"storage": "f64"}, "storage must be one of f32, f16, i16, i8"),
         ({"data_kind": "ratio"}, "data one of difference, normalised, log-ratio"),
-        ({"floor": float("nan")}, "floor"),
+        ({"regularisation": float("nan")}, "regularisation"),
         ({"column_power": 2.0}, "column power"),
     ],
 )

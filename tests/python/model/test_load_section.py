@@ -55,7 +55,7 @@ def test_touches_carry_the_load_of_strength_and_place(engine: str) -> None:
             replace(t, force_n=touches[k].force_n) for k, t in enumerate(without)
         )  # nothing else differs
         for touch in touches:
-            expected = law().loads_at(
+            expected = law().forces_at(
                 np.array([(touch.x_mm, touch.y_mm)]), np.array([touch.strength_s_per_m_mm2])
             )[0]
             assert touch.force_n == pytest.approx(expected, rel=1e-5) and touch.force_n > 0

@@ -48,19 +48,21 @@ def test_fold_of_the_forward_model_changes_nothing() -> None:
 @pytest.mark.parametrize("rank", [1, 5, 12])
 @pytest.mark.parametrize("power", [0.0, 0.5, 1.0])
 def test_projection_of_the_scaled_jacobian_is_the_sensitivity(rank: int, power: float) -> None:
-    r = reduce_jacobian(J, rank, floor=1e-2, column_power=power)
+    r = reduce_jacobian(J, rank, regularisation=1e-2, column_power=power)
     assert (r.projection.shape, r.sensitivity.shape) == ((rank, 12), (rank, 30))
     assert r.column_weight == pytest.approx(np.linalg.norm(J, axis=0) ** -power)
     assert r.projection @ J @ np.diag(r.column_weight) == pytest.approx(r.sensitivity, abs=1e-12)
 
 
-@pytest.mark.parametrize("floor", [0.0, 1e-3, 1e-2, 0.5])
-def test_greatest_eigenvalue_is_known_beforehand(floor: float) -> None:
-    r = reduce_jacobian(J, 12, floor=floor)
-    assert spectral_norm_squared(r.sensitivity) == pytest.approx(1 / (1 + floor), rel=1e-12)
+@pytest.mark.parametrize("regularisation", [0.0, 1e-3, 1e-2, 0.5])
+def test_greatest_eigenvalue_is_known_beforehand(regularisation: float) -> None:
+    r = reduce_jacobian(J, 12, regularisation=regularisation)
+    assert spectral_norm_squared(r.sensitivity) == pytest.approx(
+        1 / (1 + regularisation), rel=1e-12
+    )
     s = r.singular_values
     assert np.diag(r.sensitivity @ r.sensitivity.T) == pytest.approx(
-        s**2 / (s**2 + floor * s[0] ** 2)
+        s**2 / (s**2 + regularisation * s[0] ** 2)
     )
 
 
@@ -91,14 +93,14 @@ def test_a_pixel_that_no_row_sees_keeps_a_finite_weight_and_no_sensitivity() -> 
     [
         (J, 0, {}, "rank = 0 is out of range; use 1 to 12"),
         (J, 13, {}, "rank = 13 is out of range; use 1 to 12"),
-        (J, 5, {"floor": -0.1}, "floor"),
-        (J, 5, {"floor": float("nan")}, "floor"),
-        (J, 5, {"floor": float("inf")}, "floor"),
+        (J, 5, {"regularisation": -0.1}, "regularisation"),
+        (J, 5, {"regularisation": float("nan")}, "regularisation"),
+        (J, 5, {"regularisation": float("inf")}, "regularisation"),
         (J, 5, {"column_power": 1.5}, "column power"),
         (np.zeros((4, 6)), 2, {}, "is zero"),
         (np.full((4, 6), np.nan), 2, {}, "finite"),
         (np.ones(4), 1, {}, "finite matrix"),
-        (np.eye(4, 6) * [1, 1, 0, 0, 0, 0], 3, {"floor": 0.0}, "exceeds"),
+        (np.eye(4, 6) * [1, 1, 0, 0, 0, 0], 3, {"regularisation": 0.0}, "exceeds"),
     ],
 )
 def test_refusals(jacobian: np.ndarray, rank: int, changes: dict[str, float], text: str) -> None:

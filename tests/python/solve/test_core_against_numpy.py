@@ -131,8 +131,8 @@ def test_same_images_with_rows_left_out(storage: str, data_kind: str, solver: st
 @pytest.mark.parametrize("storage", STORAGES)
 def test_same_images_without_electrodes(storage: str, data_kind: str, solver: str) -> None:
     """One, two, three electrodes out, of each sign: what is left is whitened anew. In float32 its
-    factors lose what the low floor does not hold, and noise in the data's last figure is raised as
-    all noise is; float64 has the reference's answer.
+    factors lose what the low regularisation does not hold, and noise in the data's last figure is
+    raised as all noise is; float64 has the reference's answer.
     """
     s = small()
     made = engines(storage, data_kind, solver, max_masked=208)
@@ -156,7 +156,7 @@ def test_same_images_without_electrodes(storage: str, data_kind: str, solver: st
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", ["f32", "i8"])
 def test_same_images_after_a_noisy_tare(storage: str, data_kind: str, solver: str) -> None:
-    """The floor is raised tenfold; also with an electrode out."""
+    """The regularisation is raised tenfold; also with an electrode out."""
     s, made = small(), engines(storage, data_kind, solver)
     for reconstructor in made.values():
         reconstructor.tare(narrow(s.quiet(1, 8, noise=0.02)))
@@ -165,10 +165,13 @@ def test_same_images_after_a_noisy_tare(storage: str, data_kind: str, solver: st
     worst = agree(made, frames)
     assert worst["c64"] <= 1e-11 and worst["c"] <= 4 * F32_BOUND[solver], worst
     for k in (0, 6):
-        floors = [
-            reconstructor.reconstruct(frames[k]).info.floor for reconstructor in made.values()
+        regularisations = [
+            reconstructor.reconstruct(frames[k]).info.regularisation
+            for reconstructor in made.values()
         ]
-        assert min(floors) > 0.06 and floors == pytest.approx([floors[0]] * len(floors), rel=1e-4)
+        assert min(regularisations) > 0.06 and regularisations == pytest.approx(
+            [regularisations[0]] * len(regularisations), rel=1e-4
+        )
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)

@@ -65,7 +65,7 @@ def test_small_models(solver: str, storage: str, data_kind: str, width: str) -> 
 @pytest.mark.parametrize("width", ["float32", "float64"])
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_noisy_tare(solver: str, width: str) -> None:
-    """The floor of the whitening is raised."""
+    """The regularisation of the whitening is raised."""
     blob, s = small_blob("i8"), small()
     built = [
         CoreEngine(blob, width, prepared=prepared, portable=portable)
@@ -77,7 +77,10 @@ def test_a_noisy_tare(solver: str, width: str) -> None:
     for frame in s.frames(33, 4, noise=0.01):
         results = [engine.reconstruct(frame) for engine in built]
         same(results)
-        assert results[0].info.floor == pytest.approx(0.05, rel=0.1) and results[0].image.any()
+        assert (
+            results[0].info.regularisation == pytest.approx(0.05, rel=0.1)
+            and results[0].image.any()
+        )
 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])

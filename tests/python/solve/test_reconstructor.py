@@ -351,7 +351,7 @@ BAD_OPTIONS = [
     ({"diagnostics": 256}, "diagnostics = 256 is out of range; use 0 to 255"),
     ({"touch_fit": 8}, "touch_fit = 8 is out of range; use 0 to 7"),
     ({"touch_fit": -1}, "touch_fit"),
-    ({"refine": 2}, "refine = 2 must be true or false"),
+    ({"second_pass": 2}, "second_pass = 2 must be true or false"),
     ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),
     ({"solver": "newton"}, "solver = 'newton' is not known; use one of fista, working-set"),
     ({"warm_start": 2}, "warm_start"),
@@ -407,13 +407,14 @@ def test_the_core_refuses_them_by_itself(changes: dict[str, object]) -> None:
 EDGES = {
     "iterations": 1, "gap_every": 2**32 - 1, "max_touches": 16, "max_masked": 0, "lambda_rel": 1.0,
     "gap_rel": 1.0,
-    "lambda_noise_factor": 1e29, "detection_factor": 0.0, "saturation_v": 1e29, "touch_threshold": 1.0,
+    "lambda_noise_factor": 1e29, "detection_factor": 0.0,
+    "saturation_v": 1e29, "touch_threshold": 1.0,
     "touch_min_fraction": 1.0,
     "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000,
     "follow_mm": 0.0, "lambda_abs": 1e29,
     "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
     "regularisation_noise_factor": 0.0,
-    "touch_fit": 7, "refine": True,
+    "touch_fit": 7, "second_pass": True,
 }  # fmt: skip
 
 
@@ -436,7 +437,7 @@ def test_what_options_do(engine: str) -> None:
     sparse = made(engine, lambda_rel=0.5).reconstruct(frame)
     assert sparse.info.nonzeros < base.info.nonzeros
     assert made(engine, lambda_rel=1.0).reconstruct(frame).info.stop == "zero"
-    assert made(engine, detection_factor=1e6).reconstruct(frame).info.stop == "gate"
+    assert made(engine, detection_factor=1e6).reconstruct(frame).info.stop == "below-threshold"
     assert made(engine, lambda_abs=base.info.lambda_max * 2).reconstruct(frame).info.stop == "zero"
     assert len(made(engine, max_touches=1).reconstruct(frame).touches) == 1
     assert made(engine, max_touches=0).reconstruct(frame).touches == ()

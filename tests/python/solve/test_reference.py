@@ -107,16 +107,16 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
     w = np.linalg.norm(p, axis=1)
     jacobian = (p / w[:, None] ** 2).T @ stored  # of rank r, by columns as they are scaled
     greatest = np.linalg.svd(jacobian, compute_uv=False)[0]
-    floor = 0.01 * max(known.mean() ** 3, 0.1)
+    regularisation = 0.01 * max(known.mean() ** 3, 0.1)
     u, sigma, vt = np.linalg.svd(jacobian[known], full_matrices=False)
-    strength = sigma**2 / (sigma**2 + floor * greatest**2)
+    strength = sigma**2 / (sigma**2 + regularisation * greatest**2)
     frame = np.where(np.isnan(damaged), s.linear.v0_v, damaged)
     d = engine._gain * (frame - s.linear.v0_v)
     folded = 0.5 * (d[fold.first] + fold.sign * d[fold.second])[known]
-    scale = 0.995 * (1 + floor) / 1.01
+    scale = 0.995 * (1 + regularisation) / 1.01
     expected = scale * (vt.T * strength) @ vt
     gradient = scale * (vt.T * (strength / np.maximum(sigma, 1e-9 * greatest))) @ (u.T @ folded)
-    # directions that no row sees count by a hundredth of the floor
+    # directions that no row sees count by a hundredth of the regularisation
     assert np.linalg.norm(engine.seen.T @ engine.seen - expected, 2) < 0.012
     assert np.linalg.norm(engine.seen.T @ y - gradient) < 0.012 * np.linalg.norm(gradient)
 
@@ -124,18 +124,18 @@ def test_rows_left_out_are_whitened_anew(pairs: int) -> None:
 @pytest.mark.parametrize("noise", [4e-3, 0.02, 0.5])
 def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> None:
     """The same S'S, S'y and images, but for a scale, as from a model that was built with that
-    floor."""
+    regularisation."""
     s, frame = small(), small().frames(4, 1)[0]
     quiet = s.quiet(6, 8, noise=noise)
     engine = reference(
         small_model(), diagnostics=0
     )  # of discs this strong some rows count as outliers
     learned = engine.set_reference(quiet)
-    floor = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
-    settings = BuildSettings(rank=37, floor=floor)
+    regularisation = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
+    settings = BuildSettings(rank=37, regularisation=regularisation)
     other = reference(make_model(s.skin, s.protocol, s.linear, settings), diagnostics=0)
     other.set_reference(quiet)
-    scale = (1 + floor) / 1.01
+    scale = (1 + regularisation) / 1.01
     y, expected = engine.frame_stage(frame)[0], other.frame_stage(frame)[0]
     assert engine.seen.T @ engine.seen == pytest.approx(scale * other.seen.T @ other.seen, abs=1e-5)
     assert engine.seen.T @ y == pytest.approx(
@@ -147,17 +147,19 @@ def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise: float) -> Non
             replace(one.options, solver="active-set", lambda_noise_factor=0.0, detection_factor=0.0)
         )
         result = one.reconstruct(frame)
-        assert result.info.floor == pytest.approx(floor, rel=1e-4)
+        assert result.info.regularisation == pytest.approx(regularisation, rel=1e-4)
         images.append(result.image)
     assert images[0] == pytest.approx(images[1], abs=2e-3 * images[1].max())
 
 
 @pytest.mark.parametrize("quiet_frames", [1, 8])
-def test_the_floor_stays_where_noise_is_little_or_unknown(quiet_frames: int) -> None:
+def test_the_regularisation_stays_where_noise_is_little_or_unknown(quiet_frames: int) -> None:
     s = small()
     engine = reference(small_model(), diagnostics=0)
     engine.set_reference(s.quiet(6, quiet_frames, noise=1.5e-3 if quiet_frames > 1 else 0.1))
-    assert engine.reconstruct(s.frames(4, 1)[0]).info.floor == pytest.approx(0.01, rel=1e-4)
+    assert engine.reconstruct(s.frames(4, 1)[0]).info.regularisation == pytest.approx(
+        0.01, rel=1e-4
+    )
     assert engine.seen is small_model().sensitivity
 
 

@@ -59,13 +59,15 @@ def test_unique_rows_hold_each_voltage_once() -> None:
     }
 
 
-def test_another_floor_is_the_model_built_with_it() -> None:
+def test_another_regularisation_is_the_model_built_with_it() -> None:
     skin = Skin("disk", disk(194.0), Electrodes(16))
     linear = linearise(skin, adjacent(16), pixels_across=12, elements=800)
     usual = make_model(skin, adjacent(16), linear, BuildSettings(rank=40))
-    for floor in (0.1, 1e-3):
-        built = make_model(skin, adjacent(16), linear, BuildSettings(rank=40, floor=floor))
-        moved = tuning.with_floor(usual, floor)
+    for regularisation in (0.1, 1e-3):
+        built = make_model(
+            skin, adjacent(16), linear, BuildSettings(rank=40, regularisation=regularisation)
+        )
+        moved = tuning.with_regularisation(usual, regularisation)
         product, wanted = (
             m.projection.T.astype(np.float64) @ m.sensitivity for m in (moved, built)
         )
@@ -87,7 +89,11 @@ def _few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(electrodes, "PAIR_MM", (24.0, 36.0))
     monkeypatch.setattr(electrodes, "SWEEP", {16: (40,), 32: (100,)})
     monkeypatch.setattr(electrodes, "GRIDS", (24,))
-    for name, values in (("FLOORS", (0.01, 1e-3)), ("LAMBDAS", (0.03,)), ("ITERATIONS", (60,))):
+    for name, values in (
+        ("REGULARISATIONS", (0.01, 1e-3)),
+        ("LAMBDAS", (0.03,)),
+        ("ITERATIONS", (60,)),
+    ):
         monkeypatch.setattr(tuning, name, values)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from study_pages import fills_its_page
 
-from eitskin.core.results import ALL_SEARCH
+from eitskin.core.results import ALL_TOUCH_FIT
 from eitskin_studies.experiments import levers
 from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
@@ -52,14 +52,14 @@ def test_what_coupling_explains_and_refining_costs(done: tuple[Path, Outcome]) -
     assert whole["unexplained"] < 0.5 * alone["unexplained"]
     assert sum(whole["exact"]) >= sum(alone["exact"]) and whole["touch_macs"] > alone["touch_macs"]
     for one in IMAGES:
-        if one.options.get("refine"):
+        if one.options.get("second_pass"):
             base = images[one.name.removesuffix(", refined")]["60"]
             assert base["macs"] < images[one.name]["60"]["macs"] < 2.2 * base["macs"]
 
 
 def test_the_default_is_among_them() -> None:
     assert {one.options["touch_fit"] for one in SEARCHES if one.name == "all (the default)"} == {
-        ALL_SEARCH
+        ALL_TOUCH_FIT
     }
 
 

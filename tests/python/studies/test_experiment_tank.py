@@ -137,17 +137,20 @@ def test_simulated_noise_is_the_share_of_each_change(tmp_path: Path) -> None:
 
 def test_levers_are_named_by_what_differs() -> None:
     assert words_of(Levers()) == "defaults"
-    assert words_of(Levers(floor=0.1, blur=1.0)) == "mu 0.1, blur of 1 pixels"
+    assert words_of(Levers(regularisation=0.1, blur=1.0)) == "mu 0.1, blur of 1 pixels"
     assert len(set(one_by_one("difference"))) == len(one_by_one("difference"))
     assert Levers() in together("difference")
-    found = {Levers(): {"tuned": 0.8, "macs": 9}, Levers(floor=0.1): {"tuned": 0.8001, "macs": 5}}
-    assert chosen(found) == Levers(floor=0.1)
+    found = {
+        Levers(): {"tuned": 0.8, "macs": 9},
+        Levers(regularisation=0.1): {"tuned": 0.8001, "macs": 5},
+    }
+    assert chosen(found) == Levers(regularisation=0.1)
 
 
 def with_few_values(patch: pytest.MonkeyPatch) -> None:
     """One value a method, and few levers."""
     few = {
-        "FLOORS": (0.01,),
+        "REGULARISATIONS": (0.01,),
         "ITERATIONS": (60,),
         "LAMBDAS": (0.03,),
         "PAINTS": ((0.0, 0.0), (2.0, 0.0)),

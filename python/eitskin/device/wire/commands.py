@@ -144,12 +144,12 @@ class GetStats(Command):
 
 @dataclass(frozen=True)
 class MaskRow(Command):
-    """Leave protocol row ``row`` out (``bad`` 1) or use it again (0)."""
+    """Leave protocol row ``row`` out (``masked`` 1) or use it again (0)."""
 
     TYPE = PacketType.MASK_ROW
     LAYOUT = struct.Struct("<IHH")
     row: int
-    bad: int = 1
+    masked: int = 1
 
 
 COMMANDS: dict[int, type[Command]] = {

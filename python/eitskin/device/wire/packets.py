@@ -17,8 +17,8 @@ from eitskin.core.results import Touch
 
 LINK_VERSION = 3
 # EITS_FAULT_RAISE_FRAMES: in a row, until what a moving touch may look like for a frame is a fault
-SHOWN_FRAMES = 3
-CLEAN_FRAMES = 8  # EITS_FAULT_CLEAR_FRAMES: in a row without it, until what was found is over
+RAISE_FRAMES = 3
+CLEAR_FRAMES = 8  # EITS_FAULT_CLEAR_FRAMES: in a row without it, until what was found is over
 MAX_PAYLOAD = 16384
 STAGES = ("scan", "demodulate", "solve", "touches", "send", "frame")
 
@@ -90,7 +90,7 @@ class FaultCode(IntEnum):
     STALE_REFERENCE = 14
 
 
-# faults that frames show, and that go after CLEAN_FRAMES; of those of an electrode each has its own
+# faults that frames show, and that go after CLEAR_FRAMES; of those of an electrode each has its own
 FOUND_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.SATURATED, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY,
     FaultCode.MODEL_MISMATCH,
@@ -98,7 +98,7 @@ FOUND_FAULTS = frozenset(
 )  # fmt: skip
 DOUBTFUL_FAULTS = frozenset(
     (FaultCode.ELECTRODE_NOISY, FaultCode.MODEL_MISMATCH, FaultCode.STALE_REFERENCE)
-)  # rise after SHOWN_FRAMES
+)  # rise after RAISE_FRAMES
 ELECTRODE_FAULTS = frozenset(
     (FaultCode.ELECTRODE_OPEN, FaultCode.BRIDGED, FaultCode.ELECTRODE_NOISY)
 )

@@ -27,7 +27,7 @@ from eitskin_studies.experiments.electrodes.measuring import (
 )
 from eitskin_studies.experiments.electrodes.patterns import PATTERNS
 from eitskin_studies.experiments.electrodes.tables import all_tables, is_usual
-from eitskin_studies.experiments.electrodes.tuning import FLOORS, ITERATIONS, LAMBDAS
+from eitskin_studies.experiments.electrodes.tuning import ITERATIONS, LAMBDAS, REGULARISATIONS
 from eitskin_studies.experiments.experiment import Desk, Outcome
 from eitskin_studies.experiments.scored import number_text
 from eitskin_studies.harness.summary import summarise
@@ -36,7 +36,7 @@ from eitskin_studies.pictures.electrodes_pictures import Bar, draw_counts, draw_
 TITLE = "16, 32 and 64 electrodes and skip patterns, at equal noise and at equal time"
 SWEEP = {16: (64, 104), 32: (64, 128, 192), 64: (64, 128, 192)}
 GRIDS = (32, 40)
-TRIES = len(FLOORS) * len(LAMBDAS) * len(ITERATIONS)
+TRIES = len(REGULARISATIONS) * len(LAMBDAS) * len(ITERATIONS)
 SAID = (
     "Seed {seed}: {random} scenes of 1 to 3 random touches, {six} of six touches of radius 9 mm at"
     " least 36 mm apart, {pairs} pairs of radius 9 mm at each distance. For each row mu, lambda and"

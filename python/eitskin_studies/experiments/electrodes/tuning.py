@@ -1,4 +1,5 @@
-"""A scan's model with the floor, lambda, iterations and t that do best on the tuning scenes:
+"""A scan's model with the regularisation, lambda, iterations and t that do best on the tuning
+scenes:
 patterns differ in how fast their singular values fall, and what suits one starves another."""
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from eitskin.model.build import LIPSCHITZ_MARGIN
 from eitskin.model.model import Model
-from eitskin.model.reduction import DEFAULT_FLOOR, noise_gain, spectral_norm_squared
+from eitskin.model.reduction import DEFAULT_REGULARISATION, noise_gain, spectral_norm_squared
 from eitskin.model.storage import store
 from eitskin.scene.random_touches import Scene
 from eitskin.scoring import metrics
@@ -21,7 +22,11 @@ from eitskin_studies.experiments.scored import Bench
 
 FloatArray = npt.NDArray[np.float64]
 
-FLOORS, LAMBDAS, ITERATIONS = (0.1, DEFAULT_FLOOR, 1e-3), (0.03, 0.01, 0.003), (60, 150)
+REGULARISATIONS, LAMBDAS, ITERATIONS = (
+    (0.1, DEFAULT_REGULARISATION, 1e-3),
+    (0.03, 0.01, 0.003),
+    (60, 150),
+)
 
 
 @dataclass(frozen=True)
@@ -29,22 +34,22 @@ class Chosen:
     """What was chosen: mu of the whitening, least lambda over lambda_max, iterations, t of the
     mask."""
 
-    floor: float
+    regularisation: float
     lambda_rel: float
     iterations: int
     t: float
 
 
-def with_floor(model: Model, floor: float) -> Model:
-    """``model``, made with the default floor, as it is with another: its singular vectors stay,
-    only rows are scaled.
+def with_regularisation(model: Model, regularisation: float) -> Model:
+    """``model``, made with the default regularisation, as it is with another: its singular vectors
+    stay, only rows are scaled.
 
     A row of S has the norm a = s / sqrt(s^2 + mu s_1^2), which says s / s_1.
     """
     norm = np.linalg.norm(model.sensitivity, axis=1)
     square = np.minimum(norm**2, 1 - 1e-9)
-    relative = DEFAULT_FLOOR * square / (1 - square)
-    scale = np.sqrt((relative + DEFAULT_FLOOR) / (relative + floor))
+    relative = DEFAULT_REGULARISATION * square / (1 - square)
+    scale = np.sqrt((relative + DEFAULT_REGULARISATION) / (relative + regularisation))
     projection = (scale[:, None] * model.projection).astype(np.float32)
     stored = store(scale[:, None] * model.sensitivity, model.stored.storage)
     decoded = stored.decode(model.rank)
@@ -67,11 +72,11 @@ def tuned(
     """The best of all settings on tuning scenes with their frames, quiet (q, m) and touched (k, m):
     by the sum of image MIoU, disc MIoU and exactly counted share; the first of equals."""
     best: tuple[float, Bench, Chosen] | None = None
-    for floor in FLOORS:
-        floored = with_floor(model, floor)
+    for regularisation in REGULARISATIONS:
+        regularised = with_regularisation(model, regularisation)
         for lambda_rel, iterations in product(LAMBDAS, ITERATIONS):
             defaults = replace(model.defaults, lambda_rel=lambda_rel, iterations=iterations)
-            bench = Bench(replace(floored, defaults=defaults), judge)
+            bench = Bench(replace(regularised, defaults=defaults), judge)
             truths = bench.truths(scenes)
             results = reconstruct_many(bench.model, frames_v, quiet_v, threads=1)
             curves = judge.curves(
@@ -87,6 +92,6 @@ def tuned(
             ]
             value = round(float(curves.mean(axis=0).max() + np.mean(discs) + np.mean(exact)), 9)
             if best is None or value > best[0]:
-                best = value, bench, Chosen(floor, lambda_rel, iterations, t)
+                best = value, bench, Chosen(regularisation, lambda_rel, iterations, t)
     assert best is not None
     return best[1:]

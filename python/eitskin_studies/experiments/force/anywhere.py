@@ -75,7 +75,7 @@ def judge(
     found = calibrate(presses, radius_mm, resamples=0)
     there = np.isfinite(read.value) & (read.value > 0)
     loads = np.full(len(read.value), np.nan)
-    loads[there] = found.law.loads_at(read.place_mm[there], read.value[there]) / NEWTONS_PER_GRAM
+    loads[there] = found.law.forces_at(read.place_mm[there], read.value[there]) / NEWTONS_PER_GRAM
     values = np.where(there, read.value, np.nan).reshape(-1, len(LOADS_G))
     raw = values / np.nanmean(values, axis=0) - 1
     off = (loads / reported.grams - 1).reshape(raw.shape)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from eitskin.core.results import ALL_SEARCH, COUPLED, REGROUP, STRAIGHT
+from eitskin.core.results import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE
 from eitskin.model.build import BuildSettings
 
 
@@ -29,33 +29,33 @@ def _searching(name: str, bits: int, **options: Any) -> Lever:
 
 SEARCHES = (
     _searching("peaks alone", 0),
-    _searching("log data first", STRAIGHT),
-    _searching("interaction", COUPLED),
-    _searching("log data, split and merge", STRAIGHT | REGROUP),
-    _searching("log data, interaction", STRAIGHT | COUPLED),
-    _searching("split and merge, interaction", REGROUP | COUPLED),
-    _searching("all (the default)", ALL_SEARCH),
-    _searching("all, 12 sweeps", ALL_SEARCH, touch_sweeps=12),
+    _searching("log data first", LOG_DATA),
+    _searching("interaction", INTERACTION),
+    _searching("log data, split and merge", LOG_DATA | SPLIT_MERGE),
+    _searching("log data, interaction", LOG_DATA | INTERACTION),
+    _searching("split and merge, interaction", SPLIT_MERGE | INTERACTION),
+    _searching("all (the default)", ALL_TOUCH_FIT),
+    _searching("all, 12 sweeps", ALL_TOUCH_FIT, touch_sweeps=12),
     Lever("log-ratio model", BuildSettings(data_kind="log-ratio")),
 )
 
 CALM = {"iterations": 120, "lambda_rel": 0.01}
 GOOD = {"lambda_rel": 0.01}
 FINE = {"iterations": 90, "lambda_rel": 0.005}
-BEST = BuildSettings(rank=80, pixels_across=40, floor=0.05)
+BEST = BuildSettings(rank=80, pixels_across=40, regularisation=0.05)
 LONG = {"iterations": 150, "lambda_rel": 0.003}
 
 IMAGES = (
     Lever("standard"),
-    Lever("standard, refined", options={"refine": True}),
+    Lever("standard, refined", options={"second_pass": True}),
     Lever("good", options=GOOD),
-    Lever("good, refined", options={**GOOD, "refine": True}),
+    Lever("good, refined", options={**GOOD, "second_pass": True}),
     Lever("fine", options=FINE),
-    Lever("fine, refined", options={**FINE, "refine": True}),
-    Lever("calm", BuildSettings(floor=0.1), CALM),
-    Lever("calm, refined", BuildSettings(floor=0.1), {**CALM, "refine": True}),
+    Lever("fine, refined", options={**FINE, "second_pass": True}),
+    Lever("calm", BuildSettings(regularisation=0.1), CALM),
+    Lever("calm, refined", BuildSettings(regularisation=0.1), {**CALM, "second_pass": True}),
     Lever("best", BEST, LONG),
-    Lever("best, refined", BEST, {**LONG, "refine": True}),
+    Lever("best, refined", BEST, {**LONG, "second_pass": True}),
     Lever("log-ratio", BuildSettings(data_kind="log-ratio")),
     Lever("log-ratio, fine", BuildSettings(data_kind="log-ratio"), FINE),
 )

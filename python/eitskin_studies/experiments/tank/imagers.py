@@ -69,13 +69,13 @@ class Levers:
 
     Attributes:
         kind: of the data.
-        floor, lambda_rel, iterations: of whitening and solver.
+        regularisation, lambda_rel, iterations: of whitening and solver.
         atom: radius in pixels of the discs that an image is made of; 0 for single pixels.
         blur: radius in pixels of the disc over which the finished image is averaged; 0 for none.
     """
 
     kind: str = "difference"
-    floor: float = 0.01
+    regularisation: float = 0.01
     lambda_rel: float = 0.03
     iterations: int = 60
     atom: float = 0.0
@@ -103,10 +103,10 @@ class Tank:
             self.kernels[radius_pixels] = disc_kernel(self.grid, radius_pixels)
         return self.kernels[radius_pixels]
 
-    def model(self, kind: str, floor: float, atom: float) -> Model:
+    def model(self, kind: str, regularisation: float, atom: float) -> Model:
         """A model for metal in this tank, whose coefficients are discs of ``atom`` pixels' radius,
         or single pixels."""
-        key = kind, floor, atom
+        key = kind, regularisation, atom
         if key not in self.models:
             linear = self.linear
             if atom:
@@ -114,7 +114,7 @@ class Tank:
                     linear.grid, linear.jacobian @ self.kernel(atom), linear.v0_v, linear.elements
                 )
             settings = BuildSettings(
-                data_kind=kind, floor=floor, touch_change_ratio=TOUCH_CHANGE_RATIO
+                data_kind=kind, regularisation=regularisation, touch_change_ratio=TOUCH_CHANGE_RATIO
             )
             self.models[key] = make_model(self.skin, self.protocol, linear, settings)
         return self.models[key]
@@ -170,7 +170,7 @@ class CoreImager:
         self._grid, self._painted = tank.grid, painted
         blur = tank.kernel(levers.blur)
         self._paint = (blur / blur.sum(axis=1, keepdims=True)) @ tank.kernel(levers.atom)
-        self._solver = Reconstructor(tank.model(levers.kind, levers.floor, levers.atom))
+        self._solver = Reconstructor(tank.model(levers.kind, levers.regularisation, levers.atom))
         self._solver.with_options(
             iterations=levers.iterations, lambda_rel=levers.lambda_rel, **(options or {})
         )

@@ -17,7 +17,7 @@ from eitskin_studies.experiments.tank.contest import Grounds
 from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, Tank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
 
-FLOORS = (0.01, 0.03, 0.1, 0.3)
+REGULARISATIONS = (0.01, 0.03, 0.1, 0.3)
 ITERATIONS = (15, 30, 60, 120)
 LAMBDAS = (0.01, 0.03, 0.1)
 PAINTS = ((0.0, 0.0), (0.0, 1.0), (0.0, 1.5), (1.5, 0.0), (2.0, 0.0))  # (atom, blur)
@@ -27,7 +27,9 @@ def one_by_one(kind: str) -> list[Levers]:
     """The defaults on data of ``kind``, and each lever alone."""
     start = Levers(kind=kind)
     changes: list[dict[str, Any]] = [{}]
-    changes += [{"floor": value} for value in FLOORS if value != start.floor]
+    changes += [
+        {"regularisation": value} for value in REGULARISATIONS if value != start.regularisation
+    ]
     changes += [{"iterations": value} for value in ITERATIONS if value != start.iterations]
     changes += [{"lambda_rel": value} for value in LAMBDAS if value != start.lambda_rel]
     changes += [{"atom": atom, "blur": blur} for atom, blur in PAINTS if atom or blur]
@@ -37,8 +39,10 @@ def one_by_one(kind: str) -> list[Levers]:
 def together(kind: str) -> list[Levers]:
     """Floor, iterations and paint together, at the usual lambda."""
     return [
-        Levers(kind=kind, floor=floor, iterations=iterations, atom=atom, blur=blur)
-        for (atom, blur), floor, iterations in product(PAINTS, FLOORS, ITERATIONS)
+        Levers(
+            kind=kind, regularisation=regularisation, iterations=iterations, atom=atom, blur=blur
+        )
+        for (atom, blur), regularisation, iterations in product(PAINTS, REGULARISATIONS, ITERATIONS)
     ]
 
 
@@ -70,7 +74,9 @@ def entry_of(tank: Tank, name: str, levers: Levers) -> Entry:
 def words_of(levers: Levers) -> str:
     """What differs from the defaults."""
     start, words = Levers(kind=levers.kind), []
-    words += [f"mu {levers.floor:g}"] if levers.floor != start.floor else []
+    words += (
+        [f"mu {levers.regularisation:g}"] if levers.regularisation != start.regularisation else []
+    )
     words += [f"{levers.iterations} iterations"] if levers.iterations != start.iterations else []
     words += [f"lambda {levers.lambda_rel:g}"] if levers.lambda_rel != start.lambda_rel else []
     words += [f"atoms of {levers.atom:g} pixels"] if levers.atom else []
