@@ -17,23 +17,12 @@ Content = TypeVar("Content")
 
 LONGEST_LINE = 4000
 NAN, INFINITE, BYTE_ORDER_MARK, LINE_SEPARATOR = (
-    b"\0\0\xc0\x7f",
-    b"\0\0\x80\x7f",
-    b"\xef\xbb\xbf",
-    b"\xe2\x80\xa8",
-)
+    b"\0\0\xc0\x7f", b"\0\0\x80\x7f", b"\xef\xbb\xbf", b"\xe2\x80\xa8",
+)  # fmt: skip
 ODD_BYTES = (
-    b"\0",
-    b"\xff",
-    b"\n",
-    b"\r\n",
-    b"\0" * 16,
-    b"\xff" * 4,
-    NAN,
-    INFINITE,
-    BYTE_ORDER_MARK,
+    b"\0", b"\xff", b"\n", b"\r\n", b"\0" * 16, b"\xff" * 4, NAN, INFINITE, BYTE_ORDER_MARK,
     LINE_SEPARATOR,
-)
+)  # fmt: skip
 ODD_WORDS = (
     b"nan", b"inf", b"-inf", b"-1", b"0", b"1e999", b"1e-999", b"9" * 20, b"9" * 5000,
     b"0x7fffffffffffffff", b"1_0", b"true",

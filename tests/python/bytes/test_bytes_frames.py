@@ -45,16 +45,12 @@ def stored(**arrays: Any) -> bytes:
 
 
 FIELDS: dict[str, Any] = {
-    "format": np.array("eitskin-frames"),
-    "version": np.array(1, dtype=np.int32),
-    "voltage_v": VOLTS,
-    "reference_voltage_v": VOLTS[:1],
-    "drive_measure": np.asarray(PROTOCOL.drive_measure),
-    "n_electrodes": np.array(8),
-    "current_a": np.array(1e-3),
-    "frame_name": np.array(["a", "b", "c"]),
+    "format": np.array("eitskin-frames"), "version": np.array(1, dtype=np.int32),
+    "voltage_v": VOLTS, "reference_voltage_v": VOLTS[:1],
+    "drive_measure": np.asarray(PROTOCOL.drive_measure), "n_electrodes": np.array(8),
+    "current_a": np.array(1e-3), "frame_name": np.array(["a", "b", "c"]),
     "meta": np.array(json.dumps({"unit": "V"})),
-}
+}  # fmt: skip
 FOREIGN = {
     "v": VOLTS,
     "ref": VOLTS[0],
@@ -105,12 +101,9 @@ def test_each_field_may_hold_anything(tmp_path: Path, name: str) -> None:
 
 def test_each_array_of_a_foreign_file_may_hold_anything(tmp_path: Path) -> None:
     keys = {
-        "voltage": "v",
-        "reference": "ref",
-        "names": "names",
-        "time": "t",
+        "voltage": "v", "reference": "ref", "names": "names", "time": "t",
         "protocol_table": "table",
-    }
+    }  # fmt: skip
     good = {**FOREIGN, "t": np.arange(3.0)}
     for key, value in ((key, value) for key in keys.values() for value in ODD_ARRAYS):
         path = written(tmp_path, "x.npz", stored(**{**good, key: value, "odd\nname": np.array(1)}))

@@ -45,12 +45,9 @@ def board() -> BoardInfo:
     text = {"board": "fake", "serial": "1"}
     values = dict.fromkeys(BoardInfo.__dataclass_fields__, 1) | text | {"firmware": (0, 1, 0)}
     hashed = {
-        "n_electrodes": 8,
-        "n_rows": ROWS,
-        "protocol_hash": PROTOCOL.hash,
-        "electrodes": 16,
+        "n_electrodes": 8, "n_rows": ROWS, "protocol_hash": PROTOCOL.hash, "electrodes": 16,
         "model_bytes": 0,
-    }
+    }  # fmt: skip
     return BoardInfo(**{**values, **hashed})
 
 

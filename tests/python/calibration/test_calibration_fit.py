@@ -108,12 +108,10 @@ def test_the_same_seed_gives_the_same() -> None:
     [
         (slice(0, 3), "3 presses are too few; record at least 4"),
         (np.arange(0, 120, 5), "1 different weights are too few; use at least 3"),
-        (
-            np.flatnonzero(np.isin(np.tile(LOADS_N, 24), [1.0, 1.5])),
-            "2 different weights are too few",
-        ),
+        (np.flatnonzero(np.isin(np.tile(LOADS_N, 24), [1.0, 1.5])),
+         "2 different weights are too few"),
     ],
-)
+)  # fmt: skip
 def test_too_little_is_refused(rows: object, text: str) -> None:
     with pytest.raises(FrameError, match=text):
         calibrate(presses().take(np.arange(120)[rows]), RADIUS_MM)  # type: ignore[index]

@@ -33,21 +33,15 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
     [
         ("", "lists no weight; give frames and load of each"),
         ("first,weight_g\n", "lists no weight"),
-        (
-            "first,weight_kg\n0,1\n",
-            "its first line: unknown key 'weight_kg'; did you mean 'weight_g'?",
-        ),
+        ("first,weight_kg\n0,1\n",
+         "its first line: unknown key 'weight_kg'; did you mean 'weight_g'?"),
         ("first,weight_g\n0\n", "row 1 below the header: 1 cells under 2 names; give as many"),
-        (
-            "first,weight_g\n0,many\n",
-            "row 1 below the header: weight_g must be a number, not 'many'",
-        ),
+        ("first,weight_g\n0,many\n",
+         "row 1 below the header: weight_g must be a number, not 'many'"),
         ("first,weight_g\n0,nan\n", "weight_g = nan is out of range"),
         ("first,weight_g\n0,0\n", "weight_g = 0.0 is out of range; it must be above 0"),
-        (
-            "first,weight_g\n0,\n",
-            "give the load as weight_g (grams) or as force_n (newtons), one of them",
-        ),
+        ("first,weight_g\n0,\n",
+         "give the load as weight_g (grams) or as force_n (newtons), one of them"),
         ("first,weight_g,force_n\n0,1,1\n", "one of them"),
         ("first,weight_g,x_mm\n0,1,1\n", "a place needs x_mm and y_mm; give both or none"),
         ("first,weight_g\n-1,5\n", "first = -1.0 is out of range"),
@@ -55,15 +49,13 @@ def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("weight_g\n5\n", "the key 'first' is required"),
         ("first,weight_g\n0.5,5\n", "first = 0.5 must be a whole number"),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_is_told_in_a_line(tmp_path: Path, text: str, line: str) -> None:
     with pytest.raises(ConfigError) as caught:
         load_weights(written(tmp_path, text))
-    assert (
-        line in str(caught.value)
-        and str(caught.value).startswith(str(tmp_path))
-        and "\n" not in str(caught.value)
-    )
+    assert line in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path))
+    assert "\n" not in str(caught.value)
 
 
 def test_toml_of_another_form(tmp_path: Path) -> None:

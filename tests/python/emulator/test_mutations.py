@@ -16,14 +16,9 @@ from emulated import IMAGE
 from small_models import small_blob
 
 COPIED = (
-    "csrc",
-    "firmware",
-    "cmake",
-    "tests/emulated",
-    "tests/soak",
-    "CMakeLists.txt",
+    "csrc", "firmware", "cmake", "tests/emulated", "tests/soak", "CMakeLists.txt",
     "CMakePresets.json",
-)
+)  # fmt: skip
 TARGET = "eitskin_nucleo_f767zi"
 
 

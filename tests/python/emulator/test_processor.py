@@ -203,15 +203,12 @@ void program(void) {
     ("on", "off", "held"),
     [
         ('__asm volatile("cpsid i");', '__asm volatile("cpsie i");', True),
-        (
-            '__asm volatile("msr basepri, %0" :: "r"(0x80));',
-            '__asm volatile("msr basepri, %0" :: "r"(0));',
-            True,
-        ),
+        ('__asm volatile("msr basepri, %0" :: "r"(0x80));',
+         '__asm volatile("msr basepri, %0" :: "r"(0));', True),
         ('__asm volatile("msr basepri, %0" :: "r"(0x90));', "", False),
         ('__asm volatile("cpsid f");', '__asm volatile("cpsie f");', True),
     ],
-)
+)  # fmt: skip
 def test_masks_hold_interrupts_back(on: str, off: str, held: bool) -> None:
     taken, unmasked = out(run_program(CLOCK + MASKS % (on, off), 2000), 2)
     if held:

@@ -234,16 +234,10 @@ def test_mode_1_clocks_too_early() -> None:
         (SPI.replace("@ |", "@ | 1u << 7 |"), SHIFT, 5),
     ],
     ids=[
-        "clock off",
-        "pin mode",
-        "pin function",
-        "no FSYNC",
-        "FSYNC too soon",
-        "FSYNC no output",
-        "8 bits",
-        "LSB first",
+        "clock off", "pin mode", "pin function", "no FSYNC", "FSYNC too soon", "FSYNC no output",
+        "8 bits", "LSB first",
     ],
-)
+)  # fmt: skip
 def test_what_does_not_reach_the_generator(setup: str, shift: str, words: int) -> None:
     assert (setup, shift) != (SPI, SHIFT)
     board = shifted(setup, shift=shift)

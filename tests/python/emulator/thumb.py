@@ -23,13 +23,8 @@ BOARD = ROOT / "firmware" / "boards" / "nucleo_f767zi"
 OUT = 0x20010000  # where programs leave what they found
 STACK_TOP = 0x20008000
 FLAGS = [
-    "-mcpu=cortex-m7",
-    "-mthumb",
-    "-mfpu=fpv5-sp-d16",
-    "-mfloat-abi=hard",
-    "-O1",
-    "-ffreestanding",
-]
+    "-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard", "-O1", "-ffreestanding",
+]  # fmt: skip
 LINK = """
 SECTIONS {
     . = 0x08000000;

@@ -103,14 +103,9 @@ def test_numbering_is_advised_by_known_touches_and_mends(
     turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
     path, mended = write(tmp_path / "s.npz", one_off(turned, [40], 1.5)), tmp_path / "mended.npz"
     touch = (
-        "--skin",
-        tmp_path / "skin.toml",
-        "--touch",
-        "30,40,8",
-        "--touch=-50,10,8",
-        "--touch-in",
+        "--skin", tmp_path / "skin.toml", "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in",
         "0",
-    )
+    )  # fmt: skip
     assert run("doctor", path, *NPZ, *touch, "--json") == 11
     report = json.loads(capsys.readouterr().out)
     assert report["mend"] == "--rotate 5 --mirror"
@@ -158,10 +153,8 @@ def test_import_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture
         "V",
     )
     frames = load_frames(tmp_path / "o.npz")
-    assert (
-        frames.protocol.current_a == 2e-3
-        and said["protocol_hash"] == f"{frames.protocol.hash:016x}"
-    )
+    assert frames.protocol.current_a == 2e-3
+    assert said["protocol_hash"] == f"{frames.protocol.hash:016x}"
     assert frames.meta["source"] == "s.npz"
     assert run(*words) == 0
     assert "next: eitskin doctor" in capsys.readouterr().out
@@ -174,11 +167,9 @@ def test_the_doctor_examines_frames_files_and_prints_evidence(
     save_frames(path, rotating(quiet_only(healthy_frames(15))))
     assert run("doctor", path) == 11
     text = capsys.readouterr().out
-    assert (
-        "FAULT order" in text
-        and "rotating 0.9" in text
-        and "mend: eitskin import ... --order rotating" in text
-    )
+    assert "FAULT order" in text
+    assert "rotating 0.9" in text
+    assert "mend: eitskin import ... --order rotating" in text
     save_frames(path, quiet_only(healthy_frames(15, opposite(16))))
     assert run("doctor", path) == 0
     assert "0 faults, 0 notes: nothing must be mended" in capsys.readouterr().out
@@ -195,14 +186,9 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(
     values[measured] = np.column_stack([frames.reference_v, frames.voltage_v[0]])[index]
     np.savetxt(tmp_path / "all.csv", values, delimiter=",")
     words = (
-        tmp_path / "all.csv",
-        "--protocol",
-        "adjacent",
-        "--electrodes",
-        "16",
-        "--reference-columns",
+        tmp_path / "all.csv", "--protocol", "adjacent", "--electrodes", "16", "--reference-columns",
         "0",
-    )
+    )  # fmt: skip
     assert run("doctor", *words, "--json") == 11
     report = json.loads(capsys.readouterr().out)
     assert [finding["name"] for finding in report["findings"]] == ["order"]
@@ -228,22 +214,16 @@ def test_the_picture_is_drawn(tmp_path: Path) -> None:
         (("--skin", "SKIN", "--electrodes", "8"), "--electrodes 8: the skin .* has 16"),
         (("--skin", "SKIN", "--swap", "3"), "--swap 3: name two electrodes"),
         (("--skin", "SKIN", "--drop-channels", "3,x"), "'x' is no whole number or range"),
-        (
-            ("--skin", "SKIN", "--truth-mask", "v", "--truth-mask-extent", "1,2"),
-            "XMIN,YMIN,XMAX,YMAX",
-        ),
+        (("--skin", "SKIN", "--truth-mask", "v", "--truth-mask-extent", "1,2"),
+         "XMIN,YMIN,XMAX,YMAX"),
         (("--skin", "SKIN", "--touch", "1"), "X,Y or X,Y,RADIUS"),
         (("--skin", "SKIN", "--touch", "500,0"), "outside the skin"),
-        (
-            ("--skin", "SKIN", "--touch", "5,0", "--touch-in", "zz"),
-            "--touch-in zz: no such frame; frames are 0",
-        ),
-        (
-            ("--protocol", "adjacent", "--electrodes", "16", "--touch", "5,0"),
-            "--touch needs --skin FILE",
-        ),
+        (("--skin", "SKIN", "--touch", "5,0", "--touch-in", "zz"),
+         "--touch-in zz: no such frame; frames are 0"),
+        (("--protocol", "adjacent", "--electrodes", "16", "--touch", "5,0"),
+         "--touch needs --skin FILE"),
     ],
-)
+)  # fmt: skip
 def test_bad_words_are_refused_in_one_line(
     tmp_path: Path, words: tuple[Any, ...], said: str
 ) -> None:

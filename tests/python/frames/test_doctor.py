@@ -321,9 +321,8 @@ def test_gain_faults_are_told_apart() -> None:
     for name, columns, gain in (("drive", [0, 1], 0.7), ("measure", [2, 3], 1.3)):
         of_pair = (ROWS[:, columns] == [3, 4]).all(axis=1)
         finding = only(times(frames, np.where(of_pair, gain, 1.0)), f"{name}-pair-gain")
-        assert finding.evidence["pair"] == [3, 4] and finding.evidence["gain"] == pytest.approx(
-            gain, rel=0.03
-        )
+        assert finding.evidence["pair"] == [3, 4]
+        assert finding.evidence["gain"] == pytest.approx(gain, rel=0.03)
     report = report_of(times(frames, rng.uniform(0.8, 1.2, 208)))
     assert named(report) == [("gain-spread", "fault"), ("reciprocity", "fault")]
     assert report.mend == "--equalise"
@@ -351,10 +350,8 @@ def test_channels_of_the_wrong_sign_are_named() -> None:
     assert only(times(frames, some), "flipped-channels").mend == "--flip-channels 17,90"
     of_pair = (ROWS[:, :2] == [3, 4]).all(axis=1)
     finding = only(times(frames, np.where(of_pair, -1.0, 1.0)), "flipped-channels")
-    assert (
-        "drive [3, 4]" in finding.text
-        and finding.evidence["channels"] == np.flatnonzero(of_pair).tolist()
-    )
+    assert "drive [3, 4]" in finding.text
+    assert finding.evidence["channels"] == np.flatnonzero(of_pair).tolist()
 
 
 def test_values_that_are_no_numbers_are_counted_and_named() -> None:

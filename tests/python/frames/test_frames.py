@@ -19,19 +19,16 @@ CHANNELS = 40
 def make_frames(**changes: Any) -> Frames:
     rng = np.random.default_rng(1)
     fields: dict[str, Any] = {
-        "protocol": PROTOCOL,
-        "voltage_v": rng.normal(size=(3, CHANNELS)),
-        "reference_voltage_v": rng.normal(size=(5, CHANNELS)),
-        "frame_name": ("a", "b", "ü"),
-        "time_s": np.array([0.0, 0.1, 0.25]),
-        "touch_frame": np.array([0, 2, 2]),
+        "protocol": PROTOCOL, "voltage_v": rng.normal(size=(3, CHANNELS)),
+        "reference_voltage_v": rng.normal(size=(5, CHANNELS)), "frame_name": ("a", "b", "ü"),
+        "time_s": np.array([0.0, 0.1, 0.25]), "touch_frame": np.array([0, 2, 2]),
         "touch_xy_mm": np.array([[0.0, 1.0], [2.0, 3.0], [-4.0, 5.5]]),
         "touch_radius_mm": np.array([6.0, 7.0, 8.0]),
         "touch_strength": np.array([2.0, -0.5, np.nan]),
         "truth_mask": rng.integers(-1, 2, size=(3, 4, 6)).astype(np.int8),
         "truth_mask_extent_mm": (-97.0, -97.0, 97.0, 97.0),
         "meta": {"source": "seed 1", "options": {"snr_db": 60.0}},
-    }
+    }  # fmt: skip
     return Frames(**(fields | changes))
 
 
@@ -40,14 +37,9 @@ def test_saved_frames_come_back_equal(tmp_path: Path) -> None:
     save_frames(tmp_path / "f.npz", frames)
     back = load_frames(tmp_path / "f.npz")
     same = (
-        "voltage_v",
-        "reference_voltage_v",
-        "time_s",
-        "touch_frame",
-        "touch_xy_mm",
-        "touch_radius_mm",
-        "truth_mask",
-    )
+        "voltage_v", "reference_voltage_v", "time_s", "touch_frame", "touch_xy_mm",
+        "touch_radius_mm", "truth_mask",
+    )  # fmt: skip
     for name in same:
         assert np.array_equal(getattr(back, name), getattr(frames, name)), name
         assert getattr(back, name).dtype == getattr(frames, name).dtype, name
@@ -92,10 +84,8 @@ def test_one_reference_frame_becomes_a_row_and_names_are_counted() -> None:
     ("change", "said"),
     [
         ({"voltage_v": np.zeros((3, 41))}, r"voltage_v has shape \(3, 41\)"),
-        (
-            {"voltage_v": np.zeros((3, CHANNELS), dtype=complex)},
-            "must be real numbers, not complex128",
-        ),
+        ({"voltage_v": np.zeros((3, CHANNELS), dtype=complex)},
+         "must be real numbers, not complex128"),
         ({"voltage_v": np.full((3, CHANNELS), np.inf)}, "frame 0, channel 0 is inf"),
         ({"reference_voltage_v": np.zeros((0, CHANNELS))}, "at least one quiet frame"),
         ({"frame_name": ("a",)}, "1 names for 3 frames"),
@@ -109,7 +99,7 @@ def test_one_reference_frame_becomes_a_row_and_names_are_counted() -> None:
         ({"truth_mask_extent_mm": None}, "truth_mask_extent_mm"),
         ({"truth_mask_extent_mm": (1, 0, 0, 1)}, "truth_mask_extent_mm"),
     ],
-)
+)  # fmt: skip
 def test_wrong_fields_are_named(change: dict[str, Any], said: str) -> None:
     with pytest.raises(FrameError, match=said) as caught:
         make_frames(**change)
@@ -136,10 +126,8 @@ def rewritten(path: Path, **changes: Any) -> Path:
         ({"extra": np.zeros(2)}, "unknown field 'extra'"),
         ({"meta": np.array("{")}, "'meta' is not JSON"),
         ({"meta": np.array("[1]")}, "'meta' is not a JSON object"),
-        (
-            {"drive_measure": np.zeros((CHANNELS, 4), dtype=int)},
-            "pair of one|two different|electrode",
-        ),
+        ({"drive_measure": np.zeros((CHANNELS, 4), dtype=int)},
+         "pair of one|two different|electrode"),
         ({"drive_measure": np.zeros((CHANNELS, 3), dtype=int)}, "table"),
         ({"n_electrodes": np.array(6)}, "electrode"),
         ({"current_a": np.array(0.0)}, "current_a"),
@@ -147,7 +135,7 @@ def rewritten(path: Path, **changes: Any) -> Path:
         ({"voltage_v": np.array(["a"])}, "real numbers"),
         ({"touch_frame": np.array([0, 9, 1])}, "there are 0 to 2"),
     ],
-)
+)  # fmt: skip
 def test_wrong_files_are_refused_in_one_line_naming_the_file(
     tmp_path: Path, change: dict[str, Any], said: str
 ) -> None:

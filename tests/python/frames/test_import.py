@@ -193,9 +193,8 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
     options = SourceOptions(columns="one", reference_columns="q0,q1", scale=1.0)
     got = import_frames(rows, ImportOptions(source=options), adjacent(16), None)
     assert got.frame_name == ("one",) and len(got.reference_voltage_v) == 2
-    assert np.array_equal(got.voltage_v, voltage) and np.array_equal(
-        got.reference_voltage_v, quiet[:2]
-    )
+    assert np.array_equal(got.voltage_v, voltage)
+    assert np.array_equal(got.reference_voltage_v, quiet[:2])
     wide = tmp_path / "wide.csv"
     times = np.arange(len(quiet) + 1) * 0.25
     np.savetxt(
@@ -206,9 +205,8 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
     )
     options = SourceOptions(columns="1:209", time="0", reference_frames="0:12", scale=1e-3)
     got = import_frames(wide, ImportOptions(source=options), adjacent(16), None)
-    assert np.allclose(got.voltage_v, voltage, rtol=1e-12) and np.allclose(
-        got.reference_voltage_v, quiet, rtol=1e-12
-    )
+    assert np.allclose(got.voltage_v, voltage, rtol=1e-12)
+    assert np.allclose(got.reference_voltage_v, quiet, rtol=1e-12)
     assert got.time_s is not None and got.time_s.tolist() == [3.0]
     assert got.meta["unit"] == "V" and got.meta["options"]["scale"] == 1e-3
     with pytest.raises(
@@ -238,10 +236,8 @@ def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> 
     np.savetxt(tmp_path / "z.csv", pairs, delimiter=",", fmt="%.17g")
     columns = SourceOptions(columns="2,3", reference_columns="0,1", complex_part=part)
     got = import_frames(tmp_path / "z.csv", ImportOptions(source=columns), adjacent(16), None)
-    assert (
-        np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
-        and got.meta["unit"] == "unknown, taken as V"
-    )
+    assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
+    assert got.meta["unit"] == "unknown, taken as V"
     with pytest.raises(UsageError, match="numbers are complex; say with --complex-part"):
         import_frames(tmp_path / "z.npz", ImportOptions(source=KEYS), adjacent(16), None)
     with pytest.raises(UsageError, match="pairs re,im; 1 are named"):
@@ -297,18 +293,14 @@ def test_truth_comes_along_in_millimetres(tmp_path: Path) -> None:
     )
     options = ImportOptions(source=replace(KEYS, names="names"), truth=truth)
     got = import_frames(path, options, adjacent(16), paper_skin())
-    assert (
-        got.touch_frame is not None and got.touch_xy_mm is not None and got.touch_sign is not None
-    )
+    assert got.touch_frame is not None
+    assert got.touch_xy_mm is not None
+    assert got.touch_sign is not None
     assert got.touch_frame.tolist() == [0, 0] and got.touch_sign.tolist() == [1, -1]
     assert np.allclose(got.touch_xy_mm, [[9.7, 19.4], [29.1, -38.8]])
     assert got.touch_strength is not None and np.isnan(got.touch_strength).all()
-    assert np.array_equal(got.truth_mask, mask) and got.truth_mask_extent_mm == (
-        -97.0,
-        -97.0,
-        97.0,
-        97.0,
-    )
+    assert np.array_equal(got.truth_mask, mask)
+    assert got.truth_mask_extent_mm == (-97.0, -97.0, 97.0, 97.0)
     top_first = replace(options, truth=replace(truth, mask_top_first=True))
     flipped = import_frames(path, top_first, adjacent(16), paper_skin())
     assert np.array_equal(flipped.truth_mask, mask[:, ::-1])

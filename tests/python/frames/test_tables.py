@@ -21,30 +21,16 @@ def write(tmp_path: Path, text: str | bytes) -> Path:
 @pytest.mark.parametrize(
     "text",
     [
-        "1,2.5,-3e-2\n4,5,6\n",
-        "1;2.5;-3e-2\n4;5;6\n",
-        "1;2,5;-3e-2\n4;5;6\n",
-        "1\t2.5\t-3e-2\r\n4\t5\t6\r\n",
-        "  1   2.5  -3e-2\n  4   5    6\n",
-        "1|2.5|-3e-2\n4|5|6\n",
-        "1,2.5,-3e-2,\n4,5,6,\n",
-        "# made by hand\n\nre,im,third\n1,2.5,-3e-2\n\n4,5,6\n",
-        '"a";"b";"c"\n"1";"2,5";"-0,03"\n4;5;6\n',
-        b"\xef\xbb\xbf1,2.5,-3e-2\n4,5,6",
+        "1,2.5,-3e-2\n4,5,6\n", "1;2.5;-3e-2\n4;5;6\n", "1;2,5;-3e-2\n4;5;6\n",
+        "1\t2.5\t-3e-2\r\n4\t5\t6\r\n", "  1   2.5  -3e-2\n  4   5    6\n", "1|2.5|-3e-2\n4|5|6\n",
+        "1,2.5,-3e-2,\n4,5,6,\n", "# made by hand\n\nre,im,third\n1,2.5,-3e-2\n\n4,5,6\n",
+        '"a";"b";"c"\n"1";"2,5";"-0,03"\n4;5;6\n', b"\xef\xbb\xbf1,2.5,-3e-2\n4,5,6",
     ],
     ids=[
-        "comma",
-        "semicolon",
-        "decimal-comma",
-        "tab",
-        "spaces",
-        "bar",
-        "ends-in-comma",
-        "header",
-        "quotes",
-        "bom",
+        "comma", "semicolon", "decimal-comma", "tab", "spaces", "bar", "ends-in-comma", "header",
+        "quotes", "bom",
     ],
-)
+)  # fmt: skip
 def test_the_same_numbers_come_out_of_every_dialect(tmp_path: Path, text: str | bytes) -> None:
     assert read_table(write(tmp_path, text)).numbers(range(3)).tolist() == [
         [1, 2.5, -0.03],

@@ -53,13 +53,9 @@ def frames_of(
         for t in scenes()[k].touches
     ]
     head = {
-        "name": "fault",
-        "skin": "paper",
-        "seed": 1000 * SEED + k,
-        "frames": frames,
-        "rate_hz": rate_hz,
-        "quiet_frames": 1,
-    }
+        "name": "fault", "skin": "paper", "seed": 1000 * SEED + k, "frames": frames,
+        "rate_hz": rate_hz, "quiet_frames": 1,
+    }  # fmt: skip
     text = {"scene": head, "touch": touches, "effects": CONTACTS | effects}
     scene = scene_from_table(text, "fault", Path())
     if protocol is not None:

@@ -37,10 +37,7 @@ finite; objective, residual and gap no worse than at zero, and reported as float
 Touches (physics) are simulated at 60 dB and 12 bits on another mesh than the model's.
 """
 
-TABLE = (
-    "| case | what goes wrong | promise | nearest to its bound |",
-    "|---|---|---|---|",
-)
+TABLE = ("| case | what goes wrong | promise | nearest to its bound |", "|---|---|---|---|")
 
 
 def cell(margin: Margin | None) -> str:

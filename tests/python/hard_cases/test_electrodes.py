@@ -49,38 +49,22 @@ def using(*electrodes: int) -> np.ndarray:
 def test_detached(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Its number is told, and its 52 rows are left out."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["detached"])):
-        assert (
-            one.status == 0
-            and one.info.open_electrodes == (k % ELECTRODES,)
-            and one.info.bridged_electrodes == ()
-        )
+        assert one.status == 0
+        assert one.info.open_electrodes == (k % ELECTRODES,)
+        assert one.info.bridged_electrodes == ()
         unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
-        margins.everywhere(
-            "frames/detached",
-            "rows left out wrongly, or not",
-            unlike,
-            0,
-            "rows",
-        )
+        margins.everywhere("frames/detached", "rows left out wrongly, or not", unlike, 0, "rows")
 
 
 def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Neighbours: both are named, and left out. Others: no row is dead, and the frame is named a
     model_mismatch."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["bridged"])):
-        assert (
-            one.status == 0
-            and one.info.bridged_electrodes == pair(k)
-            and one.info.open_electrodes == ()
-        )
+        assert one.status == 0
+        assert one.info.bridged_electrodes == pair(k)
+        assert one.info.open_electrodes == ()
         unlike = abs(one.info.masked - int(using(*pair(k)).sum()))
-        margins.everywhere(
-            "frames/bridged",
-            "rows left out wrongly, or not",
-            unlike,
-            0,
-            "rows",
-        )
+        margins.everywhere("frames/bridged", "rows left out wrongly, or not", unlike, 0, "rows")
     for _, one in compare(same_everywhere, lambda k, _: simulated()[k]["bridged apart"]):
         assert one.status == 0 and "model mismatch" in one.info.diagnostics_by_name
 
@@ -111,13 +95,7 @@ def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
     for k, (_, one) in enumerate(compare(same_everywhere, rub)):
         assert one.status == 0 and one.info.noisy_electrodes == (k % ELECTRODES,)
         unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
-        margins.everywhere(
-            "frames/noisy",
-            "rows left out wrongly, or not",
-            unlike,
-            0,
-            "rows",
-        )
+        margins.everywhere("frames/noisy", "rows left out wrongly, or not", unlike, 0, "rows")
 
 
 def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> None:
@@ -128,9 +106,8 @@ def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> Non
         same_everywhere, lambda k, frame: np.where(ROWS[:, 2] == k % ELECTRODES, -frame, frame)
     )
     for k, (clean, one) in enumerate(outcomes):
-        assert {"electrode noisy", "model mismatch"} <= set(
-            one.info.diagnostics_by_name
-        ) and one.info.noisy_electrodes == pair(k)
+        assert {"electrode noisy", "model mismatch"} <= set(one.info.diagnostics_by_name)
+        assert one.info.noisy_electrodes == pair(k)
         assert one.info.masked == 13
         losses.append(miou(clean.image, k) - miou(one.image, k))
     margins.everywhere("frames/polarity", "MIoU lost", np.mean(losses), 0.02)

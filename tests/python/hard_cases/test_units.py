@@ -161,11 +161,9 @@ def test_units_of_frames(same_everywhere: SameEverywhere, margins: Margins, data
     ]
     for k, e in enumerate(exponents):
         for frame, one in enumerate(outcomes[2 * k : 2 * k + 2]):
-            assert (
-                one.status == 0
-                and one.finite()
-                and len(one.touches) == len(outcomes[frame].touches)
-            )
+            assert one.status == 0
+            assert one.finite()
+            assert len(one.touches) == len(outcomes[frame].touches)
             worst = (20 if e == -38 else 1) * data_off
             size = float(np.linalg.norm(points[0][frame]))
             off = float(np.linalg.norm(points[k][frame] - points[0][frame]))

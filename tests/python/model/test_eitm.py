@@ -106,9 +106,8 @@ def test_sections_as_documented(storage: str) -> None:
     assert (model.projection == projection[:, :r].T).all() and not projection[:, r:].any()
     columns = np.frombuffer(body["SENS"], ITEM[storage]).reshape(n, stride)
     scale = np.frombuffer(body["SCAL"], "<f4")[:, None] if "SCAL" in body else 1.0
-    assert (model.sensitivity == (columns[:, :r].astype(float) * scale).T).all() and not columns[
-        :, r:
-    ].any()
+    assert (model.sensitivity == (columns[:, :r].astype(float) * scale).T).all()
+    assert not columns[:, r:].any()
     assert (np.frombuffer(body["COLW"], "<f4") == model.column_weight).all()
     assert (np.frombuffer(body["GRID"], "<u2").reshape(n, 2) == grid.index).all()
     defaults = struct.unpack("<2I12fIf", body["DEFS"])
@@ -116,9 +115,8 @@ def test_sections_as_documented(storage: str) -> None:
     assert model.defaults.solver == "working-set" and defaults[14:] == (1, 0)
     gold = np.frombuffer(body["GOLD"], "<f4")
     assert gold[:m] == pytest.approx(linear.v0_v, rel=1e-6)
-    assert (gold[m : 2 * m] == model.golden.frame_v).all() and (
-        gold[2 * m :] == model.golden.image
-    ).all()
+    assert (gold[m : 2 * m] == model.golden.frame_v).all()
+    assert (gold[2 * m :] == model.golden.image).all()
     assert json.loads(body["META"])["skin"]["skin"]["name"] == "disk"
 
 
@@ -246,18 +244,11 @@ def test_scales_go_with_integers_only(storage: str) -> None:
 @pytest.mark.parametrize(
     "content",
     [
-        b"",
-        b"{",
-        b"[]",
-        b"3",
-        b'"x"',
-        b"\xff\xfe",
-        b'{"skin": 3}',
-        b'{"skin": {"skin": []}}',
+        b"", b"{", b"[]", b"3", b'"x"', b"\xff\xfe", b'{"skin": 3}', b'{"skin": {"skin": []}}',
         b"[" * 100_000,
     ],
     ids=lambda content: repr(content[:12]),
-)
+)  # fmt: skip
 def test_meta_must_be_an_object(content: bytes) -> None:
     blob = tiny_blob()
     padded = content + bytes(-len(content) % 16)

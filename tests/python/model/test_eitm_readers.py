@@ -20,23 +20,8 @@ from eitskin.solve.reconstructor import Reconstructor
 from small_models import tiny_blob
 
 WORDS = (
-    0,
-    1,
-    3,
-    4,
-    255,
-    256,
-    1024,
-    1025,
-    4096,
-    4097,
-    65534,
-    65535,
-    65536,
-    2**31 - 1,
-    2**31,
-    2**32 - 1,
-)
+    0, 1, 3, 4, 255, 256, 1024, 1025, 4096, 4097, 65534, 65535, 65536, 2**31 - 1, 2**31, 2**32 - 1,
+)  # fmt: skip
 FLOATS = (
     0.0,
     -0.0,

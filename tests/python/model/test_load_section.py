@@ -74,20 +74,16 @@ def changed(at: int, layout: str, value: float) -> bytes:
 
 
 WRONG = {
-    "cut": WHOLE[:-4],
-    "longer": WHOLE + bytes(4),
-    "nearly nothing": bytes(8),
-    "too few points": changed(0, "<I", 1),
-    "too many points": changed(0, "<I", 65),
-    "order 5": changed(4, "<I", 5),
-    "no radius": changed(8, "<f", 0.0),
+    "cut": WHOLE[:-4], "longer": WHOLE + bytes(4), "nearly nothing": bytes(8),
+    "too few points": changed(0, "<I", 1), "too many points": changed(0, "<I", 65),
+    "order 5": changed(4, "<I", 5), "no radius": changed(8, "<f", 0.0),
     "reach of NaN": changed(12, "<f", float("nan")),
     "less than no uncertainty": changed(16, "<f", -1.0),
     "a table that falls": changed(HEAD.size + 8, "<f", 0.5),
     "a table from above 0": changed(HEAD.size, "<f", 0.5),
     "a load of infinity": changed(HEAD.size + 28, "<f", float("inf")),
     "a gain of NaN": changed(len(WHOLE) - 4, "<f", float("nan")),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("content", WRONG.values(), ids=WRONG)

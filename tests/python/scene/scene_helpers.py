@@ -34,11 +34,8 @@ def moving_scene(frames: int = 8, **changes: Any) -> Scene:
     end = (frames - 1) / 20.0
     path = (Keyframe(0.0, -80, 0, 10), Keyframe(end, 60, 30, 10))
     given = {
-        "touches": (TouchTrack(path),),
-        "frames": frames,
-        "quiet_frames": 2,
-        "elements": ELEMENTS,
-    }
+        "touches": (TouchTrack(path),), "frames": frames, "quiet_frames": 2, "elements": ELEMENTS,
+    }  # fmt: skip
     return Scene("moving", **{**given, **changes})
 
 

@@ -73,11 +73,9 @@ def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
     scene = moving_scene(4, effects={"noise": {"snr_db": 60.0}})
     alone = compile_scene(scene)
     among = compile_scene(scene, registry=Registry({**BUILT_IN, **many}, entry_points=False))
-    assert (
-        len(many) == 200
-        and among.plan.steps == alone.plan.steps
-        and among.plan.text() == alone.plan.text()
-    )
+    assert len(many) == 200
+    assert among.plan.steps == alone.plan.steps
+    assert among.plan.text() == alone.plan.text()
     assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
 
 
@@ -140,11 +138,9 @@ def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
 
 def test_the_way_with_fewer_multiplications_is_chosen(bench: Bench) -> None:
     many = compile_scene(moving_scene(60), bench=bench)
-    assert (
-        many.counted is not None
-        and many.counted.update < many.counted.factorise
-        and many.method == "update"
-    )
+    assert many.counted is not None
+    assert many.counted.update < many.counted.factorise
+    assert many.method == "update"
     assert many.counted.update_solves == 16 + len(many.reach)
     done = simulate_frames(many)
     assert (done.work.factorisations, done.work.solves) == (1, 16 + len(many.reach))
@@ -243,10 +239,8 @@ def test_a_bridge_rescues_a_detached_electrode(bench: Bench) -> None:
     compiled = compile_scene(still_scene(effects=effects), bench=bench)
     v, rows = simulate_frames(compiled).voltage_v[-1], compiled.scene.protocol.drive_measure
     across = [set(row[2:]) == {5, 6} or set(row[:2]) == {5, 6} for row in rows.tolist()]
-    assert (
-        np.abs(v[across]).max() < 1e-6 * np.abs(v).max()
-        and (np.abs(v[np.logical_not(across)]) > 0).all()
-    )
+    assert np.abs(v[across]).max() < 1e-6 * np.abs(v).max()
+    assert (np.abs(v[np.logical_not(across)]) > 0).all()
 
 
 def test_a_bridge_of_no_resistance_is_one_electrode_and_of_much_is_none(bench: Bench) -> None:

@@ -48,10 +48,8 @@ def test_the_same_bytes_whatever_the_jobs(tmp_path: Path) -> None:
     one = write_dataset(job, tmp_path / "one")
     write_dataset(job, tmp_path / "two", jobs=2)
     assert one == {"chunks_made": 3, "chunks_kept": 0, "scenes_made": 7}
-    assert (
-        content(tmp_path / "one") == content(tmp_path / "two")
-        and len(content(tmp_path / "one")) == 4
-    )
+    assert content(tmp_path / "one") == content(tmp_path / "two")
+    assert len(content(tmp_path / "one")) == 4
 
 
 def test_an_interrupted_run_resumes_without_doing_things_twice(

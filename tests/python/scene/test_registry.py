@@ -42,14 +42,9 @@ MODULE = SimpleNamespace(Parameters=Every)
 def test_tables_become_parameters() -> None:
     assert parse_parameters(MODULE, {}, "w") == Every()  # type: ignore[arg-type]
     table = {
-        "gain": 2,
-        "bits": 8.0,
-        "on": False,
-        "kind": "fast",
-        "which": [1, 2],
-        "pair": [3, 4],
+        "gain": 2, "bits": 8.0, "on": False, "kind": "fast", "which": [1, 2], "pair": [3, 4],
         "limit_v": 0.5,
-    }
+    }  # fmt: skip
     found = parse_parameters(MODULE, table, "w")  # type: ignore[arg-type]
     assert found == Every(2.0, 8, False, "fast", (1, 2), (3.0, 4.0), 0.5)
     assert isinstance(found.gain, float) and isinstance(found.bits, int)
@@ -59,10 +54,8 @@ def test_tables_become_parameters() -> None:
     ("table", "said"),
     [
         ({"gian": 1}, r"f \[effects.x\]: unknown key 'gian'; did you mean 'gain'"),
-        (
-            {"gain": 0},
-            r"f \[effects.x\]: gain = 0 is out of range; it must be above 0 and at most 2 V",
-        ),
+        ({"gain": 0},
+         r"f \[effects.x\]: gain = 0 is out of range; it must be above 0 and at most 2 V"),
         ({"gain": float("nan")}, "gain = nan is out of range"),
         ({"gain": "loud"}, "gain must be a number"),
         ({"gain": True}, "gain must be a number"),
@@ -76,7 +69,7 @@ def test_tables_become_parameters() -> None:
         ({"pair": [1]}, "pair must be a list of 2"),
         ({"limit_v": -1}, "limit_v = -1 is out of range; it must be at least 0 V"),
     ],
-)
+)  # fmt: skip
 def test_impossible_parameters_name_file_table_and_key(table: dict[str, object], said: str) -> None:
     with pytest.raises(ConfigError, match=said):
         parse_parameters(MODULE, table, "f [effects.x]")  # type: ignore[arg-type]
@@ -85,14 +78,9 @@ def test_impossible_parameters_name_file_table_and_key(table: dict[str, object],
 def test_parameters_describe_themselves() -> None:
     rows = {row["name"]: row for row in describe_parameters(MODULE)}  # type: ignore[arg-type]
     gain = {
-        "name": "gain",
-        "type": "float",
-        "default": 1.0,
-        "low": 0,
-        "high": 2,
-        "unit": "V",
+        "name": "gain", "type": "float", "default": 1.0, "low": 0, "high": 2, "unit": "V",
         "doc": "a number",
-    }
+    }  # fmt: skip
     assert rows["gain"] == gain
     assert rows["kind"]["choices"] == ("slow", "fast")
 

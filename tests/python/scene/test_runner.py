@@ -36,29 +36,22 @@ def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
     frames = run(compile_scene(scene), truth_pixels=32)
     save_frames(tmp_path / "f.npz", frames)
     again = load_frames(tmp_path / "f.npz")
-    assert np.array_equal(
-        again.voltage_v, frames.voltage_v
-    ) and again.reference_voltage_v.shape == (2, 208)
+    assert np.array_equal(again.voltage_v, frames.voltage_v)
+    assert again.reference_voltage_v.shape == (2, 208)
     assert again.time_s is not None and again.time_s[5] == 0.25
-    assert (
-        again.touch_frame is not None
-        and again.touch_xy_mm is not None
-        and again.touch_strength is not None
-    )
-    assert (
-        again.touch_frame.tolist() == list(range(6)) and again.touch_strength.tolist() == [8.0] * 6
-    )
-    assert again.touch_xy_mm[0].tolist() == [-80.0, 0.0] and again.touch_xy_mm[5] == pytest.approx(
-        [60.0, 30.0]
-    )
+    assert again.touch_frame is not None
+    assert again.touch_xy_mm is not None
+    assert again.touch_strength is not None
+    assert again.touch_frame.tolist() == list(range(6))
+    assert again.touch_strength.tolist() == [8.0] * 6
+    assert again.touch_xy_mm[0].tolist() == [-80.0, 0.0]
+    assert again.touch_xy_mm[5] == pytest.approx([60.0, 30.0])
     assert again.truth_mask is not None and again.truth_conductivity_s_per_m is not None
     area = (again.truth_mask == 1).sum(axis=(1, 2)) * (194 / 32) ** 2
     assert area == pytest.approx(np.full(6, 314.0), rel=0.45)
     inside = again.truth_conductivity_s_per_m[again.truth_mask == 1]
-    assert (
-        inside.max() == pytest.approx(0.09, rel=0.01)
-        and np.nanmin(again.truth_conductivity_s_per_m) > 0.0099
-    )
+    assert inside.max() == pytest.approx(0.09, rel=0.01)
+    assert np.nanmin(again.truth_conductivity_s_per_m) > 0.0099
     assert again.meta["effects"] == {"noise": {"snr_db": 60.0, "noise_v": None}}
     assert again.meta["plan"]["method"] == "update" and again.meta["counters"]["states"] == 7
 
@@ -107,12 +100,8 @@ def test_without_random_effects_no_generator_is_made(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(np.random, "default_rng", refuse)
     effects: dict[str, Any] = {
-        "gel_drying": {},
-        "mains": {},
-        "adc": {},
-        "detached": {"electrodes": [3]},
-        "mux": {},
-    }
+        "gel_drying": {}, "mains": {}, "adc": {}, "detached": {"electrodes": [3]}, "mux": {},
+    }  # fmt: skip
     for own in ({}, effects):
         frames = run_scene(moving_scene(4, effects=own))
         assert frames.meta["counters"]["random_generators"] == 0

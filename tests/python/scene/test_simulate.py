@@ -177,11 +177,9 @@ def test_as_frames_carries_the_truth(session: Simulated) -> None:
     assert (frames.voltage_v == session.frames_v).all()
     assert frames.reference_voltage_v.shape == (64, 208)
     assert frames.frame_name[1] == "test-s5-1"
-    assert (
-        frames.touch_frame is not None
-        and frames.touch_strength is not None
-        and frames.touch_xy_mm is not None
-    )
+    assert frames.touch_frame is not None
+    assert frames.touch_strength is not None
+    assert frames.touch_xy_mm is not None
     assert frames.touch_frame.tolist() == [
         k for k, s in enumerate(TOUCHES.scenes) for _ in s.touches
     ]

@@ -195,8 +195,6 @@ def test_curves_refuse_what_they_cannot_judge() -> None:
 def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals() -> None:
     curves = np.array([[0.2, 0.9, 0.5, 0.5], [0.2, 0.1, 0.6, 0.6]])
     assert metrics.best_threshold(curves, [0.1, 0.2, 0.3, 0.4]) == 0.3
-    assert (
-        metrics.THRESHOLDS[0] == 0.02
-        and metrics.THRESHOLDS[-1] == 0.98
-        and len(metrics.THRESHOLDS) == 49
-    )
+    assert metrics.THRESHOLDS[0] == 0.02
+    assert metrics.THRESHOLDS[-1] == 0.98
+    assert len(metrics.THRESHOLDS) == 49

@@ -61,10 +61,8 @@ def test_found_touches_are_paired_whatever_their_order() -> None:
         frames(), 0, result(put(1, 0, off=3.0), [0, 1]), "increase"
     )
     assert score is not None
-    assert score.matching.pairs == (
-        (0, 1),
-        (1, 0),
-    ) and score.matching.distances_mm == pytest.approx((3, 3))
+    assert score.matching.pairs == ((0, 1), (1, 0))
+    assert score.matching.distances_mm == pytest.approx((3, 3))
     assert 0.7 < score.miou_touches < 0.95
 
 

@@ -55,10 +55,8 @@ def test_touches_are_paired_with_the_true_ones() -> None:
     assert seen.errors_mm == {0: pytest.approx(1.0), 1: pytest.approx(3.0)}
     text = line(seen)
     assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text
-    assert (
-        "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text
-        and text.endswith(" ms")
-    )
+    assert "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text
+    assert text.endswith(" ms")
     facts = table(seen)
     assert [touch["error_mm"] for touch in facts["touches"]] == [
         pytest.approx(1.0),
@@ -79,10 +77,8 @@ def test_touches_are_paired_with_the_true_ones() -> None:
 def test_nothing_found_is_no_error_of_zero() -> None:
     look = watcher()
     assert " s  no touch; 60 iterations" in line(look.see(touches()))
-    assert (
-        look.score.as_dict()["position_worst_mm"] is None
-        and "position error" not in look.score.text()
-    )
+    assert look.score.as_dict()["position_worst_mm"] is None
+    assert "position error" not in look.score.text()
     assert look.score.missed == 2
 
 
@@ -134,14 +130,12 @@ def test_raw_rows_that_are_missing_become_null() -> None:
         LiveFrame(3, 250_000, 9, raw=RawFrame(3, 9, 20_800, 0, volts, quality))
     )
     facts = json.loads(json.dumps(table(seen), allow_nan=False))
-    assert (
-        facts["voltage_v"][2] is None and facts["voltage_v"][0] == 1.0 and facts["time_s"] == 0.25
-    )
-    assert (
-        "5 rows in 20.80 ms" in line(seen)
-        and "1 not usable" in line(seen)
-        and "nan" not in line(seen)
-    )
+    assert facts["voltage_v"][2] is None
+    assert facts["voltage_v"][0] == 1.0
+    assert facts["time_s"] == 0.25
+    assert "5 rows in 20.80 ms" in line(seen)
+    assert "1 not usable" in line(seen)
+    assert "nan" not in line(seen)
 
 
 def test_spread_keeps_the_ends() -> None:

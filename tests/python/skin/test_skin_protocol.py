@@ -77,10 +77,8 @@ def test_opposite_and_skip() -> None:
         (lambda: table(16, []), "shape"),
         (lambda: table(16, [[0, 1, 2]]), "shape"),
         (lambda: table(16, [[0, 1, 2, 3], [0, 1]]), "rows differ in length"),
-        (
-            lambda: table(16, [[0, 1, 2, 3], [1, 2, 3, 16]]),
-            r"row 1 \(from 0\).*0 to 15; count from 0",
-        ),
+        (lambda: table(16, [[0, 1, 2, 3], [1, 2, 3, 16]]),
+         r"row 1 \(from 0\).*0 to 15; count from 0"),
         (lambda: table(16, [[0, 1, 2, -1]]), r"row 0 \(from 0\)"),
         (lambda: table(16, [[0, 1, 2, 300]]), r"row 0 \(from 0\)"),
         (lambda: table(16, [[0, 0, 2, 3]]), "two different electrodes"),
@@ -90,7 +88,7 @@ def test_opposite_and_skip() -> None:
         (lambda: Protocol(16, adjacent(16).drive_measure, 0.0), "current_a"),
         (lambda: Protocol(16, adjacent(16).drive_measure, float("nan")), "current_a"),
     ],
-)
+)  # fmt: skip
 def test_refused(make: Any, message: str) -> None:
     with pytest.raises(ProtocolError, match=message) as caught:
         make()
@@ -164,12 +162,10 @@ def test_reciprocity_of_shuffled_and_flipped_tables(n: int, seed: int) -> None:
         (adjacent(5, 2e-3), {"kind": "adjacent"}),
         (opposite(8), {"kind": "opposite"}),
         (skip(16, 3), {"kind": "skip", "skip": 3}),
-        (
-            table(6, [[0, 1, 2, 3], [3, 2, 5, 4]]),
-            {"kind": "table", "table": [[0, 1, 2, 3], [3, 2, 5, 4]]},
-        ),
+        (table(6, [[0, 1, 2, 3], [3, 2, 5, 4]]),
+         {"kind": "table", "table": [[0, 1, 2, 3], [3, 2, 5, 4]]}),
     ],
-)
+)  # fmt: skip
 def test_table_round_trip(protocol: Protocol, kind: dict[str, Any]) -> None:
     made = protocol_to_table(protocol)
     assert made == {**kind, "current_a": protocol.current_a}

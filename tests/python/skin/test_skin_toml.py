@@ -78,18 +78,14 @@ def test_evenly_by_arc_length_on_a_polygon() -> None:
     ("electrodes", "message"),
     [
         (Electrodes(16, 40), "16 electrodes of 40 mm do not fit"),
-        (
-            Electrodes(4, 10, positions_mm=(0.0, 100.0, 105.0, 300.0)),
-            r"electrodes 1 and 2 \(from 0\) overlap",
-        ),
-        (
-            Electrodes(4, 10, positions_mm=(0.0, 100.0, 200.0, 605.0)),
-            r"electrodes 0 and 3 \(from 0\) overlap",
-        ),
+        (Electrodes(4, 10, positions_mm=(0.0, 100.0, 105.0, 300.0)),
+         r"electrodes 1 and 2 \(from 0\) overlap"),
+        (Electrodes(4, 10, positions_mm=(0.0, 100.0, 200.0, 605.0)),
+         r"electrodes 0 and 3 \(from 0\) overlap"),
         (Electrodes(4, 10, positions_mm=(0.0, 100.0, 110.2, 300.0)), "gap 0.2 mm, at least 0.5 mm"),
         (Electrodes(4, 1000), "do not fit"),
     ],
-)
+)  # fmt: skip
 def test_overlap_is_refused(electrodes: Electrodes, message: str) -> None:
     with pytest.raises(GeometryError, match=message):
         Skin("s", disk(194), electrodes)

@@ -195,14 +195,10 @@ def test_detached_electrodes_are_marked_while_they_are_off(make_session: MakeSes
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (
-            lambda s: detached.make(detached.Parameters((16,)), s),
-            "16 does not exist; the skin's are 0 to 15",
-        ),
-        (
-            lambda s: detached.make(detached.Parameters(tuple(range(13))), s),
-            "no row of the protocol can be measured",
-        ),
+        (lambda s: detached.make(detached.Parameters((16,)), s),
+         "16 does not exist; the skin's are 0 to 15"),
+        (lambda s: detached.make(detached.Parameters(tuple(range(13))), s),
+         "no row of the protocol can be measured"),
         (lambda s: detached.Parameters(()), "name at least one"),
         (lambda s: detached.Parameters((1,), 2.0, 1.0), "until_s = 1 must come after from_s = 2"),
         (lambda s: bridged.Parameters((3,)), "name at least two"),
@@ -210,7 +206,7 @@ def test_detached_electrodes_are_marked_while_they_are_off(make_session: MakeSes
         (lambda s: bridged.make(bridged.Parameters((3, 99)), s), "99 does not exist"),
         (lambda s: contact_impedance.Parameters(spread=1.0), "must be below 1"),
     ],
-)
+)  # fmt: skip
 def test_impossible_contacts_are_refused(
     make_session: MakeSession, build: Any, message: str
 ) -> None:

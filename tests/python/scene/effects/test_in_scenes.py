@@ -130,11 +130,8 @@ def test_source_impedance_divides_the_current(hertz: float, with_phase: bool) ->
     """The load is what a row measures on the driven electrodes themselves."""
     rows = table(16, [[0, 8, 0, 8], [0, 8, 3, 4], [1, 2, 1, 2], [1, 2, 9, 11]])
     source = {
-        "resistance_ohm": 30e3,
-        "capacitance_pf": 200.0,
-        "frequency_hz": hertz,
-        "series_ohm": 240.0,
-    }
+        "resistance_ohm": 30e3, "capacitance_pf": 200.0, "frequency_hz": hertz, "series_ohm": 240.0,
+    }  # fmt: skip
     more = {"phase": {"frequency_hz": 50e3}} if with_phase else {}
     truth = simulate_frames(_compiled(more, rows)).true_v[0]
     load = np.repeat(truth[[0, 2]] / rows.current_a, 2) + 240.0
