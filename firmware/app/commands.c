@@ -13,11 +13,6 @@ enum {
 };
 enum { MIN_EXCITATION_MILLIHZ = 1000, MAX_EXCITATION_MILLIHZ = 250000000 };
 
-static fw_answer answer(eits_reply_status status, int32_t a, int32_t b)
-{
-    return (fw_answer){.status = status, .detail = {a, b}};
-}
-
 static fw_answer ok(void)
 {
     return (fw_answer){0};
@@ -28,7 +23,7 @@ static bool outside(fw_answer *out, size_t offset, uint32_t value, uint32_t low,
 {
     if (value >= low && value <= high)
         return false;
-    *out = answer(EITS_REPLY_RANGE, (int32_t)offset, (int32_t)(value < low ? low : high));
+    *out = fw_refuse(EITS_REPLY_RANGE, (int32_t)offset, (int32_t)(value < low ? low : high));
     return true;
 }
 
@@ -36,13 +31,13 @@ static bool fraction_outside(fw_answer *out, size_t offset, float value)
 {
     if (value >= 0 && value <= 1)
         return false;
-    *out = answer(EITS_REPLY_RANGE, (int32_t)offset, value > 1 ? 1 : 0); /* NaN is neither */
+    *out = fw_refuse(EITS_REPLY_RANGE, (int32_t)offset, value > 1 ? 1 : 0); /* NaN is neither */
     return true;
 }
 
 static fw_answer busy_with(eits_packet_type command)
 {
-    return answer(EITS_REPLY_BUSY, (int32_t)command, 0);
+    return fw_refuse(EITS_REPLY_BUSY, (int32_t)command, 0);
 }
 
 static fw_answer on_get_info(fw_instrument *instrument, const void *payload, size_t size)
@@ -77,9 +72,9 @@ static fw_answer on_stream(fw_instrument *instrument, const void *payload, size_
         outside(&bad, offsetof(eits_command_stream, every), c.every, 1, UINT16_MAX))
         return bad;
     if (c.what != 0 && !instrument->engine.open)
-        return answer(EITS_REPLY_NO_MODEL, 0, 0);
+        return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     if ((c.what & ~EITS_STREAM_RAW) != 0 && !instrument->engine.tared)
-        return answer(EITS_REPLY_NOT_TARED, 0, 0);
+        return fw_refuse(EITS_REPLY_NOT_TARED, 0, 0);
     instrument->stream =
         (fw_stream){.what = c.what, .every = c.every, .left = c.frames, .counted = c.frames != 0};
     return ok();
@@ -96,7 +91,7 @@ static fw_answer on_tare(fw_instrument *instrument, const void *payload, size_t 
         (c.frames > 1 && outside(&bad, at, c.frames, 4, FW_TARE_MAX)))
         return bad;
     if (!instrument->engine.open)
-        return answer(EITS_REPLY_NO_MODEL, 0, 0);
+        return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     fw_tare_begin(&instrument->tare, &instrument->engine, c.request, c.frames,
                   fw_now_us(instrument));
     return (fw_answer){.later = true};
@@ -119,13 +114,13 @@ static fw_answer check_scan(const fw_instrument *instrument, const eits_command_
         return bad;
     const uint64_t half_rate_millihz = (uint64_t)c->sample_rate_hz * 500u;
     if (c->excitation_millihz >= half_rate_millihz) /* more than two samples a period */
-        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
-                      (int32_t)(half_rate_millihz - 1));
+        return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
+                         (int32_t)(half_rate_millihz - 1));
     if (fw_ad9833_tuning(instrument->board->mclk_hz, c->excitation_millihz) == 0)
-        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
-                      MIN_EXCITATION_MILLIHZ);
+        return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
+                         MIN_EXCITATION_MILLIHZ);
     if (!fw_whole_periods(c->excitation_millihz, c->sample_rate_hz, c->samples))
-        return answer(
+        return fw_refuse(
             EITS_REPLY_PERIODS,
             (int32_t)fw_nearest_integer(c->excitation_millihz, c->sample_rate_hz, c->samples), 0);
     return ok();
@@ -145,14 +140,15 @@ static fw_answer on_scan(fw_instrument *instrument, const void *payload, size_t 
     const uint64_t min_us = (uint64_t)fw_scan_rows(&settings, &table) * fw_slot_us(&settings);
     if (instrument->engine.open && settings.frame_period_us != 0 &&
         settings.frame_period_us < min_us)
-        return answer(EITS_REPLY_TOO_FAST, min_us > INT32_MAX ? INT32_MAX : (int32_t)min_us, 0);
+        return fw_refuse(EITS_REPLY_TOO_FAST, min_us > INT32_MAX ? INT32_MAX : (int32_t)min_us, 0);
     fw_stop_scan(instrument);
     if (fw_scan_configure(&instrument->scan, &settings) == FW_OK) {
         instrument->settings = settings;
         instrument->engine.tared = instrument->engine.phase_known = false;
         instrument->stream.what &= EITS_STREAM_RAW;
     } else {
-        checked = answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, sample_rate_hz), 0);
+        checked =
+            fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, sample_rate_hz), 0);
     }
     fw_start_scan(instrument);
     return checked;
@@ -190,8 +186,8 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
         outside(&bad, offsetof(eits_command_solver, track), c.track, 0, 1))
         return bad;
     if (!instrument->engine.open)
-        return answer(EITS_REPLY_NO_MODEL, 0, 0);
-    eits_options options = instrument->engine.ctx.options;
+        return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
+    eits_options options = *eits_get_options(instrument->engine.ctx);
     options.iterations = c.iterations;
     options.max_touches = c.max_touches;
     options.warm_start = c.warm_start;
@@ -202,8 +198,8 @@ static fw_answer on_solver(fw_instrument *instrument, const void *payload, size_
     options.mac_limit = c.mac_limit;
     options.diagnostics = c.diagnostics;
     set_tracking(instrument, &options, c.track != 0);
-    const eits_status status = eits_set_options(&instrument->engine.ctx, &options);
-    return status == EITS_OK ? ok() : answer(EITS_REPLY_CORE, (int32_t)status, 0);
+    const eits_status status = eits_set_options(instrument->engine.ctx, &options);
+    return status == EITS_OK ? ok() : fw_refuse(EITS_REPLY_CORE, (int32_t)status, 0);
 }
 
 static fw_answer on_mask_row(fw_instrument *instrument, const void *payload, size_t size)
@@ -213,12 +209,12 @@ static fw_answer on_mask_row(fw_instrument *instrument, const void *payload, siz
     (void)size;
     memcpy(&c, payload, sizeof c);
     if (!instrument->engine.open)
-        return answer(EITS_REPLY_NO_MODEL, 0, 0);
+        return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     if (outside(&bad, offsetof(eits_command_mask_row, row), c.row, 0,
                 instrument->engine.model.n_rows - 1) ||
         outside(&bad, offsetof(eits_command_mask_row, masked), c.masked, 0, 1))
         return bad;
-    (void)eits_mask_row(&instrument->engine.ctx, c.row, c.masked);
+    (void)eits_mask_row(instrument->engine.ctx, c.row, c.masked);
     return ok();
 }
 
@@ -228,8 +224,8 @@ static fw_answer on_model_begin(fw_instrument *instrument, const void *payload, 
     (void)size;
     memcpy(&c, payload, sizeof c);
     if (c.bytes < MIN_MODEL)
-        return answer(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_model_begin, bytes),
-                      MIN_MODEL);
+        return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_model_begin, bytes),
+                         MIN_MODEL);
     return fw_upload_begin(instrument, c.bytes, c.crc);
 }
 
@@ -261,14 +257,14 @@ static fw_answer on_self_test(fw_instrument *instrument, const void *payload, si
     (void)payload;
     (void)size;
     if (!instrument->engine.open)
-        return answer(EITS_REPLY_NO_MODEL, 0, 0);
+        return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     float difference;
     const eits_model model = instrument->engine.model;
     const eits_status status = fw_engine_self_test(&instrument->engine, &model, &difference);
     if (status != EITS_OK)
-        return answer(EITS_REPLY_CORE, (int32_t)status, 0);
+        return fw_refuse(EITS_REPLY_CORE, (int32_t)status, 0);
     const int32_t parts = (int32_t)(1e9f * (difference < 2 ? difference : 2));
-    return difference == 0 ? ok() : answer(EITS_REPLY_SELF_TEST, parts, 0);
+    return difference == 0 ? ok() : fw_refuse(EITS_REPLY_SELF_TEST, parts, 0);
 }
 
 static fw_answer on_clear_faults(fw_instrument *instrument, const void *payload, size_t size)
@@ -316,14 +312,14 @@ static fw_answer dispatch(fw_instrument *instrument, const eits_link_packet *pac
             continue;
         const bool more = (c->rules & MORE_BYTES) != 0;
         if (packet->size < c->size + (more ? 1u : 0u) || (!more && packet->size != c->size))
-            return answer(EITS_REPLY_LENGTH, more ? c->size + 4 : c->size, 0);
+            return fw_refuse(EITS_REPLY_LENGTH, more ? c->size + 4 : c->size, 0);
         if ((c->rules & NOT_IN_TARE) != 0 && instrument->tare.active)
             return busy_with(EITS_PACKET_TARE);
         if ((c->rules & NOT_IN_UPLOAD) != 0 && instrument->upload.active)
             return busy_with(EITS_PACKET_MODEL_BEGIN);
         return c->run(instrument, packet->payload, packet->size);
     }
-    return answer(EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
+    return fw_refuse(EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
 }
 
 /* A command that was answered already, or is under way, is not run again. */

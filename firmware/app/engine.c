@@ -9,11 +9,6 @@ void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes)
 
 /* From the workspace's start: the core's part. From its end: what is kept while another model is
  * tried. Between: the rest. */
-static size_t kept_bytes(const eits_model *model)
-{
-    return EITS_ALIGN16(model->n_rows * sizeof(float)) + EITS_ALIGN16(model->n_rows);
-}
-
 static size_t frame_bytes(const eits_model *model)
 {
     return EITS_ALIGN16(model->n_rows * sizeof(fw_iq)) +
@@ -24,8 +19,7 @@ size_t fw_engine_needs(const eits_model *model)
 {
     const size_t rows = model->n_rows;
     return EITS_ALIGN16(eits_workspace_size(model, 0)) + 2 * frame_bytes(model) +
-           EITS_ALIGN16(rows * sizeof(uint16_t)) + EITS_ALIGN16(rows) +
-           EITS_ALIGN16(model->n_folded) + kept_bytes(model);
+           EITS_ALIGN16(rows * sizeof(uint16_t)) + EITS_ALIGN16(rows) + eits_saved_size(model);
 }
 
 static void *take(uint8_t **next, size_t bytes)
@@ -49,11 +43,9 @@ static void lay_out(fw_engine *engine)
     }
     engine->unique = take(&next, rows * sizeof(uint16_t));
     engine->flags = take(&next, rows);
-    engine->sides = take(&next, engine->model.n_folded);
     uint8_t *end = engine->workspace + engine->workspace_bytes - engine->workspace_bytes % 16u;
     /* not cleared: it may hold what is to be restored */
-    engine->saved.masked = end - EITS_ALIGN16(rows);
-    engine->saved.v0 = (float *)(void *)(end - kept_bytes(&engine->model));
+    engine->saved.core = end - eits_saved_size(&engine->model);
 }
 
 /* Rows that no fold names as a second one, in order. Rows that no fold names at all are among them.
@@ -76,11 +68,13 @@ static void list_unique(fw_engine *engine)
 /* Frames follow one another here, so that touches are followed in time. */
 static eits_status start_core(fw_engine *engine)
 {
-    const eits_status status = eits_init(&engine->ctx, &engine->model, engine->workspace,
-                                         eits_workspace_size(&engine->model, 0));
-    if (status == EITS_OK)
-        (void)eits_options_track(&engine->ctx.options);
-    return status;
+    const eits_status status = eits_init(engine->workspace, eits_workspace_size(&engine->model, 0),
+                                         &engine->model, &engine->ctx);
+    if (status != EITS_OK)
+        return status;
+    eits_options options = *eits_get_options(engine->ctx);
+    (void)eits_options_track(&options);
+    return eits_set_options(engine->ctx, &options);
 }
 
 eits_status fw_engine_open(fw_engine *engine, const eits_model *model)
@@ -114,30 +108,10 @@ fw_scan_table fw_engine_table(const fw_engine *engine)
                            engine->n_unique};
 }
 
-/* Which sides are in use decides when the next solved frame builds its basis anew, and so its MACs:
- * that is put back. */
-void fw_engine_examine(fw_engine *engine, const float *volts)
-{
-    eits_context *ctx = &engine->ctx;
-    const size_t folds = engine->model.n_folded;
-    const uint32_t stale = ctx->basis_stale;
-    uint64_t macs;
-    memcpy(engine->sides, ctx->basis_for, folds);
-    ctx->info = (eits_info){0};
-    (void)eits_frame_stage(ctx, volts, engine->model.n_rows, &ctx->info.masked, &macs);
-    const bool changed = memcmp(engine->sides, ctx->basis_for, folds) != 0;
-    memcpy(ctx->basis_for, engine->sides, folds);
-    ctx->basis_stale |= stale | (uint32_t)changed;
-}
-
 void fw_engine_save(fw_engine *engine)
 {
     fw_saved *saved = &engine->saved;
-    memcpy(saved->v0, engine->ctx.reference.v0, engine->model.n_rows * sizeof(float));
-    memcpy(saved->masked, engine->ctx.masked, engine->model.n_rows);
-    saved->reference = engine->ctx.reference;
-    saved->options = engine->ctx.options;
-    saved->next_id = engine->ctx.next_id;
+    (void)eits_save(engine->ctx, saved->core, eits_saved_size(&engine->model));
     saved->cosine = engine->cosine;
     saved->sine = engine->sine;
     saved->tared = engine->tared;
@@ -147,16 +121,7 @@ void fw_engine_save(fw_engine *engine)
 void fw_engine_restore(fw_engine *engine)
 {
     const fw_saved *saved = &engine->saved;
-    float *m2 = engine->ctx.reference.m2, *v0 = engine->ctx.reference.v0;
-    engine->ctx.reference = saved->reference;
-    engine->ctx.reference.v0 = v0;
-    engine->ctx.reference.m2 = m2;
-    engine->ctx.options = saved->options;
-    memcpy(v0, saved->v0, engine->model.n_rows * sizeof(float));
-    memcpy(engine->ctx.masked, saved->masked, engine->model.n_rows);
-    engine->ctx.next_id = saved->next_id;
-    engine->ctx.basis_stale = 1;
-    eits_forget(&engine->ctx);
+    (void)eits_restore(engine->ctx, saved->core, eits_saved_size(&engine->model));
     engine->cosine = saved->cosine;
     engine->sine = saved->sine;
     engine->tared = saved->tared;
@@ -172,11 +137,11 @@ eits_status fw_engine_self_test(fw_engine *engine, const eits_model *model, floa
     const uint8_t *kept_from = engine->workspace + engine->workspace_bytes;
     if (engine->open) {
         fw_engine_save(engine);
-        kept_from = (const uint8_t *)engine->saved.v0;
+        kept_from = engine->saved.core;
     }
-    eits_status status = eits_init(&engine->ctx, model, engine->workspace, size);
+    eits_status status = eits_init(engine->workspace, size, model, &engine->ctx);
     if (status == EITS_OK)
-        status = eits_self_test(&engine->ctx, difference);
+        status = eits_self_test(engine->ctx, difference);
     if (!engine->open)
         return status;
     const bool survived = engine->workspace + size <= kept_from;

@@ -10,11 +10,7 @@
 /* What a reference and its settings are, apart from the context: to go back to when a tare or a
  * self-test fails. */
 typedef struct fw_saved {
-    eits_reference reference;
-    eits_options options;
-    uint32_t next_id; /* of touches: ids are not used twice */
-    float *v0;        /* n_rows */
-    uint8_t *masked;  /* n_rows */
+    uint8_t *core; /* eits_save's, at the workspace's end */
     float cosine, sine;
     bool tared, phase_known;
 } fw_saved;
@@ -23,7 +19,7 @@ typedef struct fw_engine {
     uint8_t *workspace;
     size_t workspace_bytes, used_bytes; /* used by the open model */
     eits_model model;
-    eits_context ctx;
+    eits_context *ctx; /* at the workspace's start; of no use while none is open */
     bool open, tared;
     bool phase_known;   /* learned at a tare; else it is estimated from each frame */
     float cosine, sine; /* of the angle that the voltages' phase has */
@@ -31,7 +27,6 @@ typedef struct fw_engine {
     uint16_t *unique; /* rows that are no other's reciprocal */
     uint32_t n_unique;
     uint8_t *flags; /* n_rows: bits of the frame under way */
-    uint8_t *sides; /* n_folded: scratch */
     fw_saved saved;
 } fw_engine;
 
@@ -48,10 +43,6 @@ void fw_engine_close(fw_engine *engine);
 
 /* The table that the scan measures. */
 fw_scan_table fw_engine_table(const fw_engine *engine);
-
-/* The core's frame stage on a frame that is not solved: fills ctx.info as far as that goes. The
- * frames that are solved get the bits that they would have got without it. */
-void fw_engine_examine(fw_engine *engine, const float *volts);
 
 /* Keep reference, options, masks and angle; restore puts them back, the warm start forgotten. */
 void fw_engine_save(fw_engine *engine);

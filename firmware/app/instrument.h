@@ -77,6 +77,11 @@ typedef struct fw_answer {
     bool later; /* no answer now: it comes when the command is done, or is a packet of its own */
 } fw_answer;
 
+static inline fw_answer fw_refuse(eits_reply_status why, int32_t a, int32_t b)
+{
+    return (fw_answer){.status = why, .detail = {a, b}};
+}
+
 /* Whether a model can be scanned here and its packets and memory have room: OK, MODEL_SCAN or
  * MODEL_SIZE. */
 fw_answer fw_model_fits(const fw_instrument *instrument, const eits_model *model);

@@ -58,7 +58,7 @@ static void weigh(const fw_engine *engine, const fw_frame *frame, uint32_t row, 
                   evidence *so_far)
 {
     if (row == EITS_FOLD_NONE || engine->flags[row] == 0 ||
-        (frame->quality[row] & EITS_QUALITY_UNSETTLED) != 0 || engine->ctx.masked[row])
+        (frame->quality[row] & EITS_QUALITY_UNSETTLED) != 0 || eits_is_masked(engine->ctx, row))
         return;
     const fw_iq z = frame->z[row];
     const bool dead =
@@ -147,7 +147,7 @@ void fw_quality_check(fw_engine *engine, fw_frame *frame, bool by_model, fw_qual
     *quality = (fw_quality){.open = by_model ? find_open(engine, frame) : 0};
     mark_open(engine, frame, quality->open);
     for (uint32_t i = 0; i < rows; ++i) {
-        if (engine->ctx.masked[i])
+        if (eits_is_masked(engine->ctx, i))
             frame->quality[i] |= EITS_QUALITY_MASKED;
     }
     if ((frame->flags & EITS_RAW_RECIPROCAL) == 0)
@@ -155,10 +155,10 @@ void fw_quality_check(fw_engine *engine, fw_frame *frame, bool by_model, fw_qual
     if ((frame->flags & (EITS_RAW_RECIPROCAL | EITS_RAW_CHECK)) != 0)
         copy_reciprocals(engine, frame);
     for (uint32_t i = 0; i < rows; ++i) {
-        if (engine->ctx.masked[i])
+        if (eits_is_masked(engine->ctx, i))
             frame->quality[i] |= EITS_QUALITY_MASKED;
         const bool saturated =
-            (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !engine->ctx.masked[i];
+            (frame->quality[i] & EITS_QUALITY_SATURATED) != 0 && !eits_is_masked(engine->ctx, i);
         if (saturated && quality->saturated++ == 0)
             quality->first_saturated = i;
         if ((frame->quality[i] & UNUSABLE) != 0)

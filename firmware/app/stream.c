@@ -26,26 +26,27 @@ static void report_scan(fw_instrument *instrument, const fw_frame *frame, const 
         fw_fault_set(faults, EITS_FAULT_RECIPROCITY, doubtful, detail);
 }
 
-/* What the core found, whose info is of this frame; `solved`: not its frame stage alone. */
-static void send_diagnostics(fw_instrument *instrument, const fw_frame *frame, bool solved)
+/* What the core found in this frame; `referenced`: its reference may be stale. */
+static void send_diagnostics(fw_instrument *instrument, const fw_frame *frame,
+                             const eits_info *info, bool referenced)
 {
-    const eits_info *info = &instrument->engine.ctx.info;
     instrument->outliers += info->outliers;
     fw_diagnostics_open(&instrument->faults, frame->number, info->open_electrodes);
     fw_diagnostics_skin(&instrument->faults, frame->number, info);
-    if (solved)
+    if (referenced)
         fw_diagnostics_reference(&instrument->faults, frame->number, info);
 }
 
-/* Look at a frame that is not solved: faults are told whether anything is streamed or not. */
+/* Look at a frame that is not solved: faults are reported whether anything is streamed or not. */
 static void examine(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)
 {
-    if (instrument->engine.tared)
-        fw_engine_examine(&instrument->engine, frame->volts);
-    else
-        instrument->engine.ctx.info = (eits_info){.open_electrodes = quality->open};
+    const fw_engine *engine = &instrument->engine;
+    const eits_info untared = {.open_electrodes = quality->open};
+    if (engine->tared)
+        (void)eits_examine(engine->ctx, frame->volts, engine->model.n_rows);
     /* without a reference none is stale */
-    send_diagnostics(instrument, frame, !instrument->engine.tared);
+    send_diagnostics(instrument, frame, engine->tared ? eits_get_info(engine->ctx) : &untared,
+                     !engine->tared);
 }
 
 static void send_raw(fw_instrument *instrument, const fw_frame *frame, uint32_t flags)
@@ -98,13 +99,12 @@ static uint32_t low_word(uint64_t count)
 static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_packet_solved *head,
                         const eits_touch *touches, uint32_t count)
 {
-    const eits_context *ctx = &instrument->engine.ctx;
     const uint32_t pixels = instrument->engine.model.n_pixels;
     if ((instrument->stream.what & EITS_STREAM_IMAGE) != 0) {
         head->count = (uint16_t)pixels;
         head->age_us = fw_now_us(instrument) - frame->end_us;
         (void)fw_tx_queue_send(&instrument->tx_queue, EITS_PACKET_IMAGE, head, sizeof *head,
-                               ctx->image, pixels * sizeof(float));
+                               eits_get_image(instrument->engine.ctx), pixels * sizeof(float));
     }
     if ((instrument->stream.what & EITS_STREAM_TOUCHES) != 0) {
         eits_packet_touch body[EITS_MAX_TOUCHES];
@@ -123,7 +123,7 @@ static void send_solved(fw_instrument *instrument, const fw_frame *frame, eits_p
 /* Returns the microseconds that the solver took, touches included. */
 static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)
 {
-    eits_context *ctx = &instrument->engine.ctx;
+    eits_context *ctx = instrument->engine.ctx;
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count = 0;
     const uint32_t began_us = fw_now_us(instrument);
@@ -134,7 +134,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
     if (wanted && status == EITS_OK)
         (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
     const uint32_t done_us = fw_now_us(instrument);
-    const eits_info *info = &ctx->info;
+    const eits_info *info = eits_get_info(ctx);
     eits_packet_solved head = {.frame = frame->number,
                                .time_us = frame->time_us,
                                .solve_us = solved_us - began_us,
@@ -152,7 +152,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
                                .gap_rel = info->gap_rel,
                                .residual = info->residual,
                                .data_norm = info->data_norm};
-    fw_diagnostics_head(&head, info, quality, &ctx->options);
+    fw_diagnostics_head(&head, info, quality, eits_get_options(ctx));
     fw_stats_add(&instrument->stats, EITS_STAGE_SOLVE, head.solve_us);
     if (wanted)
         fw_stats_add(&instrument->stats, EITS_STAGE_TOUCHES, head.touch_us);
@@ -160,7 +160,7 @@ static uint32_t solve(fw_instrument *instrument, const fw_frame *frame, const fw
     instrument->touched = count > 0;
     fw_fault_set(&instrument->faults, EITS_FAULT_SOLVER, status != EITS_OK,
                  (fw_fault_detail){.frame = frame->number, .value = (int32_t)status});
-    send_diagnostics(instrument, frame, status == EITS_OK);
+    send_diagnostics(instrument, frame, info, status == EITS_OK);
     send_solved(instrument, frame, &head, touches, count);
     return done_us - began_us;
 }

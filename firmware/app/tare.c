@@ -26,7 +26,7 @@ void fw_tare_abort(fw_tare *tare, fw_engine *engine)
 
 static eits_status add(fw_tare *tare, fw_engine *engine, const fw_frame *frame)
 {
-    eits_context *ctx = &engine->ctx;
+    eits_context *ctx = engine->ctx;
     const uint32_t rows = engine->model.n_rows;
     if (tare->wanted == 1)
         return eits_reference_set(ctx, frame->volts, rows);
@@ -54,6 +54,6 @@ fw_tare_step fw_tare_add(fw_tare *tare, fw_engine *engine, const fw_frame *frame
         return FW_TARE_TAKEN;
     tare->active = false;
     engine->tared = engine->phase_known = true;
-    eits_forget(&engine->ctx);
+    eits_forget(engine->ctx);
     return FW_TARE_DONE;
 }

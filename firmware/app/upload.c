@@ -2,23 +2,19 @@
  * then taken up. */
 #include "app/instrument.h"
 
-static fw_answer refuse(eits_reply_status status, int32_t a, int32_t b)
-{
-    return (fw_answer){.status = status, .detail = {a, b}};
-}
-
 fw_answer fw_model_fits(const fw_instrument *instrument, const eits_model *model)
 {
     const size_t raw = sizeof(eits_packet_raw) + 5 * (size_t)model->n_rows;
     const size_t image = sizeof(eits_packet_solved) + 4 * (size_t)model->n_pixels;
     const size_t memory = instrument->engine.workspace_bytes;
     if (model->n_electrodes > FW_ELECTRODES)
-        return refuse(EITS_REPLY_MODEL_SCAN, (int32_t)model->n_electrodes, (int32_t)FW_ELECTRODES);
+        return fw_refuse(EITS_REPLY_MODEL_SCAN, (int32_t)model->n_electrodes,
+                         (int32_t)FW_ELECTRODES);
     if (raw > EITS_LINK_MAX_PAYLOAD || image > EITS_LINK_MAX_PAYLOAD)
-        return refuse(EITS_REPLY_MODEL_SIZE, (int32_t)EITS_LINK_MAX_PAYLOAD,
-                      (int32_t)(raw > image ? raw : image));
+        return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)EITS_LINK_MAX_PAYLOAD,
+                         (int32_t)(raw > image ? raw : image));
     if (fw_engine_needs(model) > memory)
-        return refuse(EITS_REPLY_MODEL_SIZE, (int32_t)memory, (int32_t)fw_engine_needs(model));
+        return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)memory, (int32_t)fw_engine_needs(model));
     return (fw_answer){0};
 }
 
@@ -52,11 +48,11 @@ fw_answer fw_upload_begin(fw_instrument *instrument, uint32_t bytes, uint32_t cr
     const fw_store *store = &instrument->board->store;
     fw_upload *upload = &instrument->upload;
     if (bytes > fw_store_room(store))
-        return refuse(EITS_REPLY_MODEL_SIZE, (int32_t)fw_store_room(store), 0);
+        return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)fw_store_room(store), 0);
     pause_scan(instrument);
     /* cut short earlier: goes on where it was */
     if (upload->begun && upload->bytes == bytes && upload->crc == crc)
-        return refuse(EITS_REPLY_OK, (int32_t)upload->offset, 0);
+        return fw_refuse(EITS_REPLY_OK, (int32_t)upload->offset, 0);
     upload->bank = spare_bank(instrument);
     upload->bytes = bytes;
     upload->crc = crc;
@@ -66,7 +62,7 @@ fw_answer fw_upload_begin(fw_instrument *instrument, uint32_t bytes, uint32_t cr
     if (upload->begun)
         return (fw_answer){0};
     leave(instrument);
-    return refuse(EITS_REPLY_FLASH, 0, 0);
+    return fw_refuse(EITS_REPLY_FLASH, 0, 0);
 }
 
 static fw_status program(const fw_store *store, const fw_upload *upload, const uint8_t *bytes,
@@ -92,20 +88,20 @@ fw_answer fw_upload_data(fw_instrument *instrument, uint32_t offset, const uint8
 {
     fw_upload *upload = &instrument->upload;
     if (!upload->begun)
-        return refuse(EITS_REPLY_OFFSET, -1, 0);
+        return fw_refuse(EITS_REPLY_OFFSET, -1, 0);
     pause_scan(instrument);
     if (offset != upload->offset)
-        return refuse(EITS_REPLY_OFFSET, (int32_t)upload->offset, 0);
+        return fw_refuse(EITS_REPLY_OFFSET, (int32_t)upload->offset, 0);
     const uint32_t left = upload->bytes - offset;
     if (size > left)
-        return refuse(EITS_REPLY_RANGE, 4, (int32_t)upload->bytes);
+        return fw_refuse(EITS_REPLY_RANGE, 4, (int32_t)upload->bytes);
     if (size % 4u != 0 && size != left)
-        return refuse(EITS_REPLY_LENGTH,
-                      (int32_t)(sizeof(eits_command_model_data) + size - size % 4u), 0);
+        return fw_refuse(EITS_REPLY_LENGTH,
+                         (int32_t)(sizeof(eits_command_model_data) + size - size % 4u), 0);
     if (program(&instrument->board->store, upload, bytes, size) != FW_OK) {
         upload->begun = false;
         leave(instrument);
-        return refuse(EITS_REPLY_FLASH, (int32_t)offset, 0);
+        return fw_refuse(EITS_REPLY_FLASH, (int32_t)offset, 0);
     }
     upload->offset += (uint32_t)size;
     return (fw_answer){0};
@@ -118,19 +114,20 @@ static fw_answer try_model(fw_instrument *instrument, eits_model *model)
     const uint8_t *bytes =
         instrument->board->store.ops->bank(instrument->board->store.ctx, upload->bank);
     if (eits_crc32(0, bytes, upload->bytes) != upload->crc)
-        return refuse(EITS_REPLY_MODEL_CRC, 0, 0);
+        return fw_refuse(EITS_REPLY_MODEL_CRC, 0, 0);
     eits_status status = eits_model_open(model, bytes, upload->bytes);
     if (status != EITS_OK)
-        return refuse(EITS_REPLY_MODEL_INVALID, (int32_t)status, 0);
+        return fw_refuse(EITS_REPLY_MODEL_INVALID, (int32_t)status, 0);
     const fw_answer fits = fw_model_fits(instrument, model);
     if (fits.status != EITS_REPLY_OK)
         return fits;
     float difference;
     status = fw_engine_self_test(&instrument->engine, model, &difference);
     if (status != EITS_OK)
-        return refuse(EITS_REPLY_CORE, (int32_t)status, 0);
+        return fw_refuse(EITS_REPLY_CORE, (int32_t)status, 0);
     if (difference != 0)
-        return refuse(EITS_REPLY_SELF_TEST, (int32_t)(1e9f * (difference < 2 ? difference : 2)), 0);
+        return fw_refuse(EITS_REPLY_SELF_TEST, (int32_t)(1e9f * (difference < 2 ? difference : 2)),
+                         0);
     return (fw_answer){0};
 }
 
@@ -139,7 +136,7 @@ fw_answer fw_upload_commit(fw_instrument *instrument)
     const fw_store *store = &instrument->board->store;
     fw_upload *upload = &instrument->upload;
     if (!upload->begun || upload->offset != upload->bytes)
-        return refuse(EITS_REPLY_OFFSET, upload->begun ? (int32_t)upload->offset : -1, 0);
+        return fw_refuse(EITS_REPLY_OFFSET, upload->begun ? (int32_t)upload->offset : -1, 0);
     pause_scan(instrument);
     upload->begun = false; /* however it ends, it is not resumed */
     eits_model model;
@@ -149,7 +146,7 @@ fw_answer fw_upload_commit(fw_instrument *instrument)
         const uint32_t generation =
             fw_store_record(store, 1u - upload->bank, &other) ? other.generation + 1u : 1u;
         if (fw_store_commit(store, upload->bank, generation, upload->bytes, upload->crc) != FW_OK)
-            answer = refuse(EITS_REPLY_FLASH, (int32_t)fw_store_room(store), 0);
+            answer = fw_refuse(EITS_REPLY_FLASH, (int32_t)fw_store_room(store), 0);
         else
             fw_open_newest(instrument);
     }

@@ -234,7 +234,7 @@ eits_context *dense_bench_open(dense_bench *bench, small_spec spec, int prepared
     bench->made = small_model_make(spec);
     small_context_open(&bench->c, &bench->made, prepared);
     bench->d = dense_of(&bench->c.model);
-    return &bench->c.ctx;
+    return bench->c.ctx;
 }
 
 void dense_bench_close(dense_bench *bench)

@@ -34,7 +34,7 @@ static inline eits_context *set_up(bench *b, small_spec spec, int project)
     small_reference(ctx->model, 1, b->reference);
     for (int i = 0; i < SMALL_ROWS; ++i)
         b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
     o.project_reference = (uint32_t)project;
     o.max_masked = SMALL_ROWS;
@@ -58,14 +58,14 @@ static inline void leave_out(bench *b, uint32_t k)
 static inline void pretend_noise(eits_context *ctx, double noise)
 {
     ctx->reference.noise_v = (eits_real)noise * ctx->reference.v0_rms;
-    ctx->basis_stale = 1;
+    ctx->projection.stale = 1;
 }
 
 static inline uint32_t stage(bench *b)
 {
     uint32_t masked = 0;
     uint64_t macs = 0;
-    CHECK_EQUAL(eits_frame_stage(&b->b.c.ctx, b->frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_EQUAL(eits_frame_stage(b->b.c.ctx, b->frame, SMALL_ROWS, &masked, &macs), EITS_OK);
     return masked;
 }
 
@@ -88,13 +88,13 @@ static inline void whitening_column(eits_context *ctx, const double *column, int
  * all rows. */
 static inline double energy_of_row(bench *b, uint32_t k, int whole)
 {
-    eits_context *ctx = &b->b.c.ctx;
+    eits_context *ctx = b->b.c.ctx;
     eits_real y[STRIDE] = {0};
     for (int i = 0; i < RANK; ++i)
         y[i] = (eits_real)b->b.d.p[k * RANK + (uint32_t)i];
     if (!whole)
         (void)eits_whiten_data(ctx, y);
-    double *back = dense_copy(whole ? y : eits_adjoint(ctx, y, ctx->adjoint), RANK), sum = 0;
+    double *back = dense_copy(whole ? y : eits_adjoint(ctx, y, ctx->solver.adjoint), RANK), sum = 0;
     for (int j = 0; j < N; ++j) {
         const double c = dense_dot(b->b.d.s + j * RANK, back, RANK);
         sum += c * c;
@@ -127,16 +127,16 @@ static inline double greatest_eigenvalue(const double *s)
  * The frame is staged. */
 static inline void solve_what_is_seen(bench *b, int sign)
 {
-    eits_context *ctx = &b->b.c.ctx;
+    eits_context *ctx = b->b.c.ctx;
     double greatest;
     for (int j = 0; j < N; ++j)
         whitening_column(ctx, b->b.d.s + j * RANK, 1, b->b.d.s + j * RANK);
     greatest = greatest_eigenvalue(b->b.d.s);
     CHECK(greatest <= (double)b->b.c.model.lipschitz);
-    if (ctx->basis_count == 0 && ctx->masked_whitening == EITS_WHITENING_DIAGONAL)
+    if (ctx->projection.count == 0 && ctx->whitening.form == EITS_WHITENING_DIAGONAL)
         CHECK_NEAR(greatest, b->b.c.model.lipschitz, 1e-3);
-    double *y = dense_copy(ctx->y, RANK), min = 0;
-    eits_options o = ctx->options;
+    double *y = dense_copy(ctx->frame.y, RANK), min = 0;
+    eits_options o = *eits_get_options(ctx);
     o.sign = (eits_sign)sign;
     o.lambda_rel = R(0.05);
     o.detection_factor = 0;
@@ -147,10 +147,10 @@ static inline void solve_what_is_seen(bench *b, int sign)
         o.gap_rel = R(BOTH_WIDTHS(1e-5, 1e-9));
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         eits_forget(ctx);
-        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-        const eits_info info = ctx->info;
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+        const eits_info info = *eits_get_info(ctx);
         CHECK(info.gap >= 0 && info.nonzeros > 0 && info.step_halvings == 0);
-        double *got = dense_copy(ctx->x, N);
+        double *got = dense_copy(eits_get_coefficients(ctx), N);
         const double lambda = (double)info.lambda, scale = 0.5 * dense_dot(y, y, RANK);
         CHECK_NEAR(info.gap, dense_gap(&b->b.d, y, got, lambda, o.sign), 300 * EPS * scale);
         const double objective = dense_objective(&b->b.d, y, got, lambda), room = 300 * EPS * scale;

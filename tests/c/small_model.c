@@ -402,7 +402,7 @@ void small_context_open(small_context *context, const small_model *model, int pr
         abort();
     const size_t size = eits_workspace_size(&context->model, prepared);
     void *workspace = small_aligned(&context->memory, size);
-    if (eits_init(&context->ctx, &context->model, workspace, size) != EITS_OK)
+    if (eits_init(workspace, size, &context->model, &context->ctx) != EITS_OK)
         abort();
 }
 
@@ -425,7 +425,7 @@ void small_reference(const eits_model *model, double gain, eits_real *frame)
 void small_new_data(eits_context *ctx, uint64_t state)
 {
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        ctx->y[i] = (eits_real)small_random(&state);
+        ctx->frame.y[i] = (eits_real)small_random(&state);
 }
 
 int small_same_touch(const eits_touch *a, const eits_touch *b)

@@ -3,6 +3,7 @@
 #ifndef EITSKIN_TEST_SMALL_MODEL_H
 #define EITSKIN_TEST_SMALL_MODEL_H
 
+#include "context/context.h"
 #include "eitskin/eitskin.h"
 
 /* 8 electrodes, adjacent: 40 rows in 19 reciprocal pairs, every fifth measured the other way round,
@@ -75,7 +76,7 @@ uint32_t small_get_u32(const uint8_t *at);
 typedef struct small_context {
     void *memory;
     eits_model model;
-    eits_context ctx;
+    eits_context *ctx;
 } small_context;
 void small_context_open(small_context *context, const small_model *model, int prepared);
 void small_context_close(small_context *context);

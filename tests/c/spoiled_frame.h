@@ -43,15 +43,15 @@ static inline eits_context *set_up(bench *b, int noise_known)
         add_noise(b, b->untouched[k]);
     }
     if (noise_known) {
-        CHECK_EQUAL(eits_reference_begin(&b->c.ctx, UNTOUCHED), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(b->c.ctx, UNTOUCHED), EITS_OK);
         for (int k = 0; k < UNTOUCHED; ++k)
-            CHECK_EQUAL(eits_reference_add(&b->c.ctx, b->untouched[k], SMALL_ROWS), EITS_OK);
-        CHECK_EQUAL(eits_reference_finish(&b->c.ctx), EITS_OK);
+            CHECK_EQUAL(eits_reference_add(b->c.ctx, b->untouched[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_finish(b->c.ctx), EITS_OK);
     } else {
-        CHECK_EQUAL(eits_reference_set(&b->c.ctx, b->frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(b->c.ctx, b->frame, SMALL_ROWS), EITS_OK);
     }
     add_noise(b, b->frame);
-    return &b->c.ctx;
+    return b->c.ctx;
 }
 
 static inline void tear_down(bench *b)
@@ -75,7 +75,7 @@ static inline int row_crosses(const eits_context *ctx, uint32_t i, uint32_t e, u
 
 static inline void look_for(eits_context *ctx, uint32_t diagnostics)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.diagnostics = diagnostics;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -83,7 +83,7 @@ static inline void look_for(eits_context *ctx, uint32_t diagnostics)
 
 static inline void reconstruct(bench *b)
 {
-    CHECK_EQUAL(eits_reconstruct(&b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
 }
 
 #endif

@@ -33,24 +33,24 @@ static void sizes_agree(void)
                                                           (size_t)m.nx * m.ny, prepared));
                     CHECK_EQUAL(size % 16, 0);
                     void *memory;
-                    eits_context ctx;
+                    eits_context *ctx;
                     uint8_t *workspace = small_aligned(&memory, size);
-                    CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
-                    const uint8_t *held_end =
-                        (uint8_t *)ctx.working_slot + EITS_ALIGN16(EITS_CACHED(m.n_pixels) * 4);
+                    CHECK_EQUAL(eits_init(workspace, size, &m, &ctx), EITS_OK);
+                    const uint8_t *cache_end =
+                        ctx->columns.wanted + EITS_ALIGN16(EITS_CACHED(m.n_pixels));
                     const uint8_t *end =
-                        prepared ? (uint8_t *)ctx.working_panels +
+                        prepared ? (uint8_t *)ctx->solver.working_panels +
                                        EITS_REALS(EITS_PANEL_COLUMNS(m.n_pixels) * m.rank)
-                                 : held_end;
+                                 : cache_end;
                     /* nothing is missing; panels may need room to be aligned */
                     const size_t spare = (size_t)(workspace + size - end);
                     CHECK(prepared ? spare <= EITS_LINE - 16 : spare == 0);
-                    CHECK((uintptr_t)ctx.panels % EITS_LINE == 0);
-                    CHECK((ctx.panels != NULL) == prepared &&
-                          (ctx.working_panels != NULL) == prepared);
-                    CHECK((uint8_t *)ctx.reference.v0 == workspace);
-                    CHECK(((uintptr_t)ctx.y | (uintptr_t)ctx.basis | (uintptr_t)ctx.x |
-                           (uintptr_t)ctx.list_index) %
+                    CHECK((uintptr_t)ctx->columns.panels % EITS_LINE == 0);
+                    CHECK((ctx->columns.panels != NULL) == prepared &&
+                          (ctx->solver.working_panels != NULL) == prepared);
+                    CHECK((uint8_t *)ctx == workspace);
+                    CHECK(((uintptr_t)ctx->frame.y | (uintptr_t)ctx->projection.basis |
+                           (uintptr_t)eits_get_coefficients(ctx) | (uintptr_t)ctx->scratch.index) %
                               16 ==
                           0);
                     free(memory);
@@ -66,29 +66,27 @@ static void refused_workspaces(void)
 {
     small_model made = small_model_make((small_spec){.rank = 12, .side = 6});
     eits_model m;
-    eits_context ctx, before;
+    eits_context *ctx = NULL;
     CHECK_EQUAL(eits_model_open(&m, made.blob, made.size), EITS_OK);
     const size_t size = eits_workspace_size(&m, 0), prepared = eits_workspace_size(&m, 1);
     CHECK_EQUAL(prepared, sizeof constant);
     CHECK(prepared > size);
     void *memory;
     uint8_t *workspace = small_aligned(&memory, prepared + 16);
-    memset(&ctx, 0x5A, sizeof ctx);
-    memcpy(&before, &ctx, sizeof ctx);
-    CHECK_EQUAL(eits_init(NULL, &m, workspace, size), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_init(&ctx, NULL, workspace, size), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_init(&ctx, &m, NULL, size), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_init(&ctx, &m, workspace, 0), EITS_E_WORKSPACE);
-    CHECK_EQUAL(eits_init(&ctx, &m, workspace, size - 1), EITS_E_WORKSPACE);
+    CHECK_EQUAL(eits_init(workspace, size, &m, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_init(workspace, size, NULL, &ctx), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_init(NULL, size, &m, &ctx), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_init(workspace, 0, &m, &ctx), EITS_E_WORKSPACE);
+    CHECK_EQUAL(eits_init(workspace, size - 1, &m, &ctx), EITS_E_WORKSPACE);
     for (size_t shift = 1; shift < 16; ++shift)
-        CHECK_EQUAL(eits_init(&ctx, &m, workspace + shift, prepared), EITS_E_WORKSPACE);
-    CHECK(memcmp(&ctx, &before, sizeof ctx) == 0);
-    CHECK_EQUAL(eits_init(&ctx, &m, workspace, size), EITS_OK);
-    CHECK(ctx.panels == NULL);
-    CHECK_EQUAL(eits_init(&ctx, &m, workspace, prepared - 1), EITS_OK);
-    CHECK(ctx.panels == NULL); /* not enough for the copy: it is left out */
-    CHECK_EQUAL(eits_init(&ctx, &m, workspace, prepared), EITS_OK);
-    CHECK(ctx.panels != NULL);
+        CHECK_EQUAL(eits_init(workspace + shift, prepared, &m, &ctx), EITS_E_WORKSPACE);
+    CHECK(ctx == NULL);
+    CHECK_EQUAL(eits_init(workspace, size, &m, &ctx), EITS_OK);
+    CHECK(ctx->columns.panels == NULL);
+    CHECK_EQUAL(eits_init(workspace, prepared - 1, &m, &ctx), EITS_OK);
+    CHECK(ctx->columns.panels == NULL); /* not enough for the copy: it is left out */
+    CHECK_EQUAL(eits_init(workspace, prepared, &m, &ctx), EITS_OK);
+    CHECK(ctx->columns.panels != NULL);
     free(memory);
     small_model_free(&made);
 }
@@ -107,7 +105,7 @@ static void exercise(eits_context *ctx, uint64_t *state)
         CHECK_EQUAL(eits_reference_add(ctx, frame, SMALL_ROWS), EITS_OK);
     }
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.touch_min_fraction = 0;
     o.touch_threshold = 0;
     o.max_touches = EITS_MAX_TOUCHES;
@@ -140,10 +138,10 @@ static void nothing_is_written_beside_the_workspace(void)
                     *copy = small_aligned(&copy_memory, made.size);
             memset(whole, 0xC3, size + 2 * GUARD);
             memcpy(copy, made.blob, made.size);
-            eits_context ctx;
+            eits_context *ctx;
             uint64_t state = 101;
-            CHECK_EQUAL(eits_init(&ctx, &m, whole + GUARD, size), EITS_OK);
-            exercise(&ctx, &state);
+            CHECK_EQUAL(eits_init(whole + GUARD, size, &m, &ctx), EITS_OK);
+            exercise(ctx, &state);
             for (int i = 0; i < GUARD; ++i)
                 CHECK(whole[i] == 0xC3 && whole[GUARD + size + (size_t)i] == 0xC3);
             CHECK(memcmp(copy, made.blob, made.size) == 0); /* the model is only read */
@@ -168,21 +166,21 @@ static void contexts_are_independent(void)
         small_reference(&c[k].model, k == 0 ? 1 : -3, references[k]);
         for (int i = 0; i < SMALL_ROWS; ++i)
             frames[k][i] = references[k][i] * (eits_real)(1 + 0.2 * small_random(&state));
-        CHECK_EQUAL(eits_reference_set(&c[k].ctx, references[k], SMALL_ROWS), EITS_OK);
-        CHECK_EQUAL(eits_reconstruct(&c[k].ctx, frames[k], SMALL_ROWS, alone[k], NULL), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(c[k].ctx, references[k], SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reconstruct(c[k].ctx, frames[k], SMALL_ROWS, alone[k], NULL), EITS_OK);
     }
     CHECK(memcmp(alone[0], alone[1], sizeof image) != 0);
     for (int round = 0; round < 6; ++round) {
-        CHECK_EQUAL(eits_reconstruct(&c[round % 2].ctx, frames[round % 2], SMALL_ROWS, image, NULL),
+        CHECK_EQUAL(eits_reconstruct(c[round % 2].ctx, frames[round % 2], SMALL_ROWS, image, NULL),
                     EITS_OK);
         CHECK(memcmp(image, alone[round % 2], sizeof image) == 0);
     }
     const size_t size = eits_workspace_size(&c[0].model, 0);
-    memset(c[0].ctx.reference.v0, 0xFF, size); /* the workspace's first byte; all NaN */
-    uint8_t *workspace = (uint8_t *)c[0].ctx.reference.v0;
-    CHECK_EQUAL(eits_init(&c[0].ctx, &c[0].model, workspace, size), EITS_OK);
-    CHECK_EQUAL(eits_reference_set(&c[0].ctx, references[0], SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_reconstruct(&c[0].ctx, frames[0], SMALL_ROWS, image, NULL), EITS_OK);
+    void *workspace = c[0].ctx;
+    memset(workspace, 0xFF, size); /* all NaN */
+    CHECK_EQUAL(eits_init(workspace, size, &c[0].model, &c[0].ctx), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(c[0].ctx, references[0], SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(c[0].ctx, frames[0], SMALL_ROWS, image, NULL), EITS_OK);
     CHECK(memcmp(image, alone[0], sizeof image) == 0);
     small_context_close(&c[0]);
     small_context_close(&c[1]);
@@ -285,17 +283,17 @@ static void options_out_of_range(void)
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
     small_context c;
     small_context_open(&c, &made, 0);
-    const eits_options before = c.ctx.options;
+    const eits_options before = *eits_get_options(c.ctx);
     CHECK_EQUAL(eits_set_options(NULL, &before), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_set_options(&c.ctx, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_set_options(c.ctx, NULL), EITS_E_ARGUMENT);
     for (size_t k = 0; k < sizeof wrong / sizeof wrong[0]; ++k) {
         eits_options o = before;
         const uint32_t whole = wrong[k].whole ? (uint32_t)wrong[k].value : 0;
         const eits_real real = (eits_real)wrong[k].value;
         memcpy((uint8_t *)&o + wrong[k].offset, wrong[k].whole ? (const void *)&whole : &real,
                wrong[k].whole ? 4 : sizeof real);
-        CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_E_ARGUMENT);
-        CHECK(memcmp(&c.ctx.options, &before, sizeof before) == 0);
+        CHECK_EQUAL(eits_set_options(c.ctx, &o), EITS_E_ARGUMENT);
+        CHECK(memcmp(eits_get_options(c.ctx), &before, sizeof before) == 0);
     }
     eits_options o = before; /* all limits that are still allowed, at once */
     o.iterations = o.gap_every = UINT32_MAX;
@@ -309,8 +307,8 @@ static void options_out_of_range(void)
         o.touch_change_s_per_m = R(1e30);
     o.regularisation_noise_factor = R(1e30);
     o.touch_min_radius_mm = o.touch_seed_radius_mm = o.touch_max_radius_mm = R(1e-6);
-    CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
-    CHECK(memcmp(&c.ctx.options, &o, sizeof o) == 0);
+    CHECK_EQUAL(eits_set_options(c.ctx, &o), EITS_OK);
+    CHECK(memcmp(eits_get_options(c.ctx), &o, sizeof o) == 0);
     small_context_close(&c);
     small_model_free(&made);
 }
@@ -325,48 +323,48 @@ static void self_test(void)
     uint8_t *golden = small_model_section(&made, "GOLD", NULL) + 4 * 2 * SMALL_ROWS;
     small_context_open(&c, &made, 1);
     CHECK_EQUAL(eits_self_test(NULL, &difference), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_self_test(&c.ctx, NULL), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
+    CHECK_EQUAL(eits_self_test(c.ctx, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_self_test(c.ctx, &difference), EITS_OK);
     double peak = 0;
     for (int j = 0; j < 36; ++j)
-        peak = fmax(peak, fabs((double)c.ctx.image[j]));
+        peak = fmax(peak, fabs((double)eits_get_image(c.ctx)[j]));
     CHECK(peak > 0);
     /* against an image of zeros: the absolute difference */
     CHECK_NEAR(difference, peak, 2 * EPS * peak);
-    memcpy(image, c.ctx.image, sizeof image);
+    memcpy(image, eits_get_image(c.ctx), sizeof image);
     small_context_close(&c);
     for (int j = 0; j < 36; ++j)
         small_put_f32(golden + 4 * j, (float)image[j]);
     small_model_seal(&made);
     for (int prepared = 0; prepared < 2; ++prepared) {
         small_context_open(&c, &made, prepared);
-        CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
+        CHECK_EQUAL(eits_self_test(c.ctx, &difference), EITS_OK);
         /* the very bits; in double, the rounding of the stored image */
         CHECK_NEAR(difference, 0, BOTH_WIDTHS(0, 1e-7));
-        CHECK(c.ctx.reference.ready);
-        CHECK_NEAR(c.ctx.reference.v0[3], c.model.golden.reference[3], 0);
+        CHECK(c.ctx->reference.ready);
+        CHECK_NEAR(c.ctx->reference.v0[3], c.model.golden.reference[3], 0);
         /* a context as before: learning starts from nothing */
-        CHECK_EQUAL(eits_reference_begin(&c.ctx, 4), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(c.ctx, 4), EITS_OK);
         for (int k = 0; k < 4; ++k) {
             eits_real frame[SMALL_ROWS];
             small_reference(&c.model, 1, frame);
-            CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+            CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
         }
-        CHECK_EQUAL(eits_reference_finish(&c.ctx), EITS_OK);
-        CHECK(c.ctx.reference.noise_v <= R(1e-6));
+        CHECK_EQUAL(eits_reference_finish(c.ctx), EITS_OK);
+        CHECK(c.ctx->reference.noise_v <= R(1e-6));
         small_context_close(&c);
     }
     small_put_f32(golden + 4 * 7, (float)(image[7] + (eits_real)(0.25 * peak)));
     small_model_seal(&made);
     small_context_open(&c, &made, 1);
-    CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_OK);
+    CHECK_EQUAL(eits_self_test(c.ctx, &difference), EITS_OK);
     const double stated_peak = fmax(peak, (double)image[7] + 0.25 * peak);
     CHECK_NEAR(difference, 0.25 * peak / stated_peak, 1e-6);
     small_context_close(&c);
     memset(golden - 8 * SMALL_ROWS, 0, 4 * SMALL_ROWS); /* a reference of zeros is none */
     small_model_seal(&made);
     small_context_open(&c, &made, 1);
-    CHECK_EQUAL(eits_self_test(&c.ctx, &difference), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_self_test(c.ctx, &difference), EITS_E_FRAME_ZERO);
     small_context_close(&c);
     small_model_free(&made);
 }

@@ -42,8 +42,8 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
         for (uint32_t i = 0; i < RANK; ++i)
             atom[i] += cover * b->d.s[(size_t)j * RANK + i];
     }
-    for (uint32_t k = 0; k < b->c.ctx.basis_count; ++k) {
-        double *basis = dense_copy(b->c.ctx.basis + k * EITS_STRIDE(RANK), RANK);
+    for (uint32_t k = 0; k < b->c.ctx->projection.count; ++k) {
+        double *basis = dense_copy(b->c.ctx->projection.basis + k * EITS_STRIDE(RANK), RANK);
         const double along = dense_dot(basis, atom, RANK);
         for (uint32_t i = 0; i < RANK; ++i)
             atom[i] -= along * basis[i];
@@ -108,17 +108,18 @@ static void responses(void)
         for (int round = 0; round < 60; ++round) {
             if (round == 30) { /* from here on with a direction to ignore */
                 for (int i = 0; i < RANK; ++i)
-                    ctx->basis[i] = R(1.0 / 6.0);
-                ctx->basis_count = 1;
+                    ctx->projection.basis[i] = R(1.0 / 6.0);
+                ctx->projection.count = 1;
             }
             const eits_disc disc = random_disc(&state);
             eits_real atom[EITS_STRIDE(RANK)];
             double expected[RANK];
             const uint32_t covered = expected_atom(&b, &disc, expected);
-            const uint64_t macs = eits_disc_atom(ctx, &disc, atom, NULL);
-            CHECK_EQUAL(macs, covered * RANK + ctx->basis_count * 2 * RANK);
+            const uint64_t macs = eits_disc_atom(ctx, &ctx->scratch, &disc, atom, NULL);
+            CHECK_EQUAL(macs, covered * RANK + ctx->projection.count * 2 * RANK);
             CHECK_NEAR(dense_greatest_difference(expected, atom, RANK), 0, 2000 * EPS);
-            CHECK_EQUAL(eits_disc_atom(ctx, &disc, atom, ctx->slope), 4 * macs);
+            CHECK_EQUAL(eits_disc_atom(ctx, &ctx->scratch, &disc, atom, &ctx->scratch.row[5]),
+                        4 * macs);
             CHECK_NEAR(dense_greatest_difference(expected, atom, RANK), 0, 2000 * EPS);
         }
         dense_bench_close(&b);
@@ -137,10 +138,10 @@ static void far_away_there_is_nothing(void)
                                     .radius_mm = 9,
                                     .polarity = 1};
             eits_real atom[EITS_STRIDE(RANK)];
-            CHECK_EQUAL(eits_disc_atom(ctx, &disc, atom, ctx->slope), 0);
+            CHECK_EQUAL(eits_disc_atom(ctx, &ctx->scratch, &disc, atom, &ctx->scratch.row[5]), 0);
             for (int i = 0; i < RANK; ++i)
-                CHECK(atom[i] == 0 && ctx->slope[0][i] == 0 && ctx->slope[1][i] == 0 &&
-                      ctx->slope[2][i] == 0);
+                CHECK(atom[i] == 0 && ctx->scratch.row[5 + 0][i] == 0 &&
+                      ctx->scratch.row[5 + 1][i] == 0 && ctx->scratch.row[5 + 2][i] == 0);
         }
     }
     dense_bench_close(&b);
@@ -180,7 +181,7 @@ static void derivatives(void)
         if (!smooth_around(&b, &disc, 1e-3))
             continue;
         ++tried;
-        (void)eits_disc_atom(ctx, &disc, atom, ctx->slope);
+        (void)eits_disc_atom(ctx, &ctx->scratch, &disc, atom, &ctx->scratch.row[5]);
         if (sizeof(eits_real) == 4)
             /* the difference itself needs doubles; that both widths agree is seen below */
             continue;
@@ -195,7 +196,8 @@ static void derivatives(void)
             for (int i = 0; i < RANK; ++i)
                 size = fmax(size, fabs(up[i] - down[i]) / (2 * step));
             for (int i = 0; i < RANK; ++i)
-                CHECK_NEAR(ctx->slope[k][i], (up[i] - down[i]) / (2 * step), 1e-5 * size + 1e-9);
+                CHECK_NEAR(ctx->scratch.row[5 + k][i], (up[i] - down[i]) / (2 * step),
+                           1e-5 * size + 1e-9);
         }
     }
     CHECK(tried >= 20);
@@ -204,7 +206,7 @@ static void derivatives(void)
     eits_real atom[EITS_STRIDE(RANK)];
     double up[RANK], down[RANK];
     CHECK(smooth_around(&b, &disc, 1e-3));
-    (void)eits_disc_atom(ctx, &disc, atom, ctx->slope);
+    (void)eits_disc_atom(ctx, &ctx->scratch, &disc, atom, &ctx->scratch.row[5]);
     for (int k = 0; k < 3; ++k) {
         eits_disc moved = disc;
         eits_real *place = k == 0 ? &moved.x_mm : (k == 1 ? &moved.y_mm : &moved.radius_mm);
@@ -213,7 +215,7 @@ static void derivatives(void)
         *place -= R(1.0 / 512.0);
         (void)expected_atom(&b, &moved, down);
         for (int i = 0; i < RANK; ++i)
-            CHECK_NEAR(ctx->slope[k][i], (up[i] - down[i]) * 512, 2e-3);
+            CHECK_NEAR(ctx->scratch.row[5 + k][i], (up[i] - down[i]) * 512, 2e-3);
     }
     dense_bench_close(&b);
 }

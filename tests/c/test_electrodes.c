@@ -10,7 +10,7 @@ static void open_electrodes(void)
             bench b;
             eits_context *ctx = set_up(&b, 1);
             look_for(ctx, EITS_DIAGNOSTICS_ALL);
-            eits_options o = ctx->options;
+            eits_options o = *eits_get_options(ctx);
             o.saturation_v = 2;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
             uint32_t count = 0, last = 0;
@@ -22,26 +22,26 @@ static void open_electrodes(void)
                 last = i;
             }
             reconstruct(&b);
-            CHECK_EQUAL(ctx->info.masked, count);
-            CHECK_EQUAL(ctx->info.open_electrodes, 1u << e);
-            CHECK_EQUAL(ctx->info.diagnostics &
+            CHECK_EQUAL(eits_get_info(ctx)->masked, count);
+            CHECK_EQUAL(eits_get_info(ctx)->open_electrodes, 1u << e);
+            CHECK_EQUAL(eits_get_info(ctx)->diagnostics &
                             (EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED),
                         EITS_DIAGNOSTIC_ELECTRODE_OPEN);
-            CHECK_EQUAL(ctx->info.saturated, kind == 2 ? count : 0);
-            CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0 || kind != 2);
+            CHECK_EQUAL(eits_get_info(ctx)->saturated, kind == 2 ? count : 0);
+            CHECK((eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0 || kind != 2);
             for (uint32_t k = 0; k < SMALL_ELECTRODES; ++k)
-                CHECK_EQUAL(ctx->electrode[k], k == e ? EITS_ELECTRODE_OPEN : 0);
+                CHECK_EQUAL(ctx->rows.electrode[k], k == e ? EITS_ELECTRODE_OPEN : 0);
             for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-                CHECK((ctx->unusable[i] & EITS_ROW_OPEN) != 0 || !row_uses(ctx, i, e));
+                CHECK((ctx->rows.unusable[i] & EITS_ROW_OPEN) != 0 || !row_uses(ctx, i, e));
             const eits_real dead = b.frame[last];
             b.frame[last] = ctx->reference.v0[last];
             reconstruct(&b);
-            CHECK_EQUAL(ctx->info.open_electrodes, 0);
-            CHECK_EQUAL(ctx->electrode[e] & EITS_ELECTRODE_OPEN, 0);
+            CHECK_EQUAL(eits_get_info(ctx)->open_electrodes, 0);
+            CHECK_EQUAL(ctx->rows.electrode[e] & EITS_ELECTRODE_OPEN, 0);
             b.frame[last] = dead;
             look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN);
             reconstruct(&b);
-            CHECK_EQUAL(ctx->info.open_electrodes, 0);
+            CHECK_EQUAL(eits_get_info(ctx)->open_electrodes, 0);
             tear_down(&b);
         }
     }
@@ -54,11 +54,11 @@ static void all_dead(void)
     eits_context *ctx = set_up(&b, 1);
     memset(b.frame, 0, sizeof b.frame);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
-    CHECK_EQUAL(ctx->info.diagnostics, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = R(NAN);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-    CHECK_EQUAL(ctx->info.diagnostics, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
     tear_down(&b);
 }
 
@@ -73,10 +73,10 @@ static void noise_alone(void)
         memset(b.frame, 0, sizeof b.frame);
         add_noise(&b, b.frame);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ZERO);
-        CHECK(ctx->info.diagnostics == 0 && ctx->info.open_electrodes == 0);
+        CHECK(eits_get_info(ctx)->diagnostics == 0 && eits_get_info(ctx)->open_electrodes == 0);
         b.frame[7] = ctx->reference.v0[7]; /* one row that lives, and it is not the front end */
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(ctx->info.diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_ELECTRODE_OPEN,
                     open ? EITS_DIAGNOSTIC_ELECTRODE_OPEN : 0);
         tear_down(&b);
     }
@@ -104,7 +104,8 @@ static void what_a_dead_row_is(void)
                                                   : fraction * b.frame[i];
         }
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.open_electrodes, way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);
+        CHECK_EQUAL(eits_get_info(ctx)->open_electrodes,
+                    way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);
         tear_down(&b);
     }
 }
@@ -114,14 +115,14 @@ static void refused_by_name(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.max_masked = 10;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = row_uses(ctx, i, 3) ? 0 : b.frame[i];
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
-    CHECK_EQUAL(ctx->info.open_electrodes, 1u << 3);
+    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
+    CHECK_EQUAL(eits_get_info(ctx)->open_electrodes, 1u << 3);
     tear_down(&b);
 }
 
@@ -135,14 +136,14 @@ static void bridged_pairs(void)
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] *= row_crosses(ctx, i, e, f) ? R(0.01) : R(1);
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_BRIDGED);
-        CHECK_EQUAL(ctx->info.bridged_electrodes, (1u << e) | (1u << f));
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_BRIDGED);
+        CHECK_EQUAL(eits_get_info(ctx)->bridged_electrodes, (1u << e) | (1u << f));
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            CHECK_EQUAL(ctx->unusable[i],
+            CHECK_EQUAL(ctx->rows.unusable[i],
                         row_uses(ctx, i, e) || row_uses(ctx, i, f) ? EITS_ROW_BRIDGED : 0);
         look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_BRIDGED);
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.bridged_electrodes, 0);
+        CHECK_EQUAL(eits_get_info(ctx)->bridged_electrodes, 0);
         tear_down(&b);
     }
 }
@@ -163,11 +164,11 @@ static void pairs_that_live(void)
                 continue;
             b.frame[i] *= 100;
             reconstruct(&b);
-            CHECK_EQUAL(ctx->info.diagnostics, 0);
+            CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
             b.frame[i] = dead;
         }
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_BRIDGED);
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_BRIDGED);
         uint32_t telling = 0; /* two rows that tell something are too few */
         memcpy(b.frame, b.untouched[0], sizeof b.frame);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
@@ -178,7 +179,7 @@ static void pairs_that_live(void)
             b.frame[i] *= row_crosses(ctx, i, e, f) || another ? 0 : R(1);
         }
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.diagnostics, 0);
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
         tear_down(&b);
     }
 }
@@ -190,23 +191,24 @@ static void masked_and_forgotten(void)
     bench b;
     eits_context *ctx = set_up(&b, 1);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.saturation_v = 2;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     const eits_real good = b.frame[9];
     b.frame[9] *= -1;
     reconstruct(&b);
-    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
     b.frame[9] = good;
     reconstruct(&b);
-    CHECK(ctx->info.diagnostics == 0 && ctx->info.outliers == 0 && ctx->info.masked == 0);
+    CHECK(eits_get_info(ctx)->diagnostics == 0 && eits_get_info(ctx)->outliers == 0 &&
+          eits_get_info(ctx)->masked == 0);
     for (int turned = 1; turned >= 0; --turned) { /* the stage by itself */
         uint32_t masked;
         uint64_t macs;
         b.frame[9] = turned ? -good : good;
         CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-        CHECK_EQUAL(ctx->info.diagnostics, turned ? EITS_DIAGNOSTIC_OUTLIER : 0);
-        CHECK_EQUAL(ctx->info.outliers, turned);
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, turned ? EITS_DIAGNOSTIC_OUTLIER : 0);
+        CHECK_EQUAL(eits_get_info(ctx)->outliers, turned);
     }
     for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
         if (!row_uses(ctx, i, 3))
@@ -215,7 +217,8 @@ static void masked_and_forgotten(void)
         b.frame[i] = i % 2 ? 3 : 0;
     }
     reconstruct(&b);
-    CHECK(ctx->info.diagnostics == 0 && ctx->info.saturated == 0 && ctx->info.masked == 20);
+    CHECK(eits_get_info(ctx)->diagnostics == 0 && eits_get_info(ctx)->saturated == 0 &&
+          eits_get_info(ctx)->masked == 20);
     tear_down(&b);
 }
 
@@ -232,8 +235,8 @@ static void small_rows(void)
         b.frame[fold.first] = grown ? R(0.42) : R(0.36),
         b.frame[fold.second] = (eits_real)fold.sign * b.frame[fold.first];
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.diagnostics, grown ? EITS_DIAGNOSTIC_OUTLIER : 0);
-        CHECK_EQUAL(ctx->info.masked, grown ? 2 : 0);
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, grown ? EITS_DIAGNOSTIC_OUTLIER : 0);
+        CHECK_EQUAL(eits_get_info(ctx)->masked, grown ? 2 : 0);
     }
     tear_down(&b);
 }
@@ -247,19 +250,19 @@ static void impossible_rows(void)
     const eits_real good = b.frame[9];
     b.frame[9] *= -1;
     reconstruct(&b);
-    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
-    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_OUTLIER);
-    CHECK_EQUAL(ctx->info.masked, 1);
+    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+    CHECK_EQUAL(ctx->rows.unusable[9], EITS_ROW_OUTLIER);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 1);
     b.frame[9] = 9 * good;
     reconstruct(&b);
-    CHECK_EQUAL(ctx->unusable[9], EITS_ROW_OUTLIER);
-    CHECK_EQUAL(ctx->info.masked, 1);
+    CHECK_EQUAL(ctx->rows.unusable[9], EITS_ROW_OUTLIER);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 1);
     b.frame[9] = good;
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] *= R(-1);
     reconstruct(&b);
-    CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0);
-    CHECK_EQUAL(ctx->info.masked, 0);
+    CHECK((eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
     tear_down(&b);
 }
 

@@ -25,8 +25,8 @@ typedef struct bench {
 static eits_context *open_made(bench *b, int prepared)
 {
     small_context_open(&b->c, &b->made, prepared);
-    small_new_data(&b->c.ctx, 61);
-    return &b->c.ctx;
+    small_new_data(b->c.ctx, 61);
+    return b->c.ctx;
 }
 
 static eits_context *set_up(bench *b, small_spec spec, int prepared)
@@ -46,7 +46,7 @@ static void tear_down(bench *b)
 static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iterations, eits_sign sign,
                        double lambda, double gap)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.solver = solver;
     o.iterations = iterations;
     o.sign = sign;
@@ -55,8 +55,8 @@ static eits_info solve(eits_context *ctx, eits_solver solver, uint32_t iteration
     o.lambda_noise_factor = 0;
     o.gap_rel = (eits_real)gap;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    return ctx->info;
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    return *eits_get_info(ctx);
 }
 
 /* The gap at the result, in double. */
@@ -64,14 +64,15 @@ static void check_gap(const eits_context *ctx, double max_rel)
 {
     dense d = dense_of(ctx->model);
     const uint32_t n = ctx->model->n_pixels, rank = ctx->model->rank;
-    double *x = dense_copy(ctx->x, n), *y = dense_copy(ctx->y, rank);
-    const double gap = dense_gap(&d, y, x, (double)ctx->info.lambda, ctx->options.sign),
+    double *x = dense_copy(eits_get_coefficients(ctx), n), *y = dense_copy(ctx->frame.y, rank);
+    const double gap = dense_gap(&d, y, x, (double)eits_get_info(ctx)->lambda,
+                                 eits_get_options(ctx)->sign),
                  scale = 0.5 * dense_dot(y, y, rank);
-    CHECK_NEAR(gap, ctx->info.gap, 300 * EPS * scale);
+    CHECK_NEAR(gap, eits_get_info(ctx)->gap, 300 * EPS * scale);
     CHECK(gap <= max_rel * scale);
     for (uint32_t j = 0; j < n; ++j)
-        CHECK(ctx->options.sign == EITS_SIGN_BOTH ||
-              (ctx->options.sign == EITS_SIGN_INCREASE ? x[j] >= 0 : x[j] <= 0));
+        CHECK(eits_get_options(ctx)->sign == EITS_SIGN_BOTH ||
+              (eits_get_options(ctx)->sign == EITS_SIGN_INCREASE ? x[j] >= 0 : x[j] <= 0));
     dense_free(&d);
     free(x), free(y);
 }
@@ -127,7 +128,7 @@ static void the_support_reaches_the_rank(void)
             if (sign == EITS_SIGN_BOTH)
                 CHECK(info.residual <= R(BOTH_WIDTHS(1e-3, 1e-6)) * info.data_norm);
             for (int j = 0; j < N; ++j)
-                CHECK(isfinite((double)ctx->x[j]));
+                CHECK(isfinite((double)eits_get_coefficients(ctx)[j]));
             tear_down(&b);
         }
     }
@@ -201,8 +202,10 @@ static void same_bits_in_every_layout(void)
                     way % 2);
                 CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
                 (void)solve(ctx, SOLVERS[s], 30, EITS_SIGN_BOTH, 0.005, 0);
-                CHECK(memcmp(ctx->x, b[0].c.ctx.x, N * sizeof *ctx->x) == 0);
-                CHECK(memcmp(&ctx->info, &b[0].c.ctx.info, sizeof ctx->info) == 0);
+                CHECK(memcmp(eits_get_coefficients(ctx), eits_get_coefficients(b[0].c.ctx),
+                             N * sizeof(eits_real)) == 0);
+                CHECK(memcmp(eits_get_info(ctx), eits_get_info(b[0].c.ctx),
+                             sizeof *eits_get_info(ctx)) == 0);
             }
             for (int way = 0; way < 4; ++way)
                 tear_down(&b[way]);
@@ -220,7 +223,7 @@ static void warm_starts(void)
             eits_context *ctx = set_up(&b, RANDOM, sign % 2);
             ctx->options.warm_start = 1;
             (void)solve(ctx, EITS_SOLVER_FISTA, 2, (eits_sign)sign, 0.001, 0);
-            const uint32_t many = ctx->info.nonzeros;
+            const uint32_t many = eits_get_info(ctx)->nonzeros;
             CHECK(many > RANK);
             CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop,
                         EITS_STOP_OPTIMUM);
@@ -234,7 +237,7 @@ static void warm_starts(void)
             CHECK(again.iterations <= 3);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
             for (uint32_t i = 0; i < RANK; ++i)
-                ctx->y[i] = -ctx->y[i]; /* where zero is the better start */
+                ctx->frame.y[i] = -ctx->frame.y[i]; /* where zero is the better start */
             CHECK_EQUAL(solve(ctx, SOLVERS[s], MANY, (eits_sign)sign, 0.01, 0).stop,
                         EITS_STOP_OPTIMUM);
             check_gap(ctx, BOTH_WIDTHS(1e-4, 1e-10));
@@ -246,8 +249,8 @@ static void warm_starts(void)
 static double objective(const eits_context *ctx)
 {
     dense d = dense_of(ctx->model);
-    double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
-    const double value = dense_objective(&d, y, x, (double)ctx->info.lambda);
+    double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
+    const double value = dense_objective(&d, y, x, (double)eits_get_info(ctx)->lambda);
     dense_free(&d);
     free(x), free(y);
     return value;
@@ -290,7 +293,7 @@ static void beside_a_basis(void)
                                                                 : b.c.model.fold[i].second] =
                         R(NAN);
             CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
-            eits_options o = ctx->options;
+            eits_options o = *eits_get_options(ctx);
             o.solver = SOLVERS[s];
             o.iterations = MANY;
             o.max_masked = SMALL_ROWS;
@@ -298,10 +301,11 @@ static void beside_a_basis(void)
             o.lambda_rel = R(0.01);
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
             CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK_EQUAL(ctx->basis_count, lost[k] + 1);
-            CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
-            CHECK(ctx->info.nonzeros >= 1 && ctx->info.gap_rel <= R(BOTH_WIDTHS(1e-4, 1e-10)));
-            CHECK(s == 0 || ctx->info.nonzeros <= (uint32_t)(RANK - 1 - lost[k]));
+            CHECK_EQUAL(ctx->projection.count, lost[k] + 1);
+            CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
+            CHECK(eits_get_info(ctx)->nonzeros >= 1 &&
+                  eits_get_info(ctx)->gap_rel <= R(BOTH_WIDTHS(1e-4, 1e-10)));
+            CHECK(s == 0 || eits_get_info(ctx)->nonzeros <= (uint32_t)(RANK - 1 - lost[k]));
             tear_down(&b);
         }
     }
@@ -317,17 +321,19 @@ static void numbers_that_cannot_be(void)
                 bench b;
                 eits_context *ctx = set_up(&b, RANDOM, 0);
                 for (uint32_t i = 0; i < (whole ? RANK : 1u); ++i)
-                    ctx->y[i] = (eits_real)(wild[k] * (i % 2 ? 1 : 0.7));
-                eits_options o = ctx->options;
+                    ctx->frame.y[i] = (eits_real)(wild[k] * (i % 2 ? 1 : 0.7));
+                eits_options o = *eits_get_options(ctx);
                 o.solver = SOLVERS[s];
                 CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-                const eits_status status = eits_solve(ctx);
+                const eits_status status = eits_solve(ctx, NULL);
                 CHECK(k > 1 || status == EITS_E_NOT_FINITE);
                 for (int j = 0; j < N; ++j)
-                    CHECK(isfinite((double)ctx->image[j]) && isfinite((double)ctx->x[j]) &&
-                          (k > 1 || ctx->image[j] == 0));
-                CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.gap_rel) &&
-                      isfinite((double)ctx->info.residual));
+                    CHECK(isfinite((double)eits_get_image(ctx)[j]) &&
+                          isfinite((double)eits_get_coefficients(ctx)[j]) &&
+                          (k > 1 || eits_get_image(ctx)[j] == 0));
+                CHECK(isfinite((double)eits_get_info(ctx)->gap) &&
+                      isfinite((double)eits_get_info(ctx)->gap_rel) &&
+                      isfinite((double)eits_get_info(ctx)->residual));
                 tear_down(&b);
             }
         }

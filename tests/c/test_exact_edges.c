@@ -33,20 +33,20 @@ static eits_context *set_up(dense_bench *b, double off)
     small_model_seal(&b->made);
     small_context_open(&b->c, &b->made, 0);
     b->d = dense_of(&b->c.model);
-    return &b->c.ctx;
+    return b->c.ctx;
 }
 
 static void check_result(const dense_bench *b, double max)
 {
-    const eits_context *ctx = &b->c.ctx;
-    double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
+    const eits_context *ctx = b->c.ctx;
+    double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
     uint32_t nonzeros = 0;
     for (int j = 0; j < N; ++j) {
-        CHECK(isfinite((double)ctx->image[j]) && isfinite(x[j]));
+        CHECK(isfinite((double)eits_get_image(ctx)[j]) && isfinite(x[j]));
         nonzeros += x[j] != 0;
     }
-    CHECK_EQUAL(ctx->info.nonzeros, nonzeros);
-    CHECK(dense_objective(&b->d, y, x, (double)ctx->info.lambda) <= max);
+    CHECK_EQUAL(eits_get_info(ctx)->nonzeros, nonzeros);
+    CHECK(dense_objective(&b->d, y, x, (double)eits_get_info(ctx)->lambda) <= max);
     free(x), free(y);
 }
 
@@ -57,7 +57,7 @@ static void every_limit_beside_columns_that_depend(void)
     for (int way = 0; way < 16; ++way) {
         dense_bench b;
         eits_context *ctx = set_up(&b, offs[way % 4]);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.sign = way / 4 % 2 ? EITS_SIGN_BOTH : EITS_SIGN_INCREASE;
         o.lambda_rel = R(way % 2 ? 0.001 : 0.1);
         o.iterations = 30;
@@ -68,18 +68,19 @@ static void every_limit_beside_columns_that_depend(void)
             o.solver = EITS_SOLVER_FISTA;
             o.warm_start = way >= 8;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-            ctx->y[limit % RANK] += R(0.4);
-            double *y = dense_copy(ctx->y, RANK);
+            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            ctx->frame.y[limit % RANK] += R(0.4);
+            double *y = dense_copy(ctx->frame.y, RANK);
             const double at_zero = 0.5 * dense_dot(y, y, RANK);
             free(y);
             o.mac_limit = limit;
             o.solver = EITS_SOLVER_ACTIVE_SET;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-            CHECK(ctx->info.macs <= limit);
-            CHECK(ctx->info.stop == EITS_STOP_MACS || ctx->info.stop == EITS_STOP_OPTIMUM ||
-                  ctx->info.stop == EITS_STOP_ITERATIONS);
+            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK(eits_get_info(ctx)->macs <= limit);
+            CHECK(eits_get_info(ctx)->stop == EITS_STOP_MACS ||
+                  eits_get_info(ctx)->stop == EITS_STOP_OPTIMUM ||
+                  eits_get_info(ctx)->stop == EITS_STOP_ITERATIONS);
             check_result(&b, at_zero * (1 + 1e-3));
         }
         dense_bench_close(&b);
@@ -93,7 +94,7 @@ static void starts_that_cancel(void)
     dense_bench b;
     eits_context *ctx = set_up(&b, 0);
     const uint32_t one = 9 + 1, other = 9 + 2; /* of a group of three */
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.sign = EITS_SIGN_BOTH;
     o.solver = EITS_SOLVER_ACTIVE_SET;
     o.warm_start = 1;
@@ -101,23 +102,23 @@ static void starts_that_cancel(void)
     o.iterations = 30;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     small_new_data(ctx, 83);
-    ctx->x[one] = R(300.5);
-    ctx->x[other] = R(-300);
+    ctx->solver.x[one] = R(300.5);
+    ctx->solver.x[other] = R(-300);
     double column[RANK], along = 0;
     for (int i = 0; i < RANK; ++i) {
         column[i] = b.d.s[one * RANK + (uint32_t)i];
-        along += column[i] * (double)ctx->y[i];
+        along += column[i] * (double)ctx->frame.y[i];
     }
     if (along < 0) { /* so that the start is better than zero */
-        ctx->x[one] = R(-300.5);
-        ctx->x[other] = R(300);
+        ctx->solver.x[one] = R(-300.5);
+        ctx->solver.x[other] = R(300);
     }
-    ctx->warm = 1;
-    double *y = dense_copy(ctx->y, RANK);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+    ctx->solver.warm = 1;
+    double *y = dense_copy(ctx->frame.y, RANK);
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
     check_result(&b, 0.5 * dense_dot(y, y, RANK));
-    CHECK(ctx->info.gap_rel < R(1e-3));
+    CHECK(eits_get_info(ctx)->gap_rel < R(1e-3));
     free(y);
     dense_bench_close(&b);
 }
@@ -177,26 +178,26 @@ static void sweeps_as_written_apart(void)
             for (uint32_t i = 0; i < RANK_HERE; ++i)
                 direction[i] = (i % 2 ? -1 : 1) / sqrt(RANK_HERE);
             small_new_data(ctx, 84);
-            ctx->basis_count = ignored;
+            ctx->projection.count = ignored;
             for (uint32_t i = 0; ignored && i < RANK_HERE; ++i)
-                ctx->basis[i] = (eits_real)direction[i];
-            double *r = dense_copy(ctx->y, RANK_HERE);
+                ctx->projection.basis[i] = (eits_real)direction[i];
+            double *r = dense_copy(ctx->frame.y, RANK_HERE);
             if (ignored) {
                 const double along = dense_dot(r, direction, RANK_HERE);
                 for (uint32_t i = 0; i < RANK_HERE; ++i)
-                    ctx->y[i] = (eits_real)(r[i] -= along * direction[i]);
+                    ctx->frame.y[i] = (eits_real)(r[i] -= along * direction[i]);
                 project_columns(&b.d, direction);
             }
-            eits_options o = ctx->options;
+            eits_options o = *eits_get_options(ctx);
             o.solver = EITS_SOLVER_COORDINATE;
             o.sign = EITS_SIGN_BOTH;
             o.iterations = SWEEPS;
             o.lambda_rel = R(0.02);
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-            CHECK_EQUAL(ctx->info.iterations, SWEEPS);
-            dense_sweeps(&b.d, square, r, (double)ctx->info.lambda, SWEEPS, x);
-            CHECK(dense_greatest_difference(x, ctx->x, N) < 3000 * EPS);
+            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK_EQUAL(eits_get_info(ctx)->iterations, SWEEPS);
+            dense_sweeps(&b.d, square, r, (double)eits_get_info(ctx)->lambda, SWEEPS, x);
+            CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 3000 * EPS);
             free(r), free(x);
             dense_bench_close(&b);
         }
@@ -214,17 +215,18 @@ static void the_active_set_ends_soon(void)
             &b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)},
             way % 2);
         small_new_data(ctx, 85 + (uint64_t)way);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.solver = EITS_SOLVER_ACTIVE_SET;
         o.sign = (eits_sign)(way / 3 % 3);
         o.iterations = ROUNDS;
         o.lambda_rel = (eits_real)lambdas[way % 3];
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-        CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
-        CHECK(ctx->info.iterations < ROUNDS && ctx->info.nonzeros <= RANK_HERE);
-        double *x = dense_copy(ctx->x, 81), *y = dense_copy(ctx->y, RANK_HERE);
-        const double gap = dense_gap(&b.d, y, x, (double)ctx->info.lambda, o.sign);
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+        CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
+        CHECK(eits_get_info(ctx)->iterations < ROUNDS && eits_get_info(ctx)->nonzeros <= RANK_HERE);
+        double *x = dense_copy(eits_get_coefficients(ctx), 81),
+               *y = dense_copy(ctx->frame.y, RANK_HERE);
+        const double gap = dense_gap(&b.d, y, x, (double)eits_get_info(ctx)->lambda, o.sign);
         CHECK(gap <= BOTH_WIDTHS(3e-6, 1e-14) * 0.5 * dense_dot(y, y, RANK_HERE));
         free(x), free(y);
         dense_bench_close(&b);
@@ -251,8 +253,8 @@ static void hidden_columns(void)
     }
     small_model_seal(&b.made);
     small_context_open(&b.c, &b.made, 0);
-    eits_context *ctx = &b.c.ctx;
-    eits_options o = ctx->options;
+    eits_context *ctx = b.c.ctx;
+    eits_options o = *eits_get_options(ctx);
     o.solver = EITS_SOLVER_ACTIVE_SET;
     o.diagnostics = o.project_reference = 0;
     o.max_masked = SMALL_ROWS;
@@ -266,9 +268,9 @@ static void hidden_columns(void)
     CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].first, 1), EITS_OK);
     CHECK_EQUAL(eits_mask_row(ctx, ctx->model->fold[k].second, 1), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK(ctx->basis_count == 1 && ctx->info.lambda > 0);
-    CHECK_EQUAL(ctx->info.nonzeros, 0);
-    CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
+    CHECK(ctx->projection.count == 1 && eits_get_info(ctx)->lambda > 0);
+    CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_OPTIMUM);
     small_context_close(&b.c);
     small_model_free(&b.made);
 }

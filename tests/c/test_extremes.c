@@ -29,7 +29,7 @@ static eits_context *open_made(bench *b)
 {
     small_model_seal(&b->made);
     small_context_open(&b->c, &b->made, 0);
-    return &b->c.ctx;
+    return b->c.ctx;
 }
 
 static void tear_down(bench *b)
@@ -90,9 +90,10 @@ static void set_columns(bench *b, uint32_t rank, float first, float rest)
 static void check_cleared(const eits_context *ctx)
 {
     for (int j = 0; j < N; ++j)
-        CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
-    CHECK(isfinite((double)ctx->info.gap) && isfinite((double)ctx->info.residual) &&
-          isfinite((double)ctx->info.lambda));
+        CHECK(eits_get_image(ctx)[j] == 0 && eits_get_coefficients(ctx)[j] == 0);
+    CHECK(isfinite((double)eits_get_info(ctx)->gap) &&
+          isfinite((double)eits_get_info(ctx)->residual) &&
+          isfinite((double)eits_get_info(ctx)->lambda));
 }
 
 static void correlations_that_overflow(void)
@@ -103,11 +104,11 @@ static void correlations_that_overflow(void)
         set_columns(&b, 12, 1e36f, 1e36f);
         eits_context *ctx = open_made(&b);
         for (int i = 0; i < 12; ++i)
-            ctx->y[i] = R(BOTH_WIDTHS(1e5, 1e150));
+            ctx->frame.y[i] = R(BOTH_WIDTHS(1e5, 1e150));
         ctx->options.solver = (eits_solver)solver;
-        CHECK_EQUAL(eits_solve(ctx), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
-        CHECK(BOTH_WIDTHS(1, 0) ==
-              (ctx->info.stop == EITS_STOP_DIVERGED && ctx->info.lambda_max == 0));
+        CHECK_EQUAL(eits_solve(ctx, NULL), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
+        CHECK(BOTH_WIDTHS(1, 0) == (eits_get_info(ctx)->stop == EITS_STOP_DIVERGED &&
+                                    eits_get_info(ctx)->lambda_max == 0));
         if (sizeof(eits_real) == 4)
             check_cleared(ctx);
         tear_down(&b);
@@ -127,16 +128,16 @@ static eits_info solve_vanishing(eits_solver solver, double size, uint32_t mac_l
     small_put_f32(small_model_section(&b.made, "DIMS", NULL) + 56, 1.2e-38f);
     eits_context *ctx = open_made(&b);
     for (int i = 0; i < MAX_RANK; ++i)
-        ctx->y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
-    eits_options o = ctx->options;
+        ctx->frame.y[i] = (eits_real)(size * (i < 8 ? 3.75 : 2.6));
+    eits_options o = *eits_get_options(ctx);
     o.solver = solver;
     o.sign = EITS_SIGN_BOTH;
     o.lambda_rel = R(0.01);
     o.iterations = 50;
     o.mac_limit = mac_limit;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    const eits_info info = ctx->info;
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    const eits_info info = *eits_get_info(ctx);
     if (sizeof(eits_real) == 4)
         check_cleared(ctx);
     tear_down(&b);

@@ -9,8 +9,8 @@ static void nothing_wrong(void)
         bench b;
         eits_context *ctx = set_up(&b, known);
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.diagnostics, 0);
-        CHECK_EQUAL(ctx->info.masked, 0);
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, 0);
+        CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
         CHECK(ctx->reference.outliers == 0 && (ctx->reference.noise_v > 0) == known);
         tear_down(&b);
     }
@@ -25,21 +25,21 @@ static void one_outlier(void)
             bench b;
             eits_context *ctx = set_up(&b, known);
             const eits_fold fold = b.c.model.fold[k];
-            CHECK(!ctx->range_known);
+            CHECK(!ctx->range.known);
             b.frame[fold.first] *= R(1.3);
             reconstruct(&b);
             if (fold.second == EITS_FOLD_NONE) {
-                CHECK_EQUAL(ctx->info.outliers, 0);
+                CHECK_EQUAL(eits_get_info(ctx)->outliers, 0);
             } else {
-                CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
-                CHECK_EQUAL(ctx->info.outliers, 2);
-                CHECK_EQUAL(ctx->info.masked, 2);
-                CHECK(ctx->unusable[fold.first] == EITS_ROW_OUTLIER &&
-                      ctx->unusable[fold.second] == EITS_ROW_OUTLIER);
+                CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+                CHECK_EQUAL(eits_get_info(ctx)->outliers, 2);
+                CHECK_EQUAL(eits_get_info(ctx)->masked, 2);
+                CHECK(ctx->rows.unusable[fold.first] == EITS_ROW_OUTLIER &&
+                      ctx->rows.unusable[fold.second] == EITS_ROW_OUTLIER);
             }
             look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER);
             reconstruct(&b);
-            CHECK_EQUAL(ctx->info.masked, 0);
+            CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
             tear_down(&b);
         }
     }
@@ -57,19 +57,20 @@ static void many_outliers(void)
         b.frame[i] *= row_uses(ctx, i, 5) ? R(1.2) : R(1);
     }
     reconstruct(&b);
-    CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_ELECTRODE_NOISY);
-    CHECK_EQUAL(ctx->info.noisy_electrodes, 1u << 5);
+    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_ELECTRODE_NOISY);
+    CHECK_EQUAL(eits_get_info(ctx)->noisy_electrodes, 1u << 5);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-        CHECK_EQUAL(ctx->unusable[i], row_uses(ctx, i, 5) ? EITS_ROW_NOISY : 0);
+        CHECK_EQUAL(ctx->rows.unusable[i], row_uses(ctx, i, 5) ? EITS_ROW_NOISY : 0);
     look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_NOISY);
     reconstruct(&b);
-    CHECK_EQUAL(ctx->info.masked, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
     memcpy(b.frame, b.untouched[0], sizeof b.frame);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
         b.frame[b.c.model.fold[k].first] *= k % 2 == 0 ? R(1.2) : R(0.9);
     look_for(ctx, EITS_DIAGNOSTICS_ALL);
     reconstruct(&b);
-    CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0 && ctx->info.masked == 0);
+    CHECK((eits_get_info(ctx)->diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0 &&
+          eits_get_info(ctx)->masked == 0);
     tear_down(&b);
 }
 
@@ -93,7 +94,7 @@ static void an_outlier_in_the_reference(void)
         CHECK_NEAR(ctx->reference.noise_v, noise, 0.05 * (double)noise);
         CHECK_NEAR(ctx->reference.lambda_noise, lambda_noise, 0.3 * (double)lambda_noise);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            CHECK_EQUAL(ctx->masked[i], 0);
+            CHECK_EQUAL(ctx->rows.masked[i], 0);
         look_for(ctx, 0);
         CHECK_EQUAL(eits_reference_begin(ctx, UNTOUCHED), EITS_OK);
         for (int k = 0; k < UNTOUCHED; ++k)
@@ -145,7 +146,7 @@ static void options_and_names(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 0);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     CHECK_EQUAL(o.diagnostics, EITS_DIAGNOSTICS_ALL);
     o.diagnostics = EITS_DIAGNOSTICS_ALL + 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);

@@ -166,16 +166,16 @@ static void touches_have_forces(void)
     eits_real frame[SMALL_ROWS];
     uint32_t count = 0;
     small_context_open(&c, &made, 0);
-    eits_options options = c.ctx.options;
+    eits_options options = *eits_get_options(c.ctx);
     options.sign = EITS_SIGN_BOTH;
     options.detection_factor = 0;
-    CHECK_EQUAL(eits_set_options(&c.ctx, &options), EITS_OK);
+    CHECK_EQUAL(eits_set_options(c.ctx, &options), EITS_OK);
     small_reference(&c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         frame[i] *= (eits_real)(1 + 0.05 * sin(1.7 * i));
-    CHECK_EQUAL(eits_reconstruct(&c.ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(&c.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(c.ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    CHECK_EQUAL(eits_find_touches(c.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
     CHECK(count > 0);
     for (uint32_t k = 0; k < count; ++k) {
         const eits_touch *t = &touches[k];

@@ -35,12 +35,12 @@ static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int proj
         b->reference[i] *= (eits_real)(1 + 0.03 * small_random(&state));
     for (int i = 0; i < SMALL_ROWS; ++i)
         b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
-    eits_options o = b->c.ctx.options;
+    eits_options o = *eits_get_options(b->c.ctx);
     o.project_reference = (uint32_t)project;
     o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
-    CHECK_EQUAL(eits_set_options(&b->c.ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_reference_set(&b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
-    return &b->c.ctx;
+    CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
+    return b->c.ctx;
 }
 
 static void tear_down(bench *b)
@@ -53,28 +53,29 @@ static void tear_down(bench *b)
 static eits_status stage(bench *b, uint32_t *masked)
 {
     uint64_t macs;
-    return eits_frame_stage(&b->c.ctx, b->frame, SMALL_ROWS, masked, &macs);
+    return eits_frame_stage(b->c.ctx, b->frame, SMALL_ROWS, masked, &macs);
 }
 
 /* Run the stage; y must be what the dense computation gives with the rows in b->out left out. */
 static void check_stage(bench *b, uint32_t masked_expected)
 {
-    eits_context *ctx = &b->c.ctx;
+    eits_context *ctx = b->c.ctx;
     double *v0 = dense_copy(b->reference, SMALL_ROWS), y[RANK];
     uint32_t masked = 99;
     CHECK_EQUAL(stage(b, &masked), EITS_OK);
     CHECK_EQUAL(masked, masked_expected);
     dense_frame(&b->c.model, &b->d, v0, (double)ctx->reference.gain,
-                ctx->options.project_reference ? v0 : NULL, b->frame, b->out, y);
+                eits_get_options(ctx)->project_reference ? v0 : NULL, b->frame, b->out, y);
     CHECK(sqrt(dense_dot(y, y, RANK)) > 0.01);
-    CHECK_NEAR(dense_greatest_difference(y, ctx->y, RANK), 0, 60 * EPS);
+    CHECK_NEAR(dense_greatest_difference(y, ctx->frame.y, RANK), 0, 60 * EPS);
     for (uint32_t i = RANK; i < EITS_STRIDE(RANK); ++i)
-        CHECK(ctx->y[i] == 0);
-    for (uint32_t k = 0; k < ctx->basis_count; ++k) { /* orthonormal, and y is orthogonal to it */
-        double *a = dense_copy(ctx->basis + EITS_STRIDE(RANK) * k, RANK),
-               *yy = dense_copy(ctx->y, RANK);
+        CHECK(ctx->frame.y[i] == 0);
+    for (uint32_t k = 0; k < ctx->projection.count;
+         ++k) { /* orthonormal, and y is orthogonal to it */
+        double *a = dense_copy(ctx->projection.basis + EITS_STRIDE(RANK) * k, RANK),
+               *yy = dense_copy(ctx->frame.y, RANK);
         for (uint32_t l = 0; l <= k; ++l) {
-            double *other = dense_copy(ctx->basis + EITS_STRIDE(RANK) * l, RANK);
+            double *other = dense_copy(ctx->projection.basis + EITS_STRIDE(RANK) * l, RANK);
             CHECK_NEAR(dense_dot(a, other, RANK), k == l, 10 * EPS);
             free(other);
         }
@@ -110,14 +111,15 @@ static void data_of_each_kind(void)
                                                                       : gain * v0 * log(v / v0));
                         used += 1;
                     }
-                    CHECK_NEAR(ctx->d[k], sum / used, 10 * EPS);
+                    CHECK_NEAR(ctx->frame.d[k], sum / used, 10 * EPS);
                 }
-                CHECK_EQUAL(ctx->basis_count, project);
-                eits_options o = ctx->options; /* the option counts from the next frame on */
+                CHECK_EQUAL(ctx->projection.count, project);
+                eits_options o =
+                    *eits_get_options(ctx); /* the option counts from the next frame on */
                 o.project_reference = !project;
                 CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
                 check_stage(&b, 0);
-                CHECK_EQUAL(ctx->basis_count, !project);
+                CHECK_EQUAL(ctx->projection.count, !project);
                 tear_down(&b);
             }
         }
@@ -137,7 +139,7 @@ static void drift_of_the_gain(void)
                     b.frame[i] = b.reference[i] * (eits_real)(1 + drifts[e]);
                 uint32_t masked;
                 CHECK_EQUAL(stage(&b, &masked), EITS_OK);
-                double *y = dense_copy(ctx->y, RANK);
+                double *y = dense_copy(ctx->frame.y, RANK);
                 size[project] = sqrt(dense_dot(y, y, RANK));
                 free(y);
                 tear_down(&b);
@@ -160,21 +162,21 @@ static void unusable_channels(void)
             b.frame[pair.first] = (eits_real)NAN; /* the reciprocal stands in, sign turned */
             b.out[pair.first] = 1;
             check_stage(&b, 1);
-            CHECK_EQUAL(ctx->basis_count, project);
+            CHECK_EQUAL(ctx->projection.count, project);
             b.frame[other.second] = (eits_real)-INFINITY;
             b.out[other.second] = 1;
             check_stage(&b, 2);
-            CHECK(ctx->unusable[pair.first] && ctx->unusable[other.second] &&
-                  !ctx->unusable[pair.second]);
+            CHECK(ctx->rows.unusable[pair.first] && ctx->rows.unusable[other.second] &&
+                  !ctx->rows.unusable[pair.second]);
             b.frame[single.first] = (eits_real)INFINITY; /* a row without reciprocal */
             b.out[single.first] = 1;
             check_stage(&b, 3);
-            CHECK_EQUAL(ctx->basis_count, 1 + project);
+            CHECK_EQUAL(ctx->projection.count, 1 + project);
             b.frame[pair.second] = (eits_real)NAN; /* now both of a pair */
             b.out[pair.second] = 1;
             check_stage(&b, 4);
-            CHECK_EQUAL(ctx->basis_count, 2 + project);
-            eits_options o = ctx->options;
+            CHECK_EQUAL(ctx->projection.count, 2 + project);
+            eits_options o = *eits_get_options(ctx);
             o.saturation_v = 5;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
             b.frame[0] = 5; /* at the limit counts as beyond it */
@@ -185,7 +187,7 @@ static void unusable_channels(void)
             memcpy(b.frame, b.reference, sizeof b.frame);
             b.frame[3] *= R(1.2);
             check_stage(&b, 0);
-            CHECK_EQUAL(ctx->basis_count, project);
+            CHECK_EQUAL(ctx->projection.count, project);
             tear_down(&b);
         }
     }
@@ -208,7 +210,7 @@ static void changing_masks(void)
                 CHECK_EQUAL(eits_mask_row(ctx, (uint32_t)i, b.out[i] && i % 3 == 0), EITS_OK);
                 expected += b.out[i];
             }
-            if (expected <= ctx->options.max_masked)
+            if (expected <= eits_get_options(ctx)->max_masked)
                 check_stage(&b, expected);
         }
         tear_down(&b);
@@ -232,7 +234,7 @@ static void left_out_is_minimised_over(void)
         uint32_t masked;
         CHECK_EQUAL(stage(&b, &masked), EITS_OK);
         CHECK_EQUAL(masked, 2);
-        memcpy(seen[round], ctx->y, sizeof seen[round]);
+        memcpy(seen[round], ctx->frame.y, sizeof seen[round]);
     }
     CHECK(memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
     /* min over a of |y + a p|^2, p the row's column of P, is |projected y|^2, and any start gives
@@ -253,7 +255,7 @@ static void nothing_left(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -262,14 +264,14 @@ static void nothing_left(void)
         if (fold.second != EITS_FOLD_NONE)
             b.frame[fold.second] = R(NAN);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(ctx->basis_count, k + 2 < RANK ? k + 2 : RANK);
-        if (ctx->basis_count < RANK)
-            CHECK(ctx->info.data_norm > R(1e-3));
+        CHECK_EQUAL(ctx->projection.count, k + 2 < RANK ? k + 2 : RANK);
+        if (ctx->projection.count < RANK)
+            CHECK(eits_get_info(ctx)->data_norm > R(1e-3));
         else
-            CHECK(ctx->info.data_norm == 0 && ctx->info.stop == EITS_STOP_ZERO &&
-                  ctx->info.nonzeros == 0);
+            CHECK(eits_get_info(ctx)->data_norm == 0 &&
+                  eits_get_info(ctx)->stop == EITS_STOP_ZERO && eits_get_info(ctx)->nonzeros == 0);
     }
-    CHECK_EQUAL(ctx->info.masked, SMALL_ROWS);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, SMALL_ROWS);
     tear_down(&b);
 }
 
@@ -277,7 +279,7 @@ static void refused_frames_clear_the_image(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     eits_real image[SIDE * SIDE], again[SIDE * SIDE], good[SMALL_ROWS];
     eits_info info;
     o.max_masked = 3;
@@ -302,7 +304,8 @@ static void refused_frames_clear_the_image(void)
         }
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, length[wrong], again, &info), expected[wrong]);
         for (int j = 0; j < SIDE * SIDE; ++j)
-            CHECK(again[j] == 0 && ctx->image[j] == 0 && ctx->x[j] == 0);
+            CHECK(again[j] == 0 && eits_get_image(ctx)[j] == 0 &&
+                  eits_get_coefficients(ctx)[j] == 0);
         CHECK(info.nonzeros == 0 && info.iterations == 0 && info.stop == EITS_STOP_BELOW_THRESHOLD);
         CHECK_EQUAL(info.masked, wrong == 0 ? 4 : 0);
         uint32_t count = 9;
@@ -339,11 +342,11 @@ static void masked_rows(void)
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
     CHECK_EQUAL(eits_mask_row(ctx, SMALL_ROWS - 1, 7), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, again, NULL), EITS_OK);
-    CHECK_EQUAL(ctx->info.masked, 1);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 1);
     CHECK(memcmp(image, again, sizeof image) != 0);
     CHECK_EQUAL(eits_mask_row(ctx, SMALL_ROWS - 1, 0), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, again, NULL), EITS_OK);
-    CHECK(ctx->info.masked == 0 && memcmp(image, again, sizeof image) == 0);
+    CHECK(eits_get_info(ctx)->masked == 0 && memcmp(image, again, sizeof image) == 0);
     tear_down(&b);
 }
 
@@ -386,7 +389,7 @@ static void ratios_at_their_limits(void)
         CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         b.out[row] = 1; /* left out as if masked, though not counted as unusable */
         check_stage(&b, 0);
-        CHECK_EQUAL(ctx->basis_count, 1);
+        CHECK_EQUAL(ctx->projection.count, 1);
         tear_down(&b);
     }
     bench b;
@@ -398,7 +401,7 @@ static void ratios_at_their_limits(void)
         b.frame[row] = b.reference[row] * (eits_real)factors[f];
         uint32_t masked;
         CHECK_EQUAL(stage(&b, &masked), EITS_OK);
-        CHECK_NEAR(ctx->d[20],
+        CHECK_NEAR(ctx->frame.d[20],
                    (double)ctx->reference.gain * (double)b.reference[row] * log(ratios[f]),
                    20 * EPS);
     }
@@ -420,24 +423,24 @@ static void directions_that_nearly_agree(void)
     small_model_seal(&made);
     small_context c;
     small_context_open(&c, &made, 0);
-    eits_options o = c.ctx.options;
+    eits_options o = *eits_get_options(c.ctx);
     o.project_reference = o.diagnostics = 0;
     o.max_masked = SMALL_ROWS;
-    CHECK_EQUAL(eits_set_options(&c.ctx, &o), EITS_OK);
+    CHECK_EQUAL(eits_set_options(c.ctx, &o), EITS_OK);
     eits_real frame[SMALL_ROWS];
     small_reference(&c.model, 1, frame);
-    CHECK_EQUAL(eits_reference_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
     frame[0] *= R(1.1);
     for (uint32_t k = 4; k < 6; ++k) {
-        CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[k].first, 1), EITS_OK);
-        CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[k].second, 1), EITS_OK);
+        CHECK_EQUAL(eits_mask_row(c.ctx, c.model.fold[k].first, 1), EITS_OK);
+        CHECK_EQUAL(eits_mask_row(c.ctx, c.model.fold[k].second, 1), EITS_OK);
     }
     uint32_t masked;
     uint64_t macs;
-    CHECK_EQUAL(eits_frame_stage(&c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-    CHECK_EQUAL(c.ctx.basis_count, 2);
-    double *a = dense_copy(c.ctx.basis, RANK),
-           *b = dense_copy(c.ctx.basis + EITS_STRIDE(RANK), RANK);
+    CHECK_EQUAL(eits_frame_stage(c.ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
+    CHECK_EQUAL(c.ctx->projection.count, 2);
+    double *a = dense_copy(c.ctx->projection.basis, RANK),
+           *b = dense_copy(c.ctx->projection.basis + EITS_STRIDE(RANK), RANK);
     CHECK_NEAR(dense_dot(a, b, RANK), 0, 4 * EPS);
     free(a), free(b);
     small_context_close(&c);
@@ -460,8 +463,8 @@ static void reciprocals_that_agree(void)
             ctx->reference.v0[fold.second] = v0 * (eits_real)(1 + off[step] * EPS);
             b.frame[fold.first] = b.frame[fold.second] = R(1.01) * v0;
             CHECK_EQUAL(eits_frame_stage(ctx, b.frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-            CHECK((ctx->reciprocity_error[4] == 0) == (step < 3));
-            CHECK(ctx->reciprocity_error[5] != 0);
+            CHECK((ctx->frame.reciprocity_error[4] == 0) == (step < 3));
+            CHECK(ctx->frame.reciprocity_error[5] != 0);
         }
         tear_down(&b);
     }

@@ -26,7 +26,7 @@ static const eits_disc THREE[] = {
 static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out, eits_real *frame)
 {
     eits_context *ctx = dense_bench_open(b, spec, 0);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.project_reference = 0;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -117,7 +117,7 @@ static void dense_interaction(const eits_context *ctx, const dense *d, const eit
             datum -= (double)m->fields.volts * s[i].moment *
                      (creal(induced) * creal(measured) + cimag(induced) * cimag(measured));
         }
-        const int used = ctx->basis_for[k] != EITS_SIDE_NONE;
+        const int used = ctx->frame.sides[k] != EITS_SIDE_NONE;
         for (uint32_t i = 0; i < d->rank; ++i) {
             added[i] += used ? datum * d->p[(size_t)k * d->rank + i] : 0;
             directions[(size_t)out * d->rank + i] = d->p[(size_t)k * d->rank + i];
@@ -128,15 +128,15 @@ static void dense_interaction(const eits_context *ctx, const dense *d, const eit
     free(directions);
 }
 
-/* ctx->y less what eits_remove_interaction leaves of it, |y| made so great that no limit is
+/* ctx->frame.y less what eits_remove_interaction leaves of it, |y| made so great that no limit is
  * reached. */
 static void interplay(eits_context *ctx, const eits_disc *disc, uint32_t count, double *added,
                       uint64_t *macs)
 {
     eits_real data[RANK + 8];
-    *macs = eits_remove_interaction(ctx, disc, count, data);
+    *macs = eits_remove_interaction(ctx, &ctx->scratch, disc, count, data);
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        added[i] = (double)ctx->y[i] - (double)data[i];
+        added[i] = (double)ctx->frame.y[i] - (double)data[i];
 }
 
 static double size_of(const double *a)
@@ -159,9 +159,9 @@ static void as_computed_densely(void)
             for (int i = 0; i < RANK; ++i)
                 CHECK_NEAR(added[i], expected[i],
                            BOTH_WIDTHS(2e-5, 1e-12) * (size_of(expected) + size_of(added)) +
-                               4 * EPS * fabs((double)ctx->y[i]));
+                               4 * EPS * fabs((double)ctx->frame.y[i]));
         }
-        CHECK(left_out < 0 || ctx->basis_for[left_out] == EITS_SIDE_NONE);
+        CHECK(left_out < 0 || ctx->frame.sides[left_out] == EITS_SIDE_NONE);
         dense_bench_close(&b);
     }
 }
@@ -176,7 +176,7 @@ static void work_is_counted(void)
     uint64_t macs, expected = 0;
     eits_context *ctx = open_bench(&b, WITH_FIELDS, -1, frame);
     for (int k = 0; k < 3; ++k)
-        expected += eits_disc_field(ctx, &THREE[k], field);
+        expected += eits_disc_field(ctx, &ctx->scratch, &THREE[k], field);
     CHECK_EQUAL(expected % (2 * L + 4), 0);
     interplay(ctx, THREE, 3, added, &macs);
     CHECK_EQUAL(macs,
@@ -259,8 +259,8 @@ static void distance_and_overlap(void)
 static int left_alone(eits_context *ctx, const eits_disc *disc, uint32_t count)
 {
     eits_real data[RANK + 8];
-    (void)eits_remove_interaction(ctx, disc, count, data);
-    return memcmp(data, ctx->y, ctx->model->rank * sizeof *data) == 0;
+    (void)eits_remove_interaction(ctx, &ctx->scratch, disc, count, data);
+    return memcmp(data, ctx->frame.y, ctx->model->rank * sizeof *data) == 0;
 }
 
 static void when_it_is_left_alone(void)
@@ -275,7 +275,7 @@ static void when_it_is_left_alone(void)
     uint64_t macs;
     interplay(ctx, strong, 2, added, &macs);
     for (int i = 0; i < RANK; ++i)
-        y[i] = (double)ctx->y[i];
+        y[i] = (double)ctx->frame.y[i];
     /* a quarter of |y|^2; it grows as the product of the changes */
     const double max = 0.5 * size_of(y) / size_of(added);
     CHECK(max > 1);
@@ -283,7 +283,7 @@ static void when_it_is_left_alone(void)
     CHECK(!left_alone(ctx, strong, 2));
     strong[0].change *= R(1.02);
     CHECK(left_alone(ctx, strong, 2));
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.touch_fit = EITS_TOUCH_FIT_LOG_DATA | EITS_TOUCH_FIT_SPLIT_MERGE;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK(!eits_has_interaction(ctx) && left_alone(ctx, THREE, 2));
@@ -296,7 +296,7 @@ static void when_it_is_left_alone(void)
         ctx = open_bench(&b, others[k], -1, frame);
         /* differences need no fields */
         CHECK(!eits_has_interaction(ctx) && left_alone(ctx, THREE, 3) &&
-              ctx->has_y_log == (k == 0));
+              ctx->frame.has_y_log == (k == 0));
         dense_bench_close(&b);
     }
     /* fields of three discs and one more do not fit into the factor of rank 9: 9 x 16 numbers hold
@@ -325,17 +325,17 @@ static void log_data(void)
         const small_spec spec = {
             .rank = RANK, .side = SIDE, .fields = 1, .kind = EITS_DATA_LOG_RATIO};
         eits_context *log_ctx = open_bench(&log_bench, spec, left_out, frame);
-        CHECK_EQUAL(ctx->has_y_log, 1);
-        CHECK(memcmp(ctx->y_log, log_ctx->y, RANK * sizeof *ctx->y) == 0);
-        CHECK(memcmp(ctx->y, log_ctx->y, RANK * sizeof *ctx->y) != 0);
+        CHECK_EQUAL(ctx->frame.has_y_log, 1);
+        CHECK(memcmp(ctx->frame.y_log, log_ctx->frame.y, RANK * sizeof *ctx->frame.y) == 0);
+        CHECK(memcmp(ctx->frame.y, log_ctx->frame.y, RANK * sizeof *ctx->frame.y) != 0);
         uint32_t masked;
         uint64_t with = 0, without = 0;
         CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &with), EITS_OK);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.touch_fit = EITS_TOUCH_FIT_SPLIT_MERGE | EITS_TOUCH_FIT_INTERACTION;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &without), EITS_OK);
-        CHECK_EQUAL(ctx->has_y_log, 0);
+        CHECK_EQUAL(ctx->frame.has_y_log, 0);
         const uint32_t folds = SMALL_FOLDED - (left_out >= 0);
         CHECK(with - without >= folds * RANK && with - without <= (folds + 2) * RANK);
         dense_bench_close(&log_bench);
@@ -357,14 +357,14 @@ static void log_data_without_a_ratio(void)
     const eits_fold fold = b.c.model.fold[3];
     ctx->reference.v0[fold.first] = ctx->reference.v0[fold.second] = 0;
     frame[fold.first] = frame[fold.second] = R(0.01);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.diagnostics = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-    eits_copy(y, ctx->y, RANK);
-    CHECK(eits_dot(ctx, y, y, RANK) > 0);
+    eits_copy(y, ctx->frame.y, RANK);
+    CHECK(eits_dot(ctx->kernels, y, y, RANK) > 0);
     for (int i = 0; i < RANK; ++i)
-        CHECK_NEAR(ctx->y_log[i], y[i], 4 * EPS * fabs((double)y[i]));
+        CHECK_NEAR(ctx->frame.y_log[i], y[i], 4 * EPS * fabs((double)y[i]));
     dense_bench_close(&b);
 }
 

@@ -469,11 +469,11 @@ static void choice_of_kernels(void)
     small_model made = small_model_make((small_spec){.rank = 3, .side = 3});
     small_context c;
     small_context_open(&c, &made, 0);
-    CHECK(strcmp(eits_kernels_name(&c.ctx), eits_kernels_best()->name) == 0);
-    CHECK_EQUAL(eits_use_portable_kernels(&c.ctx, 1), EITS_OK);
-    CHECK(strcmp(eits_kernels_name(&c.ctx), "portable") == 0);
-    CHECK_EQUAL(eits_use_portable_kernels(&c.ctx, 0), EITS_OK);
-    CHECK(strcmp(eits_kernels_name(&c.ctx), eits_kernels_best()->name) == 0);
+    CHECK(strcmp(eits_kernels_name(c.ctx), eits_kernels_best()->name) == 0);
+    CHECK_EQUAL(eits_use_portable_kernels(c.ctx, 1), EITS_OK);
+    CHECK(strcmp(eits_kernels_name(c.ctx), "portable") == 0);
+    CHECK_EQUAL(eits_use_portable_kernels(c.ctx, 0), EITS_OK);
+    CHECK(strcmp(eits_kernels_name(c.ctx), eits_kernels_best()->name) == 0);
     CHECK_EQUAL(eits_use_portable_kernels(NULL, 0), EITS_E_ARGUMENT);
     CHECK(strcmp(eits_kernels_name(NULL), "") == 0);
     small_context_close(&c);

@@ -30,7 +30,7 @@ typedef struct way {
 
 static eits_info solve(eits_context *ctx, way w, uint32_t limit)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.solver = w.solver;
     o.sign = w.sign;
     o.iterations = 40;
@@ -43,36 +43,36 @@ static eits_info solve(eits_context *ctx, way w, uint32_t limit)
     if (w.warm) {
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         small_new_data(ctx, 71);
-        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     }
     small_new_data(ctx, 72);
     for (uint32_t i = 0; w.warm && i < RANK; ++i) { /* near what the start is for */
-        eits_real kept = ctx->y[i];
+        eits_real kept = ctx->frame.y[i];
         uint64_t state = 71;
         for (uint32_t k = 0; k <= i; ++k)
             kept = (eits_real)small_random(&state);
-        ctx->y[i] = kept + R(0.2) * ctx->y[i];
+        ctx->frame.y[i] = kept + R(0.2) * ctx->frame.y[i];
     }
     o.mac_limit = limit;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    return ctx->info;
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    return *eits_get_info(ctx);
 }
 
 static void check_result(const bench *b, const eits_info *info)
 {
-    const eits_context *ctx = &b->c.ctx;
-    double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
+    const eits_context *ctx = b->c.ctx;
+    double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
     uint32_t nonzeros = 0;
     for (int j = 0; j < N; ++j) {
-        CHECK(isfinite((double)ctx->image[j]) && isfinite(x[j]));
+        CHECK(isfinite((double)eits_get_image(ctx)[j]) && isfinite(x[j]));
         nonzeros += x[j] != 0;
     }
     CHECK_EQUAL(nonzeros, info->nonzeros);
     if (info->lambda > 0) {
         const double scale = 0.5 * dense_dot(y, y, RANK);
-        CHECK_NEAR(dense_gap(&b->d, y, x, (double)info->lambda, ctx->options.sign), info->gap,
-                   300 * EPS * scale);
+        CHECK_NEAR(dense_gap(&b->d, y, x, (double)info->lambda, eits_get_options(ctx)->sign),
+                   info->gap, 300 * EPS * scale);
         CHECK(dense_objective(&b->d, y, x, (double)info->lambda) <= scale * (1 + 1e-3));
     }
     free(x), free(y);
@@ -140,10 +140,10 @@ static void beside_step_halvings(void)
     for (int solver = 0; solver < 2; ++solver) {
         const way w = {(eits_solver)solver, EITS_SIGN_BOTH, 0, 0};
         for (uint32_t limit = 1; limit < 60000; limit += 1 + limit / 53) {
-            const eits_info info = solve(&b.c.ctx, w, limit);
+            const eits_info info = solve(b.c.ctx, w, limit);
             CHECK(info.macs <= limit);
             for (int j = 0; j < N; ++j)
-                CHECK(isfinite((double)b.c.ctx.image[j]));
+                CHECK(isfinite((double)eits_get_image(b.c.ctx)[j]));
             CHECK(info.stop == EITS_STOP_DIVERGED || info.stop == EITS_STOP_MACS ||
                   info.stop == EITS_STOP_ITERATIONS);
         }
@@ -166,7 +166,7 @@ static void of_a_whole_frame(void)
         CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
         uint64_t min = 0;
         for (uint32_t limit = 1; limit < 20000; limit += 1 + limit / 50) {
-            eits_options o = ctx->options;
+            eits_options o = *eits_get_options(ctx);
             o.solver = (eits_solver)solver;
             o.mac_limit = limit;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);

@@ -32,7 +32,7 @@ static void invert(double a[RANK][RANK])
  * grows. */
 static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
 {
-    const eits_context *ctx = &b->b.c.ctx;
+    const eits_context *ctx = b->b.c.ctx;
     const double *p = b->b.d.p;
     double k[RANK][RANK], s[RANK], w[RANK], left = 0;
     for (int f = 0; f < SMALL_FOLDED; ++f)
@@ -63,7 +63,7 @@ static void by_formula(bench *b, double m[RANK][RANK], double right[RANK])
             for (int f = 0; f < SMALL_FOLDED; ++f)
                 right[i] += b->out[f] ? 0
                                       : scale * k[i][j] * s[j] * p[f * RANK + j] / w[j] *
-                                            (double)ctx->d[f] / (s[i] * w[i]);
+                                            (double)ctx->frame.d[f] / (s[i] * w[i]);
         }
     }
 }
@@ -74,16 +74,17 @@ static void the_reduction_without_those_rows(double noise)
 {
     bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
-    CHECK(ctx->can_whiten_masked);
+    CHECK(ctx->whitening.possible);
     (void)stage(&b);
-    CHECK(!ctx->masked_whitening && eits_adjoint(ctx, ctx->y, ctx->adjoint) == ctx->y);
+    CHECK(!ctx->whitening.form &&
+          eits_adjoint(ctx, ctx->frame.y, ctx->solver.adjoint) == ctx->frame.y);
     pretend_noise(ctx, noise);
     for (uint32_t count = 1; count < SMALL_FOLDED; ++count) {
         double m[RANK][RANK], right[RANK];
         leave_out(&b, (5 * count) % SMALL_FOLDED);
         (void)stage(&b);
-        CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_TRIANGLE);
-        CHECK_EQUAL(ctx->basis_count, 0);
+        CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_TRIANGLE);
+        CHECK_EQUAL(ctx->projection.count, 0);
         by_formula(&b, m, right);
         /* P is stored as float: orthogonal to its rounding */
         const double bound = BOTH_WIDTHS(3e-4, 1e-6);
@@ -94,11 +95,11 @@ static void the_reduction_without_those_rows(double noise)
             whitening_column(ctx, unit, 0, column);
             for (int i = 0; i < RANK; ++i)
                 f_unit[i] = (eits_real)column[i];
-            const eits_real *back = eits_adjoint(ctx, f_unit, ctx->adjoint);
+            const eits_real *back = eits_adjoint(ctx, f_unit, ctx->solver.adjoint);
             for (int i = 0; i < RANK; ++i)
                 CHECK_NEAR(back[i], m[i][j], bound);
         }
-        const eits_real *pulled = eits_adjoint(ctx, ctx->y, ctx->adjoint);
+        const eits_real *pulled = eits_adjoint(ctx, ctx->frame.y, ctx->solver.adjoint);
         for (int i = 0; i < RANK; ++i)
             CHECK_NEAR(pulled[i], right[i], bound);
     }
@@ -115,11 +116,11 @@ static void noise_in_the_correlations(double noise)
     double all = 0;
     ctx->reference.lambda_noise = R(3.0);
     (void)stage(&b);
-    CHECK(ctx->noise_ratio == 1 && eits_lambda_noise(ctx) == R(3.0));
+    CHECK(ctx->whitening.noise_ratio == 1 && eits_lambda_noise(ctx) == R(3.0));
     pretend_noise(ctx, noise);
     (void)stage(&b);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
-        all += energy_of_row(&b, k, !ctx->masked_whitening);
+        all += energy_of_row(&b, k, !ctx->whitening.form);
     for (uint32_t count = 1; count < 16; ++count) {
         double sum = 0, whole = 0;
         leave_out(&b, (5 * count) % SMALL_FOLDED);
@@ -147,8 +148,8 @@ static void solvers_solve_the_seen_problem(void)
             for (uint32_t k = 0; k < 7; ++k)
                 leave_out(&b, 3 * k % 20);
             (void)stage(&b);
-            CHECK(ctx->masked_whitening);
-            CHECK_EQUAL(ctx->basis_count, storage % 2);
+            CHECK(ctx->whitening.form);
+            CHECK_EQUAL(ctx->projection.count, storage % 2);
             solve_what_is_seen(&b, sign);
             dense_bench_close(&b.b);
         }
@@ -174,22 +175,23 @@ static void until_nothing_is_left(void)
             for (int j = 0; j < N; ++j)
                 CHECK(eits_is_finite(image[j]));
             const uint32_t left = SMALL_FOLDED - 1 - k;
-            CHECK(eits_is_finite(ctx->info.data_norm) && ctx->info.gap >= 0);
-            CHECK((ctx->info.data_norm > 0) == (left > (uint32_t)project));
+            CHECK(eits_is_finite(eits_get_info(ctx)->data_norm) && eits_get_info(ctx)->gap >= 0);
+            CHECK((eits_get_info(ctx)->data_norm > 0) == (left > (uint32_t)project));
             if (left <= (uint32_t)project)
-                CHECK(ctx->info.stop == EITS_STOP_ZERO && ctx->info.nonzeros == 0 && count == 0);
-            norm = k == 0 ? ctx->info.data_norm : norm;
-            CHECK(ctx->info.data_norm < 4 * norm); /* 1 / sqrt(MIN_FRACTION), and some */
+                CHECK(eits_get_info(ctx)->stop == EITS_STOP_ZERO &&
+                      eits_get_info(ctx)->nonzeros == 0 && count == 0);
+            norm = k == 0 ? eits_get_info(ctx)->data_norm : norm;
+            CHECK(eits_get_info(ctx)->data_norm < 4 * norm); /* 1 / sqrt(MIN_FRACTION), and some */
             eits_context *other = set_up(&fresh, WHITENED, project);
             CHECK_EQUAL(eits_use_portable_kernels(other, 1), EITS_OK);
             CHECK_EQUAL(eits_reconstruct(other, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK(memcmp(other->image, image, sizeof image) == 0 &&
-                  memcmp(other->y, ctx->y, RANK * sizeof *ctx->y) == 0);
+            CHECK(memcmp(eits_get_image(other), image, sizeof image) == 0 &&
+                  memcmp(other->frame.y, ctx->frame.y, RANK * sizeof *ctx->frame.y) == 0);
             dense_bench_close(&fresh.b);
         }
         memcpy(b.frame, good, sizeof good);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, NULL), EITS_OK);
-        CHECK(!ctx->masked_whitening && memcmp(whole, image, sizeof whole) == 0);
+        CHECK(!ctx->whitening.form && memcmp(whole, image, sizeof whole) == 0);
         dense_bench_close(&b.b);
     }
 }
@@ -211,14 +213,14 @@ static void rows_out_do_not_count(void)
                 CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
         }
         (void)stage(&b);
-        memcpy(seen[round], ctx->y, sizeof seen[round]);
+        memcpy(seen[round], ctx->frame.y, sizeof seen[round]);
     }
-    CHECK(ctx->masked_whitening && memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
+    CHECK(ctx->whitening.form && memcmp(seen[0], seen[1], sizeof seen[0]) == 0);
     for (int i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = b.reference[i] * R(1.3);
     (void)stage(&b);
     for (int i = 0; i < RANK; ++i)
-        CHECK_NEAR(ctx->y[i], 0, 200 * EPS);
+        CHECK_NEAR(ctx->frame.y[i], 0, 200 * EPS);
     dense_bench_close(&b.b);
 }
 
@@ -241,7 +243,7 @@ static uint32_t can_whiten_masked_with(uint32_t row, double factor, int all_rows
     }
     small_model_seal(&b.b.made);
     small_context_open(&b.b.c, &b.b.made, 0);
-    eits_context *ctx = &b.b.c.ctx;
+    eits_context *ctx = b.b.c.ctx;
     small_reference(ctx->model, 1, b.reference);
     memcpy(b.frame, b.reference, sizeof b.frame);
     b.frame[3] *= R(1.1);
@@ -249,13 +251,13 @@ static uint32_t can_whiten_masked_with(uint32_t row, double factor, int all_rows
     leave_out(&b, 4);
     leave_out(&b, 9);
     (void)stage(&b);
-    const uint32_t can_whiten_masked = ctx->masked_whitening;
-    CHECK(can_whiten_masked <= ctx->can_whiten_masked);
-    CHECK(can_whiten_masked ? ctx->basis_count == 1
-                            : ctx->basis_count <= 3 && ctx->noise_ratio == 1);
+    const uint32_t can_whiten_masked = ctx->whitening.form;
+    CHECK(can_whiten_masked <= ctx->whitening.possible);
+    CHECK(can_whiten_masked ? ctx->projection.count == 1
+                            : ctx->projection.count <= 3 && ctx->whitening.noise_ratio == 1);
     CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     for (uint32_t i = 0; i < RANK && can_whiten_masked; ++i)
-        first_of_whitening[i] = ctx->basis[STRIDE + i];
+        first_of_whitening[i] = ctx->projection.basis[STRIDE + i];
     small_context_close(&b.b.c);
     small_model_free(&b.b.made);
     return can_whiten_masked;
@@ -280,16 +282,16 @@ static void models_of_another_form(void)
     bench b;
     small_spec other = WHITENED;
     other.shape = SMALL_RANDOM;
-    CHECK(!set_up(&b, other, 0)->can_whiten_masked);
+    CHECK(!set_up(&b, other, 0)->whitening.possible);
     dense_bench_close(&b.b);
     other.shape = SMALL_IDENTITY; /* whitened with no regularisation at all */
     eits_context *ctx = set_up(&b, other, 0);
-    CHECK(ctx->can_whiten_masked && ctx->regularisation == 0);
+    CHECK(ctx->whitening.possible && ctx->whitening.mu == 0);
     leave_out(&b, 1);
     (void)stage(&b);
-    CHECK(ctx->masked_whitening);
+    CHECK(ctx->whitening.form);
     for (int i = 0; i < RANK; ++i)
-        CHECK_NEAR(ctx->y[i], i == 1 ? 0 : sqrt(MARGIN) * (double)ctx->d[i], 1e-4);
+        CHECK_NEAR(ctx->frame.y[i], i == 1 ? 0 : sqrt(MARGIN) * (double)ctx->frame.d[i], 1e-4);
     dense_bench_close(&b.b);
 }
 

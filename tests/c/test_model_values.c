@@ -252,21 +252,21 @@ static void use(const small_model *made)
         return;
     const size_t size = eits_workspace_size(&model, 1);
     void *memory;
-    eits_context ctx;
+    eits_context *ctx;
     uint8_t *workspace = small_aligned(&memory, size);
-    CHECK_EQUAL(eits_init(&ctx, &model, workspace, size), EITS_OK);
-    eits_options options = ctx.options;
-    CHECK_EQUAL(eits_set_options(&ctx, &options), EITS_OK);
+    CHECK_EQUAL(eits_init(workspace, size, &model, &ctx), EITS_OK);
+    eits_options options = *eits_get_options(ctx);
+    CHECK_EQUAL(eits_set_options(ctx, &options), EITS_OK);
     options.iterations = options.iterations < 25 ? options.iterations : 25;
     options.second_pass = 1;
-    CHECK_EQUAL(eits_set_options(&ctx, &options), EITS_OK);
+    CHECK_EQUAL(eits_set_options(ctx, &options), EITS_OK);
     eits_real difference = 0;
-    (void)eits_self_test(&ctx, &difference);
+    (void)eits_self_test(ctx, &difference);
     for (uint32_t j = 0; j < model.n_pixels; ++j)
-        CHECK(isfinite((double)ctx.image[j]));
+        CHECK(isfinite((double)eits_get_image(ctx)[j]));
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count = 99;
-    CHECK_EQUAL(eits_find_touches(&ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    CHECK_EQUAL(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
     CHECK(count <= EITS_MAX_TOUCHES);
     for (uint32_t k = 0; k < count && k < EITS_MAX_TOUCHES; ++k) {
         CHECK(isfinite((double)touches[k].x_mm) && isfinite((double)touches[k].y_mm) &&

@@ -13,7 +13,7 @@ static const small_spec SPEC = {.rank = 6, .side = 4};
 
 static void finite_touches(const eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
-    CHECK(count <= EITS_MAX_TOUCHES && count == ctx->info.touches);
+    CHECK(count <= EITS_MAX_TOUCHES && count == eits_get_info(ctx)->touches);
     for (uint32_t k = 0; k < count; ++k)
         CHECK(isfinite(touches[k].x_mm) && isfinite(touches[k].y_mm) &&
               isfinite(touches[k].radius_mm) && isfinite(touches[k].strength_s_per_m_mm2) &&
@@ -38,14 +38,14 @@ static void touches_are_finite_whatever_the_units(void)
         small_context_open(&c, &made, 0);
         eits_real frame[SMALL_ROWS];
         small_reference(&c.model, 1.0, frame);
-        CHECK_EQUAL(eits_reference_set(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_set(c.ctx, frame, SMALL_ROWS), EITS_OK);
         for (uint32_t i = 0; i < SMALL_ROWS; i += 3)
             frame[i] *= (eits_real)(1.0 + 0.01 * (i % 7));
         eits_touch touches[EITS_MAX_TOUCHES];
         uint32_t count = 0;
-        (void)eits_reconstruct(&c.ctx, frame, SMALL_ROWS, NULL, NULL);
-        CHECK_EQUAL(eits_find_touches(&c.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
-        finite_touches(&c.ctx, touches, count);
+        (void)eits_reconstruct(c.ctx, frame, SMALL_ROWS, NULL, NULL);
+        CHECK_EQUAL(eits_find_touches(c.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+        finite_touches(c.ctx, touches, count);
         small_context_close(&c);
         small_model_free(&made);
     }
@@ -53,7 +53,7 @@ static void touches_are_finite_whatever_the_units(void)
 
 static void look_for_nothing(eits_context *ctx)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.diagnostics = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
@@ -65,19 +65,19 @@ static eits_real learn_noise(double first, double others)
     small_model made = small_model_make(SPEC);
     small_context c;
     small_context_open(&c, &made, 0);
-    look_for_nothing(&c.ctx);
+    look_for_nothing(c.ctx);
     eits_real frame[SMALL_ROWS];
-    CHECK_EQUAL(eits_reference_begin(&c.ctx, 6), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(c.ctx, 6), EITS_OK);
     for (int k = 0; k < 6; ++k) {
         small_reference(&c.model, k == 0 ? first : others, frame);
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
             frame[i] *= (eits_real)(1.0 + 1e-3 * ((i + (uint32_t)k) % 5));
-        CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+        CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
     }
-    CHECK_EQUAL(eits_reference_finish(&c.ctx), EITS_OK);
-    CHECK(c.ctx.reference.ready && isfinite(c.ctx.reference.lambda_noise) &&
-          c.ctx.reference.lambda_noise > 0);
-    const eits_real noise_v = c.ctx.reference.noise_v;
+    CHECK_EQUAL(eits_reference_finish(c.ctx), EITS_OK);
+    CHECK(c.ctx->reference.ready && isfinite(c.ctx->reference.lambda_noise) &&
+          c.ctx->reference.lambda_noise > 0);
+    const eits_real noise_v = c.ctx->reference.noise_v;
     small_context_close(&c);
     small_model_free(&made);
     return noise_v;
@@ -104,17 +104,17 @@ static void a_reference_frame_out_of_range_is_refused(void)
     small_model_seal(&made);
     small_context c;
     small_context_open(&c, &made, 0);
-    look_for_nothing(&c.ctx);
+    look_for_nothing(c.ctx);
     eits_real frame[SMALL_ROWS];
-    CHECK_EQUAL(eits_reference_begin(&c.ctx, 4), EITS_OK);
+    CHECK_EQUAL(eits_reference_begin(c.ctx, 4), EITS_OK);
     small_reference(&c.model, 1.0, frame);
-    CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
-    CHECK_EQUAL(eits_reference_add(&c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_reference_add(c.ctx, frame, SMALL_ROWS), EITS_OK);
     frame[0] *= (eits_real)1.5;
-    const eits_status status = eits_reference_add(&c.ctx, frame, SMALL_ROWS);
+    const eits_status status = eits_reference_add(c.ctx, frame, SMALL_ROWS);
     CHECK_EQUAL(status, BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
-    CHECK_EQUAL(c.ctx.reference.count, status == EITS_OK ? 3 : 2);
-    CHECK(isfinite(c.ctx.reference.lambda_noise));
+    CHECK_EQUAL(c.ctx->reference.count, status == EITS_OK ? 3 : 2);
+    CHECK(isfinite(c.ctx->reference.lambda_noise));
     small_context_close(&c);
     small_model_free(&made);
 }
@@ -127,19 +127,19 @@ static void data_too_small_to_square_give_zero(void)
     small_context c;
     small_context_open(&c, &made, 0);
     for (uint32_t solver = 0; solver <= EITS_SOLVER_ACTIVE_SET; ++solver) {
-        eits_options options = c.ctx.options;
+        eits_options options = *eits_get_options(c.ctx);
         options.solver = (eits_solver)solver;
-        CHECK_EQUAL(eits_set_options(&c.ctx, &options), EITS_OK);
-        small_new_data(&c.ctx, 3);
+        CHECK_EQUAL(eits_set_options(c.ctx, &options), EITS_OK);
+        small_new_data(c.ctx, 3);
         for (uint32_t i = 0; i < SPEC.rank; ++i)
-            c.ctx.y[i] *= (eits_real)BOTH_WIDTHS(1e-24, 1e-165);
-        CHECK_EQUAL(eits_solve(&c.ctx), EITS_OK);
-        CHECK_EQUAL(c.ctx.info.stop, EITS_STOP_ZERO);
-        CHECK(c.ctx.info.lambda_max > c.ctx.info.lambda);
-        CHECK(c.ctx.info.residual <= c.ctx.info.data_norm && c.ctx.info.gap == 0 &&
-              c.ctx.info.nonzeros == 0);
+            c.ctx->frame.y[i] *= (eits_real)BOTH_WIDTHS(1e-24, 1e-165);
+        CHECK_EQUAL(eits_solve(c.ctx, NULL), EITS_OK);
+        CHECK_EQUAL(eits_get_info(c.ctx)->stop, EITS_STOP_ZERO);
+        CHECK(eits_get_info(c.ctx)->lambda_max > eits_get_info(c.ctx)->lambda);
+        CHECK(eits_get_info(c.ctx)->residual <= eits_get_info(c.ctx)->data_norm &&
+              eits_get_info(c.ctx)->gap == 0 && eits_get_info(c.ctx)->nonzeros == 0);
         for (uint32_t j = 0; j < 16; ++j)
-            CHECK(c.ctx.image[j] == 0);
+            CHECK(eits_get_image(c.ctx)[j] == 0);
     }
     small_context_close(&c);
     small_model_free(&made);

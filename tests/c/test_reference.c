@@ -21,7 +21,7 @@ static eits_context *set_up(bench *b)
 {
     b->made = small_model_make((small_spec){.rank = 12, .side = 4});
     small_context_open(&b->c, &b->made, 0);
-    return &b->c.ctx;
+    return b->c.ctx;
 }
 
 static void tear_down(bench *b)
@@ -102,7 +102,7 @@ static void refused_frames(void)
     CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     CHECK_NEAR(ctx->reference.gain, 1, 8 * EPS);
     CHECK_EQUAL(eits_mask_row(ctx, 7, 0), EITS_OK);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.saturation_v = R(1.2);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     small_reference(&b.c.model, 1, b.frame); /* its greatest number is above 1.2 */
@@ -214,7 +214,7 @@ static void learned_numbers(int project)
     eits_context *ctx = set_up(&b);
     dense d = dense_of(&b.c.model);
     static eits_real frames[UNTOUCHED][SMALL_ROWS];
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     uint64_t state = 10;
     o.project_reference = (uint32_t)project;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -301,13 +301,13 @@ static void masked_while_learning(void)
         CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
         noise[masked] = (double)ctx->reference.noise_v;
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(ctx->info.masked, masked);
-        CHECK(ctx->unusable[4] == masked && isnan((double)ctx->reference.v0[4]) == masked);
+        CHECK_EQUAL(eits_get_info(ctx)->masked, masked);
+        CHECK(ctx->rows.unusable[4] == masked && isnan((double)ctx->reference.v0[4]) == masked);
         CHECK_NEAR(ctx->reference.correlation, 1, 1e-3);
         /* until the next reference */
         CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(ctx->info.masked, 0);
+        CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
         tear_down(&b);
     }
     CHECK(noise[0] > 1e-4 && noise[0] != noise[1]);
@@ -320,7 +320,7 @@ static void nothing_to_compare(void)
     bench b;
     eits_context *ctx = set_up(&b);
     uint64_t state = 34;
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.max_masked = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_mask_row(ctx, 2, 1), EITS_OK);
@@ -352,14 +352,14 @@ static void nothing_to_compare(void)
     small_model_seal(&made);
     small_context c;
     small_context_open(&c, &made, 0);
-    CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].first, 1), EITS_OK);
-    CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].second, 1), EITS_OK);
-    CHECK_EQUAL(eits_reference_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
-    CHECK_EQUAL(eits_mask_row(&c.ctx, c.model.fold[0].first, 0), EITS_OK);
-    CHECK_EQUAL(eits_reference_set(&c.ctx, b.frame, SMALL_ROWS), EITS_OK);
+    CHECK_EQUAL(eits_mask_row(c.ctx, c.model.fold[0].first, 1), EITS_OK);
+    CHECK_EQUAL(eits_mask_row(c.ctx, c.model.fold[0].second, 1), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_mask_row(c.ctx, c.model.fold[0].first, 0), EITS_OK);
+    CHECK_EQUAL(eits_reference_set(c.ctx, b.frame, SMALL_ROWS), EITS_OK);
     /* and one that is zero throughout, read in place */
     small_put_f32(small_model_section(&made, "VREF", NULL), 0);
-    CHECK_EQUAL(eits_reference_set(&c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
+    CHECK_EQUAL(eits_reference_set(c.ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ZERO);
     small_context_close(&c);
     small_model_free(&made);
 }

@@ -10,7 +10,7 @@ static const double FACTOR = 5, MAX = 1;
 
 static void choose_factor(eits_context *ctx, double factor)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.regularisation_noise_factor = (eits_real)factor;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
 }
@@ -33,12 +33,12 @@ static void the_formula(void)
         bench b;
         eits_context *ctx = set_up(&b, WHITENED, 0);
         (void)stage(&b);
-        double *stored = dense_copy(ctx->y, RANK);
-        ctx->basis[STRIDE + RANK] = R(NAN); /* as a map that overflowed may leave it */
+        double *stored = dense_copy(ctx->frame.y, RANK);
+        ctx->projection.basis[STRIDE + RANK] = R(NAN); /* as a map that overflowed may leave it */
         pretend_noise(ctx, noises[n]);
         (void)stage(&b);
-        CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
-        CHECK_NEAR(ctx->regularisation_in_force, mu, 1e-5 * mu);
+        CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
+        CHECK_NEAR(ctx->whitening.mu_in_force, mu, 1e-5 * mu);
         CHECK_EQUAL(eits_adjoint_macs(ctx), RANK);
         CHECK_EQUAL(eits_forward_macs(ctx), RANK);
         eits_real v[STRIDE];
@@ -47,13 +47,13 @@ static void the_formula(void)
         eits_real once[STRIDE];
         memcpy(once, v, sizeof once);
         CHECK_EQUAL(eits_whiten(ctx, once), RANK);
-        const eits_real *back = eits_adjoint(ctx, v, ctx->adjoint);
+        const eits_real *back = eits_adjoint(ctx, v, ctx->solver.adjoint);
         for (int i = 0; i < STRIDE; ++i) {
             CHECK_NEAR(once[i], i < RANK ? weight(i, mu) : 0, bound);
             CHECK(once[i] <= 1 && back[i] == once[i]);
         }
         for (int i = 0; i < RANK; ++i)
-            CHECK_NEAR(ctx->y[i], weight(i, mu) * stored[i], bound * fabs(stored[i]));
+            CHECK_NEAR(ctx->frame.y[i], weight(i, mu) * stored[i], bound * fabs(stored[i]));
         free(stored);
         dense_bench_close(&b.b);
     }
@@ -65,7 +65,7 @@ static void noise_through_it(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, WHITENED, 0);
-    const double stored = (double)ctx->reduction_energy;
+    const double stored = (double)ctx->whitening.energy;
     double energy = 0, sum = 0, whole = 0;
     ctx->reference.lambda_noise = R(3.0);
     pretend_noise(ctx, 0.01);
@@ -78,10 +78,10 @@ static void noise_through_it(void)
     }
     CHECK_NEAR(eits_lambda_noise(ctx), 3 * sqrt(sum / whole), 1e-4);
     CHECK(sum < 0.7 * whole && energy < 0.7 * stored);
-    CHECK_NEAR(ctx->reduction_energy, energy, 1e-4 * energy);
+    CHECK_NEAR(ctx->whitening.energy, energy, 1e-4 * energy);
     leave_out(&b, 3);
     (void)stage(&b);
-    CHECK_NEAR(ctx->reduction_energy, stored, 0);
+    CHECK_NEAR(ctx->whitening.energy, stored, 0);
     dense_bench_close(&b.b);
 }
 
@@ -96,8 +96,8 @@ static void solvers_solve_the_seen_problem(void)
             eits_context *ctx = set_up(&b, spec, storage % 2);
             pretend_noise(ctx, storage < 2 ? 0.02 : 0.1);
             (void)stage(&b);
-            CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
-            CHECK_EQUAL(ctx->basis_count, storage % 2);
+            CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
+            CHECK_EQUAL(ctx->projection.count, storage % 2);
             solve_what_is_seen(&b, sign);
             dense_bench_close(&b.b);
         }
@@ -106,7 +106,7 @@ static void solvers_solve_the_seen_problem(void)
 
 static void reconstruct(bench *b, eits_real image[N])
 {
-    CHECK_EQUAL(eits_reconstruct(&b->b.c.ctx, b->frame, SMALL_ROWS, image, NULL), EITS_OK);
+    CHECK_EQUAL(eits_reconstruct(b->b.c.ctx, b->frame, SMALL_ROWS, image, NULL), EITS_OK);
 }
 
 /* The model's own bits where nothing is known of the noise, or nothing asked for, or hardly more
@@ -117,23 +117,23 @@ static void only_where_asked_for(void)
     eits_real plain[N], image[N], raised[N];
     eits_context *ctx = set_up(&b, WHITENED, 1);
     reconstruct(&b, plain);
-    CHECK(ctx->info.regularisation == ctx->regularisation);
-    CHECK_NEAR(ctx->regularisation, SMALL_REGULARISATION, 1e-5);
+    CHECK(eits_get_info(ctx)->regularisation == ctx->whitening.mu);
+    CHECK_NEAR(ctx->whitening.mu, SMALL_REGULARISATION, 1e-5);
     const double little[] = {1e-4, SMALL_REGULARISATION / FACTOR,
                              1.009 * SMALL_REGULARISATION / FACTOR};
     for (size_t k = 0; k < sizeof little / sizeof little[0]; ++k) {
         pretend_noise(ctx, little[k]);
         reconstruct(&b, image);
-        CHECK(!ctx->masked_whitening && ctx->info.regularisation == ctx->regularisation &&
+        CHECK(!ctx->whitening.form && eits_get_info(ctx)->regularisation == ctx->whitening.mu &&
               memcmp(image, plain, sizeof image) == 0);
     }
     pretend_noise(ctx, 1.012 * SMALL_REGULARISATION / FACTOR);
     reconstruct(&b, image);
-    CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
+    CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
     CHECK(memcmp(image, plain, sizeof image) != 0);
     pretend_noise(ctx, 0.02);
     reconstruct(&b, raised);
-    CHECK_NEAR(ctx->info.regularisation, 0.1, 1e-5);
+    CHECK_NEAR(eits_get_info(ctx)->regularisation, 0.1, 1e-5);
     choose_factor(ctx, 0);
     reconstruct(&b, image);
     CHECK(memcmp(image, plain, sizeof image) == 0);
@@ -142,7 +142,7 @@ static void only_where_asked_for(void)
     CHECK(memcmp(image, raised, sizeof image) == 0);
     choose_factor(ctx, 1e29);
     reconstruct(&b, image);
-    CHECK(ctx->info.regularisation == R(1.0));
+    CHECK(eits_get_info(ctx)->regularisation == R(1.0));
     eits_context *portable = set_up(&other, WHITENED, 1);
     pretend_noise(portable, 0.02);
     CHECK_EQUAL(eits_use_portable_kernels(portable, 1), EITS_OK);
@@ -167,22 +167,23 @@ static void models_of_other_forms(void)
     pretend_noise(ctx, 0.1);
     (void)stage(&b);
     reconstruct(&b, NULL);
-    CHECK(!ctx->masked_whitening && ctx->info.regularisation == 0);
+    CHECK(!ctx->whitening.form && eits_get_info(ctx)->regularisation == 0);
     dense_bench_close(&b.b);
     spec.shape =
         SMALL_IDENTITY; /* whitened with no regularisation at all; all directions are alike */
     ctx = set_up(&b, spec, 0);
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
-    CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
-    CHECK_NEAR(ctx->info.regularisation, 0.5, 1e-6);
+    CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
+    CHECK_NEAR(eits_get_info(ctx)->regularisation, 0.5, 1e-6);
     for (int i = 0; i < RANK; ++i)
-        CHECK_NEAR(ctx->y[i], ctx->d[i], 1e-5);
+        CHECK_NEAR(ctx->frame.y[i], ctx->frame.d[i], 1e-5);
     /* as of a row of P that is far greater than the others */
-    ctx->row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160));
+    ctx->whitening.row_scale[2] = R(BOTH_WIDTHS(1e-20, 1e-160));
     pretend_noise(ctx, 0.1);
     reconstruct(&b, NULL);
-    CHECK(!ctx->masked_whitening && ctx->noise_ratio == 1 && ctx->info.regularisation == 0);
+    CHECK(!ctx->whitening.form && ctx->whitening.noise_ratio == 1 &&
+          eits_get_info(ctx)->regularisation == 0);
     dense_bench_close(&b.b);
 }
 
@@ -215,12 +216,12 @@ static void learned_with_it(void)
     pretend_noise(ctx, noise / (double)ctx->reference.v0_rms);
     memcpy(b.frame, untouched[2], sizeof b.frame);
     (void)stage(&b);
-    CHECK_EQUAL(ctx->masked_whitening, EITS_WHITENING_DIAGONAL);
-    double *back = dense_copy(eits_adjoint(ctx, ctx->y, ctx->adjoint), RANK), max = 0;
+    CHECK_EQUAL(ctx->whitening.form, EITS_WHITENING_DIAGONAL);
+    double *back = dense_copy(eits_adjoint(ctx, ctx->frame.y, ctx->solver.adjoint), RANK), max = 0;
     for (int j = 0; j < N; ++j)
         max = fmax(max, fabs(dense_dot(b.b.d.s + j * RANK, back, RANK)));
-    CHECK_NEAR(learned, max / (double)ctx->noise_ratio, 1e-4 * learned);
-    CHECK(ctx->noise_ratio < R(0.8));
+    CHECK_NEAR(learned, max / (double)ctx->whitening.noise_ratio, 1e-4 * learned);
+    CHECK(ctx->whitening.noise_ratio < R(0.8));
     free(back);
     dense_bench_close(&b.b);
 }

@@ -30,10 +30,10 @@ static eits_context *set_up(bench *b, small_spec spec, int prepared)
     small_context_open(&b->c, &b->made, prepared);
     b->d = dense_of(&b->c.model);
     for (uint32_t i = 0; i < spec.rank; ++i) {
-        b->c.ctx.y[i] = (eits_real)small_random(&state);
-        b->y[i] = (double)b->c.ctx.y[i];
+        b->c.ctx->frame.y[i] = (eits_real)small_random(&state);
+        b->y[i] = (double)b->c.ctx->frame.y[i];
     }
-    return &b->c.ctx;
+    return b->c.ctx;
 }
 
 static void tear_down(bench *b)
@@ -48,13 +48,13 @@ static const small_spec RANDOM = {.rank = RANK, .side = SIDE};
 /* Solve with these settings; other options at their defaults. */
 static eits_info solve(eits_context *ctx, uint32_t iterations, eits_sign sign, double lambda)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.iterations = iterations;
     o.sign = sign;
     o.lambda_abs = (eits_real)lambda;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    return ctx->info;
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    return *eits_get_info(ctx);
 }
 
 static void identity_gives_the_soft_threshold(void)
@@ -73,8 +73,8 @@ static void identity_gives_the_soft_threshold(void)
                     b.y[j] > 0 ? sign != EITS_SIGN_DECREASE : sign != EITS_SIGN_INCREASE;
                 const double expected = size > 0 && allowed ? copysign(size, b.y[j]) : 0;
                 /* one step is exact: 1/4 is a round number */
-                CHECK_NEAR(ctx->x[j], expected, iterations == 1 ? 0 : 2 * EPS);
-                CHECK(ctx->image[j] == ctx->x[j]);
+                CHECK_NEAR(eits_get_coefficients(ctx)[j], expected, iterations == 1 ? 0 : 2 * EPS);
+                CHECK(eits_get_image(ctx)[j] == eits_get_coefficients(ctx)[j]);
                 nonzeros += expected != 0;
                 squares += pow(b.y[j] - expected, 2);
             }
@@ -101,14 +101,16 @@ static void same_as_the_textbook(void)
                 eits_context *ctx = set_up(&b, spec, (int)(k % 2));
                 double x[N] = {0}, largest = 0;
                 const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
-                dense_fista(&b.d, b.y, (double)ctx->info.lambda, (double)b.c.model.lipschitz,
-                            counts[k], (eits_sign)sign, x);
+                dense_fista(&b.d, b.y, (double)eits_get_info(ctx)->lambda,
+                            (double)b.c.model.lipschitz, counts[k], (eits_sign)sign, x);
                 for (int j = 0; j < N; ++j)
                     largest = fmax(largest, fabs(x[j]));
                 CHECK(largest > 0.1);
-                CHECK_NEAR(dense_greatest_difference(x, ctx->x, N), 0, 400 * EPS * largest);
+                CHECK_NEAR(dense_greatest_difference(x, eits_get_coefficients(ctx), N), 0,
+                           400 * EPS * largest);
                 for (int j = 0; j < N; ++j)
-                    CHECK(ctx->image[j] == ctx->x[j] * (eits_real)b.c.model.column_weight[j]);
+                    CHECK(eits_get_image(ctx)[j] ==
+                          eits_get_coefficients(ctx)[j] * (eits_real)b.c.model.column_weight[j]);
                 CHECK_EQUAL(info.iterations, counts[k]); /* exactly so many */
                 CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
                 tear_down(&b);
@@ -127,14 +129,14 @@ static void same_bits_in_every_layout(void)
             const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
             bench b;
             eits_context *ctx = set_up(&b, spec, way % 2);
-            CHECK((ctx->panels != NULL) == (way % 2 == 1));
+            CHECK((ctx->columns.panels != NULL) == (way % 2 == 1));
             CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
             const eits_info info = solve(ctx, 60, EITS_SIGN_BOTH, 0.02);
             if (way == 0) {
-                memcpy(first, ctx->image, sizeof first);
+                memcpy(first, eits_get_image(ctx), sizeof first);
                 first_info = info;
             }
-            CHECK(memcmp(first, ctx->image, sizeof first) == 0);
+            CHECK(memcmp(first, eits_get_image(ctx), sizeof first) == 0);
             CHECK(info.gap == first_info.gap && info.residual == first_info.residual &&
                   info.macs == first_info.macs);
             tear_down(&b);
@@ -147,13 +149,13 @@ static void optimum_has_its_marks(void)
     for (int sign = 0; sign < 3; ++sign) {
         bench b;
         eits_context *ctx = set_up(&b, RANDOM, 1);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.gap_rel = R(BOTH_WIDTHS(1e-6, 1e-12));
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         const eits_info info = solve(ctx, 50000, (eits_sign)sign, 0.05);
         CHECK_EQUAL(info.stop, EITS_STOP_GAP);
         CHECK(info.gap_rel <= o.gap_rel && info.gap >= 0);
-        double *x = dense_copy(ctx->x, N), r[RANK], c[N], largest = 0;
+        double *x = dense_copy(eits_get_coefficients(ctx), N), r[RANK], c[N], largest = 0;
         dense_residual(&b.d, b.y, x, r);
         dense_correlate(&b.d, r, c);
         const double lambda = (double)info.lambda;
@@ -190,7 +192,7 @@ static void gap_bounds_the_suboptimality(void)
             bench b;
             eits_context *ctx = set_up(&b, RANDOM, 0);
             const eits_info info = solve(ctx, counts[k], (eits_sign)sign, 0.05);
-            double *x = dense_copy(ctx->x, N), best_x[N] = {0}, r[RANK];
+            double *x = dense_copy(eits_get_coefficients(ctx), N), best_x[N] = {0}, r[RANK];
             const double lambda = (double)info.lambda, gap = (double)info.gap;
             dense_fista(&b.d, b.y, lambda, (double)b.c.model.lipschitz, 30000, (eits_sign)sign,
                         best_x);
@@ -215,7 +217,7 @@ static void stopping_by_the_gap(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, RANDOM, 0);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.gap_rel = R(1e-3);
     o.gap_every = 7;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -255,7 +257,7 @@ static void zero_is_the_optimum(void)
         CHECK(info.iterations == 0 && info.nonzeros == 0 && info.gap == 0 &&
               info.residual == info.data_norm);
         for (int j = 0; j < N; ++j)
-            CHECK(ctx->x[j] == 0 && ctx->image[j] == 0);
+            CHECK(eits_get_coefficients(ctx)[j] == 0 && eits_get_image(ctx)[j] == 0);
         info = solve(ctx, 20, (eits_sign)sign, greatest * (1 - 1e-3));
         CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros == 1);
         /* lambda just at lambda_max */
@@ -265,14 +267,14 @@ static void zero_is_the_optimum(void)
     }
     bench b;
     eits_context *ctx = set_up(&b, RANDOM, 0);
-    memset(ctx->y, 0, RANK * sizeof *ctx->y);
+    memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
     eits_info info = solve(ctx, 20, EITS_SIGN_BOTH, 0);
     CHECK(info.stop == EITS_STOP_ZERO && info.lambda_max == 0 && info.data_norm == 0);
     tear_down(&b);
     const small_spec identity = {.rank = 16, .side = 4, .shape = SMALL_IDENTITY};
     ctx = set_up(&b, identity, 0);
     for (int i = 0; i < 16; ++i)
-        ctx->y[i] = R(-1); /* nothing to be found above zero */
+        ctx->frame.y[i] = R(-1); /* nothing to be found above zero */
     info = solve(ctx, 20, EITS_SIGN_INCREASE, 0);
     CHECK(info.stop == EITS_STOP_ZERO && info.lambda_max == 0);
     tear_down(&b);
@@ -294,19 +296,20 @@ static void solving_beside_a_basis(void)
         frame[b.c.model.fold[20].first] = R(NAN);
     CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_frame_stage(ctx, frame, SMALL_ROWS, &masked, &macs), EITS_OK);
-    CHECK_EQUAL(ctx->basis_count, 3);
+    CHECK_EQUAL(ctx->projection.count, 3);
     const eits_info info = solve(ctx, 40, EITS_SIGN_INCREASE, 0.01);
-    double *basis = dense_numbers(3 * RANK), *y = dense_copy(ctx->y, RANK), x[N] = {0}, r[RANK];
+    double *basis = dense_numbers(3 * RANK), *y = dense_copy(ctx->frame.y, RANK), x[N] = {0},
+           r[RANK];
     for (uint32_t k = 0; k < 3; ++k) {
         for (uint32_t i = 0; i < RANK; ++i)
-            basis[k * RANK + i] = (double)ctx->basis[k * EITS_STRIDE(RANK) + i];
+            basis[k * RANK + i] = (double)ctx->projection.basis[k * EITS_STRIDE(RANK) + i];
     }
     for (int j = 0; j < N; ++j)
         dense_project_out(b.d.s + j * RANK, basis, 3, RANK);
     dense_fista(&b.d, y, (double)info.lambda, (double)b.c.model.lipschitz, 40, EITS_SIGN_INCREASE,
                 x);
     CHECK(info.nonzeros >= 3);
-    CHECK_NEAR(dense_greatest_difference(x, ctx->x, N), 0, 400 * EPS);
+    CHECK_NEAR(dense_greatest_difference(x, eits_get_coefficients(ctx), N), 0, 400 * EPS);
     CHECK_NEAR(info.gap, dense_gap(&b.d, y, x, (double)info.lambda, EITS_SIGN_INCREASE), 400 * EPS);
     dense_residual(&b.d, y, x, r);
     CHECK_NEAR(info.residual, sqrt(dense_dot(r, r, RANK)), 100 * EPS);
@@ -323,28 +326,28 @@ static void work_is_counted(void)
     bench b;
     eits_context *ctx = set_up(&b, spec, 0);
     const uint64_t whole = 16 * 16, column = 16;
-    memset(ctx->y, 0, 16 * sizeof *ctx->y);
-    ctx->y[3] = 1;
+    memset(ctx->frame.y, 0, 16 * sizeof *ctx->frame.y);
+    ctx->frame.y[3] = 1;
     for (uint32_t iterations = 1; iterations <= 25; iterations += 8) {
         const eits_info info = solve(ctx, iterations, EITS_SIGN_INCREASE, 0.25);
         /* S'y once, which the first iteration uses again; S'r in each later one and for the last
          * gap; S x in each */
         CHECK_EQUAL(info.macs, whole + (iterations - 1) * whole + whole + iterations * column);
     }
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.gap_rel = R(1e-12); /* the gap is asked for every 5 iterations: another S'r each */
     o.gap_every = 5;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     eits_info info = solve(ctx, 4, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + 3 * whole + whole + 4 * column);
     /* from the last coefficients: S x once more, and the first iteration's S'r */
-    o = ctx->options;
+    o = *eits_get_options(ctx);
     o.gap_rel = 0;
     o.warm_start = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + column + 3 * (whole + column) + whole);
-    ctx->y[3] = 0;
+    ctx->frame.y[3] = 0;
     info = solve(ctx, 20, EITS_SIGN_INCREASE, 0.25); /* no more than S'y where there is nothing */
     CHECK_EQUAL(info.macs, whole);
     /* with the frame stage: P d over all folded rows, of differences and of logarithms, and two
@@ -354,10 +357,10 @@ static void work_is_counted(void)
     CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     const uint64_t reduce = SMALL_FOLDED * 16, project = 2 * 16;
-    CHECK_EQUAL(ctx->info.macs,
+    CHECK_EQUAL(eits_get_info(ctx)->macs,
                 reduce + 2 * 16 /* direction, normalised */ + 2 * (reduce + project) + whole);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(ctx->info.macs, 2 * (reduce + project) + whole); /* the basis is kept */
+    CHECK_EQUAL(eits_get_info(ctx)->macs, 2 * (reduce + project) + whole); /* the basis is kept */
     /* one column of P less, and its rows whitened again: the rows left out once into the products,
      * three factors, eight probes of the noise; the data and the drift's direction by three
      * triangles; F' y */
@@ -366,19 +369,21 @@ static void work_is_counted(void)
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     const uint64_t built =
         triangle + cubic + (2 * cubic + 2 * triangle - triangle) + cubic + 8 * 2 * triangle;
-    CHECK(ctx->masked_whitening);
-    CHECK_EQUAL(ctx->basis_count, 1);
-    CHECK_EQUAL(ctx->info.macs, built + (reduce + 3 * triangle + 2 * 16) +
-                                    2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
+    CHECK(ctx->whitening.form);
+    CHECK_EQUAL(ctx->projection.count, 1);
+    CHECK_EQUAL(eits_get_info(ctx)->macs, built + (reduce + 3 * triangle + 2 * 16) +
+                                              2 * (reduce - 16 + 3 * triangle + project) +
+                                              triangle + whole);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
     /* the whitening is kept */
-    CHECK_EQUAL(ctx->info.macs, 2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
+    CHECK_EQUAL(eits_get_info(ctx)->macs,
+                2 * (reduce - 16 + 3 * triangle + project) + triangle + whole);
     o.project_reference = 0; /* each residual is mapped, there and back */
     o.warm_start = 0;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    CHECK_EQUAL(ctx->basis_count, 0);
-    ctx->y[7] = 1;
+    CHECK_EQUAL(ctx->projection.count, 0);
+    ctx->frame.y[7] = 1;
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.nonzeros, 1);
     CHECK_EQUAL(info.macs, whole + triangle + 2 * (whole + 2 * triangle) + 3 * column +

@@ -34,7 +34,7 @@ static void fill_y(bench *b, double size, double noise, uint32_t shift)
             const uint32_t j = (k < 2 ? 9 + k : 41 + 2 * k) + shift;
             sum += size * b->d.s[(size_t)j * RANK + i];
         }
-        b->c.ctx.y[i] = (eits_real)sum;
+        b->c.ctx->frame.y[i] = (eits_real)sum;
     }
 }
 
@@ -45,8 +45,8 @@ static void set_options(eits_context *ctx, eits_options o)
 
 static eits_info solve(eits_context *ctx)
 {
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    return ctx->info;
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    return *eits_get_info(ctx);
 }
 
 static void detection_threshold_and_lambda_rule(void)
@@ -54,7 +54,7 @@ static void detection_threshold_and_lambda_rule(void)
     bench b;
     eits_context *ctx = set_up(&b, RANDOM);
     fill_y(&b, 1, 0, 0);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.detection_factor = R(1.5);
     o.lambda_rel = R(0.1);
     o.lambda_noise_factor = R(0.5);
@@ -80,7 +80,7 @@ static void detection_threshold_and_lambda_rule(void)
     info = solve(ctx);
     CHECK(info.stop == EITS_STOP_BELOW_THRESHOLD && info.iterations == 0 && info.nonzeros == 0);
     for (int j = 0; j < N; ++j)
-        CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
+        CHECK(eits_get_image(ctx)[j] == 0 && eits_get_coefficients(ctx)[j] == 0);
     ctx->reference.lambda_noise = (eits_real)(top / 1.51);
     info = solve(ctx);
     CHECK(info.stop == EITS_STOP_ITERATIONS && info.nonzeros > 0);
@@ -98,7 +98,7 @@ static void warm_start_saves_iterations(void)
     for (uint32_t warm = 0; warm < 2; ++warm) {
         bench b;
         eits_context *ctx = set_up(&b, RANDOM);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.gap_rel = R(1e-4);
         o.gap_every = 1;
         o.iterations = 100000;
@@ -123,7 +123,7 @@ static void no_ghost_after_lift_off(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, RANDOM);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.warm_start = 1;
     o.iterations = 20;
     set_options(ctx, o);
@@ -132,15 +132,15 @@ static void no_ghost_after_lift_off(void)
     for (int k = 0; k < 5; ++k)
         (void)solve(ctx);
     for (int j = 0; j < N; ++j)
-        peak = fmax(peak, (double)ctx->x[j]);
+        peak = fmax(peak, (double)eits_get_coefficients(ctx)[j]);
     CHECK(peak > 0.1);
     fill_y(&b, 0, 1e-3, 0);
     (void)solve(ctx);
-    double *after = dense_copy(ctx->x, N);
+    double *after = dense_copy(eits_get_coefficients(ctx), N);
     eits_forget(ctx);
     (void)solve(ctx);
     /* zero is the better start: the very cold result */
-    CHECK(dense_greatest_difference(after, ctx->x, N) == 0);
+    CHECK(dense_greatest_difference(after, eits_get_coefficients(ctx), N) == 0);
     for (int j = 0; j < N; ++j)
         CHECK(fabs(after[j]) < 0.1 * peak);
     free(after);
@@ -151,35 +151,35 @@ static void warm_start_is_forgotten(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, RANDOM);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     eits_real cold[N], warm[N], reference[SMALL_ROWS];
     o.warm_start = 1;
     o.iterations = 6;
     set_options(ctx, o);
     fill_y(&b, 1, 0.01, 0);
     (void)solve(ctx);
-    memcpy(cold, ctx->x, sizeof cold);
+    memcpy(cold, eits_get_coefficients(ctx), sizeof cold);
     (void)solve(ctx);
-    memcpy(warm, ctx->x, sizeof warm);
+    memcpy(warm, eits_get_coefficients(ctx), sizeof warm);
     CHECK(memcmp(cold, warm, sizeof cold) != 0); /* it does start elsewhere */
     eits_forget(ctx);
     (void)solve(ctx);
-    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
     o.sign = EITS_SIGN_DECREASE; /* coefficients of the other sign are no start */
     set_options(ctx, o);
     o.sign = EITS_SIGN_INCREASE;
     set_options(ctx, o);
     (void)solve(ctx);
-    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
     small_reference(&b.c.model, 1, reference);
     /* nor are those against another reference */
     CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
     (void)solve(ctx);
-    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
     o.warm_start = 0;
     set_options(ctx, o);
     (void)solve(ctx);
-    CHECK(memcmp(cold, ctx->x, sizeof cold) == 0);
+    CHECK(memcmp(cold, eits_get_coefficients(ctx), sizeof cold) == 0);
     eits_forget(NULL);
     dense_bench_close(&b);
 }
@@ -192,7 +192,7 @@ static void step_too_large(void)
         bench b;
         eits_context *ctx =
             set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.iterations = 400;
         set_options(ctx, o);
         fill_y(&b, 1, 0.01, 0);
@@ -200,7 +200,8 @@ static void step_too_large(void)
         CHECK_EQUAL(info.stop, EITS_STOP_ITERATIONS);
         CHECK(info.step_halvings >= 1 && info.step_halvings <= 8);
         CHECK(ldexp(factors[f], (int)info.step_halvings) > 0.4); /* enough of them */
-        double *y = dense_copy(ctx->y, RANK), *x = dense_copy(ctx->x, N), good[N] = {0};
+        double *y = dense_copy(ctx->frame.y, RANK), *x = dense_copy(eits_get_coefficients(ctx), N),
+               good[N] = {0};
         const double lambda = (double)info.lambda, at_zero = 0.5 * dense_dot(y, y, RANK);
         dense_fista(&b.d, y, lambda, (double)b.c.model.lipschitz / factors[f], 20000,
                     EITS_SIGN_INCREASE, good);
@@ -215,7 +216,7 @@ static void step_too_large(void)
         }
         for (int power = -10; power <= 10; power += 20) { /* nor does the unit matter */
             for (int i = 0; i < RANK; ++i)
-                ctx->y[i] = (eits_real)ldexp(y[i], power);
+                ctx->frame.y[i] = (eits_real)ldexp(y[i], power);
             const eits_info scaled = solve(ctx);
             CHECK(scaled.step_halvings == info.step_halvings && scaled.macs == info.macs &&
                   scaled.gap_rel == info.gap_rel);
@@ -238,16 +239,16 @@ static void ending_above_the_start(void)
                                                     .side = 4,
                                                     .shape = SMALL_IDENTITY,
                                                     .lipschitz_factor = 1 / step});
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.iterations = 1;
         o.lambda_abs = (eits_real)lambda;
         set_options(ctx, o);
         for (int i = 0; i < RANK; ++i)
-            ctx->y[i] = 1;
+            ctx->frame.y[i] = 1;
         const eits_info info = solve(ctx);
         CHECK_EQUAL(info.stop, above ? EITS_STOP_DIVERGED : EITS_STOP_ITERATIONS);
         CHECK_EQUAL(info.nonzeros, above ? 0 : RANK);
-        CHECK_NEAR(ctx->x[0], above ? 0 : 1.98 * (1 - lambda), 1e-5);
+        CHECK_NEAR(eits_get_coefficients(ctx)[0], above ? 0 : 1.98 * (1 - lambda), 1e-5);
         dense_bench_close(&b);
     }
 }
@@ -260,7 +261,7 @@ static void step_absurdly_large(void)
             bench b;
             eits_context *ctx = set_up(
                 &b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[f]});
-            eits_options o = ctx->options;
+            eits_options o = *eits_get_options(ctx);
             o.iterations = 1000;
             o.sign = (eits_sign)sign;
             o.warm_start = 1;
@@ -273,7 +274,7 @@ static void step_absurdly_large(void)
                 /* no number of the wild run stays */
                 CHECK(info.residual == info.data_norm && info.gap == 0 && info.gap_rel == 0);
                 for (int j = 0; j < N; ++j)
-                    CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
+                    CHECK(eits_get_image(ctx)[j] == 0 && eits_get_coefficients(ctx)[j] == 0);
                 uint32_t count = 9;
                 CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
                 CHECK_EQUAL(count, 0);
@@ -288,17 +289,17 @@ static void data_that_are_not_finite(void)
     bench b;
     eits_context *ctx = set_up(&b, RANDOM);
     static const double wrong[] = {NAN, INFINITY, -INFINITY, BOTH_WIDTHS(1e30, 1e200)};
-    CHECK_EQUAL(eits_solve(NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_solve(NULL, NULL), EITS_E_ARGUMENT);
     for (int k = 0; k < 4; ++k) {
         fill_y(&b, 1, 0.01, 0);
         (void)solve(ctx);
-        CHECK(ctx->info.nonzeros > 0);
-        ctx->y[5] = (eits_real)wrong[k];
-        CHECK_EQUAL(eits_solve(ctx), EITS_E_NOT_FINITE);
-        CHECK(ctx->info.nonzeros == 0 && ctx->info.data_norm == 0 && ctx->info.residual == 0 &&
-              ctx->info.lambda == 0);
+        CHECK(eits_get_info(ctx)->nonzeros > 0);
+        ctx->frame.y[5] = (eits_real)wrong[k];
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_E_NOT_FINITE);
+        CHECK(eits_get_info(ctx)->nonzeros == 0 && eits_get_info(ctx)->data_norm == 0 &&
+              eits_get_info(ctx)->residual == 0 && eits_get_info(ctx)->lambda == 0);
         for (int j = 0; j < N; ++j)
-            CHECK(ctx->image[j] == 0 && ctx->x[j] == 0);
+            CHECK(eits_get_image(ctx)[j] == 0 && eits_get_coefficients(ctx)[j] == 0);
     }
     dense_bench_close(&b);
     /* coefficients that are finite, an image that is not */
@@ -310,10 +311,10 @@ static void data_that_are_not_finite(void)
     small_context_open(&w.c, &w.made, 1);
     w.d = dense_of(&w.c.model);
     fill_y(&w, 1000, 0, 0);
-    CHECK_EQUAL(eits_solve(&w.c.ctx), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
+    CHECK_EQUAL(eits_solve(w.c.ctx, NULL), BOTH_WIDTHS(EITS_E_NOT_FINITE, EITS_OK));
     for (int j = 0; j < N; ++j)
-        CHECK(isfinite((double)w.c.ctx.image[j]) &&
-              (sizeof(eits_real) == 8 || w.c.ctx.image[j] == 0));
+        CHECK(isfinite((double)eits_get_image(w.c.ctx)[j]) &&
+              (sizeof(eits_real) == 8 || eits_get_image(w.c.ctx)[j] == 0));
     dense_bench_close(&w);
 }
 
@@ -339,16 +340,17 @@ static void units_do_not_matter(void)
         CHECK_EQUAL(eits_reference_set(ctx, reference, SMALL_ROWS), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         if (u == 0) {
-            memcpy(first, ctx->image, sizeof first);
-            first_info = ctx->info;
+            memcpy(first, eits_get_image(ctx), sizeof first);
+            first_info = *eits_get_info(ctx);
             for (int j = 0; j < N; ++j)
                 peak = fmax(peak, (double)first[j]);
-            CHECK(ctx->info.nonzeros >= 3);
+            CHECK(eits_get_info(ctx)->nonzeros >= 3);
         }
         double *as_doubles = dense_copy(first, N);
-        CHECK_NEAR(dense_greatest_difference(as_doubles, ctx->image, N), 0,
+        CHECK_NEAR(dense_greatest_difference(as_doubles, eits_get_image(ctx), N), 0,
                    u < 4 ? 0 : 200 * EPS * peak);
-        CHECK_NEAR(ctx->info.lambda, first_info.lambda, 100 * EPS * (double)first_info.lambda);
+        CHECK_NEAR(eits_get_info(ctx)->lambda, first_info.lambda,
+                   100 * EPS * (double)first_info.lambda);
         free(as_doubles);
         dense_bench_close(&b);
     }
@@ -357,14 +359,14 @@ static void units_do_not_matter(void)
     eits_context *ctx = set_up(&b, RANDOM);
     fill_y(&b, 1, 0.01, 0);
     (void)solve(ctx);
-    memcpy(first, ctx->x, sizeof first);
+    memcpy(first, eits_get_coefficients(ctx), sizeof first);
     for (int power = -40; power <= 40; power += 20) {
         fill_y(&b, 1, 0.01, 0);
         for (int i = 0; i < RANK; ++i)
-            ctx->y[i] *= (eits_real)ldexp(1, power);
+            ctx->frame.y[i] *= (eits_real)ldexp(1, power);
         const eits_info info = solve(ctx);
         for (int j = 0; j < N; ++j)
-            CHECK(ctx->x[j] == first[j] * (eits_real)ldexp(1, power));
+            CHECK(eits_get_coefficients(ctx)[j] == first[j] * (eits_real)ldexp(1, power));
         CHECK(info.gap_rel > 0);
     }
     dense_bench_close(&b);

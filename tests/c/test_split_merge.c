@@ -4,12 +4,12 @@
 #include "dense.h"
 #include "small_model.h"
 
+#include "api/stages.h"
 #include "base/vec.h"
 #include "diagnostics/diagnostics.h"
 #include "eitskin/batch.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
-#include "frame/projection.h"
 #include "kernels/kernels.h"
 #include "touch/disc_fit.h"
 
@@ -21,26 +21,27 @@ static const small_spec WAVES = {.rank = RANK, .side = SIDE, .shape = SMALL_WAVE
 static const small_spec WITH_FIELDS = {
     .rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .fields = 1};
 
-/* ctx->y of these discs, each with its change. */
+/* ctx->frame.y of these discs, each with its change. */
 static void press(eits_context *ctx, const eits_disc *disc, uint32_t count)
 {
     eits_real atom[RANK];
-    eits_zero(ctx->y, RANK);
+    eits_zero(ctx->frame.y, RANK);
     for (uint32_t k = 0; k < count; ++k) {
-        (void)eits_disc_atom(ctx, disc + k, atom, NULL);
-        eits_axpy(ctx, ctx->y, disc[k].change, atom, RANK);
+        (void)eits_disc_atom(ctx, &ctx->scratch, disc + k, atom, NULL);
+        eits_axpy(ctx->kernels, ctx->frame.y, disc[k].change, atom, RANK);
     }
 }
 
-/* A fit of ctx->y that begins with these discs. */
+/* A fit of ctx->frame.y that begins with these discs. */
 static eits_fit begin(eits_context *ctx, const eits_disc *disc, uint32_t count)
 {
-    eits_fit f = {.data = ctx->y,
-                  .total = eits_dot(ctx, ctx->y, ctx->y, RANK),
-                  .radius_weight = ctx->options.touch_radius_weight};
+    eits_fit f = {.data = ctx->frame.y,
+                  .residual = ctx->scratch.row[0],
+                  .total = eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, RANK),
+                  .radius_weight = eits_get_options(ctx)->touch_radius_weight};
     f.count = count;
     memcpy(f.disc, disc, count * sizeof *disc);
-    eits_fit_restart(ctx, &f);
+    eits_fit_restart(ctx, &ctx->scratch, &f);
     f.macs = 0;
     return f;
 }
@@ -58,18 +59,18 @@ static int has(const eits_fit *f, const eits_disc *disc, double apart_mm)
     return 0;
 }
 
-/* Whether ctx->residual is what the fit's discs leave of its data. */
+/* Whether the residual is what the fit's discs leave of its data. */
 static void check_residual(eits_context *ctx, const eits_fit *f)
 {
     eits_real left[RANK], atom[RANK];
     eits_copy(left, f->data, RANK);
     for (uint32_t k = 0; k < f->count; ++k) {
-        (void)eits_disc_atom(ctx, &f->disc[k], atom, NULL);
-        eits_axpy(ctx, left, -f->disc[k].change, atom, RANK);
+        (void)eits_disc_atom(ctx, &ctx->scratch, &f->disc[k], atom, NULL);
+        eits_axpy(ctx->kernels, left, -f->disc[k].change, atom, RANK);
     }
     const double size = sqrt((double)f->total);
     for (int i = 0; i < RANK; ++i)
-        CHECK_NEAR(ctx->residual[i], left[i], 100 * EPS * size);
+        CHECK_NEAR(f->residual[i], left[i], 100 * EPS * size);
 }
 
 static void two_halves_become_one(void)
@@ -83,12 +84,12 @@ static void two_halves_become_one(void)
     halves[0].x_mm -= 4, halves[2].x_mm += 4;
     halves[0].change = halves[2].change = R(0.025);
     eits_fit f = begin(ctx, halves, 3);
-    CHECK_EQUAL(eits_fit_merge(ctx, &f), 1);
+    CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 1);
     CHECK_EQUAL(f.count, 2);
     CHECK(has(&f, &one, 0.5) && has(&f, &far, 0.5));
     check_residual(ctx, &f);
     CHECK(f.macs > 0);
-    CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
+    CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
     dense_bench_close(&b);
 }
 
@@ -103,7 +104,7 @@ static void two_touches_stay_two(void)
                                     {distances[d] / 2, 3, 9, R(0.04), 1}};
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 2);
-        CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
         CHECK_EQUAL(f.count, 2);
         /* only those within 0.7 of a radius are tried: 9 x 0.7 + 18 = 24.3 mm */
         CHECK((f.macs > 0) == (d < 2));
@@ -124,7 +125,7 @@ static void opposite_signs_are_never_one(void)
     const eits_disc truth[2] = {{-3, 3, 9, R(0.05), 1}, {3, 3, 9, R(-0.05), -1}};
     press(ctx, truth, 2);
     eits_fit f = begin(ctx, truth, 2);
-    CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
+    CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
     CHECK_EQUAL(f.count, 2);
     CHECK_EQUAL(f.macs, 0);
     dense_bench_close(&b);
@@ -142,7 +143,7 @@ static void three_thirds_become_one(void)
     for (int k = 0; k < 3; ++k)
         thirds[k].x_mm += R(5.0) * (eits_real)(k - 1), thirds[k].change /= 3;
     eits_fit f = begin(ctx, thirds, 3);
-    CHECK_EQUAL(eits_fit_merge(ctx, &f), 1);
+    CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 1);
     CHECK_EQUAL(f.count, 1);
     CHECK(has(&f, &one, 2));
     dense_bench_close(&b);
@@ -164,22 +165,22 @@ static void one_disc_over_two_touches_becomes_two(void)
         press(ctx, truth, 3);
         const eits_disc seen[2] = {truth[2], {4, 6, 14, R(0.04), 1}};
         eits_fit f = begin(ctx, seen, 2);
-        eits_fit_move_all(ctx, &f, 3);
-        eits_options o = ctx->options;
+        eits_fit_move_all(ctx, &ctx->scratch, &f, 3);
+        eits_options o = *eits_get_options(ctx);
         o.max_touches = 2;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         eits_fit full = f;
-        CHECK_EQUAL(eits_fit_split(ctx, &full), 0); /* no room for a third */
+        CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &full), 0); /* no room for a third */
         CHECK_EQUAL(full.count, 2);
         o.max_touches = 3;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        eits_fit_restart(ctx, &f);
-        CHECK_EQUAL(eits_fit_split(ctx, &f), 1);
+        eits_fit_restart(ctx, &ctx->scratch, &f);
+        CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 1);
         CHECK_EQUAL(f.count, 3);
         for (int k = 0; k < 3; ++k)
             CHECK(has(&f, &truth[k], 2.0));
         check_residual(ctx, &f);
-        CHECK_EQUAL(eits_fit_merge(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
         dense_bench_close(&b);
     }
 }
@@ -198,13 +199,14 @@ static void a_split_that_gains_little_is_undone(void)
     for (int noisy = 0; noisy < 2; ++noisy) {
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, &one, 1);
-        eits_fit_move_all(ctx, &f, 5);
-        const eits_real left = eits_dot(ctx, ctx->residual, ctx->residual, RANK);
+        eits_fit_move_all(ctx, &ctx->scratch, &f, 5);
+        const eits_real left =
+            eits_dot(ctx->kernels, ctx->solver.residual, ctx->solver.residual, RANK);
         if (noisy) /* ten times as much that no disc explains */
-            eits_axpy(ctx, ctx->y, eits_sqrt(10 * left / eits_dot(ctx, rest, rest, RANK)), rest,
-                      RANK);
+            eits_axpy(ctx->kernels, ctx->frame.y,
+                      eits_sqrt(10 * left / eits_dot(ctx->kernels, rest, rest, RANK)), rest, RANK);
         f = begin(ctx, f.disc, 1);
-        CHECK_EQUAL(eits_fit_split(ctx, &f), !noisy);
+        CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), !noisy);
         CHECK_EQUAL(f.count, noisy ? 1 : 2);
     }
     dense_bench_close(&b);
@@ -220,14 +222,14 @@ static void one_large_touch_stays_one(void)
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 1);
         const eits_disc before = f.disc[0];
-        CHECK_EQUAL(eits_fit_split(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 0);
         CHECK_EQUAL(f.count, 1);
         CHECK((f.macs > 0) == (rest > 0)); /* nothing left: nothing is tried */
         CHECK(memcmp(&before, &f.disc[0], sizeof before) == 0);
         check_residual(ctx, &f);
         f.noise = f.total; /* all that is left may be noise */
         f.macs = 0;
-        CHECK_EQUAL(eits_fit_split(ctx, &f), 0);
+        CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 0);
         CHECK_EQUAL(f.macs, 0);
         dense_bench_close(&b);
     }
@@ -238,7 +240,7 @@ static void one_large_touch_stays_one(void)
 static uint32_t found(eits_context *ctx, uint32_t bits, eits_touch *touch)
 {
     uint32_t count = 0;
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.touch_fit = bits;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_find_touches(ctx, touch, EITS_MAX_TOUCHES, &count), EITS_OK);
@@ -253,17 +255,17 @@ static void one_peak_two_touches(void)
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     const eits_disc truth[2] = {{-13, 3, 9, R(0.05), 1}, {15, 3, 9, R(0.05), 1}};
     press(ctx, truth, 2);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) /* one peak */
-        ctx->image[j] =
+        ctx->solver.image[j] =
             b.c.model.pixel[j].ix == SIDE / 2 && b.c.model.pixel[j].iy == SIDE / 2 ? 1 : 0;
     /* of bent data, as far as it knows: two peaks' worth of bend is no touch */
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 1);
-    eits_copy(ctx->y_log, ctx->y, EITS_STRIDE(RANK));
-    ctx->has_y_log = 1;
+    eits_copy(ctx->frame.y_log, ctx->frame.y, EITS_STRIDE(RANK));
+    ctx->frame.has_y_log = 1;
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL - EITS_TOUCH_FIT_SPLIT_MERGE, touch), 1);
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 2);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.max_touches = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 1);
@@ -278,14 +280,14 @@ static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t second_
                                uint32_t mac_limit)
 {
     eits_context *ctx = dense_bench_open(b, spec, 0);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.second_pass = second_pass;
     o.mac_limit = mac_limit;
     b->c.model.fields.volts *= 0.01f; /* the interaction some percent of the data */
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    memset(ctx->basis_for, EITS_SIDE_BOTH, b->c.model.n_folded); /* all folds are in use */
+    memset(ctx->frame.sides, EITS_SIDE_BOTH, b->c.model.n_folded); /* all folds are in use */
     press(ctx, PAIR, 2);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     return ctx;
 }
 
@@ -297,21 +299,25 @@ static void the_second_pass_solves_the_separate_data(void)
                  *other = open_pair(&plain, WITH_FIELDS, 0, 0);
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 2);
     CHECK_EQUAL(found(other, EITS_TOUCH_FIT_ALL, touch), 2);
-    const eits_info first = other->info;
-    CHECK_EQUAL(ctx->info.touch_macs, first.touch_macs);
-    CHECK(memcmp(other->y, other->y_separate, RANK * sizeof *other->y) != 0);
-    CHECK(memcmp(ctx->y, other->y_separate, RANK * sizeof *ctx->y) == 0);
-    eits_copy(other->y, other->y_separate, RANK);
+    const eits_info first = *eits_get_info(other);
+    CHECK_EQUAL(eits_get_info(ctx)->touch_macs, first.touch_macs);
+    CHECK(memcmp(other->frame.y, other->touch.y_separate, RANK * sizeof *other->frame.y) != 0);
+    CHECK(memcmp(ctx->frame.y, other->touch.y_separate, RANK * sizeof *ctx->frame.y) == 0);
+    eits_copy(other->frame.y, other->touch.y_separate, RANK);
     eits_forget(other);
-    CHECK_EQUAL(eits_solve(other), EITS_OK);
-    CHECK(memcmp(ctx->image, other->image, b.c.model.n_pixels * sizeof *ctx->image) == 0);
-    CHECK_EQUAL(ctx->info.iterations, first.iterations + other->info.iterations);
-    CHECK_EQUAL(ctx->info.macs, first.macs + other->info.macs);
-    CHECK_EQUAL(ctx->info.step_halvings, first.step_halvings + other->info.step_halvings);
-    CHECK_EQUAL(ctx->info.touches, 2);
-    CHECK_EQUAL(ctx->info.diagnostics, first.diagnostics);
-    CHECK(ctx->info.data_norm == other->info.data_norm && ctx->info.stop == other->info.stop &&
-          ctx->info.lambda == other->info.lambda);
+    CHECK_EQUAL(eits_solve(other, NULL), EITS_OK);
+    CHECK(memcmp(eits_get_image(ctx), eits_get_image(other),
+                 b.c.model.n_pixels * sizeof(eits_real)) == 0);
+    CHECK_EQUAL(eits_get_info(ctx)->iterations,
+                first.iterations + eits_get_info(other)->iterations);
+    CHECK_EQUAL(eits_get_info(ctx)->macs, first.macs + eits_get_info(other)->macs);
+    CHECK_EQUAL(eits_get_info(ctx)->step_halvings,
+                first.step_halvings + eits_get_info(other)->step_halvings);
+    CHECK_EQUAL(eits_get_info(ctx)->touches, 2);
+    CHECK_EQUAL(eits_get_info(ctx)->diagnostics, first.diagnostics);
+    CHECK(eits_get_info(ctx)->data_norm == eits_get_info(other)->data_norm &&
+          eits_get_info(ctx)->stop == eits_get_info(other)->stop &&
+          eits_get_info(ctx)->lambda == eits_get_info(other)->lambda);
     dense_bench_close(&plain);
     dense_bench_close(&b);
 }
@@ -340,12 +346,12 @@ static void when_there_is_no_second_pass(void)
         dense_bench b;
         eits_touch touch[EITS_MAX_TOUCHES];
         eits_context *ctx = open_pair(&b, cases[k].spec, 1, cases[k].mac_limit);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.max_touches = cases[k].touches;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        const uint64_t macs = ctx->info.macs;
+        const uint64_t macs = eits_get_info(ctx)->macs;
         CHECK_EQUAL(found(ctx, cases[k].bits, touch), cases[k].touches);
-        CHECK_EQUAL(ctx->info.macs, macs);
+        CHECK_EQUAL(eits_get_info(ctx)->macs, macs);
         dense_bench_close(&b);
     }
 }
@@ -357,20 +363,22 @@ static void nothing_comes_of_it(void)
     eits_context *ctx = open_pair(&b, WITH_FIELDS, 1, 0);
     const eits_real nothing[RANK] = {0}, infinite[RANK] = {R(INFINITY)};
     eits_real image[SIDE * SIDE], y[RANK];
-    eits_copy(image, ctx->image, SIDE * SIDE);
-    eits_copy(y, ctx->y, RANK);
-    const eits_info before = ctx->info;
+    eits_copy(image, eits_get_image(ctx), SIDE * SIDE);
+    eits_copy(y, ctx->frame.y, RANK);
+    const eits_info before = *eits_get_info(ctx);
     ctx->info.diagnostics = 4;
-    eits_solve_again(ctx, nothing);
-    CHECK(memcmp(y, ctx->y, sizeof y) == 0);
+    eits_solve_again(ctx, &ctx->scratch, nothing);
+    CHECK(memcmp(y, ctx->frame.y, sizeof y) == 0);
     for (int j = 0; j < SIDE * SIDE; ++j)
-        CHECK(ctx->image[j] == image[j]);
-    CHECK(ctx->info.stop == before.stop && ctx->info.data_norm == before.data_norm &&
-          ctx->info.diagnostics == 4);
-    CHECK_EQUAL(ctx->info.iterations, 2 * before.iterations);
-    CHECK_EQUAL(ctx->has_y_log, 0);
-    eits_solve_again(ctx, infinite);
-    CHECK(memcmp(y, ctx->y, sizeof y) == 0 && memcmp(image, ctx->image, sizeof image) == 0);
+        CHECK(eits_get_image(ctx)[j] == image[j]);
+    CHECK(eits_get_info(ctx)->stop == before.stop &&
+          eits_get_info(ctx)->data_norm == before.data_norm &&
+          eits_get_info(ctx)->diagnostics == 4);
+    CHECK_EQUAL(eits_get_info(ctx)->iterations, 2 * before.iterations);
+    CHECK_EQUAL(ctx->frame.has_y_log, 0);
+    eits_solve_again(ctx, &ctx->scratch, infinite);
+    CHECK(memcmp(y, ctx->frame.y, sizeof y) == 0 &&
+          memcmp(image, eits_get_image(ctx), sizeof image) == 0);
     dense_bench_close(&b);
 }
 
@@ -398,12 +406,12 @@ static void images_of_a_batch(void)
     for (int k = 0; k < 2; ++k) {
         eits_forget(ctx);
         CHECK_EQUAL(eits_reconstruct(ctx, frame[k], SMALL_ROWS, NULL, NULL), EITS_OK);
-        const uint64_t macs = ctx->info.macs;
+        const uint64_t macs = eits_get_info(ctx)->macs;
         CHECK_EQUAL(eits_find_touches(ctx, alone, EITS_MAX_TOUCHES, &count), EITS_OK);
-        after_second_pass += ctx->info.macs > macs;
+        after_second_pass += eits_get_info(ctx)->macs > macs;
         CHECK_EQUAL(result[k].count, count);
-        CHECK_EQUAL(result[k].info.macs, ctx->info.macs);
-        CHECK(memcmp(image[k], ctx->image, sizeof image[k]) == 0);
+        CHECK_EQUAL(result[k].info.macs, eits_get_info(ctx)->macs);
+        CHECK(memcmp(image[k], eits_get_image(ctx), sizeof image[k]) == 0);
     }
     CHECK(after_second_pass > 0);
     dense_bench_close(&b);
@@ -426,7 +434,7 @@ static void options_have_ranges(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     o.second_pass = 2;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
-    CHECK_EQUAL(ctx->options.second_pass, 1);
+    CHECK_EQUAL(eits_get_options(ctx)->second_pass, 1);
     dense_bench_close(&b);
 }
 

@@ -27,8 +27,8 @@ static void set_options(eits_context *ctx, eits_options o)
 
 static eits_info solve(eits_context *ctx)
 {
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    return ctx->info;
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    return *eits_get_info(ctx);
 }
 
 /* After a halved step the iterations that are left are those from zero, with fresh momentum. */
@@ -39,7 +39,7 @@ static void a_halved_step_starts_afresh(void)
     spec.lipschitz_factor = 1.02 / 6;
     eits_context *ctx = dense_bench_open(&b, spec, 0);
     small_new_data(ctx, 91);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.solver = EITS_SOLVER_FISTA;
     o.lambda_rel = R(0.1);
     o.gap_rel = R(1e-30); /* so that each check is made */
@@ -49,10 +49,10 @@ static void a_halved_step_starts_afresh(void)
     const eits_info info = solve(ctx);
     CHECK(info.step_halvings >= 1 && info.step_halvings <= 3);
     const double lipschitz = (double)b.c.model.lipschitz * pow(2, info.step_halvings);
-    double *y = dense_copy(ctx->y, RANK), *x = dense_numbers(N);
+    double *y = dense_copy(ctx->frame.y, RANK), *x = dense_numbers(N);
     dense_fista(&b.d, y, (double)info.lambda, lipschitz, 60 - 10 * info.step_halvings,
                 EITS_SIGN_INCREASE, x);
-    CHECK(dense_greatest_difference(x, ctx->x, N) < 2000 * EPS);
+    CHECK(dense_greatest_difference(x, eits_get_coefficients(ctx), N) < 2000 * EPS);
     free(y), free(x);
     dense_bench_close(&b);
 }
@@ -67,20 +67,21 @@ static void a_start_worse_than_zero(void)
                      *other = dense_bench_open(&cold, RANDOM, 0);
         small_new_data(ctx, 92);
         small_new_data(other, 92);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.solver = (eits_solver)solver;
         o.warm_start = 1;
         o.lambda_rel = R(1e-4);
         o.iterations = 3000;
         set_options(ctx, o);
-        CHECK(solve(ctx).residual < R(0.5) * ctx->info.data_norm);
+        CHECK(solve(ctx).residual < R(0.5) * eits_get_info(ctx)->data_norm);
         o.lambda_rel = R(0.8);
         o.iterations = 3;
         set_options(ctx, o);
         set_options(other, o);
         const eits_info info = solve(ctx);
         CHECK_EQUAL(info.nonzeros, solve(other).nonzeros);
-        CHECK(memcmp(ctx->x, other->x, N * sizeof *ctx->x) == 0);
+        CHECK(memcmp(eits_get_coefficients(ctx), eits_get_coefficients(other),
+                     N * sizeof(eits_real)) == 0);
         dense_bench_close(&warm);
         dense_bench_close(&cold);
     }
@@ -101,7 +102,7 @@ static eits_context *open_warm(bench *b, int solver)
     eits_real frame[SMALL_ROWS];
     small_reference(&b->c.model, 1, frame);
     CHECK_EQUAL(eits_reference_set(ctx, frame, SMALL_ROWS), EITS_OK);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.solver = (eits_solver)solver;
     o.warm_start = 1;
     o.iterations = 4;
@@ -122,8 +123,9 @@ static void touches_leave_no_trace(void)
             wandering_frame(&seen, k, frame);
             CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
             CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-            CHECK(memcmp(ctx->image, other->image, N * sizeof *ctx->image) == 0);
-            CHECK(memcmp(&ctx->info, &other->info, sizeof ctx->info) == 0);
+            CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) == 0);
+            CHECK(memcmp(eits_get_info(ctx), eits_get_info(other), sizeof *eits_get_info(ctx)) ==
+                  0);
             CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
             CHECK(count > 0);
         }
@@ -157,10 +159,11 @@ static void cold_after_nothing(void)
         wandering_frame(&b, 4, frame);
         CHECK_EQUAL(eits_reconstruct(other, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK(memcmp(ctx->image, other->image, N * sizeof *ctx->image) == 0);
-        CHECK(ctx->info.iterations == other->info.iterations && ctx->info.gap == other->info.gap);
+        CHECK(memcmp(eits_get_image(ctx), eits_get_image(other), N * sizeof(eits_real)) == 0);
+        CHECK(eits_get_info(ctx)->iterations == eits_get_info(other)->iterations &&
+              eits_get_info(ctx)->gap == eits_get_info(other)->gap);
         if (why == 0)
-            CHECK_EQUAL(ctx->info.macs, other->info.macs);
+            CHECK_EQUAL(eits_get_info(ctx)->macs, eits_get_info(other)->macs);
         dense_bench_close(&b);
         dense_bench_close(&fresh);
     }
@@ -175,7 +178,7 @@ static void the_longest_intervals(void)
         bench b;
         eits_context *ctx = dense_bench_open(&b, RANDOM, 0);
         small_new_data(ctx, 95);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.solver = EITS_SOLVER_WORKING_SET;
         o.iterations = 100;
         o.gap_every = intervals[k];
@@ -195,7 +198,7 @@ static void iterations_without_number(void)
         bench b;
         eits_context *ctx = dense_bench_open(&b, RANDOM, 1);
         small_new_data(ctx, 96);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.solver = (eits_solver)solver;
         o.iterations = 100000;
         o.lambda_rel = R(0.05);
@@ -206,7 +209,8 @@ static void iterations_without_number(void)
         CHECK(info.gap_rel >= 0 && info.gap_rel < R(BOTH_WIDTHS(1e-5, 1e-12)) &&
               info.step_halvings == 0);
         for (int j = 0; j < N; ++j)
-            CHECK(isfinite((double)ctx->x[j]) && ctx->x[j] >= 0);
+            CHECK(isfinite((double)eits_get_coefficients(ctx)[j]) &&
+                  eits_get_coefficients(ctx)[j] >= 0);
         dense_bench_close(&b);
     }
 }
@@ -225,18 +229,18 @@ static void steps_that_end_at_zero(void)
                                                               .lipschitz_factor = 0.01 * factor},
                                                  0);
             for (uint32_t i = 0; i < 6; ++i)
-                ctx->y[i] = (eits_real)(1 + 0.1 * i);
-            eits_options o = ctx->options;
+                ctx->frame.y[i] = (eits_real)(1 + 0.1 * i);
+            eits_options o = *eits_get_options(ctx);
             o.solver = EITS_SOLVER_FISTA;
             o.lambda_rel = R(0.1);
             o.detection_factor = 0;
             o.gap_every = every;
             o.iterations = 60;
             CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-            CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-            CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
-            CHECK_EQUAL(ctx->info.nonzeros, 6);
-            CHECK(ctx->info.step_halvings > 0 && ctx->info.gap_rel < R(1e-3));
+            CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+            CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_ITERATIONS);
+            CHECK_EQUAL(eits_get_info(ctx)->nonzeros, 6);
+            CHECK(eits_get_info(ctx)->step_halvings > 0 && eits_get_info(ctx)->gap_rel < R(1e-3));
             dense_bench_close(&b);
         }
     }

@@ -32,7 +32,7 @@ static eits_context *set_up(bench *b, eits_storage storage, int round)
         .rank = RANK, .side = SIDE, .shape = SMALL_WAVES, .storage = storage, .round = round});
     small_context_open(&b->c, &b->made, 1);
     b->d = dense_of(&b->c.model);
-    return &b->c.ctx;
+    return b->c.ctx;
 }
 
 static void tear_down(bench *b)
@@ -66,10 +66,10 @@ static void press(bench *b, const finger *fingers, uint32_t count, double noise)
             y[i] += change / (double)m->column_weight[j] * b->d.s[(size_t)j * RANK + i];
     }
     for (uint32_t i = 0; i < RANK; ++i)
-        b->c.ctx.y[i] = (eits_real)(y[i] + noise * small_random(&state));
-    CHECK_EQUAL(eits_solve(&b->c.ctx), EITS_OK);
-    CHECK_EQUAL(eits_find_touches(&b->c.ctx, b->found, EITS_MAX_TOUCHES, &b->count), EITS_OK);
-    CHECK_EQUAL(b->c.ctx.info.touches, b->count);
+        b->c.ctx->frame.y[i] = (eits_real)(y[i] + noise * small_random(&state));
+    CHECK_EQUAL(eits_solve(b->c.ctx, NULL), EITS_OK);
+    CHECK_EQUAL(eits_find_touches(b->c.ctx, b->found, EITS_MAX_TOUCHES, &b->count), EITS_OK);
+    CHECK_EQUAL(eits_get_info(b->c.ctx)->touches, b->count);
 }
 
 static double strength(finger f)
@@ -104,7 +104,7 @@ static void one_touch_anywhere(void)
     for (int storage = 0; storage < 4; ++storage) {
         bench b;
         eits_context *ctx = set_up(&b, (eits_storage)storage, 0);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         /* the radius by the data: held at the seed's, it would bend the strength by some 5 % */
         o.touch_radius_weight = R(1e-4);
         o.touch_sweeps = 40;
@@ -117,7 +117,7 @@ static void one_touch_anywhere(void)
             CHECK_EQUAL(b.count, 1);
             const eits_touch *t = check_found(&b, f, 0.1 * PIXEL, 0.05);
             CHECK(t != NULL && t->confidence > R(0.98) && t->confidence <= 1);
-            CHECK(ctx->info.touch_macs > 0);
+            CHECK(eits_get_info(ctx)->touch_macs > 0);
             bias += t == NULL ? 1 : (double)t->strength_s_per_m_mm2 / strength(f) / 15;
         }
         CHECK_NEAR(bias, 1, 0.01); /* on average it is right */
@@ -130,7 +130,7 @@ static void both_signs(void)
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger pair[2] = {{-25, 10, 9, 0.05}, {25, -12, 9, -0.03}};
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.sign = EITS_SIGN_BOTH;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, pair, 2, 0);
@@ -187,7 +187,7 @@ static void dropped_and_limited(void)
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger two[2] = {{-27, 3, 9, 0.05}, {25, 5, 9, 0.015}};
-    const eits_options defaults = ctx->options;
+    const eits_options defaults = *eits_get_options(ctx);
     eits_options o = defaults;
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
@@ -225,7 +225,7 @@ static void many_peaks(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.touch_sweeps = 0;
     o.touch_threshold = 0;
     o.touch_min_fraction = 0;
@@ -234,18 +234,18 @@ static void many_peaks(void)
     for (uint32_t max = 1; max <= EITS_MAX_TOUCHES; max += 5) {
         o.max_touches = max;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-        memset(ctx->y, 0, RANK * sizeof *ctx->y);
-        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+        memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
         ctx->info.stop = EITS_STOP_ITERATIONS;
         /* 100 peaks, the height rising with the number in a scrambled order */
         for (uint32_t iy = 0; iy < 10; ++iy) {
             for (uint32_t ix = 0; ix < 10; ++ix) {
                 const uint32_t number = (37 * (10 * iy + ix)) % 100;
-                ctx->image[(2 * iy) * SIDE + 2 * ix] = (eits_real)(0.01 * (1 + number));
+                ctx->solver.image[(2 * iy) * SIDE + 2 * ix] = (eits_real)(0.01 * (1 + number));
                 /* data that agree, so that each keeps a strength */
                 for (uint32_t i = 0; i < RANK; ++i)
-                    ctx->y[i] += (eits_real)(0.01 * (1 + number) *
-                                             b.d.s[((2 * iy) * SIDE + 2 * ix) * RANK + i]);
+                    ctx->frame.y[i] += (eits_real)(0.01 * (1 + number) *
+                                                   b.d.s[((2 * iy) * SIDE + 2 * ix) * RANK + i]);
             }
         }
         eits_touch found[EITS_MAX_TOUCHES];
@@ -268,12 +268,12 @@ static void no_touch_below_the_detection_threshold(void)
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger two[2] = {{-25, 0, 9, 0.05}, {25, 5, 9, 0.015}};
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.lambda_noise_factor = 0;
     o.detection_factor = 1;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     press(&b, two + 1, 1, 0);
-    const eits_real weak = ctx->info.lambda_max;
+    const eits_real weak = eits_get_info(ctx)->lambda_max;
     press(&b, two, 2, 0);
     CHECK_EQUAL(b.count, 2);
     ctx->reference.lambda_noise = R(0.8) * weak; /* the weaker one stands out of such noise */
@@ -282,11 +282,12 @@ static void no_touch_below_the_detection_threshold(void)
     /* of this it does not, though the frame as a whole does */
     ctx->reference.lambda_noise = R(1.25) * weak;
     press(&b, two, 2, 0);
-    CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
+    CHECK_EQUAL(eits_get_info(ctx)->stop, EITS_STOP_ITERATIONS);
     CHECK_EQUAL(b.count, 1);
     CHECK(b.found[0].x_mm < 0);
     press(&b, two + 1, 1, 0); /* alone it does not even pass the frame's detection threshold */
-    CHECK(ctx->info.stop == EITS_STOP_BELOW_THRESHOLD && b.count == 0 && ctx->info.touch_macs == 0);
+    CHECK(eits_get_info(ctx)->stop == EITS_STOP_BELOW_THRESHOLD && b.count == 0 &&
+          eits_get_info(ctx)->touch_macs == 0);
     tear_down(&b);
 }
 
@@ -295,7 +296,7 @@ static void without_sweeps(void)
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
     const finger f = {16.5, -8.5, 9, 0.05};
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.touch_sweeps = 0;
     o.touch_seed_radius_mm = R(7.5);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -313,7 +314,7 @@ static void radius_by_strength(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32, 0);
-    const eits_options defaults = ctx->options;
+    const eits_options defaults = *eits_get_options(ctx);
     eits_options o = defaults;
     for (double radius = 6; radius <= 10; radius += 2) {
         const finger f = {5.5, -13, radius, 0.05};
@@ -381,20 +382,20 @@ static void nothing_to_find(void)
     CHECK_EQUAL(eits_find_touches(ctx, b.found, EITS_MAX_TOUCHES, &count), EITS_OK);
     CHECK_EQUAL(count, 0);
     press(&b, &f, 0, 0); /* y = 0 */
-    CHECK(b.count == 0 && ctx->info.touches == 0 && ctx->info.touch_macs == 0);
+    CHECK(b.count == 0 && eits_get_info(ctx)->touches == 0 && eits_get_info(ctx)->touch_macs == 0);
     CHECK_EQUAL(eits_find_touches(NULL, b.found, 1, &count), EITS_E_ARGUMENT);
     CHECK_EQUAL(eits_find_touches(ctx, NULL, 1, &count), EITS_E_ARGUMENT);
     press(&b, two, 2, 0);
     eits_real image[SIDE * SIDE];
-    memcpy(image, ctx->image, sizeof image);
+    memcpy(image, eits_get_image(ctx), sizeof image);
     /* room for one: the strongest, both counted */
     CHECK_EQUAL(eits_find_touches(ctx, &one, 1, &count), EITS_OK);
     CHECK_EQUAL(count, 2);
     CHECK(small_same_touch(&one, &b.found[0])); /* asked again, the same with the same id */
     CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, NULL), EITS_OK);
-    CHECK_EQUAL(ctx->info.touches, 2);
+    CHECK_EQUAL(eits_get_info(ctx)->touches, 2);
     /* the image is not changed by looking for touches */
-    CHECK(memcmp(image, ctx->image, sizeof image) == 0);
+    CHECK(memcmp(image, eits_get_image(ctx), sizeof image) == 0);
     tear_down(&b);
 }
 

@@ -18,7 +18,7 @@ static eits_context *set_up(small_model *made, small_context *c)
 {
     *made = small_model_make((small_spec){.rank = RANK, .side = SIDE, .shape = SMALL_WAVES});
     small_context_open(c, made, 0);
-    return &c->ctx;
+    return c->ctx;
 }
 
 /* y of two discs at pixel centres, far from each other, or of the first alone; returns the pixels
@@ -28,14 +28,14 @@ static uint64_t press(eits_context *ctx, int both)
     const eits_disc discs[2] = {{-27, 3, 9, R(0.05), 1}, {33, -3, 9, R(0.02), 1}};
     eits_real atom[RANK];
     uint64_t covered = 0;
-    memset(ctx->y, 0, RANK * sizeof *ctx->y);
+    memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
     for (int d = 0; d <= both; ++d) {
-        const uint64_t macs = eits_disc_atom(ctx, &discs[d], atom, NULL);
+        const uint64_t macs = eits_disc_atom(ctx, &ctx->scratch, &discs[d], atom, NULL);
         covered = d == 0 ? macs / RANK : covered;
         for (int i = 0; i < RANK; ++i)
-            ctx->y[i] += discs[d].change * atom[i];
+            ctx->frame.y[i] += discs[d].change * atom[i];
     }
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     return covered;
 }
 
@@ -44,7 +44,7 @@ static uint64_t touch_macs(eits_context *ctx, uint32_t expected_touches)
     uint32_t count;
     CHECK_EQUAL(eits_find_touches(ctx, NULL, 0, &count), EITS_OK);
     CHECK_EQUAL(count, expected_touches);
-    return ctx->info.touch_macs;
+    return eits_get_info(ctx)->touch_macs;
 }
 
 /* Discs at pixel centres, of the seed's radius, held there: every product can be counted. */
@@ -53,7 +53,7 @@ static void work_is_counted(void)
     small_model made;
     small_context c;
     eits_context *ctx = set_up(&made, &c);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.touch_sweeps = 0;
     o.touch_threshold = R(0.2);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -90,7 +90,7 @@ static void units_do_not_matter(void)
     eits_context *ctx = set_up(&made, &c);
     eits_touch first[2], found[2];
     uint32_t count;
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     /* not the discs' own: the radius is a compromise of data and expectation */
     o.touch_seed_radius_mm = 8;
     o.touch_radius_weight = R(3e-4);
@@ -104,8 +104,8 @@ static void units_do_not_matter(void)
             (eits_real)(power < 0 ? 1.0 / (double)(1 << -power) : (double)(1 << power));
         (void)press(ctx, 1);
         for (int i = 0; i < RANK; ++i)
-            ctx->y[i] *= unit;
-        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+            ctx->frame.y[i] *= unit;
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
         CHECK_EQUAL(eits_find_touches(ctx, found, 2, &count), EITS_OK);
         CHECK_EQUAL(count, 2);
         for (int k = 0; k < 2; ++k) { /* powers of two: the same bits */
@@ -143,28 +143,30 @@ static void confidence_is_what_leaving_out_costs(void)
     small_model made;
     small_context c;
     eits_context *ctx = set_up(&made, &c);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     eits_real atom[RANK];
     double atoms[4 * RANK], y[RANK];
     o.touch_sweeps = 0;
     o.touch_threshold = 0;
     o.touch_seed_radius_mm = 12;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    memset(ctx->y, 0, RANK * sizeof *ctx->y);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+    memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     ctx->info.stop = EITS_STOP_ITERATIONS; /* an image made by hand, the empty peak the highest */
     for (int k = 0; k < 4; ++k) {
         const eits_disc disc = {(eits_real)places[k][0], (eits_real)places[k][1], 12, 1, 1};
-        (void)eits_disc_atom(ctx, &disc, atom, NULL);
+        (void)eits_disc_atom(ctx, &ctx->scratch, &disc, atom, NULL);
         for (int i = 0; i < RANK; ++i) {
             atoms[k * RANK + i] = (double)atom[i];
-            ctx->y[i] += (eits_real)places[k][2] * atom[i] + (k == 0 ? R(-0.02) * atom[i] : 0);
+            ctx->frame.y[i] +=
+                (eits_real)places[k][2] * atom[i] + (k == 0 ? R(-0.02) * atom[i] : 0);
         }
-        ctx->image[lround((places[k][1] + 57) / 6) * SIDE + lround((places[k][0] + 57) / 6)] =
+        ctx->solver
+            .image[lround((places[k][1] + 57) / 6) * SIDE + lround((places[k][0] + 57) / 6)] =
             (eits_real)(4 - k);
     }
     for (int i = 0; i < RANK; ++i)
-        y[i] = (double)ctx->y[i];
+        y[i] = (double)ctx->frame.y[i];
     eits_touch found[4];
     uint32_t count;
     CHECK_EQUAL(eits_find_touches(ctx, found, 4, &count), EITS_OK);
@@ -192,7 +194,7 @@ static void each_touch_must_exceed_the_detection_threshold(void)
     small_context c;
     eits_context *ctx = set_up(&made, &c);
     dense d = dense_of(&c.model);
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.touch_sweeps = 0;
     o.touch_min_fraction = 0;
     o.lambda_noise_factor = 0;
@@ -200,7 +202,7 @@ static void each_touch_must_exceed_the_detection_threshold(void)
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
     const eits_disc weak = {33, -3, 9, R(0.02), 1};
     eits_real atom[RANK];
-    (void)eits_disc_atom(ctx, &weak, atom, NULL);
+    (void)eits_disc_atom(ctx, &ctx->scratch, &weak, atom, NULL);
     double *part = dense_copy(atom, RANK), max = 0;
     for (int iy = 8; iy <= 10; ++iy) { /* pixel (15, 9) */
         for (int ix = 14; ix <= 16; ++ix)
@@ -210,7 +212,7 @@ static void each_touch_must_exceed_the_detection_threshold(void)
         ctx->reference.lambda_noise = 0;
         (void)press(ctx, 1);
         ctx->reference.lambda_noise = (eits_real)(max * (k == 0 ? 0.999 : 1.001));
-        CHECK(ctx->info.lambda_max > R(1.5) * ctx->reference.lambda_noise);
+        CHECK(eits_get_info(ctx)->lambda_max > R(1.5) * ctx->reference.lambda_noise);
         (void)touch_macs(ctx, k == 0 ? 2 : 1);
     }
     free(part);

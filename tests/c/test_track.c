@@ -20,10 +20,10 @@ static eits_context *set_up(bench *b, double follow_mm)
 {
     b->made = small_model_make((small_spec){.rank = 3, .side = 3});
     small_context_open(&b->c, &b->made, 0);
-    eits_options o = b->c.ctx.options;
+    eits_options o = *eits_get_options(b->c.ctx);
     o.follow_mm = (eits_real)follow_mm;
-    CHECK_EQUAL(eits_set_options(&b->c.ctx, &o), EITS_OK);
-    return &b->c.ctx;
+    CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
+    return b->c.ctx;
 }
 
 static void tear_down(bench *b)
@@ -126,7 +126,7 @@ static void all_of_a_full_house(void)
                 CHECK(t[l].id != t[k].id);
         }
     }
-    CHECK_EQUAL(ctx->next_id, EITS_MAX_TOUCHES + 1);
+    CHECK_EQUAL(ctx->tracker.next_id, EITS_MAX_TOUCHES + 1);
     tear_down(&b);
 }
 
@@ -148,7 +148,7 @@ static void zero_is_never_an_id(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 5);
-    ctx->next_id = UINT32_MAX - 1;
+    ctx->tracker.next_id = UINT32_MAX - 1;
     eits_touch t[4] = {at(0, 0), at(50, 0), at(0, 50), at(50, 50)};
     eits_track(ctx, t, 4);
     CHECK(t[0].id == UINT32_MAX - 1 && t[1].id == UINT32_MAX && t[2].id == 1 && t[3].id == 2);
@@ -162,7 +162,7 @@ static void through_the_whole_core(void)
     bench b;
     b.made = small_model_make((small_spec){.rank = 64, .side = 20, .shape = SMALL_WAVES});
     small_context_open(&b.c, &b.made, 0);
-    eits_context *ctx = &b.c.ctx;
+    eits_context *ctx = b.c.ctx;
     static const struct {
         double x, y, change;
         uint32_t id;
@@ -175,10 +175,10 @@ static void through_the_whole_core(void)
         eits_real atom[64];
         eits_touch touch;
         uint32_t count;
-        (void)eits_disc_atom(ctx, &disc, atom, NULL);
+        (void)eits_disc_atom(ctx, &ctx->scratch, &disc, atom, NULL);
         for (int i = 0; i < 64; ++i)
-            ctx->y[i] = (eits_real)frames[k].change * atom[i];
-        CHECK_EQUAL(eits_solve(ctx), EITS_OK);
+            ctx->frame.y[i] = (eits_real)frames[k].change * atom[i];
+        CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
         CHECK_EQUAL(eits_find_touches(ctx, &touch, 1, &count), EITS_OK);
         CHECK_EQUAL(count, frames[k].change > 0);
         if (count == 0)

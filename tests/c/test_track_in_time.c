@@ -20,8 +20,8 @@ static eits_context *set_up(bench *b, uint32_t confirm, uint32_t hold, double sm
 {
     b->made = small_model_make((small_spec){.rank = 8, .side = 20});
     small_context_open(&b->c, &b->made, 0);
-    eits_context *ctx = &b->c.ctx;
-    eits_options o = ctx->options;
+    eits_context *ctx = b->c.ctx;
+    eits_options o = *eits_get_options(ctx);
     o.track_confirm = confirm;
     o.track_hold = hold;
     o.track_smooth = (eits_real)smooth;
@@ -185,7 +185,7 @@ static void jitter(eits_context *ctx, double speed, double confidence, double *f
     for (int k = 0; k < 60; ++k) {
         const double x = -50 + speed * k, off = 4 * small_random(&random) / (10 * sqrt(confidence));
         CHECK_EQUAL(one(ctx, t, x + off, confidence), 1);
-        CHECK_EQUAL(t[0].id, ctx->next_id - 1);
+        CHECK_EQUAL(t[0].id, ctx->tracker.next_id - 1);
         if (k >= 10) {
             *found_mm += off * off;
             *reported_mm += ((double)t[0].x_mm - x) * ((double)t[0].x_mm - x);

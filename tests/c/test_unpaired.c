@@ -115,7 +115,7 @@ static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kin
     if (protocol != PLAIN)
         shape_protocol(&b->made, protocol == CROSSED);
     small_context_open(&b->c, &b->made, 0);
-    eits_context *ctx = &b->c.ctx;
+    eits_context *ctx = b->c.ctx;
     b->state = 7;
     b->half = half;
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -124,7 +124,7 @@ static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kin
         if (fold.second != EITS_FOLD_NONE)
             b->reference[fold.second] = (eits_real)fold.sign;
     }
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.project_reference = 0;
     o.max_masked = SMALL_ROWS;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -134,7 +134,7 @@ static eits_context *open_shaped(bench *b, int protocol, int half, eits_data_kin
         CHECK_EQUAL(eits_reference_add(ctx, b->frame, SMALL_ROWS), EITS_OK);
     }
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
-    CHECK(ctx->range_known && ctx->reference.noise_v > 0);
+    CHECK(ctx->range.known && ctx->reference.noise_v > 0);
     return ctx;
 }
 
@@ -151,7 +151,7 @@ static void tear_down(bench *b)
 
 static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_masked)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.diagnostics = diagnostics;
     o.max_masked = max_masked;
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
@@ -161,8 +161,8 @@ static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_maske
  */
 static uint32_t reconstruct(bench *b)
 {
-    CHECK_EQUAL(eits_reconstruct(&b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-    return b->c.ctx.info.diagnostics &
+    CHECK_EQUAL(eits_reconstruct(b->c.ctx, b->frame, SMALL_ROWS, NULL, NULL), EITS_OK);
+    return eits_get_info(b->c.ctx)->diagnostics &
            ~(uint32_t)(EITS_DIAGNOSTIC_CROWDED | EITS_DIAGNOSTIC_STALE_REFERENCE);
 }
 
@@ -178,15 +178,15 @@ static void clean_half_scans(void)
     for (int project = 0; project < 2; ++project) {
         bench b;
         eits_context *ctx = set_up(&b, 1);
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.project_reference = (uint32_t)project;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         CHECK_EQUAL(eits_reference_set(ctx, b.reference, SMALL_ROWS), EITS_OK);
         for (int k = 0; k < 40; ++k) {
             clean_frame(&b, k % 2 ? 0.15 : 0.001);
             CHECK_EQUAL(reconstruct(&b), 0);
-            CHECK_EQUAL(ctx->info.masked, 0);
-            CHECK(ctx->info.model_mismatch < EITS_MISMATCH_FRACTION || k % 2 == 0);
+            CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
+            CHECK(eits_get_info(ctx)->model_mismatch < EITS_MISMATCH_FRACTION || k % 2 == 0);
         }
         tear_down(&b);
     }
@@ -206,32 +206,33 @@ static void one_outlier_of_a_half_scan(void)
         spoil(&b, k, 0.6);
         const uint32_t found = reconstruct(&b);
         if (k == 15 || k == 18) { /* what no other says anything about may be so */
-            CHECK(found == 0 && ctx->info.masked == 0);
+            CHECK(found == 0 && eits_get_info(ctx)->masked == 0);
             tear_down(&b);
             continue;
         }
         CHECK_EQUAL(found, EITS_DIAGNOSTIC_OUTLIER);
-        CHECK_EQUAL(ctx->info.outliers, rows);
-        CHECK_EQUAL(ctx->info.masked, rows);
-        CHECK(ctx->info.model_mismatch == 0 && ctx->unusable[fold.first] == EITS_ROW_OUTLIER);
-        memcpy(data, ctx->y, sizeof data);
+        CHECK_EQUAL(eits_get_info(ctx)->outliers, rows);
+        CHECK_EQUAL(eits_get_info(ctx)->masked, rows);
+        CHECK(eits_get_info(ctx)->model_mismatch == 0 &&
+              ctx->rows.unusable[fold.first] == EITS_ROW_OUTLIER);
+        memcpy(data, ctx->frame.y, sizeof data);
         look_for(ctx, EITS_DIAGNOSTICS_ALL, rows - 1);
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
-        CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
-        CHECK_EQUAL(ctx->info.outliers, rows);
+        CHECK_EQUAL(eits_get_info(ctx)->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
+        CHECK_EQUAL(eits_get_info(ctx)->outliers, rows);
         look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-        CHECK(ctx->info.model_mismatch > EITS_MISMATCH_FRACTION && ctx->info.model_mismatch <= 1 &&
-              ctx->info.masked == 0);
+        CHECK(eits_get_info(ctx)->model_mismatch > EITS_MISMATCH_FRACTION &&
+              eits_get_info(ctx)->model_mismatch <= 1 && eits_get_info(ctx)->masked == 0);
         look_for(ctx, 0, SMALL_ROWS);
         CHECK_EQUAL(reconstruct(&b), 0);
-        CHECK_EQUAL(ctx->info.masked, 0);
+        CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
         look_for(ctx, EITS_DIAGNOSTICS_ALL, SMALL_ROWS);
         CHECK_EQUAL(eits_mask_row(ctx, fold.first, 1), EITS_OK);
         if (fold.second != EITS_FOLD_NONE)
             CHECK_EQUAL(eits_mask_row(ctx, fold.second, 1), EITS_OK);
         CHECK_EQUAL(reconstruct(&b), 0);
-        CHECK(memcmp(data, ctx->y, sizeof data) == 0);
+        CHECK(memcmp(data, ctx->frame.y, sizeof data) == 0);
         tear_down(&b);
     }
 }
@@ -246,29 +247,30 @@ static void mismatches_that_are_no_outlier(void)
     for (uint32_t k = 0; k < 9; k += 3)
         spoil(&b, k, 0.6);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK(ctx->info.masked == 0 && ctx->info.outliers == 0);
+    CHECK(eits_get_info(ctx)->masked == 0 && eits_get_info(ctx)->outliers == 0);
     clean_frame(&b, 0.15); /* noise all over: nothing stands out of it */
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
         spoil(&b, k, 0.05 * small_random(&b.state));
     spoil(&b, 4, 0.4);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(ctx->info.masked, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
     clean_frame(&b, 0.02); /* a lesser one beside it does not matter */
     spoil(&b, 0, 0.6);
     spoil(&b, 3, 0.36);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
-    CHECK(ctx->info.outliers == 2 && ctx->unusable[b.c.model.fold[0].first] == EITS_ROW_OUTLIER);
+    CHECK(eits_get_info(ctx)->outliers == 2 &&
+          ctx->rows.unusable[b.c.model.fold[0].first] == EITS_ROW_OUTLIER);
     clean_frame(&b, 0.02); /* a fold that none determines is not blamed, however large */
     spoil(&b, 18, 6);
     for (uint32_t k = 0; k < 9; k += 3)
         spoil(&b, k, 0.3);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(ctx->info.masked, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
     clean_frame(&b, 0.02); /* rows that have turned, though one stands out */
     spoil(&b, 0, -7);
     spoil(&b, 3, -1.1);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(ctx->info.masked, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
     tear_down(&b);
     ctx = set_up(&b, 0);
     clean_frame(&b, 0.15);
@@ -276,7 +278,7 @@ static void mismatches_that_are_no_outlier(void)
     b.frame[fold.first] += R(0.6);
     b.frame[fold.second] += (eits_real)fold.sign * R(0.6);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_MODEL_MISMATCH);
-    CHECK_EQUAL(ctx->info.masked, 0);
+    CHECK_EQUAL(eits_get_info(ctx)->masked, 0);
     tear_down(&b);
 }
 
@@ -298,7 +300,7 @@ static void drift_is_no_mismatch(void)
     }
     CHECK_EQUAL(eits_reference_finish(ctx), EITS_OK);
     for (int project = 0; project < 2; ++project) {
-        eits_options o = ctx->options;
+        eits_options o = *eits_get_options(ctx);
         o.project_reference = (uint32_t)project;
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         clean_frame(&b, 0.02);
@@ -306,7 +308,7 @@ static void drift_is_no_mismatch(void)
         for (int i = 0; i < SMALL_ROWS; ++i)
             b.frame[i] += R(0.2) * b.reference[i];
         CHECK_EQUAL(reconstruct(&b), project ? 0 : EITS_DIAGNOSTIC_MODEL_MISMATCH);
-        CHECK((ctx->info.model_mismatch < R(0.01)) == project);
+        CHECK((eits_get_info(ctx)->model_mismatch < R(0.01)) == project);
         const eits_fold fold = b.c.model.fold[7];
         b.frame[fold.first] += R(0.05);
         b.frame[fold.second] += (eits_real)fold.sign * R(0.05);
@@ -329,9 +331,9 @@ static void the_wrong_side_goes(void)
                 clean_frame(&b, 0.15);
                 b.frame[wrong] *= R(1.5);
                 CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
-                CHECK_EQUAL(ctx->unusable[wrong], EITS_ROW_OUTLIER);
-                CHECK_EQUAL(ctx->unusable[right], block_of(k) < BLOCKS ? 0 : EITS_ROW_OUTLIER);
-                CHECK_EQUAL(ctx->info.outliers, block_of(k) < BLOCKS ? 1 : 2);
+                CHECK_EQUAL(ctx->rows.unusable[wrong], EITS_ROW_OUTLIER);
+                CHECK_EQUAL(ctx->rows.unusable[right], block_of(k) < BLOCKS ? 0 : EITS_ROW_OUTLIER);
+                CHECK_EQUAL(eits_get_info(ctx)->outliers, block_of(k) < BLOCKS ? 1 : 2);
             }
             tear_down(&b);
         }
@@ -350,17 +352,17 @@ static void several_wrong_sides(void)
             b.frame[l % 3 ? fold.first : fold.second] *= l % 2 ? R(1.6) : R(1.4);
         }
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
-        CHECK_EQUAL(ctx->info.outliers, count);
+        CHECK_EQUAL(eits_get_info(ctx)->outliers, count);
         for (uint32_t l = 0; l < count; ++l) {
             const eits_fold fold = b.c.model.fold[l + l / 2];
-            CHECK_EQUAL(ctx->unusable[l % 3 ? fold.first : fold.second], EITS_ROW_OUTLIER);
+            CHECK_EQUAL(ctx->rows.unusable[l % 3 ? fold.first : fold.second], EITS_ROW_OUTLIER);
         }
     }
     clean_frame(&b, 0.15);
     CHECK_EQUAL(eits_mask_row(ctx, b.c.model.fold[UNSEEN].first, 1), EITS_OK);
     b.frame[b.c.model.fold[2].first] *= R(1.5);
     CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_OUTLIER);
-    CHECK_EQUAL(ctx->info.outliers, 2);
+    CHECK_EQUAL(eits_get_info(ctx)->outliers, 2);
     tear_down(&b);
 }
 
@@ -422,14 +424,14 @@ static void noisy_channel(void)
             b.frame[measures_across(ctx, fold.second) ? fold.second : fold.first] *= R(1.3);
         }
         CHECK_EQUAL(reconstruct(&b), EITS_DIAGNOSTIC_ELECTRODE_NOISY);
-        CHECK_EQUAL(ctx->info.noisy_electrodes, 3);
+        CHECK_EQUAL(eits_get_info(ctx)->noisy_electrodes, 3);
         uint32_t count = 0;
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
             const int left = crossed ? uses_either(ctx, i) : measures_across(ctx, i);
-            CHECK_EQUAL(ctx->unusable[i], left ? EITS_ROW_NOISY : 0);
+            CHECK_EQUAL(ctx->rows.unusable[i], left ? EITS_ROW_NOISY : 0);
             count += (uint32_t)left;
         }
-        CHECK(count >= PAIR_FOLDS && ctx->info.masked == count);
+        CHECK(count >= PAIR_FOLDS && eits_get_info(ctx)->masked == count);
         tear_down(&b);
     }
 }

@@ -27,8 +27,8 @@ static eits_context *set_up(bench *b, small_spec spec, int prepared)
     memset(b, 0, sizeof *b);
     b->made = small_model_make(spec);
     small_context_open(&b->c, &b->made, prepared);
-    small_new_data(&b->c.ctx, 61);
-    return &b->c.ctx;
+    small_new_data(b->c.ctx, 61);
+    return b->c.ctx;
 }
 
 static void tear_down(bench *b)
@@ -40,7 +40,7 @@ static void tear_down(bench *b)
 static eits_options with(const eits_context *ctx, eits_solver solver, uint32_t iterations,
                          eits_sign sign, double lambda)
 {
-    eits_options o = ctx->options;
+    eits_options o = *eits_get_options(ctx);
     o.solver = solver;
     o.iterations = iterations;
     o.sign = sign;
@@ -51,8 +51,8 @@ static eits_options with(const eits_context *ctx, eits_solver solver, uint32_t i
 static eits_info solve(eits_context *ctx, eits_options o)
 {
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
-    CHECK_EQUAL(eits_solve(ctx), EITS_OK);
-    return ctx->info;
+    CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
+    return *eits_get_info(ctx);
 }
 
 /* A gap is asked for that is never reached, so that each iteration looks at every column. */
@@ -65,8 +65,10 @@ static void look_always(eits_options *o)
 static void check_same(const eits_context *a, const eits_context *b)
 {
     const eits_info *i = &a->info, *j = &b->info;
-    CHECK(memcmp(a->x, b->x, a->model->n_pixels * sizeof *a->x) == 0);
-    CHECK(memcmp(a->image, b->image, a->model->n_pixels * sizeof *a->image) == 0);
+    CHECK(memcmp(eits_get_coefficients(a), eits_get_coefficients(b),
+                 eits_get_model(a)->n_pixels * sizeof(eits_real)) == 0);
+    CHECK(memcmp(eits_get_image(a), eits_get_image(b),
+                 a->model->n_pixels * sizeof *eits_get_image(a)) == 0);
     CHECK_EQUAL(i->iterations, j->iterations);
     CHECK_EQUAL(i->stop, j->stop);
     CHECK_EQUAL(i->nonzeros, j->nonzeros);
@@ -96,8 +98,8 @@ static void looking_always_gives_the_bits_of_fista(void)
                         small_new_data(ctx, 62); /* and from there to other data */
                         (void)solve(ctx, o);
                     }
-                    CHECK(b[0].c.ctx.info.nonzeros > 0);
-                    check_same(&b[0].c.ctx, &b[1].c.ctx);
+                    CHECK(eits_get_info(b[0].c.ctx)->nonzeros > 0);
+                    check_same(b[0].c.ctx, b[1].c.ctx);
                     tear_down(&b[0]);
                     tear_down(&b[1]);
                 }
@@ -120,8 +122,8 @@ static void looking_always_recovers_like_fista(void)
             look_always(&o);
             (void)solve(ctx, o);
         }
-        CHECK(b[0].c.ctx.info.step_halvings > 0);
-        check_same(&b[0].c.ctx, &b[1].c.ctx);
+        CHECK(eits_get_info(b[0].c.ctx)->step_halvings > 0);
+        check_same(b[0].c.ctx, b[1].c.ctx);
         tear_down(&b[0]);
         tear_down(&b[1]);
     }
@@ -140,7 +142,7 @@ static void a_wild_run_ends_as_zero(void)
             CHECK_EQUAL(info.stop, EITS_STOP_DIVERGED);
             CHECK(info.nonzeros == 0 && info.step_halvings == 8 && info.residual == info.data_norm);
             for (int j = 0; j < N; ++j)
-                CHECK(ctx->x[j] == 0 && ctx->image[j] == 0);
+                CHECK(eits_get_coefficients(ctx)[j] == 0 && eits_get_image(ctx)[j] == 0);
             tear_down(&b);
         }
     }
@@ -162,7 +164,8 @@ static void the_optimum_is_that_of_all_columns(void)
                 const eits_info info = solve(ctx, o);
                 CHECK_EQUAL(info.stop, asked ? EITS_STOP_GAP : EITS_STOP_ITERATIONS);
                 dense d = dense_of(&b.c.model);
-                double *x = dense_copy(ctx->x, N), *y = dense_copy(ctx->y, RANK);
+                double *x = dense_copy(eits_get_coefficients(ctx), N),
+                       *y = dense_copy(ctx->frame.y, RANK);
                 const double gap = dense_gap(&d, y, x, (double)info.lambda, (eits_sign)sign),
                              scale = 0.5 * dense_dot(y, y, RANK);
                 CHECK_NEAR(gap, info.gap, 100 * EPS * scale);
@@ -187,8 +190,8 @@ static void same_bits_in_every_layout(void)
                 way % 2);
             CHECK_EQUAL(eits_use_portable_kernels(ctx, way / 2), EITS_OK);
             (void)solve(ctx, with(ctx, EITS_SOLVER_WORKING_SET, 60, EITS_SIGN_BOTH, 0.02));
-            check_same(&b[0].c.ctx, ctx);
-            CHECK(ctx->info.macs == b[0].c.ctx.info.macs);
+            check_same(b[0].c.ctx, ctx);
+            CHECK(eits_get_info(ctx)->macs == eits_get_info(b[0].c.ctx)->macs);
         }
         for (int way = 0; way < 4; ++way)
             tear_down(&b[way]);
@@ -212,10 +215,10 @@ static void beside_a_basis(void)
         look_always(&o);
         CHECK_EQUAL(eits_set_options(ctx, &o), EITS_OK);
         CHECK_EQUAL(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL), EITS_OK);
-        CHECK_EQUAL(ctx->basis_count, 2);
+        CHECK_EQUAL(ctx->projection.count, 2);
     }
-    CHECK(b[0].c.ctx.info.nonzeros >= 3);
-    check_same(&b[0].c.ctx, &b[1].c.ctx);
+    CHECK(eits_get_info(b[0].c.ctx)->nonzeros >= 3);
+    check_same(b[0].c.ctx, b[1].c.ctx);
     tear_down(&b[0]);
     tear_down(&b[1]);
 }
@@ -243,8 +246,8 @@ static void work_is_counted(void)
     bench b;
     eits_context *ctx = set_up(&b, (small_spec){.rank = 16, .side = 4, .shape = SMALL_IDENTITY}, 0);
     const uint64_t whole = 16 * 16, column = 16;
-    eits_zero(ctx->y, 16);
-    ctx->y[3] = 1;
+    eits_zero(ctx->frame.y, 16);
+    ctx->frame.y[3] = 1;
     eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, 1, EITS_SIGN_INCREASE, 0.25);
     o.gap_every = 5;
     CHECK_EQUAL(solve(ctx, o).macs, whole + column + whole);
@@ -265,8 +268,9 @@ static void refused_options(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, RANDOM, 0);
-    CHECK_EQUAL(ctx->options.solver, EITS_SOLVER_FISTA); /* what a file of format 1.0 has */
-    eits_options o = ctx->options;
+    CHECK_EQUAL(eits_get_options(ctx)->solver,
+                EITS_SOLVER_FISTA); /* what a file of format 1.0 has */
+    eits_options o = *eits_get_options(ctx);
     o.solver = (eits_solver)(EITS_SOLVER_ACTIVE_SET + 1);
     CHECK_EQUAL(eits_set_options(ctx, &o), EITS_E_ARGUMENT);
     tear_down(&b);

@@ -25,9 +25,9 @@ enum { MAX_MODEL = 2048 * 1024, MAX_WORKSPACE = 1024 * 1024, MAX_ROWS = 4096 };
 
 static _Alignas(16) uint8_t model_bytes[MAX_MODEL];
 static _Alignas(16) uint8_t workspace[MAX_WORKSPACE];
-static float frame[MAX_ROWS];
+static float frame[MAX_ROWS], reduced_data[EITS_MAX_RANK];
 static eits_model model;
-static eits_context ctx;
+static eits_context *ctx;
 static eits_options options;
 static unsigned portable;
 static FILE *numbers;
@@ -165,15 +165,15 @@ static int load(const char *name)
     if (status == EITS_OK) {
         need = eits_workspace_size(&model, 0);
         status = need <= sizeof workspace && model.n_rows <= MAX_ROWS
-                     ? eits_init(&ctx, &model, workspace, need)
+                     ? eits_init(workspace, need, &model, &ctx)
                      : EITS_E_WORKSPACE;
     }
     if (status == EITS_OK)
-        status = eits_use_portable_kernels(&ctx, (int)portable);
+        status = eits_use_portable_kernels(ctx, (int)portable);
     if (status == EITS_OK)
-        options = ctx.options;
+        options = *eits_get_options(ctx);
     printf("model status %d workspace %lu kernels %s\n", (int)status, (unsigned long)need,
-           status == EITS_OK ? eits_kernels_name(&ctx) : "none");
+           status == EITS_OK ? eits_kernels_name(ctx) : "none");
     return status == EITS_OK;
 }
 
@@ -185,16 +185,16 @@ static int read_numbers(float *to, uint32_t count)
 /* All of `count` frames are read, also where one is refused. */
 static int tare(unsigned count)
 {
-    eits_status status = count >= 4 ? eits_reference_begin(&ctx, count) : EITS_OK;
+    eits_status status = count >= 4 ? eits_reference_begin(ctx, count) : EITS_OK;
     for (unsigned k = 0; k < count; ++k) {
         if (!read_numbers(frame, model.n_rows))
             return fail("frames.f32 is short");
         if (status == EITS_OK)
-            status = count >= 4 ? eits_reference_add(&ctx, frame, model.n_rows)
-                                : eits_reference_set(&ctx, frame, model.n_rows);
+            status = count >= 4 ? eits_reference_add(ctx, frame, model.n_rows)
+                                : eits_reference_set(ctx, frame, model.n_rows);
     }
     if (status == EITS_OK && count >= 4)
-        status = eits_reference_finish(&ctx);
+        status = eits_reference_finish(ctx);
     printf("quiet status %d\n", (int)status);
     return 1;
 }
@@ -231,26 +231,28 @@ static void print_info(const eits_info *info)
 /* One frame, or one vector of reduced data. */
 static int solve_one(unsigned k, int reduced)
 {
-    if (!read_numbers(reduced ? ctx.y : frame, reduced ? model.rank : model.n_rows))
+    if (!read_numbers(reduced ? reduced_data : frame, reduced ? model.rank : model.n_rows))
         return fail("frames.f32 is short");
     volatile uint32_t *const painted = lowest_painted();
     paint_stack(painted);
     start_timer();
-    const eits_status status =
-        reduced ? eits_solve(&ctx) : eits_reconstruct(&ctx, frame, model.n_rows, NULL, NULL);
+    const eits_status status = reduced ? eits_solve(ctx, reduced_data)
+                                       : eits_reconstruct(ctx, frame, model.n_rows, NULL, NULL);
     const unsigned long solve = instructions_since_start();
+    const eits_info *const info = eits_get_info(ctx);
+    const float *const image = eits_get_image(ctx);
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t found = 0;
     start_timer();
-    (void)eits_find_touches(&ctx, touches, EITS_MAX_TOUCHES, &found);
+    (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &found);
     const unsigned long touch = instructions_since_start();
     const unsigned long stack = stack_used(painted);
     printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu "
            "stack %lu image %08lx",
-           k, (int)status, (int)ctx.info.stop, (unsigned long)ctx.info.iterations,
-           (unsigned long)ctx.info.macs, (unsigned long)ctx.info.touch_macs, solve, touch, stack,
-           (unsigned long)eits_crc32(0, ctx.image, (size_t)model.n_pixels * sizeof ctx.image[0]));
-    print_info(&ctx.info);
+           k, (int)status, (int)info->stop, (unsigned long)info->iterations,
+           (unsigned long)info->macs, (unsigned long)info->touch_macs, solve, touch, stack,
+           (unsigned long)eits_crc32(0, image, (size_t)model.n_pixels * sizeof image[0]));
+    print_info(info);
     print_touches(touches, found);
     return 1;
 }
@@ -269,17 +271,16 @@ static int obey(const char *word, FILE *script)
         return (fscanf(script, "%63s %lf", name, &value) == 2 && set_option(name, value)) ||
                fail("unknown option");
     if (strcmp(word, "choose") == 0) {
-        printf("choose status %d\n", (int)eits_set_options(&ctx, &options));
+        printf("choose status %d\n", (int)eits_set_options(ctx, &options));
         return 1;
     }
     if (strcmp(word, "mask") == 0)
-        return (fscanf(script, "%u %u", &a, &b) == 2 &&
-                eits_mask_row(&ctx, a, (int)b) == EITS_OK) ||
+        return (fscanf(script, "%u %u", &a, &b) == 2 && eits_mask_row(ctx, a, (int)b) == EITS_OK) ||
                fail("mask");
     if (strcmp(word, "quiet") == 0)
         return fscanf(script, "%u", &a) == 1 && tare(a);
     if (strcmp(word, "forget") == 0) {
-        eits_forget(&ctx);
+        eits_forget(ctx);
         return 1;
     }
     const int reduced = strcmp(word, "solve") == 0;

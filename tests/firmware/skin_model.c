@@ -147,11 +147,11 @@ static void make_golden(skin_model *made, uint8_t *golden_image, int wrong)
     const small_model blob = {.blob = made->blob, .size = made->size};
     eits_real difference;
     small_context_open(&c, &blob, 0);
-    if (eits_self_test(&c.ctx, &difference) != EITS_OK)
+    if (eits_self_test(c.ctx, &difference) != EITS_OK)
         abort();
-    memcpy(golden_image, c.ctx.image, c.model.n_pixels * sizeof(float));
+    memcpy(golden_image, c.ctx->solver.image, c.model.n_pixels * sizeof(float));
     if (wrong)
-        small_put_f32(golden_image, c.ctx.image[0] + 1e-6f);
+        small_put_f32(golden_image, c.ctx->solver.image[0] + 1e-6f);
     small_context_close(&c);
 }
 

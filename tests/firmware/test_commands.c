@@ -204,7 +204,7 @@ static void test_solver(void)
     c = good;
     c.track = 2;
     REPLY(solver_with(c), EITS_REPLY_RANGE, 40, 1);
-    const eits_options *options = &b.host.instrument.engine.ctx.options;
+    const eits_options *options = eits_get_options(b.host.instrument.engine.ctx);
     CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
     CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
     CHECK_EQUAL(options->warm_start, 0);

@@ -120,7 +120,7 @@ static void test_outlier(void)
 static void test_switched_off(void)
 {
     start();
-    const eits_options *o = &b.host.instrument.engine.ctx.options;
+    const eits_options *o = eits_get_options(b.host.instrument.engine.ctx);
     eits_command_solver solver = {.iterations = o->iterations,
                                   .max_touches = o->max_touches,
                                   .lambda_rel = o->lambda_rel,

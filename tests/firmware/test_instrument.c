@@ -2,6 +2,7 @@
  * back-pressure. */
 #include "bench.h"
 #include "check.h"
+#include "context/context.h"
 
 #include <string.h>
 
@@ -9,7 +10,7 @@ static bench b;
 
 /* The core as a host runs it beside the board, on the frames that the board sends. */
 static struct mirror {
-    eits_context ctx;
+    eits_context *ctx;
     _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
     uint32_t taken; /* packets seen */
     uint32_t images, touches, different;
@@ -20,15 +21,15 @@ static struct mirror {
 static void mirror_start(uint32_t untouched)
 {
     memset(&mirror, 0, sizeof mirror);
-    CHECK_EQUAL(eits_init(&mirror.ctx, &b.open, mirror.workspace, eits_workspace_size(&b.open, 0)),
+    CHECK_EQUAL(eits_init(mirror.workspace, eits_workspace_size(&b.open, 0), &b.open, &mirror.ctx),
                 EITS_OK);
-    eits_options options = mirror.ctx.options;
+    eits_options options = *eits_get_options(mirror.ctx);
     CHECK_EQUAL(eits_options_track(&options), EITS_OK); /* as the firmware does */
     options.warm_start = 1; /* of both, so that a frame depends on those before it */
-    b.host.instrument.engine.ctx.options.warm_start = 1;
-    CHECK_EQUAL(eits_set_options(&mirror.ctx, &options), EITS_OK);
+    b.host.instrument.engine.ctx->options.warm_start = 1;
+    CHECK_EQUAL(eits_set_options(mirror.ctx, &options), EITS_OK);
     if (untouched > 1)
-        CHECK_EQUAL(eits_reference_begin(&mirror.ctx, untouched), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(mirror.ctx, untouched), EITS_OK);
 }
 
 static int same_bits(const void *a, const void *c, size_t size)
@@ -39,14 +40,14 @@ static int same_bits(const void *a, const void *c, size_t size)
 static void mirror_image(const host_packet *packet)
 {
     const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
-    const eits_info *info = &mirror.ctx.info;
+    const eits_info *info = eits_get_info(mirror.ctx);
     CHECK_EQUAL(head->frame, mirror.frame);
     const eits_status status =
-        eits_reconstruct(&mirror.ctx, mirror.volts, b.open.n_rows, NULL, NULL);
+        eits_reconstruct(mirror.ctx, mirror.volts, b.open.n_rows, NULL, NULL);
     ++mirror.images;
     mirror.different +=
         head->status != (uint16_t)-status || head->count != b.open.n_pixels ||
-        !same_bits(packet->payload + sizeof *head, mirror.ctx.image, 4 * b.open.n_pixels) ||
+        !same_bits(packet->payload + sizeof *head, mirror.ctx->solver.image, 4 * b.open.n_pixels) ||
         head->iterations != info->iterations || head->macs != info->macs ||
         head->stop != (uint16_t)info->stop || head->masked != info->masked ||
         !same_bits(&head->residual, &info->residual, 4) ||
@@ -59,8 +60,8 @@ static void mirror_touches(const host_packet *packet)
     const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count = 0;
-    if (mirror.ctx.info.stop != EITS_STOP_BELOW_THRESHOLD || head->status == 0)
-        CHECK_EQUAL(eits_find_touches(&mirror.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
+    if (mirror.ctx->info.stop != EITS_STOP_BELOW_THRESHOLD || head->status == 0)
+        CHECK_EQUAL(eits_find_touches(mirror.ctx, touches, EITS_MAX_TOUCHES, &count), EITS_OK);
     ++mirror.touches;
     mirror.different +=
         head->count != count || packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
@@ -77,15 +78,15 @@ static void mirror_follow(void)
             memcpy(mirror.volts, packet->payload + sizeof *head, 4 * b.open.n_rows);
             mirror.frame = head->frame;
             if ((head->flags & EITS_RAW_REFERENCE) != 0)
-                CHECK_EQUAL(mirror.ctx.reference.wanted > 0
-                                ? eits_reference_add(&mirror.ctx, mirror.volts, b.open.n_rows)
-                                : eits_reference_set(&mirror.ctx, mirror.volts, b.open.n_rows),
+                CHECK_EQUAL(mirror.ctx->reference.wanted > 0
+                                ? eits_reference_add(mirror.ctx, mirror.volts, b.open.n_rows)
+                                : eits_reference_set(mirror.ctx, mirror.volts, b.open.n_rows),
                             EITS_OK);
         } else if (packet->type == EITS_PACKET_REPLY &&
                    ((const eits_packet_reply *)(const void *)head)->command == EITS_PACKET_TARE) {
-            if (mirror.ctx.reference.wanted > 0)
-                CHECK_EQUAL(eits_reference_finish(&mirror.ctx), EITS_OK);
-            eits_forget(&mirror.ctx);
+            if (mirror.ctx->reference.wanted > 0)
+                CHECK_EQUAL(eits_reference_finish(mirror.ctx), EITS_OK);
+            eits_forget(mirror.ctx);
         } else if (packet->type == EITS_PACKET_IMAGE) {
             mirror_image(packet);
         } else if (packet->type == EITS_PACKET_TOUCHES) {
@@ -120,11 +121,11 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
     mirror_follow();
-    CHECK(b.host.instrument.engine.ctx.reference.correlation > 0.99f);
-    CHECK(same_bits(mirror.ctx.reference.v0, b.host.instrument.engine.ctx.reference.v0,
+    CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.99f);
+    CHECK(same_bits(mirror.ctx->reference.v0, b.host.instrument.engine.ctx->reference.v0,
                     4 * b.open.n_rows));
-    CHECK(same_bits(&mirror.ctx.reference.lambda_noise,
-                    &b.host.instrument.engine.ctx.reference.lambda_noise, 4));
+    CHECK(same_bits(&mirror.ctx->reference.lambda_noise,
+                    &b.host.instrument.engine.ctx->reference.lambda_noise, 4));
     const uint32_t ms = busy_ms > 0 ? 1500 : 150;
     touch(2, -3, 4);
     host_run(&b.host, ms);
@@ -133,7 +134,7 @@ static void test_same_bits(const skin_spec *spec, uint32_t untouched, uint16_t e
     mirror_follow();
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
     if (untouched > 1)
-        CHECK_EQUAL(eits_reference_begin(&mirror.ctx, untouched), EITS_OK);
+        CHECK_EQUAL(eits_reference_begin(mirror.ctx, untouched), EITS_OK);
     /* with the touches: they are gone, and their ids */
     CHECK_EQUAL(host_tare(&b.host, untouched).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, every, 0).status, EITS_REPLY_OK);
@@ -165,8 +166,8 @@ static void test_phase_of_the_voltages(void)
         b.board.extra_turn = k / 9.0;
         CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_OK);
         CHECK_EQUAL(host_tare(&b.host, 8).status, EITS_REPLY_OK);
-        CHECK_NEAR(b.host.instrument.engine.ctx.reference.gain, 1, 1e-3);
-        CHECK(b.host.instrument.engine.ctx.reference.correlation > 0.9999f);
+        CHECK_NEAR(b.host.instrument.engine.ctx->reference.gain, 1, 1e-3);
+        CHECK(b.host.instrument.engine.ctx->reference.correlation > 0.9999f);
         host_run(&b.host, 3000); /* the generator, 12 mHz off, would turn by 13 degrees */
         float volts[256];
         memcpy(volts, host_last(&b.host, EITS_PACKET_RAW)->payload + sizeof(eits_packet_raw),
@@ -246,8 +247,8 @@ static void test_failed_tare(void)
     mirror_start(0);
     const fw_engine *engine = &b.host.instrument.engine;
     static float v0[256];
-    memcpy(v0, engine->ctx.reference.v0, sizeof(float) * 208);
-    const eits_reference before = engine->ctx.reference;
+    memcpy(v0, engine->ctx->reference.v0, sizeof(float) * 208);
+    const eits_reference before = engine->ctx->reference;
     const float cosine = engine->cosine;
     touch(0, 0, 5);
     eits_command_tare tare = {.request = ++b.host.request, .frames = 16};
@@ -258,10 +259,10 @@ static void test_failed_tare(void)
     const eits_packet_reply reply = host_reply(&b.host, tare.request);
     CHECK_EQUAL(reply.status, EITS_REPLY_CORE);
     CHECK_EQUAL(reply.detail[0], EITS_E_FRAME_CHANNELS);
-    CHECK(same_bits(v0, engine->ctx.reference.v0, sizeof(float) * 208));
-    CHECK_EQUAL(engine->ctx.reference.ready, 1);
-    CHECK(same_bits(&before.noise_v, &engine->ctx.reference.noise_v, 4));
-    CHECK(same_bits(&before.gain, &engine->ctx.reference.gain, 4));
+    CHECK(same_bits(v0, engine->ctx->reference.v0, sizeof(float) * 208));
+    CHECK_EQUAL(engine->ctx->reference.ready, 1);
+    CHECK(same_bits(&before.noise_v, &engine->ctx->reference.noise_v, 4));
+    CHECK(same_bits(&before.gain, &engine->ctx->reference.gain, 4));
     CHECK(engine->cosine == cosine);
     CHECK_EQUAL(host_info(&b.host).tared, 1);
     b.sheet.detached[3] = false;
@@ -321,8 +322,8 @@ static void test_self_test_keeps_the_tare(void)
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_OK);
     CHECK_EQUAL(host_stream(&b.host, 7, 1, 0).status, EITS_REPLY_OK);
     mirror_follow();
-    eits_forget(&mirror.ctx);   /* a self-test forgets the warm start */
-    mirror.ctx.basis_stale = 1; /* and the basis, which costs MACs to build anew */
+    eits_forget(mirror.ctx);          /* a self-test forgets the warm start */
+    mirror.ctx->projection.stale = 1; /* and the basis, which costs MACs to build anew */
     host_run(&b.host, 100);
     mirror_follow();
     CHECK(mirror.images >= 8);

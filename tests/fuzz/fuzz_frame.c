@@ -55,7 +55,7 @@ static void make_models(void)
 
 typedef struct twins {
     eits_model model;
-    eits_context ctx[2];
+    eits_context *ctx[2];
     int count;
     eits_real frame[SMALL_ROWS];
 } twins;
@@ -64,8 +64,8 @@ static void open_one(twins *t, int k, int portable, int prepared)
 {
     const size_t size = eits_workspace_size(&t->model, prepared);
     MUST(size <= FUZZ_WORKSPACE);
-    MUST(eits_init(&t->ctx[k], &t->model, fuzz_workspace(k), size) == EITS_OK);
-    MUST(eits_use_portable_kernels(&t->ctx[k], portable) == EITS_OK);
+    MUST(eits_init(fuzz_workspace(k), size, &t->model, &t->ctx[k]) == EITS_OK);
+    MUST(eits_use_portable_kernels(t->ctx[k], portable) == EITS_OK);
 }
 
 static void open_twins(twins *t, uint32_t which)
@@ -80,7 +80,7 @@ static void open_twins(twins *t, uint32_t which)
 
 /* The status that a call gives for each context. */
 #define BOTH(call) \
-    both_gave((call(&t->ctx[0])), t->count < 2 ? EITS_OK : (call(&t->ctx[1])), t->count)
+    both_gave((call(t->ctx[0])), t->count < 2 ? EITS_OK : (call(t->ctx[1])), t->count)
 static eits_status both_gave(eits_status one, eits_status other, int count)
 {
     MUST(count < 2 || one == other);
@@ -94,12 +94,14 @@ static int same_bits(const void *a, const void *b, size_t size)
 
 static void same_results(const twins *t)
 {
-    const eits_context *a = &t->ctx[0], *b = &t->ctx[1];
+    const eits_context *a = t->ctx[0], *b = t->ctx[1];
     if (t->count < 2)
         return;
-    MUST(same_bits(a->image, b->image, t->model.n_pixels * sizeof(eits_real)));
-    MUST(same_bits(a->x, b->x, t->model.n_pixels * sizeof(eits_real)));
-    MUST(same_bits(&a->info, &b->info, offsetof(eits_info, data_norm) + sizeof(eits_real)));
+    MUST(same_bits(eits_get_image(a), eits_get_image(b), t->model.n_pixels * sizeof(eits_real)));
+    MUST(same_bits(eits_get_coefficients(a), eits_get_coefficients(b),
+                   t->model.n_pixels * sizeof(eits_real)));
+    MUST(same_bits(eits_get_info(a), eits_get_info(b),
+                   offsetof(eits_info, data_norm) + sizeof(eits_real)));
 }
 
 /* ---- what the input says ---- */
@@ -179,23 +181,26 @@ static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
  * sweeps only. */
 static void change_options(twins *t, fuzz_bytes *in)
 {
-    eits_options wanted = t->ctx[0].options;
+    eits_options wanted = *eits_get_options(t->ctx[0]);
     for (uint32_t changes = 1u + fuzz_u8(in) % 6u; changes > 0; --changes)
         change_option(&wanted, fuzz_u8(in), in);
-    const eits_options before = t->ctx[0].options;
-    const eits_status status = eits_set_options(&t->ctx[0], &wanted);
-    MUST(status == EITS_OK || same_bits(&before, &t->ctx[0].options, sizeof before));
+    const eits_options before = *eits_get_options(t->ctx[0]);
+    const eits_status status = eits_set_options(t->ctx[0], &wanted);
+    MUST(status == EITS_OK || same_bits(&before, eits_get_options(t->ctx[0]), sizeof before));
     if (status != EITS_OK)
         return;
     wanted.iterations = 1 + (wanted.iterations - 1) % MAX_ITERATIONS;
     wanted.touch_sweeps %= MAX_SWEEPS + 1;
     for (int k = 0; k < t->count; ++k)
-        MUST(eits_set_options(&t->ctx[k], &wanted) == EITS_OK);
+        MUST(eits_set_options(t->ctx[k], &wanted) == EITS_OK);
 }
 
 static void check_reference(const twins *t)
 {
-    const eits_reference *a = &t->ctx[0].reference, *b = &t->ctx[t->count - 1].reference;
+    eits_reference_info of[2];
+    const eits_reference_info *a = &of[0], *b = &of[t->count - 1];
+    for (int k = 0; k < t->count; ++k)
+        MUST(eits_get_reference(t->ctx[k], &of[k]) == EITS_OK);
     MUST(a->ready == b->ready && a->count == b->count);
     if (!a->ready)
         return;
@@ -210,10 +215,12 @@ static void check_reference(const twins *t)
 static void take_reference(twins *t, size_t length)
 {
 #define SET(ctx) eits_reference_set(ctx, t->frame, length)
-    const uint32_t ready = t->ctx[0].reference.ready;
+    eits_reference_info before, after;
+    MUST(eits_get_reference(t->ctx[0], &before) == EITS_OK);
     const eits_status status = BOTH(SET);
     MUST(length == SMALL_ROWS || status == EITS_E_FRAME_LENGTH);
-    MUST(t->ctx[0].reference.ready == (status == EITS_OK ? 1 : ready));
+    MUST(eits_get_reference(t->ctx[0], &after) == EITS_OK);
+    MUST(after.ready == (status == EITS_OK ? 1 : before.ready));
 }
 
 static void learn_reference(twins *t, fuzz_bytes *in)
@@ -235,28 +242,29 @@ static void reconstruct(twins *t, fuzz_bytes *in, int touches)
     uint32_t masked = 0;
     read_frame(t, in);
     /* a basis that is built meanwhile costs no more in what follows */
-    if (t->ctx[0].options.mac_limit > 0)
+    if (eits_get_options(t->ctx[0])->mac_limit > 0)
         for (int k = 0; k < t->count; ++k)
-            (void)eits_frame_stage(&t->ctx[k], t->frame, SMALL_ROWS, &masked, &frame_macs);
+            (void)eits_frame_stage(t->ctx[k], t->frame, SMALL_ROWS, &masked, &frame_macs);
 #define RECONSTRUCT(ctx) eits_reconstruct(ctx, t->frame, SMALL_ROWS, NULL, NULL)
     const eits_status status = BOTH(RECONSTRUCT);
     same_results(t);
-    fuzz_check_result(&t->ctx[0], status, frame_macs);
+    fuzz_check_result(t->ctx[0], status, frame_macs);
     if (!touches)
         return;
     eits_touch found[2][EITS_MAX_TOUCHES];
     uint32_t count[2];
     for (int k = 0; k < t->count; ++k)
-        MUST(eits_find_touches(&t->ctx[k], found[k], EITS_MAX_TOUCHES, &count[k]) == EITS_OK);
+        MUST(eits_find_touches(t->ctx[k], found[k], EITS_MAX_TOUCHES, &count[k]) == EITS_OK);
     same_results(t); /* perhaps solved again */
     for (uint32_t j = 0; j < t->model.n_pixels; ++j)
-        MUST(eits_is_finite(t->ctx[0].image[j]) && eits_is_finite(t->ctx[0].x[j]));
+        MUST(eits_is_finite(eits_get_image(t->ctx[0])[j]) &&
+             eits_is_finite(eits_get_coefficients(t->ctx[0])[j]));
     MUST(t->count < 2 || count[0] == count[1]);
     for (uint32_t k = 0; t->count == 2 && k < count[0]; ++k) /* past the id: it may be padded */
         MUST(found[0][k].id == found[1][k].id &&
              same_bits(&found[0][k].x_mm, &found[1][k].x_mm, 5 * sizeof(eits_real)));
     MUST(status == EITS_OK || count[0] == 0);
-    fuzz_check_touches(&t->ctx[0], found[0], count[0]);
+    fuzz_check_touches(t->ctx[0], found[0], count[0]);
 }
 
 static void step(twins *t, fuzz_bytes *in)
@@ -272,7 +280,7 @@ static void step(twins *t, fuzz_bytes *in)
     case 2: {
         const uint32_t row = fuzz_u8(in) % (SMALL_ROWS + 1);
         for (int k = 0; k < t->count; ++k)
-            MUST((eits_mask_row(&t->ctx[k], row, what & 8) == EITS_OK) == (row < SMALL_ROWS));
+            MUST((eits_mask_row(t->ctx[k], row, what & 8) == EITS_OK) == (row < SMALL_ROWS));
         break;
     }
     case 3:
@@ -280,7 +288,7 @@ static void step(twins *t, fuzz_bytes *in)
         break;
     case 4:
         for (int k = 0; k < t->count; ++k)
-            eits_forget(&t->ctx[k]);
+            eits_forget(t->ctx[k]);
         break;
     case 6:
         reconstruct(t, in, 1);

@@ -16,18 +16,20 @@ static void reconstruct(eits_context *ctx, const eits_real *frame)
 {
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count;
-    const eits_status status = eits_reconstruct(ctx, frame, ctx->model->n_rows, NULL, NULL);
+    const eits_status status =
+        eits_reconstruct(ctx, frame, eits_get_model(ctx)->n_rows, NULL, NULL);
     fuzz_check_result(ctx, status, 0);
     MUST(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count) == EITS_OK);
     MUST(status == EITS_OK || count == 0);
-    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) /* perhaps solved again */
-        MUST(eits_is_finite(ctx->image[j]));
+    for (uint32_t j = 0; j < eits_get_model(ctx)->n_pixels; ++j) /* perhaps solved again */
+        MUST(eits_is_finite(eits_get_image(ctx)[j]));
     fuzz_check_touches(ctx, touches, count);
 }
 
 static void use(const eits_model *model)
 {
-    static eits_context ctx;
+    eits_context *ctx;
+    eits_reference_info reference;
     static eits_real frame[MAX_ROWS];
     eits_options options;
     eits_real difference;
@@ -36,32 +38,33 @@ static void use(const eits_model *model)
     if (size > FUZZ_WORKSPACE || model->n_rows > MAX_ROWS || work > MAX_WORK)
         return;
     const int prepared = model->meta_size % 2 == 0;
-    MUST(eits_init(&ctx, model, fuzz_workspace(0),
-                   prepared ? size : eits_workspace_size(model, 0)) == EITS_OK);
+    MUST(eits_init(fuzz_workspace(0), prepared ? size : eits_workspace_size(model, 0), model,
+                   &ctx) == EITS_OK);
     MUST(eits_options_default(model, &options) == EITS_OK);
-    MUST(eits_set_options(&ctx, &options) == EITS_OK); /* its own defaults are always good ones */
+    MUST(eits_set_options(ctx, &options) == EITS_OK); /* its own defaults are always good ones */
     if (options.iterations <= MAX_ITERATIONS) {
-        const eits_status status = eits_self_test(&ctx, &difference);
+        const eits_status status = eits_self_test(ctx, &difference);
         /* infinite where the golden image is not of this world, never NaN */
         MUST(difference >= 0);
-        if (ctx.reference.ready)
-            fuzz_check_result(&ctx, status, 0);
+        MUST(eits_get_reference(ctx, &reference) == EITS_OK);
+        if (reference.ready)
+            fuzz_check_result(ctx, status, 0);
     }
     options.iterations = 1 + (options.iterations - 1) % MAX_ITERATIONS;
     options.touch_sweeps = 2;
     options.warm_start = 1;
-    MUST(eits_set_options(&ctx, &options) == EITS_OK);
+    MUST(eits_set_options(ctx, &options) == EITS_OK);
     frame_of(model, model->golden.reference, 1.0f, frame);
-    if (eits_reference_set(&ctx, frame, model->n_rows) != EITS_OK)
+    if (eits_reference_set(ctx, frame, model->n_rows) != EITS_OK)
         return;
     frame_of(model, model->golden.frame, 1.0f, frame);
-    reconstruct(&ctx, frame);
+    reconstruct(ctx, frame);
     options.sign = EITS_SIGN_BOTH;
     options.second_pass = 1;
     options.solver = (eits_solver)((model->defaults->solver + 1u) % 4u);
-    MUST(eits_set_options(&ctx, &options) == EITS_OK);
+    MUST(eits_set_options(ctx, &options) == EITS_OK);
     frame_of(model, model->golden.frame, 1.5f, frame);
-    reconstruct(&ctx, frame);
+    reconstruct(ctx, frame);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

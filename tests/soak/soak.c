@@ -9,8 +9,8 @@
 #include "hand.h"
 
 #include "base/vec.h"
+#include "context/context.h"
 #include "eitskin/eitskin.h"
-#include "kernels/kernels.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,7 +32,7 @@ typedef struct guarded {
     _Alignas(16) uint8_t before[GUARD];
     _Alignas(16) uint8_t workspace[MAX_WORKSPACE];
     uint8_t after[GUARD];
-    eits_context ctx;
+    eits_context *ctx;
 } guarded;
 
 static _Alignas(16) uint8_t model_bytes[MAX_MODEL];
@@ -69,8 +69,8 @@ static void open_context(guarded *g, int portable)
     const size_t size = eits_workspace_size(&model, 0);
     CHECK(size <= sizeof g->workspace);
     memset(g->workspace + size, PAINT, sizeof g->workspace - size);
-    CHECK(eits_init(&g->ctx, &model, g->workspace, size) == EITS_OK);
-    CHECK(eits_use_portable_kernels(&g->ctx, portable) == EITS_OK);
+    CHECK(eits_init(g->workspace, size, &model, &g->ctx) == EITS_OK);
+    CHECK(eits_use_portable_kernels(g->ctx, portable) == EITS_OK);
 }
 
 static void check_guards(const guarded *g)
@@ -103,7 +103,7 @@ static void tare(void)
     fingers.random += 12345;
     tare_gain = R(1) + R(0.0005) * (eits_real)hand_draw(&fingers, 101) - R(0.025);
     masked_row = hand_draw(&fingers, 3) == 0 ? hand_draw(&fingers, model.n_rows) : UINT32_MAX;
-    take_reference(&run.ctx);
+    take_reference(run.ctx);
     ++counts.tares;
 }
 
@@ -114,7 +114,7 @@ static void set_options(eits_context *ctx, eits_options o)
 
 static void change_options(void)
 {
-    eits_options o = run.ctx.options;
+    eits_options o = *eits_get_options(run.ctx);
     o.solver = (eits_solver)hand_draw(&fingers, 4);
     o.iterations = 5 + hand_draw(&fingers, 40);
     o.gap_rel = hand_draw(&fingers, 2) ? R(1e-2) : 0;
@@ -126,7 +126,7 @@ static void change_options(void)
         hand_draw(&fingers, 2) ? EITS_TOUCH_FIT_ALL : hand_draw(&fingers, EITS_TOUCH_FIT_ALL + 1);
     o.second_pass = hand_draw(&fingers, 3) == 0;
     o.saturation_v = 100 * fingers.rms;
-    set_options(&run.ctx, o);
+    set_options(run.ctx, o);
 }
 
 /* Unusable rows, each another, none of them masked; returns their number. */
@@ -153,16 +153,17 @@ static uint32_t break_rows(uint32_t wanted)
 
 static void check_finite(const eits_context *ctx)
 {
-    const eits_info *i = &ctx->info;
+    const eits_info *i = eits_get_info(ctx);
     for (uint32_t j = 0; j < model.n_pixels; ++j)
-        CHECK(eits_is_finite(ctx->image[j]) && eits_is_finite(ctx->x[j]));
+        CHECK(eits_is_finite(eits_get_image(ctx)[j]) &&
+              eits_is_finite(eits_get_coefficients(ctx)[j]));
     CHECK(eits_is_finite(i->lambda) && eits_is_finite(i->lambda_max) && eits_is_finite(i->gap) &&
           eits_is_finite(i->gap_rel) && eits_is_finite(i->residual) &&
           eits_is_finite(i->data_norm));
     CHECK(i->gap >= 0 && i->residual >= 0 && i->residual <= i->data_norm * R(1.001));
-    CHECK(i->iterations <= ctx->options.iterations && i->nonzeros <= model.n_pixels &&
+    CHECK(i->iterations <= eits_get_options(ctx)->iterations && i->nonzeros <= model.n_pixels &&
           i->masked <= model.n_rows);
-    CHECK(ctx->basis_count <= model.rank && ctx->working_count <= model.n_pixels);
+    CHECK(ctx->projection.count <= model.rank && ctx->solver.working_count <= model.n_pixels);
     CHECK(i->macs <= 20ull * (i->iterations + 20) * model.n_pixels * model.rank);
 }
 
@@ -188,19 +189,22 @@ static void reconstruct(eits_status expected, uint32_t masked)
 {
     eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count = 0;
-    CHECK(eits_reconstruct(&run.ctx, frame, model.n_rows, NULL, NULL) == expected);
-    check_finite(&run.ctx);
+    CHECK(eits_reconstruct(run.ctx, frame, model.n_rows, NULL, NULL) == expected);
+    check_finite(run.ctx);
     if (expected == EITS_OK) {
-        CHECK(run.ctx.info.masked == masked);
-        CHECK(eits_find_touches(&run.ctx, touches, EITS_MAX_TOUCHES, &count) == EITS_OK);
+        CHECK(eits_get_info(run.ctx)->masked == masked);
+        CHECK(eits_find_touches(run.ctx, touches, EITS_MAX_TOUCHES, &count) == EITS_OK);
     } else {
-        CHECK(eits_greatest(&run.ctx, run.ctx.image, model.n_pixels, EITS_SIGN_BOTH) == 0);
+        CHECK(eits_greatest(run.ctx->kernels, eits_get_image(run.ctx), model.n_pixels,
+                            EITS_SIGN_BOTH) == 0);
         ++counts.refused;
     }
     check_touches(touches, count);
-    crc = eits_crc32(crc, run.ctx.image, model.n_pixels * sizeof run.ctx.image[0]);
+    crc = eits_crc32(crc, eits_get_image(run.ctx),
+                     model.n_pixels * sizeof eits_get_image(run.ctx)[0]);
     counts.touches += count;
-    counts.max_macs = run.ctx.info.macs > counts.max_macs ? run.ctx.info.macs : counts.max_macs;
+    counts.max_macs = eits_get_info(run.ctx)->macs > counts.max_macs ? eits_get_info(run.ctx)->macs
+                                                                     : counts.max_macs;
 }
 
 static void one_frame(uint64_t k)
@@ -210,7 +214,7 @@ static void one_frame(uint64_t k)
     if (k % 313 == 0)
         change_options();
     if (k % 401 == 0)
-        eits_forget(&run.ctx);
+        eits_forget(run.ctx);
     hand_frame(&fingers, k, tare_gain, 1, frame);
     const uint32_t masked = masked_row != UINT32_MAX;
     if (k % 211 == 5) {
@@ -229,23 +233,22 @@ static void one_frame(uint64_t k)
 static void probe_for_drift(int portable)
 {
     open_context(&fresh, portable);
-    set_options(&fresh.ctx, run.ctx.options);
-    take_reference(&fresh.ctx);
-    eits_forget(&run.ctx);
+    set_options(fresh.ctx, *eits_get_options(run.ctx));
+    take_reference(fresh.ctx);
+    eits_forget(run.ctx);
     eits_touch seen[EITS_MAX_TOUCHES], expected[EITS_MAX_TOUCHES];
     uint32_t count, expected_count;
-    CHECK(eits_reconstruct(&run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
-    CHECK(eits_reconstruct(&fresh.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
+    CHECK(eits_reconstruct(run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
+    CHECK(eits_reconstruct(fresh.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
     /* else the limit counts the basis, which one of them made earlier */
-    if (run.ctx.options.mac_limit == 0) {
-        const eits_info *a = &run.ctx.info, *b = &fresh.ctx.info;
-        CHECK(memcmp(run.ctx.image, fresh.ctx.image, model.n_pixels * sizeof run.ctx.image[0]) ==
-              0);
+    if (eits_get_options(run.ctx)->mac_limit == 0) {
+        const eits_info *a = eits_get_info(run.ctx), *b = eits_get_info(fresh.ctx);
+        CHECK(memcmp(eits_get_image(run.ctx), eits_get_image(fresh.ctx),
+                     model.n_pixels * sizeof eits_get_image(run.ctx)[0]) == 0);
         CHECK(a->stop == b->stop && a->iterations == b->iterations && a->gap == b->gap &&
               a->residual == b->residual);
-        CHECK(eits_find_touches(&run.ctx, seen, EITS_MAX_TOUCHES, &count) == EITS_OK);
-        CHECK(eits_find_touches(&fresh.ctx, expected, EITS_MAX_TOUCHES, &expected_count) ==
-              EITS_OK);
+        CHECK(eits_find_touches(run.ctx, seen, EITS_MAX_TOUCHES, &count) == EITS_OK);
+        CHECK(eits_find_touches(fresh.ctx, expected, EITS_MAX_TOUCHES, &expected_count) == EITS_OK);
         CHECK(count == expected_count);
         for (uint32_t k = 0; k < count; ++k)
             CHECK(seen[k].x_mm == expected[k].x_mm && seen[k].y_mm == expected[k].y_mm &&
@@ -259,49 +262,52 @@ static eits_real objective(const eits_context *ctx)
 {
     eits_real sum = 0;
     for (uint32_t j = 0; j < model.n_pixels; ++j)
-        sum += eits_fabs(ctx->x[j]);
-    return R(0.5) * ctx->info.residual * ctx->info.residual + ctx->info.lambda * sum;
+        sum += eits_fabs(eits_get_coefficients(ctx)[j]);
+    return R(0.5) * eits_get_info(ctx)->residual * eits_get_info(ctx)->residual +
+           eits_get_info(ctx)->lambda * sum;
 }
 
 /* The same frame again and again: the gap asked for is kept, and no result is further from the
  * optimum than its gap. */
 static void hold_a_frame(void)
 {
-    const eits_options kept = run.ctx.options;
+    const eits_options kept = *eits_get_options(run.ctx);
     eits_options o = kept;
     o.warm_start = 1;
     o.mac_limit = 0;
     o.gap_rel = HELD_GAP;
     o.iterations = 3000;
     o.solver = (eits_solver)(counts.probes % 2); /* FISTA's two: the others end at the optimum */
-    set_options(&run.ctx, o);
-    eits_forget(&run.ctx);
+    set_options(run.ctx, o);
+    eits_forget(run.ctx);
     eits_real first = 0;
     for (int k = 0; k < HELD_FRAMES; ++k) {
-        CHECK(eits_reconstruct(&run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
-        const eits_real half = R(0.5) * run.ctx.info.data_norm * run.ctx.info.data_norm,
-                        now = objective(&run.ctx);
-        CHECK(run.ctx.info.gap_rel <= HELD_GAP);
+        CHECK(eits_reconstruct(run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
+        const eits_real half = R(0.5) * eits_get_info(run.ctx)->data_norm *
+                               eits_get_info(run.ctx)->data_norm,
+                        now = objective(run.ctx);
+        CHECK(eits_get_info(run.ctx)->gap_rel <= HELD_GAP);
         first = k == 0 ? now : first;
         CHECK(eits_fabs(now - first) <= (HELD_GAP + R(1e-5)) * half);
     }
-    set_options(&run.ctx, kept);
+    set_options(run.ctx, kept);
 }
 
 /* So many iterations: the gap ends at rounding. */
 static void run_long(void)
 {
-    const eits_options kept = run.ctx.options;
+    const eits_options kept = *eits_get_options(run.ctx);
     eits_options o = kept;
     o.warm_start = o.mac_limit = 0;
     o.gap_rel = 0;
     o.iterations = LONG_RUN;
     o.solver = EITS_SOLVER_WORKING_SET;
-    set_options(&run.ctx, o);
-    CHECK(eits_reconstruct(&run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
-    check_finite(&run.ctx);
-    CHECK(run.ctx.info.stop != EITS_STOP_DIVERGED && run.ctx.info.gap_rel < R(1e-4));
-    set_options(&run.ctx, kept);
+    set_options(run.ctx, o);
+    CHECK(eits_reconstruct(run.ctx, held_frame, model.n_rows, NULL, NULL) == EITS_OK);
+    check_finite(run.ctx);
+    CHECK(eits_get_info(run.ctx)->stop != EITS_STOP_DIVERGED &&
+          eits_get_info(run.ctx)->gap_rel < R(1e-4));
+    set_options(run.ctx, kept);
 }
 
 static void open_model(const char *path)
@@ -318,10 +324,10 @@ static void soak(uint64_t frames, int portable)
 {
     eits_real difference;
     open_context(&run, portable);
-    CHECK(eits_self_test(&run.ctx, &difference) == EITS_OK);
+    CHECK(eits_self_test(run.ctx, &difference) == EITS_OK);
     CHECK(sizeof(eits_real) != 4 || difference == 0);
     open_context(&run, portable);
-    run.ctx.next_id = FIRST_ID;
+    run.ctx->tracker.next_id = FIRST_ID;
     const uint64_t interval = frames > 20000 ? frames / 40 : frames / 4 + 1;
     for (frame_number = 0; frame_number < frames; ++frame_number) {
         one_frame(frame_number);
@@ -335,7 +341,7 @@ static void soak(uint64_t frames, int portable)
     if (frames > SHORT)
         run_long();
     CHECK(counts.probes > 0 && counts.touches > frames / 2);
-    CHECK(run.ctx.next_id < FIRST_ID && run.ctx.next_id > 0);
+    CHECK(run.ctx->tracker.next_id < FIRST_ID && run.ctx->tracker.next_id > 0);
 }
 
 #ifdef SOAK_FRAMES
@@ -358,7 +364,7 @@ int main(int argc, char **argv)
     printf("%lu frames, %lu refused, %lu tares, %lu touches, %lu probes, most MACs %lu, kernels "
            "%s, next id %lu, crc %08lx\n",
            (unsigned long)frames, counts.refused, counts.tares, counts.touches, counts.probes,
-           (unsigned long)counts.max_macs, eits_kernels_name(&run.ctx),
-           (unsigned long)run.ctx.next_id, (unsigned long)crc);
+           (unsigned long)counts.max_macs, eits_kernels_name(run.ctx),
+           (unsigned long)run.ctx->tracker.next_id, (unsigned long)crc);
     return 0;
 }

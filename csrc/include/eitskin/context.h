@@ -142,7 +142,7 @@ typedef struct eits_info {
     /* fraction of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
      * for */
     eits_real unexplained;
-    /* bit e: electrode e, of the first 64; ctx->electrode has all */
+    /* bit e: electrode e, of the first 64; eits_get_electrode_states has all */
     uint64_t open_electrodes, bridged_electrodes, noisy_electrodes;
     /* of the whitening, over s_1^2, as this frame was reduced; 0 where the model does not tell */
     eits_real regularisation;
@@ -160,30 +160,13 @@ typedef struct eits_touch {
     eits_real force_n;
 } eits_touch;
 
-/* A touch that is followed (track.h). */
-typedef struct eits_followed {
-    eits_touch touch;       /* as told of; id 0: not yet */
-    eits_real vx_mm, vy_mm; /* a frame */
-    /* covariance of place and velocity, along either axis */
-    eits_real place_mm2, both_mm2, speed_mm2;
-    uint32_t seen;   /* frames that it was found in, as far as that is asked */
-    uint32_t missed; /* frames on end that it was not */
-    uint32_t faint;  /* 1: its own S'y was below that of noise when it was last found */
-} eits_followed;
-
-/* matrix products, chosen at start-up among builds that give the same bits */
-struct eits_kernels;
-
-/* Learned from reference frames. */
-typedef struct eits_reference {
-    /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them */
-    eits_real *v0;
-    eits_real *m2; /* n_rows: sum of squared deviations, in m2_unit^2 */
-    /* V: a power of two near the first reference frame's greatest voltage, so that squares are
-     * numbers */
-    eits_real m2_unit;
-    uint32_t wanted, count;
-    uint32_t ready;
+/* The reference and its noise, as eits_get_reference gives them (frame.h takes it). */
+typedef struct eits_reference_info {
+    /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them. In the
+     * context: as long as the context, until the next reference */
+    const eits_real *v0;
+    uint32_t count;   /* reference frames that are in v0 */
+    uint32_t ready;   /* 1: frames can be measured against it; 0: there is none, or not yet */
     eits_real v0_rms; /* rms of v0 over the rows in use, V */
     /* model volts per measured volt: rms(v_ref) / rms(v0), negative where correlation is */
     eits_real gain;
@@ -192,99 +175,15 @@ typedef struct eits_reference {
     eits_real noise_v; /* rms over rows of the reference frames' deviation, V; 0 if unknown */
     /* greatest max(S'y) seen in reference frames, as with all rows in use; 0 if unknown */
     eits_real lambda_noise;
-    uint32_t second_waits; /* the second reference frame is in m2 until there is a third */
-    uint32_t outliers;     /* readings of reference frames that were left out of the reference */
-} eits_reference;
+    uint32_t outliers; /* readings of reference frames that were left out */
+} eits_reference_info;
 
-typedef struct eits_context {
-    const eits_model *model;
-    const struct eits_kernels *kernels;
-    eits_options options;
-    eits_reference reference;
-    uint8_t *masked; /* n_rows: masked by the caller */
-    /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
-    uint8_t *unusable;
-    uint8_t electrode[EITS_MAX_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
-    /* n_folded: which rows of each fold were in use when the basis below was built; 0: neither */
-    uint8_t *basis_for;
-    eits_real *d; /* n_folded: data of this frame */
-    /* n_folded: what the two rows of each fold differ by; 0 where one is in use */
-    eits_real *reciprocity_error;
-    /* n_folded: data of a drift of the gain; zeros where it is not ignored */
-    eits_real *gain_drift;
-    eits_real *off_range; /* n_folded: what of that the model cannot give, unless stale */
-    uint32_t off_range_stale;
-    /* stride each: 1 / |P_i|^2, and so much of it as predicts d (model_mismatch.c) */
-    eits_real *range_inverse, *range_shrink;
-    /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where the regularisation is
-     * raised */
-    eits_real reduction_energy;
-    eits_real reduction_energy_stored; /* as with the model's regularisation */
-    /* 1: P's rows are orthogonal, so that what the model cannot give can be told */
-    uint32_t range_known;
-    eits_real *y; /* stride: reduced data, projected */
-    /* stride each: of v0 log(v / v0); y less the touches' interaction */
-    eits_real *y_log, *y_separate;
-    uint32_t has_y_log; /* 1: y_log is this frame's */
-    /* orthonormal directions to ignore, up to rank of them, stride apart; where masked_whitening,
-     * at most one, and behind it two triangles (whitening.c) */
-    eits_real *basis;
-    uint32_t basis_count;
-    uint32_t basis_stale;
-    /* 1: the model's P and S have the builder's form, so that rows left out can be whitened again
-     */
-    uint32_t can_whiten_masked;
-    /* other than 0: for basis_for, or for the noise, the solver's S is F S (whitening.h) */
-    uint32_t masked_whitening;
-    /* stride: s_1 of the scaled Jacobian over that of each direction, and over w s_1 of the
-     * first */
-    eits_real *row_scale;
-    eits_real *row_strength;           /* stride: (s_i / s_1)^2 */
-    eits_real strongest;               /* s_1, in the units of 1 / P */
-    eits_real strongest_square;        /* |S_1|^2 */
-    eits_real regularisation;          /* mu, by which the model was whitened */
-    eits_real regularisation_in_force; /* mu' of the frames as basis_for has them */
-    eits_real whitening_square;        /* what F'F is scaled by */
-    /* how much more noise max(S'y) has so than with all rows; 1 where nothing is whitened for
-     * masked rows */
-    eits_real noise_ratio;
-    eits_real *adjoint;           /* stride: F' of the residual, and scratch */
-    eits_real *residual;          /* stride */
-    eits_real *sx, *sx_next, *sz; /* stride each */
-    eits_real *slope[3];          /* stride each: a touch's response by x, y and radius */
-    eits_real *x, *x_next, *z;    /* n_pixels each: coefficients, and the extrapolated point */
-    eits_real *gradient;          /* n_pixels */
-    /* max(n_pixels, n_folded): numbers to multiply columns by, scales included */
-    eits_real *list_value;
-    uint32_t *list_index; /* as many: those columns */
-    /* n_pixels: the working set's columns; x, x_next, z hold theirs only while it runs */
-    uint32_t *working;
-    uint32_t working_count;
-    /* rank x stride: rows that make the active set's columns orthonormal (factor.h) */
-    eits_real *factor;
-    eits_real *image; /* n_pixels: S/m */
-    eits_real *atoms; /* EITS_MAX_TOUCHES x stride: responses of the touches */
-    /* ny x nx: which kept pixel a cell of the image is; EITS_NO_PIXEL for none */
-    uint16_t *cell;
-    eits_real *panels;         /* S again, in panels of EITS_PANEL columns; NULL: not prepared */
-    eits_real *working_panels; /* the working set's columns likewise; NULL: not prepared */
-    /* EITS_CACHED(n_pixels) x stride: columns of S in use, unpacked (column_cache.h) */
-    float *cache;
-    uint16_t *cache_slot;    /* n_pixels: where a column is cached; EITS_NO_PIXEL: nowhere */
-    uint16_t *cache_column;  /* EITS_CACHED(n_pixels): which column is cached there */
-    uint8_t *cache_wanted;   /* as many: scratch */
-    uint32_t cache_next;     /* where to look for room */
-    uint32_t *working_slot;  /* EITS_CACHED(n_pixels): where the working set's columns are cached */
-    uint32_t working_cached; /* 1: all of them are */
-    eits_followed followed[EITS_MAX_TOUCHES];
-    uint32_t followed_count, next_id;
-    uint32_t warm;  /* x holds the last frame's coefficients */
-    eits_info info; /* of the last frame */
-} eits_context;
+/* One reconstruction: model, options, reference, image, touches. It lies in its workspace and is
+ * reached by functions alone. */
+typedef struct eits_context eits_context;
 
-#define EITS_PANEL      32u
-#define EITS_NO_PIXEL   0xFFFFu
-#define EITS_MAX_CACHED 256u
+#define EITS_PANEL      32u  /* columns of a panel */
+#define EITS_MAX_CACHED 256u /* columns of S that are kept unpacked */
 #define EITS_CACHED(n_pixels) \
     ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
 #define EITS_LINE                                                                                \
@@ -298,11 +197,14 @@ typedef struct eits_context {
 #define EITS_PANEL_COLUMNS(n_pixels) \
     (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
 
+/* Bytes of the context itself, at the workspace's start. */
+#define EITS_CONTEXT_SIZE EITS_ALIGN16(624u + 58u * sizeof(void *) + 252u * sizeof(eits_real))
+
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise
  * copies of S and of the working set (hosts), else 0. */
 #define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                   \
-    (2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) + EITS_ALIGN16(n_folded) +                  \
-     4 * EITS_REALS(n_folded) +                                                                    \
+    (EITS_CONTEXT_SIZE + 2 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) +                       \
+     2 * EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +                                       \
      (24 + EITS_STRIDE(rank) + (size_t)(rank) + EITS_MAX_TOUCHES) *                                \
          EITS_REALS(EITS_STRIDE(rank)) +                                                           \
      5 * EITS_REALS(n_pixels) + EITS_REALS(EITS_LIST(n_pixels, n_folded)) +                        \
@@ -326,11 +228,12 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
  * touches: each needs those before it. Errors: EITS_E_ARGUMENT. */
 eits_status eits_options_track(eits_options *options);
 
-/* Lay out `ctx` in `workspace`, set the model's default options. With room for it (see `prepared`
- * above) S is also copied into panels, which is faster where memory is plentiful and gives the same
- * bits. Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than eits_workspace_size(model, 0), or
- * not aligned to 16 bytes). */
-eits_status eits_init(eits_context *ctx, const eits_model *model, void *workspace, size_t size);
+/* Lay out a context in `workspace` (16-byte aligned, the caller's as long as the context is used;
+ * so is `model`) and set the model's default options; *ctx then points into it. With room for it
+ * (see `prepared` above) S is also copied into panels, which is faster where memory is plentiful
+ * and gives the same bits. Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than
+ * eits_workspace_size(model, 0), or not aligned); *ctx is untouched then. */
+eits_status eits_init(void *workspace, size_t size, const eits_model *model, eits_context **ctx);
 
 /* Replace the options. Errors: EITS_E_ARGUMENT for one that is out of range or not finite; then
  * nothing is changed. */
@@ -340,11 +243,59 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *options);
  * Same bits. */
 eits_status eits_use_portable_kernels(eits_context *ctx, int portable);
 
+/* Forget the warm start and the touches that were followed. */
+void eits_forget(eits_context *ctx);
+
+/* ---- What a context knows: pointers into it. Numbers change with the next frame. ---- */
+
+const eits_model *eits_get_model(const eits_context *ctx);
+const eits_options *eits_get_options(const eits_context *ctx);
+
+/* Of the last frame; each stage has filled in its fields. */
+const eits_info *eits_get_info(const eits_context *ctx);
+
+/* The last image, n_pixels, S/m; and its coefficients, image over column weight. */
+const eits_real *eits_get_image(const eits_context *ctx);
+const eits_real *eits_get_coefficients(const eits_context *ctx);
+
+/* The last frame's reduced data y as the solver saw them, projected: EITS_STRIDE(rank) numbers. */
+const eits_real *eits_get_reduced_data(const eits_context *ctx);
+
+/* Why each of the n_rows rows was left out of the last frame, bits of eits_row_state; 0: in use. */
+const uint8_t *eits_get_row_states(const eits_context *ctx);
+
+/* What the last frame showed of each electrode, bits of eits_electrode_state: n_electrodes. */
+const uint8_t *eits_get_electrode_states(const eits_context *ctx);
+
+/* 1 where row `row` is masked by eits_mask_row. Row numbers are not checked. */
+int eits_is_masked(const eits_context *ctx, uint32_t row);
+
+/* Errors: EITS_E_ARGUMENT. */
+eits_status eits_get_reference(const eits_context *ctx, eits_reference_info *reference);
+
 /* "portable", "avx2"... of the kernels in use. */
 const char *eits_kernels_name(const eits_context *ctx);
 
-/* Forget the warm start and the touches that were followed. */
-void eits_forget(eits_context *ctx);
+/* ---- Put by, and taken up again ---- */
+
+/* Bytes of eits_save: what is learned from reference frames, masked rows, options and the next
+ * touch's id. */
+#define EITS_SAVED_SIZE(n_rows)                                                               \
+    (EITS_ALIGN16(sizeof(eits_options) + 16u + 5u * sizeof(eits_real)) + EITS_REALS(n_rows) + \
+     EITS_ALIGN16(n_rows))
+
+/* The same number for an open model, as a function. Returns 0 for a null model. */
+size_t eits_saved_size(const eits_model *model);
+
+/* Copy that into `memory` (16-byte aligned): to go back to when a new reference comes to nothing,
+ * or to go on with in a context that is laid out again for the same model. Reference frames that
+ * have been added but not finished are not in it. Errors: EITS_E_ARGUMENT; EITS_E_WORKSPACE where
+ * `size` is less than eits_saved_size or `memory` not aligned. */
+eits_status eits_save(const eits_context *ctx, void *memory, size_t size);
+
+/* Be as when it was saved; the warm start and followed touches are forgotten. `memory` must be
+ * eits_save's, from a context of the same model. Errors: as eits_save. */
+eits_status eits_restore(eits_context *ctx, const void *memory, size_t size);
 
 #ifdef __cplusplus
 }

@@ -41,7 +41,7 @@ typedef enum eits_diagnostic {
 } eits_diagnostic;
 #define EITS_DIAGNOSTICS_ALL 255u
 
-/* Why a row is left out of a frame: bits of ctx->unusable[row], 0 for a row in use. */
+/* Why a row is left out of a frame: bits of eits_get_row_states, 0 for a row in use. */
 typedef enum eits_row_state {
     EITS_ROW_MASKED = 1,  /* by eits_mask_row, or while the reference was taken */
     EITS_ROW_UNKNOWN = 2, /* not a finite number */
@@ -52,7 +52,7 @@ typedef enum eits_row_state {
     EITS_ROW_NOISY = 64 /* uses a noisy electrode */
 } eits_row_state;
 
-/* Bits of ctx->electrode[e]; 0 for an electrode that nothing was found about. */
+/* Bits of eits_get_electrode_states; 0 for an electrode that nothing was found about. */
 typedef enum eits_electrode_state {
     EITS_ELECTRODE_OPEN = 1,
     EITS_ELECTRODE_BRIDGED = 2,

@@ -47,11 +47,17 @@ eits_status eits_reference_finish(eits_context *ctx);
  * Errors: EITS_E_ARGUMENT. */
 eits_status eits_mask_row(eits_context *ctx, uint32_t row, int masked);
 
-/* The frame stage alone: fills ctx->d, ctx->y, ctx->basis (and F), ctx->unusable and returns the
- * number of rows left out in `masked`. Errors: EITS_E_NO_REFERENCE, EITS_E_FRAME_LENGTH,
- * EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO, EITS_E_NOT_FINITE. */
+/* The frame stage alone: reduced data for eits_solve, row and electrode states, and in `masked` the
+ * number of rows left out, in `macs` the multiply-accumulates. Errors: EITS_E_ARGUMENT,
+ * EITS_E_NO_REFERENCE, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO,
+ * EITS_E_NOT_FINITE. */
 eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t length,
                              uint32_t *masked, uint64_t *macs);
+
+/* The diagnostics of a frame that is not to be solved: info as far as the frame stage fills it in.
+ * Frames that are solved get the bits that they would have got without it. Errors: as
+ * eits_frame_stage. */
+eits_status eits_examine(eits_context *ctx, const eits_real *frame, size_t length);
 
 #ifdef __cplusplus
 }

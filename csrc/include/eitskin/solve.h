@@ -36,14 +36,15 @@ extern "C" {
 #endif
 
 /* One frame to an image: frame stage, detection threshold, solver. `image` (n_pixels, S/m) and
- * `info` may be NULL; both are in ctx as well. On an error the image is cleared, never NaN. Errors:
- * those of eits_frame_stage, EITS_E_NOT_FINITE. */
+ * `info` may be NULL; the context has both as well. On an error the image is cleared, never NaN.
+ * Errors: those of eits_frame_stage, EITS_E_NOT_FINITE. */
 eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length,
                              eits_real *image, eits_info *info);
 
-/* The solver alone on reduced data ctx->y (as eits_frame_stage leaves it). Fills ctx->x, ctx->image
- * and, anew, ctx->info; masked rows and the frame stage's MACs are then not in it. */
-eits_status eits_solve(eits_context *ctx);
+/* The solver alone on reduced data `y` (rank numbers), or with NULL on those that eits_frame_stage
+ * left. Fills in coefficients, image and info; masked rows and the frame stage's MACs are then not
+ * in it. Errors: EITS_E_ARGUMENT, EITS_E_NOT_FINITE. */
+eits_status eits_solve(eits_context *ctx, const eits_real *y);
 
 /* Run the model's golden frame with default options: the image must have the bits that the model
  * states (float32), or be within `*difference` of it, relative to its peak (reported in either

@@ -1,6 +1,7 @@
 #include "eitskin/batch.h"
 
 #include "base/vec.h"
+#include "context/context.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
 
@@ -14,6 +15,8 @@ eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, s
     for (size_t k = 0; k < count; ++k) {
         eits_result *result = results + k;
         memset(result, 0, sizeof *result);
+        /* Frames that have nothing to do with each other: no start from the last one, no ids from
+         * it. */
         eits_forget(ctx);
         result->status = eits_reconstruct(ctx, frames + k * length, length, NULL, NULL);
         if (result->status == EITS_OK && touches != NULL)
@@ -21,9 +24,9 @@ eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, s
                                     &result->count);
         result->info = ctx->info;
         if (images != NULL)
-            eits_copy(images + k * pixels, ctx->image, pixels);
+            eits_copy(images + k * pixels, ctx->solver.image, pixels);
         if (coefficients != NULL)
-            eits_copy(coefficients + k * pixels, ctx->x, pixels);
+            eits_copy(coefficients + k * pixels, ctx->solver.x, pixels);
     }
     return EITS_OK;
 }

@@ -1,5 +1,6 @@
 /* The golden frame that each model carries. */
 #include "base/vec.h"
+#include "context/context.h"
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 
@@ -22,7 +23,7 @@ eits_status eits_self_test(eits_context *ctx, eits_real *difference)
     eits_real largest = 0, peak = 0;
     for (uint32_t j = 0; j < model->n_pixels; ++j) {
         const eits_real expected = (eits_real)model->golden.image[j],
-                        off = eits_fabs(ctx->image[j] - expected);
+                        off = eits_fabs(ctx->solver.image[j] - expected);
         largest = off > largest ? off : largest;
         peak = eits_fabs(expected) > peak ? eits_fabs(expected) : peak;
     }

@@ -50,4 +50,13 @@ static inline int eits_is_finite(eits_real value)
 #endif
 }
 
+/* 1 where each of the values is finite. */
+static inline int eits_all_finite(const eits_real *values, size_t count)
+{
+    int all = 1;
+    for (size_t i = 0; i < count; ++i)
+        all &= eits_is_finite(values[i]);
+    return all;
+}
+
 #endif

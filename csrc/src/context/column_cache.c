@@ -1,72 +1,64 @@
 #include "context/column_cache.h"
 
-#include "kernels/kernels.h"
-
 #include <string.h>
 
-static uint32_t room_of(const eits_context *ctx)
+void eits_clear_column_cache(eits_columns *c)
 {
-    return (uint32_t)EITS_CACHED(ctx->model->n_pixels);
+    for (uint32_t j = 0; j < c->s->cols; ++j)
+        c->slot[j] = EITS_NO_PIXEL;
+    for (uint32_t slot = 0; slot < c->room; ++slot)
+        c->column[slot] = EITS_NO_PIXEL;
+    c->next = 0;
 }
 
-void eits_clear_column_cache(eits_context *ctx)
+uint32_t eits_cache_columns(eits_columns *c, const eits_kernels *kernels, const uint32_t *index,
+                            uint32_t count)
 {
-    for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
-        ctx->cache_slot[j] = EITS_NO_PIXEL;
-    for (uint32_t slot = 0; slot < room_of(ctx); ++slot)
-        ctx->cache_column[slot] = EITS_NO_PIXEL;
-    ctx->cache_next = 0;
-}
-
-/* A column that is asked for is marked in cache_wanted while the request runs, so that it does not
- * give way to another. */
-uint32_t eits_cache_columns(eits_context *ctx, const uint32_t *index, uint32_t count)
-{
-    const uint32_t room = room_of(ctx);
-    const eits_matrix *s = &ctx->model->sensitivity;
+    const uint32_t room = c->room;
+    const eits_matrix *s = c->s;
     if (count > room)
         return 0;
     uint32_t absent = 0;
     for (uint32_t k = 0; k < count; ++k)
-        absent += ctx->cache_slot[index[k]] == EITS_NO_PIXEL;
+        absent += c->slot[index[k]] == EITS_NO_PIXEL;
     if (absent == 0)
         return 1;
-    memset(ctx->cache_wanted, 0, room);
+    memset(c->wanted, 0, room);
     for (uint32_t k = 0; k < count; ++k) {
-        if (ctx->cache_slot[index[k]] != EITS_NO_PIXEL)
-            ctx->cache_wanted[ctx->cache_slot[index[k]]] = 1;
+        if (c->slot[index[k]] != EITS_NO_PIXEL)
+            c->wanted[c->slot[index[k]]] = 1;
     }
-    uint32_t slot = ctx->cache_next;
+    /* Round and round, as in a clock: the oldest give way first, without a record of their use. */
+    uint32_t slot = c->next;
     for (uint32_t k = 0; k < count; ++k) {
-        if (ctx->cache_slot[index[k]] != EITS_NO_PIXEL)
+        if (c->slot[index[k]] != EITS_NO_PIXEL)
             continue;
-        while (ctx->cache_wanted[slot])
+        while (c->wanted[slot])
             slot = slot + 1 < room ? slot + 1 : 0;
-        if (ctx->cache_column[slot] != EITS_NO_PIXEL)
-            ctx->cache_slot[ctx->cache_column[slot]] = EITS_NO_PIXEL;
-        ctx->cache_column[slot] = (uint16_t)index[k];
-        ctx->cache_slot[index[k]] = (uint16_t)slot;
-        ctx->cache_wanted[slot] = 1;
-        ctx->kernels->unpack(s, (size_t)s->stride * index[k], s->stride,
-                             ctx->cache + (size_t)s->stride * slot);
+        if (c->column[slot] != EITS_NO_PIXEL)
+            c->slot[c->column[slot]] = EITS_NO_PIXEL;
+        c->column[slot] = (uint16_t)index[k];
+        c->slot[index[k]] = (uint16_t)slot;
+        c->wanted[slot] = 1;
+        kernels->unpack(s, (size_t)s->stride * index[k], s->stride,
+                        c->data + (size_t)s->stride * slot);
     }
-    ctx->cache_next = slot;
+    c->next = slot;
     return 1;
 }
 
-void eits_cache_slots(const eits_context *ctx, const uint32_t *index, uint32_t count,
-                      uint32_t *slot)
+void eits_cache_slots(const eits_columns *c, const uint32_t *index, uint32_t count, uint32_t *slot)
 {
     for (uint32_t k = 0; k < count; ++k)
-        slot[k] = ctx->cache_slot[index[k]];
+        slot[k] = c->slot[index[k]];
 }
 
-eits_matrix eits_cached_columns(const eits_context *ctx)
+eits_matrix eits_cached_columns(const eits_columns *c)
 {
-    eits_matrix cached = ctx->model->sensitivity;
-    cached.data = ctx->cache;
+    eits_matrix cached = *c->s;
+    cached.data = c->data;
     cached.scale = NULL;
     cached.storage = EITS_STORAGE_F32;
-    cached.cols = room_of(ctx);
+    cached.cols = c->room;
     return cached;
 }

@@ -30,14 +30,6 @@ static eits_real lesser(eits_real a, eits_real b)
     return a < b ? a : b;
 }
 
-/* |residual|^2 / |y|^2. */
-static eits_real unexplained(const eits_context *ctx)
-{
-    const uint32_t rank = ctx->model->rank;
-    const eits_real total = eits_dot(ctx, ctx->y, ctx->y, rank);
-    return total > 0 ? eits_dot(ctx, ctx->residual, ctx->residual, rank) / total : 0;
-}
-
 static eits_real nearest(const eits_touch *touches, uint32_t count)
 {
     eits_real min = FAR;
@@ -73,9 +65,8 @@ static eits_real score(const eits_context *ctx, const eits_touch *touches, uint3
     return eits_fma(CLEAREST, clear, sum);
 }
 
-void eits_check_crowd(eits_context *ctx, int looked, const eits_touch *touches, uint32_t count)
+void eits_check_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
-    ctx->info.unexplained = looked ? unexplained(ctx) : 0;
     ctx->info.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_CROWDED;
     if (count == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) ||
         ctx->info.lambda_max < FAINT * ctx->info.lambda_noise)

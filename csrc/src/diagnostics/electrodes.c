@@ -9,6 +9,8 @@ typedef struct limits {
     eits_real significant, noise;
 } limits;
 
+/* Against noise as well as against the reference: a quiet board may have rows smaller than its
+ * own noise, and those are neither dead nor alive. */
 static limits limits_of(const eits_context *ctx)
 {
     const eits_real fraction = EITS_ROW_SIGNIFICANT * ctx->reference.v0_rms,
@@ -19,9 +21,9 @@ static limits limits_of(const eits_context *ctx)
 static int judge_row(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
     const eits_real v0 = ctx->reference.v0[i], size = eits_fabs(v0);
-    if (!(size >= lim.significant) || (ctx->unusable[i] & EITS_ROW_MASKED) != 0)
+    if (!(size >= lim.significant) || (ctx->rows.unusable[i] & EITS_ROW_MASKED) != 0)
         return 0;
-    if (ctx->unusable[i] != 0)
+    if (ctx->rows.unusable[i] != 0)
         return DEAD;
     const eits_real fraction = EITS_ROW_DEAD_FRACTION * size,
                     limit = fraction > lim.noise ? fraction : lim.noise;
@@ -36,15 +38,15 @@ static int is_grown(const eits_context *ctx, const eits_real *frame, limits lim,
 {
     const eits_real v0 = eits_fabs(ctx->reference.v0[i]),
                     min = EITS_ROW_SMALL * ctx->reference.v0_rms;
-    return ctx->unusable[i] == 0 &&
+    return ctx->rows.unusable[i] == 0 &&
            eits_fabs(frame[i]) > eits_fma(EITS_ROW_GROWN, v0 > min ? v0 : min, lim.noise);
 }
 
 static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
 {
     const uint8_t *row = eits_row(ctx, i);
-    const unsigned any = ctx->electrode[row[0]] | ctx->electrode[row[1]] | ctx->electrode[row[2]] |
-                         ctx->electrode[row[3]];
+    const unsigned any = ctx->rows.electrode[row[0]] | ctx->rows.electrode[row[1]] |
+                         ctx->rows.electrode[row[2]] | ctx->rows.electrode[row[3]];
     return (any & (unsigned)state) != 0;
 }
 
@@ -68,13 +70,14 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint
         judged += rows[e] >= EITS_ROWS_TO_JUDGE;
         open += rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e];
     }
+    /* All electrodes at once is a plug that is out, or a supply. */
     if (open == judged)
         return 0;
     if (open == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN))
         return 1;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e) {
         if (rows[e] >= EITS_ROWS_TO_JUDGE && !alive[e])
-            ctx->electrode[e] |= EITS_ELECTRODE_OPEN;
+            ctx->rows.electrode[e] |= EITS_ELECTRODE_OPEN;
     }
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_ELECTRODE_OPEN;
     return 1;
@@ -97,6 +100,7 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
             uses(ctx, i, EITS_ELECTRODE_OPEN))
             continue;
         const int state = judge_row(ctx, frame, lim, i);
+        /* One row that lives across the pair: then there is a voltage across it, and no bridge. */
         if ((state & ALIVE) != 0)
             return 0;
         dead += state == DEAD;
@@ -113,11 +117,12 @@ static void find_bridged(eits_context *ctx, const eits_real *frame, limits lim,
             continue;
         for (uint32_t k = 0; k < 4; k += 2) {
             const uint8_t e = eits_row(ctx, i)[k], f = eits_row(ctx, i)[k + 1];
-            const unsigned known = ctx->electrode[e] & ctx->electrode[f] & EITS_ELECTRODE_BRIDGED;
+            const unsigned known =
+                ctx->rows.electrode[e] & ctx->rows.electrode[f] & EITS_ELECTRODE_BRIDGED;
             if (known != 0 || !alive[e] || !alive[f] || !pair_is_dead(ctx, frame, lim, e, f))
                 continue;
-            ctx->electrode[e] |= EITS_ELECTRODE_BRIDGED;
-            ctx->electrode[f] |= EITS_ELECTRODE_BRIDGED;
+            ctx->rows.electrode[e] |= EITS_ELECTRODE_BRIDGED;
+            ctx->rows.electrode[f] |= EITS_ELECTRODE_BRIDGED;
             ctx->info.diagnostics |= EITS_DIAGNOSTIC_BRIDGED;
         }
     }
@@ -129,9 +134,10 @@ void eits_name_electrodes(eits_context *ctx)
     info->open_electrodes = info->bridged_electrodes = info->noisy_electrodes = 0;
     for (uint32_t e = 0; e < ctx->model->n_electrodes && e < 64; ++e) {
         const uint64_t bit = (uint64_t)1 << e;
-        info->open_electrodes |= (ctx->electrode[e] & EITS_ELECTRODE_OPEN) != 0 ? bit : 0;
-        info->bridged_electrodes |= (ctx->electrode[e] & EITS_ELECTRODE_BRIDGED) != 0 ? bit : 0;
-        info->noisy_electrodes |= (ctx->electrode[e] & EITS_ELECTRODE_NOISY) != 0 ? bit : 0;
+        info->open_electrodes |= (ctx->rows.electrode[e] & EITS_ELECTRODE_OPEN) != 0 ? bit : 0;
+        info->bridged_electrodes |=
+            (ctx->rows.electrode[e] & EITS_ELECTRODE_BRIDGED) != 0 ? bit : 0;
+        info->noisy_electrodes |= (ctx->rows.electrode[e] & EITS_ELECTRODE_NOISY) != 0 ? bit : 0;
     }
 }
 
@@ -139,13 +145,13 @@ void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_r
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (uses(ctx, i, state))
-            ctx->unusable[i] |= (uint8_t)why;
+            ctx->rows.unusable[i] |= (uint8_t)why;
     }
 }
 
 void eits_leave_outlier(eits_context *ctx, uint32_t i)
 {
-    ctx->unusable[i] |= EITS_ROW_OUTLIER;
+    ctx->rows.unusable[i] |= EITS_ROW_OUTLIER;
     ++ctx->info.outliers;
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_OUTLIER;
 }
@@ -167,10 +173,11 @@ int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const int state = judge_row(ctx, frame, lim, i);
         dead += state == DEAD;
-        silent += state == DEAD && ctx->unusable[i] == 0;
+        silent += state == DEAD && ctx->rows.unusable[i] == 0;
         turned += (state & TURNED) != 0;
         grown += (uint32_t)is_grown(ctx, frame, lim, i);
     }
+    /* Many turned rows are a skin of another kind, or another order of wires. */
     if (turned >= EITS_ROWS_TO_JUDGE && eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH))
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_MODEL_MISMATCH;
     if (turned + grown > 0 && turned + grown < EITS_ROWS_TO_JUDGE &&

@@ -11,36 +11,35 @@
  * Told by two probes: P (P'v) against |P_i|^2 v. */
 static const eits_real ORTHOGONAL = R(1e-3);
 
-/* ctx->range_inverse = |P_i|^2 for now. */
-static void row_energies(eits_context *ctx)
+/* range.inverse = |P_i|^2 for now. */
+static void row_energies(eits_context *ctx, const eits_scratch *scratch)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
+        const eits_real *column = eits_column(&ctx->model->reduction, k, scratch->row[0]);
         for (uint32_t i = 0; i < ctx->model->rank; ++i)
-            ctx->range_inverse[i] = eits_fma(column[i], column[i], ctx->range_inverse[i]);
-        ctx->reduction_energy += eits_dot(ctx, column, column, ctx->model->rank);
+            ctx->range.inverse[i] = eits_fma(column[i], column[i], ctx->range.inverse[i]);
     }
 }
 
-static int is_orthogonal(eits_context *ctx, uint32_t period)
+static int is_orthogonal(eits_context *ctx, const eits_scratch *scratch, uint32_t period)
 {
+    eits_real *column = scratch->row[0], *probe = scratch->row[1];
     const uint32_t rank = ctx->model->rank, folds = ctx->model->n_folded;
-    eits_zero(ctx->sx, EITS_STRIDE(rank));
+    eits_zero(probe, EITS_STRIDE(rank));
     for (uint32_t i = 0; i < rank; ++i) {
-        if (!(ctx->range_inverse[i] > 0))
+        if (!(ctx->range.inverse[i] > 0))
             return 0;
-        ctx->sx[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->range_inverse[i]);
+        probe[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->range.inverse[i]);
     }
     for (uint32_t k = 0; k < folds; ++k) {
-        ctx->list_index[k] = k;
-        ctx->list_value[k] =
-            eits_dot(ctx, eits_column(&ctx->model->reduction, k, ctx->residual), ctx->sx, rank);
+        scratch->index[k] = k;
+        scratch->value[k] =
+            eits_dot(ctx->kernels, eits_column(&ctx->model->reduction, k, column), probe, rank);
     }
-    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->list_value, folds,
-                      ctx->residual);
+    ctx->kernels->mul(&ctx->model->reduction, scratch->index, scratch->value, folds, column);
     for (uint32_t i = 0; i < rank; ++i) {
-        const eits_real off = ctx->residual[i] - ctx->range_inverse[i] * ctx->sx[i];
-        if (!(eits_fabs(off) <= ORTHOGONAL * eits_sqrt(ctx->range_inverse[i])))
+        const eits_real off = column[i] - ctx->range.inverse[i] * probe[i];
+        if (!(eits_fabs(off) <= ORTHOGONAL * eits_sqrt(ctx->range.inverse[i])))
             return 0;
     }
     return 1;
@@ -48,55 +47,59 @@ static int is_orthogonal(eits_context *ctx, uint32_t period)
 
 /* Ridge weights s_i^2 / (s_i^2 + nu s_1^2), s_i^2 = |S_i|^2 / |P_i|^2 the squared singular values
  * of the unwhitened problem; over |P_i|^2 again, so that d is predicted by P' shrink P d. */
-static void make_shrink(eits_context *ctx)
+static void make_shrink(eits_context *ctx, const eits_scratch *scratch)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
     eits_real max = 0;
     for (uint32_t j = 0; j < s->cols; ++j) {
-        const eits_real *column = eits_column(s, j, ctx->sx), scale = eits_column_scale(s, j);
+        const eits_real *column = eits_column(s, j, scratch->row[1]),
+                        scale = eits_column_scale(s, j);
         for (uint32_t i = 0; i < s->rows; ++i) {
             const eits_real value = scale * column[i];
-            ctx->range_shrink[i] = eits_fma(value, value, ctx->range_shrink[i]);
+            ctx->range.shrink[i] = eits_fma(value, value, ctx->range.shrink[i]);
         }
     }
     for (uint32_t i = 0; i < s->rows; ++i) {
-        ctx->range_shrink[i] /= ctx->range_inverse[i];
-        max = ctx->range_shrink[i] > max ? ctx->range_shrink[i] : max;
+        ctx->range.shrink[i] /= ctx->range.inverse[i];
+        max = ctx->range.shrink[i] > max ? ctx->range.shrink[i] : max;
     }
     for (uint32_t i = 0; i < s->rows; ++i) {
-        const eits_real squared = ctx->range_shrink[i];
-        ctx->range_inverse[i] = 1 / ctx->range_inverse[i];
-        ctx->range_shrink[i] =
-            squared / eits_fma(EITS_OUTLIER_RIDGE, max, squared) * ctx->range_inverse[i];
+        const eits_real squared = ctx->range.shrink[i];
+        ctx->range.inverse[i] = 1 / ctx->range.inverse[i];
+        ctx->range.shrink[i] =
+            squared / eits_fma(EITS_OUTLIER_RIDGE, max, squared) * ctx->range.inverse[i];
     }
-    ctx->range_known =
-        eits_all_finite(ctx->range_shrink, s->rows) && eits_all_finite(ctx->range_inverse, s->rows);
+    ctx->range.known =
+        eits_all_finite(ctx->range.shrink, s->rows) && eits_all_finite(ctx->range.inverse, s->rows);
 }
 
-void eits_learn_range(eits_context *ctx)
+void eits_learn_range(eits_context *ctx, const eits_scratch *scratch)
 {
-    row_energies(ctx);
-    if (is_orthogonal(ctx, 3) && is_orthogonal(ctx, 5))
-        make_shrink(ctx);
-    eits_zero(ctx->residual, EITS_STRIDE(ctx->model->rank));
-    eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
+    row_energies(ctx, scratch);
+    if (is_orthogonal(ctx, scratch, 3) && is_orthogonal(ctx, scratch, 5))
+        make_shrink(ctx, scratch);
+    eits_zero(scratch->row[0], EITS_STRIDE(ctx->model->rank));
+    eits_zero(scratch->row[1], EITS_STRIDE(ctx->model->rank));
 }
 
-/* ctx->off_range = what of the drift the model cannot give: along - P' |P_i|^-2 P along, in full,
- * since differences of sums would be rounding. */
-static uint64_t learn_off_range(eits_context *ctx)
+/* range.off_range = what of the drift the model cannot give: along - P' |P_i|^-2 P along, in
+ * full, since differences of sums would be rounding. */
+static uint64_t learn_off_range(eits_context *ctx, const eits_scratch *scratch)
 {
+    eits_real *copy = scratch->row[0], *seen = scratch->row[3];
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     for (uint32_t k = 0; k < folds; ++k)
-        ctx->list_index[k] = k;
-    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->gain_drift, folds, ctx->sz);
+        scratch->index[k] = k;
+    ctx->kernels->mul(&ctx->model->reduction, scratch->index, ctx->projection.gain_drift, folds,
+                      seen);
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] *= ctx->range_inverse[i];
+        seen[i] *= ctx->range.inverse[i];
     for (uint32_t k = 0; k < folds; ++k) {
-        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
-        ctx->off_range[k] = ctx->gain_drift[k] - eits_dot(ctx, column, ctx->sz, rank);
+        const eits_real *column = eits_column(&ctx->model->reduction, k, copy);
+        ctx->range.off_range[k] =
+            ctx->projection.gain_drift[k] - eits_dot(ctx->kernels, column, seen, rank);
     }
-    ctx->off_range_stale = 0;
+    ctx->range.off_range_build = ctx->projection.builds;
     return 2u * (uint64_t)folds * rank;
 }
 
@@ -106,44 +109,51 @@ eits_real eits_noise_energy(const eits_context *ctx)
     const eits_real one = b->gain * b->noise_v * (b->gain * b->noise_v);
     eits_real sum = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] == EITS_SIDE_NONE) /* it may have no reference at all */
+        if (ctx->frame.sides[k] == EITS_SIDE_NONE) /* it may have no reference at all */
             continue;
         const eits_real v0 =
-            b->v0[ctx->basis_for[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second
-                                                        : ctx->model->fold[k].first];
+            b->v0[ctx->frame.sides[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second
+                                                          : ctx->model->fold[k].first];
         const eits_real each = ctx->model->data_kind == EITS_DATA_NORMALISED
                                    ? b->noise_v / v0 * (b->noise_v / v0)
                                    : one;
-        sum += ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->reciprocity_error[k] != 0 ? R(0.5) * each
-                                                                                     : each;
+        sum += ctx->frame.sides[k] == EITS_SIDE_BOTH && ctx->frame.reciprocity_error[k] != 0
+                   ? R(0.5) * each
+                   : each;
     }
     return sum;
 }
 
 eits_real eits_expected_noise(const eits_context *ctx)
 {
-    return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->reduction_energy;
+    return eits_noise_energy(ctx) / (eits_real)ctx->model->n_folded * ctx->whitening.energy;
 }
 
-int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs)
+int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
+    eits_real *weighed = scratch->row[3];
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     if (rank >= folds || !(ctx->reference.noise_v > 0))
         return 0;
-    const eits_real drift = eits_dot(ctx, ctx->gain_drift, ctx->gain_drift, folds);
-    if (drift > 0 && ctx->off_range_stale)
-        *macs += learn_off_range(ctx);
+    const eits_real drift =
+        eits_dot(ctx->kernels, ctx->projection.gain_drift, ctx->projection.gain_drift, folds);
+    if (drift > 0 && ctx->range.off_range_build != ctx->projection.builds)
+        *macs += learn_off_range(ctx, scratch);
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] = ctx->range_inverse[i] * ctx->y[i];
-    eits_real total = eits_dot(ctx, ctx->d, ctx->d, folds),
-              off = total - eits_dot(ctx, ctx->sz, ctx->y, rank);
+        weighed[i] = ctx->range.inverse[i] * ctx->frame.y[i];
+    eits_real total = eits_dot(ctx->kernels, ctx->frame.d, ctx->frame.d, folds),
+              off = total - eits_dot(ctx->kernels, weighed, ctx->frame.y, rank);
     if (drift > 0) { /* how far it drifted is no news */
-        const eits_real along = eits_dot(ctx, ctx->d, ctx->gain_drift, folds),
-                        along_off_range = eits_dot(ctx, ctx->d, ctx->off_range, folds);
-        const eits_real off_range = eits_dot(ctx, ctx->off_range, ctx->off_range, folds);
+        const eits_real along =
+                            eits_dot(ctx->kernels, ctx->frame.d, ctx->projection.gain_drift, folds),
+                        along_off_range =
+                            eits_dot(ctx->kernels, ctx->frame.d, ctx->range.off_range, folds);
+        const eits_real off_range =
+            eits_dot(ctx->kernels, ctx->range.off_range, ctx->range.off_range, folds);
         total -= along * along / drift;
         off -= off_range > 0 ? along_off_range * along_off_range / off_range : 0;
     }
+    /* Of the folds' noise, the share of the dimensions that the model leaves free. */
     const eits_real noise = eits_noise_energy(ctx) * (eits_real)(folds - rank) / (eits_real)folds;
     if (!(off > noise) || !(total > 0))
         return 0;
@@ -153,13 +163,13 @@ int eits_check_model_mismatch(eits_context *ctx, uint64_t *macs)
            off > EITS_MISMATCH_NOISE * EITS_MISMATCH_NOISE * noise;
 }
 
-void eits_check_stale_reference(eits_context *ctx)
+void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
 {
     const eits_sign sign = ctx->options.sign;
     if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE))
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
-    const eits_real against = eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, other);
+    const eits_real against = eits_greatest(ctx->kernels, gradient, ctx->model->n_pixels, other);
     const eits_real min = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;

@@ -54,29 +54,31 @@ static eits_real max_by_noise(const eits_context *ctx, uint32_t k)
 
 static int is_flagged(const eits_context *ctx, uint32_t k, tolerance tol)
 {
-    if (ctx->basis_for[k] != EITS_SIDE_BOTH)
+    if (ctx->frame.sides[k] != EITS_SIDE_BOTH)
         return 0;
-    const eits_real off = eits_fabs(ctx->reciprocity_error[k]);
+    const eits_real off = eits_fabs(ctx->frame.reciprocity_error[k]);
     if (!(off > (ctx->reference.noise_v > 0 ? max_by_noise(ctx, k) : tol.robust)) ||
         !(off > tol.largest))
         return 0;
-    return off > EITS_OUTLIER_FRACTION * eits_fma(R(0.5), off, eits_fabs(ctx->d[k]));
+    return off > EITS_OUTLIER_FRACTION * eits_fma(R(0.5), off, eits_fabs(ctx->frame.d[k]));
 }
 
 /* The median of the folds' differences is 0 where they are copies: then nothing is flagged. */
-static tolerance find_tolerance(const eits_context *ctx)
+/* Noise, if it was learned, is judged row by row; if not, by the differences that this frame
+ * has. And whatever is small beside the greatest datum does no harm in the image. */
+static tolerance find_tolerance(const eits_context *ctx, const eits_scratch *scratch)
 {
     tolerance tol = {0, 0};
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        const eits_real datum = eits_fabs(ctx->d[k]);
+        const eits_real datum = eits_fabs(ctx->frame.d[k]);
         tol.largest = datum > tol.largest ? datum : tol.largest;
-        if (ctx->basis_for[k] == EITS_SIDE_BOTH)
-            ctx->list_value[count++] = eits_fabs(ctx->reciprocity_error[k]);
+        if (ctx->frame.sides[k] == EITS_SIDE_BOTH)
+            scratch->value[count++] = eits_fabs(ctx->frame.reciprocity_error[k]);
     }
     tol.largest *= EITS_OUTLIER_LARGEST;
     if (!(ctx->reference.noise_v > 0) && count > 0) {
-        const eits_real median = eits_kth(ctx->list_value, count, count / 2);
+        const eits_real median = eits_kth(scratch->value, count, count / 2);
         tol.robust = EITS_OUTLIER_ROBUST * EITS_ROBUST * median;
         if (!(median > 0))
             tol.robust = R(INFINITY);
@@ -86,7 +88,7 @@ static tolerance find_tolerance(const eits_context *ctx)
 
 static void leave_row(eits_context *ctx, uint32_t row)
 {
-    if (row == EITS_FOLD_NONE || ctx->unusable[row] != 0)
+    if (row == EITS_FOLD_NONE || ctx->rows.unusable[row] != 0)
         return;
     eits_leave_outlier(ctx, row);
 }
@@ -96,40 +98,44 @@ static void leave_row(eits_context *ctx, uint32_t row)
 static int all_known(const eits_context *ctx)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->basis_for[k] == 0)
+        if (ctx->frame.sides[k] == 0)
             return 0;
     }
     return 1;
 }
 
-/* ctx->sz = shrink * P d, so that P_k'sz is the ridge fit of d_k. */
-static void fit_all(eits_context *ctx, uint64_t *macs)
+/* scratch->row[3] = shrink * P d, so that P_k'sz is the ridge fit of d_k. */
+static void fit_all(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
+    eits_real *fit = scratch->row[3];
     const uint32_t rank = ctx->model->rank, folds = ctx->model->n_folded;
     for (uint32_t k = 0; k < folds; ++k)
-        ctx->list_index[k] = k;
-    ctx->kernels->mul(&ctx->model->reduction, ctx->list_index, ctx->d, folds, ctx->sz);
+        scratch->index[k] = k;
+    ctx->kernels->mul(&ctx->model->reduction, scratch->index, ctx->frame.d, folds, fit);
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] *= ctx->range_shrink[i];
+        fit[i] *= ctx->range.shrink[i];
     *macs += (uint64_t)folds * rank;
 }
 
 /* What the other folds predict for each of `n` flagged ones: with H the ridge fit, e = (I -
  * H_FF)^-1 (d - H d)_F is what d is off by. 0: they cannot be told from these. */
-static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_real *out,
-                   uint64_t *macs)
+static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_t *flagged,
+                   uint32_t n, eits_real *out, uint64_t *macs)
 {
+    eits_real *weighed = scratch->row[0], *copy = scratch->row[1], *fit = scratch->row[3];
     eits_real l[EITS_OUTLIER_MAX][EITS_OUTLIER_MAX], e[EITS_OUTLIER_MAX];
     const uint32_t rank = ctx->model->rank;
-    fit_all(ctx, macs);
+    /* Leave-several-out from one fit of all: (I - H_FF) e = (d - H d)_F, by Cholesky. Eight folds
+     * at most, so the small matrix is on the stack. */
+    fit_all(ctx, scratch, macs);
     for (uint32_t a = 0; a < n; ++a) {
-        const eits_real *column = eits_column(&ctx->model->reduction, flagged[a], ctx->sx);
-        e[a] = ctx->d[flagged[a]] - eits_dot(ctx, column, ctx->sz, rank);
+        const eits_real *column = eits_column(&ctx->model->reduction, flagged[a], copy);
+        e[a] = ctx->frame.d[flagged[a]] - eits_dot(ctx->kernels, column, fit, rank);
         for (uint32_t i = 0; i < rank; ++i)
-            ctx->residual[i] = ctx->range_shrink[i] * column[i];
+            weighed[i] = ctx->range.shrink[i] * column[i];
         for (uint32_t b = 0; b <= a; ++b) {
-            const eits_real *other = eits_column(&ctx->model->reduction, flagged[b], ctx->sx);
-            eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx, ctx->residual, other, rank);
+            const eits_real *other = eits_column(&ctx->model->reduction, flagged[b], copy);
+            eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx->kernels, weighed, other, rank);
             for (uint32_t k = 0; k < b; ++k)
                 sum = eits_fma(-l[a][k], l[b][k], sum);
             if (a == b && !(sum > EITS_OUTLIER_PIVOT))
@@ -147,22 +153,25 @@ static int predict(eits_context *ctx, const uint32_t *flagged, uint32_t n, eits_
         for (uint32_t k = a + 1; k < n; ++k)
             e[a] = eits_fma(-l[k][a], e[k], e[a]);
         e[a] /= l[a][a];
-        out[a] = ctx->d[flagged[a]] - e[a];
+        out[a] = ctx->frame.d[flagged[a]] - e[a];
     }
     return 1;
 }
 
 /* The side that is clearly nearer to the prediction stays; else both go. */
-static void choose_sides(eits_context *ctx, const uint32_t *flagged, uint32_t n, uint64_t *macs)
+static void choose_sides(eits_context *ctx, const eits_scratch *scratch, const uint32_t *flagged,
+                         uint32_t n, uint64_t *macs)
 {
     eits_real predicted[EITS_OUTLIER_MAX];
     const int known =
-        ctx->range_known && all_known(ctx) && predict(ctx, flagged, n, predicted, macs);
+        ctx->range.known && all_known(ctx) && predict(ctx, scratch, flagged, n, predicted, macs);
     for (uint32_t a = 0; a < n; ++a) {
         const eits_fold fold = ctx->model->fold[flagged[a]];
-        const eits_real d = ctx->d[flagged[a]], half = R(0.5) * ctx->reciprocity_error[flagged[a]];
+        const eits_real d = ctx->frame.d[flagged[a]],
+                        half = R(0.5) * ctx->frame.reciprocity_error[flagged[a]];
         const eits_real first = known ? eits_fabs(d + half - predicted[a]) : 1,
                         second = known ? eits_fabs(d - half - predicted[a]) : 1;
+        /* Where neither is clearly nearer nobody knows which is wrong. */
         if (!(first <= EITS_OUTLIER_NEARER * second))
             leave_row(ctx, fold.first);
         if (!(second <= EITS_OUTLIER_NEARER * first))
@@ -178,7 +187,7 @@ static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (eits_is_pair(eits_row(ctx, i) + 2, e, f))
-            ctx->unusable[i] |= EITS_ROW_NOISY;
+            ctx->rows.unusable[i] |= EITS_ROW_NOISY;
     }
 }
 
@@ -221,11 +230,13 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
     if (!eits_wants(ctx, EITS_DIAGNOSTIC_ELECTRODE_NOISY))
         return;
     for (uint32_t e = 0; e < ctx->model->n_electrodes; ++e)
-        ctx->electrode[e] |= (eits_real)shared[e] >= EITS_NOISY_FRACTION * (eits_real)count
-                                 ? EITS_ELECTRODE_NOISY
-                                 : 0;
+        ctx->rows.electrode[e] |= (eits_real)shared[e] >= EITS_NOISY_FRACTION * (eits_real)count
+                                      ? EITS_ELECTRODE_NOISY
+                                      : 0;
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_ELECTRODE_NOISY;
     eits_name_electrodes(ctx);
+    /* One channel of an amplifier is worse than an electrode would be: only what it measures is
+     * wrong, not what it drives. */
     if (any == 2 && is_channel(ctx, found[0], found[1], tol))
         leave_channel(ctx, found[0], found[1]);
     else
@@ -234,45 +245,48 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
 
 /* ---- without reciprocals ---- */
 
-int eits_find_unpaired_outlier(eits_context *ctx, uint64_t *macs)
+int eits_find_unpaired_outlier(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
+    eits_real *copy = scratch->row[0], *fit = scratch->row[3], *error = scratch->value;
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
     for (uint32_t k = 0; k < folds; ++k) {
-        if (ctx->basis_for[k] == EITS_SIDE_BOTH && ctx->reciprocity_error[k] != 0)
+        if (ctx->frame.sides[k] == EITS_SIDE_BOTH && ctx->frame.reciprocity_error[k] != 0)
             return 0;
     }
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sz[i] = ctx->range_shrink[i] * ctx->y[i];
+        fit[i] = ctx->range.shrink[i] * ctx->frame.y[i];
     eits_real worst = 0, energy = 0;
     uint32_t at = 0;
     for (uint32_t k = 0; k < folds; ++k) {
-        const eits_real *column = eits_column(&ctx->model->reduction, k, ctx->residual);
+        const eits_real *column = eits_column(&ctx->model->reduction, k, copy);
         eits_real leverage = 0;
-        const eits_real off = eits_fabs(ctx->d[k] - eits_dot(ctx, column, ctx->sz, rank));
+        const eits_real off =
+            eits_fabs(ctx->frame.d[k] - eits_dot(ctx->kernels, column, fit, rank));
         for (uint32_t i = 0; i < rank; ++i)
-            leverage = eits_fma(ctx->range_shrink[i] * column[i], column[i], leverage);
+            leverage = eits_fma(ctx->range.shrink[i] * column[i], column[i], leverage);
         const eits_real left = 1 - leverage;
         energy = eits_fma(off, off, energy);
-        ctx->list_value[k] = left > EITS_OUTLIER_PIVOT ? off / eits_sqrt(left) : 0;
-        if (ctx->list_value[k] > worst) {
-            worst = ctx->list_value[k];
+        error[k] = left > EITS_OUTLIER_PIVOT ? off / eits_sqrt(left) : 0;
+        if (error[k] > worst) {
+            worst = error[k];
             at = k;
         }
     }
     *macs += 2u * (uint64_t)folds * rank;
+    /* Half the energy in one fold, and far beyond the others: a touch of a shape that the model
+     * lacks spreads over many. */
     if (!(worst * worst > EITS_OUTLIER_ENERGY * energy) ||
-        !(worst >
-          EITS_OUTLIER_UNPAIRED * EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2)))
+        !(worst > EITS_OUTLIER_UNPAIRED * EITS_ROBUST * eits_kth(error, folds, folds / 2)))
         return 0;
     leave_row(ctx, ctx->model->fold[at].first);
     leave_row(ctx, ctx->model->fold[at].second);
     return 1;
 }
 
-int eits_find_outliers(eits_context *ctx, uint64_t *macs)
+int eits_find_outliers(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
     uint32_t flagged[EITS_OUTLIER_MAX], count = 0;
-    const tolerance tol = find_tolerance(ctx);
+    const tolerance tol = find_tolerance(ctx, scratch);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (!is_flagged(ctx, k, tol))
             continue;
@@ -285,7 +299,7 @@ int eits_find_outliers(eits_context *ctx, uint64_t *macs)
     if (count > EITS_OUTLIER_MAX)
         find_noisy(ctx, count, tol);
     else if (eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER))
-        choose_sides(ctx, flagged, count, macs);
+        choose_sides(ctx, scratch, flagged, count, macs);
     return (ctx->info.diagnostics & (EITS_DIAGNOSTIC_OUTLIER | EITS_DIAGNOSTIC_ELECTRODE_NOISY)) !=
            0;
 }

@@ -1,23 +1,19 @@
-/* The reference frame and its noise, from one frame or learned from many untouched ones. */
-#include "eitskin/frame.h"
+/* The reference frame: its mean and noise over several frames, and how it fits the model. */
+#include "frame/reference.h"
 
 #include "base/vec.h"
-#include "diagnostics/diagnostics.h"
-#include "frame/projection.h"
-#include "frame/whitening.h"
-#include "kernels/kernels.h"
-
-enum { MIN_REFERENCE_FRAMES = 4 };
 
 /* A reference frame must be whole: rows that cannot be used are to be masked first. */
-static eits_status check_reference_frame(const eits_context *ctx, const eits_real *frame,
-                                         size_t length)
+eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real *frame,
+                                       size_t length)
 {
     if (length != ctx->model->n_rows)
         return EITS_E_FRAME_LENGTH;
+    /* A row without a voltage here would be one without a reference for every frame to come: that
+     * is to be decided by masking it, not by a bad frame. */
     const eits_real limit = ctx->options.saturation_v;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (!ctx->masked[i] &&
+        if (!ctx->rows.masked[i] &&
             (!eits_is_finite(frame[i]) || (limit > 0 && eits_fabs(frame[i]) >= limit)))
             return EITS_E_FRAME_CHANNELS;
     }
@@ -28,7 +24,8 @@ static eits_status check_reference_frame(const eits_context *ctx, const eits_rea
  * taken. */
 static int has_reference(const eits_context *ctx, uint32_t row)
 {
-    return row != EITS_FOLD_NONE && !ctx->masked[row] && eits_is_finite(ctx->reference.v0[row]);
+    return row != EITS_FOLD_NONE && !ctx->rows.masked[row] &&
+           eits_is_finite(ctx->reference.v0[row]);
 }
 
 /* The reference on one folded row: the mean of both sides in use; 0 where neither is. */
@@ -42,7 +39,7 @@ static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
 
 /* Set gain, correlation and v0_rms from v0; a scale is taken out first so that squares neither
  * overflow nor vanish. */
-static eits_status fit_to_model(eits_context *ctx)
+eits_status eits_fit_reference(eits_context *ctx)
 {
     const eits_model *model = ctx->model;
     eits_reference *b = &ctx->reference;
@@ -74,85 +71,20 @@ static eits_status fit_to_model(eits_context *ctx)
     b->correlation = vr / (eits_sqrt(vv) * eits_sqrt(rr));
     b->v0_rms = largest * eits_sqrt(vv / (eits_real)used);
     b->gain = largest_ref / largest * (eits_sqrt(rr) / eits_sqrt(vv));
+    /* The sign is the wiring's: a board that swaps V+ and V- measures as well as any other. */
     if (b->correlation < 0)
         b->gain = -b->gain;
-    ctx->basis_stale = 1;
-    ctx->warm = 0;
+    ctx->projection.stale = 1;
     return eits_is_finite(b->gain) && b->gain != 0 ? EITS_OK : EITS_E_FRAME_ZERO;
 }
 
-eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t length)
-{
-    if (ctx == NULL || frame == NULL)
-        return EITS_E_ARGUMENT;
-    eits_status status = check_reference_frame(ctx, frame, length);
-    if (status != EITS_OK)
-        return status;
-    eits_reference *b = &ctx->reference;
-    eits_real *old = b->m2; /* keeps the old reference until the new one is known to be good */
-    b->wanted = 0;          /* learning, if any was under way, ends here */
-    eits_copy(old, b->v0, length);
-    eits_copy(b->v0, frame, length);
-    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (ctx->masked[i])
-            b->v0[i] = R(NAN);
-    }
-    status = fit_to_model(ctx);
-    if (status != EITS_OK) {
-        eits_copy(b->v0, old, length);
-        if (b->ready)
-            (void)fit_to_model(ctx);
-    } else {
-        b->ready = 1;
-        b->count = 1;
-        b->noise_v = 0;
-        b->lambda_noise = 0;
-        b->outliers = b->second_waits = 0;
-    }
-    eits_zero(b->m2, length);
-    return status;
-}
-
-eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
-{
-    if (ctx == NULL || count < MIN_REFERENCE_FRAMES)
-        return EITS_E_ARGUMENT;
-    eits_reference *b = &ctx->reference;
-    eits_zero(b->v0, ctx->model->n_rows);
-    eits_zero(b->m2, ctx->model->n_rows);
-    b->wanted = count;
-    b->count = 0;
-    b->ready = 0;
-    b->lambda_noise = 0;
-    b->noise_v = 0;
-    b->outliers = b->second_waits = 0;
-    return EITS_OK;
-}
-
-/* How far a reference frame reaches above nothing: max |S'y| against the mean so far. */
-static eits_status learn_lambda_noise(eits_context *ctx, const eits_real *frame)
-{
-    uint32_t masked;
-    uint64_t macs;
-    const eits_status status = eits_frame_data(ctx, frame, &masked, &macs);
-    if (status != EITS_OK)
-        return status;
-    eits_apply_t(ctx, eits_adjoint(ctx, ctx->y, ctx->adjoint), ctx->gradient);
-    if (!eits_all_finite(ctx->gradient, ctx->model->n_pixels))
-        return EITS_E_NOT_FINITE;
-    const eits_real seen =
-        eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, EITS_SIGN_BOTH) / ctx->noise_ratio;
-    if (seen > ctx->reference.lambda_noise)
-        ctx->reference.lambda_noise = seen;
-    return EITS_OK;
-}
-
 /* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
-static eits_real unit_for(const eits_context *ctx, const eits_real *frame)
+eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame)
 {
     eits_real largest = 0, unit = 1;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
-        largest = !ctx->masked[i] && eits_fabs(frame[i]) > largest ? eits_fabs(frame[i]) : largest;
+        largest =
+            !ctx->rows.masked[i] && eits_fabs(frame[i]) > largest ? eits_fabs(frame[i]) : largest;
     while (unit <= R(0.5) * largest)
         unit *= 2;
     while (unit > largest && unit > R(0x1p-125))
@@ -161,7 +93,7 @@ static eits_real unit_for(const eits_context *ctx, const eits_real *frame)
 }
 
 /* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
-static eits_real noise_so_far(const eits_context *ctx)
+eits_real eits_reference_noise(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
     eits_real sum = 0;
@@ -178,17 +110,19 @@ static eits_real noise_so_far(const eits_context *ctx)
 }
 
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
-static void take_in(eits_context *ctx, const eits_real *frame)
+void eits_take_reference_frame(eits_context *ctx, const eits_real *frame)
 {
     eits_reference *b = &ctx->reference;
     ++b->count;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* Welford, Technometrics 4 (1962) 419 */
-        if (ctx->masked[i] == EITS_MASKED_NOW)
+        if (ctx->rows.masked[i] == EITS_MASKED_NOW)
             continue;
-        if (ctx->masked[i])
+        if (ctx->rows.masked[i])
             b->v0[i] = R(NAN);
         if (!eits_is_finite(b->v0[i]))
             continue;
+        /* In units of m2_unit, since the square of a microvolt is no float32 beside that of a volt.
+         */
         const eits_real delta = frame[i] - b->v0[i];
         b->v0[i] += delta / (eits_real)b->count;
         b->m2[i] = eits_fma(delta / b->m2_unit, (frame[i] - b->v0[i]) / b->m2_unit, b->m2[i]);
@@ -196,10 +130,10 @@ static void take_in(eits_context *ctx, const eits_real *frame)
 }
 
 /* The second frame waits in m2 until a third tells which of them is right where they differ. */
-static void keep_second(eits_context *ctx, const eits_real *frame)
+void eits_keep_second_frame(eits_context *ctx, const eits_real *frame)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
-        if (ctx->masked[i])
+        if (ctx->rows.masked[i])
             ctx->reference.v0[i] = R(NAN);
     }
     eits_copy(ctx->reference.m2, frame, ctx->model->n_rows);
@@ -207,11 +141,10 @@ static void keep_second(eits_context *ctx, const eits_real *frame)
     ctx->reference.second_waits = 1;
 }
 
-static void weigh_second(eits_context *ctx, const eits_real *frame)
+void eits_take_second_frame(eits_context *ctx)
 {
     eits_reference *b = &ctx->reference;
-    b->outliers += eits_reference_weigh_second(ctx, frame);
-    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* as take_in */
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* as eits_take_reference_frame */
         const eits_real delta = b->m2[i] - b->v0[i], second = b->m2[i];
         b->m2[i] = 0;
         if (!eits_is_finite(b->v0[i]))
@@ -220,52 +153,4 @@ static void weigh_second(eits_context *ctx, const eits_real *frame)
         b->m2[i] = eits_fma(delta / b->m2_unit, (second - b->v0[i]) / b->m2_unit, 0);
     }
     b->second_waits = 0;
-}
-
-eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t length)
-{
-    if (ctx == NULL || frame == NULL || ctx->reference.count >= ctx->reference.wanted)
-        return EITS_E_ARGUMENT;
-    eits_reference *b = &ctx->reference;
-    eits_status status = check_reference_frame(ctx, frame, length);
-    if (status != EITS_OK)
-        return status;
-    const int judged = eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER);
-    if (b->count == 1 && judged) {
-        keep_second(ctx, frame);
-        return EITS_OK;
-    }
-    if (b->second_waits)
-        weigh_second(ctx, frame);
-    const uint32_t left = b->count >= 2 && judged ? eits_reference_mask_outliers(ctx, frame) : 0;
-    if (b->count == b->wanted / 2) {
-        status = fit_to_model(ctx);
-        /* lambda_noise is learned with the regularisation that it asks for */
-        b->noise_v = noise_so_far(ctx);
-    }
-    if (status == EITS_OK && b->count >= b->wanted / 2)
-        status = learn_lambda_noise(ctx, frame);
-    if (status == EITS_OK) {
-        if (b->count == 0)
-            b->m2_unit = unit_for(ctx, frame);
-        take_in(ctx, frame);
-        b->outliers += left;
-    }
-    eits_reference_unmask(ctx);
-    return status;
-}
-
-eits_status eits_reference_finish(eits_context *ctx)
-{
-    if (ctx == NULL)
-        return EITS_E_ARGUMENT;
-    eits_reference *b = &ctx->reference;
-    if (b->count < MIN_REFERENCE_FRAMES || b->count != b->wanted)
-        return EITS_E_REFERENCE_SHORT;
-    const eits_status status = fit_to_model(ctx);
-    if (status != EITS_OK)
-        return status;
-    b->noise_v = noise_so_far(ctx);
-    b->ready = 1;
-    return EITS_OK;
 }

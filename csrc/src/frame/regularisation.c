@@ -25,7 +25,7 @@ static eits_real asked_regularisation(const eits_context *ctx)
 eits_real eits_regularisation_of_all(const eits_context *ctx)
 {
     const eits_real asked = asked_regularisation(ctx);
-    return asked > AS_IT_IS * ctx->regularisation ? asked : ctx->regularisation;
+    return asked > AS_IT_IS * ctx->whitening.mu ? asked : ctx->whitening.mu;
 }
 
 eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing)
@@ -33,7 +33,7 @@ eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing
     const eits_real left = 1 - missing, cube = left * left * left,
                     lowered =
                         cube > MIN_REGULARISATION_FRACTION ? cube : MIN_REGULARISATION_FRACTION;
-    const eits_real of_model = lowered * ctx->regularisation,
+    const eits_real of_model = lowered * ctx->whitening.mu,
                     asked = left * asked_regularisation(ctx),
                     wanted = asked > of_model ? asked : of_model;
     return wanted > MIN_REGULARISATION ? wanted : MIN_REGULARISATION;
@@ -43,9 +43,9 @@ eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing
  * Lipschitz constant holds, whatever rounding made of the stored matrices. */
 static eits_real weight_of(const eits_context *ctx, eits_real regularisation, uint32_t i)
 {
-    const eits_real square =
-        ctx->strongest_square * (1 + regularisation) / (ctx->row_strength[i] + regularisation);
-    const eits_real weight = eits_sqrt(square) * ctx->row_scale[i];
+    const eits_real square = ctx->whitening.s1_square * (1 + regularisation) /
+                             (ctx->whitening.row_strength[i] + regularisation);
+    const eits_real weight = eits_sqrt(square) * ctx->whitening.row_scale[i];
     return weight < 1 ? weight : 1;
 }
 
@@ -54,11 +54,11 @@ static eits_real weight_of(const eits_context *ctx, eits_real regularisation, ui
 eits_real eits_regularisation_noise(const eits_context *ctx, eits_real regularisation)
 {
     eits_real sum = 0, total = 0;
-    if (!(regularisation > ctx->regularisation))
+    if (!(regularisation > ctx->whitening.mu))
         return 1;
     for (uint32_t i = 0; i < ctx->model->rank; ++i) {
-        const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]),
-                        square = ctx->row_strength[i] * w2 * w2;
+        const eits_real w2 = 1 / (ctx->whitening.row_scale[i] * ctx->whitening.row_scale[i]),
+                        square = ctx->whitening.row_strength[i] * w2 * w2;
         const eits_real weight = weight_of(ctx, regularisation, i), w2_kept = weight * weight;
         total += square;
         sum = eits_fma(square * w2_kept, w2_kept, sum);
@@ -72,7 +72,7 @@ eits_real eits_regularisation_weights(const eits_context *ctx, eits_real regular
     eits_real energy = 0, total = 0;
     eits_zero(weight, EITS_STRIDE(ctx->model->rank));
     for (uint32_t i = 0; i < ctx->model->rank; ++i) {
-        const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
+        const eits_real w2 = 1 / (ctx->whitening.row_scale[i] * ctx->whitening.row_scale[i]);
         weight[i] = weight_of(ctx, regularisation, i);
         energy = eits_fma(weight[i] * weight[i], w2, energy);
         total += w2;

@@ -6,11 +6,7 @@
 #ifndef EITSKIN_REGULARISATION_H
 #define EITSKIN_REGULARISATION_H
 
-#include "eitskin/context.h"
-
-/* The usual regularisation_noise_factor: chosen on training scenes at 30 to 55 dB, of one to three
- * touches, six, light ones and drift. */
-#define EITS_REGULARISATION_NOISE_FACTOR R(5.0)
+#include "context/context.h"
 
 /* mu' with all rows in use: the model's, or regularisation_noise_factor times the noise over the
  * reference's rms where that is more. */

@@ -23,26 +23,15 @@ static inline eits_real *row_of(const eits_context *ctx, eits_real *triangle, ui
 static inline eits_real dot_of_row(const eits_context *ctx, uint32_t i, const eits_real *a,
                                    const eits_real *b)
 {
-    return eits_dot(ctx, a + first_of(i), b + first_of(i),
+    return eits_dot(ctx->kernels, a + first_of(i), b + first_of(i),
                     EITS_STRIDE(ctx->model->rank) - first_of(i));
 }
 
 static inline void add_row(const eits_context *ctx, uint32_t i, eits_real *out, eits_real factor,
                            const eits_real *a)
 {
-    eits_axpy(ctx, out + first_of(i), factor, a + first_of(i),
+    eits_axpy(ctx->kernels, out + first_of(i), factor, a + first_of(i),
               EITS_STRIDE(ctx->model->rank) - first_of(i));
-}
-
-/* F, or where it is diagonal its diagonal; behind the basis' one direction */
-static inline eits_real *whitening_of(const eits_context *ctx)
-{
-    return ctx->basis + EITS_STRIDE(ctx->model->rank);
-}
-
-static inline eits_real *metric_of(const eits_context *ctx) /* G */
-{
-    return whitening_of(ctx) + EITS_PADDED_TRIANGLE(ctx->model->rank);
 }
 
 static inline uint64_t triangle_macs(const eits_context *ctx)

@@ -30,10 +30,11 @@ static eits_real greatest_entry(const eits_matrix *p, eits_real *copy)
 }
 
 /* |P_i|^2 / greatest^2 into `square`; 0 where two rows are not orthogonal or one is zero. */
-static int orthogonal_rows(eits_context *ctx, eits_real greatest, eits_real *square)
+static int orthogonal_rows(eits_context *ctx, const eits_scratch *scratch, eits_real greatest,
+                           eits_real *square)
 {
     const eits_matrix *p = &ctx->model->reduction;
-    eits_real *gram = whitening_of(ctx), *v = ctx->sz;
+    eits_real *gram = ctx->whitening.map, *v = scratch->row[3];
     eits_zero(gram, EITS_PADDED_TRIANGLE(p->rows));
     for (uint32_t k = 0; k < p->cols; ++k) {
         const eits_real *column = eits_column(p, k, v);
@@ -56,11 +57,12 @@ static int orthogonal_rows(eits_context *ctx, eits_real greatest, eits_real *squ
 }
 
 /* |S_i|^2. */
-static void squares_of_rows(const eits_context *ctx, eits_real *square)
+static void squares_of_rows(const eits_context *ctx, const eits_scratch *scratch, eits_real *square)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
     for (uint32_t j = 0; j < s->cols; ++j) {
-        const eits_real *column = eits_column(s, j, ctx->sz), scale = eits_column_scale(s, j);
+        const eits_real *column = eits_column(s, j, scratch->row[3]),
+                        scale = eits_column_scale(s, j);
         for (uint32_t i = 0; i < s->rows; ++i) {
             const eits_real v = scale * column[i];
             square[i] = eits_fma(v, v, square[i]);
@@ -72,7 +74,7 @@ static void squares_of_rows(const eits_context *ctx, eits_real *square)
 static int take_form(eits_context *ctx, eits_real greatest)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_real *w2 = ctx->row_scale, *s2 = ctx->row_strength;
+    eits_real *w2 = ctx->whitening.row_scale, *s2 = ctx->whitening.row_strength;
     uint32_t weakest = 0, strongest = 0;
     for (uint32_t i = 0; i < rank; ++i) {
         weakest = w2[i] > w2[weakest] ? i : weakest;
@@ -84,50 +86,64 @@ static int take_form(eits_context *ctx, eits_real greatest)
         if (!(eits_fabs(eits_fma(per_square, w2[i], s2[i]) - 1) <= FORM))
             return 0;
     }
-    ctx->strongest = eits_sqrt(top / top_w2) / greatest;
-    if (!(ctx->strongest > R(1e-30)) || !(ctx->strongest < R(1e30)))
+    ctx->whitening.s1 = eits_sqrt(top / top_w2) / greatest;
+    if (!(ctx->whitening.s1 > R(1e-30)) || !(ctx->whitening.s1 < R(1e30)))
         return 0;
-    ctx->strongest_square = top;
-    ctx->regularisation = per_square > 0 ? per_square * top_w2 / top : 0;
+    ctx->whitening.s1_square = top;
+    ctx->whitening.mu = per_square > 0 ? per_square * top_w2 / top : 0;
     for (uint32_t i = 0; i < rank; ++i) {
         s2[i] = s2[i] / w2[i] * (top_w2 / top);
         w2[i] = eits_sqrt(top_w2 / w2[i]) / eits_sqrt(top);
     }
     return eits_all_finite(w2, rank) && eits_all_finite(s2, rank) &&
-           eits_is_finite(ctx->regularisation);
+           eits_is_finite(ctx->whitening.mu);
 }
 
-void eits_whitening_init(eits_context *ctx)
+/* |P|^2. */
+static eits_real energy_of(const eits_context *ctx, eits_real *copy)
 {
-    const eits_real greatest = greatest_entry(&ctx->model->reduction, ctx->sz);
+    const eits_matrix *p = &ctx->model->reduction;
+    eits_real sum = 0;
+    for (uint32_t k = 0; k < p->cols; ++k) {
+        const eits_real *column = eits_column(p, k, copy);
+        sum += eits_dot(ctx->kernels, column, column, p->rows);
+    }
+    return sum;
+}
+
+void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch)
+{
+    ctx->whitening.energy = energy_of(ctx, scratch->row[3]);
+    const eits_real greatest = greatest_entry(&ctx->model->reduction, scratch->row[3]);
     if (!(greatest > 0) || !eits_is_finite(1 / greatest) ||
-        !orthogonal_rows(ctx, greatest, ctx->row_scale))
+        !orthogonal_rows(ctx, scratch, greatest, ctx->whitening.row_scale))
         return;
-    squares_of_rows(ctx, ctx->row_strength);
-    ctx->can_whiten_masked = (uint32_t)take_form(ctx, greatest);
-    ctx->reduction_energy_stored = ctx->reduction_energy;
+    squares_of_rows(ctx, scratch, ctx->whitening.row_strength);
+    ctx->whitening.possible = (uint32_t)take_form(ctx, greatest);
+    ctx->whitening.energy_stored = ctx->whitening.energy;
 }
 
 /* ---- the whitening ---- */
 
 static int in_use(const eits_context *ctx, uint32_t k)
 {
-    return ctx->basis_for[k] != 0;
+    return ctx->frame.sides[k] != 0;
 }
 
 /* N = U_o' U_o + e I, summed over whichever rows are fewer, those left out or those in use. */
-static uint64_t sum_products(eits_context *ctx, uint32_t missing, eits_real lost, eits_real *n)
+static uint64_t sum_products(eits_context *ctx, const eits_scratch *scratch, uint32_t missing,
+                             eits_real lost, eits_real *n)
 {
     const eits_matrix *p = &ctx->model->reduction;
     const int by_missing = missing <= p->cols - missing;
-    eits_real *u = ctx->sz;
+    eits_real *u = scratch->row[3];
     eits_zero(n, EITS_PADDED_TRIANGLE(p->rows));
     for (uint32_t k = 0; k < p->cols; ++k) {
         if (in_use(ctx, k) == by_missing)
             continue;
         const eits_real *column = eits_column(p, k, u);
         for (uint32_t i = 0; i < p->rows; ++i)
-            u[i] = column[i] * ctx->row_scale[i] * ctx->strongest;
+            u[i] = column[i] * ctx->whitening.row_scale[i] * ctx->whitening.s1;
         for (uint32_t i = 0; i < p->rows; ++i)
             add_row(ctx, i, row_of(ctx, n, i), u[i], u);
     }
@@ -163,17 +179,17 @@ static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_re
 }
 
 /* G G' = R diag(s^2) R' + regularisation I, from the last row up. */
-static uint64_t factor_metric(eits_context *ctx, eits_real regularisation, eits_real *r,
-                              eits_real *g)
+static uint64_t factor_metric(eits_context *ctx, const eits_scratch *scratch,
+                              eits_real regularisation, eits_real *r, eits_real *g)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_real *scaled = ctx->sz;
+    eits_real *scaled = scratch->row[3];
     uint64_t macs = 0;
     eits_zero(g, EITS_PADDED_TRIANGLE(rank));
     for (uint32_t i = rank; i-- > 0;) {
         eits_real *row = row_of(ctx, g, i);
         for (uint32_t k = first_of(i); k < rank; ++k)
-            scaled[k] = row_of(ctx, r, i)[k] * ctx->row_strength[k];
+            scaled[k] = row_of(ctx, r, i)[k] * ctx->whitening.row_strength[k];
         for (uint32_t j = rank; j-- > i;) {
             const eits_real product = dot_of_row(ctx, j, scaled, row_of(ctx, r, j));
             /* row[j] is zero yet */
@@ -206,7 +222,7 @@ static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, ei
     }
     for (uint32_t i = 0; i < rank; ++i) {
         for (uint32_t k = i; k < rank; ++k)
-            row_of(ctx, r, i)[k] *= fraction * ctx->row_scale[k];
+            row_of(ctx, r, i)[k] *= fraction * ctx->whitening.row_scale[k];
     }
     return macs;
 }
@@ -220,33 +236,34 @@ enum { PROBES = 8 };
  * PROBES sign vectors that are orthogonal within each PROBES directions. The greatest of the
  * columns grows faster than their mean does by rows left out, by an exponent found on masks of one
  * row to three electrodes. */
-static uint64_t measure_noise(eits_context *ctx)
+static uint64_t measure_noise(eits_context *ctx, const eits_scratch *scratch)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_real *v = ctx->sz, sum = 0, total = 0;
+    eits_real *v = scratch->row[3], sum = 0, total = 0;
     for (uint32_t p = 0; p < PROBES; ++p) {
         for (uint32_t i = 0; i < rank; ++i) {
             const uint32_t both = i & p, odd = (both ^ both >> 1 ^ both >> 2) & 1u;
-            const eits_real size = eits_sqrt(ctx->row_strength[i]) / ctx->row_scale[i];
+            const eits_real size =
+                eits_sqrt(ctx->whitening.row_strength[i]) / ctx->whitening.row_scale[i];
             v[i] = odd ? -size : size;
         }
         (void)eits_whiten(ctx, v);
-        solve_transposed(ctx, metric_of(ctx), v);
-        sum += eits_dot(ctx, v, v, rank);
+        solve_transposed(ctx, ctx->whitening.metric, v);
+        sum += eits_dot(ctx->kernels, v, v, rank);
     }
     for (uint32_t i = 0; i < rank; ++i) {
-        const eits_real w2 = 1 / (ctx->row_scale[i] * ctx->row_scale[i]);
-        total = eits_fma(ctx->row_strength[i] * w2, w2, total);
+        const eits_real w2 = 1 / (ctx->whitening.row_scale[i] * ctx->whitening.row_scale[i]);
+        total = eits_fma(ctx->whitening.row_strength[i] * w2, w2, total);
     }
     const eits_real of_all = eits_regularisation_noise(ctx, eits_regularisation_of_all(ctx));
-    const eits_real ratio = eits_sqrt(ctx->whitening_square * sum / (PROBES * total)) / of_all;
-    ctx->noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));
+    const eits_real ratio = eits_sqrt(ctx->whitening.square * sum / (PROBES * total)) / of_all;
+    ctx->whitening.noise_ratio = of_all * (ratio * eits_sqrt(eits_sqrt(ratio)));
     return PROBES * 2u * triangle_macs(ctx);
 }
 
 eits_real eits_lambda_noise(const eits_context *ctx)
 {
-    return ctx->noise_ratio * ctx->reference.lambda_noise;
+    return ctx->whitening.noise_ratio * ctx->reference.lambda_noise;
 }
 
 /* No row is left out: the regularisation alone may differ. */
@@ -255,52 +272,55 @@ static void raise_regularisation(eits_context *ctx)
     const eits_real regularisation = eits_regularisation_of_all(ctx),
                     noise = eits_regularisation_noise(ctx, regularisation);
     /* a model's rows may be of any size */
-    if (!(regularisation > ctx->regularisation) || !(noise > 0) || !eits_is_finite(noise))
+    if (!(regularisation > ctx->whitening.mu) || !(noise > 0) || !eits_is_finite(noise))
         return;
-    ctx->masked_whitening = EITS_WHITENING_DIAGONAL;
-    ctx->regularisation_in_force = regularisation;
-    ctx->noise_ratio = noise;
-    ctx->reduction_energy = ctx->reduction_energy_stored *
-                            eits_regularisation_weights(ctx, regularisation, whitening_of(ctx));
+    ctx->whitening.form = EITS_WHITENING_DIAGONAL;
+    ctx->whitening.mu_in_force = regularisation;
+    ctx->whitening.noise_ratio = noise;
+    ctx->whitening.energy = ctx->whitening.energy_stored *
+                            eits_regularisation_weights(ctx, regularisation, ctx->whitening.map);
 }
 
-static uint64_t build_triangle(eits_context *ctx, eits_real regularisation, uint32_t missing)
+static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
+                               eits_real regularisation, uint32_t missing)
 {
     const eits_real lost = LOST * regularisation;
-    ctx->whitening_square = STEP_MARGIN * ctx->strongest_square * (1 + regularisation) / (1 + lost);
-    eits_real *f = whitening_of(ctx), *g = metric_of(ctx);
-    uint64_t macs = sum_products(ctx, missing, lost, f);
+    ctx->whitening.square =
+        STEP_MARGIN * ctx->whitening.s1_square * (1 + regularisation) / (1 + lost);
+    eits_real *f = ctx->whitening.map, *g = ctx->whitening.metric;
+    uint64_t macs = sum_products(ctx, scratch, missing, lost, f);
     macs += factor_products(ctx, lost, f);
-    macs += factor_metric(ctx, regularisation, f, g);
-    macs += finish_whitening(ctx, eits_sqrt(ctx->whitening_square), g, f);
-    ctx->masked_whitening = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))
-                                ? EITS_WHITENING_TRIANGLE
-                                : EITS_WHITENING_STORED;
-    if (ctx->masked_whitening)
-        macs += measure_noise(ctx);
-    if (!(ctx->noise_ratio > 0) || !eits_is_finite(ctx->noise_ratio)) {
-        ctx->masked_whitening = EITS_WHITENING_STORED;
-        ctx->noise_ratio = 1;
+    macs += factor_metric(ctx, scratch, regularisation, f, g);
+    macs += finish_whitening(ctx, eits_sqrt(ctx->whitening.square), g, f);
+    ctx->whitening.form = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))
+                              ? EITS_WHITENING_TRIANGLE
+                              : EITS_WHITENING_STORED;
+    if (ctx->whitening.form)
+        macs += measure_noise(ctx, scratch);
+    if (!(ctx->whitening.noise_ratio > 0) || !eits_is_finite(ctx->whitening.noise_ratio)) {
+        ctx->whitening.form = EITS_WHITENING_STORED;
+        ctx->whitening.noise_ratio = 1;
     }
-    ctx->regularisation_in_force = ctx->masked_whitening ? regularisation : ctx->regularisation;
+    ctx->whitening.mu_in_force = ctx->whitening.form ? regularisation : ctx->whitening.mu;
     return macs;
 }
 
-uint64_t eits_whitening_build(eits_context *ctx)
+uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch)
 {
     const uint32_t folded = ctx->model->n_folded;
     uint32_t missing = 0;
     for (uint32_t k = 0; k < folded; ++k)
         missing += !in_use(ctx, k);
-    ctx->masked_whitening = EITS_WHITENING_STORED;
-    ctx->noise_ratio = 1;
-    if (!ctx->can_whiten_masked)
+    ctx->whitening.form = EITS_WHITENING_STORED;
+    ctx->whitening.noise_ratio = 1;
+    if (!ctx->whitening.possible)
         return 0;
-    ctx->regularisation_in_force = ctx->regularisation;
-    ctx->reduction_energy = ctx->reduction_energy_stored;
+    ctx->whitening.mu_in_force = ctx->whitening.mu;
+    ctx->whitening.energy = ctx->whitening.energy_stored;
     if (missing > 0)
         return build_triangle(
-            ctx, eits_regularisation_of_rest(ctx, (eits_real)missing / (eits_real)folded), missing);
+            ctx, scratch, eits_regularisation_of_rest(ctx, (eits_real)missing / (eits_real)folded),
+            missing);
     raise_regularisation(ctx);
     return 0;
 }
@@ -328,12 +348,12 @@ static void solve_transposed(const eits_context *ctx, eits_real *triangle, eits_
  * diag(1/w^2) P_o d_o. */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
 {
-    if (ctx->masked_whitening == EITS_WHITENING_DIAGONAL)
+    if (ctx->whitening.form == EITS_WHITENING_DIAGONAL)
         return eits_whiten(ctx, v);
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        v[i] *= ctx->whitening_square * ctx->row_scale[i] * ctx->row_scale[i];
-    solve_transposed(ctx, whitening_of(ctx), v);
-    solve_transposed(ctx, metric_of(ctx), v);
-    solve(ctx, metric_of(ctx), v);
+        v[i] *= ctx->whitening.square * ctx->whitening.row_scale[i] * ctx->whitening.row_scale[i];
+    solve_transposed(ctx, ctx->whitening.map, v);
+    solve_transposed(ctx, ctx->whitening.metric, v);
+    solve(ctx, ctx->whitening.metric, v);
     return 3u * triangle_macs(ctx);
 }

@@ -10,30 +10,21 @@
 #ifndef EITSKIN_WHITENING_H
 #define EITSKIN_WHITENING_H
 
-#include "eitskin/context.h"
+#include "context/context.h"
 
 /* Whether the model has the builder's form, and with what numbers: w and s from the rows of P and
- * S, mu from how they relate. Otherwise rows left out are minimised over instead (frame.c). Uses
- * ctx->basis and ctx->sz as scratch. */
-void eits_whitening_init(eits_context *ctx);
+ * S, mu from how they relate. Otherwise rows left out are minimised over instead (frame.c). The
+ * triangles' memory is free for it meanwhile. */
+void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch);
 
-/* What ctx->masked_whitening says of F. */
-enum {
-    /* there is none: no row is left out and the regularisation is the model's, or the model has not
-     * the form, or numbers overflow */
-    EITS_WHITENING_STORED = 0,
-    EITS_WHITENING_TRIANGLE = 1, /* rows are left out */
-    EITS_WHITENING_DIAGONAL = 2  /* none is, but the regularisation is raised */
-};
-
-/* Make the whitening for the folded rows that ctx->basis_for has; sets ctx->masked_whitening.
- * Returns the multiply-accumulates. Uses ctx->sz as scratch. */
-uint64_t eits_whitening_build(eits_context *ctx);
+/* Make the whitening for the folded rows that frame.sides has; sets whitening.form.
+ * Returns the multiply-accumulates. */
+uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch);
 
 /* lambda_noise for the rows in use. */
 eits_real eits_lambda_noise(const eits_context *ctx);
 
-/* While ctx->masked_whitening: P d of the rows in use (stride numbers) becomes the data that F S x
+/* While whitening.form: P d of the rows in use (stride numbers) becomes the data that F S x
  * is to meet. */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v);
 

@@ -8,39 +8,40 @@
 /* out = D v. */
 static void weigh(const eits_context *ctx, const eits_real *v, eits_real *out)
 {
-    const eits_real *weight = whitening_of(ctx);
+    const eits_real *weight = ctx->whitening.map;
     for (size_t i = 0; i < EITS_STRIDE(ctx->model->rank); ++i)
         out[i] = weight[i] * v[i];
 }
 
 uint64_t eits_whiten(const eits_context *ctx, eits_real *v)
 {
-    if (ctx->masked_whitening == EITS_WHITENING_DIAGONAL)
+    if (ctx->whitening.form == EITS_WHITENING_DIAGONAL)
         weigh(ctx, v, v);
-    for (uint32_t i = 0; ctx->masked_whitening == EITS_WHITENING_TRIANGLE && i < ctx->model->rank;
+    for (uint32_t i = 0; ctx->whitening.form == EITS_WHITENING_TRIANGLE && i < ctx->model->rank;
          ++i)
-        v[i] = dot_of_row(ctx, i, row_of(ctx, whitening_of(ctx), i), v);
+        v[i] = dot_of_row(ctx, i, row_of(ctx, ctx->whitening.map, i), v);
     return eits_adjoint_macs(ctx);
 }
 
 uint64_t eits_residual(const eits_context *ctx, const eits_real *sx, eits_real *out)
 {
     const size_t stride = EITS_STRIDE(ctx->model->rank);
-    if (ctx->masked_whitening == EITS_WHITENING_TRIANGLE) {
+    /* F and Q have to be applied to S x; y has been through both. */
+    if (ctx->whitening.form == EITS_WHITENING_TRIANGLE) {
         eits_copy(out, sx, stride);
         const uint64_t macs = eits_forward(ctx, out);
         for (size_t i = 0; i < stride; ++i)
-            out[i] = ctx->y[i] - out[i];
+            out[i] = ctx->frame.y[i] - out[i];
         return macs;
     }
-    if (ctx->masked_whitening == EITS_WHITENING_DIAGONAL) {
-        const eits_real *weight = whitening_of(ctx);
+    if (ctx->whitening.form == EITS_WHITENING_DIAGONAL) {
+        const eits_real *weight = ctx->whitening.map;
         for (size_t i = 0; i < stride; ++i)
-            out[i] = eits_fma(-weight[i], sx[i], ctx->y[i]);
+            out[i] = eits_fma(-weight[i], sx[i], ctx->frame.y[i]);
         return ctx->model->rank + eits_project(ctx, out);
     }
-    eits_copy(out, ctx->y, stride);
-    eits_axpy(ctx, out, -1, sx, stride);
+    eits_copy(out, ctx->frame.y, stride);
+    eits_axpy(ctx->kernels, out, -1, sx, stride);
     return eits_project(ctx, out);
 }
 
@@ -52,26 +53,26 @@ uint64_t eits_forward(const eits_context *ctx, eits_real *v)
 
 uint64_t eits_forward_macs(const eits_context *ctx)
 {
-    return eits_adjoint_macs(ctx) + 2u * (uint64_t)ctx->basis_count * ctx->model->rank;
+    return eits_adjoint_macs(ctx) + 2u * (uint64_t)ctx->projection.count * ctx->model->rank;
 }
 
 const eits_real *eits_adjoint(const eits_context *ctx, const eits_real *v, eits_real *room)
 {
-    if (!ctx->masked_whitening)
+    if (!ctx->whitening.form)
         return v;
-    if (ctx->masked_whitening == EITS_WHITENING_DIAGONAL) {
+    if (ctx->whitening.form == EITS_WHITENING_DIAGONAL) {
         weigh(ctx, v, room);
         return room;
     }
     eits_zero(room, EITS_STRIDE(ctx->model->rank));
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
-        add_row(ctx, i, room, v[i], row_of(ctx, whitening_of(ctx), i));
+        add_row(ctx, i, room, v[i], row_of(ctx, ctx->whitening.map, i));
     return room;
 }
 
 uint64_t eits_adjoint_macs(const eits_context *ctx)
 {
-    return ctx->masked_whitening == EITS_WHITENING_TRIANGLE   ? triangle_macs(ctx)
-           : ctx->masked_whitening == EITS_WHITENING_DIAGONAL ? ctx->model->rank
-                                                              : 0;
+    return ctx->whitening.form == EITS_WHITENING_TRIANGLE   ? triangle_macs(ctx)
+           : ctx->whitening.form == EITS_WHITENING_DIAGONAL ? ctx->model->rank
+                                                            : 0;
 }

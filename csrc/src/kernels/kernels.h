@@ -10,6 +10,7 @@
 #define EITSKIN_KERNELS_H
 
 #include "eitskin/context.h"
+#include "eitskin/model.h"
 
 typedef struct eits_prox {
     eits_real step, threshold, beta;
@@ -70,39 +71,26 @@ void eits_read_column(const eits_matrix *matrix, uint32_t column, eits_real *out
 uint32_t eits_list_nonzeros(const eits_kernels *kernels, const eits_matrix *matrix,
                             const eits_real *x, uint32_t *index, eits_real *value);
 
-/* out = S' v by panels if there are any, else from the columns. */
-void eits_apply_t(const eits_context *ctx, const eits_real *v, eits_real *out);
+/* Multiply the values of listed columns by the columns' scales, where the matrix has any. */
+void eits_scale_listed(const eits_matrix *matrix, const uint32_t *index, uint32_t count,
+                       eits_real *values);
 
-/* out = the working set's S' v, by its panels if there are any, else from the columns. */
-void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real *out);
-
-/* out = S x, x being that of the working set; returns the number of non-zeros. Uses the context's
- * list. */
-uint32_t eits_apply_working(const eits_context *ctx, const eits_real *x, eits_real *out);
-
-/* Keep the working set's columns at hand: those of S that are not cached yet are unpacked, and in a
- * prepared context their panels copied. Needed after each change of ctx->working. */
-void eits_pack_panels(eits_context *ctx);
-
-/* out = S x; returns the number of non-zeros. Uses the context's list. */
-uint32_t eits_apply(const eits_context *ctx, const eits_real *x, eits_real *out);
-
-static inline eits_real eits_dot(const eits_context *ctx, const eits_real *a, const eits_real *b,
-                                 size_t count)
+static inline eits_real eits_dot(const eits_kernels *kernels, const eits_real *a,
+                                 const eits_real *b, size_t count)
 {
-    return ctx->kernels->dot(a, b, count);
+    return kernels->dot(a, b, count);
 }
 
-static inline void eits_axpy(const eits_context *ctx, eits_real *out, eits_real factor,
+static inline void eits_axpy(const eits_kernels *kernels, eits_real *out, eits_real factor,
                              const eits_real *a, size_t count)
 {
-    ctx->kernels->axpy(out, factor, a, count);
+    kernels->axpy(out, factor, a, count);
 }
 
-static inline eits_real eits_greatest(const eits_context *ctx, const eits_real *a, size_t count,
+static inline eits_real eits_greatest(const eits_kernels *kernels, const eits_real *a, size_t count,
                                       eits_sign sign)
 {
-    return ctx->kernels->greatest(a, count, sign);
+    return kernels->greatest(a, count, sign);
 }
 
 /* Copy S without scales into panels of EITS_PANEL columns: panel, row, lane. */

@@ -219,11 +219,10 @@ static void mul_t_f32(const eits_matrix *matrix, const uint32_t *index, uint32_t
     "vldmia %[" #C "]!, {s" #C4 "-s" #C7 "}\n\t" HALVES(C4, A, B) HALVES(C5, D, E)           \
         HALVES(C6, F, G) "vcvtb.f32.f16 s" #C6 ", s" #C7 "\n\tvcvtt.f32.f16 s" #C7 ", s" #C7 \
                          "\n\t"
-#define IN_ORDER                                                                    \
-    BOTH(0, 8, 16)                                                                  \
-    BOTH(1, 9, 17)                                                                  \
-    BOTH(2, 10, 18) BOTH(3, 11, 19) BOTH(4, 12, 20) BOTH(5, 13, 21) BOTH(6, 14, 22) \
-        BOTH(7, 15, 23)
+#define IN_ORDER   \
+    BOTH(0, 8, 16) \
+    BOTH(1, 9, 17) \
+    BOTH(2, 10, 18) BOTH(3, 11, 19) BOTH(4, 12, 20) BOTH(5, 13, 21) BOTH(6, 14, 22) BOTH(7, 15, 23)
 TWO_COLUMNS(two_columns_f16,
             HALVES_FROM(c0, 0, 1, 4, 5, 6, 7, 2, 3, 4, 5)
                 HALVES_FROM(c1, 8, 9, 12, 13, 14, 15, 10, 11, 12, 13),

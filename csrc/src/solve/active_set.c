@@ -7,12 +7,12 @@
  * S x as it is, until one of them is zero and makes room: the factor never has more rows than there
  * are directions. */
 #include "base/vec.h"
+#include "context/products.h"
 #include "frame/projection.h"
 #include "frame/whitening.h"
 #include "kernels/column.h"
-#include "solve/duality_gap.h"
 #include "solve/gram_factor.h"
-#include "solve/solvers.h"
+#include "solve/solve.h"
 #include "solve/violations.h"
 #include "solve/working_set.h"
 
@@ -49,24 +49,26 @@ static uint64_t macs_to_finish(const eits_context *ctx, uint32_t count)
 }
 
 /* Whether `macs`, and S x of one more column and the gap after it are still to be had. */
+/* Once a step is too dear the solve ends; what is cheaper is not tried instead, so that the
+ * result does not depend on the order of tests. */
 static int affords(const eits_context *ctx, active *a, uint64_t macs)
 {
     a->limited =
-        a->limited || !eits_affords(ctx, macs + macs_to_finish(ctx, ctx->working_count + 1));
+        a->limited || !eits_affords(ctx, macs + macs_to_finish(ctx, ctx->solver.working_count + 1));
     return !a->limited;
 }
 
 /* The last active column takes the place. Uses a->work and a->step. */
 static void drop(eits_context *ctx, active *a, uint32_t place)
 {
-    const uint32_t count = ctx->working_count, last = count - 1;
+    const uint32_t count = ctx->solver.working_count, last = count - 1;
     if (affords(ctx, a, eits_factor_macs(count))) { /* otherwise the factor is needed no longer */
         ctx->info.macs += eits_factor_macs(count);
         eits_factor_drop(ctx, count, place, a->work, a->step);
     }
-    ctx->working_count = last;
-    ctx->working[place] = ctx->working[last];
-    ctx->x[place] = ctx->x[last];
+    ctx->solver.working_count = last;
+    ctx->solver.working[place] = ctx->solver.working[last];
+    ctx->solver.x[place] = ctx->solver.x[last];
     a->pull[place] = a->pull[last];
     a->sign[place] = a->sign[last];
 }
@@ -75,8 +77,8 @@ static void drop(eits_context *ctx, active *a, uint32_t place)
  */
 static void activate_dependent(eits_context *ctx, uint32_t j, eits_real x)
 {
-    ctx->working[ctx->working_count] = j;
-    ctx->x[ctx->working_count++] = x;
+    ctx->solver.working[ctx->solver.working_count] = j;
+    ctx->solver.x[ctx->solver.working_count++] = x;
 }
 
 /* The part of column j that counts into a->column; returns its square, 0 where it is but rounding.
@@ -85,15 +87,16 @@ static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
     const uint32_t rank = ctx->model->rank;
-    const eits_real scale = eits_column_scale(s, j), *from = eits_column(s, j, ctx->sz);
+    const eits_real scale = eits_column_scale(s, j), *from = eits_column(s, j, ctx->solver.sz);
     for (uint32_t i = 0; i < rank; ++i)
         a->column[i] = scale * from[i];
-    const eits_real before = eits_dot(ctx, a->column, a->column, rank);
+    const eits_real before = eits_dot(ctx->kernels, a->column, a->column, rank);
     ctx->info.macs += rank;
-    if (ctx->basis_count == 0 && !ctx->masked_whitening)
+    /* Nothing is ignored and F = 1: the column counts as it is. */
+    if (ctx->projection.count == 0 && !ctx->whitening.form)
         return before;
     ctx->info.macs += rank + eits_forward(ctx, a->column);
-    const eits_real square = eits_dot(ctx, a->column, a->column, rank);
+    const eits_real square = eits_dot(ctx->kernels, a->column, a->column, rank);
     return square > INDEPENDENT * before ? square : 0;
 }
 
@@ -101,22 +104,23 @@ static eits_real read_column(eits_context *ctx, active *a, uint32_t j)
  * it leaves of its square. */
 static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
 {
-    const uint32_t count = ctx->working_count;
-    ctx->kernels->dots(&ctx->model->sensitivity, ctx->working, count,
-                       eits_adjoint(ctx, a->column, ctx->adjoint), a->step);
+    const uint32_t count = ctx->solver.working_count;
+    ctx->kernels->dots(&ctx->model->sensitivity, ctx->solver.working, count,
+                       eits_adjoint(ctx, a->column, ctx->solver.adjoint), a->step);
     eits_factor_solve(ctx, count, a->step, a->work, a->step);
     ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_adjoint_macs(ctx) +
                       eits_factor_macs(count) + count;
-    return square - eits_dot(ctx, a->work, a->work, count);
+    /* What the projection on the active columns leaves: |s_j|^2 - |K S_A's_j|^2, by Pythagoras. */
+    return square - eits_dot(ctx->kernels, a->work, a->work, count);
 }
 
 static void activate(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_real sign,
                      eits_real pull, eits_real left)
 {
-    const uint32_t k = ctx->working_count++;
+    const uint32_t k = ctx->solver.working_count++;
     eits_factor_append(ctx, k, a->step, left);
-    ctx->working[k] = j;
-    ctx->x[k] = x;
+    ctx->solver.working[k] = j;
+    ctx->solver.x[k] = x;
     a->sign[k] = sign;
     a->pull[k] = pull;
 }
@@ -126,22 +130,24 @@ static void activate(eits_context *ctx, active *a, uint32_t j, eits_real x, eits
  * the new one moved, 0 where there is no such way. */
 static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_real pull)
 {
-    const uint32_t count = ctx->working_count;
+    const uint32_t count = ctx->solver.working_count;
     ctx->info.macs += count;
+    /* The objective's slope along the exchange is the pulls' sum, since S x does not change on the
+     * way. */
     eits_real slope = sign * pull, shortest = R(INFINITY);
     uint32_t place = count;
     for (uint32_t k = 0; k < count; ++k) {
         const eits_real d = -sign * a->step[k];
         slope = eits_fma(d, a->pull[k], slope);
-        if (d * a->sign[k] < 0 && ctx->x[k] / -d < shortest) {
-            shortest = ctx->x[k] / -d;
+        if (d * a->sign[k] < 0 && ctx->solver.x[k] / -d < shortest) {
+            shortest = ctx->solver.x[k] / -d;
             place = k;
         }
     }
     if (!(slope > 0) || place == count)
         return 0;
     for (uint32_t k = 0; k < count; ++k)
-        ctx->x[k] = eits_fma(-sign * shortest, a->step[k], ctx->x[k]);
+        ctx->solver.x[k] = eits_fma(-sign * shortest, a->step[k], ctx->solver.x[k]);
     drop(ctx, a, place);
     a->moved = 1;
     return shortest;
@@ -150,12 +156,12 @@ static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_rea
 /* Take column j in, at zero. */
 static void add(eits_context *ctx, active *a, uint32_t j)
 {
-    const eits_real sign = ctx->gradient[j] > 0 ? 1 : -1,
-                    pull = ctx->gradient[j] - sign * a->lambda;
+    const eits_real sign = ctx->solver.gradient[j] > 0 ? 1 : -1,
+                    pull = ctx->solver.gradient[j] - sign * a->lambda;
     const uint32_t rank = ctx->model->rank;
     eits_real x = 0, square = 0;
     for (int first = 1;; first = 0) {
-        const uint32_t count = ctx->working_count;
+        const uint32_t count = ctx->solver.working_count;
         if (!affords(ctx, a,
                      (uint64_t)rank * (count + 2u) + eits_forward_macs(ctx) +
                          eits_adjoint_macs(ctx) + eits_factor_macs(count) + 2u * count))
@@ -169,7 +175,7 @@ static void add(eits_context *ctx, active *a, uint32_t j)
         }
         const eits_real moved = exchange(ctx, a, sign, pull);
         x += moved;
-        if (ctx->working_count == count) /* no way on */
+        if (ctx->solver.working_count == count) /* no way on */
             break;
     }
     if (x == 0)
@@ -179,9 +185,11 @@ static void add(eits_context *ctx, active *a, uint32_t j)
 }
 
 /* How far coefficient k can go of its step: 2 where it keeps its sign to the end. */
+/* A coefficient that would change sign stops at zero: beyond it lambda |x| has another slope,
+ * and the step is not the optimum any more. */
 static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
 {
-    const eits_real x = ctx->x[k], target = x + a->step[k];
+    const eits_real x = ctx->solver.x[k], target = x + a->step[k];
     if (a->sign[k] * target > 0)
         return 2;
     return x == 0 ? 0 : -x / a->step[k];
@@ -191,8 +199,8 @@ static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
  * change sign. */
 static void settle(eits_context *ctx, active *a)
 {
-    while (ctx->working_count > 0) {
-        const uint32_t count = ctx->working_count;
+    while (ctx->solver.working_count > 0) {
+        const uint32_t count = ctx->solver.working_count;
         if (!affords(ctx, a, eits_factor_macs(count)))
             return;
         eits_factor_solve(ctx, count, a->pull, a->work, a->step);
@@ -207,7 +215,7 @@ static void settle(eits_context *ctx, active *a)
             fraction = a->reach[k] < fraction ? a->reach[k] : fraction;
         }
         for (uint32_t k = 0; k < count; ++k) {
-            ctx->x[k] += fraction * a->step[k];
+            ctx->solver.x[k] += fraction * a->step[k];
             a->pull[k] *= 1 - fraction;
         }
         a->moved = a->moved || fraction > 0;
@@ -223,13 +231,13 @@ static void settle(eits_context *ctx, active *a)
     }
 }
 
-/* The pull of the active columns, from ctx->gradient, which is zero for them afterwards; returns
- * the greatest. */
+/* The pull of the active columns, from solver.gradient, which is zero for them afterwards;
+ * returns the greatest. */
 static eits_real take_pulls(eits_context *ctx, active *a)
 {
     eits_real greatest = 0;
-    for (uint32_t k = 0; k < ctx->working_count; ++k) {
-        eits_real *g = &ctx->gradient[ctx->working[k]];
+    for (uint32_t k = 0; k < ctx->solver.working_count; ++k) {
+        eits_real *g = &ctx->solver.gradient[ctx->solver.working[k]];
         a->pull[k] = *g - a->sign[k] * a->lambda;
         greatest = eits_fabs(a->pull[k]) > greatest ? eits_fabs(a->pull[k]) : greatest;
         *g = 0;
@@ -237,9 +245,9 @@ static eits_real take_pulls(eits_context *ctx, active *a)
     return greatest;
 }
 
-static eits_duality_gap check_gap(eits_context *ctx, const active *a)
+static eits_duality_gap check_gap(eits_context *ctx, const eits_scratch *scratch, const active *a)
 {
-    ctx->info.nonzeros = eits_apply_working(ctx, ctx->x, ctx->sx);
+    ctx->info.nonzeros = eits_apply_working(ctx, scratch, ctx->solver.x, ctx->solver.sx);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
     return eits_find_duality_gap(ctx, a->lambda, EITS_LAYOUT_WORKING);
 }
@@ -255,8 +263,9 @@ static int begin_warm(eits_context *ctx, active *a)
                                active_count * (rank + active_count) + 2u * eits_gradient_macs(ctx)))
         return 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
-        const eits_real x = ctx->x[j];
-        const eits_real square = x != 0 && ctx->working_count < a->max ? read_column(ctx, a, j) : 0;
+        const eits_real x = ctx->solver.x[j];
+        const eits_real square =
+            x != 0 && ctx->solver.working_count < a->max ? read_column(ctx, a, j) : 0;
         if (!(square > 0))
             continue;
         const eits_real left = what_is_left(ctx, a, square);
@@ -268,19 +277,21 @@ static int begin_warm(eits_context *ctx, active *a)
 
 static void start_over_from_zero(eits_context *ctx)
 {
-    ctx->working_count = 0;
+    ctx->solver.working_count = 0;
     ctx->info.nonzeros = 0;
-    eits_zero(ctx->x, ctx->model->n_pixels);
-    eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
+    eits_zero(ctx->solver.x, ctx->model->n_pixels);
+    eits_zero(ctx->solver.sx, EITS_STRIDE(ctx->model->rank));
 }
 
 /* Take in the first `missing` columns listed, and step to the optimum with them. Returns whether
  * anything moved. */
-static int take_in(eits_context *ctx, active *a, uint32_t missing)
+/* A column that comes in loosely ends the round: the factor does not have it, so no step may be
+ * based on it. */
+static int take_in(eits_context *ctx, const eits_scratch *scratch, active *a, uint32_t missing)
 {
     a->moved = 0;
     for (uint32_t k = 0; k < missing && !a->limited && !a->loose; ++k)
-        add(ctx, a, ctx->list_index[k]);
+        add(ctx, a, scratch->index[k]);
     if (!a->loose)
         settle(ctx, a);
     return a->moved;
@@ -288,48 +299,52 @@ static int take_in(eits_context *ctx, active *a, uint32_t missing)
 
 /* What joins next is mostly beside what is or was active: look there only. *objective is the last
  * one known. Returns whether anything moved. */
-static int look_nearby(eits_context *ctx, active *a, eits_real *objective)
+static int look_nearby(eits_context *ctx, const eits_scratch *scratch, active *a,
+                       eits_real *objective)
 {
     const uint64_t rank = ctx->model->rank;
     if (a->limited || a->loose || a->broken ||
-        !eits_affords(ctx, ctx->working_count * rank + eits_forward_macs(ctx) +
-                               macs_to_finish(ctx, ctx->working_count)))
+        !eits_affords(ctx, ctx->solver.working_count * rank + eits_forward_macs(ctx) +
+                               macs_to_finish(ctx, ctx->solver.working_count)))
         return 0;
-    ctx->info.macs += rank * eits_apply_working(ctx, ctx->x, ctx->sx);
-    ctx->info.macs += eits_take_residual(ctx, ctx->sx);
+    ctx->info.macs += rank * eits_apply_working(ctx, scratch, ctx->solver.x, ctx->solver.sx);
+    ctx->info.macs += eits_take_residual(ctx, ctx->solver.sx);
     eits_real l1 = 0;
-    for (uint32_t k = 0; k < ctx->working_count; ++k)
-        l1 += eits_fabs(ctx->x[k]);
-    const eits_real now =
-        R(0.5) * eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank) + a->lambda * l1;
+    for (uint32_t k = 0; k < ctx->solver.working_count; ++k)
+        l1 += eits_fabs(ctx->solver.x[k]);
+    const eits_real now = R(0.5) * eits_dot(ctx->kernels, ctx->solver.residual,
+                                            ctx->solver.residual, ctx->model->rank) +
+                          a->lambda * l1;
     if (!(now < *objective * (1 - WORTHWHILE)))
         return 0;
     *objective = now;
     eits_nearby_add(ctx, &a->near);
     if (!eits_affords(ctx, a->near.count * rank + eits_adjoint_macs(ctx) +
-                               macs_to_finish(ctx, ctx->working_count)))
+                               macs_to_finish(ctx, ctx->solver.working_count)))
         return 0;
-    eits_take_gradient_nearby(ctx, &a->near);
+    eits_take_gradient_nearby(ctx, scratch, &a->near);
     (void)take_pulls(ctx, a);
-    const uint32_t missing = eits_list_violations(ctx, a->lambda + a->tolerance, &a->near);
-    return missing > 0 && take_in(ctx, a, missing);
+    const uint32_t missing = eits_list_violations(ctx, scratch, a->lambda + a->tolerance, &a->near);
+    return missing > 0 && take_in(ctx, scratch, a, missing);
 }
 
 /* One round; *c becomes the duality gap after it. */
-static int round_of(eits_context *ctx, active *a, uint32_t missing, eits_duality_gap *c)
+static int round_of(eits_context *ctx, const eits_scratch *scratch, active *a, uint32_t missing,
+                    eits_duality_gap *c)
 {
     eits_real objective = c->objective;
     ++ctx->info.iterations;
-    const int moved = take_in(ctx, a, missing);
-    for (int looks = 0; moved && looks < LOOKS_NEARBY && look_nearby(ctx, a, &objective); ++looks)
+    const int moved = take_in(ctx, scratch, a, missing);
+    for (int looks = 0; moved && looks < LOOKS_NEARBY && look_nearby(ctx, scratch, a, &objective);
+         ++looks)
         ;
     if (moved)
-        *c = check_gap(ctx, a);
+        *c = check_gap(ctx, scratch, a);
     return moved;
 }
 
 /* Rounds until something ends them; 0 where another solver has to go on. */
-static int rounds(eits_context *ctx, active *a, eits_duality_gap *c)
+static int rounds(eits_context *ctx, const eits_scratch *scratch, active *a, eits_duality_gap *c)
 {
     const eits_options *o = &ctx->options;
     const eits_real enough = o->gap_rel * R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
@@ -343,12 +358,12 @@ static int rounds(eits_context *ctx, active *a, eits_duality_gap *c)
             return 1;
         }
         const eits_real pull = take_pulls(ctx, a), before = c->objective;
-        const uint32_t missing = eits_list_violations(ctx, a->lambda + a->tolerance, NULL);
+        const uint32_t missing = eits_list_violations(ctx, scratch, a->lambda + a->tolerance, NULL);
         if (stalls == 2 || (missing == 0 && pull <= a->tolerance)) {
             ctx->info.stop = EITS_STOP_OPTIMUM;
             return 1;
         }
-        const int moved = round_of(ctx, a, stalls > 0 && missing > 1 ? 1 : missing, c);
+        const int moved = round_of(ctx, scratch, a, stalls > 0 && missing > 1 ? 1 : missing, c);
         if (a->broken || (a->loose && !a->limited) || !(c->objective <= before * (1 + R(1e-3))))
             return 0;
         if (a->limited) {
@@ -361,22 +376,26 @@ static int rounds(eits_context *ctx, active *a, eits_duality_gap *c)
     }
 }
 
-void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known)
+void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                         int gradient_known)
 {
-    const uint32_t free = ctx->model->rank - ctx->basis_count;
+    const uint32_t free = ctx->model->rank - ctx->projection.count;
     active a = {.lambda = lambda, .max = free < ctx->model->n_pixels ? free : ctx->model->n_pixels};
+    /* Rounding of a correlation is about epsilon |s_j| |y|, and |s_j|^2 at most the Lipschitz
+     * constant. */
     a.tolerance = 2 * EPSILON * eits_sqrt((eits_real)ctx->model->lipschitz) * ctx->info.data_norm;
-    a.pull = ctx->slope[0], a.sign = ctx->slope[1], a.work = ctx->slope[2], a.step = ctx->sz;
-    a.reach = ctx->x_next, a.column = ctx->sx_next;
+    a.pull = scratch->row[5], a.sign = scratch->row[6], a.work = scratch->row[7],
+    a.step = ctx->solver.sz;
+    a.reach = ctx->solver.x_next, a.column = ctx->solver.sx_next;
     a.near = eits_nearby_none(ctx);
     eits_duality_gap c;
     /* the set changes column by column here: none are active unpacked */
-    ctx->working_count = ctx->working_cached = 0;
+    ctx->solver.working_count = ctx->solver.working_cached = 0;
     if (gradient_known) {
-        eits_copy(ctx->residual, ctx->y, EITS_STRIDE(ctx->model->rank));
+        eits_copy(ctx->solver.residual, ctx->frame.y, EITS_STRIDE(ctx->model->rank));
         c = eits_duality_gap_of(ctx, lambda, EITS_LAYOUT_WORKING);
     } else if (begin_warm(ctx, &a)) {
-        c = check_gap(ctx, &a);
+        c = check_gap(ctx, scratch, &a);
         if (!(c.objective < eits_ceiling(ctx))) {
             start_over_from_zero(ctx);
             c = eits_find_duality_gap(ctx, lambda, EITS_LAYOUT_WORKING);
@@ -386,8 +405,9 @@ void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known
         eits_report_duality_gap(ctx, eits_find_duality_gap(ctx, lambda, EITS_LAYOUT_FULL));
         return;
     }
-    const int done = rounds(ctx, &a, &c);
-    if (!done && !(eits_all_finite(ctx->x, ctx->working_count) && c.objective <= eits_ceiling(ctx)))
+    const int done = rounds(ctx, scratch, &a, &c);
+    if (!done && !(eits_all_finite(ctx->solver.x, ctx->solver.working_count) &&
+                   c.objective <= eits_ceiling(ctx)))
         start_over_from_zero(ctx);
     eits_working_set_end(ctx);
     if (done) {
@@ -400,5 +420,5 @@ void eits_run_active_set(eits_context *ctx, eits_real lambda, int gradient_known
                                                              : c);
         return;
     }
-    eits_run_coordinate(ctx, lambda, 0);
+    eits_run_coordinate(ctx, scratch, lambda, 0);
 }

@@ -6,35 +6,30 @@
  * either. Where rows left out are whitened again (whitening.h) what is kept is F' of the residual.
  */
 #include "base/vec.h"
+#include "context/products.h"
 #include "frame/projection.h"
 #include "frame/whitening.h"
 #include "kernels/column.h"
 #include "kernels/kernels.h"
-#include "solve/duality_gap.h"
-#include "solve/solvers.h"
+#include "solve/solve.h"
 #include "solve/working_set.h"
 
 typedef struct descent {
     eits_real lambda;
-    /* where one direction is ignored: the residual's part along it, which ctx->residual then has
-     * too */
+    /* where one direction is ignored: the residual's part along it, which solver.residual then
+     * has too */
     eits_real along;
     eits_real *norm;  /* |s_j|^2; negative: not known yet */
     eits_real *slant; /* s_j along the direction ignored */
     int apart; /* at most one direction is ignored, and nothing is whitened for masked rows */
 } descent;
 
-static eits_real *scratch(const eits_context *ctx)
-{
-    return ctx->sz;
-}
-
 static uint64_t macs_of_a_visit(const eits_context *ctx, const descent *d)
 {
     const uint64_t rank = ctx->model->rank;
-    if (ctx->masked_whitening)
+    if (ctx->whitening.form)
         return 3u * rank + 2u * eits_forward_macs(ctx) + eits_adjoint_macs(ctx);
-    return rank * (d->apart ? 4u : 3u + 2u * ctx->basis_count);
+    return rank * (d->apart ? 4u : 3u + 2u * ctx->projection.count);
 }
 
 /* Whether one more visit, S x with one more column and the gap after it are still to be had. */
@@ -48,7 +43,7 @@ static int affords_visit(const eits_context *ctx, const descent *d)
 /* F s_j of a column. */
 static eits_real *see(eits_context *ctx, const eits_real *column, eits_real scale)
 {
-    eits_real *seen = ctx->sx_next;
+    eits_real *seen = ctx->solver.sx_next;
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         seen[i] = scale * column[i];
     ctx->info.macs += eits_whiten(ctx, seen);
@@ -59,17 +54,17 @@ static void measure(eits_context *ctx, descent *d, uint32_t j, const eits_real *
                     eits_real scale)
 {
     const uint32_t rank = ctx->model->rank;
-    if (ctx->masked_whitening) {
+    if (ctx->whitening.form) {
         const eits_real *seen = see(ctx, column, scale);
-        d->norm[j] = eits_dot(ctx, seen, seen, rank);
+        d->norm[j] = eits_dot(ctx->kernels, seen, seen, rank);
         ctx->info.macs += rank;
         return;
     }
-    d->norm[j] = scale * scale * eits_dot(ctx, column, column, rank);
+    d->norm[j] = scale * scale * eits_dot(ctx->kernels, column, column, rank);
     ctx->info.macs += rank;
-    if (!d->apart || ctx->basis_count == 0)
+    if (!d->apart || ctx->projection.count == 0)
         return;
-    d->slant[j] = scale * eits_dot(ctx, column, ctx->basis, rank);
+    d->slant[j] = scale * eits_dot(ctx->kernels, column, ctx->projection.basis, rank);
     ctx->info.macs += rank;
 }
 
@@ -79,34 +74,38 @@ static void measure(eits_context *ctx, descent *d, uint32_t j, const eits_real *
 static eits_real visit(eits_context *ctx, descent *d, uint32_t j)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
-    const eits_real *column = eits_column(s, j, scratch(ctx)), scale = eits_column_scale(s, j);
+    const eits_real *column = eits_column(s, j, ctx->solver.sz), scale = eits_column_scale(s, j);
     const uint32_t rank = ctx->model->rank;
+    /* Most columns are never visited, so norms are found when they are first needed. */
     if (d->norm[j] < 0)
         measure(ctx, d, j, column, scale);
-    eits_real gradient = scale * eits_dot(ctx, column, ctx->residual, rank);
+    eits_real gradient = scale * eits_dot(ctx->kernels, column, ctx->solver.residual, rank);
     ctx->info.macs += rank;
-    if (d->apart && ctx->basis_count == 1)
+    if (d->apart && ctx->projection.count == 1)
         gradient = eits_fma(-d->along, d->slant[j], gradient);
-    const eits_real norm = d->norm[j], before = ctx->x[j], v = eits_fma(norm, before, gradient);
+    const eits_real norm = d->norm[j], before = ctx->solver.x[j],
+                    v = eits_fma(norm, before, gradient);
     const int up = ctx->options.sign != EITS_SIGN_DECREASE && v > d->lambda;
     const int down = ctx->options.sign != EITS_SIGN_INCREASE && v < -d->lambda;
+    /* Soft threshold: the minimum of a parabola and lambda |x| along one axis. */
     const eits_real shrunk = up ? v - d->lambda : down ? v + d->lambda : 0;
     const eits_real after = norm > 0 ? shrunk / norm : 0, step = after - before;
     if (step == 0)
         return 0;
-    ctx->x[j] = after;
+    ctx->solver.x[j] = after;
     ctx->info.nonzeros += (uint32_t)(after != 0) - (uint32_t)(before != 0);
     ctx->info.macs += rank;
-    if (ctx->masked_whitening) {
+    if (ctx->whitening.form) {
         eits_real *seen = see(ctx, column, scale);
         ctx->info.macs += eits_project(ctx, seen) + eits_adjoint_macs(ctx);
-        eits_axpy(ctx, ctx->residual, -step, eits_adjoint(ctx, seen, ctx->adjoint), rank);
+        eits_axpy(ctx->kernels, ctx->solver.residual, -step,
+                  eits_adjoint(ctx, seen, ctx->solver.adjoint), rank);
         return norm * step * step;
     }
-    eits_axpy(ctx, ctx->residual, -step * scale, column, rank);
+    eits_axpy(ctx->kernels, ctx->solver.residual, -step * scale, column, rank);
     if (!d->apart)
-        ctx->info.macs += eits_project(ctx, ctx->residual);
-    else if (ctx->basis_count == 1)
+        ctx->info.macs += eits_project(ctx, ctx->solver.residual);
+    else if (ctx->projection.count == 1)
         d->along = eits_fma(-step, d->slant[j], d->along);
     return norm * step * step;
 }
@@ -121,35 +120,38 @@ static sweep_end sweep(eits_context *ctx, descent *d, eits_real *worth)
 {
     uint32_t count = 0, k = 0;
     *worth = 0;
-    for (; k < ctx->working_count && affords_visit(ctx, d); ++k) {
-        const uint32_t j = ctx->working[k];
+    for (; k < ctx->solver.working_count && affords_visit(ctx, d); ++k) {
+        const uint32_t j = ctx->solver.working[k];
         const eits_real won = visit(ctx, d, j);
         *worth += won;
-        if (ctx->x[j] != 0 || won != 0)
-            ctx->working[count++] = j;
+        if (ctx->solver.x[j] != 0 || won != 0)
+            ctx->solver.working[count++] = j;
     }
-    const sweep_end end = k < ctx->working_count ? SWEEP_LIMIT : SWEEP_DONE;
-    ctx->working_count = count;
+    const sweep_end end = k < ctx->solver.working_count ? SWEEP_LIMIT : SWEEP_DONE;
+    ctx->solver.working_count = count;
     return end;
 }
 
 /* Take S x, the residual and the gradient of every column anew. */
-static eits_duality_gap look(eits_context *ctx, descent *d)
+static eits_duality_gap look(eits_context *ctx, const eits_scratch *scratch, descent *d)
 {
-    ctx->info.nonzeros = eits_apply(ctx, ctx->x, ctx->sx);
+    ctx->info.nonzeros = eits_apply(ctx, scratch, ctx->solver.x, ctx->solver.sx);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
     d->along = 0;
     return eits_find_duality_gap(ctx, d->lambda, EITS_LAYOUT_FULL);
 }
 
+/* All that are not zero, whether they move or not: only their sum tells when the sweep is at
+ * rest. */
 static void choose(eits_context *ctx, const descent *d)
 {
     uint32_t count = 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
-        ctx->working[count] = j;
-        count += ctx->x[j] != 0 || eits_moves(ctx->gradient[j], d->lambda, ctx->options.sign);
+        ctx->solver.working[count] = j;
+        count += ctx->solver.x[j] != 0 ||
+                 eits_moves(ctx->solver.gradient[j], d->lambda, ctx->options.sign);
     }
-    ctx->working_count = count;
+    ctx->solver.working_count = count;
 }
 
 /* What all steps of a sweep are worth when only rounding moves. */
@@ -165,7 +167,7 @@ static eits_real rounding(const eits_context *ctx)
 static int descend(eits_context *ctx, descent *d, uint32_t last)
 {
     eits_real first = 0, worth = 0;
-    eits_copy(ctx->residual, eits_adjoint(ctx, ctx->residual, ctx->adjoint),
+    eits_copy(ctx->solver.residual, eits_adjoint(ctx, ctx->solver.residual, ctx->solver.adjoint),
               EITS_STRIDE(ctx->model->rank));
     ctx->info.macs += eits_adjoint_macs(ctx);
     for (int begun = 0; ctx->info.iterations < last && !(begun && worth <= SETTLED * first);
@@ -182,23 +184,24 @@ static int descend(eits_context *ctx, descent *d, uint32_t last)
     return 0;
 }
 
-void eits_run_coordinate(eits_context *ctx, eits_real lambda, int gradient_known)
+void eits_run_coordinate(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                         int gradient_known)
 {
     const eits_options *o = &ctx->options;
     const eits_real scale = R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
     const uint32_t end = o->iterations;
     descent d = {.lambda = lambda,
-                 .norm = ctx->z,
-                 .slant = ctx->x_next,
-                 .apart = !ctx->masked_whitening && ctx->basis_count <= 1};
+                 .norm = ctx->solver.z,
+                 .slant = ctx->solver.x_next,
+                 .apart = !ctx->whitening.form && ctx->projection.count <= 1};
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         d.norm[j] = -1;
     eits_duality_gap c = {0};
     if (gradient_known) {
-        eits_copy(ctx->residual, ctx->y, EITS_STRIDE(ctx->model->rank));
+        eits_copy(ctx->solver.residual, ctx->frame.y, EITS_STRIDE(ctx->model->rank));
         c = eits_duality_gap_of(ctx, lambda, EITS_LAYOUT_FULL);
     } else {
-        c = look(ctx, &d);
+        c = look(ctx, scratch, &d);
     }
     ctx->info.stop = EITS_STOP_ITERATIONS;
     uint32_t interval = o->gap_every;
@@ -211,7 +214,7 @@ void eits_run_coordinate(eits_context *ctx, eits_real lambda, int gradient_known
         const uint32_t done = ctx->info.iterations,
                        due = interval < end - done ? done + interval : end;
         const int resting = descend(ctx, &d, due);
-        c = look(ctx, &d);
+        c = look(ctx, scratch, &d);
         if (!(c.objective <= eits_ceiling(ctx))) {
             ctx->info.stop = EITS_STOP_DIVERGED;
             break;

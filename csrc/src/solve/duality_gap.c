@@ -1,16 +1,19 @@
 /* The duality gap, the gradient that it needs, and the limit of multiply-accumulates. */
-#include "solve/duality_gap.h"
+#include "solve/solve.h"
 
 #include "base/vec.h"
+#include "context/products.h"
 #include "frame/projection.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
 uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx)
 {
-    return eits_residual(ctx, sx, ctx->residual);
+    return eits_residual(ctx, sx, ctx->solver.residual);
 }
 
+/* Counted in advance as well, so that a step is not begun which the limit would leave without
+ * its gap. */
 uint64_t eits_gradient_macs(const eits_context *ctx)
 {
     return (uint64_t)ctx->model->n_pixels * ctx->model->rank + eits_forward_macs(ctx) +
@@ -20,7 +23,8 @@ uint64_t eits_gradient_macs(const eits_context *ctx)
 void eits_take_gradient(eits_context *ctx, const eits_real *sx)
 {
     (void)eits_take_residual(ctx, sx);
-    eits_apply_t(ctx, eits_adjoint(ctx, ctx->residual, ctx->adjoint), ctx->gradient);
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->solver.residual, ctx->solver.adjoint),
+                 ctx->solver.gradient);
     ctx->info.macs += eits_gradient_macs(ctx);
 }
 
@@ -34,6 +38,8 @@ static eits_real half_square_of_data(const eits_context *ctx)
     return R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
 }
 
+/* Rounding may lift the objective a little; a thousandth of its value at zero is far above
+ * rounding and far below what a step too long does. */
 eits_real eits_ceiling(const eits_context *ctx)
 {
     return half_square_of_data(ctx) * (1 + R(1e-3));
@@ -47,20 +53,23 @@ eits_real eits_ceiling(const eits_context *ctx)
 eits_duality_gap eits_duality_gap_of(const eits_context *ctx, eits_real lambda, eits_layout layout)
 {
     const eits_real largest =
-        eits_greatest(ctx, ctx->gradient, ctx->model->n_pixels, ctx->options.sign);
+        eits_greatest(ctx->kernels, ctx->solver.gradient, ctx->model->n_pixels, ctx->options.sign);
     const eits_real s = largest > lambda ? lambda / largest : 1;
     const uint32_t count =
-        layout == EITS_LAYOUT_WORKING ? ctx->working_count : ctx->model->n_pixels;
+        layout == EITS_LAYOUT_WORKING ? ctx->solver.working_count : ctx->model->n_pixels;
     eits_real lane[8] = {0}, lane_l1[8] = {0};
     for (uint32_t k = 0; k < count; ++k) { /* columns that are not cached add zero to their lanes */
-        const uint32_t j = layout == EITS_LAYOUT_WORKING ? ctx->working[k] : k;
-        const eits_real weight = lambda * eits_fabs(ctx->x[k]);
-        const eits_real slack = eits_fma(-s * ctx->x[k], ctx->gradient[j], weight);
+        const uint32_t j = layout == EITS_LAYOUT_WORKING ? ctx->solver.working[k] : k;
+        const eits_real weight = lambda * eits_fabs(ctx->solver.x[k]);
+        const eits_real slack = eits_fma(-s * ctx->solver.x[k], ctx->solver.gradient[j], weight);
+        /* By lanes of the column's number, not of its place in the list: the sum then has the same
+         * bits in either layout. */
         lane[j % 8] += slack > 0 ? slack : 0; /* below zero by rounding only */
         lane_l1[j % 8] += weight;
     }
     eits_duality_gap c;
-    c.residual_squared = eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
+    c.residual_squared =
+        eits_dot(ctx->kernels, ctx->solver.residual, ctx->solver.residual, ctx->model->rank);
     c.gap = eits_fma(R(0.5) * (1 - s) * (1 - s), c.residual_squared, eits_tree8(lane));
     c.objective = eits_fma(R(0.5), c.residual_squared, eits_tree8(lane_l1));
     return c;
@@ -68,7 +77,7 @@ eits_duality_gap eits_duality_gap_of(const eits_context *ctx, eits_real lambda, 
 
 eits_duality_gap eits_find_duality_gap(eits_context *ctx, eits_real lambda, eits_layout layout)
 {
-    eits_take_gradient(ctx, ctx->sx);
+    eits_take_gradient(ctx, ctx->solver.sx);
     return eits_duality_gap_of(ctx, lambda, layout);
 }
 

@@ -1,10 +1,10 @@
 /* FISTA with non-negative, non-positive or signed shrinkage; solve.h has the problem and its
  * source. */
 #include "base/vec.h"
+#include "context/products.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
-#include "solve/duality_gap.h"
-#include "solve/solvers.h"
+#include "solve/solve.h"
 #include "solve/working_set.h"
 
 enum { MAX_STEP_HALVINGS = 8 };
@@ -17,29 +17,33 @@ static int by_working_set(const eits_context *ctx)
 /* How many coefficients x, x_next and z hold. */
 static uint32_t working_size(const eits_context *ctx)
 {
-    return by_working_set(ctx) ? ctx->working_count : ctx->model->n_pixels;
+    return by_working_set(ctx) ? ctx->solver.working_count : ctx->model->n_pixels;
 }
 
 static void take_working_gradient(eits_context *ctx, const eits_real *sx)
 {
     ctx->info.macs += eits_take_residual(ctx, sx);
-    eits_apply_t_working(ctx, eits_adjoint(ctx, ctx->residual, ctx->adjoint), ctx->gradient);
-    ctx->info.macs += (uint64_t)ctx->working_count * ctx->model->rank + eits_adjoint_macs(ctx);
+    eits_apply_t_working(ctx, eits_adjoint(ctx, ctx->solver.residual, ctx->solver.adjoint),
+                         ctx->solver.gradient);
+    ctx->info.macs +=
+        (uint64_t)ctx->solver.working_count * ctx->model->rank + eits_adjoint_macs(ctx);
 }
 
 /* The extrapolated point starts at x, momentum forgotten. */
 static void restart_momentum(eits_context *ctx)
 {
-    eits_copy(ctx->z, ctx->x, working_size(ctx));
-    eits_copy(ctx->sz, ctx->sx, EITS_STRIDE(ctx->model->rank));
+    eits_copy(ctx->solver.z, ctx->solver.x, working_size(ctx));
+    eits_copy(ctx->solver.sz, ctx->solver.sx, EITS_STRIDE(ctx->model->rank));
 }
 
+/* After a step that was too long the last x may be anywhere, infinite even; zero is the only
+ * point known to be good. */
 static void start_over_from_zero(eits_context *ctx)
 {
-    ctx->working_count = 0;
+    ctx->solver.working_count = 0;
     ctx->info.nonzeros = 0;
-    eits_zero(ctx->x, ctx->model->n_pixels);
-    eits_zero(ctx->sx, EITS_STRIDE(ctx->model->rank));
+    eits_zero(ctx->solver.x, ctx->model->n_pixels);
+    eits_zero(ctx->solver.sx, EITS_STRIDE(ctx->model->rank));
     restart_momentum(ctx);
 }
 
@@ -57,27 +61,34 @@ static int affords_product(const eits_context *ctx)
         return 1;
     uint64_t count = 0;
     for (uint32_t k = 0; k < working_size(ctx); ++k)
-        count += ctx->x_next[k] != 0;
+        count += ctx->solver.x_next[k] != 0;
     return eits_affords(ctx, count * ctx->model->rank + eits_gradient_macs(ctx));
 }
 
-/* One iteration from z with the given step, ctx->gradient being that at z; *t is the momentum
- * number. 0 where the limit of multiply-accumulates allows it no longer; x is as it was then. */
-static int iterate(eits_context *ctx, eits_real lambda, eits_real step, eits_real *t)
+/* One iteration from z with the given step, solver.gradient being that at z; *t is the
+ * momentum number. 0 where the limit of multiply-accumulates allows it no longer; x is as it was
+ * then. */
+static int iterate(eits_context *ctx, const eits_scratch *scratch, eits_real lambda, eits_real step,
+                   eits_real *t)
 {
     const eits_real t_next = R(0.5) * (1 + eits_sqrt(eits_fma(4 * *t, *t, 1)));
     const eits_real beta = (*t - 1) / t_next;
     const eits_prox how = {
         .step = step, .threshold = step * lambda, .beta = beta, .sign = ctx->options.sign};
-    ctx->kernels->prox(&how, working_size(ctx), ctx->gradient, ctx->x, ctx->x_next, ctx->z);
+    ctx->kernels->prox(&how, working_size(ctx), ctx->solver.gradient, ctx->solver.x,
+                       ctx->solver.x_next, ctx->solver.z);
     if (!affords_product(ctx))
         return 0;
-    ctx->info.nonzeros = by_working_set(ctx) ? eits_apply_working(ctx, ctx->x_next, ctx->sx_next)
-                                             : eits_apply(ctx, ctx->x_next, ctx->sx_next);
+    ctx->info.nonzeros =
+        by_working_set(ctx)
+            ? eits_apply_working(ctx, scratch, ctx->solver.x_next, ctx->solver.sx_next)
+            : eits_apply(ctx, scratch, ctx->solver.x_next, ctx->solver.sx_next);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
-    ctx->kernels->extrapolate(ctx->sz, beta, ctx->sx_next, ctx->sx, EITS_STRIDE(ctx->model->rank));
-    swap(&ctx->x, &ctx->x_next);
-    swap(&ctx->sx, &ctx->sx_next);
+    /* S z from S x as z from x: linear, and it saves a product. */
+    ctx->kernels->extrapolate(ctx->solver.sz, beta, ctx->solver.sx_next, ctx->solver.sx,
+                              EITS_STRIDE(ctx->model->rank));
+    swap(&ctx->solver.x, &ctx->solver.x_next);
+    swap(&ctx->solver.sx, &ctx->solver.sx_next);
     *t = t_next;
     return 1;
 }
@@ -101,34 +112,35 @@ static int looks_at_every_column(const eits_context *ctx, uint32_t k, const sche
 static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule *s)
 {
     const uint64_t total = eits_gradient_macs(ctx);
-    const uint64_t some = (uint64_t)ctx->working_count * ctx->model->rank + eits_forward_macs(ctx) +
-                          eits_adjoint_macs(ctx);
+    const uint64_t some = (uint64_t)ctx->solver.working_count * ctx->model->rank +
+                          eits_forward_macs(ctx) + eits_adjoint_macs(ctx);
     return eits_affords(ctx, total + (looks_at_every_column(ctx, k, s) ? total : some));
 }
 
 /* The gradient at z for iteration k (from 1): of every column, or of the working set as it is then.
  */
-static void prepare_gradient(eits_context *ctx, eits_real lambda, uint32_t k, schedule *s,
-                             int known)
+static void prepare_gradient(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                             uint32_t k, schedule *s, int known)
 {
     if (looks_at_every_column(ctx, k, s)) {
         if (!known)
-            eits_take_gradient(ctx, ctx->sz);
+            eits_take_gradient(ctx, ctx->solver.sz);
         if (!by_working_set(ctx))
             return;
-        eits_working_set_choose(ctx, lambda);
+        eits_working_set_choose(ctx, scratch, lambda);
         s->next_look = s->interval < UINT32_MAX - k ? k + s->interval : UINT32_MAX;
         s->interval = ctx->options.gap_rel > 0 || s->interval > UINT32_MAX / LOOK_GROWTH / 2
                           ? s->interval
                           : LOOK_GROWTH * s->interval;
         return;
     }
-    take_working_gradient(ctx, ctx->sz);
+    take_working_gradient(ctx, ctx->solver.sz);
     if (k % PRUNE_EVERY == 1)
         eits_working_set_prune(ctx, lambda);
 }
 
-static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient_known)
+static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                               int gradient_known)
 {
     const eits_options *o = &ctx->options;
     const eits_layout layout = by_working_set(ctx) ? EITS_LAYOUT_WORKING : EITS_LAYOUT_FULL;
@@ -145,8 +157,8 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
         if (!known && !affords_gradient(ctx, k, &looks))
             ctx->info.stop = EITS_STOP_MACS;
         else
-            prepare_gradient(ctx, lambda, k, &looks, known);
-        if (ctx->info.stop == EITS_STOP_MACS || !iterate(ctx, lambda, step, &t)) {
+            prepare_gradient(ctx, scratch, lambda, k, &looks, known);
+        if (ctx->info.stop == EITS_STOP_MACS || !iterate(ctx, scratch, lambda, step, &t)) {
             ctx->info.stop = EITS_STOP_MACS;
             break;
         }
@@ -154,9 +166,12 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
         gap_known = 0;
         if (k != o->iterations && k % o->gap_every != 0)
             continue;
+        /* The gap costs a whole gradient: it is found at the end, where one is asked for, and where
+         * |S x| says that the objective may have risen. */
         const int none = ctx->info.nonzeros == 0;
         if (k != o->iterations && !(o->gap_rel > 0) && !none &&
-            eits_dot(ctx, ctx->sx, ctx->sx, ctx->model->rank) <= 4 * 2 * scale)
+            eits_dot(ctx->kernels, ctx->solver.sx, ctx->solver.sx, ctx->model->rank) <=
+                4 * 2 * scale)
             continue; /* |Sx| <= 2 |y| wherever the objective is below its value at zero */
         c = eits_find_duality_gap(ctx, lambda, layout);
         gap_known = 1;
@@ -171,6 +186,8 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
             step *= R(0.5);
             t = 1;
             start_over_from_zero(ctx);
+            /* With the shorter step all begins again, the schedule included; iterations spent stay
+             * spent. */
             looks = (schedule){.next_look = k + 1, .interval = o->gap_every};
             c = eits_duality_gap_at_zero(ctx, lambda);
             continue;
@@ -190,12 +207,25 @@ static void iterate_to_the_end(eits_context *ctx, eits_real lambda, int gradient
     eits_report_duality_gap(ctx, c);
 }
 
-void eits_run_fista(eits_context *ctx, eits_real lambda, int gradient_known)
+/* x and x_next have changed places with each iteration; but x_next is only lent. */
+static void bring_home(eits_context *ctx, eits_real *home)
 {
-    ctx->working_count = 0;
+    if (ctx->solver.x == home)
+        return;
+    swap(&ctx->solver.x, &ctx->solver.x_next);
+    eits_copy(ctx->solver.x, ctx->solver.x_next, ctx->model->n_pixels);
+}
+
+void eits_run_fista(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                    int gradient_known)
+{
+    /* x outlives the solve where it was laid out. */
+    eits_real *const home = ctx->solver.x;
+    ctx->solver.working_count = 0;
     if (by_working_set(ctx) && !gradient_known) /* a warm start */
         eits_working_set_begin(ctx);
-    iterate_to_the_end(ctx, lambda, gradient_known);
+    iterate_to_the_end(ctx, scratch, lambda, gradient_known);
     if (by_working_set(ctx))
         eits_working_set_end(ctx);
+    bring_home(ctx, home);
 }

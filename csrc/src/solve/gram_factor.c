@@ -5,7 +5,7 @@
 
 static eits_real *row(const eits_context *ctx, uint32_t i)
 {
-    return ctx->factor + EITS_STRIDE(ctx->model->rank) * i;
+    return ctx->solver.factor + EITS_STRIDE(ctx->model->rank) * i;
 }
 
 void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, eits_real *w,
@@ -13,10 +13,12 @@ void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, ei
 {
     const size_t stride = EITS_STRIDE(ctx->model->rank), length = EITS_STRIDE(count);
     eits_zero(b + count, length - count);
-    ctx->kernels->rows_dot(ctx->factor, stride, count, length, b, w);
-    ctx->kernels->rows_sum(ctx->factor, stride, count, length, w, d);
+    ctx->kernels->rows_dot(ctx->solver.factor, stride, count, length, b, w);
+    ctx->kernels->rows_sum(ctx->solver.factor, stride, count, length, w, d);
 }
 
+/* The new row is what makes the new column orthonormal to the others: (1, -d) over the root of
+ * what is left of its square. */
 void eits_factor_append(eits_context *ctx, uint32_t count, const eits_real *d, eits_real left)
 {
     const eits_real fraction = 1 / eits_sqrt(left);
@@ -40,11 +42,12 @@ void eits_factor_drop(eits_context *ctx, uint32_t count, uint32_t place, eits_re
     const eits_real norm = eits_sqrt(square), end = eits_fabs(scratch[last]);
     /* the sign that does not cancel */
     scratch[last] = scratch[last] < 0 ? -(norm + end) : norm + end;
+    /* Householder's vector v = scratch; rows less twice v (v'rows) / |v|^2. */
     const eits_real twice = norm > 0 ? 1 / (norm * (norm + end)) : 0;
-    ctx->kernels->rows_sum(ctx->factor, stride, count, length, scratch, more);
+    ctx->kernels->rows_sum(ctx->solver.factor, stride, count, length, scratch, more);
     for (uint32_t i = 0; i < last; ++i) {
         eits_real *r = row(ctx, i);
-        eits_axpy(ctx, r, -twice * scratch[i], more, length);
+        eits_axpy(ctx->kernels, r, -twice * scratch[i], more, length);
         r[place] = r[last];
         r[last] = 0;
     }

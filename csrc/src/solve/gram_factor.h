@@ -4,7 +4,7 @@
 #ifndef EITSKIN_FACTOR_H
 #define EITSKIN_FACTOR_H
 
-#include "eitskin/context.h"
+#include "context/context.h"
 
 /* w = K b, d = K'w = G^-1 b, of the first `count` columns. All have room for EITS_STRIDE(count);
  * `d` may be `b`, and b is padded with zeros. */

@@ -5,11 +5,11 @@
 #include "kernels/kernels.h"
 
 /* How far the correlations lie violation zero under the sign rule. */
-static const eits_real *violation(const eits_context *ctx)
+static const eits_real *violation(const eits_context *ctx, const eits_scratch *scratch)
 {
-    const eits_real *g = ctx->gradient;
+    const eits_real *g = ctx->solver.gradient;
     const uint32_t n = ctx->model->n_pixels;
-    eits_real *out = ctx->list_value;
+    eits_real *out = scratch->value;
     switch (ctx->options.sign) {
     case EITS_SIGN_INCREASE:
         return g;
@@ -25,10 +25,8 @@ static const eits_real *violation(const eits_context *ctx)
     return out;
 }
 
-/* 1 where v[j] is the greatest among its neighbours; of equals the first is. Beyond the image's
- * edge the edge is seen again, and for a pixel that is not there j itself. One branch at the end:
- * each of them would be guessed wrong. */
-static int is_peak(const eits_context *ctx, const eits_real *v, uint32_t j)
+/* One branch at the end: each of them would be guessed wrong. */
+int eits_is_peak(const eits_context *ctx, const eits_real *v, uint32_t j)
 {
     const uint32_t nx = ctx->model->nx, ix = ctx->model->pixel[j].ix, iy = ctx->model->pixel[j].iy;
     const uint32_t left = ix - (ix > 0), right = ix + (ix + 1 < nx),
@@ -49,11 +47,12 @@ static int is_peak(const eits_context *ctx, const eits_real *v, uint32_t j)
 
 /* Put column j, if it is a peak, into the list of `count`, greatest first; returns how many there
  * are then. */
-static uint32_t consider(const eits_context *ctx, const eits_real *v, uint32_t j, uint32_t count)
+static uint32_t consider(const eits_context *ctx, const eits_scratch *scratch, const eits_real *v,
+                         uint32_t j, uint32_t count)
 {
-    if (!is_peak(ctx, v, j))
+    if (!eits_is_peak(ctx, v, j))
         return count;
-    uint32_t at = count, *list = ctx->list_index;
+    uint32_t at = count, *list = scratch->index;
     for (; at > 0 && v[list[at - 1]] < v[j]; --at)
         list[at] = list[at - 1];
     list[at] = j;
@@ -93,7 +92,8 @@ static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real
     return any;
 }
 
-static uint32_t of_all(const eits_context *ctx, const eits_real *v, eits_real min)
+static uint32_t of_all(const eits_context *ctx, const eits_scratch *scratch, const eits_real *v,
+                       eits_real min)
 {
     const uint32_t n = ctx->model->n_pixels;
     uint32_t count = 0, flag[BLOCK];
@@ -104,31 +104,34 @@ static uint32_t of_all(const eits_context *ctx, const eits_real *v, eits_real mi
             continue;
         for (uint32_t j = first; j < end; ++j) {
             if (whole ? flag[j - first] : v[j] > min)
-                count = consider(ctx, v, j, count);
+                count = consider(ctx, scratch, v, j, count);
         }
     }
     return count;
 }
 
-uint32_t eits_list_violations(const eits_context *ctx, eits_real min, const eits_nearby *near)
+uint32_t eits_list_violations(const eits_context *ctx, const eits_scratch *scratch, eits_real min,
+                              const eits_nearby *near)
 {
-    const eits_real *v = violation(ctx);
+    /* Peaks only: neighbours of a column that is missing exceed lambda as well, and most of them no
+     * longer do once it is in. */
+    const eits_real *v = violation(ctx, scratch);
     if (near == NULL)
-        return of_all(ctx, v, min);
-    uint32_t above = 0, count = 0, *list = ctx->list_index;
+        return of_all(ctx, scratch, v, min);
+    uint32_t above = 0, count = 0, *list = scratch->index;
     for (uint32_t k = 0; k < near->count; ++k) { /* no branch that would be guessed wrong */
         list[above] = near->column[k];
         above += v[near->column[k]] > min;
     }
     for (uint32_t k = 0; k < above; ++k) /* there are never more peaks than columns read */
-        count = consider(ctx, v, list[k], count);
+        count = consider(ctx, scratch, v, list[k], count);
     return count;
 }
 
 eits_nearby eits_nearby_none(const eits_context *ctx)
 {
-    const eits_nearby near = {.column = (uint32_t *)(void *)ctx->image,
-                              .marked = (uint8_t *)(void *)ctx->z};
+    const eits_nearby near = {.column = (uint32_t *)(void *)ctx->solver.image,
+                              .marked = (uint8_t *)(void *)ctx->solver.z};
     memset(near.marked, 0, ctx->model->n_pixels);
     return near;
 }
@@ -154,19 +157,21 @@ static void add_around(const eits_context *ctx, eits_nearby *near, uint32_t j)
 
 void eits_nearby_add(const eits_context *ctx, eits_nearby *near)
 {
-    for (uint32_t k = 0; k < ctx->working_count; ++k) {
-        if (near->marked[ctx->working[k]] != AROUND)
-            add_around(ctx, near, ctx->working[k]);
+    for (uint32_t k = 0; k < ctx->solver.working_count; ++k) {
+        if (near->marked[ctx->solver.working[k]] != AROUND)
+            add_around(ctx, near, ctx->solver.working[k]);
     }
 }
 
-void eits_take_gradient_nearby(eits_context *ctx, const eits_nearby *near)
+void eits_take_gradient_nearby(eits_context *ctx, const eits_scratch *scratch,
+                               const eits_nearby *near)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
-    ctx->kernels->dots(s, near->column, near->count, eits_adjoint(ctx, ctx->residual, ctx->adjoint),
-                       ctx->list_value);
-    eits_zero(ctx->gradient, s->cols);
+    ctx->kernels->dots(s, near->column, near->count,
+                       eits_adjoint(ctx, ctx->solver.residual, ctx->solver.adjoint),
+                       scratch->value);
+    eits_zero(ctx->solver.gradient, s->cols);
     for (uint32_t k = 0; k < near->count; ++k)
-        ctx->gradient[near->column[k]] = ctx->list_value[k];
+        ctx->solver.gradient[near->column[k]] = scratch->value[k];
     ctx->info.macs += (uint64_t)near->count * s->rows + eits_adjoint_macs(ctx);
 }

@@ -35,25 +35,25 @@ void eits_working_set_begin(eits_context *ctx)
 {
     uint32_t count = 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
-        const eits_real value = ctx->x[j];
+        const eits_real value = ctx->solver.x[j];
         if (value == 0)
             continue;
-        ctx->working[count] = j;
-        ctx->x[count++] = value;
+        ctx->solver.working[count] = j;
+        ctx->solver.x[count++] = value;
     }
-    ctx->working_count = count;
+    ctx->solver.working_count = count;
 }
 
-void eits_working_set_choose(eits_context *ctx, eits_real lambda)
+void eits_working_set_choose(eits_context *ctx, const eits_scratch *scratch, eits_real lambda)
 {
-    const uint32_t n = ctx->model->n_pixels, before = ctx->working_count;
+    const uint32_t n = ctx->model->n_pixels, before = ctx->solver.working_count;
     const limits rest = limits_for(lambda, ctx->options.sign);
     /* the image is made after the last iteration */
-    eits_real *x = ctx->x_next, *z = ctx->image, *gradient = ctx->gradient;
-    uint32_t *chosen = ctx->list_index;
+    eits_real *x = ctx->solver.x_next, *z = ctx->solver.image, *gradient = ctx->solver.gradient;
+    uint32_t *chosen = scratch->index;
     uint32_t count = 0, j = 0;
     for (uint32_t old = 0; old <= before; ++old) {
-        const uint32_t next = old < before ? ctx->working[old] : n;
+        const uint32_t next = old < before ? ctx->solver.working[old] : n;
         for (; j < next; ++j) {
             if (!moves(gradient[j], rest))
                 continue;
@@ -61,45 +61,108 @@ void eits_working_set_choose(eits_context *ctx, eits_real lambda)
             x[count] = z[count] = 0;
             gradient[count++] = gradient[j];
         }
-        if (next == n || (ctx->x[old] == 0 && ctx->z[old] == 0 && !moves(gradient[next], rest))) {
+        if (next == n ||
+            (ctx->solver.x[old] == 0 && ctx->solver.z[old] == 0 && !moves(gradient[next], rest))) {
             ++j;
             continue;
         }
         chosen[count] = j;
-        x[count] = ctx->x[old];
-        z[count] = ctx->z[old];
+        x[count] = ctx->solver.x[old];
+        z[count] = ctx->solver.z[old];
         gradient[count++] = gradient[j++];
     }
-    ctx->working_count = count;
-    memcpy(ctx->working, chosen, count * sizeof *chosen);
-    eits_copy(ctx->x, x, count);
-    eits_copy(ctx->z, z, count);
+    ctx->solver.working_count = count;
+    memcpy(ctx->solver.working, chosen, count * sizeof *chosen);
+    eits_copy(ctx->solver.x, x, count);
+    eits_copy(ctx->solver.z, z, count);
     eits_pack_panels(ctx);
 }
 
 void eits_working_set_prune(eits_context *ctx, eits_real lambda)
 {
-    const uint32_t before = ctx->working_count;
+    const uint32_t before = ctx->solver.working_count;
     const limits rest = limits_for(lambda, ctx->options.sign);
     uint32_t count = 0;
     for (uint32_t k = 0; k < before; ++k) {
-        const eits_real x = ctx->x[k], z = ctx->z[k], gradient = ctx->gradient[k];
+        const eits_real x = ctx->solver.x[k], z = ctx->solver.z[k],
+                        gradient = ctx->solver.gradient[k];
         if (x == 0 && z == 0 && !moves(gradient, rest))
             continue;
-        ctx->working[count] = ctx->working[k];
-        ctx->x[count] = x;
-        ctx->z[count] = z;
-        ctx->gradient[count++] = gradient;
+        ctx->solver.working[count] = ctx->solver.working[k];
+        ctx->solver.x[count] = x;
+        ctx->solver.z[count] = z;
+        ctx->solver.gradient[count++] = gradient;
     }
-    ctx->working_count = count;
+    ctx->solver.working_count = count;
+    /* Packing costs about an iteration; not for nothing. */
     if (count < before)
         eits_pack_panels(ctx);
 }
 
 void eits_working_set_end(eits_context *ctx)
 {
-    eits_zero(ctx->x_next, ctx->model->n_pixels);
-    for (uint32_t k = 0; k < ctx->working_count; ++k)
-        ctx->x_next[ctx->working[k]] = ctx->x[k];
-    eits_copy(ctx->x, ctx->x_next, ctx->model->n_pixels);
+    eits_zero(ctx->solver.x_next, ctx->model->n_pixels);
+    for (uint32_t k = 0; k < ctx->solver.working_count; ++k)
+        ctx->solver.x_next[ctx->solver.working[k]] = ctx->solver.x[k];
+    eits_copy(ctx->solver.x, ctx->solver.x_next, ctx->model->n_pixels);
+}
+
+/* ---- products over it ---- */
+
+void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real *out)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    if (ctx->solver.working_panels != NULL) {
+        ctx->kernels->mul_t_panels(s, ctx->solver.working_panels, ctx->solver.working,
+                                   ctx->solver.working_count, v, out);
+    } else if (ctx->solver.working_cached) {
+        const eits_matrix cached = eits_cached_columns(&ctx->columns);
+        ctx->kernels->mul_t(&cached, ctx->solver.working_slot, ctx->solver.working_count, v, out);
+        eits_scale_listed(s, ctx->solver.working, ctx->solver.working_count, out);
+    } else {
+        ctx->kernels->mul_t(s, ctx->solver.working, ctx->solver.working_count, v, out);
+    }
+}
+
+uint32_t eits_apply_working(const eits_context *ctx, const eits_scratch *scratch,
+                            const eits_real *x, eits_real *out)
+{
+    const eits_matrix *s = &ctx->model->sensitivity;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->solver.working_count; ++k) {
+        scratch->index[count] = ctx->solver.working[k];
+        scratch->value[count] = x[k];
+        count += x[k] != 0;
+    }
+    eits_scale_listed(s, scratch->index, count, scratch->value);
+    if (ctx->solver.working_cached) {
+        const eits_matrix cached = eits_cached_columns(&ctx->columns);
+        eits_cache_slots(&ctx->columns, scratch->index, count, scratch->index);
+        ctx->kernels->mul(&cached, scratch->index, scratch->value, count, out);
+    } else {
+        ctx->kernels->mul(s, scratch->index, scratch->value, count, out);
+    }
+    return count;
+}
+
+void eits_pack_panels(eits_context *ctx)
+{
+    const uint32_t rows = ctx->model->rank;
+    ctx->solver.working_cached = eits_cache_columns(&ctx->columns, ctx->kernels,
+                                                    ctx->solver.working, ctx->solver.working_count);
+    if (ctx->solver.working_cached)
+        eits_cache_slots(&ctx->columns, ctx->solver.working, ctx->solver.working_count,
+                         ctx->solver.working_slot);
+    if (ctx->solver.working_panels == NULL)
+        return;
+    for (uint32_t k = 0; k < EITS_PANEL_COLUMNS(ctx->solver.working_count); ++k) {
+        eits_real *to = ctx->solver.working_panels + (size_t)(k / EITS_PANEL) * EITS_PANEL * rows +
+                        k % EITS_PANEL;
+        /* lanes to spare hold any column */
+        const uint32_t j = ctx->solver.working[k < ctx->solver.working_count ? k : 0];
+        const eits_real *from =
+            ctx->columns.panels + (size_t)(j / EITS_PANEL) * EITS_PANEL * rows + j % EITS_PANEL;
+        for (uint32_t i = 0; i < rows; ++i)
+            to[(size_t)i * EITS_PANEL] = from[(size_t)i * EITS_PANEL];
+    }
 }

@@ -3,7 +3,7 @@
 #ifndef EITSKIN_DISC_H
 #define EITSKIN_DISC_H
 
-#include "eitskin/context.h"
+#include "context/context.h"
 
 typedef struct eits_disc {
     eits_real x_mm, y_mm, radius_mm;
@@ -14,15 +14,16 @@ typedef struct eits_disc {
 /* A pixel is covered by clamp(1/2 + (radius - distance) / pixel): exact for a straight edge that
  * crosses it squarely. `atom` (stride numbers) gets Q F S w (whitening.h), w the covers over the
  * column weights, that is the answer to a change of 1 S/m; with `slope` not NULL, its three arrays
- * get the derivatives by x, y and radius. Uses z, x_next and gradient as scratch. Returns the
+ * get the derivatives by x, y and radius. Returns the
  * multiply-accumulates. */
-uint64_t eits_disc_atom(eits_context *ctx, const eits_disc *disc, eits_real *atom,
-                        eits_real *const *slope);
+uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                        eits_real *atom, eits_real *const *slope);
 
 /* The model's fields (eits_fields), averaged over the disc's covers: `field` has fields.at.stride
- * numbers, zeros where no pixel is covered. Uses z, x_next, gradient and the list as scratch.
+ * numbers, zeros where no pixel is covered.
  * Returns the multiply-accumulates. */
-uint64_t eits_disc_field(eits_context *ctx, const eits_disc *disc, eits_real *field);
+uint64_t eits_disc_field(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
+                         eits_real *field);
 
 /* mm^2 that the disc's covers add up to on the pixels that count: what its change was fitted with.
  * On a coarse grid that differs by per cents from place to place, and near the rim it is only the

@@ -2,6 +2,7 @@
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
+#include "diagnostics/diagnostics.h"
 #include "kernels/kernels.h"
 
 enum { STRENGTH_PASSES = 10 };
@@ -13,41 +14,57 @@ static const eits_real DAMPING = R(1e-3);
 static const eits_real SETTLED_PIXELS = R(1.0 / 256.0);
 static const eits_real MAX_RADIUS_STEP_PIXELS = R(0.5);
 
+eits_fit eits_fit_none(const eits_context *ctx, const eits_scratch *scratch)
+{
+    return (eits_fit){.data = ctx->frame.y,
+                      .residual = scratch->row[0],
+                      .total = eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, ctx->model->rank),
+                      .noise = eits_expected_noise(ctx)};
+}
+
+eits_real eits_fit_left(const eits_context *ctx, const eits_fit *f)
+{
+    return eits_dot(ctx->kernels, f->residual, f->residual, ctx->model->rank);
+}
+
+/* The projection of `target` on the atom; of the wrong sign it is no touch. */
 eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const eits_real *atom,
                            const eits_real *target)
 {
     const uint32_t rank = ctx->model->rank;
-    const eits_real energy = eits_dot(ctx, atom, atom, rank);
-    const eits_real change = energy > 0 ? eits_dot(ctx, atom, target, rank) / energy : 0;
+    const eits_real energy = eits_dot(ctx->kernels, atom, atom, rank);
+    const eits_real change = energy > 0 ? eits_dot(ctx->kernels, atom, target, rank) / energy : 0;
     return change * disc->polarity > 0 ? change : 0;
 }
 
-void eits_fit_strengths(eits_context *ctx, eits_fit *f)
+void eits_fit_strengths(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_copy(ctx->residual, f->data, EITS_STRIDE(rank));
+    eits_copy(f->residual, f->data, EITS_STRIDE(rank));
     for (uint32_t k = 0; k < f->count; ++k) {
-        f->macs += eits_disc_atom(ctx, &f->disc[k], eits_atom(ctx, k), NULL);
+        f->macs += eits_disc_atom(ctx, scratch, &f->disc[k], eits_atom(ctx, k), NULL);
         f->disc[k].change = 0;
     }
+    /* Few discs that overlap little: a few rounds, each disc after the other, are as good as a
+     * solve of all at once, and keep every sign. */
     for (int pass = 0; pass < STRENGTH_PASSES; ++pass) {
         for (uint32_t k = 0; k < f->count; ++k) {
             eits_disc *disc = &f->disc[k];
-            eits_axpy(ctx, ctx->residual, disc->change, eits_atom(ctx, k), rank);
-            disc->change = eits_best_change(ctx, disc, eits_atom(ctx, k), ctx->residual);
-            eits_axpy(ctx, ctx->residual, -disc->change, eits_atom(ctx, k), rank);
+            eits_axpy(ctx->kernels, f->residual, disc->change, eits_atom(ctx, k), rank);
+            disc->change = eits_best_change(ctx, disc, eits_atom(ctx, k), f->residual);
+            eits_axpy(ctx->kernels, f->residual, -disc->change, eits_atom(ctx, k), rank);
             f->macs += 4u * rank;
         }
     }
 }
 
-void eits_fit_restart(eits_context *ctx, eits_fit *f)
+void eits_fit_restart(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_copy(ctx->residual, f->data, EITS_STRIDE(rank));
+    eits_copy(f->residual, f->data, EITS_STRIDE(rank));
     for (uint32_t k = 0; k < f->count; ++k) {
-        f->macs += eits_disc_atom(ctx, &f->disc[k], eits_atom(ctx, k), NULL) + rank;
-        eits_axpy(ctx, ctx->residual, -f->disc[k].change, eits_atom(ctx, k), rank);
+        f->macs += eits_disc_atom(ctx, scratch, &f->disc[k], eits_atom(ctx, k), NULL) + rank;
+        eits_axpy(ctx->kernels, f->residual, -f->disc[k].change, eits_atom(ctx, k), rank);
     }
 }
 
@@ -94,53 +111,59 @@ eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc)
 }
 
 /* |target - change atom|^2, target being what the other touches leave. */
-static eits_real squared_residual(const eits_context *ctx, const eits_real *target,
-                                  eits_real change, const eits_real *atom)
+static eits_real squared_residual(const eits_context *ctx, const eits_scratch *scratch,
+                                  const eits_real *target, eits_real change, const eits_real *atom)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_real *difference = ctx->sx;
+    eits_real *difference = scratch->row[1];
     for (uint32_t i = 0; i < rank; ++i)
         difference[i] = eits_fma(-change, atom[i], target[i]);
-    return eits_dot(ctx, difference, difference, rank);
+    return eits_dot(ctx->kernels, difference, difference, rank);
 }
 
 /* One damped Gauss-Newton step of one disc, others held; halved up to twice until the residual
- * falls. Returns how far it went, mm. ctx->residual is what all discs leave, before and after. */
-static eits_real move_disc(eits_context *ctx, eits_fit *f, uint32_t k)
+ * falls. Returns how far it went, mm. f->residual is what all discs leave, before and
+ * after. */
+static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     const uint32_t rank = ctx->model->rank;
     const eits_options *o = &ctx->options;
     eits_disc *disc = &f->disc[k];
-    eits_real *atom = eits_atom(ctx, k), *trial_atom = ctx->sx_next, *left = ctx->sz,
-              *target = ctx->residual;
-    eits_axpy(ctx, target, disc->change, atom, rank);
-    f->macs += eits_disc_atom(ctx, disc, atom, ctx->slope);
+    eits_real *atom = eits_atom(ctx, k), *trial_atom = scratch->row[2], *left = scratch->row[3],
+              *target = f->residual;
+    eits_axpy(ctx->kernels, target, disc->change, atom, rank);
+    f->macs += eits_disc_atom(ctx, scratch, disc, atom, &scratch->row[5]);
     disc->change = eits_best_change(ctx, disc, atom, target);
     for (uint32_t i = 0; i < rank; ++i)
         left[i] = eits_fma(-disc->change, atom[i], target[i]);
-    const eits_real energy = disc->change * disc->change * eits_dot(ctx, atom, atom, rank);
+    const eits_real energy = disc->change * disc->change * eits_dot(ctx->kernels, atom, atom, rank);
+    /* Data tell area times change well and the radius badly. The change is known within limits, so
+     * strength suggests a radius: a prior whose weight is the touch's energy, or the noise where
+     * that is more. */
     const eits_real expected = eits_expected_radius(o, disc),
                     deviation = RADIUS_DEVIATION * expected;
     const eits_real by_energy = f->radius_weight * energy, by_noise = f->noise / (eits_real)rank;
     const eits_real weight =
         (by_energy > by_noise ? by_energy : by_noise) / (deviation * deviation);
-    const eits_real *column[4] = {ctx->slope[0], ctx->slope[1], ctx->slope[2], atom};
+    const eits_real *column[4] = {scratch->row[5], scratch->row[6], scratch->row[7], atom};
     eits_real h[4][4], g[4], step[4];
     for (int i = 0; i < 4; ++i) {
         /* the fourth parameter is the change, relatively */
         const eits_real by_change = disc->change * disc->change;
         for (int j = 0; j <= i; ++j)
-            h[i][j] = h[j][i] = by_change * eits_dot(ctx, column[i], column[j], rank);
-        g[i] = disc->change * eits_dot(ctx, column[i], left, rank);
+            h[i][j] = h[j][i] = by_change * eits_dot(ctx->kernels, column[i], column[j], rank);
+        g[i] = disc->change * eits_dot(ctx->kernels, column[i], left, rank);
     }
     h[2][2] += weight;
     g[2] = eits_fma(weight, expected - disc->radius_mm, g[2]);
     f->macs += 17u * rank;
+    /* Gauss-Newton: H = J'J of x, y, radius and relative change, so that all four are of the same
+     * size. */
     damped_step((const eits_real(*)[4])h, g, step);
     const eits_real reach = (eits_real)ctx->model->pixel_mm,
                     radius_reach = MAX_RADIUS_STEP_PIXELS * reach;
     const eits_real off = disc->radius_mm - expected;
-    const eits_real cost = eits_dot(ctx, left, left, rank) + weight * off * off;
+    const eits_real cost = eits_dot(ctx->kernels, left, left, rank) + weight * off * off;
     eits_real moved = 0, fraction = 1;
     for (int attempt = 0; attempt < 3; ++attempt, fraction *= R(0.5)) {
         eits_disc trial = *disc;
@@ -151,10 +174,10 @@ static eits_real move_disc(eits_context *ctx, eits_fit *f, uint32_t k)
             o->touch_min_radius_mm, o->touch_max_radius_mm);
         if (!eits_disc_on_skin(ctx, &trial))
             continue;
-        f->macs += eits_disc_atom(ctx, &trial, trial_atom, NULL) + 3u * rank;
+        f->macs += eits_disc_atom(ctx, scratch, &trial, trial_atom, NULL) + 3u * rank;
         trial.change = eits_best_change(ctx, &trial, trial_atom, target);
         const eits_real trial_off = trial.radius_mm - expected;
-        if (!(squared_residual(ctx, target, trial.change, trial_atom) +
+        if (!(squared_residual(ctx, scratch, target, trial.change, trial_atom) +
                   weight * trial_off * trial_off <
               cost))
             continue;
@@ -167,25 +190,27 @@ static eits_real move_disc(eits_context *ctx, eits_fit *f, uint32_t k)
         eits_copy(atom, trial_atom, rank);
         break;
     }
-    eits_axpy(ctx, target, -disc->change, atom, rank);
+    eits_axpy(ctx->kernels, target, -disc->change, atom, rank);
     return moved;
 }
 
-void eits_fit_move(eits_context *ctx, eits_fit *f, uint32_t first, uint32_t last, uint32_t sweeps)
+void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t first,
+                   uint32_t last, uint32_t sweeps)
 {
     for (uint32_t sweep = 0; sweep < sweeps; ++sweep) {
         eits_real farthest = 0;
         for (uint32_t k = first; k <= last; ++k) {
-            const eits_real moved = move_disc(ctx, f, k);
+            const eits_real moved = move_disc(ctx, scratch, f, k);
             farthest = moved > farthest ? moved : farthest;
         }
+        /* Further moves would not be seen. */
         if (farthest < SETTLED_PIXELS * (eits_real)ctx->model->pixel_mm)
             break;
     }
 }
 
-void eits_fit_move_all(eits_context *ctx, eits_fit *f, uint32_t sweeps)
+void eits_fit_move_all(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t sweeps)
 {
     if (f->count > 0)
-        eits_fit_move(ctx, f, 0, f->count - 1u, sweeps);
+        eits_fit_move(ctx, scratch, f, 0, f->count - 1u, sweeps);
 }

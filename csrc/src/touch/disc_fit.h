@@ -9,9 +9,9 @@ typedef struct eits_fit {
     eits_disc disc[EITS_MAX_TOUCHES];
     /* what leaving it out would add to |residual|^2, relative to |y|^2 */
     eits_real explained[EITS_MAX_TOUCHES];
-    /* stride: what the discs are to explain; ctx->residual is what they leave of it */
-    const eits_real *data;
-    eits_real total; /* |y|^2 */
+    const eits_real *data; /* stride: what the discs are to explain */
+    eits_real *residual;   /* stride, row 0 of the scratch: what they leave of it */
+    eits_real total;       /* |y|^2 */
     /* of that, what noise is expected to give; 0 where none was learned */
     eits_real noise;
     /* options.touch_radius_weight, times what the stage of the touch fit asks for */
@@ -23,7 +23,7 @@ typedef struct eits_fit {
 /* Where the k-th disc's answer to 1 S/m is kept: stride numbers. */
 static inline eits_real *eits_atom(const eits_context *ctx, uint32_t k)
 {
-    return ctx->atoms + EITS_STRIDE(ctx->model->rank) * k;
+    return ctx->touch.atoms + EITS_STRIDE(ctx->model->rank) * k;
 }
 
 static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
@@ -33,11 +33,17 @@ static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
 
 /* disc_fit.c */
 
+/* No discs yet, of the frame's data. */
+eits_fit eits_fit_none(const eits_context *ctx, const eits_scratch *scratch);
+
+/* |residual|^2. */
+eits_real eits_fit_left(const eits_context *ctx, const eits_fit *f);
+
 /* All strengths at once by coordinate descent, from none. */
-void eits_fit_strengths(eits_context *ctx, eits_fit *f);
+void eits_fit_strengths(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* Atoms and residual of the discs as they are; after a change of discs or data. */
-void eits_fit_restart(eits_context *ctx, eits_fit *f);
+void eits_fit_restart(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* The change that explains `target` best along `atom`, of the disc's own sign. */
 eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const eits_real *atom,
@@ -48,20 +54,32 @@ eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const
 eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc);
 
 /* Sweeps of Gauss-Newton's steps over discs `first` to `last`, until they settle. */
-void eits_fit_move(eits_context *ctx, eits_fit *f, uint32_t first, uint32_t last, uint32_t sweeps);
-void eits_fit_move_all(eits_context *ctx, eits_fit *f, uint32_t sweeps);
+void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t first,
+                   uint32_t last, uint32_t sweeps);
+void eits_fit_move_all(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
+                       uint32_t sweeps);
 
 /* prune.c: drop the weakest while it explains too little or does not stand out of the noise; the
  * others take up what it leaves. */
-void eits_fit_prune(eits_context *ctx, eits_fit *f);
+void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* split_merge.c */
 
 /* Overlapping or nearly touching discs become one where that explains as much. Returns 1 where any
  * did. */
-int eits_fit_merge(eits_context *ctx, eits_fit *f);
+int eits_fit_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* A disc becomes two where they explain clearly more. Returns 1 where any did. */
-int eits_fit_split(eits_context *ctx, eits_fit *f);
+int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
+
+/* touch.c */
+
+/* Peaks of the image start discs, which are fitted to the frame's data; f->count of them are
+ * touches. */
+void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
+
+/* The discs as touches without ids, strongest first; returns how many there are: those whose
+ * numbers are finite. */
+uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_touch *out);
 
 #endif

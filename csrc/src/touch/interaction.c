@@ -1,8 +1,7 @@
 #include "touch/interaction.h"
 
 #include "base/vec.h"
-#include "diagnostics/diagnostics.h"
-#include "frame/projection.h"
+#include "frame/fold.h"
 #include "kernels/kernels.h"
 
 static const eits_real MAX = R(0.25); /* of |y|^2: what interaction may add */
@@ -48,6 +47,7 @@ static void add_induced(const eits_context *ctx, const eits_disc *i, const eits_
                         const eits_real *source, eits_real *induced)
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
+    /* The dipole of disc j, per unit of the field that it lies in. */
     const eits_real s = moment(ctx, j) * (eits_real)ctx->model->fields.per_sheet;
     const eits_real *mirror = source + 2 * (size_t)electrodes;
     const complex_number z = {i->x_mm, i->y_mm}, apart = {i->x_mm - j->x_mm, i->y_mm - j->y_mm};
@@ -77,6 +77,8 @@ static void answer(const eits_context *ctx, const eits_disc *i, const eits_real 
                    const eits_real *induced, eits_real *sum)
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
+    /* By reciprocity: what the pair measures of a change is the field of the drive times that of
+     * the measuring pair, if that carried the current. */
     const eits_real factor = -((eits_real)ctx->model->fields.volts * moment(ctx, i));
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
@@ -88,46 +90,47 @@ static void answer(const eits_context *ctx, const eits_disc *i, const eits_real 
     }
 }
 
-/* The folds' sums in ctx->list_value, of those in use, reduced. */
-static uint64_t reduce(eits_context *ctx, eits_real *out)
+/* The folds' sums in scratch->value, of those in use, reduced. */
+static uint64_t reduce(eits_context *ctx, const eits_scratch *scratch, eits_real *out)
 {
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        ctx->list_index[count] = k;
-        ctx->list_value[count] = ctx->list_value[k];
-        count += ctx->basis_for[k] != EITS_SIDE_NONE;
+        scratch->index[count] = k;
+        scratch->value[count] = scratch->value[k];
+        count += ctx->frame.sides[k] != EITS_SIDE_NONE;
     }
-    return eits_reduce(ctx, count, out);
+    return eits_reduce(ctx, scratch, count, out);
 }
 
-uint64_t eits_remove_interaction(eits_context *ctx, const eits_disc *disc, uint32_t count,
-                                 eits_real *data)
+uint64_t eits_remove_interaction(eits_context *ctx, const eits_scratch *scratch,
+                                 const eits_disc *disc, uint32_t count, eits_real *data)
 {
+    eits_real *added_data = scratch->row[1];
     const eits_model *model = ctx->model;
     const size_t stride = model->fields.at.stride, room = model->rank * EITS_STRIDE(model->rank);
-    eits_copy(data, ctx->y, EITS_STRIDE(model->rank));
+    eits_copy(data, ctx->frame.y, EITS_STRIDE(model->rank));
     if (count < 2 || !eits_has_interaction(ctx) || (count + 1) * stride > room)
         return 0;
     uint64_t macs = 0;
-    eits_real *field = ctx->factor, *induced = ctx->factor + stride * count;
+    eits_real *field = scratch->square, *induced = scratch->square + stride * count;
     for (uint32_t i = 0; i < count; ++i)
-        macs += eits_disc_field(ctx, &disc[i], field + stride * i);
-    eits_zero(ctx->list_value, model->n_folded);
+        macs += eits_disc_field(ctx, scratch, &disc[i], field + stride * i);
+    eits_zero(scratch->value, model->n_folded);
     for (uint32_t i = 0; i < count; ++i) {
         eits_zero(induced, stride);
         for (uint32_t j = 0; j < count; ++j) {
             if (j != i)
                 add_induced(ctx, &disc[i], &disc[j], field + stride * j, induced);
         }
-        answer(ctx, &disc[i], field + stride * i, induced, ctx->list_value);
+        answer(ctx, &disc[i], field + stride * i, induced, scratch->value);
     }
     macs += (uint64_t)count * ((count - 1u) * 4u * model->n_electrodes + 3u * model->n_folded);
-    macs += reduce(ctx, ctx->sx);
-    const eits_real total = eits_dot(ctx, ctx->y, ctx->y, model->rank),
-                    added = eits_dot(ctx, ctx->sx, ctx->sx, model->rank);
+    macs += reduce(ctx, scratch, added_data);
+    const eits_real total = eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, model->rank),
+                    added = eits_dot(ctx->kernels, added_data, added_data, model->rank);
     if (!(added <= MAX * total)) /* far beyond the second order: discs that are no touches */
         return macs + 2u * model->rank;
     for (uint32_t i = 0; i < model->rank; ++i)
-        data[i] -= ctx->sx[i];
+        data[i] -= added_data[i];
     return macs + 2u * model->rank;
 }

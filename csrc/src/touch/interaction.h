@@ -18,10 +18,11 @@
  * are differences, the option asks for it. */
 int eits_has_interaction(const eits_context *ctx);
 
-/* `data` (stride numbers) = ctx->y less what the interaction of the discs adds to it, so that the
- * discs' own answers are left. Uses the factor, sx and the list. Returns the multiply-accumulates.
+/* `data` (stride numbers) = frame.y less what the interaction of the discs adds to it, so that
+ * the discs' own answers are left. Returns the
+ * multiply-accumulates.
  */
-uint64_t eits_remove_interaction(eits_context *ctx, const eits_disc *disc, uint32_t count,
-                                 eits_real *data);
+uint64_t eits_remove_interaction(eits_context *ctx, const eits_scratch *scratch,
+                                 const eits_disc *disc, uint32_t count, eits_real *data);
 
 #endif

@@ -15,14 +15,14 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
     const uint32_t rank = ctx->model->rank, n = f->count;
     eits_real l[EITS_MAX_TOUCHES][EITS_MAX_TOUCHES] = {{0}}, norm[EITS_MAX_TOUCHES];
     for (uint32_t i = 0; i < n; ++i) {
-        norm[i] = eits_sqrt(eits_dot(ctx, eits_atom(ctx, i), eits_atom(ctx, i), rank));
+        norm[i] = eits_sqrt(eits_dot(ctx->kernels, eits_atom(ctx, i), eits_atom(ctx, i), rank));
         for (uint32_t j = 0; j <= i; ++j) {
             const eits_real both = norm[i] * norm[j];
-            eits_real sum =
-                i == j
-                    ? 1 + R(1e-5)
-                    : (both > 0 ? eits_dot(ctx, eits_atom(ctx, i), eits_atom(ctx, j), rank) / both
-                                : 0);
+            eits_real sum = i == j ? 1 + R(1e-5)
+                                   : (both > 0 ? eits_dot(ctx->kernels, eits_atom(ctx, i),
+                                                          eits_atom(ctx, j), rank) /
+                                                     both
+                                               : 0);
             for (uint32_t k = 0; k < j; ++k)
                 sum = eits_fma(-l[i][k], l[j][k], sum);
             if (i == j)
@@ -31,6 +31,9 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
                 l[i][j] = sum / l[j][j];
         }
     }
+    /* Leaving k out lets the others take up what it explained, as far as they can: that is what the
+     * inverse Gram matrix says, and a disc beside a stronger one is not credited with what both can
+     * do. */
     f->macs += (uint64_t)n * (n + 1) / 2 * rank;
     for (uint32_t k = 0; k < n; ++k) { /* column k of L^-1; its squared norm is (G^-1)_kk */
         eits_real column[EITS_MAX_TOUCHES] = {0}, squared = 0;
@@ -41,6 +44,7 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
             column[i] = sum / l[i][i];
             squared = eits_fma(column[i], column[i], squared);
         }
+        /* Over the squared norm of L^-1's column: what no other disc can take over. */
         const eits_real size = f->disc[k].change * norm[k];
         f->explained[k] = f->total > 0 ? size * size / (squared * f->total) : 0;
     }
@@ -48,15 +52,15 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
 
 /* Whether the disc stands out of the noise by the same test as the whole frame: S_j'(y - other
  * discs) at its pixel. */
-static int stands_out(eits_context *ctx, eits_fit *f, uint32_t k)
+static int stands_out(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     const eits_real min = ctx->options.detection_factor * eits_lambda_noise(ctx);
     const uint32_t rank = ctx->model->rank;
     if (!(min > 0))
         return 1;
     const eits_disc *disc = &f->disc[k];
-    const eits_real *atom = eits_adjoint(ctx, eits_atom(ctx, k), ctx->slope[0]);
-    const eits_real *residual = eits_adjoint(ctx, ctx->residual, ctx->slope[1]);
+    const eits_real *atom = eits_adjoint(ctx, eits_atom(ctx, k), scratch->row[5]);
+    const eits_real *residual = eits_adjoint(ctx, f->residual, scratch->row[6]);
     eits_real best = 0;
     f->macs += 2u * eits_adjoint_macs(ctx);
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j) {
@@ -70,10 +74,11 @@ static int stands_out(eits_context *ctx, eits_fit *f, uint32_t k)
             disc->y_mm;
         if (eits_fabs(dx) > pixel || eits_fabs(dy) > pixel)
             continue;
-        const eits_real *column = eits_column(&ctx->model->sensitivity, j, ctx->sx),
+        const eits_real *column = eits_column(&ctx->model->sensitivity, j, scratch->row[1]),
                         scale = eits_column_scale(&ctx->model->sensitivity, j);
-        const eits_real seen = scale * eits_fma(disc->change, eits_dot(ctx, column, atom, rank),
-                                                eits_dot(ctx, column, residual, rank));
+        const eits_real seen =
+            scale * eits_fma(disc->change, eits_dot(ctx->kernels, column, atom, rank),
+                             eits_dot(ctx->kernels, column, residual, rank));
         f->macs += 2u * rank;
         best = seen * disc->polarity > best ? seen * disc->polarity : best;
     }
@@ -83,7 +88,7 @@ static int stands_out(eits_context *ctx, eits_fit *f, uint32_t k)
 static void drop(eits_context *ctx, eits_fit *f, uint32_t k)
 {
     const uint32_t rank = ctx->model->rank;
-    eits_axpy(ctx, ctx->residual, f->disc[k].change, eits_atom(ctx, k), rank);
+    eits_axpy(ctx->kernels, f->residual, f->disc[k].change, eits_atom(ctx, k), rank);
     --f->count;
     for (uint32_t l = k; l < f->count; ++l) {
         f->disc[l] = f->disc[l + 1];
@@ -91,8 +96,9 @@ static void drop(eits_context *ctx, eits_fit *f, uint32_t k)
     }
 }
 
-void eits_fit_prune(eits_context *ctx, eits_fit *f)
+void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
+    /* One at a time: when the weakest is gone the others may explain more. */
     while (f->count > 0) {
         leave_one_out_gains(ctx, f);
         uint32_t weakest = 0;
@@ -101,10 +107,10 @@ void eits_fit_prune(eits_context *ctx, eits_fit *f)
         const int alone = f->count == 1;
         const int enough =
             alone ? f->explained[0] > 0 : f->explained[weakest] >= ctx->options.touch_min_fraction;
-        if (enough && stands_out(ctx, f, weakest))
+        if (enough && stands_out(ctx, scratch, f, weakest))
             return;
         drop(ctx, f, weakest);
-        eits_fit_move_all(ctx, f,
+        eits_fit_move_all(ctx, scratch, f,
                           ctx->options.touch_sweeps < DROP_SWEEPS ? ctx->options.touch_sweeps
                                                                   : DROP_SWEEPS);
     }

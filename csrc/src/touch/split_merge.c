@@ -29,23 +29,18 @@ typedef struct saved {
     eits_real left; /* |residual|^2 */
 } saved;
 
-static eits_real left_over(const eits_context *ctx)
-{
-    return eits_dot(ctx, ctx->residual, ctx->residual, ctx->model->rank);
-}
-
 static saved save(const eits_context *ctx, const eits_fit *f)
 {
-    saved s = {.count = f->count, .left = left_over(ctx)};
+    saved s = {.count = f->count, .left = eits_fit_left(ctx, f)};
     memcpy(s.disc, f->disc, sizeof s.disc);
     return s;
 }
 
-static void restore(eits_context *ctx, eits_fit *f, const saved *s)
+static void restore(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, const saved *s)
 {
     memcpy(f->disc, s->disc, sizeof s->disc);
     f->count = s->count;
-    eits_fit_restart(ctx, f);
+    eits_fit_restart(ctx, scratch, f);
 }
 
 static eits_real lesser(eits_real a, eits_real b)
@@ -111,7 +106,9 @@ static eits_disc merged(const eits_options *o, const eits_disc *a, const eits_di
 }
 
 /* Make the pair one disc; 1 if that is kept. */
-static int try_merge(eits_context *ctx, eits_fit *f, const pair *p)
+/* Tried for real and undone where it does not hold: a criterion from the two discs alone would
+ * not know what the data say. */
+static int try_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, const pair *p)
 {
     const uint32_t rank = ctx->model->rank;
     const saved before = save(ctx, f);
@@ -119,29 +116,29 @@ static int try_merge(eits_context *ctx, eits_fit *f, const pair *p)
     --f->count;
     for (uint32_t k = p->j; k < f->count; ++k)
         f->disc[k] = f->disc[k + 1u];
-    eits_fit_restart(ctx, f);
-    f->disc[p->i].change =
-        eits_best_change(ctx, &f->disc[p->i], eits_atom(ctx, p->i), ctx->residual);
-    eits_axpy(ctx, ctx->residual, -f->disc[p->i].change, eits_atom(ctx, p->i), rank);
+    eits_fit_restart(ctx, scratch, f);
+    f->disc[p->i].change = eits_best_change(ctx, &f->disc[p->i], eits_atom(ctx, p->i), f->residual);
+    eits_axpy(ctx->kernels, f->residual, -f->disc[p->i].change, eits_atom(ctx, p->i), rank);
     f->macs += 3u * rank;
-    eits_fit_move(ctx, f, p->i, p->i, MERGE_SWEEPS);
-    eits_fit_move_all(ctx, f, 1);
+    eits_fit_move(ctx, scratch, f, p->i, p->i, MERGE_SWEEPS);
+    eits_fit_move_all(ctx, scratch, f, 1);
     const eits_real more =
         eits_fma(MERGE_TOTAL, f->total,
                  eits_fma(MERGE_LEFT, before.left, NOISE * f->noise / (eits_real)rank));
-    if (left_over(ctx) <= before.left + more)
+    if (eits_fit_left(ctx, f) <= before.left + more)
         return 1;
-    restore(ctx, f, &before);
+    restore(ctx, scratch, f, &before);
     return 0;
 }
 
-int eits_fit_merge(eits_context *ctx, eits_fit *f)
+/* From the nearest pair on; after a merge the order is another, so it starts again. */
+int eits_fit_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     int any = 0;
     pair next, last;
     const pair *after = NULL;
     while (next_pair(f, after, &next)) {
-        if (try_merge(ctx, f, &next)) {
+        if (try_merge(ctx, scratch, f, &next)) {
             any = 1;
             after = NULL;
         } else {
@@ -161,15 +158,19 @@ typedef struct two {
 
 /* Strengths of two atoms that explain `target` best; what they leave, or -1 where they are no
  * touches of that sign. */
-static eits_real both_changes(const eits_context *ctx, const eits_real *target,
-                              eits_real *const atom[2], eits_real polarity, eits_real change[2])
+static eits_real both_changes(const eits_context *ctx, const eits_scratch *scratch,
+                              const eits_real *target, eits_real *const atom[2], eits_real polarity,
+                              eits_real change[2])
 {
+    eits_real *left = scratch->row[1];
     const uint32_t rank = ctx->model->rank;
-    const eits_real aa = eits_dot(ctx, atom[0], atom[0], rank),
-                    bb = eits_dot(ctx, atom[1], atom[1], rank);
-    const eits_real ab = eits_dot(ctx, atom[0], atom[1], rank);
-    const eits_real at = eits_dot(ctx, atom[0], target, rank),
-                    bt = eits_dot(ctx, atom[1], target, rank);
+    const eits_real aa = eits_dot(ctx->kernels, atom[0], atom[0], rank),
+                    bb = eits_dot(ctx->kernels, atom[1], atom[1], rank);
+    const eits_real ab = eits_dot(ctx->kernels, atom[0], atom[1], rank);
+    const eits_real at = eits_dot(ctx->kernels, atom[0], target, rank),
+                    bt = eits_dot(ctx->kernels, atom[1], target, rank);
+    /* Normal equations of two unknowns. Where the atoms are all but parallel there is no telling
+     * them apart. */
     const eits_real determinant = eits_fma(aa, bb, -(ab * ab));
     if (!(determinant > R(1e-5) * aa * bb))
         return -1;
@@ -178,12 +179,14 @@ static eits_real both_changes(const eits_context *ctx, const eits_real *target,
     if (!(change[0] * polarity > 0 && change[1] * polarity > 0))
         return -1;
     for (uint32_t i = 0; i < rank; ++i)
-        ctx->sx[i] = eits_fma(-change[1], atom[1][i], eits_fma(-change[0], atom[0][i], target[i]));
-    return eits_dot(ctx, ctx->sx, ctx->sx, rank);
+        left[i] = eits_fma(-change[1], atom[1][i], eits_fma(-change[0], atom[0][i], target[i]));
+    return eits_dot(ctx->kernels, left, left, rank);
 }
 
 /* The best of some pairs in the place of disc k. */
-static two best_two(eits_context *ctx, eits_fit *f, uint32_t k)
+/* Two discs side by side along four directions, in the place of the one: a start for the fit,
+ * not a result. Which direction is best hardly depends on the exact offset. */
+static two best_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     static const eits_real along[DIRECTIONS][2] = {
         {1, 0},
@@ -194,10 +197,10 @@ static two best_two(eits_context *ctx, eits_fit *f, uint32_t k)
     const eits_disc one = f->disc[k];
     const eits_real radius = SPLIT_RADIUS * one.radius_mm,
                     smallest = ctx->options.touch_min_radius_mm;
-    eits_real *target = ctx->sz, *const atom[2] = {ctx->slope[0], ctx->slope[1]};
+    eits_real *target = scratch->row[3], *const atom[2] = {scratch->row[5], scratch->row[6]};
     two best = {.left = -1};
-    eits_copy(target, ctx->residual, EITS_STRIDE(rank));
-    eits_axpy(ctx, target, one.change, eits_atom(ctx, k), rank);
+    eits_copy(target, f->residual, EITS_STRIDE(rank));
+    eits_axpy(ctx->kernels, target, one.change, eits_atom(ctx, k), rank);
     for (int d = 0; d < DIRECTIONS; ++d) {
         const eits_real dx = SPLIT_OFFSET * one.radius_mm * along[d][0],
                         dy = SPLIT_OFFSET * one.radius_mm * along[d][1];
@@ -210,9 +213,9 @@ static two best_two(eits_context *ctx, eits_fit *f, uint32_t k)
         if (!eits_disc_on_skin(ctx, &here.disc[0]) || !eits_disc_on_skin(ctx, &here.disc[1]))
             continue;
         for (int side = 0; side < 2; ++side)
-            f->macs += eits_disc_atom(ctx, &here.disc[side], atom[side], NULL);
+            f->macs += eits_disc_atom(ctx, scratch, &here.disc[side], atom[side], NULL);
         eits_real change[2];
-        here.left = both_changes(ctx, target, atom, one.polarity, change);
+        here.left = both_changes(ctx, scratch, target, atom, one.polarity, change);
         f->macs += 8u * rank;
         if (here.left < 0 || (best.left >= 0 && here.left >= best.left))
             continue;
@@ -224,33 +227,34 @@ static two best_two(eits_context *ctx, eits_fit *f, uint32_t k)
 }
 
 /* Make disc k two; 1 if that is kept. */
-static int try_split(eits_context *ctx, eits_fit *f, uint32_t k)
+static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     const uint32_t last = f->count;
     const saved before = save(ctx, f);
-    const two begin = best_two(ctx, f, k);
+    const two begin = best_two(ctx, scratch, f, k);
     if (begin.left < 0 || begin.left > SPLIT_FIRST * before.left)
         return 0;
     f->disc[k] = begin.disc[0];
     f->disc[last] = begin.disc[1];
     ++f->count;
-    eits_fit_restart(ctx, f);
+    eits_fit_restart(ctx, scratch, f);
+    /* These two first, since the others are where they belong; then all, once. */
     for (int sweep = 0; sweep < SPLIT_SWEEPS; ++sweep) {
-        eits_fit_move(ctx, f, k, k, 1);
-        eits_fit_move(ctx, f, last, last, 1);
+        eits_fit_move(ctx, scratch, f, k, k, 1);
+        eits_fit_move(ctx, scratch, f, last, last, 1);
     }
-    eits_fit_move_all(ctx, f, 1);
-    const eits_real left = left_over(ctx),
+    eits_fit_move_all(ctx, scratch, f, 1);
+    const eits_real left = eits_fit_left(ctx, f),
                     min = eits_fma(SPLIT_TOTAL, f->total,
                                    NOISE * f->noise / (eits_real)ctx->model->rank);
     if (left <= SPLIT_GAIN * before.left && before.left - left >= min &&
         edge_distance(&f->disc[k], &f->disc[last]) > SPLIT_DISTANCE)
         return 1;
-    restore(ctx, f, &before);
+    restore(ctx, scratch, f, &before);
     return 0;
 }
 
-int eits_fit_split(eits_context *ctx, eits_fit *f)
+int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     uint8_t looked[EITS_MAX_TOUCHES] = {0};
     const eits_real enough = eits_fma(SPLIT_TOTAL, f->total, SPLIT_NOISE * f->noise);
@@ -258,7 +262,7 @@ int eits_fit_split(eits_context *ctx, eits_fit *f)
     /* those that come by splitting are not split again at once */
     const uint32_t before = f->count;
     for (uint32_t turn = 0; turn < before; ++turn) {
-        if (f->count >= ctx->options.max_touches || left_over(ctx) < enough)
+        if (f->count >= ctx->options.max_touches || eits_fit_left(ctx, f) < enough)
             return any;
         uint32_t k = before;
         for (uint32_t i = 0; i < before; ++i) { /* the largest first */
@@ -266,7 +270,7 @@ int eits_fit_split(eits_context *ctx, eits_fit *f)
                 k = i;
         }
         looked[k] = 1;
-        any |= try_split(ctx, f, k);
+        any |= try_split(ctx, scratch, f, k);
     }
     return any;
 }

@@ -65,6 +65,8 @@ static int on_skin(const eits_context *ctx, const eits_touch *touch)
 static eits_real place_variance(const eits_context *ctx, const eits_touch *found)
 {
     const eits_real pixel = (eits_real)ctx->model->pixel_mm, own = own_lambda(ctx, found);
+    /* The weaker a touch over the noise, the less sure its place: in proportion, as for the centre
+     * of any noisy peak. */
     const eits_real noise = own > 0 ? ctx->info.lambda_noise / own : 0;
     return eits_fma(square(ctx->options.track_smooth * noise), square(pixel),
                     square(MIN_DEVIATION * pixel));
@@ -88,6 +90,8 @@ static void predict(const eits_context *ctx, eits_followed *f)
         return;
     next.touch.x_mm += f->vx_mm;
     next.touch.y_mm += f->vy_mm;
+    /* Constant velocity, disturbed by a random change within each frame; the covariances of place
+     * and velocity grow with it. */
     next.place_mm2 += eits_fma(R(2), f->both_mm2, f->speed_mm2) + R(0.25) * change;
     next.both_mm2 += eits_fma(R(0.5), change, f->speed_mm2);
     next.speed_mm2 += change;
@@ -109,6 +113,7 @@ static eits_followed updated(const eits_context *ctx, const eits_followed *befor
     const eits_followed restarted = next;
     const eits_touch *old = &before->touch;
     const eits_real total = before->place_mm2 + next.place_mm2;
+    /* Kalman's gains for a measured place: the more is known, the less a new place moves it. */
     const eits_real gain = before->place_mm2 / total, speed_gain = before->both_mm2 / total;
     const eits_real dx = found->x_mm - old->x_mm, dy = found->y_mm - old->y_mm;
     next.touch.x_mm = eits_fma(gain, dx, old->x_mm);
@@ -132,14 +137,16 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
                  uint32_t *owner)
 {
     uint8_t taken[EITS_MAX_TOUCHES] = {0};
+    /* Greedy, nearest first: with touches further apart than they move in a frame, it is the best
+     * assignment, too. */
     for (;;) { /* at most EITS_MAX_TOUCHES pairs */
         const eits_real reach =
             square(reported ? ctx->options.follow_mm : TENTATIVE_REACH * ctx->options.follow_mm);
         eits_real nearest = reach;
         uint32_t from = NONE, to = NONE;
         for (uint32_t k = 0; k < count; ++k) {
-            for (uint32_t l = 0; owner[k] == NONE && l < ctx->followed_count; ++l) {
-                const eits_touch *one = &ctx->followed[l].touch;
+            for (uint32_t l = 0; owner[k] == NONE && l < ctx->tracker.count; ++l) {
+                const eits_touch *one = &ctx->tracker.followed[l].touch;
                 const eits_real dx = found[k].x_mm - one->x_mm, dy = found[k].y_mm - one->y_mm;
                 const eits_real squared = eits_fma(dx, dx, dy * dy);
                 if (!taken[l] && (one->id != 0) == reported && squared <= nearest) {
@@ -157,14 +164,17 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
 }
 
 /* An id for a touch that may be told of now. */
+/* A touch that is clear beyond doubt is reported at once; others once they have been seen often
+ * enough that noise would not have been. */
 static void name(eits_context *ctx, eits_followed *f)
 {
     const int clear = own_lambda(ctx, &f->touch) >= SURE_CLEARNESS * ctx->info.lambda_noise &&
                       f->touch.confidence >= SURE_FRACTION;
     if (f->touch.id != 0 || (f->seen < ctx->options.track_confirm && !clear))
         return;
-    f->touch.id = ctx->next_id;
-    ctx->next_id = ctx->next_id == UINT32_MAX ? 1 : ctx->next_id + 1; /* 0 is never an id */
+    f->touch.id = ctx->tracker.next_id;
+    ctx->tracker.next_id =
+        ctx->tracker.next_id == UINT32_MAX ? 1 : ctx->tracker.next_id + 1; /* 0 is never an id */
 }
 
 /* Those that were found, in their order, then those that are waited for, as far as there is room.
@@ -176,13 +186,13 @@ static void update_tracks(eits_context *ctx, const eits_touch *found, uint32_t c
     uint8_t met_again[EITS_MAX_TOUCHES] = {0};
     for (uint32_t k = 0; k < count; ++k) {
         next[k] = owner[k] == NONE ? track_start(ctx, &found[k])
-                                   : updated(ctx, &ctx->followed[owner[k]], &found[k]);
+                                   : updated(ctx, &ctx->tracker.followed[owner[k]], &found[k]);
         if (owner[k] != NONE)
             met_again[owner[k]] = 1;
         name(ctx, &next[k]);
     }
-    for (uint32_t l = 0; l < ctx->followed_count; ++l) {
-        eits_followed *f = &ctx->followed[l];
+    for (uint32_t l = 0; l < ctx->tracker.count; ++l) {
+        eits_followed *f = &ctx->tracker.followed[l];
         if (met_again[l] || f->touch.id == 0 || f->missed >= ctx->options.track_hold ||
             count == EITS_MAX_TOUCHES)
             continue;
@@ -191,8 +201,8 @@ static void update_tracks(eits_context *ctx, const eits_touch *found, uint32_t c
         next[count++] = *f;
     }
     for (uint32_t k = 0; k < count; ++k)
-        ctx->followed[k] = next[k];
-    ctx->followed_count = count;
+        ctx->tracker.followed[k] = next[k];
+    ctx->tracker.count = count;
 }
 
 uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count)
@@ -202,13 +212,13 @@ uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count)
         touches[k].id = 0;
         owner[k] = NONE;
     }
-    for (uint32_t l = 0; l < ctx->followed_count; ++l)
-        predict(ctx, &ctx->followed[l]);
+    for (uint32_t l = 0; l < ctx->tracker.count; ++l)
+        predict(ctx, &ctx->tracker.followed[l]);
     pair(ctx, touches, count, 1, owner);
     pair(ctx, touches, count, 0, owner);
     update_tracks(ctx, touches, count, owner);
-    for (uint32_t l = 0; l < ctx->followed_count; ++l) {
-        const eits_followed *f = &ctx->followed[l];
+    for (uint32_t l = 0; l < ctx->tracker.count; ++l) {
+        const eits_followed *f = &ctx->tracker.followed[l];
         const int held = f->faint && f->seen >= KNOWN_FRAMES && reported < ctx->options.max_touches;
         if (f->touch.id == 0 || (f->missed > 0 && !held))
             continue;

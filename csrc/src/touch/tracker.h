@@ -3,10 +3,10 @@
 #ifndef EITSKIN_TRACK_H
 #define EITSKIN_TRACK_H
 
-#include "eitskin/context.h"
+#include "context/context.h"
 
 /* From the `count` touches that were found in a frame (room for EITS_MAX_TOUCHES) to those that are
- * told of, in their place, strongest first; returns how many. ctx->info says how clear the frame
+ * told of, in their place, strongest first; returns how many. info says how clear the frame
  * is.
  *
  * Nearest pairs of a touch that is followed and one that is found, within follow_mm, belong

@@ -74,19 +74,20 @@ class CoreEngine:
         )
         self.workspace_bytes = int(self._lib.eits_workspace_size(self._model, int(prepared)))
         self._workspace = aligned(self.workspace_bytes)
-        self._context = self._ffi.new("eits_context *")
+        context = self._ffi.new("eits_context **")
         status = self._lib.eits_init(
-            self._context, self._model, self._ffi.from_buffer(self._workspace), self.workspace_bytes
+            self._ffi.from_buffer(self._workspace), self.workspace_bytes, self._model, context
         )
         self._check(status, "workspace", UsageError)
+        self._context = context[0]
         self._lib.eits_use_portable_kernels(self._context, int(portable))
         self.n_rows, self.n_pixels = int(self._model.n_rows), int(self._model.n_pixels)
         # buffers and their pointers are made once: casting anew at each call would cost more than
         # the call
         self._frame = np.zeros(self.n_rows, dtype=self.dtype)
         self._frame_pointer = self._ffi.from_buffer("eits_real[]", self._frame)
-        self._image = self._view(self._context.image, self.n_pixels)
-        self._info = self._ffi.addressof(self._context, "info")
+        self._image = self._view(self._lib.eits_get_image(self._context), self.n_pixels)
+        self._info = self._lib.eits_get_info(self._context)
         self._touches = self._ffi.new("eits_touch[]", int(self._lib.EITS_MAX_TOUCHES))
         self._touch_count = self._ffi.new("uint32_t *")
         self._null = self._ffi.NULL
@@ -156,7 +157,8 @@ class CoreEngine:
                 )
                 self._check_frame(status, f"reference frame {number} (from 0)")
             self._check_frame(self._lib.eits_reference_finish(self._context), "reference frames")
-        b = self._context.reference
+        b = self._ffi.new("eits_reference_info *")
+        self._check(self._lib.eits_get_reference(self._context, b), "reference", UsageError)
         return LearnedReference(
             int(b.count),
             b.correlation,
@@ -210,30 +212,27 @@ class CoreEngine:
     def bare_solve(self, y: npt.NDArray[np.floating[Any]]) -> Callable[[], Any]:
         """The solver's C call alone on reduced data ``y`` (r,), which it takes now; the result is
         in ``coefficients``. For benchmarks."""
-        self._view(self._context.y, int(self._model.rank))[:] = y
         lib, context = self._lib, self._context
-        return lambda: lib.eits_solve(context)
+        pointer = self._reals(np.array(y, dtype=self.dtype))
+        return lambda: lib.eits_solve(context, pointer)
 
     def bare_solves(self, many: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:
         """``bare_solve`` of each of ``many`` (k, r), one after another: their x (k, n)."""
-        y, x = (
-            self._view(self._context.y, int(self._model.rank)),
-            np.empty((len(many), self.n_pixels), dtype=self.dtype),
-        )
+        x = np.empty((len(many), self.n_pixels), dtype=self.dtype)
         solve, context = self._lib.eits_solve, self._context
-        for k in range(len(many)):
-            y[:] = many[k]
-            solve(context)
-            x[k] = self._view(context.x, self.n_pixels)
+        for k, y in enumerate(np.ascontiguousarray(many, dtype=self.dtype)):
+            solve(context, self._reals(y))
+            x[k] = self._view(self._lib.eits_get_coefficients(context), self.n_pixels)
         return x
 
     def coefficients(self) -> npt.NDArray[Any]:
         """x of the last solve, (n,)."""
-        return self._view(self._context.x, self.n_pixels).copy()
+        return self._view(self._lib.eits_get_coefficients(self._context), self.n_pixels).copy()
 
     def reduced_data(self) -> npt.NDArray[Any]:
         """y of the last frame as the solver saw it, projected, (stride,)."""
-        return self._view(self._context.y, (int(self._model.rank) + 7) // 8 * 8).copy()
+        stride = (int(self._model.rank) + 7) // 8 * 8
+        return self._view(self._lib.eits_get_reduced_data(self._context), stride).copy()
 
     def reconstruct(
         self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True
@@ -261,7 +260,7 @@ class CoreEngine:
             )
             found_ns = perf_counter_ns()
             found = tuple(_touch(self._touches[k]) for k in range(self._touch_count[0]))
-        coefficients = self._view(self._context.x, self.n_pixels).copy()
+        coefficients = self.coefficients()
         info = _info(self._info, solved_ns - began_ns, found_ns - solved_ns)
         return Reconstruction(self._image.copy(), coefficients, found, info)
 

@@ -30,6 +30,7 @@ class Declarations:
     enums: dict[str, tuple[tuple[str, int | None], ...]] = field(default_factory=dict)
     structs: dict[str, Struct] = field(default_factory=dict)
     functions: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = field(default_factory=dict)
+    opaque: set[str] = field(default_factory=set)
     macros: set[str] = field(default_factory=set)
     not_understood: list[str] = field(default_factory=list)
 
@@ -69,9 +70,12 @@ def _statements(text: str) -> list[str]:
 def _read(statement: str, found: Declarations) -> None:
     enum = re.fullmatch(r"typedef enum (?:\w+ )?\{(.*)\} ?(\w+)", statement)
     struct = re.fullmatch(r"typedef struct (?:\w+ )?\{(.*)\} ?(\w+)", statement)
+    opaque = re.fullmatch(r"typedef struct (\w+) \1", statement)
     function = re.fullmatch(r"([\w ]+[ *]+)(\w+) ?\((.*)\)", statement)
     if enum:
         found.enums[enum.group(2)] = _members(enum.group(1))
+    elif opaque:
+        found.opaque.add(opaque.group(1))
     elif struct:
         found.structs[struct.group(2)] = _fields(struct.group(1), found)
     elif function:
@@ -151,5 +155,6 @@ def differences(cdef: Declarations, header: Declarations) -> list[str]:
         f"function {name}: not in the cdef"
         for name in header.functions.keys() - cdef.functions.keys()
     ]
+    wrong += [f"opaque {name}: in one alone" for name in cdef.opaque ^ header.opaque]
     wrong += [f"macro {name}: not in the headers" for name in cdef.macros - header.macros]
     return wrong

@@ -87,8 +87,8 @@ class Host(CoreEngine):
     def outcome(self, numbers: np.ndarray, reduced: bool = False) -> Outcome:
         """Of one frame, or of one vector of reduced data."""
         if reduced:
-            self._view(self._context.y, len(numbers))[:] = numbers
-            status = int(self._lib.eits_solve(self._context))
+            reduced_data = self._reals(np.array(numbers, dtype=self.dtype))
+            status = int(self._lib.eits_solve(self._context, reduced_data))
         else:
             status = self.solve_frame(numbers)
         self._lib.eits_find_touches(

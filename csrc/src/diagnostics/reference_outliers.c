@@ -13,7 +13,7 @@ static const eits_real OWN_MIN = R(0.05);
 
 static int in_use(const eits_context *ctx, uint32_t row, const eits_real *older)
 {
-    return row != EITS_FOLD_NONE && !ctx->masked[row] && eits_is_finite(older[row]);
+    return row != EITS_FOLD_NONE && !ctx->rows.masked[row] && eits_is_finite(older[row]);
 }
 
 static eits_real change(const eits_context *ctx, uint32_t row, const eits_real *newer,
@@ -46,8 +46,8 @@ static eits_real size_of(const eits_context *ctx, uint32_t k, const eits_real *o
 }
 
 /* What an oddity may be; sets `paired` where reciprocals tell. */
-static eits_real limit_of(const eits_context *ctx, const eits_real *newer, const eits_real *older,
-                          int *paired)
+static eits_real limit_of(const eits_context *ctx, const eits_scratch *scratch,
+                          const eits_real *newer, const eits_real *older, int *paired)
 {
     const uint32_t folds = ctx->model->n_folded;
     eits_real largest = 0;
@@ -55,16 +55,18 @@ static eits_real limit_of(const eits_context *ctx, const eits_real *newer, const
         const eits_real v = in_use(ctx, i, older) ? eits_fabs(older[i]) : 0;
         largest = v > largest ? v : largest;
     }
+    /* Reciprocals first: they are measured in the same frame, so nothing but noise may differ.
+     * Where they never do they are copies, and the change itself has to serve. */
     for (int way = 1; way >= 0; --way) {
         int any = 0;
         for (uint32_t k = 0; k < folds; ++k) {
-            ctx->list_value[k] = oddity(ctx, k, newer, older, way);
-            any |= ctx->list_value[k] > 0;
+            scratch->value[k] = oddity(ctx, k, newer, older, way);
+            any |= scratch->value[k] > 0;
         }
         if (!any)
             continue;
         *paired = way;
-        const eits_real spread = EITS_ROBUST * eits_kth(ctx->list_value, folds, folds / 2);
+        const eits_real spread = EITS_ROBUST * eits_kth(scratch->value, folds, folds / 2);
         const eits_real limit = way ? PAIRED * spread : UNPAIRED * spread,
                         min = (way ? PAIRED_MIN : UNPAIRED_MIN) * largest;
         return limit > min ? limit : min;
@@ -73,20 +75,20 @@ static eits_real limit_of(const eits_context *ctx, const eits_real *newer, const
     return largest;
 }
 
-uint32_t eits_reference_compare(eits_context *ctx, const eits_real *newer, const eits_real *older,
-                                uint8_t bit)
+uint32_t eits_reference_compare(eits_context *ctx, const eits_scratch *scratch,
+                                const eits_real *newer, const eits_real *older, uint8_t bit)
 {
     int paired;
-    const eits_real limit = limit_of(ctx, newer, older, &paired);
+    const eits_real limit = limit_of(ctx, scratch, newer, older, &paired);
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         const eits_real off = oddity(ctx, k, newer, older, paired);
         const int odd = off > limit && off > OWN_MIN * size_of(ctx, k, older);
-        ctx->list_index[k] = (ctx->list_index[k] & ~(uint32_t)bit) | (odd ? bit : 0u);
+        scratch->index[k] = (scratch->index[k] & ~(uint32_t)bit) | (odd ? bit : 0u);
         count += (uint32_t)odd;
     }
     for (uint32_t k = 0; k < ctx->model->n_folded && count > EITS_OUTLIER_MAX; ++k)
-        ctx->list_index[k] &= ~(uint32_t)bit;
+        scratch->index[k] &= ~(uint32_t)bit;
     return count > EITS_OUTLIER_MAX ? 0 : count;
 }
 
@@ -106,32 +108,34 @@ static uint32_t odd_rows(const eits_context *ctx, uint32_t k, const eits_real *n
     return count;
 }
 
-uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_real *frame)
+uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_scratch *scratch,
+                                      const eits_real *frame)
 {
     uint32_t left = 0;
-    if (eits_reference_compare(ctx, frame, ctx->reference.v0, 1) == 0)
+    if (eits_reference_compare(ctx, scratch, frame, ctx->reference.v0, 1) == 0)
         return 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        uint32_t rows[2], count = (ctx->list_index[k] & 1u) != 0
+        uint32_t rows[2], count = (scratch->index[k] & 1u) != 0
                                       ? odd_rows(ctx, k, frame, ctx->reference.v0, rows)
                                       : 0;
         left += count;
         while (count > 0)
-            ctx->masked[rows[--count]] = EITS_MASKED_NOW;
+            ctx->rows.masked[rows[--count]] = EITS_MASKED_NOW;
     }
     return left;
 }
 
-uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_real *frame)
+uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_scratch *scratch,
+                                     const eits_real *frame)
 {
     enum { WITH_SECOND = 1, FIRST_WITH_THIRD = 2, SECOND_WITH_THIRD = 4 };
     eits_real *first = ctx->reference.v0, *second = ctx->reference.m2;
     uint32_t left = 0;
-    (void)eits_reference_compare(ctx, second, first, WITH_SECOND);
-    (void)eits_reference_compare(ctx, frame, first, FIRST_WITH_THIRD);
-    (void)eits_reference_compare(ctx, frame, second, SECOND_WITH_THIRD);
+    (void)eits_reference_compare(ctx, scratch, second, first, WITH_SECOND);
+    (void)eits_reference_compare(ctx, scratch, frame, first, FIRST_WITH_THIRD);
+    (void)eits_reference_compare(ctx, scratch, frame, second, SECOND_WITH_THIRD);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        const uint32_t odd = ctx->list_index[k] & 7u;
+        const uint32_t odd = scratch->index[k] & 7u;
         uint32_t rows[2], count = 0;
         if (odd == (WITH_SECOND | FIRST_WITH_THIRD) || odd == (WITH_SECOND | SECOND_WITH_THIRD))
             count = odd_rows(ctx, k, second, first, rows);
@@ -150,5 +154,5 @@ uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_real *frame)
 void eits_reference_unmask(eits_context *ctx)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
-        ctx->masked[i] = ctx->masked[i] == EITS_MASKED_NOW ? 0 : ctx->masked[i];
+        ctx->rows.masked[i] = ctx->rows.masked[i] == EITS_MASKED_NOW ? 0 : ctx->rows.masked[i];
 }

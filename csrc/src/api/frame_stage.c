@@ -1,0 +1,176 @@
+/* The frame stage: which rows are of use, data, whitening, projection, and what is wrong. */
+#include "api/stages.h"
+#include "eitskin/frame.h"
+
+#include "base/vec.h"
+#include "diagnostics/diagnostics.h"
+#include "frame/fold.h"
+#include "frame/projection.h"
+#include "frame/whitening.h"
+
+/* Why each row of this frame cannot be used, as far as the row itself tells. */
+static void find_unusable(eits_context *ctx, const eits_real *frame)
+{
+    const eits_real limit = ctx->options.saturation_v;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        const unsigned masked =
+            ctx->rows.masked[i] || !eits_is_finite(ctx->reference.v0[i]) ? EITS_ROW_MASKED : 0;
+        const unsigned unknown = !eits_is_finite(frame[i]) ? EITS_ROW_UNKNOWN : 0;
+        const unsigned saturated =
+            limit > 0 && eits_fabs(frame[i]) >= limit ? EITS_ROW_SATURATED : 0;
+        ctx->rows.unusable[i] = (uint8_t)(masked | unknown | saturated);
+        ctx->info.saturated += masked == 0 && saturated != 0;
+    }
+    if (ctx->info.saturated > 0 && eits_wants(ctx, EITS_DIAGNOSTIC_SATURATED))
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_SATURATED;
+}
+
+static uint32_t count_unusable(const eits_context *ctx)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
+        count += ctx->rows.unusable[i] != 0;
+    return count;
+}
+
+static void clear_diagnostics(eits_context *ctx)
+{
+    eits_info *info = &ctx->info;
+    info->diagnostics = info->saturated = info->outliers = 0;
+    info->open_electrodes = info->bridged_electrodes = info->noisy_electrodes = 0;
+    info->model_mismatch = info->unexplained = 0;
+    memset(ctx->rows.electrode, 0, sizeof ctx->rows.electrode);
+}
+
+/* A frame of nothing but zeros is a dead front end, not an untouched skin. */
+static int is_dead(const eits_context *ctx, const eits_real *frame)
+{
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (!ctx->rows.unusable[i] && frame[i] != 0)
+            return 0;
+    }
+    return 1;
+}
+
+/* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew.
+ */
+static int examine_reduced(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
+{
+    if (!ctx->range.known || !eits_check_model_mismatch(ctx, scratch, macs))
+        return 0;
+    /* by turned rows: then it is no single fold */
+    const int known = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0;
+    if (!known && eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER) &&
+        eits_find_unpaired_outlier(ctx, scratch, macs)) {
+        ctx->info.model_mismatch = 0;
+        return 1;
+    }
+    if (eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH))
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_MODEL_MISMATCH;
+    return 0;
+}
+
+static eits_status check_rows(const eits_context *ctx, const eits_real *frame, uint32_t *masked)
+{
+    *masked = count_unusable(ctx);
+    if (*masked > ctx->options.max_masked)
+        return EITS_E_FRAME_CHANNELS;
+    return *masked < ctx->model->n_rows && is_dead(ctx, frame) ? EITS_E_FRAME_ZERO : EITS_OK;
+}
+
+eits_status eits_frame_data(eits_context *ctx, const eits_scratch *scratch, const eits_real *frame,
+                            uint32_t *masked, uint64_t *macs)
+{
+    const eits_model *model = ctx->model;
+    /* without a reference there is nothing to judge by */
+    const int judged = ctx->reference.ready != 0;
+    *macs = 0;
+    clear_diagnostics(ctx);
+    find_unusable(ctx, frame);
+    /* Electrodes first: their rows would otherwise be counted as so many outliers. */
+    const int dead = judged && !eits_find_electrodes(ctx, frame);
+    eits_status status = check_rows(ctx, frame, masked);
+    if (status == EITS_OK && dead)
+        status = EITS_E_FRAME_ZERO;
+    if (status != EITS_OK)
+        return status;
+    eits_fold_data(ctx, frame);
+    if (judged && eits_find_outliers(ctx, scratch, macs)) {
+        status = check_rows(ctx, frame, masked);
+        if (status != EITS_OK)
+            return status;
+        eits_fold_data(ctx, frame);
+    }
+    if (ctx->projection.stale)
+        *macs += eits_build_basis(ctx, scratch);
+    /* The model tells what data it can give only of a whole frame: with rows left out P d is no
+     * projection on its range any more. */
+    uint32_t count = eits_reduce_frame(ctx, scratch, macs);
+    if (count == model->n_folded && judged && examine_reduced(ctx, scratch, macs)) {
+        status = check_rows(ctx, frame, masked);
+        if (status != EITS_OK)
+            return status;
+        eits_fold_data(ctx, frame);
+        if (ctx->projection.stale)
+            *macs += eits_build_basis(ctx, scratch);
+        count = eits_reduce_frame(ctx, scratch, macs);
+    }
+    *macs += ctx->whitening.form ? eits_whiten_data(ctx, ctx->frame.y) : 0;
+    *macs += eits_project(ctx, ctx->frame.y);
+    ctx->frame.has_y_log = judged && model->data_kind == EITS_DATA_DIFFERENCE &&
+                           (ctx->options.touch_fit & EITS_TOUCH_FIT_LOG_DATA) != 0;
+    *macs += ctx->frame.has_y_log ? eits_reduce_log(ctx, scratch, frame) : 0;
+    /* Fewer folds than directions: the triangle makes up the rest of them from e, which is no data.
+     */
+    const uint32_t directions = ctx->whitening.form && count < model->rank ? count : model->rank;
+    if (ctx->projection.count >= directions) /* no direction is left: what is there is rounding */
+        eits_zero(ctx->frame.y, model->rank);
+    return eits_is_finite(eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, model->rank))
+               ? EITS_OK
+               : EITS_E_NOT_FINITE;
+}
+
+static eits_status check_call(const eits_context *ctx, const eits_real *frame, size_t length)
+{
+    if (ctx == NULL || frame == NULL)
+        return EITS_E_ARGUMENT;
+    if (!ctx->reference.ready)
+        return EITS_E_NO_REFERENCE;
+    return length == ctx->model->n_rows ? EITS_OK : EITS_E_FRAME_LENGTH;
+}
+
+eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t length,
+                             uint32_t *masked, uint64_t *macs)
+{
+    if (masked == NULL || macs == NULL)
+        return EITS_E_ARGUMENT;
+    const eits_status status = check_call(ctx, frame, length);
+    return status == EITS_OK ? eits_frame_data(ctx, &ctx->scratch, frame, masked, macs) : status;
+}
+
+/* Which sides are in use decides when the next solved frame builds its basis again, and so its
+ * MACs: they are put back. */
+eits_status eits_examine(eits_context *ctx, const eits_real *frame, size_t length)
+{
+    eits_status status = check_call(ctx, frame, length);
+    if (status != EITS_OK)
+        return status;
+    const size_t folds = ctx->model->n_folded;
+    const uint32_t stale = ctx->projection.stale;
+    uint64_t macs;
+    memcpy(ctx->frame.kept_sides, ctx->frame.sides, folds);
+    ctx->info = (eits_info){0};
+    status = eits_frame_data(ctx, &ctx->scratch, frame, &ctx->info.masked, &macs);
+    ctx->projection.stale |=
+        stale | (memcmp(ctx->frame.kept_sides, ctx->frame.sides, folds) != 0 ? 1u : 0u);
+    memcpy(ctx->frame.sides, ctx->frame.kept_sides, folds);
+    return status;
+}
+
+eits_status eits_mask_row(eits_context *ctx, uint32_t row, int masked)
+{
+    if (ctx == NULL || row >= ctx->model->n_rows)
+        return EITS_E_ARGUMENT;
+    ctx->rows.masked[row] = masked != 0;
+    return EITS_OK;
+}

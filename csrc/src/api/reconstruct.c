@@ -1,0 +1,55 @@
+/* From a frame, or from its reduced data, to an image. */
+#include "eitskin/frame.h"
+#include "eitskin/solve.h"
+
+#include "api/stages.h"
+#include "base/vec.h"
+#include "context/context.h"
+#include "solve/solve.h"
+
+eits_status eits_solve(eits_context *ctx, const eits_real *y)
+{
+    if (ctx == NULL)
+        return EITS_E_ARGUMENT;
+    if (y != NULL)
+        eits_copy(ctx->frame.y, y, ctx->model->rank);
+    ctx->info = (eits_info){0};
+    return eits_solve_frame(ctx, &ctx->scratch, ctx->options.warm_start != 0);
+}
+
+eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t length,
+                             eits_real *image, eits_info *info)
+{
+    if (ctx == NULL || frame == NULL)
+        return EITS_E_ARGUMENT;
+    ctx->info = (eits_info){0};
+    eits_status status = eits_frame_stage(ctx, frame, length, &ctx->info.masked, &ctx->info.macs);
+    if (status == EITS_OK)
+        status = eits_solve_frame(ctx, &ctx->scratch, ctx->options.warm_start != 0);
+    else
+        eits_answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
+    if (image != NULL)
+        eits_copy(image, ctx->solver.image, ctx->model->n_pixels);
+    if (info != NULL)
+        *info = ctx->info;
+    return status;
+}
+
+void eits_solve_again(eits_context *ctx, const eits_scratch *scratch, const eits_real *y)
+{
+    const eits_info before = ctx->info;
+    const size_t stride = EITS_STRIDE(ctx->model->rank);
+    eits_copy(ctx->frame.y_log, ctx->frame.y, stride); /* of no more use for this frame */
+    ctx->frame.has_y_log = 0;
+    eits_copy(ctx->frame.y, y, stride);
+    (void)eits_solve_frame(ctx, scratch, 0);
+    /* The interaction is an estimate: one that leaves nothing of a frame with two touches was
+     * wrong. */
+    if (!ctx->solver.warm) { /* it came to nothing, or to no number */
+        eits_copy(ctx->frame.y, ctx->frame.y_log, stride);
+        (void)eits_solve_frame(ctx, scratch, 0);
+    }
+    ctx->info.iterations += before.iterations;
+    ctx->info.step_halvings += before.step_halvings;
+    ctx->info.diagnostics = before.diagnostics; /* judged by the frame as it came */
+}

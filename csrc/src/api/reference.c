@@ -1,0 +1,146 @@
+/* The reference frame and its noise, from one frame or learned from many. */
+#include "eitskin/frame.h"
+
+#include "api/stages.h"
+#include "base/vec.h"
+#include "context/products.h"
+#include "diagnostics/diagnostics.h"
+#include "frame/reference.h"
+#include "frame/whitening.h"
+
+enum { MIN_REFERENCE_FRAMES = 4 };
+
+/* Coefficients of another reference are no start. */
+static eits_status fit(eits_context *ctx)
+{
+    ctx->solver.warm = 0;
+    return eits_fit_reference(ctx);
+}
+
+/* One frame says nothing of noise: what depends on it (detection threshold, raised
+ * regularisation, tests against noise) stays off until frames are learned from. */
+eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t length)
+{
+    if (ctx == NULL || frame == NULL)
+        return EITS_E_ARGUMENT;
+    eits_status status = eits_check_reference_frame(ctx, frame, length);
+    if (status != EITS_OK)
+        return status;
+    eits_reference *b = &ctx->reference;
+    /* A frame that turns out to be of no use must not cost the reference that there is. */
+    eits_real *old = b->m2; /* keeps the old reference until the new one is known to be good */
+    b->wanted = 0;          /* learning, if any was under way, ends here */
+    eits_copy(old, b->v0, length);
+    eits_copy(b->v0, frame, length);
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (ctx->rows.masked[i])
+            b->v0[i] = R(NAN);
+    }
+    status = fit(ctx);
+    if (status != EITS_OK) {
+        eits_copy(b->v0, old, length);
+        if (b->ready)
+            (void)fit(ctx);
+    } else {
+        b->ready = 1;
+        b->count = 1;
+        b->noise_v = 0;
+        b->lambda_noise = 0;
+        b->outliers = b->second_waits = 0;
+    }
+    eits_zero(b->m2, length);
+    return status;
+}
+
+eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
+{
+    if (ctx == NULL || count < MIN_REFERENCE_FRAMES)
+        return EITS_E_ARGUMENT;
+    eits_reference *b = &ctx->reference;
+    eits_zero(b->v0, ctx->model->n_rows);
+    eits_zero(b->m2, ctx->model->n_rows);
+    b->wanted = count;
+    b->count = 0;
+    b->ready = 0;
+    b->lambda_noise = 0;
+    b->noise_v = 0;
+    b->outliers = b->second_waits = 0;
+    return EITS_OK;
+}
+
+/* How far a reference frame reaches above nothing: max |S'y| against the mean so far. */
+static eits_status learn_lambda_noise(eits_context *ctx, const eits_scratch *scratch,
+                                      const eits_real *frame)
+{
+    uint32_t masked;
+    uint64_t macs;
+    const eits_status status = eits_frame_data(ctx, scratch, frame, &masked, &macs);
+    if (status != EITS_OK)
+        return status;
+    eits_apply_t(ctx, eits_adjoint(ctx, ctx->frame.y, scratch->row[4]), scratch->pixel[0]);
+    if (!eits_all_finite(scratch->pixel[0], ctx->model->n_pixels))
+        return EITS_E_NOT_FINITE;
+    const eits_real seen =
+        eits_greatest(ctx->kernels, scratch->pixel[0], ctx->model->n_pixels, EITS_SIGN_BOTH) /
+        ctx->whitening.noise_ratio;
+    if (seen > ctx->reference.lambda_noise)
+        ctx->reference.lambda_noise = seen;
+    return EITS_OK;
+}
+
+eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t length)
+{
+    if (ctx == NULL || frame == NULL || ctx->reference.count >= ctx->reference.wanted)
+        return EITS_E_ARGUMENT;
+    eits_reference *b = &ctx->reference;
+    eits_status status = eits_check_reference_frame(ctx, frame, length);
+    if (status != EITS_OK)
+        return status;
+    const int judged = eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER);
+    /* Of two frames that differ in a reading nobody knows which is wrong: the third decides. From
+     * then on the mean is the judge. */
+    if (b->count == 1 && judged) {
+        eits_keep_second_frame(ctx, frame);
+        return EITS_OK;
+    }
+    if (b->second_waits) {
+        ctx->reference.outliers += eits_reference_weigh_second(ctx, &ctx->scratch, frame);
+        eits_take_second_frame(ctx);
+    }
+    const uint32_t left =
+        b->count >= 2 && judged ? eits_reference_mask_outliers(ctx, &ctx->scratch, frame) : 0;
+    /* The second half is measured against the mean of the first: a frame measured against a mean
+     * that contains it would show too little noise. noise_v so far is enough to raise the
+     * regularisation as it will be raised for the frames to come. */
+    if (b->count == b->wanted / 2) {
+        status = fit(ctx);
+        /* lambda_noise is learned with the regularisation that it asks for */
+        b->noise_v = eits_reference_noise(ctx);
+    }
+    if (status == EITS_OK && b->count >= b->wanted / 2)
+        status = learn_lambda_noise(ctx, &ctx->scratch, frame);
+    if (status == EITS_OK) {
+        if (b->count == 0)
+            b->m2_unit = eits_reference_unit(ctx, frame);
+        eits_take_reference_frame(ctx, frame);
+        b->outliers += left;
+    }
+    /* Readings were left out of this frame alone. */
+    eits_reference_unmask(ctx);
+    return status;
+}
+
+eits_status eits_reference_finish(eits_context *ctx)
+{
+    if (ctx == NULL)
+        return EITS_E_ARGUMENT;
+    eits_reference *b = &ctx->reference;
+    if (b->count < MIN_REFERENCE_FRAMES || b->count != b->wanted)
+        return EITS_E_REFERENCE_SHORT;
+    const eits_status status = fit(ctx);
+    if (status != EITS_OK)
+        return status;
+    b->noise_v = eits_reference_noise(ctx);
+    b->ready = 1;
+    return EITS_OK;
+}

@@ -1,0 +1,52 @@
+/* From the image to touches: fitted, judged, followed, weighed; and perhaps a second pass. */
+#include "eitskin/force.h"
+#include "eitskin/touch.h"
+
+#include "api/stages.h"
+#include "context/context.h"
+#include "diagnostics/diagnostics.h"
+#include "touch/disc_fit.h"
+#include "touch/tracker.h"
+
+/* Whether the image says that there may be touches. */
+static int may_have_touches(const eits_context *ctx)
+{
+    const eits_stop stop = ctx->info.stop;
+    return stop != EITS_STOP_BELOW_THRESHOLD && stop != EITS_STOP_ZERO &&
+           stop != EITS_STOP_DIVERGED;
+}
+
+eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,
+                              uint32_t *count)
+{
+    if (ctx == NULL || (touches == NULL && room > 0))
+        return EITS_E_ARGUMENT;
+    const eits_scratch *scratch = &ctx->scratch;
+    eits_fit f = eits_fit_none(ctx, scratch);
+    eits_touch found[EITS_MAX_TOUCHES];
+    /* An image that is zero for the reason given by info.stop has no touches; those that were
+     * followed are then held or given up like any that are not found. */
+    ctx->info.unexplained = 0;
+    if (may_have_touches(ctx)) {
+        eits_fit_touches(ctx, scratch, &f);
+        ctx->info.unexplained = f.total > 0 ? eits_fit_left(ctx, &f) / f.total : 0;
+    }
+    const uint32_t finite = eits_report_touches(ctx, &f, found);
+    ctx->info.touch_macs = f.macs;
+    eits_check_crowd(ctx, found, finite);
+    /* Judged by what this frame shows; tracking may hide some of it and add others. */
+    const uint32_t reported = eits_track(ctx, found, finite);
+    ctx->info.touches = reported;
+    for (uint32_t k = 0; k < reported; ++k)
+        found[k].force_n =
+            eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
+    /* Last, since it overwrites image, info and scratch. */
+    if (ctx->options.second_pass && ctx->options.mac_limit == 0 && f.count > 1 &&
+        f.data == ctx->touch.y_separate)
+        eits_solve_again(ctx, scratch, ctx->touch.y_separate);
+    for (uint32_t k = 0; k < reported && k < room; ++k)
+        touches[k] = found[k];
+    if (count != NULL)
+        *count = reported;
+    return EITS_OK;
+}

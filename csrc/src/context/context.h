@@ -1,0 +1,199 @@
+/* What a context holds, part by part: inside the library.
+ *
+ * Each part belongs to one room, which alone writes it once it is laid out; the rooms above it
+ * read. tests/python/core/test_rooms.py checks that, and that no room includes one above it. All
+ * memory comes from the caller's workspace and is laid out once, by api/setup.c. "stride" is
+ * EITS_STRIDE(rank): rank, rounded up to whole vectors of the kernels. */
+#ifndef EITSKIN_CONTEXT_PARTS_H
+#define EITSKIN_CONTEXT_PARTS_H
+
+#include "context/column_cache.h"
+#include "eitskin/context.h"
+#include "eitskin/diagnostics.h"
+#include "kernels/kernels.h"
+
+enum { EITS_SCRATCH_ROWS = 8, EITS_SCRATCH_PIXELS = 3 };
+
+/* The reference frame and its noise. Written by frame/reference. */
+typedef struct eits_reference {
+    /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them */
+    eits_real *v0;
+    uint32_t count; /* reference frames that are in v0 */
+    uint32_t ready; /* 1: frames can be measured against it */
+    eits_real v0_rms;
+    eits_real gain;
+    eits_real correlation;
+    eits_real noise_v;
+    eits_real lambda_noise;
+    uint32_t outliers;
+    /* While several frames are learned from. n_rows: sum of squared deviations, in m2_unit^2 */
+    eits_real *m2;
+    /* V: a power of two near the first reference frame's greatest voltage, so that squares are
+     * numbers */
+    eits_real m2_unit;
+    uint32_t wanted;       /* frames that are to come in all */
+    uint32_t second_waits; /* the second reference frame is in m2 until there is a third */
+} eits_reference;
+
+/* A row of eits_rows.masked that is left out of the reference frame at hand only. */
+enum { EITS_MASKED_NOW = 2 };
+
+/* Which rows and electrodes are of use. Written by frame and diagnostics. */
+typedef struct eits_rows {
+    uint8_t *masked; /* n_rows: 1 by the caller, EITS_MASKED_NOW by a reference frame */
+    /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
+    uint8_t *unusable;
+    uint8_t electrode[EITS_MAX_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
+} eits_rows;
+
+/* Which rows of a fold are in use. */
+enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_BOTH = 3 };
+
+/* One frame, folded and reduced. Written by frame. */
+typedef struct eits_frame {
+    uint8_t *sides;      /* n_folded: EITS_SIDE_..., of the last frame */
+    uint8_t *kept_sides; /* n_folded: the last solved frame's, while another is examined */
+    eits_real *d;        /* n_folded: data */
+    /* n_folded: what the two rows of each fold differ by; 0 where one is in use */
+    eits_real *reciprocity_error;
+    eits_real *y;       /* stride: reduced data, projected; what the solver is to explain */
+    eits_real *y_log;   /* stride: the same of v0 log(v / v0) */
+    uint32_t has_y_log; /* 1: y_log is this frame's */
+} eits_frame;
+
+/* Q: directions of the reduced data that carry no news are taken out. Written by frame. */
+typedef struct eits_projection {
+    /* orthonormal directions, up to rank of them, stride apart. Where rows left out are whitened
+     * again there is at most one, and the room behind it is the whitening's (below) */
+    eits_real *basis;
+    uint32_t count;
+    uint32_t stale;  /* 1: basis and whitening do not fit the next frame, whatever its sides */
+    uint32_t builds; /* counts up with each build: others learn from it that theirs is stale */
+    /* n_folded: data of a drift of the gain; zeros where it is not ignored */
+    eits_real *gain_drift;
+} eits_projection;
+
+/* What there is of F, by which the solver's S is F S. */
+typedef enum eits_whitening_form {
+    /* F = 1: no row is left out and the regularisation is the model's, or the model has not the
+     * builder's form, or numbers overflow */
+    EITS_WHITENING_STORED = 0,
+    EITS_WHITENING_TRIANGLE = 1, /* rows are left out */
+    EITS_WHITENING_DIAGONAL = 2  /* none is, but the regularisation is raised */
+} eits_whitening_form;
+
+/* F (frame/whitening.h), for the sides and the noise in force. Written by frame/whitening. */
+typedef struct eits_whitening {
+    /* 1: the model's P and S have the builder's form, so that rows left out can be whitened again
+     */
+    uint32_t possible;
+    eits_whitening_form form;
+    /* stride: s_1 of the scaled Jacobian over that of each direction, and over w s_1 of the
+     * first */
+    eits_real *row_scale;
+    eits_real *row_strength; /* stride: (s_i / s_1)^2 */
+    eits_real s1;            /* in the units of 1 / P */
+    eits_real s1_square;     /* |S_1|^2 */
+    eits_real mu;            /* by which the model was whitened, over s_1^2 */
+    eits_real mu_in_force;   /* of this frame */
+    eits_real square;        /* what F'F is scaled by */
+    eits_real noise_ratio;   /* noise in max(S'F'y) over that with F = 1 */
+    /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where mu is raised */
+    eits_real energy;
+    eits_real energy_stored; /* as with the model's mu */
+    eits_real *map;    /* F as a triangle, or its diagonal: behind the basis' first direction */
+    eits_real *metric; /* G, a triangle (frame/whitening.h): behind the map */
+} eits_whitening;
+
+/* What data the model can give at all: P's range. Written by diagnostics/model_mismatch. */
+typedef struct eits_range {
+    uint32_t known;           /* 1: P's rows are orthogonal, so that it can be found out */
+    eits_real *inverse;       /* stride: 1 / |P_i|^2 */
+    eits_real *shrink;        /* stride: so much of it as predicts d */
+    eits_real *off_range;     /* n_folded: what of the gain's drift the model cannot give */
+    uint32_t off_range_build; /* the projection.builds that it belongs to */
+} eits_range;
+
+/* The image and the solvers' working memory. Written by solve. x, image and warm outlive a solve;
+ * vectors marked "lent" are the scratch's. */
+typedef struct eits_solve_state {
+    eits_real *x;                 /* n_pixels: coefficients */
+    eits_real *image;             /* n_pixels: S/m */
+    uint32_t warm;                /* 1: x holds the last frame's coefficients */
+    eits_real *x_next, *z;        /* n_pixels each, lent: the next x, and the extrapolated point */
+    eits_real *gradient;          /* n_pixels, lent: S'F'(y - F S x) */
+    eits_real *sx, *sx_next, *sz; /* stride each, lent: S times x, x_next and z */
+    eits_real *residual;          /* stride, lent: Q (y - F S x) */
+    eits_real *adjoint;           /* stride, lent: F' of the residual */
+    /* n_pixels: the working set's columns; x, x_next, z hold theirs only while it runs */
+    uint32_t *working;
+    uint32_t working_count;
+    eits_real *working_panels; /* the working set's columns in panels; NULL: not prepared */
+    uint32_t *working_slot;    /* EITS_CACHED(n_pixels): where the column cache has them */
+    uint32_t working_cached;   /* 1: all of them are there */
+    /* rank x stride, lent: rows that make the active set's columns orthonormal (gram_factor.h) */
+    eits_real *factor;
+} eits_solve_state;
+
+/* Memory of the touches' fit. Written by touch. */
+typedef struct eits_touch_memory {
+    eits_real *atoms;      /* EITS_MAX_TOUCHES x stride: what the skin answers to each disc */
+    eits_real *y_separate; /* stride: y less the touches' interaction */
+} eits_touch_memory;
+
+/* A touch that is followed (touch/tracker.h). */
+typedef struct eits_followed {
+    eits_touch touch;       /* as reported; id 0: not yet */
+    eits_real vx_mm, vy_mm; /* a frame */
+    /* covariance of place and velocity, along either axis */
+    eits_real place_mm2, both_mm2, speed_mm2;
+    uint32_t seen;   /* frames that it was found in, as far as that is asked */
+    uint32_t missed; /* frames on end that it was not */
+    uint32_t faint;  /* 1: its own S'y was below that of noise when it was last found */
+} eits_followed;
+
+/* Written by touch/tracker. */
+typedef struct eits_tracker {
+    eits_followed followed[EITS_MAX_TOUCHES];
+    uint32_t count;
+    uint32_t next_id;
+} eits_tracker;
+
+/* Memory that nobody owns. Each stage is lent all of it, hands it down to the functions that need
+ * some, and finds it in disorder afterwards; a function that calls others with it says in its
+ * comment, or by its locals' names, what it keeps where meanwhile. While a solver runs, its vectors
+ * (eits_solve_state) are these: row 0 to 4, pixel 0 to 2 and square. */
+typedef struct eits_scratch {
+    eits_real *value; /* max(n_pixels, n_folded): what columns are multiplied by, with scales */
+    uint32_t *index;  /* as many: which columns */
+    eits_real *row[EITS_SCRATCH_ROWS];     /* stride each */
+    eits_real *pixel[EITS_SCRATCH_PIXELS]; /* n_pixels each */
+    eits_real *square;                     /* rank x stride */
+} eits_scratch;
+
+struct eits_context {
+    const eits_model *model;
+    const eits_kernels *kernels;
+    eits_options options;
+    eits_info info; /* of the last frame; each stage fills in its fields */
+    uint16_t *cell; /* ny x nx: which kept pixel a cell of the image is; EITS_NO_PIXEL for none */
+    eits_columns columns;
+    eits_reference reference;
+    eits_rows rows;
+    eits_frame frame;
+    eits_projection projection;
+    eits_whitening whitening;
+    eits_range range;
+    eits_solve_state solver;
+    eits_touch_memory touch;
+    eits_tracker tracker;
+    eits_scratch scratch;
+};
+
+/* Row i's electrodes, I+, I-, V+, V-. */
+static inline const uint8_t *eits_row(const eits_context *ctx, uint32_t i)
+{
+    return ctx->model->protocol + 4 * (size_t)i;
+}
+
+#endif

@@ -1,0 +1,15 @@
+/* The kernels on what a context has of S: panels, cached columns or the stored matrix, whichever is
+ * the fastest of those there are. Same bits. */
+#ifndef EITSKIN_PRODUCTS_H
+#define EITSKIN_PRODUCTS_H
+
+#include "context/context.h"
+
+/* out = S' v by panels if there are any, else from the columns. */
+void eits_apply_t(const eits_context *ctx, const eits_real *v, eits_real *out);
+
+/* out = S x; returns the number of non-zeros. */
+uint32_t eits_apply(const eits_context *ctx, const eits_scratch *scratch, const eits_real *x,
+                    eits_real *out);
+
+#endif

@@ -1,0 +1,205 @@
+/* From voltages to reduced data: difference to the reference, fold, and the directions to ignore.
+ */
+#include "frame/fold.h"
+
+#include "base/log.h"
+#include "base/vec.h"
+#include "frame/projection.h"
+#include "frame/whitening.h"
+#include "kernels/kernels.h"
+
+/* v0 log(v / v0): beyond a ratio of 16 either way it is no touch; and the logarithm must not meet
+ * zero or a turned sign. */
+static eits_real log_datum(const eits_context *ctx, eits_real v, eits_real v0)
+{
+    const eits_real q = v / v0, low = R(1.0 / 16.0), high = R(16.0);
+    return ctx->reference.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
+}
+
+/* The datum of one row from its voltage and its reference, in model volts (or without unit where
+ * normalised). */
+static eits_real datum(const eits_context *ctx, eits_real v, eits_real v0)
+{
+    switch (ctx->model->data_kind) {
+    case EITS_DATA_DIFFERENCE:
+        break;
+    case EITS_DATA_NORMALISED:
+        return (v - v0) / v0;
+    case EITS_DATA_LOG_RATIO:
+        return log_datum(ctx, v, v0);
+    }
+    return ctx->reference.gain * (v - v0);
+}
+
+/* Rows whose reference is all but zero say nothing as a ratio. */
+static int ratio_undefined(const eits_context *ctx, eits_real v0)
+{
+    return ctx->model->data_kind != EITS_DATA_DIFFERENCE &&
+           eits_fabs(v0) < R(1e-6) * ctx->reference.v0_rms;
+}
+
+/* A row and its reciprocal that differ by less than rounding of their references agree: quantised
+ * voltages often do. */
+static int exceeds_rounding(const eits_context *ctx, eits_real difference, eits_real v0)
+{
+    const eits_real rounding = sizeof(eits_real) == 4 ? R(0x1p-20) : R(0x1p-49);
+    return eits_fabs(difference) > rounding * (ctx->model->data_kind == EITS_DATA_NORMALISED
+                                                   ? 1
+                                                   : eits_fabs(ctx->reference.gain * v0));
+}
+
+/* d_k: the mean of a row and its reciprocal, or whichever is usable; reciprocity_error_k: their
+ * difference. Where other sides are in use than before, the basis has to be built again. */
+void eits_fold_data(eits_context *ctx, const eits_real *frame)
+{
+    const eits_real *v0 = ctx->reference.v0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_fold fold = ctx->model->fold[k];
+        const uint32_t rows[2] = {fold.first, fold.second};
+        eits_real sum = 0, difference = 0;
+        uint8_t used = EITS_SIDE_NONE;
+        for (int side = 0; side < 2; ++side) {
+            const uint32_t i = rows[side];
+            if (i == EITS_FOLD_NONE || ctx->rows.unusable[i] || ratio_undefined(ctx, v0[i]))
+                continue;
+            /* a ratio has no sign to turn: only the differences of a reciprocal measured the other
+             * way round do */
+            const int turn =
+                side == 1 && fold.sign < 0 && ctx->model->data_kind != EITS_DATA_NORMALISED;
+            const eits_real measured = datum(ctx, frame[i], v0[i]),
+                            value = turn ? -measured : measured;
+            difference = sum - value;
+            sum += value;
+            used |= (uint8_t)(side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND);
+        }
+        ctx->frame.d[k] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
+        ctx->frame.reciprocity_error[k] =
+            used == EITS_SIDE_BOTH && exceeds_rounding(ctx, difference, v0[fold.first]) ? difference
+                                                                                        : 0;
+        ctx->projection.stale |= used != ctx->frame.sides[k];
+        ctx->frame.sides[k] = used;
+    }
+}
+
+/* P e_k for one folded row. */
+static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out)
+{
+    const eits_real one = 1;
+    ctx->kernels->mul(&ctx->model->reduction, &k, &one, 1, out);
+}
+
+/* Add `candidate` to the basis unless it lies in its span: Gram-Schmidt, twice for accuracy in
+ * float32. */
+static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
+{
+    const uint32_t rank = ctx->model->rank;
+    const size_t stride = EITS_STRIDE(rank);
+    const eits_real before = eits_dot(ctx->kernels, candidate, candidate, rank);
+    uint64_t macs = 0;
+    if (ctx->projection.count == rank || !(before > 0))
+        return 0;
+    for (int pass = 0; pass < 2; ++pass)
+        macs += eits_project(ctx, candidate);
+    const eits_real after = eits_dot(ctx->kernels, candidate, candidate, rank);
+    /* What is left is rounding: the direction is there already. */
+    if (!(after > R(1e-6) * before))
+        return macs;
+    const eits_real scale = 1 / eits_sqrt(after);
+    eits_real *slot = ctx->projection.basis + stride * ctx->projection.count++;
+    for (uint32_t i = 0; i < rank; ++i)
+        slot[i] = scale * candidate[i];
+    return macs + 2u * rank;
+}
+
+/* The reduced direction along which drift of the gain moves the data: the reference, folded as the
+ * data are. */
+static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, eits_real *out)
+{
+    const eits_model *model = ctx->model;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const eits_fold fold = model->fold[k];
+        const uint8_t used = ctx->frame.sides[k];
+        const eits_real first = used & EITS_SIDE_FIRST ? ctx->reference.v0[fold.first] : 0;
+        const eits_real second =
+            used & EITS_SIDE_SECOND ? (eits_real)fold.sign * ctx->reference.v0[fold.second] : 0;
+        const eits_real along =
+            ctx->reference.gain *
+            (used == EITS_SIDE_BOTH ? R(0.5) * (first + second) : first + second);
+        scratch->index[k] = k;
+        ctx->projection.gain_drift[k] =
+            used != EITS_SIDE_NONE && model->data_kind == EITS_DATA_NORMALISED ? 1 : along;
+    }
+    /* Kept unreduced as well: the test for data off the model's range leaves the drift out, too. */
+    ctx->kernels->mul(&model->reduction, scratch->index, ctx->projection.gain_drift,
+                      model->n_folded, out);
+    return (uint64_t)model->n_folded * model->rank;
+}
+
+uint64_t eits_build_basis(eits_context *ctx, const eits_scratch *scratch)
+{
+    eits_real *direction = scratch->row[0];
+    /* Where F takes care of the folds left out, their directions need not be ignored. */
+    uint64_t macs = eits_whitening_build(ctx, scratch);
+    ctx->projection.count = 0;
+    eits_zero(ctx->projection.gain_drift, ctx->model->n_folded);
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (ctx->whitening.form || ctx->frame.sides[k] != EITS_SIDE_NONE)
+            continue;
+        reduction_column(ctx, k, direction);
+        macs += ctx->model->rank + extend_basis(ctx, direction);
+    }
+    if (ctx->options.project_reference) {
+        macs += drift_direction(ctx, scratch, direction);
+        macs += ctx->whitening.form ? eits_whiten_data(ctx, direction) : 0;
+        macs += extend_basis(ctx, direction);
+    }
+    ctx->projection.stale = 0;
+    ++ctx->projection.builds;
+    return macs;
+}
+
+/* y = P d of the folds in use, not yet projected; returns their number. */
+uint32_t eits_reduce_frame(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
+{
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        scratch->index[count] = k;
+        scratch->value[count] = ctx->frame.d[k];
+        count += ctx->frame.sides[k] != EITS_SIDE_NONE;
+    }
+    ctx->kernels->mul(&ctx->model->reduction, scratch->index, scratch->value, count, ctx->frame.y);
+    *macs += (uint64_t)count * ctx->model->rank;
+    return count;
+}
+
+uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t count, eits_real *out)
+{
+    ctx->kernels->mul(&ctx->model->reduction, scratch->index, scratch->value, count, out);
+    const uint64_t macs = ctx->whitening.form ? eits_whiten_data(ctx, out) : 0;
+    return macs + (uint64_t)count * ctx->model->rank + eits_project(ctx, out);
+}
+
+/* y_log: the same of v0 log(v / v0), for the first places of touches. Rows whose reference is
+ * all but zero stay differences. */
+uint64_t eits_reduce_log(eits_context *ctx, const eits_scratch *scratch, const eits_real *frame)
+{
+    const eits_real *v0 = ctx->reference.v0, min = R(1e-6) * ctx->reference.v0_rms;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_fold fold = ctx->model->fold[k];
+        const uint8_t used = ctx->frame.sides[k];
+        eits_real sum = 0;
+        for (uint32_t side = 0; side < 2; ++side) {
+            const uint32_t i = side == 0 ? fold.first : fold.second;
+            if (!(used & (side == 0 ? EITS_SIDE_FIRST : EITS_SIDE_SECOND)))
+                continue;
+            const eits_real value = eits_fabs(v0[i]) < min ? datum(ctx, frame[i], v0[i])
+                                                           : log_datum(ctx, frame[i], v0[i]);
+            sum += side == 1 && fold.sign < 0 ? -value : value;
+        }
+        scratch->index[count] = k;
+        scratch->value[count] = used == EITS_SIDE_BOTH ? R(0.5) * sum : sum;
+        count += used != EITS_SIDE_NONE;
+    }
+    return eits_reduce(ctx, scratch, count, ctx->frame.y_log);
+}

@@ -1,0 +1,30 @@
+/* What the public eits_reference_* functions are made of (api/reference.c): none of these looks for
+ * outliers, and none measures a frame. */
+#ifndef EITSKIN_REFERENCE_H
+#define EITSKIN_REFERENCE_H
+
+#include "context/context.h"
+
+/* Whether each row that is not masked has a finite voltage below saturation.
+ * Errors: EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS. */
+eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real *frame,
+                                       size_t length);
+
+/* Set gain, correlation and v0_rms from v0; the basis is stale then. Errors: EITS_E_FRAME_ZERO. */
+eits_status eits_fit_reference(eits_context *ctx);
+
+/* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
+eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame);
+
+/* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
+eits_real eits_reference_noise(const eits_context *ctx);
+
+/* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
+void eits_take_reference_frame(eits_context *ctx, const eits_real *frame);
+
+/* The second frame waits in m2 until a third tells which of them is right where they differ; then
+ * it is taken in from there. */
+void eits_keep_second_frame(eits_context *ctx, const eits_real *frame);
+void eits_take_second_frame(eits_context *ctx);
+
+#endif

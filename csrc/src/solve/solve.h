@@ -1,0 +1,78 @@
+/* One frame's reduced data to coefficients and image. */
+#ifndef EITSKIN_SOLVE_FRAME_H
+#define EITSKIN_SOLVE_FRAME_H
+
+#include "context/context.h"
+
+/* Solve for frame.y: lambda, detection threshold, start, solver, image. info holds what the frame
+ * stage counted, and zeros; `from_last`: start from the last coefficients.
+ * Errors: EITS_E_NOT_FINITE. */
+eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int from_last);
+
+/* x = 0 is the answer: for the reason given. */
+void eits_answer_zero(eits_context *ctx, eits_stop why);
+
+/* ---- the solvers ----
+ *
+ * Each from solver.x and solver.sx (both zero, or a warm start's).
+ * `gradient_known`: x is zero and solver.gradient holds S'y. Each leaves x, sx and how it went
+ * in info; where stop is EITS_STOP_DIVERGED, x is of no use. */
+
+/* FISTA on every column or on a working set, as the options say: until the count or the gap; a rise
+ * of the objective above its start halves the step and starts over from zero. */
+void eits_run_fista(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                    int gradient_known);
+
+/* Coordinate descent: sweeps until the count, the gap, or until nothing moves. */
+void eits_run_coordinate(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                         int gradient_known);
+
+/* Active set: rounds until the count, the gap, or until no column is missing; where its factor
+ * breaks down, coordinate descent goes on from where it came to. */
+void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
+                         int gradient_known);
+
+/* ---- duality_gap.c: what all solvers share ---- */
+
+typedef struct eits_duality_gap {
+    eits_real gap;
+    eits_real objective;
+    eits_real residual_squared;
+} eits_duality_gap;
+
+/* Where a solver keeps its coefficients: solver.x[j] for each column, or solver.x[k] for
+ * column solver.working[k]. */
+typedef enum eits_layout { EITS_LAYOUT_FULL = 0, EITS_LAYOUT_WORKING = 1 } eits_layout;
+
+/* residual = Q (y - F sx), with y projected already and F as in whitening.h; returns the
+ * multiply-accumulates. */
+uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx);
+
+/* solver.residual = Q (y - F sx), solver.gradient = S' F' residual, of every column;
+ * counts into info. */
+void eits_take_gradient(eits_context *ctx, const eits_real *sx);
+
+/* Objective and gap at solver.x from solver.residual and solver.gradient as
+ * eits_take_gradient leaves them. */
+eits_duality_gap eits_duality_gap_of(const eits_context *ctx, eits_real lambda, eits_layout layout);
+
+/* Both in one. */
+eits_duality_gap eits_find_duality_gap(eits_context *ctx, eits_real lambda, eits_layout layout);
+
+/* The same at x = 0, of what info knows: no product is needed. */
+eits_duality_gap eits_duality_gap_at_zero(const eits_context *ctx, eits_real lambda);
+
+/* Multiply-accumulates of eits_take_gradient, solver.sx being known. */
+uint64_t eits_gradient_macs(const eits_context *ctx);
+
+/* 1 where `macs` more stay within the limit, or there is none. */
+int eits_affords(const eits_context *ctx, uint64_t macs);
+
+/* What the objective may not exceed, with room for rounding: that of x = 0. Above it nothing was
+ * won. */
+eits_real eits_ceiling(const eits_context *ctx);
+
+/* Gap and residual into info. */
+void eits_report_duality_gap(eits_context *ctx, eits_duality_gap c);
+
+#endif

@@ -1,0 +1,124 @@
+"""The rooms of csrc/src: which may include which, and which part of a context each writes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from build_tools import CSRC
+
+# from the ground up: a room includes those before it, and itself
+ROOMS = (
+    "base",
+    "kernels",
+    "model",
+    "context",
+    "frame",
+    "diagnostics",
+    "solve",
+    "touch",
+    "api",
+)
+APART = {"link": ("base", "link")}  # knows nothing of contexts
+# which rooms write the fields of each part of a context; api lays out, and starts and ends stages
+OWNERS = {
+    "reference": {"frame"},
+    "rows": {"diagnostics"},
+    "frame": {"frame"},
+    "projection": {"frame"},
+    "whitening": {"frame"},
+    "range": {"diagnostics"},
+    "solver": {"solve"},
+    "touch": {"touch"},
+    "tracker": {"touch"},
+    "columns": {"context"},
+    "options": set(),
+}
+MOST_FILES = 12
+SOURCES = sorted((CSRC / "src").rglob("*.[ch]"))
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(CSRC / "src").parts[0]
+
+
+def includes(text: str) -> list[str]:
+    """Of the core's own files, as "frame/fold.h"; public headers ("eitskin/...") are no room's."""
+    names = re.findall(r'^\s*#\s*include\s*"([^"]+)"', text, re.M)
+    return [name for name in names if not name.startswith("eitskin/")]
+
+
+def allowed(room: str) -> tuple[str, ...]:
+    return APART.get(room) or ROOMS[: ROOMS.index(room) + 1]
+
+
+def circle(edges: dict[str, set[str]]) -> list[str]:
+    """One way round from a node back to itself; empty where there is none."""
+    done: set[str] = set()
+
+    def walk(node: str, way: list[str]) -> list[str]:
+        if node in way:
+            return [*way[way.index(node) :], node]
+        if node in done:
+            return []
+        for after in sorted(edges.get(node, set())):
+            found = walk(after, [*way, node])
+            if found:
+                return found
+        done.add(node)
+        return []
+
+    for start in sorted(edges):
+        found = walk(start, [])
+        if found:
+            return found
+    return []
+
+
+def strangers(text: str, room: str) -> list[str]:
+    """Parts of the context that ``text`` assigns to although they belong to another room."""
+    bare = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+    written = re.findall(
+        r"\bctx->(\w+)(?:\.\w+|->\w+|\[[^]]*\])+\s*(?:[-+*/|&^]|<<|>>)?=(?!=)", bare
+    )
+    written += re.findall(r"(?:\+\+|--)ctx->(\w+)\.", bare)
+    return sorted({part for part in written if room not in OWNERS.get(part, {room})})
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(CSRC / "src")))
+def test_a_file_keeps_to_its_room(path: Path) -> None:
+    text, room = path.read_text(encoding="ascii"), room_of(path)
+    assert {name.split("/")[0] for name in includes(text)} <= set(allowed(room))
+    if room != "api":
+        assert strangers(text, room) == []
+        # memory that nobody owns is handed down, not fetched
+        assert not re.search(r"\bctx->scratch\b", text)
+
+
+def test_no_circle_of_files() -> None:
+    """A source and its header are one file here."""
+    edges: dict[str, set[str]] = {}
+    for path in SOURCES:
+        name = str(path.relative_to(CSRC / "src").with_suffix(""))
+        others = {other.removesuffix(".h") for other in includes(path.read_text(encoding="ascii"))}
+        edges.setdefault(name, set()).update(others - {name})
+    assert circle(edges) == []
+    assert "context/context" in edges["frame/fold"]  # they were read at all
+
+
+def test_rooms_are_small() -> None:
+    counts: dict[Path, int] = {}
+    for path in SOURCES:
+        counts[path.parent] = counts.get(path.parent, 0) + 1
+    assert {path.name for path in counts} == {*ROOMS, *APART}
+    assert max(counts.values()) <= MOST_FILES
+
+
+def test_offenders_are_noticed() -> None:
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == ["a", "b", "c", "a"]
+    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+    assert "solve" not in allowed("frame")
+    assert strangers("ctx->solver.x[3] = 1; /* ctx->frame.y = 0; */", "touch") == ["solver"]
+    assert strangers("ctx->frame.y[i] += 1; ++ctx->tracker.count;", "solve") == ["frame", "tracker"]
+    assert strangers("if (ctx->solver.warm == 1) ctx->info.gap = 0;", "frame") == []
