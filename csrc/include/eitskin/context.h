@@ -1,7 +1,26 @@
 /* eitskin: one reconstruction context in memory that the caller owns.
  *
- * Order of calls: eits_model_open, eits_init, a reference frame (eits_reference_*), then
- * eits_reconstruct and, if touches are wanted, eits_find_touches for each frame. Contexts fraction
+ * All that is needed, errors apart (each call returns an eits_status):
+ *
+ *     static _Alignas(16) uint8_t workspace[140 * 1024]; // or eits_workspace_size(&model, 0) bytes
+ *     eits_model model;                                  // a view of the blob, which stays
+ *     eits_context *ctx;                                 // points into the workspace
+ *     eits_touch touches[EITS_MAX_TOUCHES];
+ *     uint32_t count;
+ *
+ *     eits_model_open(&model, blob, blob_size);
+ *     eits_init(workspace, sizeof workspace, &model, &ctx);
+ *     eits_reference_begin(ctx, 16);                     // nothing touches the skin meanwhile
+ *     for (int k = 0; k < 16; ++k)
+ *         eits_reference_add(ctx, measure(), model.n_rows);
+ *     eits_reference_finish(ctx);
+ *     for (;;) {
+ *         eits_reconstruct(ctx, measure(), model.n_rows, NULL, NULL);
+ *         eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
+ *     }
+ *
+ * `measure` stands for whatever gives n_rows voltages in the order of the model's protocol.
+ * eits_find_touches may be left out. Contexts fraction
  * nothing; one context is used by one thread at a time.
  */
 #ifndef EITSKIN_CONTEXT_H
@@ -154,7 +173,7 @@ typedef struct eits_touch {
     eits_real radius_mm;
     eits_real strength_s_per_m_mm2; /* conductivity change integrated over the touch: S/m mm^2 */
     /* fraction of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
-     * not found in this frame and is cached */
+     * not found in this frame and is held */
     eits_real confidence;
     /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
     eits_real force_n;
@@ -182,22 +201,38 @@ typedef struct eits_reference_info {
  * reached by functions alone. */
 typedef struct eits_context eits_context;
 
-#define EITS_PANEL      32u  /* columns of a panel */
-#define EITS_MAX_CACHED 256u /* columns of S that are kept unpacked */
-#define EITS_CACHED(n_pixels) \
-    ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
-#define EITS_LINE                                                                                \
-    64u /* bytes: panels start at a multiple, where no vector of theirs lies across two lines of \
-           the cache */
-#define EITS_ALIGN16(bytes)           (((size_t)(bytes) + 15u) & ~(size_t)15u)
-#define EITS_STRIDE(rank)             (((size_t)(rank) + 7u) & ~(size_t)7u)
-#define EITS_REALS(count)             EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
-#define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
-#define EITS_PADDED_TRIANGLE(rank)    (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
+/* ---- Sizes, all constant expressions where their arguments are ---- */
+
+/* Columns of a panel: S in panels has that many columns side by side, row after row, so that a
+ * product S'v fills vector registers without gathering. */
+#define EITS_PANEL 32u
 #define EITS_PANEL_COLUMNS(n_pixels) \
     (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
 
-/* Bytes of the context itself, at the workspace's start. */
+/* Columns of S that are kept unpacked as floats: more than a working set or a disc has. */
+#define EITS_MAX_CACHED 256u
+#define EITS_CACHED(n_pixels) \
+    ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
+
+/* Bytes of a line of the processor's cache: panels start at a multiple, where no vector of theirs
+ * lies across two lines. */
+#define EITS_LINE 64u
+
+/* Each array starts at a multiple of 16 bytes. */
+#define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
+#define EITS_REALS(count)   EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
+
+/* rank, rounded up to the eight lanes in which sums are made (base/vec.h). */
+#define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
+
+/* A list of pixels or of folded rows. */
+#define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
+
+/* Numbers of an upper triangle whose rows begin at multiples of eight columns. */
+#define EITS_PADDED_TRIANGLE(rank) (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
+
+/* Bytes of the context itself, at the workspace's start; what is not arrays. Pointers and numbers
+ * of whatever width; a little is left over. */
 #define EITS_CONTEXT_SIZE EITS_ALIGN16(624u + 58u * sizeof(void *) + 252u * sizeof(eits_real))
 
 /* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise
@@ -246,7 +281,10 @@ eits_status eits_use_portable_kernels(eits_context *ctx, int portable);
 /* Forget the warm start and the touches that were followed. */
 void eits_forget(eits_context *ctx);
 
-/* ---- What a context knows: pointers into it. Numbers change with the next frame. ---- */
+/* ---- What a context knows ----
+ *
+ * Pointers into the context: valid as long as it is, not to be written to. What they point to
+ * changes with the next frame. `ctx` must not be NULL here, unless an error is stated. */
 
 const eits_model *eits_get_model(const eits_context *ctx);
 const eits_options *eits_get_options(const eits_context *ctx);
