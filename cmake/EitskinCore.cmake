@@ -19,7 +19,10 @@ set(EITSKIN_CORE_SOURCES
     api/touches.c api/batch.c api/self_test.c
     link/link.c)
 
-set(EITSKIN_WARNINGS -Wall -Wextra -Wconversion -Wdouble-promotion -Werror)
+set(EITSKIN_WARNINGS -Wall -Wextra -Wconversion -Wdouble-promotion)
+if(EITSKIN_WERROR)
+    list(APPEND EITSKIN_WARNINGS -Werror)
+endif()
 set(EITSKIN_ARITHMETIC -fno-fast-math -ffp-contract=off -fno-math-errno) # in this order: the first resets the last
 
 function(eitskin_add_core name)
@@ -27,7 +30,9 @@ function(eitskin_add_core name)
     set(root ${PROJECT_SOURCE_DIR}/csrc)
     list(TRANSFORM EITSKIN_CORE_SOURCES PREPEND ${root}/src/ OUTPUT_VARIABLE sources)
     add_library(${name} STATIC ${sources})
-    target_include_directories(${name} PUBLIC ${root}/include PRIVATE ${root}/src)
+    target_include_directories(
+        ${name} PUBLIC $<BUILD_INTERFACE:${root}/include> $<INSTALL_INTERFACE:include>
+        PRIVATE ${root}/src)
     target_compile_options(${name} PRIVATE ${EITSKIN_WARNINGS} ${EITSKIN_ARITHMETIC})
     set_target_properties(${name} PROPERTIES C_VISIBILITY_PRESET hidden)
     if(CORE_DOUBLE)

@@ -1,0 +1,113 @@
+"""The C core as somebody else uses it: installed, found by CMake and pkg-config, or as a
+subproject."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin.solve.reconstructor import Reconstructor
+
+ROOT = Path(__file__).resolve().parents[3]
+EXAMPLES = ROOT / "examples" / "c"
+
+
+def run(*command: object) -> str:
+    """What a command prints; its errors are the test's."""
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the core is installed."""
+    build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
+    run(
+        "cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug",
+        "-DEITSKIN_TESTS=OFF", f"-DCMAKE_INSTALL_PREFIX={prefix}", "-DCMAKE_INSTALL_LIBDIR=lib",
+    )  # fmt: skip
+    run("cmake", "--build", build, "--target", "eitskin_f32", "eitskin_f64")
+    run("cmake", "--install", build, "--component", "core")
+    return prefix
+
+
+@pytest.fixture(scope="module")
+def programs(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The examples, built by find_package on the installed copy."""
+    build = tmp_path_factory.mktemp("examples")
+    run("cmake", "-S", EXAMPLES, "-B", build, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}")
+    run("cmake", "--build", build)
+    return build
+
+
+def golden_touches() -> list[tuple[float, float, float]]:
+    """Place and radius of the touches of the prebuilt model's golden frame, from Python."""
+    model, _ = load_prebuilt()
+    skin = Reconstructor(model)
+    skin.tare(model.golden.reference_v)
+    found = skin.reconstruct(model.golden.frame_v).touches
+    return [(touch.x_mm, touch.y_mm, touch.radius_mm) for touch in found]
+
+
+def printed_touches(text: str) -> list[tuple[float, float, float]]:
+    """The same, from lines of an example."""
+    line = re.compile(r"touch \d+: \((\S+), (\S+)\) mm, radius (\S+) mm")
+    return [(float(x), float(y), float(r)) for x, y, r in line.findall(text)]
+
+
+@pytest.mark.parametrize("program", ["minimal", "minimal_double", "minimal_cpp"])
+def test_an_example_finds_the_touches_that_python_finds(programs: Path, program: str) -> None:
+    with resources.as_file(resources.files("eitskin.model") / "paper.eitm") as model:
+        found = printed_touches(run(programs / program, model))
+    expected = golden_touches()
+    assert len(expected) >= 1
+    assert len(found) == len(expected)
+    for one, other in zip(found, expected, strict=True):
+        assert one == pytest.approx(other, abs=0.06)  # printed to 0.1 mm
+
+
+def test_an_example_says_what_is_wrong_with_a_file(programs: Path, tmp_path: Path) -> None:
+    (tmp_path / "no.eitm").write_bytes(b"not a model" * 20)
+    done = subprocess.run(
+        [programs / "minimal", tmp_path / "no.eitm"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "not an .eitm model" in done.stderr
+
+
+def test_pkg_config_gives_what_a_compiler_needs(prefix: Path, tmp_path: Path) -> None:
+    tool = shutil.which("pkg-config")
+    assert tool, "pkg-config is missing; install it:  apt-get install pkgconf"
+    for name in ("eitskin", "eitskin64"):
+        flags = run(
+            "env", f"PKG_CONFIG_PATH={prefix}/lib/pkgconfig", tool, "--cflags", "--libs", name
+        )
+        run("cc", EXAMPLES / "minimal.c", "-o", tmp_path / name, *flags.split())
+
+
+def test_as_a_subproject_it_brings_neither_tests_nor_werror(tmp_path: Path) -> None:
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(user LANGUAGES C)\n"
+        f'add_subdirectory("{ROOT}" eitskin)\n'
+        f'add_executable(user "{EXAMPLES}/minimal.c")\n'
+        "target_link_libraries(user PRIVATE eitskin::core)\n"
+    )
+    run("cmake", "-S", tmp_path, "-B", tmp_path / "build", "-G", "Ninja")
+    rules = (tmp_path / "build" / "build.ninja").read_text()
+    assert "csrc/src/solve/fista.c" in rules
+    assert "-Werror" not in rules
+    assert "tests/c" not in rules
+    assert "firmware" not in rules
+
+
+def test_memory_table_of_the_page_is_what_the_macros_give(programs: Path) -> None:
+    page = (ROOT / "docs" / "reference" / "c-api.md").read_text(encoding="utf-8")
+    for row in run(programs / "memory").splitlines():
+        assert row in page, f"docs/reference/c-api.md lacks the row  {row}"
