@@ -72,8 +72,8 @@ def plan_flash(
 ) -> FlashPlan:
     """The commands that put the firmware ``image`` (.bin) on a board and, where given, ``model`` in
     its first bank; the record of the second bank is then erased, so that the first one counts.
-    ``serial``: the ST-LINK's, where several boards are plugged in.
-    ``installed``: the tool must be there; not to show only what would be run.
+    ``serial``: the ST-LINK's, where several boards are plugged in. ``installed``: the tool must be
+    there; not to show only what would be run.
 
     Raises:
         FileError: the image cannot be read.

@@ -30,9 +30,8 @@ def open_device(
 
     ``model`` is put into the bank of a simulated or emulated board (without it, the prebuilt
     model); a real board's and a recording's must be the same. ``image`` is the firmware of an
-    emulated board (without it, the one that ships with eitskin).
-    ``room``: packets that are queued for a slow reader. ``reconnect``: how long an unplugged board
-        is waited for.
+    emulated board (without it, the one that ships with eitskin). ``room``: packets that are queued
+    for a slow reader. ``reconnect``: how long an unplugged board is waited for.
 
     Raises:
         DeviceError: it cannot be opened, does not answer, is of another version, or has another

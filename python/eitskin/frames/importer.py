@@ -45,16 +45,14 @@ class ImportOptions:
     """How to mend a source; the defaults change nothing.
 
     ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns). ``keep_table``: keep
-        the source's own
-    table. ``sign``: "reversed" negates, "magnitude" takes each channel's sign from the homogeneous
-    prediction.
-    ``rotate``, ``mirror``: our number of source electrode 0, and whether counting then goes down.
-        ``clockwise``: the
-    source counts clockwise, so mirror if the skin does not. ``swaps``: pairs of our electrodes
-    whose wires were exchanged. ``flip_channels``, ``impute_channels``, ``drop_channels``: channels
-    of the protocol's order to negate, to fill from their reciprocals, and to leave out;
-    ``drop_electrodes``: every channel that uses them. ``equalise``: give each channel the gain that
-    makes the reference the homogeneous prediction. ``current_a``: instead of the protocol's.
+    the source's own table. ``sign``: "reversed" negates, "magnitude" takes each channel's sign from
+    the homogeneous prediction. ``rotate``, ``mirror``: our number of source electrode 0, and
+    whether counting then goes down. ``clockwise``: the source counts clockwise, so mirror if the
+    skin does not. ``swaps``: pairs of our electrodes whose wires were exchanged. ``flip_channels``,
+    ``impute_channels``, ``drop_channels``: channels of the protocol's order to negate, to fill from
+    their reciprocals, and to leave out; ``drop_electrodes``: every channel that uses them.
+    ``equalise``: give each channel the gain that makes the reference the homogeneous prediction.
+    ``current_a``: instead of the protocol's.
     """
 
     source: SourceOptions = field(default_factory=SourceOptions)

@@ -32,8 +32,8 @@ class SourceOptions:
     NPZ and MAT: ``voltage``, ``reference``, ``names``, ``time``, ``protocol_table`` name arrays.
     Text: ``columns`` and ``reference_columns`` choose columns ("2", "0,2", "1:209", header names),
     ``time`` one column. ``reference_frames`` chooses quiet frames among the frames. ``scale`` turns
-    the source's numbers into volts (None: unknown, taken as 1).
-    ``complex_part``: what to keep of complex numbers; in text, columns then come in pairs re, im.
+    the source's numbers into volts (None: unknown, taken as 1). ``complex_part``: what to keep of
+    complex numbers; in text, columns then come in pairs re, im.
     """
 
     voltage: str | None = None

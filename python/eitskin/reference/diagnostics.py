@@ -150,8 +150,8 @@ class Examiner:
         self, frame: FloatArray, ref: Reference, masked: BoolArray, unusable: BoolArray
     ) -> BoolArray:
         """Rows (m,) to leave out because of open electrodes, bridged pairs or impossible values.
-        ``masked``: without reference;
-        ``unusable``: those, and rows that cannot be used by themselves."""
+        ``masked``: without reference; ``unusable``: those, and rows that cannot be used by
+        themselves."""
         noise = ROW_DEAD_NOISE * ref.noise_v
         size = np.where(masked, 0.0, np.abs(np.nan_to_num(ref.v0)))
         along = np.where(

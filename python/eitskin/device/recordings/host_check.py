@@ -26,11 +26,9 @@ class HostCheck:
     """How many frames were compared and how that ended.
 
     ``same``: every bit of the image, and of the touches but their ids, which count on from whatever
-        the board did before, and
-    all that was found in the frame.
-    ``different``: numbers of frames that are not. ``untold``: frames whose solve or touches began
-        from one that was lost on the
-    way, or from a reference that was. ``alone``: solved on the board without its raw frame here.
+    the board did before, and all that was found in the frame. ``different``: numbers of frames that
+    are not. ``untold``: frames whose solve or touches began from one that was lost on the way, or
+    from a reference that was. ``alone``: solved on the board without its raw frame here.
     """
 
     same: int = 0

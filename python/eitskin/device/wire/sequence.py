@@ -30,8 +30,7 @@ class SequenceCheck:
     """Judges each packet's number against those before. One for each direction of a link.
 
     ``was_late``: the last one judged was refused as late. ``revived``: so many of those just before
-        the last one judged were of
-    a new life after all.
+    the last one judged were of a new life after all.
     """
 
     def __init__(self, counters: SequenceCounters) -> None:

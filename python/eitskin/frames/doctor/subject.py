@@ -25,8 +25,7 @@ class Subject:
     that order.
 
     ``given``: the order that was said. ``remarks``: what had to be assumed to read it.
-        ``unit_known``: whether the
-    numbers are said to be volts.
+    ``unit_known``: whether the numbers are said to be volts.
     """
 
     source: str
