@@ -88,8 +88,7 @@ def _show(options: argparse.Namespace) -> None:
 
 def _truth(path: Path) -> SceneTruth | None:
     """Of the scene that the recorded board saw, where that is still to be found."""
-    from eitskin.device.recordings.recording import read_head
-    from eitskin.device.recordings.run_file import recorded_options
+    from eitskin.device.recordings.recording import read_head, recorded_options
     from eitskin.scoring.matching import match
     from eitskin.scoring.scene_truth import truth_of
 

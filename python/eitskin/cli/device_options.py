@@ -14,7 +14,7 @@ from eitskin.errors import FileError, UsageError
 if TYPE_CHECKING:
     from eitskin.device.client import Device
     from eitskin.device.known_model import KnownModel
-    from eitskin.device.recordings.run_file import RunRecorder
+    from eitskin.device.recordings.recording import Recorder
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.packets import Stream
     from eitskin.scoring.scene_truth import SceneTruth
@@ -330,7 +330,7 @@ def prepare(
     needs_reference: bool,
     record: Path | None = None,
     truth: SceneTruth | None = None,
-) -> RunRecorder | None:
+) -> Recorder | None:
     """Scan, solver and reference as the options say; then what is to be touched begins, and
     ``truth`` is told when. Recording begins before the reference is taken; the recorder is the
     caller's to close.
@@ -340,7 +340,7 @@ def prepare(
     """
     from eitskin.device.live import begin_scene, set_up, take_reference
     from eitskin.device.news import News
-    from eitskin.device.recordings.run_file import RunRecorder
+    from eitskin.device.recordings.recording import Recorder
 
     if device.transport.replays:
         _refuse_settings(options, device.transport.name)
@@ -350,7 +350,7 @@ def prepare(
         read_solver(options) if wish is None else _wished_solver(options, wish, device, known)
     )
     solver = set_up(device, read_scan(options), settings, known)
-    recorder = None if record is None else RunRecorder(record, device, solver, overwrite=True)
+    recorder = None if record is None else Recorder(record, device, solver, overwrite=True)
     try:
         simulated = device.transport.synchronous
         if (

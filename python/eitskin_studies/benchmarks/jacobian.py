@@ -12,7 +12,6 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import importlib.util
-import platform
 import statistics
 import sys
 import time
@@ -31,6 +30,7 @@ from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fem.sensitivity import element_to_pixel, sensitivity
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
+from eitskin_studies.benchmarks.frame import machine
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -71,7 +71,7 @@ def run(
         model = _whole_model(skin, protocol, grid, model_elements, max(3, rounds))
     return {
         "versions": _versions(),
-        "machine": f"{platform.machine()}, Python {platform.python_version()}, {threads}",
+        "machine": f"{machine()}, {threads}",
         "rounds": rounds,
         "pixels": grid.n_pixels,
         "voltages": protocol.n_rows,

@@ -10,8 +10,7 @@ from bytes_damage import any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
 from hypothesis import strategies as st
 
-from eitskin.device.recordings.recording import frames_of, read_head
-from eitskin.device.recordings.run_file import recorded_options
+from eitskin.device.recordings.recording import frames_of, read_head, recorded_options
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.commands import COMMANDS, parse_command
 from eitskin.device.wire.explain import fault_text, quality_text, reply_text

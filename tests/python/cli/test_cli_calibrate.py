@@ -17,7 +17,7 @@ from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
 from eitskin.device.live import LiveFrame, follow, take_reference
 from eitskin.device.recordings.host_check import check_recording
-from eitskin.device.recordings.run_file import RunRecorder
+from eitskin.device.recordings.recording import Recorder
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.packets import Stream
 from eitskin.model.eitm import decode_model, load_model
@@ -111,7 +111,7 @@ def recorded(folder: Path, blob: bytes, path: Path) -> list[LiveFrame]:
         [bank_bytes(blob, 1), bytes([ERASED]) * BANK_BYTES],
     )
     options = board_options(decode_model(blob, "made"))
-    with Device(SimTransport("test", board)) as device, RunRecorder(path, device, options):
+    with Device(SimTransport("test", board)) as device, Recorder(path, device, options):
         device.solver(options)
         take_reference(device, 16, streamed=True)
         device.start_scene()

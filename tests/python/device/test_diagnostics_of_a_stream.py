@@ -20,7 +20,7 @@ from eitskin.device.live import LiveFrame, follow, take_reference
 from eitskin.device.news import News
 from eitskin.device.open import open_device
 from eitskin.device.recordings.host_check import check_recording
-from eitskin.device.recordings.run_file import RunRecorder
+from eitskin.device.recordings.recording import Recorder
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.explain import fault_text
@@ -130,7 +130,7 @@ def test_a_recording_replays_with_what_was_found_and_the_check_compares_it(tmp_p
     options = board_options(prebuilt()[0])
     with sim_device(board()) as device:
         device.solver(options)
-        with RunRecorder(path, device, options):
+        with Recorder(path, device, options):
             take_reference(device, QUIET, streamed=True)
             device.start_scene()
             live = list(follow(device, ALL))
@@ -162,7 +162,7 @@ def test_the_check_tells_findings_apart(tmp_path: Path) -> None:
         return b"".join(encode(kind, k, bytes(payload)) for kind, k, payload in packets)
 
     path, hiding = tmp_path / "run.eits", Damaging(SimTransport("hides", board()), same, hide)
-    with Device(hiding) as device, RunRecorder(path, device, board_options(prebuilt()[0])):
+    with Device(hiding) as device, Recorder(path, device, board_options(prebuilt()[0])):
         device.solver(board_options(prebuilt()[0]))
         take_reference(device, QUIET, streamed=True)
         device.start_scene()

@@ -173,8 +173,7 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
             belong together.
     """
     from eitskin.device.client import Device
-    from eitskin.device.recordings.recording import FileTransport
-    from eitskin.device.recordings.run_file import recorded_options
+    from eitskin.device.recordings.recording import FileTransport, recorded_options
 
     options = recorded_options(path)
     with Device(FileTransport(path)) as device:

@@ -6,15 +6,18 @@ docs/reference/link-protocol.md, "Recordings", specifies the file.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from eitskin import __version__
+from eitskin.core.results import Options, check_options
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.packets import LINK_VERSION, PacketType
 from eitskin.device.wire.payloads import build_info
-from eitskin.errors import DeviceError, FileError
+from eitskin.errors import DeviceError, EitskinError, FileError
 from eitskin.fileio import parse_json
 
 if TYPE_CHECKING:
@@ -25,18 +28,27 @@ FORMAT = "eits"
 VERSION = 1
 CHUNK = 1 << 16
 MAX_HEAD = 4096
+LOOKED_THROUGH = 64 * CHUNK  # the note of the solver is among the first packets
 
 
 class Recorder:
-    """Writes every packet that ``device`` receives to the new file ``path`` until it is closed.
-    ``packets`` and ``bytes`` count.
+    """Writes every packet that ``device`` receives to the new file ``path`` until it is closed,
+    after the ``options`` that its solver has, so that the host can solve it again. ``packets`` and
+    ``bytes`` count.
 
     Raises:
         FileError: the file exists already, or cannot be written.
         DeviceError: the board does not answer.
     """
 
-    def __init__(self, path: str | Path, device: Device, *, overwrite: bool = False) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        device: Device,
+        options: Options | None = None,
+        *,
+        overwrite: bool = False,
+    ) -> None:
         self.path, self._device = Path(path), device
         self.packets = self.bytes = 0
         info = device.board if device.transport.replays else device.info()
@@ -60,6 +72,9 @@ class Recorder:
                 self._write(PacketType.INFO, last_sequence, build_info(info))
 
             device.link.begin_tap(begin, self._take)
+            if options is not None:
+                note = json.dumps({"solver": asdict(options)})
+                self._write(PacketType.RECORDING, 0, note.encode())
         except BaseException:
             self._file.close()
             raise
@@ -222,3 +237,38 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
                 " default)"
             )
         return as_frames(run.quiet, run.frames, protocol, device.board, known, allow_nonfinite=True)
+
+
+def recorded_options(path: str | Path) -> Options | None:
+    """The solver's options that the recording notes; None where it notes none.
+
+    Raises:
+        FileError, DeviceError: as ``read_head``; or the note cannot be read.
+    """
+    read_head(path)
+    for note in _notes(path):
+        if "solver" in note:
+            try:
+                options = Options(**note["solver"])
+                check_options(options)
+            except (TypeError, EitskinError) as error:
+                raise FileError(
+                    f"{path}: what it notes of the solver cannot be ({error}); record again"
+                ) from None
+            return options
+    return None
+
+
+def _notes(path: str | Path) -> Iterator[dict[str, Any]]:
+    decoder, read = Decoder(), 0
+    with Path(path).open("rb") as stream:
+        while read < LOOKED_THROUGH and (data := stream.read(CHUNK)):
+            read += len(data)
+            for packet in decoder.feed(data):
+                if packet.type == PacketType.RECORDING:
+                    try:
+                        note = parse_json(packet.payload)
+                    except ValueError:
+                        continue
+                    if isinstance(note, dict):
+                        yield note
