@@ -33,9 +33,9 @@ def monomials(u: FloatArray, v: FloatArray, order: int) -> FloatArray:
 class LoadLaw:
     """A calibration. ``strength`` (p,) S/m mm^2 and ``force_n`` (p,) N both ascend from 0: the
     table where the gain is 1. ``gain`` (t,) are coefficients of :func:`terms_of` (``order``) in u =
-    x /
-    ``radius_mm``, v = y / ``radius_mm``, trusted to ``reach`` = sqrt(u^2 + v^2); ``uncertainty`` is
-    relative: 95 % of the loads that were left out of the fit were within it. float32 all.
+    x / ``radius_mm``, v = y / ``radius_mm``, trusted to ``reach`` = sqrt(u^2 + v^2);
+    ``uncertainty`` is relative: 95 % of the loads that were left out of the fit were within it.
+    float32 all.
     """
 
     strength: npt.NDArray[np.float32]

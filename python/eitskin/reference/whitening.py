@@ -26,8 +26,7 @@ class Form:
     apart.
 
     ``left`` U (k, r); ``scale`` 1 / (w s_1) and ``strength`` (s / s_1)^2, both (r,);
-    ``regularisation`` mu;
-    ``square`` |S_1|^2.
+    ``regularisation`` mu; ``square`` |S_1|^2.
     """
 
     left: FloatArray
@@ -43,8 +42,7 @@ class Whitening:
     of S x is to meet what ``data`` (r, r) makes of P d.
 
     ``noise_ratio``: how much more noise max(S'y) has than with all rows and the model's
-    regularisation;
-        ``energy_ratio``: |y|^2 likewise.
+    regularisation; ``energy_ratio``: |y|^2 likewise.
     """
 
     see: FloatArray

@@ -33,9 +33,8 @@ class Configuration:
     Attributes:
         name: what tables and pictures call it.
         rank, pixels, storage, regularisation, column_power: of the model: rows of the reduced
-        Jacobian,
-            pixels along the skin's longer side, the type it is stored in, mu and p of the reduction
-            (``eitskin.model.reduction``).
+            Jacobian, pixels along the skin's longer side, the type it is stored in, mu and p of the
+            reduction (``eitskin.model.reduction``).
         solver, iterations, gap, mac_limit: how the image is found; at most ``iterations``, or until
             the relative duality gap is below ``gap`` (0: never), or at most ``mac_limit``
             multiply-accumulates (0: no limit) where the core has one.
@@ -47,8 +46,7 @@ class Configuration:
         touch_fit: parts of the search for touches (``core.results``: straight data 1, regrouping 2,
             coupling 4).
         second_pass: the image is solved again with the touches' interplay taken out of the data;
-        not
-            over a board's link.
+            not over a board's link.
         samples: of a measurement, at 1 MS/s; white noise falls with the root of them.
         scan: "full" measures every row, "reciprocal" one of each reciprocal pair, in half the time
             with sqrt(2) of the noise.

@@ -17,7 +17,8 @@ from eitskin.core.engine import CoreEngine
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.batch import Batch, check_threads
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.benchmarks.frame import golden_session, machine
+from eitskin_studies.benchmarks.frame import golden_session
+from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
 
 

@@ -59,10 +59,9 @@ class Rate:
     """A fault at one SNR over all scenes.
 
     ``named``: share called by its name; ``other``: share about which anything but "crowded" was
-        said; ``crowded``; ``miou``: mean
-    of the spoilt frames' images. ``lost``: image MIoU lost; ``lost_discs``: that of the touches as
-    discs; ``lost_blind``: with the diagnostics off, at 60 dB; ``peak_lost``: share of the peak,
-    gain apart.
+    said; ``crowded``; ``miou``: mean of the spoilt frames' images. ``lost``: image MIoU lost;
+    ``lost_discs``: that of the touches as discs; ``lost_blind``: with the diagnostics off, at 60
+    dB; ``peak_lost``: share of the peak, gain apart.
     """
 
     fault: str

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import platform
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter_ns
@@ -17,6 +16,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.harness.machine import machine
 
 SEED = 20240918
 
@@ -46,14 +46,6 @@ class FrameTimes:
             - (self.p50_us["C: solve"] + self.p50_us["C: touches"])
             / self.p50_us["Python: frame to touches"]
         )
-
-
-def machine() -> str:
-    """Processor and Python, for a benchmark's first line."""
-    return (
-        f"{platform.machine()} {platform.system()}, Python {platform.python_version()}, numpy"
-        f" {np.__version__}"
-    )
 
 
 def golden_session() -> tuple[

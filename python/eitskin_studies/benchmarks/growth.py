@@ -30,7 +30,7 @@ from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.benchmarks.frame import machine
+from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
 
 FloatArray = npt.NDArray[np.float64]

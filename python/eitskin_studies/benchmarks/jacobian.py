@@ -30,7 +30,7 @@ from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fem.sensitivity import element_to_pixel, sensitivity
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
-from eitskin_studies.benchmarks.frame import machine
+from eitskin_studies.harness.machine import machine
 
 FloatArray = npt.NDArray[np.float64]
 

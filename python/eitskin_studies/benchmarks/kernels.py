@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import UsageError
-from eitskin_studies.benchmarks.frame import machine
 from eitskin_studies.harness.emulated import checkout_root, need_tools
+from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
 
 WIDTHS = ("f32", "f64")

@@ -26,7 +26,7 @@ from eitskin.scene.registry import BUILT_IN
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import Bench
 from eitskin.scene.touch_path import Keyframe, TouchTrack
-from eitskin_studies.benchmarks.frame import machine
+from eitskin_studies.harness.machine import machine
 
 Progress: TypeAlias = Callable[[Sequence[Any]], Iterable[Any]]
 

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from eitskin_studies.benchmarks.frame import machine
 from eitskin_studies.benchmarks.solve_peers import (
     Candidate,
     candidates,
@@ -26,6 +25,7 @@ from eitskin_studies.benchmarks.solve_peers import (
     versions,
 )
 from eitskin_studies.benchmarks.solve_problems import Problems, make_problems, models, sessions
+from eitskin_studies.harness.machine import machine
 
 LEVELS = (1e-2, 1e-4, 1e-6)
 EQUAL_ITERATIONS = (30, 60, 200)

@@ -18,7 +18,7 @@ from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
 from eitskin.tuning.configuration import ELEMENTS, Configuration
 from eitskin.tuning.front import Front, Point
-from eitskin_studies.benchmarks.frame import machine
+from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sessions import Progress, Session
 from eitskin_studies.harness.store import Store
 from eitskin_studies.tradeoff.accuracy import Solved, Trained, score, solve_session, train

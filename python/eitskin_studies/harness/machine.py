@@ -1,0 +1,15 @@
+"""The line that says where numbers were measured."""
+
+from __future__ import annotations
+
+import platform
+
+import numpy as np
+
+
+def machine() -> str:
+    """Processor and Python, for a benchmark's first line."""
+    return (
+        f"{platform.machine()} {platform.system()}, Python {platform.python_version()}, numpy"
+        f" {np.__version__}"
+    )
