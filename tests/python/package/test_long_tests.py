@@ -1,0 +1,20 @@
+"""The list of long tests fits the tests that there are."""
+
+from __future__ import annotations
+
+import re
+from fnmatch import fnmatch
+from pathlib import Path
+
+TESTS = Path(__file__).resolve().parents[1]
+
+
+def test_every_pattern_names_a_test() -> None:
+    names = [
+        f"{file.relative_to(TESTS).as_posix()}::{name}"
+        for file in TESTS.rglob("test_*.py")
+        for name in re.findall(r"^def (test_\w+)", file.read_text(encoding="utf-8"), re.MULTILINE)
+    ]
+    lines = (TESTS / "long_tests.txt").read_text(encoding="utf-8").splitlines()
+    patterns = [line.partition("(")[0] for line in lines if line and not line.startswith("#")]
+    assert [p for p in patterns if not any(fnmatch(name, p) for name in names)] == []
