@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import sys
 from dataclasses import replace
 from typing import Any
@@ -29,11 +28,6 @@ from eitskin.scene.simulate import conductivity_with
 from eitskin.scene.touch_path import touches_at
 
 NEEDED: dict[str, dict[str, Any]] = {"noise": {"snr_db": 60.0}}
-
-
-@pytest.fixture(scope="module")
-def bench() -> Bench:
-    return Bench()
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
@@ -77,22 +71,6 @@ def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
     assert among.plan.steps == alone.plan.steps
     assert among.plan.text() == alone.plan.text()
     assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
-
-
-def test_the_factory_of_an_unnamed_effect_is_never_called(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(parameters: Any, session: Any) -> Any:
-        raise AssertionError("called")
-
-    before = simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v
-    for target in BUILT_IN.values():
-        monkeypatch.setattr(importlib.import_module(target), "make", refuse)
-    assert np.array_equal(
-        simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v, before
-    )
-    with pytest.raises(AssertionError, match="called"):
-        compile_scene(still_scene(effects={"noise": {"snr_db": 60.0}}), bench=bench)
 
 
 def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(bench: Bench) -> None:
@@ -223,12 +201,6 @@ def test_contradictory_effects_are_refused(bench: Bench) -> None:
         compile_scene(varying, bench=bench)
 
 
-def test_a_protocol_that_detached_electrodes_leave_unsolvable_is_refused(bench: Bench) -> None:
-    everything = {"detached": {"electrodes": list(range(0, 16, 2)), "from_s": 0.05}}
-    with pytest.raises(ConfigError, match=r"f.toml \[effects.detached\]: .*no row of the protocol"):
-        compile_scene(still_scene(effects=everything, where="f.toml"), bench=bench)
-
-
 def test_a_bridge_rescues_a_detached_electrode(bench: Bench) -> None:
     """Electrode 5 off, but joined to 6 by a wire: rows over both read 0, the others' rows are read
     through 6."""
@@ -241,17 +213,6 @@ def test_a_bridge_rescues_a_detached_electrode(bench: Bench) -> None:
     across = [set(row[2:]) == {5, 6} or set(row[:2]) == {5, 6} for row in rows.tolist()]
     assert np.abs(v[across]).max() < 1e-6 * np.abs(v).max()
     assert (np.abs(v[np.logical_not(across)]) > 0).all()
-
-
-def test_a_bridge_of_no_resistance_is_one_electrode_and_of_much_is_none(bench: Bench) -> None:
-    plain = simulate_frames(compile_scene(still_scene(), bench=bench)).voltage_v
-    for ohm, bound in ((1e12, 1e-7), (0.0, None)):
-        effects = {"bridged": {"electrodes": [3, 4], "resistance_ohm": ohm}}
-        bridged = simulate_frames(
-            compile_scene(still_scene(effects=effects), bench=bench)
-        ).voltage_v
-        difference = np.abs(bridged - plain).max() / np.abs(plain).max()
-        assert difference > 0.1 if bound is None else difference < bound
 
 
 def test_bad_steps_are_said_to_be_the_effects(bench: Bench) -> None:
@@ -283,15 +244,3 @@ def test_bad_steps_are_said_to_be_the_effects(bench: Bench) -> None:
         simulate_frames(
             compile_scene(still_scene(effects={"endless": {}}), registry=registry, bench=bench)
         )
-
-
-def test_effects_that_disagree_on_the_excitation_frequency_are_refused(bench: Bench) -> None:
-    effects = {"phase": {"frequency_hz": 1e4}, "source_impedance": {"frequency_hz": 5e4}}
-    said = (
-        r"f.toml \[effects.source_impedance\]: frequency_hz = 50000.0 contradicts \[effects.phase\]"
-        r" frequency_hz"
-    )
-    with pytest.raises(ConfigError, match=said):
-        compile_scene(still_scene(effects=effects, where="f.toml"), bench=bench)
-    effects["source_impedance"]["frequency_hz"] = 1e4
-    compile_scene(still_scene(effects=effects), bench=bench)

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
-ROOT = Path(__file__).resolve().parents[3]
+from fresh_python import run_python
+
+HEAVY = {"matplotlib", "dask", "distributed", "tqdm"}
 
 PROBE = """
 import json, sys
@@ -33,11 +31,7 @@ print(json.dumps([loaded, sorted(sys.modules)]))
 
 def fresh(code: str, *arguments: str) -> str:
     """What ``code`` prints in a fresh process."""
-    path = os.pathsep.join(filter(None, [str(ROOT / "python"), os.environ.get("PYTHONPATH")]))
-    command = [sys.executable, "-c", code, *arguments]
-    done = subprocess.run(
-        command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, check=False
-    )
+    done = run_python(code, *arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -48,11 +42,7 @@ def fresh(code: str, *arguments: str) -> str:
 def test_only_named_effects_are_imported(effects: dict[str, dict[str, float]]) -> None:
     own, every = json.loads(fresh(PROBE, json.dumps(effects)))
     assert own == sorted(effects)
-    assert not [
-        name
-        for name in every
-        if name.split(".")[0] in ("matplotlib", "dask", "distributed", "tqdm")
-    ]
+    assert not {name.split(".")[0] for name in every} & HEAVY
 
 
 def test_listing_effects_imports_none() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +23,6 @@ from eitskin.scene.runner import run, run_scene, simulate_frames
 from eitskin.scene.session import Bench
 
 RANDOM = ("noise", "jitter", "channel_gain", "contact_impedance", "background", "charge_injection")
-
-
-@pytest.fixture(scope="module")
-def bench() -> Bench:
-    return Bench()
 
 
 def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
@@ -54,13 +48,6 @@ def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
     assert np.nanmin(again.truth_conductivity_s_per_m) > 0.0099
     assert again.meta["effects"] == {"noise": {"snr_db": 60.0, "noise_v": None}}
     assert again.meta["plan"]["method"] == "update" and again.meta["counters"]["states"] == 7
-
-
-def test_the_same_scene_gives_the_same_frames_and_another_seed_others(bench: Bench) -> None:
-    scene = still_scene(effects={"noise": {"snr_db": 60.0}})
-    one, two = (simulate_frames(compile_scene(scene, bench=bench)).voltage_v for _ in range(2))
-    other = simulate_frames(compile_scene(replace(scene, seed=2), bench=bench)).voltage_v
-    assert np.array_equal(one, two) and not np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("added", sorted(set(BUILT_IN) - {"noise"}))
@@ -152,12 +139,3 @@ def test_a_conductivity_that_cannot_be_names_effect_and_time(bench: Bench) -> No
         match=r"f.toml \[effects.sinking\]: at 0.05 s it makes a conductivity of -0.002",
     ):
         simulate_frames(compile_scene(scene, registry=registry, bench=bench))
-
-
-def test_a_detached_electrode_comes_back(bench: Bench) -> None:
-    effects = {"detached": {"electrodes": [5], "from_s": 0.05, "until_s": 0.15}}
-    compiled = compile_scene(still_scene(5, effects=effects), bench=bench)
-    frames = simulate_frames(compiled).voltage_v[2:]
-    uses = (compiled.scene.protocol.drive_measure == 5).any(axis=1)
-    assert (frames[[1, 2]][:, uses] == 0).all() and (frames[[0, 3, 4]][:, uses] != 0).all()
-    assert np.array_equal(frames[0], frames[3]) and len(compiled.states) == 3

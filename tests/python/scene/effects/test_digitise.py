@@ -44,14 +44,6 @@ def test_noise_in_volts_and_its_default(make_session: MakeSession, v0: FloatArra
         noise.Parameters(snr_db=60.0, noise_v=1e-3)
 
 
-def test_a_frame_of_noise_is_the_same_however_it_is_asked_for(
-    make_session: MakeSession, v0: FloatArray
-) -> None:
-    step = noise.make(noise.Parameters(), make_session())
-    assert np.array_equal(step.apply(v0, 0.0, 7), step.apply(v0, 0.0, 7))
-    assert not np.array_equal(step.apply(v0, 0.0, 7), step.apply(v0, 0.0, 8))
-
-
 @pytest.mark.parametrize("bits", [6, 12, 16])
 def test_quantisation_error_has_the_variance_of_a_uniform_step(
     make_session: MakeSession, bits: int

@@ -91,11 +91,12 @@ def test_detached_electrodes_carry_no_signal_and_leave_the_rest(
 
 def test_a_wobbling_electrode_is_lost_for_a_while() -> None:
     effects = {"detached": {"electrodes": [5], "from_s": 0.1, "until_s": 0.2}}
-    done = simulate_frames(_compiled(effects, frames=6, rate_hz=20.0))
+    compiled = _compiled(effects, frames=6, rate_hz=20.0)
+    done = simulate_frames(compiled)
     lost = np.isin(adjacent(16).drive_measure, [5]).any(axis=1)
     off = [not row[lost].any() for row in done.voltage_v]
     assert off == [False, False, False, True, True, False, False]
-    assert np.array_equal(done.voltage_v[0], done.voltage_v[-1])
+    assert np.array_equal(done.voltage_v[0], done.voltage_v[-1]) and len(compiled.states) == 2
 
 
 def test_phase_leaves_detached_electrodes_detached() -> None:
@@ -188,7 +189,16 @@ def test_common_mode_with_a_grounded_sink() -> None:
         ({"noise": {"snr_db": 60.0, "noise_v": 1e-3}}, r"\[effects.noise\]: snr_db: give either"),
         (
             {"charge_injection": {"window_us": 15.0}},
-            r"\[effects.charge_injection\]: window_us = 15",
+            r"\[effects.charge_injection\]: window_us = 15 is 0\.75 periods of 50000 Hz",
+        ),
+        (
+            {"detached": {"electrodes": list(range(0, 16, 2)), "from_s": 0.05}},
+            r"\[effects.detached\]: .*no row of the protocol",
+        ),
+        (
+            {"phase": {"frequency_hz": 1e4}, "source_impedance": {"frequency_hz": 5e4}},
+            r"\[effects.source_impedance\]: frequency_hz = 50000.0 contradicts"
+            r" \[effects.phase\] frequency_hz",
         ),
         ({"misplacement": {"spread_mm": 80.0}}, r"\[effects.misplacement\]: spread_mm = 80"),
         ({"phase": {"readout": "in_fase"}}, r"\[effects.phase\].*did you mean 'in_phase'"),
