@@ -64,3 +64,12 @@ def sealed(
     size = struct.unpack_from("<I", out, 8)[0]
     struct.pack_into("<I", out, 12, zlib.crc32(bytes(out[16:size])))
     return bytes(out)
+
+
+def patched(
+    blob: bytes | bytearray, at: int, layout: str, *values: float, rehash: bool = False
+) -> bytes:
+    """``blob`` with ``values`` packed at ``at``, and sealed again."""
+    out = bytearray(blob)
+    struct.pack_into(layout, out, at, *values)
+    return sealed(out, rehash=rehash)

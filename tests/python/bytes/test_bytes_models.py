@@ -6,14 +6,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 from bytes_damage import any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
 
-from eitm_bytes import sealed, sections_of
+from eitm_bytes import sealed
 from eitskin.core.engine import CoreEngine
-from eitskin.errors import EitskinError, ModelError
-from eitskin.model.eitm import decode_model, encode_model, load_model
+from eitskin.errors import EitskinError
+from eitskin.model.eitm import encode_model, load_model
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import tiny_blob
 
@@ -63,15 +62,3 @@ def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(
         np.isfinite([t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2]).all()
         for t in result.touches
     )
-
-
-def test_iterations_without_end_are_refused() -> None:
-    """A model whose own defaults would keep a board busy for a day is not one that ``eitskin model
-    build`` made."""
-    blob = bytearray(tiny_blob())
-    place = sections_of(blob)["DEFS"].offset
-    blob[place : place + 4] = (100_001).to_bytes(4, "little")
-    with pytest.raises(ModelError):
-        CoreEngine(sealed(blob), prepared=False)
-    with pytest.raises(ModelError, match="a default out of range"):
-        decode_model(sealed(blob), "x")
