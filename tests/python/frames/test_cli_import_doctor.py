@@ -20,6 +20,7 @@ from eitskin.skin.protocol import adjacent, opposite
 
 ROWS = adjacent(16).drive_measure.astype(np.int64)
 NPZ = ("--voltage", "v", "--reference", "r", "--scale", "1")
+ADJACENT = ("--protocol", "adjacent", "--electrodes", "16")
 SKIN = """
 [skin]
 name = "paper"
@@ -88,11 +89,10 @@ FAULTS: dict[str, Callable[[], Frames]] = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_advice_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
     path, mended = write(tmp_path / "s.npz", FAULTS[fault]()), tmp_path / "mended.npz"
-    protocol = ("--protocol", "adjacent", "--electrodes", "16")
-    assert run("doctor", path, *NPZ, *protocol, "--json") == 11
+    assert run("doctor", path, *NPZ, *ADJACENT, "--json") == 11
     advice = json.loads(capsys.readouterr().out)["mend"].split()
     assert advice
-    assert run("import", path, "-o", mended, *NPZ, *protocol, *advice) == 0
+    assert run("import", path, "-o", mended, *NPZ, *ADJACENT, *advice) == 0
     assert run("doctor", mended, "--json") == 0, capsys.readouterr().out
 
 
@@ -110,19 +110,7 @@ def test_numbering_is_advised_by_known_touches_and_mends(
     report = json.loads(capsys.readouterr().out)
     assert report["mend"] == "--rotate 5 --mirror"
     assert any("renumber by import first" in text for text in report["untold"])
-    assert (
-        run(
-            "import",
-            path,
-            "-o",
-            mended,
-            *NPZ,
-            "--skin",
-            tmp_path / "skin.toml",
-            *report["mend"].split(),
-        )
-        == 0
-    )
+    assert run("import", path, "-o", mended, *NPZ, *touch[:2], *report["mend"].split()) == 0
     capsys.readouterr()
     assert run("doctor", mended, *touch, "--json") == 11
     again = json.loads(capsys.readouterr().out)
@@ -133,25 +121,11 @@ def test_numbering_is_advised_by_known_touches_and_mends(
 
 def test_import_says_what_it_wrote(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "s.npz", healthy_frames(14))
-    words = (
-        "import",
-        path,
-        "-o",
-        tmp_path / "o.npz",
-        *NPZ,
-        "--protocol",
-        "adjacent",
-        "--electrodes",
-        16,
-    )
+    words = ("import", path, "-o", tmp_path / "o.npz", *NPZ, *ADJACENT)
     assert run(*words, "--current-a", "0.002", "--json") == 0
     said = json.loads(capsys.readouterr().out)
-    assert (said["frames"], said["quiet_frames"], said["channels"], said["unit"]) == (
-        1,
-        12,
-        208,
-        "V",
-    )
+    assert (said["frames"], said["quiet_frames"]) == (1, 12)
+    assert (said["channels"], said["unit"]) == (208, "V")
     frames = load_frames(tmp_path / "o.npz")
     assert frames.protocol.current_a == 2e-3
     assert said["protocol_hash"] == f"{frames.protocol.hash:016x}"
@@ -185,10 +159,7 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(
     index = match_rows(frames.protocol.drive_measure, rows[measured]).index
     values[measured] = np.column_stack([frames.reference_v, frames.voltage_v[0]])[index]
     np.savetxt(tmp_path / "all.csv", values, delimiter=",")
-    words = (
-        tmp_path / "all.csv", "--protocol", "adjacent", "--electrodes", "16", "--reference-columns",
-        "0",
-    )  # fmt: skip
+    words = (tmp_path / "all.csv", *ADJACENT, "--reference-columns", "0")
     assert run("doctor", *words, "--json") == 11
     report = json.loads(capsys.readouterr().out)
     assert [finding["name"] for finding in report["findings"]] == ["order"]
@@ -220,8 +191,7 @@ def test_the_picture_is_drawn(tmp_path: Path) -> None:
         (("--skin", "SKIN", "--touch", "500,0"), "outside the skin"),
         (("--skin", "SKIN", "--touch", "5,0", "--touch-in", "zz"),
          "--touch-in zz: no such frame; frames are 0"),
-        (("--protocol", "adjacent", "--electrodes", "16", "--touch", "5,0"),
-         "--touch needs --skin FILE"),
+        ((*ADJACENT, "--touch", "5,0"), "--touch needs --skin FILE"),
     ],
 )  # fmt: skip
 def test_bad_words_are_refused_in_one_line(

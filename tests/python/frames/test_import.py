@@ -20,7 +20,8 @@ from eitskin.frames.truth import TruthOptions
 from eitskin.skin.protocol import adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
 
-TABLE = adjacent(16).drive_measure.astype(np.int64)
+ADJACENT = adjacent(16)
+TABLE = ADJACENT.drive_measure.astype(np.int64)
 KEYS = SourceOptions(voltage="v", reference="r", scale=1.0)
 
 
@@ -38,6 +39,14 @@ def source(
     return path
 
 
+def taken(
+    path: Path, protocol: Any = ADJACENT, skin: Any = None, source: Any = KEYS, **options: Any
+) -> Frames:
+    """What import makes of ``path``; the source's arrays are v and r unless something else is
+    said."""
+    return import_frames(path, ImportOptions(source=source, **options), protocol, skin)
+
+
 def assert_same(frames: Frames, wanted: Frames) -> None:
     assert frames.protocol.hash == wanted.protocol.hash
     assert np.allclose(frames.voltage_v, wanted.voltage_v, rtol=1e-12)
@@ -53,9 +62,7 @@ def test_every_order_comes_back_in_ours(tmp_path: Path, protocol: Any, order: st
     index = np.zeros(len(rows), dtype=np.int64)
     index[measured] = match_rows(protocol.drive_measure, rows[measured]).index
     path = source(tmp_path, frames, index, np.where(measured, 1.0, 77.0))
-    assert_same(
-        import_frames(path, ImportOptions(source=KEYS, order=order), protocol, None), frames
-    )
+    assert_same(taken(path, protocol, order=order), frames)
 
 
 def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
@@ -66,7 +73,7 @@ def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
     sign = np.where(np.arange(208) < 50, -1.0, 1.0)
     path = source(tmp_path, frames, index, sign, rows=rows + 1)
     inside = replace(KEYS, protocol_table="rows", table_base=1)
-    assert_same(import_frames(path, ImportOptions(source=inside), adjacent(16), None), frames)
+    assert_same(taken(path, source=inside), frames)
     text = tmp_path / "rows.csv"
     np.savetxt(text, rows, fmt="%d", delimiter=",", header="I+,I-,V+,V-")
     options = ImportOptions(source=KEYS, order="table", table_file=str(text))
@@ -78,7 +85,7 @@ def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path: Path) -> None:
     with pytest.raises(
         FrameError, match="1 to 16, but they are 0 to 15; if it counts from 1 say --table-base 1"
     ):
-        import_frames(path, ImportOptions(source=replace(inside, table_base=0)), adjacent(16), None)
+        taken(path, source=replace(inside, table_base=0))
 
 
 @pytest.mark.parametrize("sign", ("reversed", "magnitude"))
@@ -88,7 +95,7 @@ def test_signs_come_back(tmp_path: Path, protocol: Any, sign: str) -> None:
     path = tmp_path / "s.npz"
     change = np.abs if sign == "magnitude" else np.negative
     np.savez(path, v=change(frames.voltage_v), r=change(frames.reference_voltage_v))
-    assert_same(import_frames(path, ImportOptions(source=KEYS, sign=sign), protocol, None), frames)
+    assert_same(taken(path, protocol, sign=sign), frames)
 
 
 @pytest.mark.parametrize(("rotate", "mirror"), [(3, False), (0, True), (5, True)])
@@ -115,9 +122,7 @@ def test_clockwise_mirrors_unless_the_skin_is_clockwise(tmp_path: Path) -> None:
 
 def test_swapped_wires_give_the_table_that_was_really_measured(tmp_path: Path) -> None:
     path = source(tmp_path, healthy_frames(6))
-    frames = import_frames(
-        path, ImportOptions(source=KEYS, swaps=((3, 9), (1, 2))), adjacent(16), None
-    )
+    frames = taken(path, swaps=((3, 9), (1, 2)))
     assert np.array_equal(frames.protocol.drive_measure, swap_map(16, [(3, 9), (1, 2)])[TABLE])
 
 
@@ -145,7 +150,7 @@ def test_channels_are_flipped_filled_and_left_out(tmp_path: Path) -> None:
         ({"flip_channels": (-1,)}, "--flip-channels -1"),
     ):
         with pytest.raises(UsageError, match=said):
-            import_frames(path, ImportOptions(source=KEYS, **bad), adjacent(16), None)
+            taken(path, **bad)
 
 
 def test_bad_values_pass_only_where_they_are_mended(tmp_path: Path) -> None:
@@ -155,20 +160,16 @@ def test_bad_values_pass_only_where_they_are_mended(tmp_path: Path) -> None:
     path = tmp_path / "nan.npz"
     np.savez(path, v=voltage, r=frames.reference_voltage_v)
     with pytest.raises(FrameError, match=r"frame 0, row 0 \(from 0\) is nan"):
-        import_frames(path, ImportOptions(source=KEYS), adjacent(16), None)
+        taken(path)
     with pytest.raises(FrameError, match="frame 0, channel 0 is nan"):
-        import_frames(path, ImportOptions(source=KEYS, impute_channels=(3,)), adjacent(16), None)
-    mended = import_frames(
-        path, ImportOptions(source=KEYS, impute_channels=(0,)), adjacent(16), None
-    )
+        taken(path, impute_channels=(3,))
+    mended = taken(path, impute_channels=(0,))
     assert mended.voltage_v[0, 0] == voltage[0, 26]
 
 
 def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
     frames = healthy_frames(9, gain=0.15)
-    mended = import_frames(
-        source(tmp_path, frames), ImportOptions(source=KEYS, equalise=True), adjacent(16), None
-    )
+    mended = taken(source(tmp_path, frames), equalise=True)
     gains = mended.reference_v / frames.reference_v
     assert np.allclose(mended.voltage_v, frames.voltage_v * gains)
     pairs = mended.protocol.reciprocal_pairs()
@@ -179,9 +180,7 @@ def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
     with pytest.raises(
         FrameError, match=r"channel 40 has 0\.0\d+ of its predicted reference \(1 such\)"
     ):
-        import_frames(
-            tmp_path / "weak.npz", ImportOptions(source=KEYS, equalise=True), adjacent(16), None
-        )
+        taken(tmp_path / "weak.npz", equalise=True)
 
 
 def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
@@ -191,7 +190,7 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
     three = np.vstack([quiet[0], quiet[1], voltage]).T
     np.savetxt(rows, three, delimiter=";", header="q0;q1;one", comments="", fmt="%.17g")
     options = SourceOptions(columns="one", reference_columns="q0,q1", scale=1.0)
-    got = import_frames(rows, ImportOptions(source=options), adjacent(16), None)
+    got = taken(rows, source=options)
     assert got.frame_name == ("one",) and len(got.reference_voltage_v) == 2
     assert np.array_equal(got.voltage_v, voltage)
     assert np.array_equal(got.reference_voltage_v, quiet[:2])
@@ -204,7 +203,7 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
         fmt="%.17g",
     )
     options = SourceOptions(columns="1:209", time="0", reference_frames="0:12", scale=1e-3)
-    got = import_frames(wide, ImportOptions(source=options), adjacent(16), None)
+    got = taken(wide, source=options)
     assert np.allclose(got.voltage_v, voltage, rtol=1e-12)
     assert np.allclose(got.reference_voltage_v, quiet, rtol=1e-12)
     assert got.time_s is not None and got.time_s.tolist() == [3.0]
@@ -212,9 +211,7 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path: Path) -> None:
     with pytest.raises(
         FrameError, match=r"209 chosen columns: a frame should have 208 channels \(16 electrodes, "
     ):
-        import_frames(
-            wide, ImportOptions(source=SourceOptions(reference_frames="0:12")), adjacent(16), None
-        )
+        taken(wide, source=SourceOptions(reference_frames="0:12"))
 
 
 @pytest.mark.parametrize("part", ("real", "imag", "abs", "in-phase"))
@@ -230,23 +227,18 @@ def test_complex_parts_of_arrays_and_column_pairs(tmp_path: Path, part: str) -> 
     }[part]
     np.savez(tmp_path / "z.npz", v=voltage, r=quiet)
     source_of = replace(KEYS, complex_part=part)
-    got = import_frames(tmp_path / "z.npz", ImportOptions(source=source_of), adjacent(16), None)
+    got = taken(tmp_path / "z.npz", source=source_of)
     assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
     pairs = np.column_stack([quiet[0].real, quiet[0].imag, voltage[0].real, voltage[0].imag])
     np.savetxt(tmp_path / "z.csv", pairs, delimiter=",", fmt="%.17g")
     columns = SourceOptions(columns="2,3", reference_columns="0,1", complex_part=part)
-    got = import_frames(tmp_path / "z.csv", ImportOptions(source=columns), adjacent(16), None)
+    got = taken(tmp_path / "z.csv", source=columns)
     assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
     assert got.meta["unit"] == "unknown, taken as V"
     with pytest.raises(UsageError, match="numbers are complex; say with --complex-part"):
-        import_frames(tmp_path / "z.npz", ImportOptions(source=KEYS), adjacent(16), None)
+        taken(tmp_path / "z.npz")
     with pytest.raises(UsageError, match="pairs re,im; 1 are named"):
-        import_frames(
-            tmp_path / "z.csv",
-            ImportOptions(source=replace(columns, columns="2")),
-            adjacent(16),
-            None,
-        )
+        taken(tmp_path / "z.csv", source=replace(columns, columns="2"))
 
 
 def test_mat_files_with_structs(tmp_path: Path) -> None:
@@ -258,14 +250,14 @@ def test_mat_files_with_structs(tmp_path: Path) -> None:
         {"data": {"v": frames.voltage_v.T, "quiet": frames.reference_voltage_v.T}, "note": "x"},
     )
     options = SourceOptions(voltage="data.v", reference="data.quiet", scale=1.0)
-    assert_same(import_frames(path, ImportOptions(source=options), adjacent(16), None), frames)
+    assert_same(taken(path, source=options), frames)
     with pytest.raises(
         FrameError, match=r"no array 'v' for --voltage; it holds data.quiet \(208, 12\), data.v"
     ):
-        import_frames(path, ImportOptions(source=KEYS), adjacent(16), None)
+        taken(path)
     path.write_bytes(path.read_bytes()[:700])
     with pytest.raises(EitskinError, match=r"not a readable MAT file|cannot read"):
-        import_frames(path, ImportOptions(source=options), adjacent(16), None)
+        taken(path, source=options)
 
 
 def test_truth_comes_along_in_millimetres(tmp_path: Path) -> None:
@@ -324,7 +316,7 @@ def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path: Path) -> None:
     assert np.array_equal(back.touch_xy_mm, frames.touch_xy_mm)
     assert back.meta["before"] == {} and back.meta["options"] == {"sign": "reversed"}
     with pytest.raises(UsageError, match="a frames file already"):
-        import_frames(tmp_path / "a.npz", ImportOptions(source=KEYS), None, None)
+        taken(tmp_path / "a.npz", None)
     with pytest.raises(ProtocolError, match="another protocol"):
         import_frames(tmp_path / "a.npz", ImportOptions(), opposite(16), None)
 
@@ -387,7 +379,7 @@ def test_foreign_and_square_sources(tmp_path: Path) -> None:
         import_frames(tmp_path / "absent.csv", ImportOptions(), adjacent(16), None)
     np.savez(tmp_path / "square.npz", v=np.ones((40, 40)), r=np.ones(40), words=np.array(["a"]))
     with pytest.raises(UsageError, match="both sides fit; say --layout"):
-        import_frames(tmp_path / "square.npz", ImportOptions(source=KEYS), adjacent(8), None)
+        taken(tmp_path / "square.npz", adjacent(8))
     with pytest.raises(FrameError, match="holds <U1, no numbers"):
         words = ImportOptions(source=replace(KEYS, voltage="words"))
         import_frames(tmp_path / "square.npz", words, adjacent(8), None)
