@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from firmware_checks import CHECKS, run_session, table_after_upload
 
 from cross_build import ROOT, build_cortex_m7
+from eitskin.config import load_toml
 from emulated import IMAGE
 from small_models import small_blob
 
@@ -22,123 +23,10 @@ COPIED = (
 TARGET = "eitskin_nucleo_f767zi"
 
 
-@dataclass(frozen=True)
-class Mutation:
-    """Texts to be replaced in a file, each of which must be there exactly once, and the check that
-    must notice."""
-
-    file: str
-    replaced: tuple[tuple[str, str], ...]
-    noticed_by: str
-
-
-BOARD, DRIVERS, APP = "firmware/boards/nucleo_f767zi", "firmware/drivers", "firmware/app"
-MUTATIONS = {
-    "SPI mode wrong": Mutation(
-        f"{BOARD}/generator.c",
-        (("mode = SPI_CR1_CPOL;", "mode = SPI_CR1_CPOL | 1u;"),),
-        "generator",
-    ),
-    "SPI clock missing": Mutation(
-        f"{BOARD}/clock.c", (("RCC_APB1ENR |= RCC_APB1ENR_SPI3EN;", ""),), "generator"
-    ),
-    "ADC clock missing": Mutation(
-        f"{BOARD}/clock.c", (("RCC_APB2ENR |= RCC_APB2ENR_ADC1EN;", ""),), "amplitudes"
-    ),
-    "AD9833 word order": Mutation(
-        f"{DRIVERS}/ad9833.c",
-        (
-            (
-                "words[1] = (uint16_t)(ADDRESS_FREQ0 | (tuning & 0x3FFFu));",
-                "words[2] = (uint16_t)(ADDRESS_FREQ0 | (tuning & 0x3FFFu));",
-            ),
-            (
-                "words[2] = (uint16_t)(ADDRESS_FREQ0 | (tuning >> 14",
-                "words[1] = (uint16_t)(ADDRESS_FREQ0 | (tuning >> 14",
-            ),
-        ),
-        "generator",
-    ),
-    "DDS left in reset": Mutation(
-        f"{DRIVERS}/ad9833.c",
-        (
-            (
-                "words[4] = (uint16_t)(CONTROL_B28 | waveform_bits(waveform));",
-                "words[4] = (uint16_t)(FW_AD9833_RESET_WORD | waveform_bits(waveform));",
-            ),
-        ),
-        "generator",
-    ),
-    "two multiplexers swapped": Mutation(
-        f"{DRIVERS}/adg1206.c",
-        (
-            (
-                "addresses |= (uint32_t)electrodes[k] << (4 * k);",
-                "addresses |= (uint32_t)electrodes[k] << (4 * (k == 1 ? 2 : k == 2 ? 1 : k));",
-            ),
-        ),
-        "order",
-    ),
-    "no break before make": Mutation(
-        f"{DRIVERS}/adg1206.c",
-        (
-            (
-                "fw_status status = fw_adg1206_all_off(bank);\n    if (status != FW_OK)",
-                "fw_status status = FW_OK;\n    if (status != FW_OK)",
-            ),
-        ),
-        "broken_first",
-    ),
-    "no wait before make": Mutation(
-        f"{DRIVERS}/adg1206.c",
-        (("bank->lines.ops->wait_ns(bank->lines.ctx, FW_ADG1206_OFF_NS);", ""),),
-        "broken_first",
-    ),
-    "DMA flag not cleared": Mutation(
-        f"{BOARD}/capture.c",
-        (
-            ("        DMA_LIFCR(DMA2_BASE) = STREAM_FLAGS;\n        filling", "        filling"),
-            ("} while ((DMA_LISR(DMA2_BASE) & DMA_LISR_TCIF0) != 0);", "} while (false);"),
-        ),
-        "interrupts",
-    ),
-    "wrong interrupt": Mutation(
-        f"{BOARD}/stm32f767.h",
-        (("#define IRQ_DMA2_STREAM0 56u", "#define IRQ_DMA2_STREAM0 57u"),),
-        "interrupts",
-    ),
-    "settling skipped": Mutation(
-        f"{APP}/scan.c",
-        (
-            ("fw_burst_us(s) + s->settle_us + FW_SWITCH_US;", "fw_burst_us(s) + FW_SWITCH_US;"),
-            (
-                "if ((uint64_t)us * s->excitation_millihz % 1000000000u == 0)",
-                "if ((uint64_t)us * s->excitation_millihz > 0)",
-            ),
-            (
-                (
-                    "(int32_t)(burst->start_us - scan->switched_us) >"
-                    " (int32_t)scan->settings.settle_us;"
-                ),
-                "true;",
-            ),
-        ),
-        "amplitudes",
-    ),
-}
-STALE_TABLE = Mutation(
-    f"{APP}/engine.c",
-    (
-        (
-            "    return (fw_scan_table){engine->model.protocol,",
-            (
-                "    static const uint8_t *first;\n    if (first == NULL)\n        first ="
-                " engine->model.protocol;\n    return (fw_scan_table){first,"
-            ),
-        ),
-    ),
-    "table_after_upload",
+MUTATIONS: dict[str, dict[str, Any]] = load_toml(
+    Path(__file__).with_name("mutations.toml"), "firmware with one bug each"
 )
+STALE_TABLE = MUTATIONS.pop("stale table")
 
 
 class Workshop:
@@ -153,13 +41,13 @@ class Workshop:
         build_cortex_m7(self.source, self.build, TARGET)
         self.unmutated = (self.build / IMAGE).read_bytes()
 
-    def mutant(self, mutation: Mutation) -> bytes:
+    def mutant(self, mutation: dict[str, Any]) -> bytes:
         """The image of the sources with ``mutation``, which is undone again."""
-        path = self.source / mutation.file
+        path = self.source / mutation["file"]
         original = text = path.read_text()
-        for old, new in mutation.replaced:
+        for old, new in mutation["replaced"]:
             assert text.count(old) == 1, (
-                f"{mutation.file}: {old!r} is there {text.count(old)} times: bring the mutation up"
+                f"{path.name}: {old!r} is there {text.count(old)} times: bring the mutation up"
                 " to date"
             )
             text = text.replace(old, new)
@@ -197,7 +85,7 @@ def test_a_mutant_is_noticed(workshop: Workshop, name: str) -> None:
     session = run_session(workshop.mutant(mutation))
     found = {check.__name__: told for check in CHECKS if (told := check(session)) is not None}
     print(f"{name}: {found}")
-    assert mutation.noticed_by in found
+    assert mutation["noticed_by"] in found
 
 
 def test_a_stale_protocol_table_is_noticed(workshop: Workshop) -> None:
