@@ -1,5 +1,5 @@
 """``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches
-are told in grams."""
+are given in grams."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def add_parser(subparsers: Any) -> None:
     """Add ``calibrate``."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="known weights on a skin, so that its touches are told in grams",
+        help="known weights on a skin, so that its touches come in grams",
         description=(
             "Fit the law that turns a touch's strength and place into its load to recordings of"
             " known weights, say how far it is to be trusted, and store it in a copy of the model."

@@ -24,7 +24,7 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     add_device(parser)
-    option(parser, "--reset-statistics", "count anew after this")
+    option(parser, "--reset-statistics", "count from zero after this")
     parser.set_defaults(run=run)
 
 

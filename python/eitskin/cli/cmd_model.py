@@ -245,6 +245,6 @@ def run_upload(options: argparse.Namespace) -> int:
     else:
         print(
             f"{url}: {options.model} is in bank {info.bank}, {len(blob)} bytes, checksum"
-            f" {info.model_crc:08x}; tare anew"
+            f" {info.model_crc:08x}; tare again"
         )
     return 0

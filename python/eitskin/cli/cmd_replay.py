@@ -1,4 +1,4 @@
-"""``eitskin replay``: a recording as it was streamed, as frames, or held against this host's
+"""``eitskin replay``: a recording as it was streamed, as frames, or compared with this host's
 core."""
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def _truth(path: Path) -> SceneTruth | None:
 
     solver = recorded_options(path)
     try:
-        match([], [])  # scipy, without which nothing can be held against anything
+        match([], [])  # scipy, which every comparison with the truth needs
         return truth_of(
             str(read_head(path).get("url", "")), "increase" if solver is None else solver.sign
         )

@@ -34,7 +34,7 @@ def add_parser(subparsers: Any) -> None:
         description=(
             "Follow a board: a line a frame on standard output, faults and events of the link on"
             " standard error, a summary at the end. What is seen on a simulated or emulated board"
-            " is held against its scene's truth. With --json each line is a JSON object, the last"
+            " is compared with its scene's truth. With --json each line is a JSON object, the last"
             " one the summary."
         ),
     )

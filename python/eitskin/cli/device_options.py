@@ -332,7 +332,7 @@ def prepare(
     truth: SceneTruth | None = None,
 ) -> Recorder | None:
     """Scan, solver and reference as the options say; then what is to be touched begins, and
-    ``truth`` is told when. Recording begins before the reference is taken; the recorder is the
+    ``truth`` learns when. Recording begins before the reference is taken; the recorder is the
     caller's to close.
 
     Raises:

@@ -80,7 +80,7 @@ def show(
         broken = error
         summary.link = device.counters.as_dict()
     finally:
-        items.close()  # the board is told to stop before it is asked what it counted
+        items.close()  # the board gets its stop before it is asked what it counted
     if broken is None:
         finish(summary, device)
     if options.picture is not None and album.count and known is not None:
