@@ -1,6 +1,9 @@
-/* Commands: lengths and ranges are checked before anything is changed, and one that is sent again
- * is answered again. */
-#include "app/instrument.h"
+#include "app/commands.h"
+
+#include "app/models.h"
+#include "app/report.h"
+#include "app/scan_control.h"
+#include "app/upload.h"
 
 #include <string.h>
 

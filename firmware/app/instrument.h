@@ -1,4 +1,4 @@
-/* Everything that the application keeps, and how its parts call each other. */
+/* Everything that the application keeps. */
 #ifndef FW_INSTRUMENT_H
 #define FW_INSTRUMENT_H
 
@@ -71,63 +71,9 @@ typedef struct fw_instrument {
     uint8_t chunk[FW_READ_BYTES];
 } fw_instrument;
 
-typedef struct fw_answer {
-    eits_reply_status status;
-    int32_t detail[2];
-    bool later; /* no answer now: it comes when the command is done, or is a packet of its own */
-} fw_answer;
-
-static inline fw_answer fw_refuse(eits_reply_status why, int32_t a, int32_t b)
+static inline uint32_t fw_now_us(const fw_instrument *instrument)
 {
-    return (fw_answer){.status = why, .detail = {a, b}};
+    return instrument->board->system->time_us(instrument->board->system_ctx);
 }
-
-/* Whether a model can be scanned here and its packets and memory have room: OK, MODEL_SCAN or
- * MODEL_SIZE. */
-fw_answer fw_model_fits(const fw_instrument *instrument, const eits_model *model);
-
-/* ---- instrument.c ---- */
-void fw_instrument_init(fw_instrument *instrument, const fw_board *board);
-
-/* One turn of the main loop; false: nothing was to be done. */
-bool fw_instrument_step(fw_instrument *instrument);
-int fw_instrument_run(fw_instrument *instrument, const fw_board *board);
-
-uint32_t fw_now_us(const fw_instrument *instrument);
-
-/* Start generator and scan where a model is open and no upload is under way; what cannot be started
- * is tried again. */
-void fw_start_scan(fw_instrument *instrument);
-void fw_stop_scan(fw_instrument *instrument);
-
-/* Open the newest model that can be used; raises NO_MODEL where there is none. */
-void fw_open_newest(fw_instrument *instrument);
-void fw_report_no_model(fw_instrument *instrument);
-
-/* A tare that cannot go on is answered, and the last reference put back. */
-void fw_fail_tare(fw_instrument *instrument, eits_status why);
-
-/* ---- stream.c ---- */
-/* Judge a frame, give it to the tare or the solver, and send what is streamed. */
-void fw_process_frame(fw_instrument *instrument, fw_frame *frame);
-
-/* ---- upload.c ---- */
-fw_answer fw_upload_begin(fw_instrument *instrument, uint32_t bytes, uint32_t crc);
-fw_answer fw_upload_data(fw_instrument *instrument, uint32_t offset, const uint8_t *bytes,
-                         size_t size);
-fw_answer fw_upload_commit(fw_instrument *instrument);
-
-/* An upload that the host has left: the model in use goes on; it may still be resumed. */
-void fw_upload_check(fw_instrument *instrument);
-
-/* ---- report.c ---- */
-void fw_send_info(fw_instrument *instrument, uint32_t request);
-void fw_send_stats(fw_instrument *instrument, uint32_t request, bool reset);
-void fw_send_reply(fw_instrument *instrument, eits_packet_type command, uint32_t request,
-                   fw_answer answer);
-void fw_send_tare_reply(fw_instrument *instrument, fw_answer answer);
-
-/* ---- commands.c ---- */
-void fw_command(fw_instrument *instrument, const eits_link_packet *packet);
 
 #endif

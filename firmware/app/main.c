@@ -1,5 +1,5 @@
 /* The application of a board: one instrument, in static memory. */
-#include "app/instrument.h"
+#include "app/main_loop.h"
 
 static fw_instrument instrument;
 

@@ -1,5 +1,4 @@
-/* What the board says about itself, and answers to commands. */
-#include "app/instrument.h"
+#include "app/report.h"
 
 #include <string.h>
 

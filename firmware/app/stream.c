@@ -1,6 +1,7 @@
-/* What becomes of a frame: checked, given to the tare or to the solver, and sent. */
-#include "app/instrument.h"
+#include "app/stream.h"
+
 #include "app/phase.h"
+#include "app/report.h"
 
 /* What the scan itself tells. */
 static void report_scan(fw_instrument *instrument, const fw_frame *frame, const fw_quality *quality)

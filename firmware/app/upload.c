@@ -1,22 +1,7 @@
-/* A model over the wire into the bank that is not in use: verified, tried, made valid, and only
- * then taken up. */
-#include "app/instrument.h"
+#include "app/upload.h"
 
-fw_answer fw_model_fits(const fw_instrument *instrument, const eits_model *model)
-{
-    const size_t raw = sizeof(eits_packet_raw) + 5 * (size_t)model->n_rows;
-    const size_t image = sizeof(eits_packet_solved) + 4 * (size_t)model->n_pixels;
-    const size_t memory = instrument->engine.workspace_bytes;
-    if (model->n_electrodes > FW_ELECTRODES)
-        return fw_refuse(EITS_REPLY_MODEL_SCAN, (int32_t)model->n_electrodes,
-                         (int32_t)FW_ELECTRODES);
-    if (raw > EITS_LINK_MAX_PAYLOAD || image > EITS_LINK_MAX_PAYLOAD)
-        return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)EITS_LINK_MAX_PAYLOAD,
-                         (int32_t)(raw > image ? raw : image));
-    if (fw_engine_needs(model) > memory)
-        return fw_refuse(EITS_REPLY_MODEL_SIZE, (int32_t)memory, (int32_t)fw_engine_needs(model));
-    return (fw_answer){0};
-}
+#include "app/models.h"
+#include "app/scan_control.h"
 
 /* The bank that is not in use; with no model open, one whose record is not whole. */
 static uint32_t spare_bank(const fw_instrument *instrument)

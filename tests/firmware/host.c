@@ -1,5 +1,7 @@
 #include "host.h"
 
+#include "app/main_loop.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,5 @@
 /* Starting: without a model, on another model than before, and how the main loop ends. */
+#include "app/main_loop.h"
 #include "bench.h"
 #include "check.h"
 

@@ -35,6 +35,8 @@ uint32_t mps2_time_us(void *ctx);
 uint32_t mps2_lock(void *ctx);
 void mps2_unlock(void *ctx, uint32_t state);
 void mps2_wake(void);
+void mps2_wait(void *ctx); /* until mps2_wake, or at most 1 ms */
+void mps2_timebase_start(void);
 /* What the world does takes no board time: between these two calls the board's timers stand still.
  */
 void mps2_hold_time(void);

@@ -1,5 +1,7 @@
 #include "simulated.h"
 
+#include "app/main_loop.h"
+#include "app/scan_control.h"
 #include "app/sincos.h"
 
 #include <string.h>
@@ -344,7 +346,7 @@ void sim_start(sim_board *sim)
     fw_instrument_init(&sim->instrument, &sim->board);
 }
 
-static void turn(sim_board *sim)
+static void step(sim_board *sim)
 {
     (void)fw_instrument_step(&sim->instrument);
     if (sim->instrument.reset_wanted)
@@ -356,7 +358,7 @@ void sim_write(sim_board *sim, const uint8_t *bytes, size_t size)
     sim->to_board = bytes;
     sim->to_board_bytes = size;
     while (sim->to_board_bytes > 0)
-        turn(sim);
+        step(sim);
 }
 
 bool sim_wants_frame(const sim_board *sim)
@@ -402,6 +404,6 @@ void sim_scan_frame(sim_board *sim)
             next_burst(sim);
         else
             wait_idle(sim);
-        turn(sim);
+        step(sim);
     }
 }

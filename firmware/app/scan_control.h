@@ -1,0 +1,15 @@
+/* Starting and stopping the generator and the scan. */
+#ifndef FW_SCAN_CONTROL_H
+#define FW_SCAN_CONTROL_H
+
+#include "app/instrument.h"
+
+/* Start generator and scan where a model is open and no upload is under way; what cannot be started
+ * is tried again. */
+void fw_start_scan(fw_instrument *instrument);
+void fw_stop_scan(fw_instrument *instrument);
+
+/* A tare that cannot go on is answered, and the last reference put back. */
+void fw_fail_tare(fw_instrument *instrument, eits_status why);
+
+#endif

@@ -1,0 +1,78 @@
+/* Board time by timer 0, which stands still while the world does something; and what waits for
+ * it. */
+#include "mps2.h"
+
+static volatile bool woken;
+static uint32_t last_ticks, rest_ticks, now_us;
+
+uint32_t mps2_lock(void *ctx)
+{
+    (void)ctx;
+    uint32_t state;
+    __asm volatile("mrs %0, primask\n cpsid i" : "=r"(state)::"memory");
+    return state;
+}
+
+void mps2_unlock(void *ctx, uint32_t state)
+{
+    (void)ctx;
+    __asm volatile("msr primask, %0" ::"r"(state) : "memory");
+}
+
+/* The timer wraps every 13 s of board time; the application looks more often. */
+uint32_t mps2_time_us(void *ctx)
+{
+    const uint32_t state = mps2_lock(ctx), ticks = TIMER_VALUE(TIMER_TIME);
+    rest_ticks += last_ticks - ticks;
+    last_ticks = ticks;
+    now_us += rest_ticks / MPS2_TICKS_A_US;
+    rest_ticks %= MPS2_TICKS_A_US;
+    const uint32_t us = now_us;
+    mps2_unlock(ctx, state);
+    return us;
+}
+
+static uint32_t slot_timer_was, held;
+
+void mps2_hold_time(void)
+{
+    const uint32_t state = mps2_lock(NULL);
+    if (held++ == 0) {
+        TIMER_CTRL(TIMER_TIME) = 0;
+        slot_timer_was = TIMER_CTRL(TIMER_SLOT);
+        TIMER_CTRL(TIMER_SLOT) = slot_timer_was & ~TIMER_ENABLE;
+    }
+    mps2_unlock(NULL, state);
+}
+
+void mps2_release_time(void)
+{
+    const uint32_t state = mps2_lock(NULL);
+    if (--held == 0) {
+        TIMER_CTRL(TIMER_SLOT) = slot_timer_was;
+        TIMER_CTRL(TIMER_TIME) = TIMER_ENABLE;
+    }
+    mps2_unlock(NULL, state);
+}
+
+void mps2_wake(void)
+{
+    woken = true;
+}
+
+/* Not WFI: QEMU lets its clock run with the host's while the processor sleeps, and runs would
+ * differ. */
+void mps2_wait(void *ctx)
+{
+    const uint32_t start = mps2_time_us(ctx);
+    while (!woken && mps2_time_us(ctx) - start < 1000u)
+        ;
+    woken = false;
+}
+
+void mps2_timebase_start(void)
+{
+    TIMER_RELOAD(TIMER_TIME) = 0xFFFFFFFFu;
+    TIMER_VALUE(TIMER_TIME) = last_ticks = 0xFFFFFFFFu;
+    TIMER_CTRL(TIMER_TIME) = TIMER_ENABLE;
+}
