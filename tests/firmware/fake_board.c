@@ -25,36 +25,6 @@ static bool fails(uint32_t call, uint32_t from, uint32_t count)
 
 /* ---- generator ---- */
 
-static void decode(fake_board *f, uint16_t word)
-{
-    switch (word >> 14) {
-    case 0: {
-        const bool was_reset = (f->dds_control & 0x0100u) != 0 || f->dds_control == 0;
-        f->dds_control = word;
-        f->dds_half = false;
-        if (was_reset && (word & 0x0100u) == 0)
-            f->dds_released_ns = f->now_ns;
-        break;
-    }
-    case 1:
-        if ((f->dds_control & 0x2000u) == 0) /* only B28 writes are decoded */
-            break;
-        if (f->dds_half) {
-            f->dds_high = word & 0x3FFFu;
-            f->dds_low = f->dds_pending;
-        } else {
-            f->dds_pending = word & 0x3FFFu;
-        }
-        f->dds_half = !f->dds_half;
-        break;
-    case 3:
-        f->dds_phase = word & 0xFFFu;
-        break;
-    default:
-        break;
-    }
-}
-
 static fw_status spi_write(void *ctx, const uint16_t *words, size_t count)
 {
     fake_board *f = ctx;
@@ -62,31 +32,27 @@ static fw_status spi_write(void *ctx, const uint16_t *words, size_t count)
         return FW_E_BUS;
     for (size_t k = 0; k < count; ++k) {
         record(f, FAKE_SPI, words[k], 0);
-        decode(f, words[k]);
+        if (ad9833_model_write(&f->generator, words[k]))
+            f->released_ns = f->now_ns;
         f->now_ns += 2000;
     }
     return FW_OK;
 }
 
-static double tuning(const fake_board *f)
-{
-    const bool running = (f->dds_control & 0x2000u) != 0 && (f->dds_control & 0x0100u) == 0;
-    return running ? (double)(f->dds_high << 14 | f->dds_low) : 0;
-}
-
 double fake_generator_hz(const fake_board *f)
 {
-    return tuning(f) * f->board.mclk_hz / 268435456.0;
+    const double turn = ad9833_model_runs(&f->generator) ? f->generator.tuning : 0;
+    return turn * f->board.mclk_hz / 268435456.0;
 }
 
 /* Sine of the generator, in turns since it was released; 0 while nothing comes. */
 static double generator(const fake_board *f, double at_ns)
 {
     /* anything but a sine is no use here */
-    if (tuning(f) == 0 || (f->dds_control & 0x002Au) != 0)
+    if (fake_generator_hz(f) == 0 || (f->generator.control & 0x002Au) != 0)
         return 0;
-    const double turns = fake_generator_hz(f) * 1e-9 * (at_ns - (double)f->dds_released_ns) +
-                         f->dds_phase / 4096.0 + f->extra_turn;
+    const double turns = fake_generator_hz(f) * 1e-9 * (at_ns - (double)f->released_ns) +
+                         f->generator.phase / 4096.0 + f->extra_turn;
     return sin(2 * acos(-1.0) * (turns - floor(turns)));
 }
 
@@ -382,8 +348,7 @@ static const fw_system_ops SYSTEM = {time_us,       system_wait,  system_lock, s
 void fake_restart(fake_board *f)
 {
     f->capturing = f->stalled = f->in_interrupt = false;
-    f->dds_control = 0;
-    f->dds_low = f->dds_high = f->dds_phase = f->dds_pending = 0;
+    f->generator = (ad9833_model){0};
     f->levels = 0;
     f->events = f->bursts = 0;
     f->to_board_size = f->to_board_at = f->to_host_size = 0;

@@ -8,6 +8,7 @@
 #define FW_FAKE_BOARD_H
 
 #include "app/instrument.h"
+#include "boards/parts/ad9833_model.h"
 
 #include <setjmp.h>
 
@@ -48,11 +49,9 @@ typedef struct fake_board {
     uint32_t lines_calls, lines_fail_from, lines_fails;
 
     /* generator */
-    uint32_t dds_low, dds_high, dds_phase, dds_pending;
-    uint16_t dds_control;
-    bool dds_half;
-    uint64_t dds_released_ns;
-    double extra_turn; /* phase that the way through cables and skin adds */
+    ad9833_model generator;
+    uint64_t released_ns; /* when its phase began */
+    double extra_turn;    /* phase that the way through cables and skin adds */
 
     /* multiplexers and skin */
     uint32_t levels;

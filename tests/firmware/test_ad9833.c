@@ -97,7 +97,7 @@ static void test_start(void)
     CHECK_EQUAL(generator.tuning, 0x10C7);
     CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 77, FW_SINE), FW_OK);
     CHECK_NEAR(fake_generator_hz(&board), 50000, 0.02);
-    CHECK_EQUAL(board.dds_phase, 77);
+    CHECK_EQUAL(board.generator.phase, 77);
     CHECK_EQUAL(fw_ad9833_stop(&generator), FW_OK);
     CHECK_EQUAL(generator.state, FW_AD9833_RESET);
     CHECK_NEAR(fake_generator_hz(&board), 0, 0);
@@ -117,7 +117,7 @@ static void test_bus_fails_at_each_word(void)
         CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
         /* the write after the failure got through */
         CHECK_EQUAL(generator.state, FW_AD9833_RESET);
-        CHECK_EQUAL(board.dds_control, 0x2100);
+        CHECK_EQUAL(board.generator.control, 0x2100);
         CHECK_NEAR(fake_generator_hz(&board), 0, 0);
         board.spi_fails = 100; /* from here on nothing gets through */
         CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);

@@ -6,6 +6,7 @@
  *
  * A frame lasts frame_us from the start of the scan on, the last one for ever. Electrodes that are
  * no row's read 0 V. */
+#include "boards/parts/ad9833_model.h"
 #include "mps2.h"
 
 #include <math.h>
@@ -21,11 +22,8 @@ static struct {
     const uint8_t *electrodes;
     const float *volts;
 } skin;
-static struct {
-    uint32_t levels;
-    uint32_t control, half, tuning;
-    uint32_t running_since_us;
-} parts;
+static ad9833_model generator;
+static uint32_t levels_now, running_since_us;
 
 void mps2_skin_start(void)
 {
@@ -45,28 +43,13 @@ void mps2_skin_start(void)
     skin.volts = (const float *)(const void *)(skin.electrodes + (size_t)head[0] * 4u);
 }
 
-/* AD9833 data sheet, tables 6 to 9: B28 loads frequency register 0 in two words, low half first;
- * RESET holds the phase at 0. */
 static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
 {
-    const uint32_t b28 = 1u << 13, select = 1u << 11, reset = 1u << 8;
     for (size_t k = 0; k < count; ++k) {
-        const uint32_t word = words[k], value = word & 0x3FFFu;
-        if (word >> 14 == 0) {
-            if ((parts.control & reset) != 0 && (word & reset) == 0)
-                parts.running_since_us = mps2_time_us(ctx);
-            parts.control = word;
-            parts.half = 0;
-        } else if (word >> 14 == 1 && (parts.control & b28) != 0) {
-            if (parts.half == 0)
-                parts.tuning = (parts.tuning & ~0x3FFFu) | value;
-            else
-                parts.tuning = (parts.tuning & 0x3FFFu) | value << 14;
-            parts.half ^= 1u;
-        }
+        if (ad9833_model_write(&generator, words[k]))
+            running_since_us = mps2_time_us(ctx);
     }
-    /* frequency register 1 is not modelled */
-    return (parts.control & select) != 0 ? FW_E_BUS : FW_OK;
+    return (generator.control & AD9833_MODEL_FSELECT) != 0 ? FW_E_BUS : FW_OK;
 }
 
 static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
@@ -74,7 +57,7 @@ static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
     (void)ctx;
     if (mask >> LINES != 0)
         return FW_E_ARGUMENT;
-    parts.levels = (parts.levels & ~mask) | (levels & mask);
+    levels_now = (levels_now & ~mask) | (levels & mask);
     return FW_OK;
 }
 
@@ -89,9 +72,9 @@ static float connected_volts(uint32_t scanning_us)
 {
     uint8_t four[4];
     for (uint32_t k = 0; k < 4; ++k) {
-        if ((parts.levels >> (16u + k) & 1u) == 0)
+        if ((levels_now >> (16u + k) & 1u) == 0)
             return 0;
-        four[k] = (uint8_t)(parts.levels >> 4u * k & 0xFu);
+        four[k] = (uint8_t)(levels_now >> 4u * k & 0xFu);
     }
     const uint32_t passed = skin.frame_us == 0 ? 0 : scanning_us / skin.frame_us;
     const float *const frame =
@@ -105,13 +88,13 @@ static float connected_volts(uint32_t scanning_us)
 void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us,
                      uint32_t scanning_us)
 {
-    const bool untouched = (parts.control & 1u << 8) != 0 || skin.rows == 0;
+    const bool untouched = !ad9833_model_runs(&generator) || skin.rows == 0;
     const float volts =
         untouched ? 0 : connected_volts(scanning_us) * ((float)MPS2_GAIN_PPM * 1e-6f);
     const float steps =
         volts * ((float)(MPS2_FULL_SCALE_CODE + 1) / ((float)MPS2_REFERENCE_UV * 1e-6f));
-    const uint32_t a_us = parts.tuning * (MPS2_MCLK_HZ / 1000000u),
-                   begin = a_us * (start_us - parts.running_since_us);
+    const uint32_t a_us = generator.tuning * (MPS2_MCLK_HZ / 1000000u),
+                   begin = a_us * (start_us - running_since_us);
     for (uint32_t k = 0; k < samples; ++k) {
         /* sample k is taken k + 1/2 sample periods after the slot's start */
         const uint32_t phase =

@@ -1,7 +1,6 @@
 /* Flash in memory: erased, then "bank0.bin" and "bank1.bin" where there are such. */
+#include "boards/parts/nor_model.h"
 #include "mps2.h"
-
-#include <string.h>
 
 static _Alignas(16) uint8_t banks[FW_BANKS][MPS2_BANK_BYTES];
 
@@ -14,21 +13,15 @@ static const uint8_t *bank_start(void *ctx, uint32_t bank)
 static fw_status erase(void *ctx, uint32_t bank)
 {
     (void)ctx;
-    if (bank >= FW_BANKS)
-        return FW_E_ARGUMENT;
-    memset(banks[bank], 0xFF, MPS2_BANK_BYTES);
-    return FW_OK;
+    return bank < FW_BANKS ? nor_model_erase(banks[bank], MPS2_BANK_BYTES) : FW_E_ARGUMENT;
 }
 
 static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
 {
     (void)ctx;
-    if (bank >= FW_BANKS || offset % 4u != 0 || size % 4u != 0 || offset > MPS2_BANK_BYTES ||
-        size > MPS2_BANK_BYTES - offset)
+    if (bank >= FW_BANKS)
         return FW_E_ARGUMENT;
-    for (size_t k = 0; k < size; ++k) /* bits fall, none rises */
-        banks[bank][offset + k] &= ((const uint8_t *)bytes)[k];
-    return memcmp(banks[bank] + offset, bytes, size) == 0 ? FW_OK : FW_E_FLASH;
+    return nor_model_program(banks[bank], MPS2_BANK_BYTES, offset, bytes, size);
 }
 
 void mps2_store_start(void)

@@ -3,6 +3,7 @@
 #include "app/main_loop.h"
 #include "app/scan_control.h"
 #include "app/sincos.h"
+#include "boards/parts/nor_model.h"
 
 #include <string.h>
 
@@ -20,32 +21,16 @@ size_t sim_board_bytes(void)
     return sizeof(sim_board);
 }
 
-/* ---- generator: AD9833 data sheet, tables 6 to 9 ---- */
-
-enum { CONTROL_RESET = 0x0100 };
+/* ---- generator ---- */
 
 static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
 {
     sim_board *sim = ctx;
     for (size_t k = 0; k < count; ++k) {
-        const uint32_t value = words[k] & 0x3FFFu;
-        if (words[k] >> 14 == 0) {
-            if ((sim->generator_control & CONTROL_RESET) != 0 && (words[k] & CONTROL_RESET) == 0)
-                sim->released_us = (uint32_t)sim->now_us;
-            sim->generator_control = words[k];
-            sim->high_half_next = false;
-        } else if (words[k] >> 14 == 1) { /* two words, the low half first */
-            sim->tuning = sim->high_half_next ? (sim->tuning & 0x3FFFu) | value << 14
-                                              : (sim->tuning & 0xFFFC000u) | value;
-            sim->high_half_next = !sim->high_half_next;
-        }
+        if (ad9833_model_write(&sim->generator, words[k]))
+            sim->released_us = (uint32_t)sim->now_us;
     }
     return FW_OK;
-}
-
-static bool generator_runs(const sim_board *sim)
-{
-    return sim->generator_control != 0 && (sim->generator_control & CONTROL_RESET) == 0;
 }
 
 /* ---- multiplexers ---- */
@@ -125,7 +110,7 @@ static float volts_now(sim_board *sim)
 {
     const eits_model *model = &sim->instrument.engine.model;
     uint8_t joined[4];
-    if ((sim->lines & FW_MUX_ENABLES) != FW_MUX_ENABLES || !generator_runs(sim))
+    if ((sim->lines & FW_MUX_ENABLES) != FW_MUX_ENABLES || !ad9833_model_runs(&sim->generator))
         return 0;
     for (uint32_t k = 0; k < 4; ++k)
         joined[k] = (uint8_t)(sim->lines >> 4 * k & 15u);
@@ -154,7 +139,7 @@ static fw_status start(void *ctx)
     sim_board *sim = ctx;
     sim_converter *converter = &sim->converter;
     /* 2^28 times mclk / rate, of which the generator's phase takes `tuning` a sample */
-    const uint64_t turn = (uint64_t)sim->tuning * MCLK_HZ;
+    const uint64_t turn = (uint64_t)sim->generator.tuning * MCLK_HZ;
     for (uint32_t k = 0; k < converter->setup.samples; ++k) {
         const uint64_t phase = turn * k / converter->setup.sample_rate_hz;
         fw_sincos((uint32_t)phase << 4, &converter->cosine[k], &converter->sine[k]);
@@ -177,7 +162,7 @@ static void convert(sim_board *sim, float volts)
         (FULL_SCALE_CODE + 1) / (1e-6f * (float)sim->board.capture.reference_uv);
     const float steps = volts * steps_a_volt;
     float c, s;
-    fw_sincos((sim->tuning * (MCLK_HZ / 1000000u) * passed_us) << 4, &c, &s);
+    fw_sincos((sim->generator.tuning * (MCLK_HZ / 1000000u) * passed_us) << 4, &c, &s);
     for (uint32_t k = 0; k < converter->setup.samples; ++k) {
         const float code = 0.5f * (FULL_SCALE_CODE + 1) + 0.5f +
                            steps * (c * converter->sine[k] + s * converter->cosine[k]);
@@ -210,7 +195,7 @@ static void next_burst(sim_board *sim)
         scan_has_begun(sim);
 }
 
-/* ---- flash, as NOR: bits fall, none rises ---- */
+/* ---- flash ---- */
 
 static const uint8_t *bank_start(void *ctx, uint32_t bank)
 {
@@ -220,20 +205,13 @@ static const uint8_t *bank_start(void *ctx, uint32_t bank)
 static fw_status erase(void *ctx, uint32_t bank)
 {
     const sim_board *sim = ctx;
-    memset(sim->bank[bank], 0xFF, sim->board.store.bank_bytes);
-    return FW_OK;
+    return nor_model_erase(sim->bank[bank], sim->board.store.bank_bytes);
 }
 
 static fw_status program(void *ctx, uint32_t bank, uint32_t offset, const void *bytes, size_t size)
 {
     const sim_board *sim = ctx;
-    const size_t room = sim->board.store.bank_bytes;
-    uint8_t *cells = sim->bank[bank] + offset;
-    if (offset % 4u != 0 || size % 4u != 0 || offset > room || size > room - offset)
-        return FW_E_ARGUMENT;
-    for (size_t k = 0; k < size; ++k)
-        cells[k] &= ((const uint8_t *)bytes)[k];
-    return memcmp(cells, bytes, size) == 0 ? FW_OK : FW_E_FLASH;
+    return nor_model_program(sim->bank[bank], sim->board.store.bank_bytes, offset, bytes, size);
 }
 
 /* ---- link ---- */
@@ -341,7 +319,7 @@ void sim_init(sim_board *sim, const sim_setup *setup)
 void sim_start(sim_board *sim)
 {
     sim->converter.running = false;
-    sim->generator_control = 0;
+    sim->generator = (ad9833_model){0};
     sim->to_board_bytes = 0;
     fw_instrument_init(&sim->instrument, &sim->board);
 }

@@ -13,6 +13,7 @@
 #define SIMULATED_H
 
 #include "app/instrument.h"
+#include "boards/parts/ad9833_model.h"
 
 /* Frames of the untouched skin, then those of the scene. */
 typedef struct sim_scene {
@@ -39,12 +40,10 @@ typedef struct sim_converter {
 typedef struct sim_board {
     fw_board board;
     uint64_t now_us;
-    /* AD9833: control register, frequency register 0, when reset was released last */
-    uint16_t generator_control;
-    bool high_half_next;
-    uint32_t tuning, released_us;
-    uint32_t lines; /* of the multiplexers, as in fw_board */
-    uint32_t row;   /* that was measured last */
+    ad9833_model generator;
+    uint32_t released_us; /* when its phase began */
+    uint32_t lines;       /* of the multiplexers, as in fw_board */
+    uint32_t row;         /* that was measured last */
     sim_converter converter;
     sim_scene scene;
     uint8_t *bank[FW_BANKS];
