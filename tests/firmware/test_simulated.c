@@ -1,0 +1,189 @@
+/* The simulated board by itself: what it measures are the frames that it is shown, in their order,
+ * on a clock that runs only for whoever wants frames. */
+#include "bench.h"
+#include "check.h"
+#include "simulated.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BANK = 128 * 1024, WORKSPACE = 192 * 1024, UNTOUCHED = 4, FRAMES = 3, ROWS = 208 };
+
+typedef struct rig {
+    _Alignas(16) uint8_t bank[FW_BANKS][BANK];
+    _Alignas(16) uint8_t workspace[WORKSPACE];
+    sim_board sim;
+    eits_link_decoder decoder;
+    _Alignas(8) uint8_t decoding[EITS_LINK_MAX_PACKET + 4];
+    eits_packet_raw head; /* of the last RAW */
+    float raw[ROWS];
+    uint32_t raws, replies, refused, sequence;
+} rig;
+
+static rig a, b;
+static bench source; /* of the model and of voltages */
+static float volts[(UNTOUCHED + FRAMES) * ROWS];
+
+static void collect(rig *r)
+{
+    uint8_t bytes[1000];
+    for (size_t size; (size = sim_read(&r->sim, bytes, sizeof bytes)) > 0;) {
+        for (size_t at = 0; at < size;) {
+            eits_link_packet packet;
+            at += eits_link_feed(&r->decoder, bytes + at, size - at, &packet);
+            if (packet.payload != NULL && packet.type == EITS_PACKET_RAW) {
+                memcpy(&r->head, packet.payload, sizeof r->head);
+                memcpy(r->raw, packet.payload + sizeof r->head, sizeof r->raw);
+                ++r->raws;
+            } else if (packet.payload != NULL && packet.type == EITS_PACKET_REPLY) {
+                eits_packet_reply reply;
+                memcpy(&reply, packet.payload, sizeof reply);
+                ++r->replies;
+                r->refused += reply.status != EITS_REPLY_OK;
+            }
+        }
+    }
+}
+
+static void send(rig *r, eits_packet_type type, const void *payload, size_t size)
+{
+    uint8_t bytes[100];
+    const size_t sent =
+        eits_link_encode(bytes, sizeof bytes, (uint8_t)type, r->sequence++, payload, size, NULL, 0);
+    sim_write(&r->sim, bytes, sent);
+    collect(r);
+}
+
+static void stream(rig *r, uint16_t what, uint32_t frames)
+{
+    const eits_command_stream c = {
+        .request = r->sequence + 1, .what = what, .every = 1, .frames = frames};
+    send(r, EITS_PACKET_STREAM, &c, sizeof c);
+}
+
+static void start(rig *r, uint32_t period_us)
+{
+    memset(r, 0, sizeof *r);
+    memset(r->bank, 0xFF, sizeof r->bank);
+    fake_put_model(&source.board, 0, 1, source.model.blob, source.model.size);
+    memcpy(r->bank[0], source.board.bank[0], BANK);
+    CHECK_EQUAL(eits_link_decoder_init(&r->decoder, r->decoding, sizeof r->decoding), EITS_OK);
+    const sim_setup setup = {.serial = "5",
+                             .frame_period_us = period_us,
+                             .banks = {r->bank[0], r->bank[1]},
+                             .bank_bytes = BANK,
+                             .workspace = r->workspace,
+                             .workspace_bytes = WORKSPACE};
+    sim_init(&r->sim, &setup);
+    collect(r);
+}
+
+static void show(rig *r, double rate_hz)
+{
+    uint32_t bytes, crc;
+    CHECK(sim_model(&r->sim, &bytes, &crc) == r->bank[0]);
+    CHECK_EQUAL(bytes, source.model.size);
+    CHECK_EQUAL(crc, source.model.crc);
+    sim_show(&r->sim, volts, UNTOUCHED, FRAMES, rate_hz);
+}
+
+/* Which of the frames it was, by the scale that each has; -1: none of them. */
+static int shown(const rig *r)
+{
+    const float step = 1e-6f * (float)r->sim.board.capture.reference_uv / 65536;
+    for (int k = 0; k < UNTOUCHED + FRAMES; ++k) {
+        float worst = 0;
+        for (uint32_t i = 0; i < ROWS; ++i)
+            worst = fmaxf(worst, fabsf(fabsf(r->raw[i]) - fabsf(volts[k * ROWS + (int)i])));
+        if (worst < step)
+            return k;
+    }
+    return -1;
+}
+
+static int scan(rig *r)
+{
+    const uint32_t before = r->raws;
+    sim_scan_frame(&r->sim);
+    collect(r);
+    CHECK_EQUAL(r->raws, before + 1);
+    return shown(r);
+}
+
+static void test_frames_in_order(void)
+{
+    start(&a, 50000);
+    CHECK(!sim_wants_frame(&a.sim));
+    stream(&a, EITS_STREAM_RAW, 0);
+    CHECK(sim_wants_frame(&a.sim));
+    show(&a, 20.0);
+    for (int k = 0; k < 6; ++k)
+        CHECK_EQUAL(scan(&a), k % UNTOUCHED);
+    const eits_command_tare tare = {.request = 77, .frames = 4};
+    send(&a, EITS_PACKET_TARE, &tare, sizeof tare);
+    for (int k = 0; k < 4; ++k)
+        CHECK_EQUAL(scan(&a), k); /* from the first again */
+    const uint32_t last_us = a.head.time_us;
+    sim_begin_scene(&a.sim);
+    for (int k = 0; k < FRAMES; ++k) {
+        CHECK(!sim_scene_over(&a.sim));
+        CHECK_EQUAL(scan(&a), UNTOUCHED + k);
+        CHECK_EQUAL(a.head.time_us, last_us + 50000u * (uint32_t)(k + 1));
+        CHECK_EQUAL(a.head.scan_us, 207 * 100 + 80);
+    }
+    CHECK(sim_scene_over(&a.sim));
+    CHECK_EQUAL(scan(&a), UNTOUCHED + FRAMES - 1); /* the last one is held */
+    CHECK_EQUAL(a.refused, 0);
+    CHECK_EQUAL(a.replies, 2);
+}
+
+/* Nobody wants frames: time stands still. Off and on: it goes on, and the model is there. */
+static void test_time_and_restart(void)
+{
+    stream(&a, 0, 0);
+    const uint64_t us = a.sim.now_us;
+    sim_scan_frame(&a.sim);
+    CHECK(!sim_wants_frame(&a.sim));
+    CHECK_EQUAL(a.sim.now_us, us);
+    const eits_command_plain reset = {.request = 500};
+    send(&a, EITS_PACKET_RESET, &reset, sizeof reset);
+    CHECK_EQUAL(a.sim.now_us, us);
+    CHECK(!a.sim.instrument.engine.tared && a.sim.instrument.engine.open);
+    stream(&a, EITS_STREAM_RAW, 1);
+    CHECK_EQUAL(scan(&a), UNTOUCHED + FRAMES - 1);
+    CHECK(!sim_wants_frame(&a.sim));
+}
+
+/* As fast as it goes, frames of the scene come more than once; another board beside it has its own
+ * scene. */
+static void test_two_boards(void)
+{
+    start(&a, 0);
+    start(&b, 0);
+    stream(&a, EITS_STREAM_RAW, 0);
+    stream(&b, EITS_STREAM_RAW, 0);
+    show(&a, 20.0);
+    show(&b, 20.0);
+    sim_begin_scene(&a.sim);
+    for (int k = 0; k < 6; ++k) {
+        const int number = (int)(k * 0.0208 * 20 + 0.5);
+        CHECK_EQUAL(scan(&a), UNTOUCHED + (number < FRAMES ? number : FRAMES - 1));
+        CHECK_EQUAL(scan(&b), k % UNTOUCHED);
+        CHECK_EQUAL(a.head.time_us, b.head.time_us);
+    }
+}
+
+int main(void)
+{
+    bench_start(&source, &SKIN_ADJACENT);
+    for (uint32_t k = 0; k < UNTOUCHED + FRAMES; ++k) {
+        for (uint32_t i = 0; i < ROWS; ++i)
+            volts[k * ROWS + i] = (1.0f + 0.01f * (float)k) * (float)bench_volts(&source, i);
+    }
+    test_frames_in_order();
+    test_time_and_restart();
+    test_two_boards();
+    bench_stop(&source);
+    return checks_report("simulated");
+}
