@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import struct
 import zlib
-from dataclasses import dataclass
 
 from eitskin.errors import DeviceError
 
@@ -18,16 +17,6 @@ MAGIC = 0x4B4E4245  # "EBNK"
 ERASED = 0xFF
 _RECORD = struct.Struct("<IIIIIIII")
 RECORD_BYTES = _RECORD.size
-
-
-@dataclass(frozen=True)
-class BankRecord:
-    """Which model a bank holds: ``generation`` counts uploads (mod 2^32), ``model_crc`` is zlib's
-    CRC-32 of the whole file."""
-
-    generation: int
-    model_bytes: int
-    model_crc: int
 
 
 def record_offset(bank_bytes: int = BANK_BYTES) -> int:
@@ -55,28 +44,3 @@ def bank_bytes(model: bytes, generation: int, bank_bytes: int = BANK_BYTES) -> b
             " fewer pixels, a lower rank or a smaller storage type (eitskin model build --help)"
         )
     return model + bytes([ERASED]) * (room - len(model)) + record_bytes(model, generation)
-
-
-def read_record(bank: bytes) -> BankRecord | None:
-    """The record of a ``bank``, or None where there is none or it is damaged. The model itself is
-    not looked at."""
-    if len(bank) < _RECORD.size:
-        return None
-    tail = bank[-_RECORD.size :]
-    magic, generation, size, crc, *_, check = _RECORD.unpack(tail)
-    if magic != MAGIC or check != zlib.crc32(tail[:-4]) or size > record_offset(len(bank)):
-        return None
-    return BankRecord(generation, size, crc)
-
-
-def newest_bank(banks: list[bytes]) -> int | None:
-    """The number of the bank that a board would start from: a valid record, its model's checksum
-    right, the generation the latest by a comparison that wraps. None where no bank is valid."""
-    best: tuple[int, BankRecord] | None = None
-    for number, bank in enumerate(banks):
-        record = read_record(bank)
-        if record is None or zlib.crc32(bank[: record.model_bytes]) != record.model_crc:
-            continue
-        if best is None or 0 < (record.generation - best[1].generation) % 2**32 < 2**31:
-            best = number, record
-    return None if best is None else best[0]
