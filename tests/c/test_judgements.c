@@ -275,6 +275,27 @@ static void odd_readings(void)
     dense_bench_close(&b);
 }
 
+/* Rows that are not in use are neither volts nor a change. */
+static void rows_out_of_use(void)
+{
+    dense_bench b;
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    const uint32_t rows[2] = {ctx->model->fold[4].first, ctx->model->fold[4].second};
+    eits_real older[SMALL_ROWS], newer[SMALL_ROWS];
+    uint32_t marked[SMALL_FOLDED];
+    for (int out = 0; out < 2; ++out) {
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            older[i] = newer[i] = R(0.02);
+        ctx->rows.masked[rows[out]] = 1;
+        CHECK_EQUAL(odd_folds(ctx, newer, older, marked), 0);
+        newer[rows[1 - out]] += R(0.009);
+        CHECK_EQUAL(odd_folds(ctx, newer, older, marked), 1);
+        CHECK(marked[4]);
+        ctx->rows.masked[rows[out]] = 0;
+    }
+    dense_bench_close(&b);
+}
+
 /* ---- noise that is learned ---- */
 
 /* The noise of voltages of any size, whose squares are out of range; and what lambda makes of it.
@@ -336,6 +357,7 @@ int main(void)
     mismatches();
     noise_of_the_data();
     odd_readings();
+    rows_out_of_use();
     noise_of_any_size();
     return checks_report("judgements");
 }
