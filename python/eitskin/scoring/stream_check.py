@@ -22,7 +22,6 @@ from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore
 
 FloatArray = npt.NDArray[np.float64]
-WORST_ROWS = 3
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,6 @@ import numpy as np
 from eitskin.core.results import ALL_TOUCH_FIT, MAX_TOUCHES, Options
 from eitskin.model.model import Model
 
-TRACKING = (
-    "detection_factor",
-    "track_confirm",
-    "track_hold",
-    "track_smooth",
-)  # what tracking changes
-
 
 def default_options(model: Model) -> Options:
     """The model's own defaults."""
