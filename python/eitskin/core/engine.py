@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from dataclasses import asdict
 from time import perf_counter_ns
 from typing import Any
@@ -195,36 +194,6 @@ class CoreEngine:
             )
         )
 
-    def bare_calls(
-        self, frame: npt.NDArray[np.floating[Any]]
-    ) -> tuple[Callable[[], Any], Callable[[], Any]]:
-        """The two C calls for ``frame``, solve and touches, with nothing of Python around them. For
-        benchmarks."""
-        self._frame[:] = frame
-        lib, context, null = self._lib, self._context, self._null
-        return (
-            lambda: lib.eits_reconstruct(context, self._frame_pointer, self.n_rows, null, null),
-            lambda: lib.eits_find_touches(
-                context, self._touches, len(self._touches), self._touch_count
-            ),
-        )
-
-    def bare_solve(self, y: npt.NDArray[np.floating[Any]]) -> Callable[[], Any]:
-        """The solver's C call alone on reduced data ``y`` (r,), which it takes now; the result is
-        in ``coefficients``. For benchmarks."""
-        lib, context = self._lib, self._context
-        pointer = self._reals(np.array(y, dtype=self.dtype))
-        return lambda: lib.eits_solve(context, pointer)
-
-    def bare_solves(self, many: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:
-        """``bare_solve`` of each of ``many`` (k, r), one after another: their x (k, n)."""
-        x = np.empty((len(many), self.n_pixels), dtype=self.dtype)
-        solve, context = self._lib.eits_solve, self._context
-        for k, y in enumerate(np.ascontiguousarray(many, dtype=self.dtype)):
-            solve(context, self._reals(y))
-            x[k] = self._view(self._lib.eits_get_coefficients(context), self.n_pixels)
-        return x
-
     def coefficients(self) -> npt.NDArray[Any]:
         """x of the last solve, (n,)."""
         return self._view(self._lib.eits_get_coefficients(self._context), self.n_pixels).copy()
@@ -323,20 +292,6 @@ class CoreEngine:
             each = tuple(_touch(found[room * k + i]) for i in range(r.count))
             done.append(Reconstruction(images[k], coefficients[k], each, _info(r.info)))
         return done
-
-    def bare_block(self, frames: npt.NDArray[np.floating[Any]]) -> Callable[[], Any]:
-        """The one C call of :meth:`reconstruct_block` for ``frames`` (k, m), with nothing of Python
-        around it. For benchmarks."""
-        given, count = np.ascontiguousarray(frames, dtype=self.dtype), len(frames)
-        images, coefficients = (
-            np.empty((count, self.n_pixels), dtype=self.dtype) for _ in range(2)
-        )
-        found = self._ffi.new("eits_touch[]", count * int(self._lib.EITS_MAX_TOUCHES))
-        results = self._ffi.new("eits_result[]", count)
-        pointers = [self._reals(array) for array in (given, images, coefficients)]
-        return lambda: self._lib.eits_reconstruct_batch(
-            self._context, pointers[0], self.n_rows, count, pointers[1], pointers[2], found, results
-        )
 
     def _reals(self, array: npt.NDArray[Any]) -> Any:
         return self._ffi.from_buffer("eits_real[]", array)

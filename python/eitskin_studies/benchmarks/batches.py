@@ -18,6 +18,7 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.batch import Batch, check_threads
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.benchmarks.frame import golden_session
+from eitskin_studies.harness.bare_core import bare_block
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
 
@@ -63,7 +64,7 @@ def _c_alone(
     for part in parts:
         engine = CoreEngine(blob)
         engine.set_reference(quiet[None])
-        calls.append(engine.bare_block(part))
+        calls.append(bare_block(engine, part))
 
     def run_all() -> None:
         running = [Thread(target=call) for call in calls]

@@ -16,6 +16,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.harness.bare_core import bare_calls
 from eitskin_studies.harness.machine import machine
 
 SEED = 20240918
@@ -112,7 +113,7 @@ def run(runs: int = 2000) -> FrameTimes:
 
     for k in range(-20, runs):
         frame = frames[k % len(frames)]
-        solve, touches = core.bare_calls(frame)
+        solve, touches = bare_calls(core, frame)
         if k < 0:
             solve()
             continue

@@ -30,6 +30,7 @@ from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
+from eitskin_studies.harness.bare_core import bare_calls
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sections import Filling, text_table
 
@@ -184,7 +185,7 @@ def run(
             total, counted = np.zeros(2), np.zeros(2)
             for frame in one.frames:
                 one.engine.forget()
-                for part, call in enumerate(one.engine.bare_calls(frame)):
+                for part, call in enumerate(bare_calls(one.engine, frame)):
                     start = thread_time_ns()
                     call()
                     total[part] += thread_time_ns() - start

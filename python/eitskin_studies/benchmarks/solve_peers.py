@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
 from eitskin_studies.benchmarks.solve_problems import Problems, bench_options
+from eitskin_studies.harness.bare_core import bare_solve, bare_solves
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -86,7 +87,7 @@ def _ours(problems: Problems, solver: str, width: str) -> Candidate:
                 problems.model, solver=solver, iterations=count, lambda_abs=float(problems.lam[k])
             )
         )
-        return engine.bare_solve(problems.y[k])
+        return bare_solve(engine, problems.y[k])
 
     return Candidate(f"eitskin {solver}, {width}", COUNTS, prepare, lambda _: engine.coefficients())
 
@@ -105,7 +106,7 @@ def _ours_in_a_row(problems: Problems, width: str) -> Candidate:
 
         def run() -> Floats:
             engine.set_options(options)
-            return engine.bare_solves(many)
+            return bare_solves(engine, many)
 
         return run
 

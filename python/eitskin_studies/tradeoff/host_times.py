@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from eitskin.core.engine import CoreEngine
 from eitskin.tuning.configuration import Configuration
+from eitskin_studies.harness.bare_core import bare_calls
 from eitskin_studies.harness.sessions import Measured, Progress
 from eitskin_studies.tradeoff.engines import Built
 
@@ -41,7 +42,7 @@ def host_times(
                 frames_v = measured.frames_v[(k * count) // SCENES]
                 for frame_v in frames_v[:-1]:
                     engine.reconstruct(frame_v)
-                solve, touches = engine.bare_calls(frames_v[-1])
+                solve, touches = bare_calls(engine, frames_v[-1])
                 start = perf_counter_ns()
                 solve()
                 touches()

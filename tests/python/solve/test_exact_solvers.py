@@ -13,6 +13,7 @@ from eitskin.core.results import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.benchmarks.solve_problems import Problems, bench_options, make_problems
+from eitskin_studies.harness.bare_core import bare_solve
 from small_models import prebuilt, session, small_blob, small_model
 
 
@@ -29,7 +30,7 @@ def solved(problems: Problems, width: str, **options: object) -> list[tuple[np.n
         engine.set_options(
             bench_options(problems.model, lambda_abs=float(problems.lam[k]), **options)
         )
-        engine.bare_solve(problems.y[k])()
+        bare_solve(engine, problems.y[k])()
         found.append((engine.coefficients(), engine.last_info().stop))
     return found
 
@@ -82,7 +83,7 @@ def test_more_macs_give_a_lower_objective(problems: Problems, solver: str) -> No
                     mac_limit=limit,
                 )
             )
-            engine.bare_solve(problems.y[k])()
+            bare_solve(engine, problems.y[k])()
             info = engine.last_info()
             assert info.macs <= limit
             values.append(problems.suboptimality(k, engine.coefficients()))
