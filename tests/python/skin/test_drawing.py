@@ -59,6 +59,11 @@ def described(
     return load_skin(path)[0]
 
 
+def assert_centres(skin: Skin, wanted: list[tuple[float, float]]) -> None:
+    """Where the electrodes are, mm."""
+    np.testing.assert_allclose(skin.electrode_centres_mm(), wanted, atol=1e-4)
+
+
 def test_y_goes_up_from_the_lower_edge_of_the_page(tmp_path: Path) -> None:
     assert outline(svg(tmp_path, BOX)).bounding_box_mm == pytest.approx((10, 30, 70, 70), abs=1e-4)
     shifted = 'width="50mm" height="40mm" viewBox="10 20 100 80"'
@@ -140,14 +145,10 @@ def test_marks_are_numbered_by_their_ids(tmp_path: Path) -> None:
     """Left, top, right, bottom as drawn; the ids say where 0 is and which way round, and 10 comes
     after 9."""
     skin = described(tmp_path, BOX + MARKS.format(2, 9, 10, 11), electrodes='marked = "electrode"')
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm(), [(10, 50), (40, 70), (70, 50), (40, 30)], atol=1e-4
-    )
+    assert_centres(skin, [(10, 50), (40, 70), (70, 50), (40, 30)])
     assert skin.electrodes.clockwise and skin.electrodes.count == 4
     skin = described(tmp_path, BOX + MARKS.format(3, 2, 1, 0), electrodes='marked = "electrode"')
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm(), [(40, 30), (70, 50), (40, 70), (10, 50)], atol=1e-4
-    )
+    assert_centres(skin, [(40, 30), (70, 50), (40, 70), (10, 50)])
     assert not skin.electrodes.clockwise
     assert skin_from_table(skin_to_table(skin), "again") == skin
 
@@ -157,24 +158,18 @@ def test_marks_without_numbers_lie_along_the_rim(tmp_path: Path) -> None:
     skin = described(
         tmp_path, body, electrodes='marked = "e"\nstart_angle_deg = 0\ndirection = "clockwise"'
     )
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm(), [(70, 50), (40, 30), (10, 50), (40, 70)], atol=1e-4
-    )
+    assert_centres(skin, [(70, 50), (40, 30), (10, 50), (40, 70)])
 
 
 def test_points_and_fractions(tmp_path: Path) -> None:
     skin = described(
         tmp_path, BOX, electrodes="points_mm = [[40, 72], [8, 50], [40, 29], [70, 50]]"
     )
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm(), [(40, 70), (10, 50), (40, 30), (70, 50)], atol=1e-4
-    )
+    assert_centres(skin, [(40, 70), (10, 50), (40, 30), (70, 50)])
     skin = described(
         tmp_path, BOX, electrodes="fractions = [0.0, 0.25, 0.5, 0.75]\nstart_angle_deg = 90"
     )
-    np.testing.assert_allclose(
-        skin.electrode_centres_mm(), [(40, 70), (10, 50), (40, 30), (70, 50)], atol=1e-4
-    )
+    assert_centres(skin, [(40, 70), (10, 50), (40, 30), (70, 50)])
     path = tmp_path / "disk.toml"
     path.write_text(
         "[skin]\ndiameter_mm = 100\n[electrodes]\npoints_mm = [[0, 52], [-50, 0], [0, -50], [49,"
