@@ -1,5 +1,10 @@
-/* eitskin: many frames that have nothing to do with each other, in one call: for hosts, where a
- * thread has its own context. */
+/* eitskin: many frames that have nothing to do with each other, in one call.
+ *
+ * For hosts that solve recorded or simulated frames: one call from Python for thousands of frames
+ * costs nothing in between, and threads share the work where each has a context of its own on the
+ * same model. Each frame starts cold, so that its result does not depend on the others, nor on how
+ * they are divided among threads. A stream, where touches are followed, calls eits_reconstruct and
+ * eits_find_touches instead. */
 #ifndef EITSKIN_BATCH_H
 #define EITSKIN_BATCH_H
 

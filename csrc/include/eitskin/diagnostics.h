@@ -28,11 +28,11 @@ typedef enum eits_diagnostic {
     EITS_DIAGNOSTIC_BRIDGED = 4,
     /* single rows that nothing else bears out: left out; info.outliers counts them */
     EITS_DIAGNOSTIC_OUTLIER = 8,
-    /* info.noisy_electrodes: too many outliers fraction them; all rows that use them are left out
-     */
+    /* info.noisy_electrodes: too many outliers have them in common; all rows that use them are
+     * left out */
     EITS_DIAGNOSTIC_ELECTRODE_NOISY = 16,
-    /* nothing in the range of the model's gives such data; info.model_mismatch says how much of
-       them. Imaged as is */
+    /* no change of conductivity gives such data by this model; info.model_mismatch says how much
+     * of them is out of its range. Imaged as is */
     EITS_DIAGNOSTIC_MODEL_MISMATCH = 32,
     /* the change goes the way touches cannot: tare again. Imaged as is */
     EITS_DIAGNOSTIC_STALE_REFERENCE = 64,

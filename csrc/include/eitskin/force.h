@@ -1,4 +1,11 @@
-/* eitskin: how hard a touch presses, on a skin that was calibrated with known weights. */
+/* eitskin: how hard a touch presses, on a skin that was calibrated with known weights.
+ *
+ * A press changes the conductivity more the harder it is, but not in proportion: the gel saturates.
+ * And the same press gives another strength at another place. Calibration
+ * (docs/guide/calibration.md) fits both: a gain, a polynomial in the place, that makes strengths
+ * comparable; and a table from strength to newtons. eits_find_touches fills in eits_touch.force_n
+ * by this function.
+ */
 #ifndef EITSKIN_FORCE_H
 #define EITSKIN_FORCE_H
 

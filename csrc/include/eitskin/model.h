@@ -1,8 +1,18 @@
 /* eitskin: a view of an .eitm model, read in place (docs/reference/eitm-format.md specifies the
  * bytes).
  *
+ * A model is everything that is known of a skin before the first frame: its protocol, the reduced
+ * sensitivity S of its pixels, the matrix P that brings data into the same space, the pixels'
+ * places, the fields for what touches do to each other, defaults, and one golden frame to test the
+ * core with. It is made offline from a description of the skin (`eitskin model build`).
+ *
  * Nothing is copied: the view points into the blob, which must stay where it is, unchanged, as long
- * as the view is used.
+ * as the view is used. Many contexts and threads may share one model. eits_model_open checks the
+ * CRC, every length, index and number once, so that nothing has to be checked later; it reads the
+ * whole blob, 0.3 MB as shipped. Sections that this version does not know are skipped.
+ *
+ * Names as in the format's page: m rows of the protocol, of which n_folded folds are left once
+ * reciprocal rows are averaged; rank r; n pixels. P is r x n_folded, S is r x n.
  */
 #ifndef EITSKIN_MODEL_H
 #define EITSKIN_MODEL_H
@@ -168,11 +178,14 @@ typedef struct eits_model {
     uint32_t meta_size;
 } eits_model;
 
-/* Check `blob` wholly and fill `model` with pointers into it.
+/* Check `blob` wholly and fill `model` with pointers into it. `blob` must start at a multiple of 16
+ * bytes (EITS_MODEL_ALIGNMENT); `size` may be larger than the model, as a flash bank is.
  * Errors: EITS_E_ARGUMENT, EITS_E_MODEL_*; `model` is untouched then. */
 eits_status eits_model_open(eits_model *model, const void *blob, size_t size);
 
-/* FNV-1a, 64 bits, over n_electrodes and n_rows as little-endian u16 and the table's bytes. */
+/* What names a protocol: the firmware compares it with that of the table it scans, so that a model
+ * is never fed with another order of rows. FNV-1a, 64 bits, over n_electrodes and n_rows as
+ * little-endian u16 and the table's bytes. */
 uint64_t eits_protocol_hash(uint32_t n_electrodes, uint32_t n_rows, const uint8_t *table);
 
 /* CRC-32 (reflected 0xEDB88320, as in zlib) of `size` bytes, continuing from `crc` (0 to start). */

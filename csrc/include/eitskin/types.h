@@ -1,5 +1,9 @@
 /* eitskin: scalar width, status codes, version.
  *
+ * eits_real is the scalar of every frame, image and touch. A program is built for one width: link
+ * the library of that width, and define EITS_DOUBLE for the wide one (CMake and pkg-config do).
+ * eits_real_size tells a binding which one it got.
+ *
  * The same sources build twice on a host: with `float` (what a microcontroller runs) and, with
  * EITS_DOUBLE defined, with `double`, so that the narrow width is always judged against the wide
  * one of the same code.
