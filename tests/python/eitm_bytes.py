@@ -48,7 +48,7 @@ def sealed(
     count: int | None = None,
     rehash: bool = False,
 ) -> bytes:
-    """``blob`` with its checksum mended, and its size, number of sections and protocol hash where
+    """``blob`` with its checksum repaired, and its size, number of sections and protocol hash where
     wanted."""
     out = bytearray(blob)
     if total is not None:

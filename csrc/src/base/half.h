@@ -14,7 +14,7 @@ static inline float eits_half_to_float(uint16_t half)
     __asm__("vmov %0, %1\n\tvcvtb.f32.f16 %0, %0" : "=t"(value) : "r"((uint32_t)half));
     return value;
 #else
-    /* the exponent and fraction as float bits, 112 too low in the exponent, mended by an exact
+    /* the exponent and fraction as float bits, 112 too low in the exponent, corrected by an exact
      * multiplication by 2^112 */
     const uint32_t bits = (uint32_t)(half & 0x7FFFu) << 13;
     const uint32_t sign = (uint32_t)(half & 0x8000u) << 16;

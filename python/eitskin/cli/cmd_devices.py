@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.cli.arguments import option
 
 if TYPE_CHECKING:
-    from eitskin.device.census import FoundPort
+    from eitskin.device.discovery import FoundPort
 
 URLS = {
     "auto": "the one board that is plugged in",
@@ -39,9 +39,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """List, ask, print."""
-    from eitskin.device.census import census
+    from eitskin.device.discovery import discover
 
-    found = census(ask=not options.quiet)
+    found = discover(ask=not options.quiet)
     if options.json:
         print(json.dumps({"ports": [port.as_dict() for port in found], "urls": URLS}, indent=2))
         return 0

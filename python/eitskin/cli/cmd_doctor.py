@@ -33,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             " sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains,"
             " noise and drift. Takes a frames file, any source that import reads, or with --device"
             " a board whose skin is not touched, and then also says which faults the board itself"
-            " reports. Exit code 0: nothing must be mended; 11: something must."
+            " reports. Exit code 0: nothing must be repaired; 11: something must."
         ),
     )
     option(parser, "source", "frames file, or CSV, NPZ, MAT as for import", Path, nargs="?")

@@ -22,7 +22,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             " needs."
         ),
     )
-    option(parser, "source", "CSV or other text table, NPZ, MAT, or a frames file to mend", Path)
+    option(parser, "source", "CSV or other text table, NPZ, MAT, or a frames file to repair", Path)
     option(parser, "-o --output OUT.npz", "frames file to write", Path, required=True)
     option(parser, "--json", "say what was written as JSON")
     add_import_options(parser)
@@ -30,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, mend, write."""
+    """Read, repair, write."""
     from eitskin.frames.frames import save_frames
     from eitskin.frames.importer import import_frames
 

@@ -117,16 +117,16 @@ def _count(
 ) -> None:
     from tqdm import tqdm
 
+    from eitskin.device.events import Events
     from eitskin.device.live import LiveFrame
-    from eitskin.device.news import News
     from eitskin.device.wire.packets import Fault
 
-    news = News()
+    events = Events()
     with tqdm(
         desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()
     ) as bar:
         for item in items:
-            for text in news.lines(item):
+            for text in events.lines(item):
                 bar.write(f"eitskin: {text}", file=sys.stderr)
             if isinstance(item, LiveFrame):
                 summary.add(item)

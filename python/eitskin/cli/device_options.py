@@ -338,8 +338,8 @@ def prepare(
     Raises:
         EitskinError: a setting cannot be, the board refuses it, or the recording cannot be written.
     """
+    from eitskin.device.events import Events
     from eitskin.device.live import begin_scene, set_up, take_reference
-    from eitskin.device.news import News
     from eitskin.device.recordings.recording import Recorder
 
     if device.transport.replays:
@@ -368,9 +368,9 @@ def prepare(
         began_us, meanwhile = begin_scene(device)
         if truth is not None and began_us is not None:
             truth.begin(began_us)
-        news = News()
+        events = Events()
         for item in meanwhile:
-            for text in news.lines(item):
+            for text in events.lines(item):
                 say(text)
     except BaseException:
         if recorder is not None:

@@ -22,7 +22,7 @@ def add_import_options(parser: argparse.ArgumentParser) -> None:
     """Add all of them to ``parser``; defaults change nothing."""
     _add_protocol(parser.add_argument_group("protocol: the order of the result"))
     _add_place(parser.add_argument_group("where the frames are in the source"))
-    _add_mending(parser.add_argument_group("what differs in the source, and what to mend"))
+    _add_repairs(parser.add_argument_group("what differs in the source, and what to repair"))
     _add_truth(parser.add_argument_group("truth that an NPZ or MAT source brings along"))
 
 
@@ -175,7 +175,7 @@ def _add_place(group: Any) -> None:
     option(group, "--header-rows N", "rows before the numbers; else found", int)
 
 
-def _add_mending(group: Any) -> None:
+def _add_repairs(group: Any) -> None:
     option(group, "--order", "how the source lists its channels", choices=ORDERS, default="fixed")
     option(group, "--table-file FILE", "text table of the source's rows: I+, I-, V+, V-")
     option(group, "--protocol-table KEY", "NPZ, MAT: array with that table")

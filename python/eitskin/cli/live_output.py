@@ -54,17 +54,17 @@ def show(
     Raises:
         EitskinError: what ended the stream, after everything up to then was summed up.
     """
+    from eitskin.device.events import Events
     from eitskin.device.live import LiveFrame, LiveSummary, finish
-    from eitskin.device.news import News
     from eitskin.device.wire.packets import Fault
     from eitskin.scoring.stream_check import Watcher, line, table
     from eitskin.view.stream_picture import Album, draw_stream
 
-    summary, watcher, album, news = LiveSummary(), Watcher(known, truth), Album(), News()
+    summary, watcher, album, events = LiveSummary(), Watcher(known, truth), Album(), Events()
     broken: EitskinError | None = None
     try:
         for item in items:
-            for text in news.lines(item):
+            for text in events.lines(item):
                 print(f"eitskin: {text}", file=sys.stderr, flush=True)
             if isinstance(item, LiveFrame):
                 summary.add(item)

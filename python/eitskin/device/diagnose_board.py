@@ -86,7 +86,7 @@ def board_subject(
 
 def board_findings(report: Report, measured: Measured) -> Report:
     """``report`` with what the board itself says. Remedies of ``eitskin import`` are taken out: a
-    board is mended by hand."""
+    board is repaired by hand."""
     raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]
     told = {
         (fault.code, fault.index if fault.code in ELECTRODE_FAULTS else 0): fault
@@ -109,11 +109,11 @@ def board_findings(report: Report, measured: Measured) -> Report:
         count = measured.stats.slots_repeated
         text = f"{count} measurements were repeated because the multiplexers were switched too late"
         own.append(Finding("board-slots", NOTE, text, {"slots_repeated": count}))
-    findings = tuple(replace(finding, mend="") for finding in (*report.findings, *own))
+    findings = tuple(replace(finding, repair="") for finding in (*report.findings, *own))
     counted: dict[str, object] = (
         {} if measured.stats is None else {"board_frames_scanned": measured.stats.frames_scanned}
     )
-    return replace(report, findings=findings, mend="", measured={**report.measured, **counted})
+    return replace(report, findings=findings, repair="", measured={**report.measured, **counted})
 
 
 def _severity(code: int) -> str:

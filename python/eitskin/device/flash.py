@@ -126,7 +126,7 @@ def run_flash(plan: FlashPlan, echo: Callable[[str], None] | None = None) -> Non
 
     Raises:
         DeviceError: a command fails; the firmware may then be half written, and flashing again
-            mends it.
+            repairs it.
     """
     for command, line in zip(plan.commands, plan.lines(), strict=True):
         if echo is not None:

@@ -184,7 +184,7 @@ def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
     under way end, which still shows the untouched skin. Returns the emulated board's clock at the
     scene's time 0 (None: it is when the next scan begins), and news that came meanwhile.
     """
-    transport, news = device.transport, []
+    transport, events = device.transport, []
     device.start_scene()
     if not transport.url.startswith("emu:"):
         return None, []
@@ -195,8 +195,8 @@ def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
         item := device.next_item(1.1e-6 * max(info.frame_us, info.n_rows * info.slot_us))
     ) is not None:
         if isinstance(item, Fault | LinkEvent):
-            news.append(item)
-    return began, news
+            events.append(item)
+    return began, events
 
 
 def follow(

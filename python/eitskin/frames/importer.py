@@ -19,8 +19,8 @@ from eitskin import __version__
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.frames.frames import Frames, load_frames
 from eitskin.frames.homogeneous import homogeneous
-from eitskin.frames.mend import equalising_gains, flipped, imputed, kept_channels, signed
 from eitskin.frames.orders import electrode_map, match_rows, relabel, source_table, swap_map
+from eitskin.frames.repair import equalising_gains, flipped, imputed, kept_channels, signed
 from eitskin.frames.source import (
     RawFrames,
     SourceOptions,
@@ -42,7 +42,7 @@ ASSUMED_QUIET = "no quiet frames were named; the first frame is taken for one"
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """How to mend a source; the defaults change nothing.
+    """How to repair a source; the defaults change nothing.
 
     ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns). ``keep_table``: keep
     the source's own table. ``sign``: "reversed" negates, "magnitude" takes each channel's sign from
@@ -82,12 +82,12 @@ def import_frames(
     *,
     lenient: bool = False,
 ) -> Frames:
-    """Read ``path`` and mend it as ``options`` say.
+    """Read ``path`` and repair it as ``options`` say.
 
     ``protocol`` is the wanted order (None, or ``keep_table``: the source's own table is kept, with
     ``n_electrodes``); ``skin`` gives numbering direction and prediction where known. An eitskin
-    frames file may be mended again. ``lenient`` is for examination: NaN and Inf pass, and where no
-    quiet frames are named the first frame is taken.
+    frames file may be repaired again. ``lenient`` is for examination: NaN and Inf pass, and where
+    no quiet frames are named the first frame is taken.
 
     Raises:
         EitskinError: each of its kinds, for what cannot be read or does not fit.

@@ -132,7 +132,7 @@ def refuse_nonfinite(raw: RawFrames, where: str) -> None:
             frame, row = (int(k) for k in bad[0])
             raise FrameError(
                 f"{where}: {what}: frame {frame}, row {row} (from 0) is {values[frame, row]}"
-                f" ({len(bad)} such values); mend the source, or leave those frames out"
+                f" ({len(bad)} such values); repair the source, or leave those frames out"
             )
 
 

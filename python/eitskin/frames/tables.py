@@ -49,7 +49,7 @@ class TextTable:
                 if value is None:
                     found = f"{cells[column]!r} is not a number" if cells[column] else "is empty"
                     raise FrameError(
-                        f"{self.path}: line {line}, column {column} (from 0): {found}; mend the"
+                        f"{self.path}: line {line}, column {column} (from 0): {found}; repair the"
                         " cell"
                     )
                 row.append(value)
@@ -103,7 +103,7 @@ def read_table(
         if len(cells) != width:
             raise FrameError(
                 f"{path}: line {number} has {len(cells)} cells, line {body[0][0]} has {width};"
-                " mend it"
+                " repair it"
             )
     header = rows[skip - 1][1] if skip and len(rows[skip - 1][1]) == width else ()
     return TextTable(

@@ -59,7 +59,7 @@ def _value(value: Any, hint: Any, metadata: Mapping[str, Any], what: str) -> Any
     if hint in (int, float):
         return _number(value, hint, metadata, what)
     raise ConfigError(
-        f"{what}: the effect declares a type that scenes do not know ({hint}); mend the effect"
+        f"{what}: the effect declares a type that scenes do not know ({hint}); repair the effect"
     )
 
 

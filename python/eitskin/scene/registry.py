@@ -97,7 +97,7 @@ def _check_contract(module: object, name: str, where: str) -> None:
             )
     if name != module.NAME or not isinstance(module.STAGE, Stage):  # type: ignore[attr-defined]
         raise ConfigError(
-            f"{where}: its module's NAME must be {name!r} and its STAGE a Stage; mend the module"
+            f"{where}: its module's NAME must be {name!r} and its STAGE a Stage; repair the module"
         )
 
 

@@ -131,7 +131,7 @@ def make_steps(
     def build_mesh() -> Mesh:
         if in_geometry:
             raise ConfigError(
-                "an effect of the geometry comes before the mesh and cannot ask for it; mend the"
+                "an effect of the geometry comes before the mesh and cannot ask for it; repair the"
                 " effect"
             )
         return desk.mesh(skin, scene.elements)
@@ -162,7 +162,7 @@ def make_steps(
             raise type(error)(f"{scene.where} [effects.{name}]: {error}") from None
         if step.stage is not module.STAGE or step.name != name:
             raise ConfigError(
-                f"{scene.where} [effects.{name}]: its step has another name or stage; mend the"
+                f"{scene.where} [effects.{name}]: its step has another name or stage; repair the"
                 " effect"
             )
         steps.append(step)

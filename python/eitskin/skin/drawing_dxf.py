@@ -36,7 +36,7 @@ def read_dxf(content: bytes, where: str, reading: Reading) -> list[Shape]:
     """
     talk = logging.getLogger("ezdxf")
     before = talk.level
-    talk.setLevel(logging.CRITICAL)  # what it mends in a file is no news to the user
+    talk.setLevel(logging.CRITICAL)  # what it repairs in a file is no news to the user
     try:
         document, _ = ezdxf.recover.read(io.BytesIO(content))
         scale = reading.scale_mm or _scale_of(document, where)

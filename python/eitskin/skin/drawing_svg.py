@@ -84,7 +84,7 @@ def _page(root: ET.Element, where: str, reading: Reading) -> Page:
     ):
         raise ConfigError(
             f"{where}: viewBox = {root.get('viewBox')!r} is not four numbers, width and height"
-            " above 0; mend it"
+            " above 0; repair it"
         )
     sizes = [_length_mm(root.get(key)) for key in ("width", "height")]
     scale = reading.scale_mm

@@ -191,7 +191,7 @@ def polygon(vertices: Iterable[Sequence[float]]) -> Outline:
     if not np.isfinite(corners).all():
         bad = int(np.flatnonzero(~np.isfinite(corners).all(axis=1))[0])
         raise GeometryError(
-            f"outline: point {bad} (from 0) is {points[bad]}, not finite; mend its coordinates"
+            f"outline: point {bad} (from 0) is {points[bad]}, not finite; repair its coordinates"
         )
     size = np.ptp(corners, axis=0)
     if size.min() < MIN_SIZE_MM or size.max() > MAX_SIZE_MM:

@@ -114,7 +114,7 @@ def test_a_raw_export_in_another_order_and_polarity(
     """The rod before electrode 0 (12 o'clock) at 0.58 of the radius is the strongest touch, and it
     conducts."""
     source, output = str(shared_data / "tank_metal_e1.csv"), str(folder / "e1.npz")
-    mend = [
+    repair = [
         "--columns",
         "2",
         "--reference-columns",
@@ -124,7 +124,7 @@ def test_a_raw_export_in_another_order_and_polarity(
         "--sign",
         "reversed",
     ]
-    assert main(["import", source, "-o", output, "--skin", str(SKIN), *mend]) == 0
+    assert main(["import", source, "-o", output, "--skin", str(SKIN), *repair]) == 0
     touches = reconstructed(folder, "e1.npz", capsys, "--sign", "both")["frames"][0]["touches"]
     rod = touches[0]
     assert rod["strength_s_per_m_mm2"] > 0

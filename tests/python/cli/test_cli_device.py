@@ -429,7 +429,7 @@ def test_doctor_on_a_board_that_reports_a_fault(
     diagnostics = strict(capsys.readouterr().out)["diagnostics"]
     assert [diagnostic["name"] for diagnostic in diagnostics] == [
         "board-electrode-open"
-    ] and diagnostics[0]["mend"] == ""
+    ] and diagnostics[0]["repair"] == ""
 
 
 # ---- start-up ----

@@ -15,9 +15,9 @@ from device_helpers import QUIET, Damaging, empty_bank, same, scene, sim_device
 from eitskin.core.diagnostics import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
+from eitskin.device.events import Events
 from eitskin.device.known_model import board_options
 from eitskin.device.live import LiveFrame, follow, take_reference
-from eitskin.device.news import News
 from eitskin.device.open import open_device
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
@@ -199,45 +199,49 @@ def bits(*names: str) -> int:
 
 
 def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
-    news = News()
+    events = Events()
     outlier = {"diagnostics": bits("outlier"), "outliers": 1}
-    assert news.lines(solved(1)) == []
-    assert news.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
-    assert news.lines(solved(3, **outlier)) == []
-    assert [news.lines(solved(4 + k)) for k in range(CLEAR_FRAMES - 1)] == [[]] * (CLEAR_FRAMES - 1)
-    assert news.lines(solved(20, **outlier)) == []  # it came back in time
-    said = [news.lines(solved(21 + k)) for k in range(CLEAR_FRAMES)]
+    assert events.lines(solved(1)) == []
+    assert events.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
+    assert events.lines(solved(3, **outlier)) == []
+    assert [events.lines(solved(4 + k)) for k in range(CLEAR_FRAMES - 1)] == [[]] * (
+        CLEAR_FRAMES - 1
+    )
+    assert events.lines(solved(20, **outlier)) == []  # it came back in time
+    said = [events.lines(solved(21 + k)) for k in range(CLEAR_FRAMES)]
     assert said == [[]] * (CLEAR_FRAMES - 1) + [[f"outlier: over, frame {20 + CLEAR_FRAMES}"]]
 
 
 def test_what_fault_and_head_tell_is_said_once() -> None:
-    news, off = News(), {"diagnostics": bits("electrode open"), "open_electrodes": (5,)}
+    events, off = Events(), {"diagnostics": bits("electrode open"), "open_electrodes": (5,)}
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
-    assert news.lines(rise) == [
+    assert events.lines(rise) == [
         "electrode 5 open, frame 41: it makes no contact; wet or press it, then tare"
     ]
-    assert news.lines(solved(41, **off)) == []
+    assert events.lines(solved(41, **off)) == []
     also = {"diagnostics": bits("electrode open"), "open_electrodes": (5, 9)}
-    assert news.lines(solved(42, **also)) == ["electrode 9 open, frame 42"]  # its fault was lost
-    assert news.lines(replace(rise, frame=42, index=9)) == []
-    assert news.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == [
+    assert events.lines(solved(42, **also)) == ["electrode 9 open, frame 42"]  # its fault was lost
+    assert events.lines(replace(rise, frame=42, index=9)) == []
+    assert events.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == [
         "electrode 5 open: over, frame 53"
     ]
-    assert news.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == []
+    assert events.lines(Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)) == []
 
 
 def test_a_bridged_pair_is_said_once() -> None:
-    news = News()
+    events = Events()
     text = (
         "electrodes 6 and 7 bridged, frame 3: water, paste or a wire joins them; dry or part them"
     )
-    assert news.lines(Fault(FaultCode.BRIDGED, True, 3, 6, 7, (0xC0, 0, 0, 0, 0))) == [text]
-    assert news.lines(Fault(FaultCode.BRIDGED, True, 3, 7, 6, (0xC0, 0, 0, 0, 0))) == []
+    assert events.lines(Fault(FaultCode.BRIDGED, True, 3, 6, 7, (0xC0, 0, 0, 0, 0))) == [text]
+    assert events.lines(Fault(FaultCode.BRIDGED, True, 3, 7, 6, (0xC0, 0, 0, 0, 0))) == []
     assert (
-        news.lines(solved(3, diagnostics=bits("electrodes bridged"), bridged_electrodes=(6, 7)))
+        events.lines(solved(3, diagnostics=bits("electrodes bridged"), bridged_electrodes=(6, 7)))
         == []
     )
-    over = [line for e in (6, 7) for line in news.lines(Fault(FaultCode.BRIDGED, False, 11, e, 0))]
+    over = [
+        line for e in (6, 7) for line in events.lines(Fault(FaultCode.BRIDGED, False, 11, e, 0))
+    ]
     assert over == ["electrode 6 bridged: over, frame 11", "electrode 7 bridged: over, frame 11"]
 
 
@@ -256,9 +260,12 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:
-    news, model_mismatch = News(), {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125}
+    events, model_mismatch = (
+        Events(),
+        {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125},
+    )
     told = [
-        news.lines(solved(frame, **(model_mismatch if frame in (2, 3, 7, 8, 9, 10) else {})))
+        events.lines(solved(frame, **(model_mismatch if frame in (2, 3, 7, 8, 9, 10) else {})))
         for frame in range(1, 12)
     ]
     assert told == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]

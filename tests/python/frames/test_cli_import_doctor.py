@@ -88,12 +88,12 @@ FAULTS: dict[str, Callable[[], Frames]] = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_advice_mends(tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str) -> None:
-    path, mended = write(tmp_path / "s.npz", FAULTS[fault]()), tmp_path / "mended.npz"
+    path, repaired = write(tmp_path / "s.npz", FAULTS[fault]()), tmp_path / "repaired.npz"
     assert run("doctor", path, *NPZ, *ADJACENT, "--json") == 11
-    advice = json.loads(capsys.readouterr().out)["mend"].split()
+    advice = json.loads(capsys.readouterr().out)["repair"].split()
     assert advice
-    assert run("import", path, "-o", mended, *NPZ, *ADJACENT, *advice) == 0
-    assert run("doctor", mended, "--json") == 0, capsys.readouterr().out
+    assert run("import", path, "-o", repaired, *NPZ, *ADJACENT, *advice) == 0
+    assert run("doctor", repaired, "--json") == 0, capsys.readouterr().out
 
 
 def test_numbering_is_advised_by_known_touches_and_mends(
@@ -101,21 +101,24 @@ def test_numbering_is_advised_by_known_touches_and_mends(
 ) -> None:
     (tmp_path / "skin.toml").write_text(SKIN)
     turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
-    path, mended = write(tmp_path / "s.npz", one_off(turned, [40], 1.5)), tmp_path / "mended.npz"
+    path, repaired = (
+        write(tmp_path / "s.npz", one_off(turned, [40], 1.5)),
+        tmp_path / "repaired.npz",
+    )
     touch = (
         "--skin", tmp_path / "skin.toml", "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in",
         "0",
     )  # fmt: skip
     assert run("doctor", path, *NPZ, *touch, "--json") == 11
     report = json.loads(capsys.readouterr().out)
-    assert report["mend"] == "--rotate 5 --mirror"
+    assert report["repair"] == "--rotate 5 --mirror"
     assert any("renumber by import first" in text for text in report["untold"])
-    assert run("import", path, "-o", mended, *NPZ, *touch[:2], *report["mend"].split()) == 0
+    assert run("import", path, "-o", repaired, *NPZ, *touch[:2], *report["repair"].split()) == 0
     capsys.readouterr()
-    assert run("doctor", mended, *touch, "--json") == 11
+    assert run("doctor", repaired, *touch, "--json") == 11
     again = json.loads(capsys.readouterr().out)
     assert [finding["name"] for finding in again["findings"]] == ["channel-gain"]
-    assert run("import", mended, "-o", tmp_path / "m2.npz", *again["mend"].split()) == 0
+    assert run("import", repaired, "-o", tmp_path / "m2.npz", *again["repair"].split()) == 0
     assert run("doctor", tmp_path / "m2.npz", *touch) == 0
 
 
@@ -143,10 +146,10 @@ def test_the_doctor_examines_frames_files_and_prints_evidence(
     text = capsys.readouterr().out
     assert "FAULT order" in text
     assert "rotating 0.9" in text
-    assert "mend: eitskin import ... --order rotating" in text
+    assert "repair: eitskin import ... --order rotating" in text
     save_frames(path, quiet_only(healthy_frames(15, opposite(16))))
     assert run("doctor", path) == 0
-    assert "0 faults, 0 notes: nothing must be mended" in capsys.readouterr().out
+    assert "0 faults, 0 notes: nothing must be repaired" in capsys.readouterr().out
 
 
 def test_sources_with_all_pairs_are_recognised_by_their_number(
@@ -163,7 +166,7 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(
     assert run("doctor", *words, "--json") == 11
     report = json.loads(capsys.readouterr().out)
     assert [finding["name"] for finding in report["findings"]] == ["order"]
-    assert report["mend"] == "--order rotating-all"
+    assert report["repair"] == "--order rotating-all"
 
 
 def test_the_picture_is_drawn(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_rotating_order_is_recognised(protocol: Protocol) -> None:
     skin = skin_for(protocol)
     index = match_rows(protocol.drive_measure, source_table("rotating", protocol)).index
     finding = only(permuted(healthy_frames(3, protocol, skin), index), "order", skin=skin)
-    assert finding.mend == "--order rotating"
+    assert finding.repair == "--order rotating"
     reached = finding.evidence["correlation"]
     assert reached["rotating"] > 0.99 and reached["as given"] < 0.5
 
@@ -126,7 +126,7 @@ def test_reversed_polarity_is_recognised(protocol: Protocol) -> None:
         :, 2:
     ].tolist() and (len(set(np.sign(frames.reference_v))) == 1)
     finding = only(frames, "reversed-or-magnitude" if one_sign else "reversed", skin=skin)
-    assert finding.mend == "--sign reversed"
+    assert finding.repair == "--sign reversed"
 
 
 def test_reversed_polarity_is_certain_once_a_channel_crosses_zero() -> None:
@@ -134,7 +134,7 @@ def test_reversed_polarity_is_certain_once_a_channel_crosses_zero() -> None:
     voltage = -frames.voltage_v.copy()
     voltage[0, 6] = -0.2 * rms(frames)
     assert (
-        only(quiet_only(changed(frames, -frames.reference_voltage_v, voltage)), "reversed").mend
+        only(quiet_only(changed(frames, -frames.reference_voltage_v, voltage)), "reversed").repair
         == "--sign reversed"
     )
 
@@ -143,7 +143,7 @@ def test_reversed_polarity_is_certain_once_a_channel_crosses_zero() -> None:
 def test_magnitudes_are_recognised_where_signs_differ(protocol: Protocol) -> None:
     frames = healthy_frames(5, protocol)
     magnitudes = changed(frames, np.abs(frames.reference_voltage_v), np.abs(frames.voltage_v))
-    assert only(magnitudes, "magnitude").mend == "--sign magnitude"
+    assert only(magnitudes, "magnitude").repair == "--sign magnitude"
 
 
 def test_magnitudes_of_adjacent_patterns_cannot_be_told_from_reversed() -> None:
@@ -160,7 +160,7 @@ def test_magnitudes_of_adjacent_patterns_cannot_be_told_from_reversed() -> None:
 def test_numbering_is_told_by_two_known_touches(rotate: int, mirror: bool, option: str) -> None:
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, rotate, mirror), seed=6)
     finding = only(frames, "numbering")
-    assert finding.mend == option
+    assert finding.repair == option
     assert finding.evidence[option] > 0.98 > finding.evidence["as given"] + 0.05
 
 
@@ -199,14 +199,14 @@ def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame() -> None:
                 8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=transfer[np.ix_(moved, moved)]
             )
         )
-        assert only(turned, "numbering", skin=skin).mend == option
+        assert only(turned, "numbering", skin=skin).repair == option
 
 
 def test_every_pair_of_exchanged_wires_is_named() -> None:
     frames = healthy_frames(9)
     for i, j in combinations(range(16), 2):
         exchanged = as_if_electrodes(frames, swap_map(16, [(i, j)]), seed=16 * i + j)
-        assert only(exchanged, "swapped-electrodes").mend == f"--swap {i},{j}"
+        assert only(exchanged, "swapped-electrodes").repair == f"--swap {i},{j}"
 
 
 def test_two_exchanges_in_rotating_order_and_reversed_are_untangled() -> None:
@@ -218,7 +218,7 @@ def test_two_exchanges_in_rotating_order_and_reversed_are_untangled() -> None:
         ("swapped-electrodes", "fault"),
         ("reversed", "fault"),
     ]
-    assert report.mend == "--order rotating --swap 3,9 --swap 1,14 --sign reversed"
+    assert report.repair == "--order rotating --swap 3,9 --swap 1,14 --sign reversed"
 
 
 @pytest.mark.parametrize(("width_mm", "known"), [(4.0, True), (20.0, True), (1.5, False)])
@@ -230,7 +230,7 @@ def test_joined_electrodes_are_named_whatever_their_width(width_mm: float, known
             continue
         joined = quiet_only(healthy_frames(16 * i + j, transfer_ohm=shorted(transfer, i, j)))
         finding = only(joined, "shorted-electrodes", skin=PAPER if known else None)
-        assert finding.evidence["electrodes"] == [i, j] and finding.mend == ""
+        assert finding.evidence["electrodes"] == [i, j] and finding.repair == ""
 
 
 @pytest.mark.parametrize(("driving", "measuring"), [(True, True), (True, False), (False, True)])
@@ -250,7 +250,7 @@ def test_every_dead_electrode_is_named_with_its_side(driving: bool, measuring: b
             if driving:
                 values[:, drives] = noise[:, drives]
         finding = only(changed(frames, reference, voltage), "dead-electrode")
-        assert finding.mend == f"--drop-electrodes {electrode}"
+        assert finding.repair == f"--drop-electrodes {electrode}"
         assert ("driving" in finding.text, "measuring" in finding.text) == (driving, measuring)
 
 
@@ -281,7 +281,7 @@ def test_a_noisy_channel_a_stuck_one_and_a_noisy_electrode_are_named() -> None:
     reference = frames.reference_voltage_v.copy()
     reference[:, 77] += sigma * rng.normal(size=len(reference))
     finding = only(with_reference(frames, reference), "noisy-channels")
-    assert finding.evidence["channels"] == [77] and finding.mend == "--impute-channels 77"
+    assert finding.evidence["channels"] == [77] and finding.repair == "--impute-channels 77"
     reference = frames.reference_voltage_v.copy()
     reference[:, 13] = reference[0, 13]
     finding = only(with_reference(frames, reference), "stuck")
@@ -291,7 +291,7 @@ def test_a_noisy_channel_a_stuck_one_and_a_noisy_electrode_are_named() -> None:
     reference[:, using] += sigma * rng.normal(size=(len(reference), using.sum()))
     finding = only(with_reference(frames, reference), "noisy-channels")
     assert finding.evidence["channels"] == np.flatnonzero(using).tolist()
-    assert finding.mend == "--drop-electrodes 5"
+    assert finding.repair == "--drop-electrodes 5"
 
 
 @pytest.mark.parametrize(("snr_db", "severity"), [(40.0, "note"), (20.0, "fault")])
@@ -316,7 +316,7 @@ def test_gain_faults_are_told_apart() -> None:
     one = np.ones(208)
     one[40] = 1.4
     finding = only(times(frames, one), "channel-gain")
-    assert finding.evidence["channels"] == [40] and finding.mend == "--impute-channels 40"
+    assert finding.evidence["channels"] == [40] and finding.repair == "--impute-channels 40"
     assert finding.evidence["worst_gain"] == pytest.approx(1.4, rel=0.1)
     for name, columns, gain in (("drive", [0, 1], 0.7), ("measure", [2, 3], 1.3)):
         of_pair = (ROWS[:, columns] == [3, 4]).all(axis=1)
@@ -325,7 +325,7 @@ def test_gain_faults_are_told_apart() -> None:
         assert finding.evidence["gain"] == pytest.approx(gain, rel=0.03)
     report = report_of(times(frames, rng.uniform(0.8, 1.2, 208)))
     assert named(report) == [("gain-spread", "fault"), ("reciprocity", "fault")]
-    assert report.mend == "--equalise"
+    assert report.repair == "--equalise"
     assert named(report_of(healthy_frames(16, gain=0.045))) == [
         ("gain-spread", "note"),
         ("reciprocity", "note"),
@@ -347,7 +347,7 @@ def test_channels_of_the_wrong_sign_are_named() -> None:
     frames = healthy_frames(18)
     some = np.ones(208)
     some[[17, 90]] = -1
-    assert only(times(frames, some), "flipped-channels").mend == "--flip-channels 17,90"
+    assert only(times(frames, some), "flipped-channels").repair == "--flip-channels 17,90"
     of_pair = (ROWS[:, :2] == [3, 4]).all(axis=1)
     finding = only(times(frames, np.where(of_pair, -1.0, 1.0)), "flipped-channels")
     assert "drive [3, 4]" in finding.text
@@ -391,7 +391,7 @@ def test_several_remedies_become_one() -> None:
     reference[:, 50] = reference[0, 50]
     report = report_of(changed(frames, reference, frames.voltage_v * gains))
     assert named(report) == [("stuck", "fault"), ("channel-gain", "fault")]
-    assert report.mend == "--impute-channels 50,100 --drop-channels 0,26"
+    assert report.repair == "--impute-channels 50,100 --drop-channels 0,26"
 
 
 def test_a_round_skin_needs_no_scipy() -> None:

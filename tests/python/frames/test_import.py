@@ -136,12 +136,12 @@ def test_channels_are_flipped_filled_and_left_out(tmp_path: Path) -> None:
         drop_channels=(207,),
         drop_electrodes=(9,),
     )
-    mended = import_frames(path, options, adjacent(16), None)
+    repaired = import_frames(path, options, adjacent(16), None)
     kept = [row for row in range(207) if 9 not in TABLE[row]]
-    assert np.array_equal(mended.protocol.drive_measure, TABLE[kept])
-    assert np.allclose(mended.voltage_v[:, 5], -frames.voltage_v[:, 5])
+    assert np.array_equal(repaired.protocol.drive_measure, TABLE[kept])
+    assert np.allclose(repaired.voltage_v[:, 5], -frames.voltage_v[:, 5])
     assert TABLE[0].tolist() == [0, 1, 2, 3] and TABLE[26].tolist() == [2, 3, 0, 1]
-    assert np.allclose(mended.voltage_v[:, 0], frames.voltage_v[:, 26])
+    assert np.allclose(repaired.voltage_v[:, 0], frames.voltage_v[:, 26])
     for bad, said in (
         ({"impute_channels": (0, 26)}, "no good reciprocal"),
         ({"impute_channels": (208,)}, "--impute-channels 208: out of range; there are 0 to 207"),
@@ -163,17 +163,19 @@ def test_bad_values_pass_only_where_they_are_mended(tmp_path: Path) -> None:
         taken(path)
     with pytest.raises(FrameError, match="frame 0, channel 0 is nan"):
         taken(path, impute_channels=(3,))
-    mended = taken(path, impute_channels=(0,))
-    assert mended.voltage_v[0, 0] == voltage[0, 26]
+    repaired = taken(path, impute_channels=(0,))
+    assert repaired.voltage_v[0, 0] == voltage[0, 26]
 
 
 def test_equalised_gains_follow_the_prediction(tmp_path: Path) -> None:
     frames = healthy_frames(9, gain=0.15)
-    mended = taken(source(tmp_path, frames), equalise=True)
-    gains = mended.reference_v / frames.reference_v
-    assert np.allclose(mended.voltage_v, frames.voltage_v * gains)
-    pairs = mended.protocol.reciprocal_pairs()
-    assert np.allclose(mended.reference_v[pairs.first], mended.reference_v[pairs.second], rtol=1e-9)
+    repaired = taken(source(tmp_path, frames), equalise=True)
+    gains = repaired.reference_v / frames.reference_v
+    assert np.allclose(repaired.voltage_v, frames.voltage_v * gains)
+    pairs = repaired.protocol.reciprocal_pairs()
+    assert np.allclose(
+        repaired.reference_v[pairs.first], repaired.reference_v[pairs.second], rtol=1e-9
+    )
     weak = frames.reference_voltage_v.copy()
     weak[:, 40] *= 0.01
     np.savez(tmp_path / "weak.npz", v=frames.voltage_v, r=weak)
@@ -309,8 +311,8 @@ def test_truth_comes_along_in_millimetres(tmp_path: Path) -> None:
 def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path: Path) -> None:
     frames = healthy_frames(14)
     save_frames(tmp_path / "a.npz", frames)
-    mended = import_frames(tmp_path / "a.npz", ImportOptions(sign="reversed"), None, None)
-    save_frames(tmp_path / "b.npz", mended)
+    repaired = import_frames(tmp_path / "a.npz", ImportOptions(sign="reversed"), None, None)
+    save_frames(tmp_path / "b.npz", repaired)
     back = load_frames(tmp_path / "b.npz")
     assert np.array_equal(back.voltage_v, -frames.voltage_v)
     assert np.array_equal(back.touch_xy_mm, frames.touch_xy_mm)

@@ -1,4 +1,4 @@
-"""Measured tank frames: their order, sign and numbering are recognised, import mends them, and
+"""Measured tank frames: their order, sign and numbering are recognised, import repairs them, and
 truth comes along."""
 
 from __future__ import annotations
@@ -91,16 +91,16 @@ def test_kit4_is_healthy_with_notes_on_what_is_there(kit4: Frames) -> None:
 def test_kit4_numbered_the_other_way_is_noticed(kit4: Frames) -> None:
     wrong = replace(KIT4, electrodes=replace(KIT4.electrodes, clockwise=False))
     report = examine(subject_from_frames(kit4, wrong))
-    assert report.mend == "--mirror" and report.exit_code == 11
+    assert report.repair == "--mirror" and report.exit_code == 11
     turned = replace(KIT4, electrodes=replace(KIT4.electrodes, start_angle_deg=0.0))
-    assert examine(subject_from_frames(kit4, turned)).mend == "--rotate 12"
+    assert examine(subject_from_frames(kit4, turned)).repair == "--rotate 12"
 
 
 @pytest.mark.parametrize("name", TANKS)
 def test_the_rotating_order_of_the_raw_exports_is_recognised(shared_data: Path, name: str) -> None:
     report = examine(subject_from_source(shared_data / name, ImportOptions(), adjacent(16), None))
     assert report.exit_code == 11
-    assert report.mend == "--order rotating --sign reversed"
+    assert report.repair == "--order rotating --sign reversed"
     order = next(finding for finding in report.findings if finding.name == "order")
     assert order.evidence["correlation"]["rotating"] > 0.995
     assert order.evidence["correlation"]["fixed"] < 0.25

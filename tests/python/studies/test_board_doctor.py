@@ -65,7 +65,7 @@ def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board() -> Non
         by_name["board-watchdog"].severity == "note" and "2 packets" in by_name["board-link"].text
     )
     assert "not-finite" in by_name and report.exit_code == 11
-    assert report.mend == "" and not any(finding.mend for finding in report.findings)
+    assert report.repair == "" and not any(finding.repair for finding in report.findings)
     assert not any("import" in text for text in report.lines())
 
 

@@ -25,7 +25,8 @@ from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous
 
 RENUMBER_FIRST = (
-    "how to mend what has an electrode's or a channel's number here: renumber by import first, then"
+    "how to repair what has an electrode's or a channel's number here: renumber by import first,"
+    " then"
     " examine again"
 )
 
@@ -105,9 +106,9 @@ def _report(subject: Subject, case: Case, outcomes: list[Outcome]) -> Report:
     findings = tuple(finding for outcome in outcomes for finding in outcome.findings)
     untold = (*subject.remarks, *(text for outcome in outcomes for text in outcome.untold))
     if any(finding.name == "numbering" for finding in findings):
-        if any(names_numbers(finding.mend) for finding in findings):
+        if any(names_numbers(finding.repair) for finding in findings):
             untold = (*untold, RENUMBER_FIRST)
-        findings = tuple(replace(f, mend="") if names_numbers(f.mend) else f for f in findings)
+        findings = tuple(replace(f, repair="") if names_numbers(f.repair) else f for f in findings)
     frames = case.frames
     described = (
         f"{frames.n_frames} frame(s) of {len(case.rows)} channels,"
@@ -123,5 +124,5 @@ def _report(subject: Subject, case: Case, outcomes: list[Outcome]) -> Report:
         findings=findings,
         untold=untold,
         measured=measured,
-        mend=combined_remedy(case, (finding.mend for finding in findings if finding.mend)),
+        repair=combined_remedy(case, (finding.repair for finding in findings if finding.repair)),
     )

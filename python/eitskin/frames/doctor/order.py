@@ -89,7 +89,7 @@ def check_frames(case: Case) -> Outcome:
 
 
 def check_sign(case: Case) -> tuple[Case, Outcome]:
-    """Reversed polarity, or magnitudes only; the case comes back with the signs mended.
+    """Reversed polarity, or magnitudes only; the case comes back with the signs repaired.
 
     Where the homogeneous frame has both signs, magnitudes show by having one. Where it has only one
     (adjacent patterns), data of the other sign are reversed, or magnitudes; only a channel that
@@ -130,7 +130,7 @@ def check_sign(case: Case) -> tuple[Case, Outcome]:
             text = (
                 "all voltages are above 0 where the homogeneous frame is below 0: reversed polarity"
                 " or magnitudes; no channel crosses 0, so they cannot be told apart, and both"
-                " options mend it alike"
+                " options repair it alike"
             )
             finding = Finding("reversed-or-magnitude", FAULT, text, evidence, "--sign reversed")
         return _negated(case), Outcome((finding,))

@@ -44,7 +44,9 @@ def draw(path: str | Path, report: Report, case: Case) -> None:
         panel.spines[["top", "right"]].set_visible(False)
     faults = [finding.name for finding in report.findings if finding.severity == FAULT]
     verdict = (
-        "nothing must be mended" if not faults else "to mend: " + ", ".join(dict.fromkeys(faults))
+        "nothing must be repaired"
+        if not faults
+        else "to repair: " + ", ".join(dict.fromkeys(faults))
     )
     figure.suptitle(f"{Path(report.source).name}: {verdict}", x=0.01, ha="left", fontsize=11)
     with write_beside(path) as temporary:
@@ -71,7 +73,7 @@ def _reference(panel: Any, case: Case) -> None:
             markersize=6,
             label="not trusted",
         )
-    panel.set(xlabel="channel (order and sign mended)", ylabel="mV", title="Mean quiet frame")
+    panel.set(xlabel="channel (order and sign repaired)", ylabel="mV", title="Mean quiet frame")
     low, high = panel.get_ylim()
     panel.set_ylim(low, high + 0.2 * (high - low))
     panel.legend(frameon=False, fontsize=8, loc="upper right", ncols=2)

@@ -1,4 +1,4 @@
-"""Which options of ``eitskin import`` mend bad channels, and how the remedies of several findings
+"""Which options of ``eitskin import`` repair bad channels, and how the remedies of several findings
 become one."""
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from eitskin.frames.doctor.case import Case, numbers
-from eitskin.frames.mend import partners
+from eitskin.frames.repair import partners
 
 CHANNEL_LISTS = ("--flip-channels", "--impute-channels", "--drop-channels", "--drop-electrodes")
 

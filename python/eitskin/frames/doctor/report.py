@@ -16,18 +16,18 @@ SHOWN = 8
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found. ``name`` is stable for programs; ``severity`` FAULT must be mended, NOTE
+    """One thing found. ``name`` is stable for programs; ``severity`` FAULT must be repaired, NOTE
     need not.
 
-    ``evidence`` holds the numbers that it rests on, ``mend`` the options of ``eitskin import`` that
-    mend it ("" where only the hardware can be mended).
+    ``evidence`` holds the numbers that it rests on, ``repair`` the options of ``eitskin import``
+    that repair it ("" where only the hardware can be repaired).
     """
 
     name: str
     severity: str
     text: str
     evidence: Mapping[str, Any] = field(default_factory=dict)
-    mend: str = ""
+    repair: str = ""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Outcome:
 class Report:
     """The whole examination of ``source``; ``subject`` says in words what was examined.
 
-    ``mend``: the options of ``eitskin import`` that together mend all that can be mended.
+    ``repair``: the options of ``eitskin import`` that together repair all that can be repaired.
     """
 
     source: str
@@ -52,11 +52,11 @@ class Report:
     findings: tuple[Finding, ...]
     untold: tuple[str, ...]
     measured: Mapping[str, Any]
-    mend: str = ""
+    repair: str = ""
 
     @property
     def healthy(self) -> bool:
-        """Whether nothing must be mended."""
+        """Whether nothing must be repaired."""
         return not any(finding.severity == FAULT for finding in self.findings)
 
     @property
@@ -76,13 +76,13 @@ class Report:
                     "severity": finding.severity,
                     "text": finding.text,
                     "evidence": _finite(finding.evidence),
-                    "mend": finding.mend,
+                    "repair": finding.repair,
                 }
                 for finding in self.findings
             ],
             "untold": list(self.untold),
             "measured": _finite(self.measured),
-            "mend": self.mend,
+            "repair": self.repair,
         }
 
     def lines(self) -> list[str]:
@@ -95,8 +95,8 @@ class Report:
                     "        evidence: "
                     + ", ".join(f"{k} {_shown(v)}" for k, v in finding.evidence.items())
                 )
-            if finding.mend:
-                lines.append(f"        mend: eitskin import ... {finding.mend}")
+            if finding.repair:
+                lines.append(f"        repair: eitskin import ... {finding.repair}")
         lines.extend(f"  not told: {text}" for text in self.untold)
         if self.measured:
             lines.append(
@@ -107,10 +107,10 @@ class Report:
         counted = f"{faults} fault{'s' * (faults != 1)}, {notes} note{'s' * (notes != 1)}"
         lines.append(
             f"  {counted}: "
-            + ("nothing must be mended" if self.healthy else "mend these before imaging")
+            + ("nothing must be repaired" if self.healthy else "repair these before imaging")
         )
-        if self.mend:
-            lines.append(f"  all in one: eitskin import {self.source} -o OUT.npz ... {self.mend}")
+        if self.repair:
+            lines.append(f"  all in one: eitskin import {self.source} -o OUT.npz ... {self.repair}")
         return lines
 
 

@@ -61,7 +61,7 @@ def subject_from_source(
     skin: Skin | None,
     n_electrodes: int | None = None,
 ) -> Subject:
-    """Any file that ``import`` reads, mended as ``options`` say, and a frames file as
+    """Any file that ``import`` reads, repaired as ``options`` say, and a frames file as
     ``load_frames`` reads it.
 
     Unlike import, NaN and Inf pass, and where no quiet frames are named the first frame is taken.

@@ -158,7 +158,7 @@ def _without(case: Case, dead: Dead, before: float) -> tuple[Case, list[Finding]
         evidence |= {f"{name}_gain": gain for name, gain in sides.items()}
         evidence |= {"misfit": round(dead.misfit, 4), "misfit_without": round(before, 4)}
         text = (
-            f"electrode {electrode} (from 0) is dead, {' and '.join(sides)}: mend its contact, or"
+            f"electrode {electrode} (from 0) is dead, {' and '.join(sides)}: repair its contact, or"
             " leave it out"
         )
         findings.append(

@@ -39,7 +39,7 @@ _OF_ELECTRODES = {
 }
 
 
-class News:
+class Events:
     """Turns what a stream gives into lines, as it comes."""
 
     def __init__(self) -> None:

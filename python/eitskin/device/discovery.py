@@ -31,7 +31,7 @@ class FoundPort:
         return port | {"board": board, "why": self.why}
 
 
-def census(*, ask: bool = True) -> list[FoundPort]:
+def discover(*, ask: bool = True) -> list[FoundPort]:
     """All serial ports, boards first; where ``ask``, those that look like a board's are asked what
     they are."""
     return [_asked(port) if ask and port.is_board else FoundPort(port) for port in list_devices()]
