@@ -205,7 +205,7 @@ def miou(estimate: BoolArray, truth: BoolArray) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
+class ImageScorer:
     """MIoU of pixel images on one raster.
 
     Attributes:
@@ -276,14 +276,14 @@ def _miou_of_passed(passed: IntArray, truth: BoolArray, count: int) -> FloatArra
 
 def judge_for(
     region: Region, grid: Grid, spacing_mm: float = RASTER_MM, lookup: str = LOOKUP
-) -> Judge:
-    """The judge for images on ``grid`` of the skin ``region``.
+) -> ImageScorer:
+    """The scorer for images on ``grid`` of the skin ``region``.
 
     Raises:
         UsageError: as :func:`raster_inside` and :func:`lookup_for`.
     """
     raster = raster_inside(region, spacing_mm)
-    return Judge(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)
+    return ImageScorer(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)
 
 
 def pixel_cover(

@@ -46,7 +46,7 @@ class Scorer:
     """Scores the frames of one model; ``gate_mm`` is how near a touch must be to its true one."""
 
     model: Model
-    judge: metrics.Judge
+    image_scorer: metrics.ImageScorer
     gate_mm: float
 
     def score(
@@ -60,7 +60,7 @@ class Scorer:
         image = np.asarray(result.image, dtype=np.float64)
         values = np.abs(image) if sign == "both" else image * wanted[0]
         shown = metrics.touch_mask(
-            self.judge.lookup.show(values), self.model.defaults.mask_threshold
+            self.image_scorer.lookup.show(values), self.model.defaults.mask_threshold
         )
         discs = self._discs(result.touches)
         true_places = [i for i in frames.touches_in(number) if _sign_of(frames, i) in wanted]
@@ -77,10 +77,10 @@ class Scorer:
     def _discs(self, touches: tuple[Touch, ...]) -> BoolArray:
         centres = np.array([(touch.x_mm, touch.y_mm) for touch in touches]).reshape(-1, 2)
         radii = np.array([touch.radius_mm for touch in touches])
-        return metrics.disc_mask(self.judge.raster.points_mm, centres, radii)
+        return metrics.disc_mask(self.image_scorer.raster.points_mm, centres, radii)
 
     def _truth(self, frames: Frames, number: int, wanted: tuple[int, ...]) -> BoolArray | None:
-        points = self.judge.raster.points_mm
+        points = self.image_scorer.raster.points_mm
         if frames.truth_mask is not None and frames.truth_mask_extent_mm is not None:
             mask = np.isin(frames.truth_mask[number], wanted)
             return (
@@ -113,5 +113,5 @@ def scorer_for(model: Model) -> Scorer:
     """
     outline = model.skin.outline
     scale = size_to_paper(outline)
-    judge = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale)
-    return Scorer(model, judge, GATE_MM * scale)
+    image_scorer = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale)
+    return Scorer(model, image_scorer, GATE_MM * scale)

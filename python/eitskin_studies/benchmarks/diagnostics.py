@@ -143,8 +143,11 @@ class _Eye:
         model, blob = load_prebuilt()
         self._solver = Reconstructor(model, blob=blob)
         self._all = self._solver.options.diagnostics
-        self._judge, self._threshold = scorer_for(model).judge, model.defaults.mask_threshold
-        self._points = self._judge.raster.points_mm
+        self._image_scorer, self._threshold = (
+            scorer_for(model).image_scorer,
+            model.defaults.mask_threshold,
+        )
+        self._points = self._image_scorer.raster.points_mm
 
     def truth(self, scene: Scene) -> BoolArray:
         return metrics.disc_mask(self._points, scene.centres_mm(), scene.radii_mm())
@@ -169,7 +172,7 @@ class _Eye:
             nothing = metrics.miou(np.zeros_like(truth), truth)
             return _Seen(None, nothing, nothing, 0.0)
         image = np.asarray(result.image, dtype=np.float64)
-        shown = metrics.touch_mask(self._judge.lookup.show(image), self._threshold)
+        shown = metrics.touch_mask(self._image_scorer.lookup.show(image), self._threshold)
         centres, radii = (
             [(t.x_mm, t.y_mm) for t in result.touches],
             [t.radius_mm for t in result.touches],

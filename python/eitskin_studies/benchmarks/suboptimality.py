@@ -69,8 +69,10 @@ def run(scenes: int, seed: int, progress: Progress) -> Curves:
     name, model, blob = models()[0]
     test, train = sessions(scenes, seed), sessions(max(2, scenes // 2), seed, "train")
     problems = make_problems(name, model, blob, test)
-    judge = metrics.judge_for(test.skin.outline, model.grid)
-    truths = [truth_masks(session.touches, judge.raster.points_mm) for session in (train, test)]
+    image_scorer = metrics.judge_for(test.skin.outline, model.grid)
+    truths = [
+        truth_masks(session.touches, image_scorer.raster.points_mm) for session in (train, test)
+    ]
     engine = CoreEngine(blob)
     stops = []
     for solver, settings in progress(
@@ -79,8 +81,8 @@ def run(scenes: int, seed: int, progress: Progress) -> Curves:
         engine.set_options(bench_options(model, solver=solver, **settings))
         trained, _, _ = _images(engine, train)
         images, coefficients, macs = _images(engine, test)
-        threshold = metrics.best_threshold(judge.curves(trained, truths[0]))
-        scores = judge.curves(images, truths[1], [threshold])[:, 0]
+        threshold = metrics.best_threshold(image_scorer.curves(trained, truths[0]))
+        scores = image_scorer.curves(images, truths[1], [threshold])[:, 0]
         off = [problems.suboptimality(k, x) for k, x in enumerate(coefficients)]
         worst = np.sort(scores)[: max(1, -(-len(scores) // 10))]
         effort = settings.get("mac_limit", settings["iterations"])

@@ -185,7 +185,7 @@ def compare(
     """
     how = Settings() if settings is None else settings
     setup = setup_for(skin, protocol, elements=how.elements)
-    judge = metrics.judge_for(skin.outline, setup.grid, how.raster_mm, how.lookup)
+    image_scorer = metrics.judge_for(skin.outline, setup.grid, how.raster_mm, how.lookup)
     mesh = mesh_for_elements(skin, how.simulated_elements)
 
     def session(role: str, count: int) -> _Session:
@@ -199,14 +199,14 @@ def compare(
         return _Session(
             simulated,
             simulated.differences_v(),
-            truth_masks(drawn, judge.raster.points_mm),
+            truth_masks(drawn, image_scorer.raster.points_mm),
             tuple(scene.centres_mm() for scene in drawn.scenes),
         )
 
     train, test = session("train", how.train_scenes), session("test", how.scenes)
     chosen = families(setup)
     results = tuple(
-        _run(family, setup, judge, train, test, how.gate_mm)
+        _run(family, setup, image_scorer, train, test, how.gate_mm)
         for family in progress(chosen, "reconstructing")
     )
     perfect = np.array(
@@ -215,7 +215,7 @@ def compare(
             for scene in test.simulated.touches.scenes
         ]
     )
-    ceiling = judge.curves(perfect, test.truths).mean(axis=0)
+    ceiling = image_scorer.curves(perfect, test.truths).mean(axis=0)
     best = int(np.argmax(ceiling))
     return Comparison(
         how,
@@ -241,7 +241,7 @@ def truth_masks(touches: TouchSet, points_mm: FloatArray) -> npt.NDArray[np.bool
 def _run(
     family: Family,
     setup: Setup,
-    judge: metrics.Judge,
+    image_scorer: metrics.ImageScorer,
     train: _Session,
     test: _Session,
     gate_mm: float,
@@ -251,7 +251,7 @@ def _run(
     for value in family.values:
         method = family.make(value)
         images = _images(method, train, setup.grid.n_pixels)
-        curves = judge.curves(images, train.truths)
+        curves = image_scorer.curves(images, train.truths)
         score = float(curves.mean(axis=0).max())
         if best is None or score > best[0] + 1e-12:
             best = score, value, method, images, curves
@@ -274,7 +274,7 @@ def _run(
     else:
         assert touch_threshold is not None
         found = tuple(touches_in_image(image, index, centres, touch_threshold) for image in images)
-    curves = judge.curves(images, test.truths)
+    curves = image_scorer.curves(images, test.truths)
     return Result(
         name=method.name,
         parameter=family.parameter,

@@ -50,24 +50,25 @@ def session_in_parts(
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A model and how it is judged: images by ``judge``, touches as found within ``gate_mm``."""
+    """A model and how it is judged: images by ``image_scorer``, touches as found within
+    ``gate_mm``."""
 
     model: Model
-    judge: metrics.Judge
+    image_scorer: metrics.ImageScorer
     gate_mm: float = GATE_MM
 
     def truths(self, scenes: Sequence[Scene]) -> npt.NDArray[np.bool_]:
-        """The true discs on the judge's cells, (k, p)."""
-        points = self.judge.raster.points_mm
+        """The true discs on the scorer's cells, (k, p)."""
+        points = self.image_scorer.raster.points_mm
         return np.array(
             [metrics.disc_mask(points, scene.centres_mm(), scene.radii_mm()) for scene in scenes]
         )
 
     def discs(self, one: Reconstruction) -> npt.NDArray[np.bool_]:
-        """The touches found, as discs on the judge's cells, (p,)."""
+        """The touches found, as discs on the scorer's cells, (p,)."""
         places = np.array([(touch.x_mm, touch.y_mm) for touch in one.touches]).reshape(-1, 2)
         return metrics.disc_mask(
-            self.judge.raster.points_mm, places, [touch.radius_mm for touch in one.touches]
+            self.image_scorer.raster.points_mm, places, [touch.radius_mm for touch in one.touches]
         )
 
     def matched(self, scene: Scene, one: Reconstruction) -> Matching:
@@ -83,7 +84,7 @@ class Bench:
         tuning seed."""
         results = reconstruct_many(self.model, frames_v, quiet_v, threads=1, touches=False)
         images = np.array([one.image for one in results], dtype=np.float64)
-        return metrics.best_threshold(self.judge.curves(images, self.truths(scenes)))
+        return metrics.best_threshold(self.image_scorer.curves(images, self.truths(scenes)))
 
     def scores(
         self, scenes: Sequence[Scene], quiet_v: FloatArray, frames_v: FloatArray, t: float
@@ -96,7 +97,7 @@ class Bench:
         truths = self.truths(scenes)
         images = np.array([one.image for one in results], dtype=np.float64)
         scored: dict[str, list[Any]] = {
-            "image": self.judge.curves(images, truths, [t])[:, 0].round(DIGITS).tolist()
+            "image": self.image_scorer.curves(images, truths, [t])[:, 0].round(DIGITS).tolist()
         }
         scored |= {
             name: []

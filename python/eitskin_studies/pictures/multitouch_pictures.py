@@ -15,7 +15,7 @@ from eitskin.skin.skin import Skin
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
 from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, MAX, MIN, NARROW, RING, WIDE
 from eitskin_studies.experiments.multitouch.counts import Score, Share, auc, roc, share_of
-from eitskin_studies.experiments.multitouch.doubt import Judged
+from eitskin_studies.experiments.multitouch.doubt import ScoredFrame
 from eitskin_studies.experiments.multitouch.doubt_tables import found_some, reliabilities
 from eitskin_studies.experiments.multitouch.gallery import Example
 from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, SNRS_DB
@@ -172,7 +172,7 @@ def draw_doubt(path: str | Path, doubts: Doubts) -> None:
         save_png(figure, path)
 
 
-def _groupings(frames: Sequence[Judged]) -> list[tuple[str, list[str], npt.NDArray[np.int64]]]:
+def _groupings(frames: Sequence[ScoredFrame]) -> list[tuple[str, list[str], npt.NDArray[np.int64]]]:
     found = np.array([f.found for f in frames])
     near = np.digitize([f.nearest for f in frames], NEAREST_EDGES[1:])
     snr = np.array([SNRS_DB.index(f.snr_db) for f in frames])
@@ -186,7 +186,7 @@ def _groupings(frames: Sequence[Judged]) -> list[tuple[str, list[str], npt.NDArr
 
 def _bars(
     axes: Axes,
-    frames: Sequence[Judged],
+    frames: Sequence[ScoredFrame],
     said: npt.NDArray[np.bool_],
     group: npt.NDArray[np.int64],
     ticks: Sequence[str],

@@ -72,7 +72,7 @@ def solve_frames(
 
 def train(built: Built, session: Session, solved: Solved) -> Trained:
     """t with the best mean MIoU, and the scale of force."""
-    curves = built.judge.curves(solved.images, session.truths(built.judge.raster))
+    curves = built.image_scorer.curves(solved.images, session.truths(built.image_scorer.raster))
     found, true = _forces(session, solved)
     usable = found > 0
     scale = float(np.median(true[usable] / found[usable])) if usable.any() else 1.0
@@ -82,8 +82,8 @@ def train(built: Built, session: Session, solved: Solved) -> Trained:
 def score(built: Built, session: Session, solved: Solved, trained: Trained) -> dict[str, Any]:
     """Everything about the accuracy in plain values fit for JSON; see ``docs/results/tradeoff.md``
     for what each is."""
-    truths = session.truths(built.judge.raster)
-    image = built.judge.curves(solved.images, truths, [trained.threshold])[:, 0]
+    truths = session.truths(built.image_scorer.raster)
+    image = built.image_scorer.curves(solved.images, truths, [trained.threshold])[:, 0]
     discs = [
         metrics.miou(_discs(built, result), truth)
         for result, truth in zip(solved.results, truths, strict=True)
@@ -131,7 +131,7 @@ def _error(values: npt.ArrayLike) -> dict[str, float | None]:
 def _discs(built: Built, result: Reconstruction) -> npt.NDArray[np.bool_]:
     places = np.array([(t.x_mm, t.y_mm) for t in result.touches]).reshape(-1, 2)
     return metrics.disc_mask(
-        built.judge.raster.points_mm, places, np.array([t.radius_mm for t in result.touches])
+        built.image_scorer.raster.points_mm, places, np.array([t.radius_mm for t in result.touches])
     )
 
 

@@ -23,11 +23,11 @@ from eitskin.tuning.configuration import ELEMENTS, Configuration, build_settings
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A configuration made ready: its model, the file's bytes, and the judge of its images."""
+    """A configuration made ready: its model, the file's bytes, and the scorer of its images."""
 
     model: Model
     blob: bytes
-    judge: metrics.Judge
+    image_scorer: metrics.ImageScorer
 
     def reconstructor(self, one: Configuration) -> Reconstructor:
         """The C core in float32 with the configuration's settings."""
@@ -44,7 +44,7 @@ class ModelShop:
         self.skin, self.protocol = skin, protocol
         self._forward: ForwardModel | None = None
         self._linear: dict[int, Linearisation] = {}
-        self._judges: dict[int, metrics.Judge] = {}
+        self._image_scorers: dict[int, metrics.ImageScorer] = {}
         self._raster = metrics.raster_inside(skin.outline)
 
     def refuse(self, one: Configuration) -> None:
@@ -72,7 +72,7 @@ class ModelShop:
         model = make_model(
             self.skin, self.protocol, self._linearise(one.pixels), build_settings(one, self.skin)
         )
-        return Built(model, encode_model(model), self._judge(one.pixels))
+        return Built(model, encode_model(model), self._image_scorer(one.pixels))
 
     def _linearise(self, pixels: int) -> Linearisation:
         if self._forward is None:
@@ -88,10 +88,10 @@ class ModelShop:
             )
         return self._linear[pixels]
 
-    def _judge(self, pixels: int) -> metrics.Judge:
-        if pixels not in self._judges:
+    def _image_scorer(self, pixels: int) -> metrics.ImageScorer:
+        if pixels not in self._image_scorers:
             grid = self._linearise(pixels).grid
-            self._judges[pixels] = metrics.Judge(
+            self._image_scorers[pixels] = metrics.ImageScorer(
                 self._raster, metrics.lookup_for(self._raster.points_mm, grid), grid.n_pixels
             )
-        return self._judges[pixels]
+        return self._image_scorers[pixels]

@@ -98,14 +98,14 @@ def rows_of(*electrodes: int) -> BoolArray:
     return np.asarray(np.isin(prebuilt()[0].protocol.drive_measure, electrodes).any(axis=1))
 
 
-class Judge:
+class LeftOutRows:
     """Images and touches against what a scene holds."""
 
     def __init__(self) -> None:
         model, blob = prebuilt()
         self.threshold = model.defaults.mask_threshold
         self.scorer: Scorer = scorer_for(model)
-        self.points_mm = self.scorer.judge.raster.points_mm
+        self.points_mm = self.scorer.image_scorer.raster.points_mm
         self.reconstructor = Reconstructor(model, blob=blob)
         self.reconstructor.with_options(max_masked=len(model.protocol.drive_measure))
 
@@ -131,7 +131,7 @@ class Judge:
         assert result.info.step_halvings == 0
         truth = self.mask(case.scene.centres_mm(), [t.radius_mm for t in case.scene.touches])
         seen = metrics.touch_mask(
-            self.scorer.judge.lookup.show(result.image.astype(np.float64)), self.threshold
+            self.scorer.image_scorer.lookup.show(result.image.astype(np.float64)), self.threshold
         )
         discs = self.mask(
             [(t.x_mm, t.y_mm) for t in result.touches], [t.radius_mm for t in result.touches]
@@ -140,15 +140,15 @@ class Judge:
 
 
 @pytest.fixture(scope="module")
-def judge() -> Judge:
+def left_out_rows() -> LeftOutRows:
     """One for all."""
-    return Judge()
+    return LeftOutRows()
 
 
 NONE_OUT = np.zeros(208, dtype=np.bool_)
 
 
-def scores(judge: Judge, electrodes: int) -> FloatArray:
+def scores(left_out_rows: LeftOutRows, electrodes: int) -> FloatArray:
     """Mean scores of image and discs with so many electrodes out, the first of them truly off."""
     found = []
     for case in cases():
@@ -157,20 +157,22 @@ def scores(judge: Judge, electrodes: int) -> FloatArray:
             if electrodes
             else NONE_OUT
         )
-        found.append(judge.score(case, case.detached_v if electrodes else case.whole_v, out))
+        found.append(
+            left_out_rows.score(case, case.detached_v if electrodes else case.whole_v, out)
+        )
     return np.asarray(np.mean(found, axis=0))
 
 
-def test_a_detached_electrode(judge: Judge) -> None:
-    whole, damaged = scores(judge, 0), scores(judge, 1)
+def test_a_detached_electrode(left_out_rows: LeftOutRows) -> None:
+    whole, damaged = scores(left_out_rows, 0), scores(left_out_rows, 1)
     loss = whole - damaged
     print(f"whole {whole}, an electrode off {damaged}, loss {loss}")
     assert whole[0] >= 0.84 and whole[1] >= 0.88
     assert loss.max() <= MAX_LOSS
 
 
-def test_each_further_electrode_costs_a_little(judge: Judge) -> None:
-    found = np.array([scores(judge, electrodes) for electrodes in range(4)])
+def test_each_further_electrode_costs_a_little(left_out_rows: LeftOutRows) -> None:
+    found = np.array([scores(left_out_rows, electrodes) for electrodes in range(4)])
     print(found)
     steps = -np.diff(found, axis=0)
     assert (steps > 0).all()
@@ -178,34 +180,34 @@ def test_each_further_electrode_costs_a_little(judge: Judge) -> None:
     assert (found[3] >= (0.70, 0.78)).all()
 
 
-def test_a_few_lost_rows_cost_next_to_nothing(judge: Judge) -> None:
+def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows: LeftOutRows) -> None:
     """Both of a reciprocal pair: one alone stands for both."""
     fold, generator = prebuilt()[0].fold, np.random.default_rng(SEED)
-    whole = scores(judge, 0)
+    whole = scores(left_out_rows, 0)
     for count, most in ((1, 0.004), (10, 0.008), (20, 0.012)):
         found = []
         for case in cases():
             lost = generator.choice(len(fold.first), count, replace=False)
             out = NONE_OUT.copy()
             out[fold.first[lost]] = out[fold.second[lost]] = True
-            found.append(judge.score(case, case.whole_v, out))
+            found.append(left_out_rows.score(case, case.whole_v, out))
         mean = np.mean(found, axis=0)
         loss = whole - mean
         print(count, mean, loss)
         assert loss.max() <= most, count
 
 
-def test_no_touch_is_seen_where_there_is_none(judge: Judge) -> None:
+def test_no_touch_is_seen_where_there_is_none(left_out_rows: LeftOutRows) -> None:
     """Quiet frames after the reference, an electrode's rows lost: as few pass the gate as with all
     rows."""
     seen = {0: 0, 1: 0}
     for case in cases()[:64]:
-        judge.reconstructor.tare(case.quiet_v[: QUIET - 4])
+        left_out_rows.reconstructor.tare(case.quiet_v[: QUIET - 4])
         for electrodes in seen:
             out = rows_of(case.electrode) if electrodes else NONE_OUT
             for frame_v in case.quiet_v[QUIET - 4 :]:
                 seen[electrodes] += bool(
-                    judge.reconstructor.reconstruct(np.where(out, np.nan, frame_v)).touches
+                    left_out_rows.reconstructor.reconstruct(np.where(out, np.nan, frame_v)).touches
                 )
     print(seen)
     assert seen[1] <= seen[0] + 3

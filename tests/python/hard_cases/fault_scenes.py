@@ -126,9 +126,9 @@ def scorer() -> Scorer:
 
 def miou(image: np.ndarray, k: int) -> float:
     """Of an image (n,) against scene k, at the model's own threshold."""
-    judge, scene = scorer().judge, scenes()[k]
-    truth = metrics.disc_mask(judge.raster.points_mm, scene.centres_mm(), scene.radii_mm())
-    shown = judge.lookup.show(np.asarray(image, dtype=np.float64))
+    image_scorer, scene = scorer().image_scorer, scenes()[k]
+    truth = metrics.disc_mask(image_scorer.raster.points_mm, scene.centres_mm(), scene.radii_mm())
+    shown = image_scorer.lookup.show(np.asarray(image, dtype=np.float64))
     return float(
         metrics.miou(metrics.touch_mask(shown, prebuilt()[0].defaults.mask_threshold), truth)
     )

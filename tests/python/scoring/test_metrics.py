@@ -123,31 +123,33 @@ def test_touch_mask_is_strict_and_signed() -> None:
 def test_curves_equal_masks_on_the_raster(lookup: str) -> None:
     outline = disk(60.0)
     grid = grid_for(outline, 12)
-    judge = metrics.judge_for(outline, grid, 1.0, lookup)
+    image_scorer = metrics.judge_for(outline, grid, 1.0, lookup)
     generator = np.random.default_rng(5)
     images = generator.normal(size=(7, grid.n_pixels))
     images[5] = -np.abs(images[5])
     images[6] = 0.0
     centres = generator.uniform(-20, 20, size=(7, 2))
-    truths = np.stack([metrics.disc_mask(judge.raster.points_mm, [c], [6.0]) for c in centres])
+    truths = np.stack(
+        [metrics.disc_mask(image_scorer.raster.points_mm, [c], [6.0]) for c in centres]
+    )
     truths[4] = False
     thresholds = [0.0, 0.3, 0.8, 1.0]
     for sign in (1, -1):
-        curves = judge.curves(images, truths, thresholds, sign)
+        curves = image_scorer.curves(images, truths, thresholds, sign)
         for k in range(7):
             top = (sign * images[k]).max()
             for j, t in enumerate(thresholds):
-                shown = (sign * judge.lookup.show(images[k]) > t * top) & (top > 0)
+                shown = (sign * image_scorer.lookup.show(images[k]) > t * top) & (top > 0)
                 assert curves[k, j] == pytest.approx(metrics.miou(shown, truths[k]), abs=1e-12)
 
 
 def test_nearest_curve_is_the_pixel_mask_spread_over_cells() -> None:
     grid = grid_for(SQUARE, 6)
-    judge = metrics.judge_for(SQUARE, grid, 1.0, "nearest")
+    image_scorer = metrics.judge_for(SQUARE, grid, 1.0, "nearest")
     image = np.random.default_rng(2).uniform(size=36)
-    truth = metrics.disc_mask(judge.raster.points_mm, [[12, 17]], [6])
-    mask = metrics.touch_mask(image, 0.6)[judge.lookup.pixel[:, 0]]
-    assert judge.curves(image[None], truth[None], [0.6])[0, 0] == pytest.approx(
+    truth = metrics.disc_mask(image_scorer.raster.points_mm, [[12, 17]], [6])
+    mask = metrics.touch_mask(image, 0.6)[image_scorer.lookup.pixel[:, 0]]
+    assert image_scorer.curves(image[None], truth[None], [0.6])[0, 0] == pytest.approx(
         metrics.miou(mask, truth)
     )
 
@@ -174,22 +176,22 @@ def test_a_perfect_image_is_limited_by_its_pixels_only() -> None:
     assert 0.83 < score["nearest"] < 0.90
     assert 0.95 < score["bilinear"] < 0.99
     fine = grid_for(SQUARE, 20)
-    judge = metrics.judge_for(SQUARE, fine, lookup="nearest")
-    truth = metrics.disc_mask(judge.raster.points_mm, [[12, 17]], [6])[None]
-    assert judge.curves(truth.astype(float), truth, [0.5])[0, 0] == 1.0
+    image_scorer = metrics.judge_for(SQUARE, fine, lookup="nearest")
+    truth = metrics.disc_mask(image_scorer.raster.points_mm, [[12, 17]], [6])[None]
+    assert image_scorer.curves(truth.astype(float), truth, [0.5])[0, 0] == 1.0
 
 
 def test_curves_refuse_what_they_cannot_judge() -> None:
-    judge = metrics.judge_for(SQUARE, grid_for(SQUARE, 6))
-    truths = np.zeros((2, len(judge.raster.points_mm)), dtype=bool)
+    image_scorer = metrics.judge_for(SQUARE, grid_for(SQUARE, 6))
+    truths = np.zeros((2, len(image_scorer.raster.points_mm)), dtype=bool)
     with pytest.raises(UsageError, match=r"\(2, 36\)"):
-        judge.curves(np.zeros((2, 35)), truths)
+        image_scorer.curves(np.zeros((2, 35)), truths)
     with pytest.raises(UsageError, match="ascend"):
-        judge.curves(np.zeros((2, 36)), truths, [0.5, 0.4])
+        image_scorer.curves(np.zeros((2, 36)), truths, [0.5, 0.4])
     broken = np.zeros((2, 36))
     broken[1, 3] = np.nan
     with pytest.raises(UsageError, match="image 1"):
-        judge.curves(broken, truths)
+        image_scorer.curves(broken, truths)
 
 
 def test_best_threshold_is_the_best_mean_and_the_lowest_of_equals() -> None:

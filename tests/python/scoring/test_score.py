@@ -135,7 +135,7 @@ def test_a_mask_is_the_truth_where_there_is_one() -> None:
 def test_lengths_scale_with_the_skin() -> None:
     scorer = scorer_for(small_model())
     assert scorer.gate_mm == pytest.approx(10 * 100 / 194)
-    assert scorer.judge.raster.spacing_mm == pytest.approx(1.5 * 100 / 194)
+    assert scorer.image_scorer.raster.spacing_mm == pytest.approx(1.5 * 100 / 194)
 
 
 def test_a_model_that_says_nothing_of_its_skin() -> None:

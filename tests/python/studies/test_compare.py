@@ -48,14 +48,16 @@ def test_results_are_what_their_parts_give(comparison: Comparison) -> None:
     """Thresholds, parameter and MIoU of the second method, worked out again from frames and
     truth."""
     setup, result = comparison.setup, comparison.results[1]
-    judge = metrics.judge_for(SKIN.outline, setup.grid, lookup="nearest")
+    image_scorer = metrics.judge_for(SKIN.outline, setup.grid, lookup="nearest")
 
     def curves(strength: float, of: str) -> np.ndarray:
         session = getattr(comparison, of)
         images = baselines.noser(setup.jacobian, strength).reconstruct(
             session.frames_v - session.quiet_v.mean(axis=0)
         )
-        return judge.curves(images, truth_masks(session.touches, judge.raster.points_mm))
+        return image_scorer.curves(
+            images, truth_masks(session.touches, image_scorer.raster.points_mm)
+        )
 
     best = max((1e-5, 1e-2), key=lambda a: curves(a, "train").mean(axis=0).max())
     assert result.value == best

@@ -32,7 +32,7 @@ from eitskin_studies.experiments.multitouch.cells import (
 from eitskin_studies.experiments.multitouch.counts import auc, quantile, roc, score, share
 from eitskin_studies.experiments.multitouch.doubt import (
     FEATURES,
-    Judged,
+    ScoredFrame,
     calibration,
     features,
     fit_rule,
@@ -211,13 +211,13 @@ def test_features_of_a_frame() -> None:
     assert features(_seen([], []), math.inf, 9.0) == (0, 2, 1, 0, 10, 3)
 
 
-def _frames(count: int, seed: int) -> list[Judged]:
+def _frames(count: int, seed: int) -> list[ScoredFrame]:
     """Frames that are exact the more surely, the less is unexplained; other features are noise."""
     draws = np.random.default_rng(seed).uniform(size=(count, 8))
     made = []
     for row in draws:
         exact = bool(row[7] < 1 / (1 + math.exp(20 * (row[3] - 0.4))))
-        made.append(Judged(60.0, 3, 3, exact, exact, False, 2.0, tuple(map(float, row[:6]))))
+        made.append(ScoredFrame(60.0, 3, 3, exact, exact, False, 2.0, tuple(map(float, row[:6]))))
     return made
 
 
@@ -233,7 +233,9 @@ def test_rule_learns_what_matters() -> None:
     assert 0.93 < shown.exact_not_said.mean < 0.99 and shown.exact_said.mean < 0.6
     exact = np.array([one.exact for one in test])
     assert reliability(rule.chances(test), exact).error < 0.05
-    nothing = Judged(60.0, 1, 0, False, False, False, math.inf, (0.0, 2.0, 1.0, 9.0, 10.0, 3.0))
+    nothing = ScoredFrame(
+        60.0, 1, 0, False, False, False, math.inf, (0.0, 2.0, 1.0, 9.0, 10.0, 3.0)
+    )
     assert not rule.says([nothing])[0]
 
 

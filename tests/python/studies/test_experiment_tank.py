@@ -27,9 +27,9 @@ from eitskin_studies.experiments.tank.imagers import (
     datum,
     disc_kernel,
 )
-from eitskin_studies.experiments.tank.judging import jittered_truth, places, signed_miou
 from eitskin_studies.experiments.tank.levers import chosen, one_by_one, together, words_of
 from eitskin_studies.experiments.tank.scenes import RULES, simulated, with_signs
+from eitskin_studies.experiments.tank.signed_scores import jittered_truth, places, signed_miou
 from eitskin_studies.experiments.tank.tables import CHOSEN
 from eitskin_studies.experiments.tank.tanks import (
     TOUCH_LIKE,

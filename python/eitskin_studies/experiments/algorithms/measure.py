@@ -68,12 +68,14 @@ class Field:
         return setup_for(self.skin, self.protocol, elements=MODEL_ELEMENTS)
 
     @cached_property
-    def judges(self) -> dict[str, metrics.Judge]:
+    def image_scorers(self) -> dict[str, metrics.ImageScorer]:
         """By lookup; all on one raster."""
         raster = metrics.raster_inside(self.skin.outline)
         grid = self.setup.grid
         return {
-            k: metrics.Judge(raster, metrics.lookup_for(raster.points_mm, grid, k), grid.n_pixels)
+            k: metrics.ImageScorer(
+                raster, metrics.lookup_for(raster.points_mm, grid, k), grid.n_pixels
+            )
             for k in metrics.LOOKUPS
         }
 
@@ -228,9 +230,12 @@ def _reconstructed(
 
 
 def _curves(field: Field, session: Session, images: FloatArray) -> dict[str, FloatArray]:
-    judges = field.judges
-    truths = session.truths(judges[metrics.LOOKUP].raster)
-    return {lookup: judge.curves(images, truths) for lookup, judge in judges.items()}
+    image_scorers = field.image_scorers
+    truths = session.truths(image_scorers[metrics.LOOKUP].raster)
+    return {
+        lookup: image_scorer.curves(images, truths)
+        for lookup, image_scorer in image_scorers.items()
+    }
 
 
 def _found(

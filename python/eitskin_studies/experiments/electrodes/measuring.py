@@ -188,12 +188,12 @@ class Workshop:
             case.rank, case.pixels, elements=MODEL_ELEMENTS, column_power=case.power
         )
         model = make_model(self.skin, scan_of(case).protocol, self.linear(case), settings)
-        judge = metrics.judge_for(self.skin.outline, model.grid)
+        image_scorer = metrics.judge_for(self.skin.outline, model.grid)
         chosen_on = [(self.sets[key].scenes, *self.frames(key, case, noise_v)) for key in TRAINING]
         scenes = [scene for drawn, _, _ in chosen_on for scene in drawn]
         bench, chosen = tuned(
             model,
-            judge,
+            image_scorer,
             scenes,
             chosen_on[0][1],
             np.concatenate([frames_v for _, _, frames_v in chosen_on]),

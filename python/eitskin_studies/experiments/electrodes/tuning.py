@@ -64,7 +64,7 @@ def with_regularisation(model: Model, regularisation: float) -> Model:
 
 def tuned(
     model: Model,
-    judge: metrics.Judge,
+    image_scorer: metrics.ImageScorer,
     scenes: Sequence[Scene],
     quiet_v: FloatArray,
     frames_v: FloatArray,
@@ -76,10 +76,10 @@ def tuned(
         regularised = with_regularisation(model, regularisation)
         for lambda_rel, iterations in product(LAMBDAS, ITERATIONS):
             defaults = replace(model.defaults, lambda_rel=lambda_rel, iterations=iterations)
-            bench = Bench(replace(regularised, defaults=defaults), judge)
+            bench = Bench(replace(regularised, defaults=defaults), image_scorer)
             truths = bench.truths(scenes)
             results = reconstruct_many(bench.model, frames_v, quiet_v, threads=1)
-            curves = judge.curves(
+            curves = image_scorer.curves(
                 np.array([one.image for one in results], dtype=np.float64), truths
             )
             t = metrics.best_threshold(curves)

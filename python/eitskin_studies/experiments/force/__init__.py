@@ -62,11 +62,11 @@ def run(desk: Desk) -> Outcome:
                 "reading": name,
                 "sets": [tuned.facts, reported.facts],
             }
-            judge = partial(
-                anywhere.judge, tuned, on[name], reported, read[name], instruments.radius_mm
+            image_scorer = partial(
+                anywhere.image_scorer, tuned, on[name], reported, read[name], instruments.radius_mm
             )
             judged[name, snr] = anywhere.Anywhere.from_dict(
-                desk.kept(facts, lambda judge=judge: judge().as_dict())  # type: ignore[misc]
+                desk.kept(facts, lambda image_scorer=image_scorer: image_scorer().as_dict())  # type: ignore[misc]
             )
     reps, quiet = settings.count(30, 4), settings.count(4000, 80)
     found = []

@@ -129,10 +129,10 @@ class Lab:
         self, lever: Lever, session: Session, results: Sequence[Reconstruction]
     ) -> FloatArray:
         grid = self.model(lever).grid
-        judge = metrics.Judge(
+        image_scorer = metrics.ImageScorer(
             self._raster, metrics.lookup_for(self._raster.points_mm, grid), grid.n_pixels
         )
-        return judge.curves(
+        return image_scorer.curves(
             np.array([one.image for one in results], dtype=np.float64), session.truths(self._raster)
         )
 

@@ -41,7 +41,7 @@ BINS = 10
 
 
 @dataclass(frozen=True)
-class Judged:
+class ScoredFrame:
     """A frame, what came of it, and by what it could have been known. ``found`` touches;
     ``nearest`` pair's distance over the sum of its radii (inf where there is none)."""
 
@@ -55,10 +55,12 @@ class Judged:
     features: tuple[float, ...]
 
 
-def judge(seen: Seen, truth_mm: FloatArray, snr_db: float, seed_radius_mm: float) -> Judged:
+def score_frame(
+    seen: Seen, truth_mm: FloatArray, snr_db: float, seed_radius_mm: float
+) -> ScoredFrame:
     """One frame."""
     found, near = len(seen.x_mm), nearest(seen)
-    return Judged(
+    return ScoredFrame(
         snr_db,
         len(truth_mm),
         found,
@@ -106,26 +108,26 @@ class Rule:
     offset: float
     bar: float
 
-    def scores(self, frames: Sequence[Judged]) -> FloatArray:
+    def scores(self, frames: Sequence[ScoredFrame]) -> FloatArray:
         """(k,)."""
         known = np.array([one.features for one in frames], dtype=np.float64).reshape(
             -1, len(self.weights)
         )
         return np.asarray(known @ self.weights + self.offset)
 
-    def says(self, frames: Sequence[Judged]) -> BoolArray:
+    def says(self, frames: Sequence[ScoredFrame]) -> BoolArray:
         """Doubt about each; none where nothing was found."""
         return np.asarray(
             (self.scores(frames) < self.bar)
             & np.array([one.found > 0 for one in frames], dtype=np.bool_)
         )
 
-    def chances(self, frames: Sequence[Judged]) -> FloatArray:
+    def chances(self, frames: Sequence[ScoredFrame]) -> FloatArray:
         """Of being exact, (k,)."""
         return np.asarray(1 / (1 + np.exp(-self.scores(frames))))
 
 
-def fit_rule(frames: Sequence[Judged], aim: float = AIM) -> Rule:
+def fit_rule(frames: Sequence[ScoredFrame], aim: float = AIM) -> Rule:
     """On tuning frames in which something was found, at whatever SNR. The bar is the lowest at
     which a share ``aim`` of what is above is exact, of frames at 60 dB and more: below, noise hides
     touches that no feature knows of.
@@ -182,7 +184,7 @@ class Calibration:
     wrong_said: Share
 
 
-def calibration(frames: Sequence[Judged], said: BoolArray | None = None) -> Calibration:
+def calibration(frames: Sequence[ScoredFrame], said: BoolArray | None = None) -> Calibration:
     """Of the core's own ``crowded``, or of ``said`` (k,)."""
     says = np.array([one.said for one in frames], dtype=np.bool_) if said is None else said
     right, exact = (

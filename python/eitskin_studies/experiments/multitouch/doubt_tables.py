@@ -11,8 +11,8 @@ from eitskin_studies.experiments.multitouch.counts import auc
 from eitskin_studies.experiments.multitouch.doubt import (
     FEATURES,
     Calibration,
-    Judged,
     Reliability,
+    ScoredFrame,
     calibration,
     reliability,
 )
@@ -71,7 +71,7 @@ def rule_table(doubts: Doubts) -> Table:
     return Table("rule", ("feature", "coefficient"), tuple(rows))
 
 
-def found_some(frames: Sequence[Judged]) -> list[Judged]:
+def found_some(frames: Sequence[ScoredFrame]) -> list[ScoredFrame]:
     """Frames in which something was found: a score says nothing about the others."""
     return [one for one in frames if one.found > 0]
 

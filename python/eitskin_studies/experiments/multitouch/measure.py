@@ -27,11 +27,11 @@ from eitskin_studies.experiments.multitouch.cells import (
 from eitskin_studies.experiments.multitouch.counts import Score, score
 from eitskin_studies.experiments.multitouch.doubt import (
     Confidences,
-    Judged,
     Rule,
+    ScoredFrame,
     confidences,
     fit_rule,
-    judge,
+    score_frame,
 )
 from eitskin_studies.experiments.multitouch.lab import (
     CLASSICAL,
@@ -86,8 +86,8 @@ class Doubts:
     variant; and the one rule that the tuning frames of all variants gave: the core has one."""
 
     rule: Rule
-    cells: dict[str, list[Judged]]
-    mixed: dict[str, list[Judged]]
+    cells: dict[str, list[ScoredFrame]]
+    mixed: dict[str, list[ScoredFrame]]
     touches: dict[str, Confidences]
 
 
@@ -172,9 +172,9 @@ def doubts(lab: Lab, desk: Desk, counted: Counted) -> Doubts:
     """The core's own signal on all that was counted, and on mixed scenes; the rule from mixed
     tuning scenes."""
 
-    def frames(which: Sequence[Cell], variant: Variant, tuning: bool = False) -> list[Judged]:
+    def frames(which: Sequence[Cell], variant: Variant, tuning: bool = False) -> list[ScoredFrame]:
         return [
-            judge(seen, truth, snr_db, lab.seed_radius_mm(variant))
+            score_frame(seen, truth, snr_db, lab.seed_radius_mm(variant))
             for cell in which for snr_db in SNRS_DB for seen,
             truth in _pairs(lab, cell, variant, snr_db, tuning)
         ]  # fmt: skip

@@ -12,7 +12,7 @@ from eitskin_studies.experiments.multitouch.cells import (
     MIXED_SCENES,
 )
 from eitskin_studies.experiments.multitouch.counts import Share
-from eitskin_studies.experiments.multitouch.doubt import Judged, calibration
+from eitskin_studies.experiments.multitouch.doubt import ScoredFrame, calibration
 from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, TRAINING_PARTS, Lab
 from eitskin_studies.experiments.multitouch.measure import Counted, Doubts, Limit
 from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
@@ -60,7 +60,7 @@ def closing(counted: Counted, limited: Sequence[Limit], doubted: Doubts) -> str:
     )
 
 
-def _sure(frames: Sequence[Judged]) -> str:
+def _sure(frames: Sequence[ScoredFrame]) -> str:
     one = calibration([frame for frame in frames if frame.snr_db >= HEADLINE_DB])
     return f"{_pc(one.not_said)}, {_pc(one.right_not_said)}"
 

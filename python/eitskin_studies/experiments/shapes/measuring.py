@@ -52,8 +52,10 @@ class Maker:
             make_model(self.variant.skin, self.protocol, self.linear, settings),
             self.variant.scale,
         )
-        judge = metrics.judge_for(self.variant.skin.outline, model.grid, metrics.RASTER_MM * scale)
-        return Bench(model, judge, GATE_MM * scale)
+        image_scorer = metrics.judge_for(
+            self.variant.skin.outline, model.grid, metrics.RASTER_MM * scale
+        )
+        return Bench(model, image_scorer, GATE_MM * scale)
 
     @cached_property
     def tuning(self) -> TouchSet:
@@ -125,7 +127,7 @@ class Maker:
         return self.bench.scores(self.test.scenes, measured.quiet_v, measured.frames_v[:, -1], t)
 
     def _about(self) -> dict[str, Any]:
-        model, judge, scenes = self.bench.model, self.bench.judge, self.test.scenes
+        model, image_scorer, scenes = self.bench.model, self.bench.image_scorer, self.test.scenes
         norm = np.linalg.norm(self.linear.jacobian, axis=0)
         perfect = np.array(
             [
@@ -148,7 +150,7 @@ class Maker:
                 rim_distance_mm(self.variant.skin.outline, model.grid.centres_mm()).max()
             ),
             "sensitivity_log10": np.log10(norm / norm.max()).round(3).tolist(),
-            "ceiling": float(judge.curves(perfect, self.bench.truths(scenes), [0.5]).mean()),
+            "ceiling": float(image_scorer.curves(perfect, self.bench.truths(scenes), [0.5]).mean()),
             "scene_image": [float(f"{value:.4g}") for value in one.image],
             "scene_found": [[t.x_mm, t.y_mm, t.radius_mm] for t in one.touches],
             "scene_true": [[t.x_mm, t.y_mm, t.radius_mm] for t in scenes[chosen].touches],

@@ -27,8 +27,8 @@ from eitskin_studies.experiments.tank.imagers import (
     baseline_entries,
     core_entries,
 )
-from eitskin_studies.experiments.tank.judging import jittered_truth
 from eitskin_studies.experiments.tank.scenes import simulated
+from eitskin_studies.experiments.tank.signed_scores import jittered_truth
 from eitskin_studies.experiments.tank.tanks import (
     PHANTOMS,
     RADIUS_MM,
@@ -96,16 +96,16 @@ def _grounds(desk: Desk, ours: Tank, folder: Path) -> tuple[Grounds, dict[str, A
     """What is judged on, and what all results depend on."""
     measured = phantoms(folder)
     scale = size_to_paper(ours.skin.outline)
-    judge = metrics.judge_for(ours.skin.outline, ours.grid, metrics.RASTER_MM * scale)
+    image_scorer = metrics.judge_for(ours.skin.outline, ours.grid, metrics.RASTER_MM * scale)
     share = float(np.median(reciprocal_share(measured)))
     settings = desk.settings
     tuning, test = settings.count(TUNING_SCENES), settings.count(TEST_SCENES)
     grounds = Grounds(
-        judge,
+        image_scorer,
         ours.grid,
-        simulated(desk, settings.tuning_seed, tuning, False, judge.raster, share),
-        simulated(desk, settings.tuning_seed, tuning, True, judge.raster, share),
-        simulated(desk, settings.seed, test, False, judge.raster, share),
+        simulated(desk, settings.tuning_seed, tuning, False, image_scorer.raster, share),
+        simulated(desk, settings.tuning_seed, tuning, True, image_scorer.raster, share),
+        simulated(desk, settings.seed, test, False, image_scorer.raster, share),
         measured,
         rods(folder),
         GATE_MM * scale,
@@ -124,9 +124,9 @@ def _grounds(desk: Desk, ours: Tank, folder: Path) -> tuple[Grounds, dict[str, A
 
 def _ceiling(desk: Desk, grounds: Grounds) -> list[dict[str, Any]]:
     """MIoU of the true discs, moved by so much, against the truth, for each touch-like frame."""
-    frames, points = grounds.phantoms, grounds.judge.raster.points_mm
+    frames, points = grounds.phantoms, grounds.image_scorer.raster.points_mm
     assert frames.touch_xy_mm is not None and frames.touch_radius_mm is not None
-    conductive, _ = truth_of(frames, grounds.judge.raster)
+    conductive, _ = truth_of(frames, grounds.image_scorer.raster)
     found, draws = [], desk.settings.count(DRAWS)
     for off in TRUTH_ERRORS:
         scores = []

@@ -17,8 +17,13 @@ from eitskin.scoring import metrics
 from eitskin.scoring.image_touches import match_all, touches_in_image
 from eitskin.scoring.matching import Matching
 from eitskin_studies.experiments.tank.imagers import Entry, Imager, Shown
-from eitskin_studies.experiments.tank.judging import match_signs, places, signed_curves, signed_miou
 from eitskin_studies.experiments.tank.scenes import Set
+from eitskin_studies.experiments.tank.signed_scores import (
+    match_signs,
+    places,
+    signed_curves,
+    signed_miou,
+)
 from eitskin_studies.experiments.tank.tanks import Rods, objects_of, touch_like, truth_of
 
 FloatArray = npt.NDArray[np.float64]
@@ -33,7 +38,7 @@ class Grounds:
     (``test``), the measured frames; ``noise_share`` is the simulated noise over the rms of a
     frame's change."""
 
-    judge: metrics.Judge
+    image_scorer: metrics.ImageScorer
     grid: Grid
     metal: Set
     mixed: Set
@@ -55,7 +60,7 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
     for value in entry.values:
         imager = entry.make(value)
         shown = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, False)
-        curves = curves_of(shown, grounds.metal.conductive, grounds.judge)
+        curves = curves_of(shown, grounds.metal.conductive, grounds.image_scorer)
         score = float(curves.mean(axis=0).max())
         if best is None or score > best[0] + 1e-12:
             best = score, value, imager, curves, shown
@@ -64,12 +69,12 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
     threshold = metrics.best_threshold(curves)
     at = metrics.THRESHOLDS.index(threshold)
     test = imager.show(grounds.test.quiet_v, grounds.test.frames_v, False)
-    test_curves = curves_of(test, grounds.test.conductive, grounds.judge)
+    test_curves = curves_of(test, grounds.test.conductive, grounds.image_scorer)
     chosen = touch_like(grounds.phantoms)
     frames = grounds.phantoms.voltage_v[chosen]
     measured = imager.show(grounds.phantoms.reference_voltage_v, frames, False)
-    conductive, _ = truth_of(grounds.phantoms, grounds.judge.raster)
-    measured_curves = curves_of(measured, conductive[chosen], grounds.judge)
+    conductive, _ = truth_of(grounds.phantoms, grounds.image_scorer.raster)
+    measured_curves = curves_of(measured, conductive[chosen], grounds.image_scorer)
     place_threshold = None
     if metal.touches is None:
         place_threshold = best_place_threshold(metal.images, grounds)
@@ -101,34 +106,34 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
     return {**result, **(_both_signs(imager, place_threshold, grounds) if entry.both_signs else {})}
 
 
-def curves_of(shown: Shown, truth: BoolArray, judge: metrics.Judge) -> FloatArray:
+def curves_of(shown: Shown, truth: BoolArray, image_scorer: metrics.ImageScorer) -> FloatArray:
     """MIoU (k, T) of increases; discs are judged as discs, the same at each threshold."""
     if shown.touches is None:
-        return judge.curves(shown.images, truth)
+        return image_scorer.curves(shown.images, truth)
     scores = [
-        metrics.miou(_discs(touches, 1, judge), true)
+        metrics.miou(_discs(touches, 1, image_scorer), true)
         for touches, true in zip(shown.touches, truth, strict=True)
     ]
     return np.repeat(np.array(scores)[:, None], len(metrics.THRESHOLDS), axis=1)
 
 
 def signed_curves_of(
-    shown: Shown, conductive: BoolArray, resistive: BoolArray, judge: metrics.Judge
+    shown: Shown, conductive: BoolArray, resistive: BoolArray, image_scorer: metrics.ImageScorer
 ) -> FloatArray:
     """The same of both signs."""
     if shown.touches is None:
-        return signed_curves(judge, shown.images, conductive, resistive)
+        return signed_curves(image_scorer, shown.images, conductive, resistive)
     scores = [
-        signed_miou(_discs(touches, 1, judge), _discs(touches, -1, judge), up, down)
+        signed_miou(_discs(touches, 1, image_scorer), _discs(touches, -1, image_scorer), up, down)
         for touches, up, down in zip(shown.touches, conductive, resistive, strict=True)
     ]
     return np.repeat(np.array(scores)[:, None], len(metrics.THRESHOLDS), axis=1)
 
 
-def _discs(touches: Sequence[Touch], sign: int, judge: metrics.Judge) -> BoolArray:
+def _discs(touches: Sequence[Touch], sign: int, image_scorer: metrics.ImageScorer) -> BoolArray:
     own = [t for t in touches if t.strength_s_per_m_mm2 * sign > 0]
     return metrics.disc_mask(
-        judge.raster.points_mm, [(t.x_mm, t.y_mm) for t in own], [t.radius_mm for t in own]
+        image_scorer.raster.points_mm, [(t.x_mm, t.y_mm) for t in own], [t.radius_mm for t in own]
     )
 
 
@@ -150,11 +155,13 @@ def _both_signs(imager: Imager, place_threshold: float | None, grounds: Grounds)
     """All nine frames and the rods, with both signs."""
     mixed, frames = grounds.mixed, grounds.phantoms
     tuned = imager.show(mixed.quiet_v, mixed.frames_v, True)
-    curves = signed_curves_of(tuned, mixed.conductive, mixed.resistive, grounds.judge)
+    curves = signed_curves_of(tuned, mixed.conductive, mixed.resistive, grounds.image_scorer)
     threshold = metrics.best_threshold(curves)
     shown = imager.show(frames.reference_voltage_v, frames.voltage_v, True)
-    truths = truth_of(frames, grounds.judge.raster)
-    scores = signed_curves_of(shown, *truths, grounds.judge)[:, metrics.THRESHOLDS.index(threshold)]
+    truths = truth_of(frames, grounds.image_scorer.raster)
+    scores = signed_curves_of(shown, *truths, grounds.image_scorer)[
+        :, metrics.THRESHOLDS.index(threshold)
+    ]
     matchings: list[Matching] = []
     for k, found in enumerate(_both(shown, place_threshold, grounds.grid)):
         matchings += match_signs(

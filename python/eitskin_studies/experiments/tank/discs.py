@@ -60,7 +60,7 @@ def _variant(
     frames, chosen = grounds.phantoms, touch_like(grounds.phantoms)
     tuned = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, signed)
     shown = imager.show(frames.reference_voltage_v, frames.voltage_v[chosen], signed)
-    truth = truth_of(frames, grounds.judge.raster)[0][chosen]
+    truth = truth_of(frames, grounds.image_scorer.raster)[0][chosen]
     at_tuned = match_all(
         grounds.metal.conductive_mm, increases(tuned, None, grounds.grid), grounds.gate_mm
     )
@@ -71,8 +71,12 @@ def _variant(
     )
     return {
         "name": name,
-        "tuned": float(np.mean(curves_of(tuned, grounds.metal.conductive, grounds.judge)[:, 0])),
-        "touch_like": [float(value) for value in curves_of(shown, truth, grounds.judge)[:, 0]],
+        "tuned": float(
+            np.mean(curves_of(tuned, grounds.metal.conductive, grounds.image_scorer)[:, 0])
+        ),
+        "touch_like": [
+            float(value) for value in curves_of(shown, truth, grounds.image_scorer)[:, 0]
+        ],
         "tuned_exact": float(np.mean([one.exact for one in at_tuned])),
         "found": sum(one.hits for one in at_shown),
         "true": sum(one.hits + one.misses for one in at_shown),

@@ -91,15 +91,15 @@ def _watched(desk: Desk, wanted: list[Levers]) -> Iterable[Levers]:
 def _measured(tank: Tank, grounds: Grounds, levers: Levers) -> dict[str, Any]:
     imager = CoreImager(tank, levers)
     tuned = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, False)
-    curves = grounds.judge.curves(tuned.images, grounds.metal.conductive)
+    curves = grounds.image_scorer.curves(tuned.images, grounds.metal.conductive)
     threshold = metrics.best_threshold(curves)
     at = metrics.THRESHOLDS.index(threshold)
     places = touch_like(grounds.phantoms)
     real = imager.show(
         grounds.phantoms.reference_voltage_v, grounds.phantoms.voltage_v[places], False
     )
-    truth = truth_of(grounds.phantoms, grounds.judge.raster)[0][places]
-    measured = grounds.judge.curves(real.images, truth)
+    truth = truth_of(grounds.phantoms, grounds.image_scorer.raster)[0][places]
+    measured = grounds.image_scorer.curves(real.images, truth)
     return {
         "tuned": float(curves.mean(axis=0).max()),
         "threshold": threshold,

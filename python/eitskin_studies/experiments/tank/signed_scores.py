@@ -33,7 +33,7 @@ def signed_miou(
 
 
 def signed_curves(
-    judge: metrics.Judge,
+    image_scorer: metrics.ImageScorer,
     images: FloatArray,
     conductive: BoolArray,
     resistive: BoolArray,
@@ -43,7 +43,7 @@ def signed_curves(
     and where -x > t max|x|."""
     result = np.empty((len(images), len(thresholds)))
     for k, image in enumerate(images):
-        shown, top = judge.lookup.show(image), float(np.abs(image).max())
+        shown, top = image_scorer.lookup.show(image), float(np.abs(image).max())
         for i, t in enumerate(thresholds):
             up, down = (shown > t * top) & (top > 0), (shown < -t * top) & (top > 0)
             result[k, i] = signed_miou(up, down, conductive[k], resistive[k])
