@@ -35,7 +35,7 @@ from eitskin.scene.plan import Plan, make_plan
 from eitskin.scene.random_touches import Touch
 from eitskin.scene.reading import live_rows, solved_impedance, with_bridges
 from eitskin.scene.registry import Registry
-from eitskin.scene.session import Bench, SessionWork, check_shared, load_effects, make_steps
+from eitskin.scene.session import MeshCache, SessionWork, check_shared, load_effects, make_steps
 from eitskin.scene.touch_path import touches_at
 from eitskin.skin.skin import Skin
 
@@ -100,9 +100,9 @@ class Compiled:
 
 
 def compile_scene(
-    scene: Scene, *, registry: Registry | None = None, bench: Bench | None = None
+    scene: Scene, *, registry: Registry | None = None, mesh_cache: MeshCache | None = None
 ) -> Compiled:
-    """Compile ``scene``; ``bench`` lends the meshes and untouched skins of scenes before.
+    """Compile ``scene``; ``mesh_cache`` lends the meshes and untouched skins of scenes before.
 
     Raises:
         ConfigError: an effect or a parameter is unknown or impossible, or effects contradict each
@@ -110,17 +110,19 @@ def compile_scene(
         GeometryError, ProtocolError, UsageError, MissingExtraError: from effects, meshing and the
             forward model.
     """
-    desk, work = Bench() if bench is None else bench, SessionWork()
+    mesh_cache, work = MeshCache() if mesh_cache is None else mesh_cache, SessionWork()
     modules = load_effects(scene, Registry() if registry is None else registry)
     parameters = {
         name: parse_parameters(module, scene.effects[name], f"{scene.where} [effects.{name}]")
         for name, module in modules.items()
     }
     check_shared(scene, modules, parameters)
-    steps, skin = make_steps(scene, modules, parameters, desk, work)
+    steps, skin = make_steps(scene, modules, parameters, mesh_cache, work)
     phase = _only_phase(scene, steps)
-    states, state_of_frame = _states(scene, desk.cover(skin, scene.elements), steps)
-    model = desk.model(skin, scene.protocol, scene.elements, solved_impedance(states[0].contacts))
+    states, state_of_frame = _states(scene, mesh_cache.cover(skin, scene.elements), steps)
+    model = mesh_cache.model(
+        skin, scene.protocol, scene.elements, solved_impedance(states[0].contacts)
+    )
     pairs = tuple(dict.fromkeys((i, j) for state in states for i, j, _ in state.contacts.bridges))
     model.patterns = with_bridges(model.patterns, pairs)
     method, reach, counted = _choose_method(scene, model, states, steps)
@@ -128,9 +130,9 @@ def compile_scene(
     if method == "factorise" and all(
         step.stage >= Stage.FRONT_END or _is_voltage(step) for step in steps
     ):
-        if bench is not None:
-            desk.v0_v(scene, work)
-        electrodes = desk.known(scene)
+        if mesh_cache is not None:
+            mesh_cache.v0_v(scene, work)
+        electrodes = mesh_cache.known(scene)
         known = {
             k: electrodes for k, s in enumerate(states) if electrodes is not None and not s.touches
         }

@@ -32,7 +32,7 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.dataset_ranges import Ranges, drawn, ranges_of
 from eitskin.scene.description import Scene
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.scene.truth import truth_of
 from eitskin.skin.protocol import table as protocol_of_rows
 from eitskin.skin.skin import skin_to_table
@@ -126,18 +126,18 @@ def job_of(
     return Job(scene, ranges, count, seed, chunk)
 
 
-def make_chunk(job: Job, chunk: int, bench: Bench | None = None) -> bytes:
+def make_chunk(job: Job, chunk: int, mesh_cache: MeshCache | None = None) -> bytes:
     """The .npz of one chunk: c scenes of f frames, t touches; every field is listed in
     docs/guide/scenes.md.
 
     Raises:
         EitskinError: a drawn scene cannot be; the text names its number.
     """
-    desk = _own_bench() if bench is None else bench
+    mesh_cache = _own_mesh_cache() if mesh_cache is None else mesh_cache
     voltage, reference, seeds, touches, values = [], [], [], [], []
     for number in job.numbers(chunk):
         scene = drawn(job.scene, job.ranges, job.seed, number)
-        compiled = compile_scene(scene, bench=desk)
+        compiled = compile_scene(scene, mesh_cache=mesh_cache)
         done = simulate_frames(compiled)
         voltage.append(done.voltage_v[scene.quiet_frames :])
         reference.append(done.voltage_v[: scene.quiet_frames].mean(axis=0))
@@ -176,14 +176,14 @@ def make_chunk(job: Job, chunk: int, bench: Bench | None = None) -> bytes:
     return stream.getvalue()
 
 
-_BENCH: list[Bench] = []
+_MESH_CACHE: list[MeshCache] = []
 
 
-def _own_bench() -> Bench:
+def _own_mesh_cache() -> MeshCache:
     """This process's own meshes and models."""
-    if not _BENCH:
-        _BENCH.append(Bench())
-    return _BENCH[0]
+    if not _MESH_CACHE:
+        _MESH_CACHE.append(MeshCache())
+    return _MESH_CACHE[0]
 
 
 def chunk_path(folder: Path, chunk: int) -> Path:

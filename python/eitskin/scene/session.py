@@ -24,7 +24,7 @@ from eitskin.skin.skin import Skin
 FloatArray = npt.NDArray[np.float64]
 
 
-class Bench:
+class MeshCache:
     """Meshes, models and untouched skins, kept between scenes of the same skin and protocol object
     (dataset mode)."""
 
@@ -122,7 +122,7 @@ def make_steps(
     scene: Scene,
     modules: dict[str, EffectModule],
     parameters: dict[str, Any],
-    desk: Bench,
+    mesh_cache: MeshCache,
     work: SessionWork,
 ) -> tuple[tuple[Step, ...], Skin]:
     """Every named effect's step, geometry first, and the skin as it truly is."""
@@ -134,7 +134,7 @@ def make_steps(
                 "an effect of the geometry comes before the mesh and cannot ask for it; repair the"
                 " effect"
             )
-        return desk.mesh(skin, scene.elements)
+        return mesh_cache.mesh(skin, scene.elements)
 
     def make_stream(name: str, index: int) -> np.random.Generator:
         work.generators += 1
@@ -148,7 +148,7 @@ def make_steps(
         rate_hz=scene.rate_hz,
         seed=scene.seed,
         build_mesh=build_mesh,
-        solve_v0=lambda: desk.v0_v(scene, work),
+        solve_v0=lambda: mesh_cache.v0_v(scene, work),
         make_stream=make_stream,
     )
     steps: list[Step] = []

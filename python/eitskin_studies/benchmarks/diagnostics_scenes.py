@@ -20,7 +20,7 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.random_touches import Scene, random_touches
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import measure
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
@@ -102,7 +102,7 @@ class Table:
     """Makes cases; meshes are kept."""
 
     def __init__(self, seed: int) -> None:
-        self.seed, self._bench = seed, Bench()
+        self.seed, self._bench = seed, MeshCache()
 
     def cases(self, numbers: Iterable[int], scenes: tuple[Scene, ...]) -> Iterator[Case]:
         """Each scene, with every fault that has to be solved for."""
@@ -148,7 +148,7 @@ class Table:
         )
         if protocol is not None:
             made = replace(made, protocol=protocol)
-        return simulate_frames(compile_scene(made, bench=self._bench)).voltage_v
+        return simulate_frames(compile_scene(made, mesh_cache=self._bench)).voltage_v
 
 
 def drawn(seed: int, count: int) -> tuple[Scene, ...]:

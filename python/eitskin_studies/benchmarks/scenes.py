@@ -24,7 +24,7 @@ from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.registry import BUILT_IN
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin_studies.harness.machine import machine
 
@@ -61,12 +61,12 @@ def effects_table(
     base = moving_scene(frames)
     every = {name: DEFAULTS.get(name, {}) for name in BUILT_IN}
     cases = {"none": {}, **{name: {name: table} for name, table in every.items()}, "all": every}
-    desk, times, rows = Bench(), dict[str, list[float]](), {}
+    workspace, times, rows = MeshCache(), dict[str, list[float]](), {}
     work = [(name, k) for k in range(rounds + 1) for name in cases]
     for name, k in work if progress is None else progress(work):
         scene = replace(base, effects=cases[name])
         start = perf_counter()
-        compiled = compile_scene(scene, bench=desk)
+        compiled = compile_scene(scene, mesh_cache=workspace)
         middle = perf_counter()
         done = simulate_frames(compiled)
         end = perf_counter()
@@ -119,16 +119,16 @@ def scenes_table(
 ) -> dict[str, Any]:
     """Frames per second of a moving touch, both ways, and the rate of static scenes of a dataset,
     in one process."""
-    desk = Bench()
+    workspace = MeshCache()
     ways: dict[str, Any] = {}
     frames_v = {}
     for method in ("update", "factorise"):
         scene = replace(moving_scene(frames, elements), solver=method)
-        compile_scene(scene, bench=desk)
+        compile_scene(scene, mesh_cache=workspace)
         compile_s, run_s = [], []
         for _ in range(rounds):
             start = perf_counter()
-            compiled = compile_scene(scene, bench=desk)
+            compiled = compile_scene(scene, mesh_cache=workspace)
             middle = perf_counter()
             done = simulate_frames(compiled)
             compile_s.append(middle - start)
@@ -143,7 +143,9 @@ def scenes_table(
             "factorisations": done.work.factorisations,
             "solves": done.work.solves,
         }
-    auto = compile_scene(replace(moving_scene(frames, elements), solver="auto"), bench=desk)
+    auto = compile_scene(
+        replace(moving_scene(frames, elements), solver="auto"), mesh_cache=workspace
+    )
     largest = float(np.abs(frames_v["factorise"]).max())
     return {
         "machine": machine(),
@@ -157,19 +159,21 @@ def scenes_table(
                 float(np.abs(frames_v["update"] - frames_v["factorise"]).max()) / largest
             ),
         },
-        "dataset": _dataset(scenes, elements, desk, progress),
+        "dataset": _dataset(scenes, elements, workspace, progress),
     }
 
 
-def _dataset(scenes: int, elements: int, desk: Bench, progress: Progress | None) -> dict[str, Any]:
+def _dataset(
+    scenes: int, elements: int, workspace: MeshCache, progress: Progress | None
+) -> dict[str, Any]:
     job = job_of(replace(find_scene("random_touches"), elements=elements), scenes, 1)
-    make_chunk(replace(job, count=1), 0, desk)
+    make_chunk(replace(job, count=1), 0, workspace)
     chunks, seconds, size = range(job.chunks), 0.0, 0
     parts: list[tuple[float, float]] = []
-    time_parts = _timer_of_parts(job, desk)
+    time_parts = _timer_of_parts(job, workspace)
     for chunk in chunks if progress is None else progress(chunks):
         start = perf_counter()
-        size += len(make_chunk(job, chunk, desk))
+        size += len(make_chunk(job, chunk, workspace))
         seconds += perf_counter() - start
         parts += [time_parts() for _ in range(5)]
     return {
@@ -178,19 +182,19 @@ def _dataset(scenes: int, elements: int, desk: Bench, progress: Progress | None)
         "scenes_per_s": scenes / seconds,
         "bytes_a_scene": size / scenes,
         "projected_s": PROJECTED * seconds / scenes if scenes != PROJECTED else seconds,
-        "shares": _shares(parts, _solved_states(job, desk), seconds / scenes),
+        "shares": _shares(parts, _solved_states(job, workspace), seconds / scenes),
     }
 
 
-def _solved_states(job: Job, desk: Bench) -> int:
-    compiled = compile_scene(drawn(job.scene, job.ranges, job.seed, 0), bench=desk)
+def _solved_states(job: Job, workspace: MeshCache) -> int:
+    compiled = compile_scene(drawn(job.scene, job.ranges, job.seed, 0), mesh_cache=workspace)
     return len(compiled.states) - len(compiled.known)
 
 
-def _timer_of_parts(job: Job, desk: Bench) -> Callable[[], tuple[float, float]]:
+def _timer_of_parts(job: Job, workspace: MeshCache) -> Callable[[], tuple[float, float]]:
     """A function that times one factorisation and one solve of all patterns, alone, in s; called
     among the chunks."""
-    compiled = compile_scene(drawn(job.scene, job.ranges, job.seed, 0), bench=desk)
+    compiled = compile_scene(drawn(job.scene, job.ranges, job.seed, 0), mesh_cache=workspace)
     model, impedance = compiled.model, compiled.states[0].contacts.impedance_ohm_m2
     conductivity = np.full(model.mesh.n_elements, job.scene.skin.conductivity_s_per_m)
     matrix = model.system_for(impedance == 0).matrix(conductivity, impedance)

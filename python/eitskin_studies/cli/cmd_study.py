@@ -34,7 +34,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run, write, print."""
-    from eitskin_studies.experiments.experiment import Settings, desk_in
+    from eitskin_studies.experiments.experiment import Settings, workspace_in
     from eitskin_studies.experiments.registry import EXPERIMENTS, load
 
     if options.name == "list":
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         from eitskin.view.pictures import load_matplotlib
 
         load_matplotlib()
-    outcome = experiment.run(desk_in(folder, settings, progress))
+    outcome = experiment.run(workspace_in(folder, settings, progress))
     write_all(outcome, folder, not options.no_pictures)
     if options.page is not None:
         write_page(outcome, folder, options.page, options.name, settings)

@@ -1,5 +1,5 @@
-"""What an experiment is, and the desk that it works at: seeded, resumable, every result kept as it
-comes."""
+"""What an experiment is, and the workspace that it works at: seeded, resumable, every result kept
+as it comes."""
 
 from __future__ import annotations
 
@@ -85,9 +85,9 @@ class Outcome:
 
 
 @dataclass(eq=False)
-class Desk:
+class Workspace:
     """Where an experiment works: its settings, its folder, and what is kept there. Use
-    :func:`desk_in`."""
+    :func:`workspace_in`."""
 
     settings: Settings
     folder: Path
@@ -146,12 +146,12 @@ class Experiment(Protocol):
 
     TITLE: str
 
-    def run(self, desk: Desk) -> Outcome:
-        """All of it; what the desk has kept is not computed again."""
+    def run(self, workspace: Workspace) -> Outcome:
+        """All of it; what the workspace has kept is not computed again."""
 
 
-def desk_in(folder: Path, settings: Settings, progress: Progress) -> Desk:
-    """A desk in ``folder``, which is made.
+def workspace_in(folder: Path, settings: Settings, progress: Progress) -> Workspace:
+    """A workspace in ``folder``, which is made.
 
     Raises:
         FileError: it cannot be made or read.
@@ -162,7 +162,7 @@ def desk_in(folder: Path, settings: Settings, progress: Progress) -> Desk:
         raise FileError(
             f"{folder}: cannot make this folder ({error.strerror}); name another with -o"
         ) from None
-    return Desk(settings, folder, progress, Store(folder / "results.jsonl"))
+    return Workspace(settings, folder, progress, Store(folder / "results.jsonl"))
 
 
 def plain(items: Sequence[Any], what: str) -> Iterable[Any]:

@@ -49,7 +49,7 @@ def session_in_parts(
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class Evaluator:
     """A model and how it is judged: images by ``image_scorer``, touches as found within
     ``gate_mm``."""
 

@@ -135,7 +135,7 @@ def run(
         raise FileError(
             f"{folder}: cannot make this folder ({error.strerror}); name another with -o"
         ) from None
-    desk = _Desk(
+    workspace = _Desk(
         settings,
         Store(folder / RESULTS),
         Workshop(skin, protocol, settings.seed, settings.simulated_elements, folder / "frames"),
@@ -144,9 +144,9 @@ def run(
         progress,
     )
     for name in (TRAIN, HEADLINE, *settings.sets):
-        desk.session(name)
+        workspace.session(name)
     trained = {
-        one.name: _train(desk, one) for one in progress(configurations, "choosing thresholds")
+        one.name: _train(workspace, one) for one in progress(configurations, "choosing thresholds")
     }
     cells = [(name, snr_db) for name in (HEADLINE, *settings.sets) for snr_db in settings.snrs_db]
     scores: dict[str, dict[str, dict[str, Any]]] = {one.name: {} for one in configurations}
@@ -156,16 +156,16 @@ def run(
         [(*cell, one) for cell in cells for one in configurations], "scoring"
     ):
         scores[one.name].setdefault(name, {})[f"{snr_db:g}"] = _score(
-            desk, one, name, snr_db, trained[one.name]
+            workspace, one, name, snr_db, trained[one.name]
         )
-    counted, why = _instructions(desk, configurations, folder)
-    times, kernels = _host(desk, configurations)
+    counted, why = _instructions(workspace, configurations, folder)
+    times, kernels = _host(workspace, configurations)
     points = [
         Point(
             one,
             trained[one.name].threshold,
             trained[one.name].force_scale,
-            static_costs(one, desk.built(one)),
+            static_costs(one, workspace.built(one)),
             counted[one.name],
             times[one.name],
             scores[one.name],
@@ -196,39 +196,41 @@ def _world(settings: RunSettings, skin: Skin, protocol: Protocol) -> dict[str, A
     }
 
 
-def _train(desk: _Desk, one: Configuration) -> Trained:
-    facts = desk.facts(one, "train")
-    kept = desk.store.get(facts)
+def _train(workspace: _Desk, one: Configuration) -> Trained:
+    facts = workspace.facts(one, "train")
+    kept = workspace.store.get(facts)
     if kept is None:
-        session = desk.session(TRAIN)
+        session = workspace.session(TRAIN)
         done = train(
-            desk.built(one), session, solve_session(one, desk.built(one), session, HEADLINE_DB)
+            workspace.built(one),
+            session,
+            solve_session(one, workspace.built(one), session, HEADLINE_DB),
         )
-        kept = desk.store.put(facts, vars(done))
+        kept = workspace.store.put(facts, vars(done))
     return Trained(**kept)
 
 
 def _score(
-    desk: _Desk, one: Configuration, name: str, snr_db: float, trained: Trained
+    workspace: _Desk, one: Configuration, name: str, snr_db: float, trained: Trained
 ) -> dict[str, Any]:
-    session = desk.session(name)
-    facts = desk.facts(one, "score", set=name, scenes=session.scenes, snr_db=snr_db)
-    kept = desk.store.get(facts)
+    session = workspace.session(name)
+    facts = workspace.facts(one, "score", set=name, scenes=session.scenes, snr_db=snr_db)
+    kept = workspace.store.get(facts)
     if kept is None:
-        solved = solve_session(one, desk.built(one), session, snr_db)
-        kept = desk.store.put(facts, score(desk.built(one), session, solved, trained))
+        solved = solve_session(one, workspace.built(one), session, snr_db)
+        kept = workspace.store.put(facts, score(workspace.built(one), session, solved, trained))
     values: dict[str, Any] = kept
     return values
 
 
 def _instructions(
-    desk: _Desk, configurations: Sequence[Configuration], folder: Path
+    workspace: _Desk, configurations: Sequence[Configuration], folder: Path
 ) -> tuple[dict[str, dict[str, Any] | None], str]:
     """Counted instructions by configuration, None where they were not; and a word about how."""
-    how, found = desk.settings, {}
+    how, found = workspace.settings, {}
     wanted: list[Configuration] = []
     for one in configurations:
-        found[one.name] = desk.store.get(_counting(desk, one)) if how.counted else None
+        found[one.name] = workspace.store.get(_counting(workspace, one)) if how.counted else None
         if found[one.name] is None:
             wanted.append(one)
     scenes = (
@@ -242,56 +244,68 @@ def _instructions(
     emulator = make_emulator(folder)
     if isinstance(emulator, str):
         return found, f"estimated from MACs: {emulator}"
-    session = desk.session(HEADLINE)
-    solved = {one.name: solve_session(one, desk.built(one), session, HEADLINE_DB) for one in wanted}
+    session = workspace.session(HEADLINE)
+    solved = {
+        one.name: solve_session(one, workspace.built(one), session, HEADLINE_DB) for one in wanted
+    }
     with ThreadPoolExecutor(2) as pool:
-        jobs = [(one, pool.submit(_count, desk, emulator, one, solved[one.name])) for one in wanted]
+        jobs = [
+            (one, pool.submit(_count, workspace, emulator, one, solved[one.name])) for one in wanted
+        ]
         try:
-            for one, job in desk.progress(jobs, "emulating"):
-                found[one.name] = desk.store.put(_counting(desk, one), job.result())
+            for one, job in workspace.progress(jobs, "emulating"):
+                found[one.name] = workspace.store.put(_counting(workspace, one), job.result())
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
     return found, text
 
 
-def _counting(desk: _Desk, one: Configuration) -> dict[str, Any]:
-    how = desk.settings
-    return desk.facts(one, "instructions", counted=[how.scenes, how.counted, how.costliest])
+def _counting(workspace: _Desk, one: Configuration) -> dict[str, Any]:
+    how = workspace.settings
+    return workspace.facts(one, "instructions", counted=[how.scenes, how.counted, how.costliest])
 
 
-def _count(desk: _Desk, emulator: Emulator, one: Configuration, solved: Solved) -> dict[str, Any]:
-    measured = desk.session(HEADLINE).measured(HEADLINE_DB, one.samples, one.scan, one.held)
-    how = desk.settings
+def _count(
+    workspace: _Desk, emulator: Emulator, one: Configuration, solved: Solved
+) -> dict[str, Any]:
+    measured = workspace.session(HEADLINE).measured(HEADLINE_DB, one.samples, one.scan, one.held)
+    how = workspace.settings
     return count_instructions(
-        emulator, one, desk.built(one), measured, solved, how.counted, how.costliest
+        emulator, one, workspace.built(one), measured, solved, how.counted, how.costliest
     )
 
 
 def _host(
-    desk: _Desk, configurations: Sequence[Configuration]
+    workspace: _Desk, configurations: Sequence[Configuration]
 ) -> tuple[dict[str, dict[str, Any] | None], str]:
     """Times by configuration; all are taken together, or none."""
-    rounds = desk.settings.rounds
+    rounds = workspace.settings.rounds
     if not rounds:
         return {one.name: None for one in configurations}, "not timed"
     facts = {
-        **desk.world,
+        **workspace.world,
         "what": "host",
         "machine": machine(),
         "rounds": rounds,
-        "scenes": desk.settings.scenes,
+        "scenes": workspace.settings.scenes,
     }
-    facts["configurations"] = [desk.facts(one, "host")["configuration"] for one in configurations]
-    kept = desk.store.get(facts)
+    facts["configurations"] = [
+        workspace.facts(one, "host")["configuration"] for one in configurations
+    ]
+    kept = workspace.store.get(facts)
     if kept is None:
-        session = desk.session(HEADLINE)
+        session = workspace.session(HEADLINE)
         entries = [
-            (one, desk.built(one), session.measured(HEADLINE_DB, one.samples, one.scan, one.held))
+            (
+                one,
+                workspace.built(one),
+                session.measured(HEADLINE_DB, one.samples, one.scan, one.held),
+            )
             for one in configurations
         ]
-        rows, kernels = host_times(entries, rounds, desk.progress)
-        kept = desk.store.put(facts, {"rows": rows, "kernels": kernels})
+        rows, kernels = host_times(entries, rounds, workspace.progress)
+        kept = workspace.store.put(facts, {"rows": rows, "kernels": kernels})
     return {one.name: row for one, row in zip(configurations, kept["rows"], strict=True)}, str(
         kept["kernels"]
     )

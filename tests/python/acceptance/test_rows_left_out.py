@@ -21,7 +21,7 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.random_touches import Scene, random_touches
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.scoring import metrics
 from eitskin.scoring.score import Scorer, scorer_for
 from eitskin.skin.skin import paper_skin
@@ -55,7 +55,7 @@ class Case:
 @cache
 def cases() -> tuple[Case, ...]:
     """Every scene, simulated nonlinearly."""
-    skin, bench, made = paper_skin(), Bench(), []
+    skin, mesh_cache, made = paper_skin(), MeshCache(), []
     for k, scene in enumerate(random_touches(skin.outline, SEED, SCENES, "faults").scenes):
         electrode = k % ELECTRODES
         touches = [
@@ -85,7 +85,7 @@ def cases() -> tuple[Case, ...]:
             },
         }
         voltage_v = simulate_frames(
-            compile_scene(scene_from_table(table, "one", Path()), bench=bench)
+            compile_scene(scene_from_table(table, "one", Path()), mesh_cache=mesh_cache)
         ).voltage_v
         made.append(
             Case(scene, electrode, voltage_v[:QUIET], voltage_v[QUIET], voltage_v[QUIET + 1])

@@ -14,7 +14,7 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.random_touches import Scene, random_touches
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.scoring import metrics
 from eitskin.scoring.score import Scorer, scorer_for
 from eitskin.skin.protocol import Protocol, adjacent, table
@@ -35,9 +35,9 @@ def scenes() -> tuple[Scene, ...]:
 
 
 @cache
-def bench() -> Bench:
+def mesh_cache() -> MeshCache:
     """Meshes, kept."""
-    return Bench()
+    return MeshCache()
 
 
 def frames_of(
@@ -60,7 +60,7 @@ def frames_of(
     scene = scene_from_table(text, "fault", Path())
     if protocol is not None:
         scene = replace(scene, protocol=protocol)
-    return simulate_frames(compile_scene(scene, bench=bench())).voltage_v
+    return simulate_frames(compile_scene(scene, mesh_cache=mesh_cache())).voltage_v
 
 
 def swapped(i: int, j: int) -> Protocol:

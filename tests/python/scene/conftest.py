@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 
 from eitskin.scene import session
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -20,6 +20,6 @@ def meshes_are_kept() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def bench() -> Bench:
+def mesh_cache() -> MeshCache:
     """Meshes, models and untouched skins, kept from scene to scene."""
-    return Bench()
+    return MeshCache()

@@ -23,7 +23,7 @@ from eitskin.scene.effect import Contacts, ContactStep, Cost, Stage, VoltageStep
 from eitskin.scene.forward_steps import count_costs
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import run_scene, simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import conductivity_with
 from eitskin.scene.touch_path import touches_at
 
@@ -31,12 +31,12 @@ NEEDED: dict[str, dict[str, Any]] = {"noise": {"snr_db": 60.0}}
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
-def test_naming_an_effect_adds_exactly_one_step(name: str, bench: Bench) -> None:
+def test_naming_an_effect_adds_exactly_one_step(name: str, mesh_cache: MeshCache) -> None:
     """The steps of the scene without it stay, in their order."""
     scene = moving_scene(4)
-    without = compile_scene(scene, bench=bench).plan.steps
+    without = compile_scene(scene, mesh_cache=mesh_cache).plan.steps
     named = compile_scene(
-        replace(scene, effects={name: NEEDED.get(name, {})}), bench=bench
+        replace(scene, effects={name: NEEDED.get(name, {})}), mesh_cache=mesh_cache
     ).plan.steps
     assert len(named) == len(without) + 1
     assert [step.name for step in named if step.name != name] == [step.name for step in without]
@@ -73,7 +73,9 @@ def test_two_hundred_unnamed_effects_change_neither_plan_nor_frames() -> None:
     assert np.array_equal(simulate_frames(among).voltage_v, simulate_frames(alone).voltage_v)
 
 
-def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(bench: Bench) -> None:
+def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(
+    mesh_cache: MeshCache,
+) -> None:
     """V0 has patterns of its own; asking for it late does not disturb the scene's."""
 
     def make(parameters: Any, session: Any) -> VoltageStep:
@@ -90,7 +92,7 @@ def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(bench: Be
     assert scaled == pytest.approx(plain, rel=1e-12)
 
 
-def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
+def test_update_and_factorisation_agree_to_1e_9(mesh_cache: MeshCache) -> None:
     """Real, with contacts, with bridges and complex, and with the grounded electrode off."""
     around = moving_scene(16, rate_hz=20.0)
     for effects in (
@@ -103,7 +105,9 @@ def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
     ):
         frames = {}
         for solver in ("update", "factorise"):
-            compiled = compile_scene(replace(around, effects=effects, solver=solver), bench=bench)
+            compiled = compile_scene(
+                replace(around, effects=effects, solver=solver), mesh_cache=mesh_cache
+            )
             assert compiled.method == solver
             frames[solver] = simulate_frames(compiled)
             assert frames[solver].work.factorisations == (
@@ -114,15 +118,15 @@ def test_update_and_factorisation_agree_to_1e_9(bench: Bench) -> None:
         assert difference < 1e-9 * largest, effects
 
 
-def test_the_way_with_fewer_multiplications_is_chosen(bench: Bench) -> None:
-    many = compile_scene(moving_scene(60), bench=bench)
+def test_the_way_with_fewer_multiplications_is_chosen(mesh_cache: MeshCache) -> None:
+    many = compile_scene(moving_scene(60), mesh_cache=mesh_cache)
     assert many.counted is not None
     assert many.counted.update < many.counted.factorise
     assert many.method == "update"
     assert many.counted.update_solves == 16 + len(many.reach)
     done = simulate_frames(many)
     assert (done.work.factorisations, done.work.solves) == (1, 16 + len(many.reach))
-    still = compile_scene(still_scene(60), bench=bench)
+    still = compile_scene(still_scene(60), mesh_cache=mesh_cache)
     assert still.method == "factorise" and still.counted is None
 
 
@@ -133,7 +137,7 @@ def test_count_prefers_factorisations_where_few_states_touch_much() -> None:
     assert count_costs(model, shunted, np.array([300, 300]), 600).cheaper == "factorise"
 
 
-def test_the_plan_tells_what_the_run_then_does(bench: Bench) -> None:
+def test_the_plan_tells_what_the_run_then_does(mesh_cache: MeshCache) -> None:
     for effects in (
         {},
         {"noise": {"snr_db": 60.0}},
@@ -173,19 +177,21 @@ def test_a_static_scene_of_a_thousand_frames_factorises_once_for_its_frames() ->
     assert bare.meta["counters"]["factorisations"] == 1
 
 
-def test_order_within_a_stage_is_that_of_order_then_name(bench: Bench) -> None:
+def test_order_within_a_stage_is_that_of_order_then_name(mesh_cache: MeshCache) -> None:
     scene = still_scene(
         effects={"jitter": {}, "adc": {}, "noise": {"snr_db": 60.0}, "saturation": {}}
     )
-    names = [step.name for step in compile_scene(scene, bench=bench).plan.steps if step.effect]
+    names = [
+        step.name for step in compile_scene(scene, mesh_cache=mesh_cache).plan.steps if step.effect
+    ]
     turned = replace(scene, effects=dict(reversed(scene.effects.items())))
     assert names == [
-        step.name for step in compile_scene(turned, bench=bench).plan.steps if step.effect
+        step.name for step in compile_scene(turned, mesh_cache=mesh_cache).plan.steps if step.effect
     ]
     assert set(names[-1:]) == {"adc"}
 
 
-def test_contradictory_effects_are_refused(bench: Bench) -> None:
+def test_contradictory_effects_are_refused(mesh_cache: MeshCache) -> None:
     name = effect_module("opposed")
     sys.modules[name].CONFLICTS = ("mains",)  # type: ignore[attr-defined]
     registry = Registry({**BUILT_IN, "opposed": name})
@@ -193,29 +199,29 @@ def test_contradictory_effects_are_refused(bench: Bench) -> None:
     with pytest.raises(
         ConfigError, match=r"f.toml \[effects.opposed\]: it contradicts \[effects.mains\]"
     ):
-        compile_scene(scene, registry=registry, bench=bench)
+        compile_scene(scene, registry=registry, mesh_cache=mesh_cache)
     varying = still_scene(effects={"gel_drying": {}}, solver="update", where="f.toml")
     with pytest.raises(
         ConfigError, match=r'f.toml \[scene\]: solver = "update" .* \[effects.gel_drying\]'
     ):
-        compile_scene(varying, bench=bench)
+        compile_scene(varying, mesh_cache=mesh_cache)
 
 
-def test_a_bridge_rescues_a_detached_electrode(bench: Bench) -> None:
+def test_a_bridge_rescues_a_detached_electrode(mesh_cache: MeshCache) -> None:
     """Electrode 5 off, but joined to 6 by a wire: rows over both read 0, the others' rows are read
     through 6."""
     effects = {
         "detached": {"electrodes": [5]},
         "bridged": {"electrodes": [5, 6], "resistance_ohm": 0.0},
     }
-    compiled = compile_scene(still_scene(effects=effects), bench=bench)
+    compiled = compile_scene(still_scene(effects=effects), mesh_cache=mesh_cache)
     v, rows = simulate_frames(compiled).voltage_v[-1], compiled.scene.protocol.drive_measure
     across = [set(row[2:]) == {5, 6} or set(row[:2]) == {5, 6} for row in rows.tolist()]
     assert np.abs(v[across]).max() < 1e-6 * np.abs(v).max()
     assert (np.abs(v[np.logical_not(across)]) > 0).all()
 
 
-def test_bad_steps_are_said_to_be_the_effects(bench: Bench) -> None:
+def test_bad_steps_are_said_to_be_the_effects(mesh_cache: MeshCache) -> None:
     def renamed(parameters: Any, session: Any) -> VoltageStep:
         return VoltageStep("other", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v)
 
@@ -239,8 +245,10 @@ def test_bad_steps_are_said_to_be_the_effects(bench: Bench) -> None:
         ("negative", "negative or not finite"),
     ):
         with pytest.raises(ConfigError, match=rf"scene \[effects.{name}\]: .*{said}"):
-            compile_scene(still_scene(effects={name: {}}), registry=registry, bench=bench)
+            compile_scene(still_scene(effects={name: {}}), registry=registry, mesh_cache=mesh_cache)
     with pytest.raises(ConfigError, match=r"frame -2, row 0 is -?inf.*endless"):
         simulate_frames(
-            compile_scene(still_scene(effects={"endless": {}}), registry=registry, bench=bench)
+            compile_scene(
+                still_scene(effects={"endless": {}}), registry=registry, mesh_cache=mesh_cache
+            )
         )

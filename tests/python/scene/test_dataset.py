@@ -30,7 +30,7 @@ from eitskin.scene.dataset import (
 from eitskin.scene.dataset_ranges import drawn, ranges_of
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 
 
 def small_job(count: int = 7, seed: int = 3, chunk: int = 3) -> Job:
@@ -58,11 +58,11 @@ def test_an_interrupted_run_resumes_without_doing_things_twice(
     job, made = small_job(), []
     real = make_chunk
 
-    def interrupted(job: Job, chunk: int, bench: Bench | None = None) -> bytes:
+    def interrupted(job: Job, chunk: int, mesh_cache: MeshCache | None = None) -> bytes:
         if len(made) == 2:
             raise KeyboardInterrupt
         made.append(chunk)
-        return real(job, chunk, bench)
+        return real(job, chunk, mesh_cache)
 
     monkeypatch.setattr(dataset, "make_chunk", interrupted)
     with pytest.raises(KeyboardInterrupt):

@@ -16,14 +16,14 @@ from eitskin.errors import FileError
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.library_scenes import descriptions, find_scene, library
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 
 EXPECTED = {
     "single_press", "light_press", "two_touch", "pinch", "swipe", "ring7", "roll", "rotate", "grip",
     "drying_gel", "loose_electrode", "bridged", "mains_hum", "drift", "real_board",
     "random_touches", "demo",
 }  # fmt: skip
-BENCH = Bench()
+BENCH = MeshCache()
 
 
 def test_the_library_has_its_scenes_each_with_a_line() -> None:
@@ -36,7 +36,7 @@ def test_the_library_has_its_scenes_each_with_a_line() -> None:
 @pytest.mark.parametrize("name", sorted(EXPECTED))
 def test_every_library_scene_runs(name: str) -> None:
     scene = replace(find_scene(name), elements=ELEMENTS)
-    compiled = compile_scene(scene, bench=BENCH)
+    compiled = compile_scene(scene, mesh_cache=BENCH)
     frames = simulate_frames(compiled).voltage_v
     assert frames.shape == (scene.n_frames, 208)
     quiet, noise_v = (

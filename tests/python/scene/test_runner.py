@@ -20,7 +20,7 @@ from eitskin.scene.compiler import compile_scene
 from eitskin.scene.effect import Cost, MaterialStep, Stage
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import run, run_scene, simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 
 RANDOM = ("noise", "jitter", "channel_gain", "contact_impedance", "background", "charge_injection")
 
@@ -52,7 +52,7 @@ def test_frames_carry_the_truth_and_survive_their_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("added", sorted(set(BUILT_IN) - {"noise"}))
 def test_adding_an_effect_leaves_the_others_samples_as_they_were(
-    added: str, bench: Bench, monkeypatch: pytest.MonkeyPatch
+    added: str, mesh_cache: MeshCache, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every number that named effects draw, by stream: equal to the bit with and without one more
     effect."""
@@ -71,7 +71,7 @@ def test_adding_an_effect_leaves_the_others_samples_as_they_were(
     steps, states = [], []
     for own in (effects, {added: {}, **effects}):
         drawn.clear()
-        compiled = compile_scene(still_scene(effects=own), bench=bench)
+        compiled = compile_scene(still_scene(effects=own), mesh_cache=mesh_cache)
         simulate_frames(compiled)
         noise = next(step for step in compiled.steps if step.name == "noise")
         steps.append(np.array([noise.apply(np.zeros(208), 0.0, k) for k in range(4)]))  # type: ignore[union-attr,call-arg,arg-type]
@@ -97,7 +97,7 @@ def test_without_random_effects_no_generator_is_made(monkeypatch: pytest.MonkeyP
 
 
 def test_arithmetic_is_complex_only_with_phase(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
+    mesh_cache: MeshCache, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from eitskin.fem import cem
     from eitskin.scene import forward_steps
@@ -119,12 +119,14 @@ def test_arithmetic_is_complex_only_with_phase(
         assert done.work.complex_factorisations == 0 and done.true_v.dtype == np.float64
     assert set(seen) == {np.dtype(np.float64)}
     seen.clear()
-    done = simulate_frames(compile_scene(still_scene(3, effects={"phase": {}}), bench=bench))
+    done = simulate_frames(
+        compile_scene(still_scene(3, effects={"phase": {}}), mesh_cache=mesh_cache)
+    )
     assert set(seen) == {np.dtype(np.complex128)} and done.work.complex_factorisations == 2
     assert done.true_v.dtype == np.complex128 and done.voltage_v.dtype == np.float64
 
 
-def test_a_conductivity_that_cannot_be_names_effect_and_time(bench: Bench) -> None:
+def test_a_conductivity_that_cannot_be_names_effect_and_time(mesh_cache: MeshCache) -> None:
     def make(parameters: Any, session: Any) -> MaterialStep:
         return MaterialStep(
             "sinking", Cost(), "", lambda c, time_s, frame: c - 0.08 * max(time_s + 0.1, 0.0), True
@@ -138,4 +140,4 @@ def test_a_conductivity_that_cannot_be_names_effect_and_time(bench: Bench) -> No
         ConfigError,
         match=r"f.toml \[effects.sinking\]: at 0.05 s it makes a conductivity of -0.002",
     ):
-        simulate_frames(compile_scene(scene, registry=registry, bench=bench))
+        simulate_frames(compile_scene(scene, registry=registry, mesh_cache=mesh_cache))

@@ -28,7 +28,7 @@ from eitskin_studies.experiments.algorithms.entrants import (
 from eitskin_studies.experiments.algorithms.measure import TUNING, Field
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, shown_set, touch_set
-from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
 
 KEPT = (
     *("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"),
@@ -60,14 +60,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("algorithms")
 
 
-def small(folder: Path, monkeypatch: pytest.MonkeyPatch, share: float = 0.03) -> Desk:
+def small(folder: Path, monkeypatch: pytest.MonkeyPatch, share: float = 0.03) -> Workspace:
     monkeypatch.setattr(algorithms, "entrants", few)
     monkeypatch.setattr(measure, "SIMULATED_ELEMENTS", 4000)
     monkeypatch.setattr(measure, "MODEL_ELEMENTS", 2000)
-    desk = desk_in(folder, Settings(seed=2, share=share), plain)
-    real = desk.scenes
-    monkeypatch.setattr(desk, "scenes", lambda skin, protocol: real(skin, protocol, 4000))
-    return desk
+    workspace = workspace_in(folder, Settings(seed=2, share=share), plain)
+    real = workspace.scenes
+    monkeypatch.setattr(workspace, "scenes", lambda skin, protocol: real(skin, protocol, 4000))
+    return workspace
 
 
 @pytest.fixture(scope="module")
@@ -117,14 +117,14 @@ def test_tables_agree_with_the_data(outcome: Outcome) -> None:
 def test_what_is_kept_is_not_computed_again(
     folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    desk = small(folder, monkeypatch)
+    workspace = small(folder, monkeypatch)
 
     def never(*_: object, **__: object) -> None:
         raise AssertionError("computed again")
 
     monkeypatch.setattr(measure, "setup_for", never)
-    monkeypatch.setattr(desk, "scenes", never)
-    again = algorithms.run(desk)
+    monkeypatch.setattr(workspace, "scenes", never)
+    again = algorithms.run(workspace)
     assert (
         again.data == outcome.data
         and again.tables == outcome.tables
@@ -167,7 +167,9 @@ def test_sets_are_apart_and_of_their_numbers() -> None:
 
 
 def test_tuning_and_test_scenes_have_seeds_of_their_own(tmp_path: Path) -> None:
-    field = Field(desk_in(tmp_path, Settings(seed=4), plain), paper_skin(), adjacent(16), 20, 60)
+    field = Field(
+        workspace_in(tmp_path, Settings(seed=4), plain), paper_skin(), adjacent(16), 20, 60
+    )
     assert field.seed_and_count(TUNING) == (100_004, 20) and field.seed_and_count("test") == (4, 60)
 
 

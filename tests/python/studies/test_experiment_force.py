@@ -11,7 +11,7 @@ import pytest
 from study_pages import fills_its_page
 
 from eitskin_studies.experiments import force
-from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
 from eitskin_studies.experiments.force import anywhere, detection, scenes
 from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
@@ -28,8 +28,8 @@ from eitskin_studies.harness.sessions import SceneSolver
 SHARE = 0.01
 
 
-class CountingDesk(Desk):
-    """A desk with a coarse mesh, that counts what is made."""
+class CountingDesk(Workspace):
+    """A workspace with a coarse mesh, that counts what is made."""
 
     made = 0
 
@@ -44,21 +44,21 @@ class CountingDesk(Desk):
         return SceneSolver(skin, protocol, elements, self.folder / "frames")
 
 
-def desk(folder: Path) -> CountingDesk:
-    usual = desk_in(folder, Settings(2, SHARE), plain)
+def workspace(folder: Path) -> CountingDesk:
+    usual = workspace_in(folder, Settings(2, SHARE), plain)
     return CountingDesk(usual.settings, usual.folder, usual.progress, usual.store)
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome, int]:
     folder = tmp_path_factory.mktemp("force")
-    one = desk(folder)
+    one = workspace(folder)
     return folder, force.run(one), one.made
 
 
 def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, Outcome, int]) -> None:
     folder, outcome, made = done
-    again = desk(folder)
+    again = workspace(folder)
     assert to_json(force.run(again)) == to_json(outcome)
     assert again.made == 0 and made > 30
 

@@ -18,7 +18,7 @@ from eitskin.frames.homogeneous import homogeneous as predicted
 from eitskin.skin.protocol import Protocol, adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import homogeneous
-from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
 from eitskin_studies.experiments.homogeneous.cases import CASES, IDEAL, INSTRUMENT
 from eitskin_studies.experiments.homogeneous.measured import FILE, load_tank
 from eitskin_studies.experiments.homogeneous.uniformity import (
@@ -32,9 +32,9 @@ ROWS = PROTOCOL.drive_measure.astype(np.int64)
 EVEN_V = predicted(paper_skin(), 16).voltages(ROWS, 1e-3)
 
 
-def small(folder: Path, patch: pytest.MonkeyPatch, data: Path | None = None) -> Desk:
+def small(folder: Path, patch: pytest.MonkeyPatch, data: Path | None = None) -> Workspace:
     patch.setattr(homogeneous, "SIMULATED_ELEMENTS", 2500)
-    return desk_in(folder, Settings(seed=3, share=0.1, data=data), plain)
+    return workspace_in(folder, Settings(seed=3, share=0.1, data=data), plain)
 
 
 @pytest.fixture(scope="module")

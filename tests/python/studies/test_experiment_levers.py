@@ -10,7 +10,7 @@ from study_pages import fills_its_page
 
 from eitskin.core.results import ALL_TOUCH_FIT
 from eitskin_studies.experiments import levers
-from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
 from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM, Lab
 
@@ -18,11 +18,13 @@ SETTINGS = Settings(share=0.05)
 
 
 def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
-    scenes = Desk.scenes
+    scenes = Workspace.scenes
     patch.setattr(
-        Desk, "scenes", lambda desk, skin, scan, elements=2500: scenes(desk, skin, scan, elements)
+        Workspace,
+        "scenes",
+        lambda workspace, skin, scan, elements=2500: scenes(workspace, skin, scan, elements),
     )
-    return levers.run(desk_in(folder, SETTINGS, plain))
+    return levers.run(workspace_in(folder, SETTINGS, plain))
 
 
 @pytest.fixture(scope="module")

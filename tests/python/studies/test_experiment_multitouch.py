@@ -16,7 +16,7 @@ from eitskin.scene.library_scenes import find_scene
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import multitouch
-from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
 from eitskin_studies.experiments.multitouch import measure
 from eitskin_studies.experiments.multitouch.ceiling import STEP_MM, Truthful
 from eitskin_studies.experiments.multitouch.cells import (
@@ -49,12 +49,14 @@ COARSE = 2500
 
 def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
     """All of it, on few scenes, a coarse mesh, and one cell of the ceiling."""
-    scenes = Desk.scenes
+    scenes = Workspace.scenes
     patch.setattr(
-        Desk, "scenes", lambda desk, skin, scan, elements=COARSE: scenes(desk, skin, scan, elements)
+        Workspace,
+        "scenes",
+        lambda workspace, skin, scan, elements=COARSE: scenes(workspace, skin, scan, elements),
     )
     patch.setattr(measure, "CEILING_CELLS", ((WIDE, 6, 80.0),))
-    return multitouch.run(desk_in(folder, Settings(share=0.01), plain))
+    return multitouch.run(workspace_in(folder, Settings(share=0.01), plain))
 
 
 @pytest.fixture(scope="module")
@@ -151,8 +153,8 @@ def test_what_does_not_fit_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(measure, "counting_cells", lambda: (Cell(WIDE, 40, 1),))
     monkeypatch.setattr(measure, "single_cell", lambda: Cell(WIDE, 41, 1))
     monkeypatch.setattr(measure, "uneven_cells", tuple)
-    desk = desk_in(tmp_path, Settings(), plain)
-    counted = measure.count_all(Lab(desk), desk)
+    workspace = workspace_in(tmp_path, Settings(), plain)
+    counted = measure.count_all(Lab(workspace), workspace)
     assert set(counted.unfit) == {(WIDE, 40), (WIDE, 41)} and not counted.scores
     twelve = measure.Counted({}, {(WIDE, k): "full" for k in range(2, 13)})
     assert all("do not fit" in row[1] for row in exact_table(twelve, WIDE, "x").rows)

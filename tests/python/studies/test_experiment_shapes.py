@@ -17,7 +17,7 @@ from eitskin.fem.grid import grid_for
 from eitskin.model.build import linearise
 from eitskin.skin.protocol import adjacent
 from eitskin_studies.experiments import registry, shapes
-from eitskin_studies.experiments.experiment import Outcome, Settings, desk_in, plain
+from eitskin_studies.experiments.experiment import Outcome, Settings, plain, workspace_in
 from eitskin_studies.experiments.scored import share_text
 from eitskin_studies.experiments.shapes import measuring
 from eitskin_studies.experiments.shapes.example_drawings import (
@@ -41,8 +41,10 @@ def _small(monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], folder: P
     """A run on two shapes with few elements and scenes."""
     monkeypatch.setattr(shapes, "variants", lambda _: [known["disk, 16"], known["hand, 16 placed"]])
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
-    monkeypatch.setattr("eitskin_studies.experiments.experiment.Desk.scenes.__defaults__", (2000,))
-    return shapes.run(desk_in(folder, Settings(share=0.03), plain))
+    monkeypatch.setattr(
+        "eitskin_studies.experiments.experiment.Workspace.scenes.__defaults__", (2000,)
+    )
+    return shapes.run(workspace_in(folder, Settings(share=0.03), plain))
 
 
 def test_a_run_and_one_that_goes_on(
@@ -71,7 +73,7 @@ def test_a_run_and_one_that_goes_on(
 def test_sets_depend_on_the_seed_only(known: dict[str, Variant], tmp_path: Path) -> None:
     def drawn(seed: int) -> Any:
         maker = measuring.Maker(
-            desk_in(tmp_path, Settings(seed=seed, share=0.02), plain), known["forearm, 16"]
+            workspace_in(tmp_path, Settings(seed=seed, share=0.02), plain), known["forearm, 16"]
         )
         return maker.test.scenes, maker.tuning.scenes
 

@@ -14,7 +14,7 @@ from eitskin.errors import UsageError
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import tracking
-from eitskin_studies.experiments.experiment import Desk, Settings, desk_in, plain
+from eitskin_studies.experiments.experiment import Settings, Workspace, plain, workspace_in
 from eitskin_studies.experiments.tracking import measured, streams
 from eitskin_studies.experiments.tracking.counted import Count, count_stream, total
 from eitskin_studies.experiments.tracking.streams import (
@@ -28,17 +28,19 @@ from eitskin_studies.experiments.tracking.streams import (
 
 
 @pytest.fixture
-def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Desk:
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     """Coarse meshes, one SNR, one speed."""
     monkeypatch.setattr(measured, "ELEMENTS", 1500)
     monkeypatch.setattr(streams.Stream.scene, "__defaults__", (1500,))
     monkeypatch.setattr(tracking, "SNRS_DB", (40,))
     monkeypatch.setattr(tracking, "SPEEDS_MM_S", (0, 50))
-    return desk_in(tmp_path / "out", Settings(share=0.05), plain)
+    return workspace_in(tmp_path / "out", Settings(share=0.05), plain)
 
 
-def test_the_whole_and_again(desk: Desk, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    outcome = tracking.run(desk)
+def test_the_whole_and_again(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    outcome = tracking.run(workspace)
     assert {table.name for table in outcome.tables} == {"tracking", "parts", "choices", "passing"}
     assert all(len(row) == len(table.head) for table in outcome.tables for row in table.rows)
     assert len(outcome.tables[1].rows) == 8
@@ -50,7 +52,7 @@ def test_the_whole_and_again(desk: Desk, monkeypatch: pytest.MonkeyPatch, tmp_pa
         measured, "simulate_frames", lambda compiled: pytest.fail("simulated again")
     )
     monkeypatch.setattr(measured, "count_stream", lambda *given: pytest.fail("counted again"))
-    again = tracking.run(desk_in(desk.folder, desk.settings, plain))
+    again = tracking.run(workspace_in(workspace.folder, workspace.settings, plain))
     assert again.tables == outcome.tables
 
 

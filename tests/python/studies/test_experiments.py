@@ -13,7 +13,14 @@ import pytest
 from eitskin.cli.main import main
 from eitskin.errors import ConfigError, UsageError
 from eitskin_studies.experiments import registry
-from eitskin_studies.experiments.experiment import Desk, Outcome, Settings, Table, desk_in, plain
+from eitskin_studies.experiments.experiment import (
+    Outcome,
+    Settings,
+    Table,
+    Workspace,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.write import to_json, write_all, write_page
 
 PAGES = Path(__file__).parents[3] / "docs" / "results"
@@ -27,12 +34,12 @@ class Small:
     def __init__(self) -> None:
         self.computed = 0
 
-    def run(self, desk: Desk) -> Outcome:
+    def run(self, workspace: Workspace) -> Outcome:
         def make() -> Mapping[str, Any]:
             self.computed += 1
             return {"mean": 0.5, "none": float("nan")}
 
-        values = desk.kept({"part": "small"}, make)
+        values = workspace.kept({"part": "small"}, make)
         table = Table("small", ("what", "value"), (("mean", f"{values['mean']:g}"),))
         return Outcome(
             (table,), values, {"small.png": lambda path: path.write_bytes(b"png")}, {"said": "so"}
@@ -116,7 +123,7 @@ def test_what_cannot_be_is_refused_on_one_line(
 
 
 def test_a_page_without_its_marks_stays_as_it_is(tmp_path: Path) -> None:
-    outcome = Small().run(desk_in(tmp_path / "out", Settings(), plain))
+    outcome = Small().run(workspace_in(tmp_path / "out", Settings(), plain))
     write_all(outcome, tmp_path / "out", pictures=False)
     page = tmp_path / "small.md"
     page.write_text("<!-- small -->\nold\n<!-- end small -->\n")
@@ -128,12 +135,12 @@ def test_a_page_without_its_marks_stays_as_it_is(tmp_path: Path) -> None:
 
 def test_a_torn_line_is_computed_again(tmp_path: Path) -> None:
     one = Small()
-    one.run(desk_in(tmp_path, Settings(), plain))
+    one.run(workspace_in(tmp_path, Settings(), plain))
     kept = tmp_path / "results.jsonl"
     kept.write_bytes(kept.read_bytes()[:-9])
-    one.run(desk_in(tmp_path, Settings(), plain))
+    one.run(workspace_in(tmp_path, Settings(), plain))
     assert one.computed == 2
-    one.run(desk_in(tmp_path, Settings(), plain))
+    one.run(workspace_in(tmp_path, Settings(), plain))
     assert one.computed == 2
 
 

@@ -12,25 +12,25 @@ from eitskin_studies.experiments.algorithms.entrants import entrants
 from eitskin_studies.experiments.algorithms.measure import Field
 from eitskin_studies.experiments.algorithms.results import result_of
 from eitskin_studies.experiments.algorithms.tables import data, tables, words
-from eitskin_studies.experiments.experiment import Desk, Outcome
+from eitskin_studies.experiments.experiment import Outcome, Workspace
 
 TITLE = "Single, double and triple touch by every method"
 TEST_SCENES, TUNING_SCENES = 60, 20
 
 
-def run(desk: Desk) -> Outcome:
+def run(workspace: Workspace) -> Outcome:
     """All methods on all sets.
 
     Raises:
         UsageError: the C core is not built.
-        FileError: the desk's folder cannot be written.
+        FileError: the workspace's folder cannot be written.
         GeometryError, MissingExtraError: from meshing and simulating.
     """
     from eitskin_studies.pictures import algorithms_pictures as pictures
 
-    count = desk.settings.count
-    field = Field(desk, paper_skin(), adjacent(16), count(TUNING_SCENES), count(TEST_SCENES))
-    results = [result_of(field, entrant) for entrant in desk.progress(entrants(), "methods")]
+    count = workspace.settings.count
+    field = Field(workspace, paper_skin(), adjacent(16), count(TUNING_SCENES), count(TEST_SCENES))
+    results = [result_of(field, entrant) for entrant in workspace.progress(entrants(), "methods")]
     grid = grid_for(field.skin.outline)
     drawn = {
         "images.png": partial(pictures.draw_images, skin=field.skin, grid=grid, results=results),

@@ -18,7 +18,7 @@ from eitskin.skin.skin import Skin
 from eitskin_studies.compare.families import FindsTouches, Learns, Method, Setup, setup_for
 from eitskin_studies.experiments.algorithms.entrants import Entrant, macs_of
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Desk
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
 from eitskin_studies.harness.sessions import SceneSolver, Session
 
 FloatArray = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ class Field:
         tuning, test: scenes a set, there is one for each number of touches.
     """
 
-    desk: Desk
+    workspace: Workspace
     skin: Skin
     protocol: Protocol
     tuning: int
@@ -82,22 +82,22 @@ class Field:
     @cached_property
     def solver(self) -> SceneSolver:
         """Of scenes, on a mesh of its own."""
-        return self.desk.scenes(self.skin, self.protocol)
+        return self.workspace.scenes(self.skin, self.protocol)
 
     def seed_and_count(self, role: str) -> tuple[int, int]:
         """Of the sets of "tuning" and "test"."""
-        settings = self.desk.settings
+        settings = self.workspace.settings
         return (settings.tuning_seed, self.tuning) if role == TUNING else (settings.seed, self.test)
 
     def session(self, role: str, number: int = 0) -> Session:
         """The set "tuning" or "test" of scenes with ``number`` touches, or "shown"; solved when
         first asked for."""
         if (role, number) not in self._sessions:
-            drawn = shown_set(self.desk.settings.seed)
+            drawn = shown_set(self.workspace.settings.seed)
             if role != SHOWN:
                 drawn = touch_set(self.skin.outline, number, *self.seed_and_count(role))
             name = role if role == SHOWN else f"{drawn.role} touch, {role}"
-            self._sessions[role, number] = self.solver.session(drawn, self.desk.progress, name)
+            self._sessions[role, number] = self.solver.session(drawn, self.workspace.progress, name)
         return self._sessions[role, number]
 
     def facts(
@@ -149,7 +149,7 @@ def judged(
         positions = {} if found is None else _positions(session, found)
         return {**_curves(field, session, images), "macs": macs_of(method, dv), **positions}
 
-    return field.desk.kept_arrays(
+    return field.workspace.kept_arrays(
         field.facts("test", entrant, value, TEST, number, touch_threshold=touch_threshold), make
     )
 
@@ -171,7 +171,7 @@ def shown(field: Field, entrant: Entrant, value: float, touch_threshold: float |
             "found_in": where,
         }
 
-    return field.desk.kept_arrays(
+    return field.workspace.kept_arrays(
         field.facts("shown", entrant, value, SHOWN, 0, touch_threshold=touch_threshold), make
     )
 
@@ -185,7 +185,7 @@ def _tuning(field: Field, entrant: Entrant, value: float, number: int) -> dict[s
             for lookup, curves in _curves(field, session, images).items()
         }
 
-    kept = field.desk.kept(field.facts("tuning", entrant, value, TUNING, number), make)
+    kept = field.workspace.kept(field.facts("tuning", entrant, value, TUNING, number), make)
     return {lookup: np.array(curve) for lookup, curve in kept.items()}
 
 
@@ -209,7 +209,7 @@ def _counting(field: Field, entrant: Entrant, value: float, number: int) -> list
             )
         return scores
 
-    scores: list[list[int]] = field.desk.kept(
+    scores: list[list[int]] = field.workspace.kept(
         field.facts("counting", entrant, value, TUNING, number), make
     )
     return scores

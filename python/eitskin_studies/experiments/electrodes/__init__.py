@@ -28,7 +28,7 @@ from eitskin_studies.experiments.electrodes.measuring import (
 from eitskin_studies.experiments.electrodes.patterns import PATTERNS
 from eitskin_studies.experiments.electrodes.tables import all_tables, is_usual
 from eitskin_studies.experiments.electrodes.tuning import ITERATIONS, LAMBDAS, REGULARISATIONS
-from eitskin_studies.experiments.experiment import Desk, Outcome
+from eitskin_studies.experiments.experiment import Outcome, Workspace
 from eitskin_studies.experiments.scored import number_text
 from eitskin_studies.harness.summary import summarise
 from eitskin_studies.pictures.electrodes_pictures import Bar, draw_counts, draw_patterns
@@ -67,18 +67,18 @@ def cases() -> list[Case]:
     return list(dict.fromkeys([*usual, *swept, *flat]))
 
 
-def run(desk: Desk) -> Outcome:
+def run(workspace: Workspace) -> Outcome:
     """Every case; scenes are solved once a number of electrodes."""
-    shops = {count: Workshop(desk, count) for count in COUNTS}
-    sigma_v = noise_v(desk)
+    shops = {count: Workshop(workspace, count) for count in COUNTS}
+    sigma_v = noise_v(workspace)
     ordered = sorted(cases(), key=lambda case: case.electrodes)
     measured = {
         case: shops[case.electrodes].measured(case, sigma_v)
-        for case in desk.progress(ordered, "scans and models")
+        for case in workspace.progress(ordered, "scans and models")
     }
     results = {case: measured[case] for case in cases()}
     bars = [_bar(case, result) for case, result in results.items() if is_usual(case)]
-    settings = desk.settings
+    settings = workspace.settings
     usual = {
         "random": RANDOM,
         "six": SIX,

@@ -36,7 +36,7 @@ from eitskin_studies.experiments.electrodes.patterns import (
     within_time,
 )
 from eitskin_studies.experiments.electrodes.tuning import tuned
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.scored import session_in_parts
 from eitskin_studies.harness.sessions import Session
 from eitskin_studies.tradeoff.scene_sets import ring_touches
@@ -90,7 +90,7 @@ class Workshop:
     """A skin of some electrodes: scenes solved once for every pattern, and one Jacobian of the
     transfer matrix a grid."""
 
-    desk: Desk
+    workspace: Workspace
     electrodes: int
 
     @cached_property
@@ -104,7 +104,7 @@ class Workshop:
     def sets(self) -> dict[str, TouchSet]:
         """What is touched: for choosing settings and to report, 1 to 3 random ones, six apart, and
         pairs at each distance."""
-        settings, outline = self.desk.settings, self.skin.outline
+        settings, outline = self.workspace.settings, self.skin.outline
         sets = {
             "train": random_touches(outline, settings.tuning_seed, settings.count(TUNING), "train"),
             "train six": spaced_touches(
@@ -122,10 +122,10 @@ class Workshop:
     @cached_property
     def sessions(self) -> dict[str, Session]:
         """The transfer matrices of every scene, without noise."""
-        solver = self.desk.scenes(self.skin, transfer(self.electrodes))
+        solver = self.workspace.scenes(self.skin, transfer(self.electrodes))
         name = f"{self.electrodes} electrodes"
         return {
-            key: session_in_parts(solver, drawn, self.desk.progress, f"{name} {key}")
+            key: session_in_parts(solver, drawn, self.workspace.progress, f"{name} {key}")
             for key, drawn in self.sets.items()
         }
 
@@ -181,7 +181,9 @@ class Workshop:
             "samples": scan.samples,
         }
         sets = [drawn.name for drawn in self.sets.values()]
-        return dict(self.desk.kept({**facts, "sets": sets}, lambda: self._measure(case, noise_v)))
+        return dict(
+            self.workspace.kept({**facts, "sets": sets}, lambda: self._measure(case, noise_v))
+        )
 
     def _measure(self, case: Case, noise_v: float) -> dict[str, Any]:
         settings = BuildSettings(
@@ -191,7 +193,7 @@ class Workshop:
         image_scorer = metrics.judge_for(self.skin.outline, model.grid)
         chosen_on = [(self.sets[key].scenes, *self.frames(key, case, noise_v)) for key in TRAINING]
         scenes = [scene for drawn, _, _ in chosen_on for scene in drawn]
-        bench, chosen = tuned(
+        evaluator, chosen = tuned(
             model,
             image_scorer,
             scenes,
@@ -200,7 +202,7 @@ class Workshop:
         )
         tested = {key: drawn.scenes for key, drawn in self.sets.items() if key not in TRAINING}
         scores = {
-            key: bench.scores(scenes, *self.frames(key, case, noise_v), chosen.t)
+            key: evaluator.scores(scenes, *self.frames(key, case, noise_v), chosen.t)
             for key, scenes in tested.items()
         }
         return {
@@ -214,7 +216,7 @@ class Workshop:
         }
 
 
-def noise_v(desk: Desk) -> float:
+def noise_v(workspace: Workspace) -> float:
     """Sigma in V of a row of 80 samples: 60 dB below rms(V0) of the 16-electrode adjacent scan."""
 
     def make() -> float:
@@ -222,7 +224,7 @@ def noise_v(desk: Desk) -> float:
         forward = ForwardModel(mesh_for_elements(skin, MODEL_ELEMENTS), skin, adjacent(16))
         return noise_deviation_v(forward.voltages(skin.conductivity_s_per_m), SNR_DB)
 
-    return float(desk.kept({"electrodes": "noise", "snr_db": SNR_DB}, make))
+    return float(workspace.kept({"electrodes": "noise", "snr_db": SNR_DB}, make))
 
 
 def resolved_mm(scores: Mapping[str, Any], share: float = 0.9) -> float:

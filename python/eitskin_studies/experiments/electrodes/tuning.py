@@ -18,7 +18,7 @@ from eitskin.model.storage import store
 from eitskin.scene.random_touches import Scene
 from eitskin.scoring import metrics
 from eitskin.solve.batch import reconstruct_many
-from eitskin_studies.experiments.scored import Bench
+from eitskin_studies.experiments.scored import Evaluator
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -68,30 +68,31 @@ def tuned(
     scenes: Sequence[Scene],
     quiet_v: FloatArray,
     frames_v: FloatArray,
-) -> tuple[Bench, Chosen]:
+) -> tuple[Evaluator, Chosen]:
     """The best of all settings on tuning scenes with their frames, quiet (q, m) and touched (k, m):
     by the sum of image MIoU, disc MIoU and exactly counted share; the first of equals."""
-    best: tuple[float, Bench, Chosen] | None = None
+    best: tuple[float, Evaluator, Chosen] | None = None
     for regularisation in REGULARISATIONS:
         regularised = with_regularisation(model, regularisation)
         for lambda_rel, iterations in product(LAMBDAS, ITERATIONS):
             defaults = replace(model.defaults, lambda_rel=lambda_rel, iterations=iterations)
-            bench = Bench(replace(regularised, defaults=defaults), image_scorer)
-            truths = bench.truths(scenes)
-            results = reconstruct_many(bench.model, frames_v, quiet_v, threads=1)
+            evaluator = Evaluator(replace(regularised, defaults=defaults), image_scorer)
+            truths = evaluator.truths(scenes)
+            results = reconstruct_many(evaluator.model, frames_v, quiet_v, threads=1)
             curves = image_scorer.curves(
                 np.array([one.image for one in results], dtype=np.float64), truths
             )
             t = metrics.best_threshold(curves)
             discs = [
-                metrics.miou(bench.discs(one), truth)
+                metrics.miou(evaluator.discs(one), truth)
                 for one, truth in zip(results, truths, strict=True)
             ]
             exact = [
-                bench.matched(scene, one).exact for scene, one in zip(scenes, results, strict=True)
+                evaluator.matched(scene, one).exact
+                for scene, one in zip(scenes, results, strict=True)
             ]
             value = round(float(curves.mean(axis=0).max() + np.mean(discs) + np.mean(exact)), 9)
             if best is None or value > best[0]:
-                best = value, bench, Chosen(regularisation, lambda_rel, iterations, t)
+                best = value, evaluator, Chosen(regularisation, lambda_rel, iterations, t)
     assert best is not None
     return best[1:]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.experiments.experiment import Desk, Outcome
+from eitskin_studies.experiments.experiment import Outcome, Workspace
 from eitskin_studies.experiments.force import anywhere, curves, detection, scenes
 from eitskin_studies.experiments.force.law import NOMINAL, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
@@ -32,16 +32,16 @@ SNR_DB, AVERAGED_DB = 60.0, 72.0  # the second is what the mean of sixteen frame
 SNRS_DB = (40.0, 50.0, SNR_DB, AVERAGED_DB, 84.0)
 
 
-def run(desk: Desk) -> Outcome:
-    """All of it; what the desk has kept is not computed again."""
+def run(workspace: Workspace) -> Outcome:
+    """All of it; what the workspace has kept is not computed again."""
     from eitskin_studies.pictures import force_pictures as pictures
 
-    settings, skin = desk.settings, paper_skin()
+    settings, skin = workspace.settings, paper_skin()
     protocol = adjacent(skin.electrodes.count)
     radius_mm = (skin.outline.diameter_mm or 0.0) / 2
-    solver, instruments = desk.scenes(skin, protocol), Instruments(skin, protocol)
+    solver, instruments = workspace.scenes(skin, protocol), Instruments(skin, protocol)
     laws = (NOMINAL, *drawn_laws(settings.seed, settings.count(16)))
-    put = partial(scenes.solved, desk, solver)
+    put = partial(scenes.solved, workspace, solver)
     nominal = put("force curves", settings.seed, scenes.curve_rows(radius_mm))
     uncertain = put("force laws", settings.seed, scenes.law_rows(radius_mm, len(laws)), laws)
     tuning = scenes.spiral(settings.tuning_seed, settings.count(24, 8), radius_mm)
@@ -50,11 +50,11 @@ def run(desk: Desk) -> Outcome:
     reported = put("force reported", settings.seed, scenes.spread_rows(places))
     light = put("force light", settings.seed, scenes.light_rows(radius_mm, settings.count(15, 6)))
 
-    told, of_laws = (_read(desk, instruments, one, SNR_DB) for one in (nominal, uncertain))
+    told, of_laws = (_read(workspace, instruments, one, SNR_DB) for one in (nominal, uncertain))
     drawn = curves.curves_of(nominal, told, uncertain, of_laws)
     judged: dict[tuple[str, float], anywhere.Anywhere] = {}
-    for snr in desk.progress(SNRS_DB, "calibrating"):
-        on, read = (_read(desk, instruments, one, snr) for one in (tuned, reported))
+    for snr in workspace.progress(SNRS_DB, "calibrating"):
+        on, read = (_read(workspace, instruments, one, snr) for one in (tuned, reported))
         for name in READOUTS:
             facts = {
                 "part": "anywhere",
@@ -66,11 +66,11 @@ def run(desk: Desk) -> Outcome:
                 anywhere.image_scorer, tuned, on[name], reported, read[name], instruments.radius_mm
             )
             judged[name, snr] = anywhere.Anywhere.from_dict(
-                desk.kept(facts, lambda image_scorer=image_scorer: image_scorer().as_dict())  # type: ignore[misc]
+                workspace.kept(facts, lambda image_scorer=image_scorer: image_scorer().as_dict())  # type: ignore[misc]
             )
     reps, quiet = settings.count(30, 4), settings.count(4000, 80)
     found = []
-    for snr in desk.progress(detection.SNRS_DB, "light presses"):
+    for snr in workspace.progress(detection.SNRS_DB, "light presses"):
         facts = {
             "part": "detection",
             "snr_db": snr,
@@ -81,7 +81,7 @@ def run(desk: Desk) -> Outcome:
         look = partial(detection.detect, instruments, light, snr, reps, quiet)
         found.append(
             detection.Detection.from_dict(
-                desk.kept(facts, lambda look=look: look().as_dict())  # type: ignore[misc]
+                workspace.kept(facts, lambda look=look: look().as_dict())  # type: ignore[misc]
             )
         )
 
@@ -109,19 +109,21 @@ def run(desk: Desk) -> Outcome:
             "skin.png": lambda path: pictures.draw_skin(path, skin, places, judged, AVERAGED_DB),
             "detection.png": lambda path: pictures.draw_detection(path, found),
         },
-        {"sets": _sets(desk, tuned, reported, laws, reps, touch)},
+        {"sets": _sets(workspace, tuned, reported, laws, reps, touch)},
     )
 
 
 def _read(
-    desk: Desk, instruments: Instruments, presses: PressSet, snr_db: float
+    workspace: Workspace, instruments: Instruments, presses: PressSet, snr_db: float
 ) -> dict[str, Readout]:
     facts = {"part": "readings", "set": presses.facts, "snr_db": snr_db}
-    return from_lists(desk.kept(facts, lambda: as_lists(instruments.read(presses.session, snr_db))))
+    return from_lists(
+        workspace.kept(facts, lambda: as_lists(instruments.read(presses.session, snr_db)))
+    )
 
 
 def _sets(
-    desk: Desk,
+    workspace: Workspace,
     tuned: PressSet,
     reported: PressSet,
     laws: tuple[object, ...],
@@ -131,7 +133,7 @@ def _sets(
     def of(one: PressSet) -> str:
         return f"{len(set(map(tuple, one.place_mm.tolist())))} places"
 
-    seed, tuning_seed = desk.settings.seed, desk.settings.tuning_seed
+    seed, tuning_seed = workspace.settings.seed, workspace.settings.tuning_seed
     return (
         f"Calibrated on {of(tuned)} of seed {tuning_seed}, reported on {of(reported)} of seed"
         f" {seed}, each with five weights; {len(laws) - 1} laws beside the nominal one; {reps}"

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from eitskin.scene.random_touches import Scene, TouchSet
 from eitskin.scene.streams import stream
-from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, PressLaw
 from eitskin_studies.harness.sessions import SceneSolver, Session
 
@@ -72,7 +72,7 @@ def spiral(seed: int, count: int, radius_mm: float) -> FloatArray:
 
 
 def solved(
-    desk: Desk, solver: SceneSolver, role: str, seed: int,
+    workspace: Workspace, solver: SceneSolver, role: str, seed: int,
     rows: Sequence[tuple[float, tuple[float, float], int, int]],
     laws: Sequence[PressLaw] = (NOMINAL,),
 ) -> PressSet:  # fmt: skip
@@ -84,7 +84,7 @@ def solved(
     volts = []
     for start in range(0, len(scenes), AT_ONCE):
         part = solver.session(
-            TouchSet(role, seed, tuple(scenes[start : start + AT_ONCE])), desk.progress
+            TouchSet(role, seed, tuple(scenes[start : start + AT_ONCE])), workspace.progress
         )
         volts.append(part.exact_v)
     whole = TouchSet(role, seed, tuple(scenes))

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, Desk, Outcome
+from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, Outcome, Workspace
 from eitskin_studies.experiments.homogeneous.cases import (
     CASES,
     ELECTRODES,
@@ -30,32 +30,32 @@ TITLE = "The 208 values of an untouched skin"
 SESSIONS = 8
 
 
-def run(desk: Desk) -> Outcome:
+def run(workspace: Workspace) -> Outcome:
     """All cases in sessions of their own, and the measured tank where there is one.
 
     Raises:
-        FileError: the desk's folder cannot be written, or the measured frames cannot be read.
+        FileError: the workspace's folder cannot be written, or the measured frames cannot be read.
         GeometryError, MissingExtraError: from meshing and simulating.
     """
     from eitskin_studies.pictures import homogeneous_pictures as pictures
 
-    bench, sessions = Bench(), desk.settings.count(SESSIONS)
-    tank = load_tank(desk.settings.data)
+    mesh_cache, sessions = MeshCache(), workspace.settings.count(SESSIONS)
+    tank = load_tank(workspace.settings.data)
     wanted = [(case, k) for case in CASES for k in range(1 if case.name == IDEAL else sessions)]
     found: dict[str, list[dict[str, Any]]] = {}
-    for case, k in desk.progress(wanted, "sessions"):
-        found.setdefault(case.name, []).append(_kept(desk, case, k, bench))
+    for case, k in workspace.progress(wanted, "sessions"):
+        found.setdefault(case.name, []).append(_kept(workspace, case, k, mesh_cache))
     rows = [_row(case.name, found[case.name], adjacent(ELECTRODES), case.fault) for case in CASES]
     if tank is not None:
         ideal = Case(SIMULATED_TANK, {})
-        seed, of_tank = desk.settings.seed, tank_skin()
+        seed, of_tank = workspace.settings.seed, tank_skin()
         facts = {
             "experiment": "homogeneous",
             "case": SIMULATED_TANK,
             "elements": SIMULATED_ELEMENTS,
         }
-        kept = desk.kept(
-            facts, lambda: examined(ideal, of_tank, seed, 0, SIMULATED_ELEMENTS, bench)
+        kept = workspace.kept(
+            facts, lambda: examined(ideal, of_tank, seed, 0, SIMULATED_ELEMENTS, mesh_cache)
         )
         rows.append(_row(SIMULATED_TANK, [kept], adjacent(ELECTRODES)))
         reference = {"reference_v": tank.frames.reference_voltage_v.mean(axis=0).tolist()}
@@ -71,23 +71,23 @@ def run(desk: Desk) -> Outcome:
         "deviations.png": partial(pictures.draw_deviations, rows=rows),
     }
     return Outcome(
-        tables(rows), data(rows), drawn, words(rows, desk.settings, sessions, tank is not None)
+        tables(rows), data(rows), drawn, words(rows, workspace.settings, sessions, tank is not None)
     )
 
 
-def _kept(desk: Desk, case: Case, session: int, bench: Bench) -> dict[str, Any]:
+def _kept(workspace: Workspace, case: Case, session: int, mesh_cache: MeshCache) -> dict[str, Any]:
     """A session under its own seed, its failing electrode another in each."""
-    seed = 1000 * desk.settings.seed + session
+    seed = 1000 * workspace.settings.seed + session
     facts = {
         "experiment": "homogeneous",
         "case": case.name,
         "session": session,
         "elements": SIMULATED_ELEMENTS,
     }
-    kept: dict[str, Any] = desk.kept(
+    kept: dict[str, Any] = workspace.kept(
         facts,
         lambda: examined(
-            case, paper_skin(), seed, (3 * session) % ELECTRODES, SIMULATED_ELEMENTS, bench
+            case, paper_skin(), seed, (3 * session) % ELECTRODES, SIMULATED_ELEMENTS, mesh_cache
         ),
     )
     return kept

@@ -13,7 +13,7 @@ from eitskin.frames.frames import Frames
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import Scene
 from eitskin.scene.runner import run as run_scene
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import Skin
 
@@ -106,7 +106,7 @@ CASES = (
 
 
 def examined(
-    case: Case, skin: Skin, seed: int, electrode: int, elements: int, bench: Bench
+    case: Case, skin: Skin, seed: int, electrode: int, elements: int, mesh_cache: MeshCache
 ) -> dict[str, Any]:
     """A session of the untouched ``skin``: its mean quiet frame "reference_v", and what the doctor
     finds, in JSON values.
@@ -124,7 +124,7 @@ def examined(
         elements=elements,
         where="study homogeneous",
     )
-    made = run_scene(compile_scene(scene, bench=bench))
+    made = run_scene(compile_scene(scene, mesh_cache=mesh_cache))
     frames = Frames(adjacent(ELECTRODES), made.voltage_v, made.reference_voltage_v)
     return {
         "reference_v": frames.reference_voltage_v.mean(axis=0).tolist(),

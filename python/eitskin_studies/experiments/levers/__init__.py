@@ -3,7 +3,7 @@ what it costs."""
 
 from __future__ import annotations
 
-from eitskin_studies.experiments.experiment import Desk, Outcome
+from eitskin_studies.experiments.experiment import Outcome, Workspace
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
 from eitskin_studies.experiments.levers.measure import Lab
 from eitskin_studies.experiments.levers.tables import (
@@ -17,17 +17,17 @@ from eitskin_studies.pictures.levers_pictures import draw_images, draw_search
 TITLE = "Levers: what helps for its multiply-accumulates, and what does not"
 
 
-def run(desk: Desk) -> Outcome:
+def run(workspace: Workspace) -> Outcome:
     """Every search of touches on every set, every image at every SNR."""
-    lab = Lab(desk)
-    searches = {one.name: lab.searched(one) for one in desk.progress(SEARCHES, "searching")}
-    images = {one.name: lab.imaged(one) for one in desk.progress(IMAGES, "imaging")}
+    lab = Lab(workspace)
+    searches = {one.name: lab.searched(one) for one in workspace.progress(SEARCHES, "searching")}
+    images = {one.name: lab.imaged(one) for one in workspace.progress(IMAGES, "imaging")}
     return Outcome(
         tables=(asked_table(images), search_table(searches), image_table(images)),
-        data={"searches": searches, "images": images, "seed": desk.settings.seed},
+        data={"searches": searches, "images": images, "seed": workspace.settings.seed},
         pictures={
             "search.png": lambda path: draw_search(path, searches),
             "images.png": lambda path: draw_images(path, images),
         },
-        words={"conditions": conditions(desk.settings)},
+        words={"conditions": conditions(workspace.settings)},
     )

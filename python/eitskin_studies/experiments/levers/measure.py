@@ -20,7 +20,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.batch import reconstruct_many
 from eitskin.solve.options import default_options
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.levers.configurations import Lever
 from eitskin_studies.experiments.scored import session_in_parts
 from eitskin_studies.harness.sessions import Session, apparent_change_s_per_m_mm2
@@ -43,14 +43,14 @@ DIGITS = 6
 class Lab:
     """Scenes, models and judges, each made when it is first needed."""
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk, self.skin, self.protocol = desk, paper_skin(), adjacent(16)
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace, self.skin, self.protocol = workspace, paper_skin(), adjacent(16)
         self._models: dict[str, Model] = {}
         self._sessions: dict[tuple[str, bool], Session] = {}
 
     @cached_property
     def _solver(self) -> Any:
-        return self.desk.scenes(self.skin, self.protocol)
+        return self.workspace.scenes(self.skin, self.protocol)
 
     @cached_property
     def _raster(self) -> metrics.Raster:
@@ -62,18 +62,18 @@ class Lab:
         for name in (RANDOM, *COUNTED):
             snr_db = 60.0 if name == RANDOM else COUNTED[name][2]
             facts = self._facts("search", lever, name, snr_db)
-            found[name] = self.desk.kept(facts, partial(self._search, lever, name, snr_db))
+            found[name] = self.workspace.kept(facts, partial(self._search, lever, name, snr_db))
         return found
 
     def imaged(self, lever: Lever) -> dict[str, Any]:
         """MIoU of the image and cost at every SNR, t chosen on tuning scenes at 60 dB; by SNR."""
-        threshold = self.desk.kept(
+        threshold = self.workspace.kept(
             self._facts("t", lever, RANDOM, 60.0), partial(self._threshold, lever)
         )
         found: dict[str, Any] = {"threshold": threshold}
         for snr_db in IMAGE_SNRS_DB:
             facts = self._facts("image", lever, RANDOM, snr_db)
-            found[f"{snr_db:g}"] = self.desk.kept(
+            found[f"{snr_db:g}"] = self.workspace.kept(
                 facts, partial(self._image, lever, snr_db, threshold)
             )
         return found
@@ -83,7 +83,7 @@ class Lab:
             "part": part,
             "set": name,
             "snr_db": snr_db,
-            "share": self.desk.settings.share,
+            "share": self.workspace.settings.share,
             **lever.facts(),
         }
 
@@ -93,12 +93,12 @@ class Lab:
             drawn = self._draw(name, tuning)
             role = "tuning" if tuning else "test"
             self._sessions[name, tuning] = session_in_parts(
-                self._solver, drawn, self.desk.progress, f"{name}, {role}"
+                self._solver, drawn, self.workspace.progress, f"{name}, {role}"
             )
         return self._sessions[name, tuning]
 
     def _draw(self, name: str, tuning: bool) -> TouchSet:
-        how, outline = self.desk.settings, self.skin.outline
+        how, outline = self.workspace.settings, self.skin.outline
         seed = how.tuning_seed if tuning else how.seed
         if name == RANDOM:
             return random_touches(outline, seed, how.count(TUNING if tuning else SCENES), "levers")

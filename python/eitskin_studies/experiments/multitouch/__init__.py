@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from eitskin_studies.experiments.experiment import Desk, Outcome
+from eitskin_studies.experiments.experiment import Outcome, Workspace
 from eitskin_studies.experiments.multitouch import doubt_tables, tables
 from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE
 from eitskin_studies.experiments.multitouch.gallery import gallery
@@ -25,21 +25,21 @@ from eitskin_studies.experiments.multitouch.words import closing, conditions
 TITLE = "Many touches at once: how many, where, and when to say that it cannot be told"
 
 
-def run(desk: Desk) -> Outcome:
-    """All of it; what the desk has kept is not computed again.
+def run(workspace: Workspace) -> Outcome:
+    """All of it; what the workspace has kept is not computed again.
 
     Raises:
-        FileError: the desk's folder cannot be written.
+        FileError: the workspace's folder cannot be written.
         MissingExtraError: scipy or netgen is not installed.
     """
     from eitskin_studies.pictures import multitouch_pictures as pictures
 
-    lab = Lab(desk)
-    prepare_mixed(lab, desk)
-    counted = count_all(lab, desk)
-    limited = limits(lab, desk)
-    doubted = doubts(lab, desk, counted)
-    examples = gallery(lab, desk)
+    lab = Lab(workspace)
+    prepare_mixed(lab, workspace)
+    counted = count_all(lab, workspace)
+    limited = limits(lab, workspace)
+    doubted = doubts(lab, workspace, counted)
+    examples = gallery(lab, workspace)
     made = (
         tables.asked_table(counted),
         tables.exact_table(counted, RING, "exact-ring"),
@@ -63,7 +63,7 @@ def run(desk: Desk) -> Outcome:
             "doubt.png": lambda path: pictures.draw_doubt(path, doubted),
             "confidence.png": lambda path: pictures.draw_confidence(path, doubted),
         },
-        {"conditions": conditions(lab, desk), "closing": closing(counted, limited, doubted)},
+        {"conditions": conditions(lab, workspace), "closing": closing(counted, limited, doubted)},
     )
 
 

@@ -13,7 +13,7 @@ from eitskin.errors import GeometryError
 from eitskin.scene.random_touches import Scene
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE, Cell, counting_cells
 from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, Lab
 from eitskin_studies.experiments.multitouch.variants import (
@@ -52,7 +52,7 @@ class Example:
     classical: FloatArray
 
 
-def gallery(lab: Lab, desk: Desk) -> list[Example]:
+def gallery(lab: Lab, workspace: Workspace) -> list[Example]:
     """The first scene of each of ``EXAMPLES``, at 60 dB; what does not fit on the skin is left
     out."""
     usual = {(cell.geometry, cell.touches): cell for cell in counting_cells()}
@@ -91,7 +91,7 @@ def gallery(lab: Lab, desk: Desk) -> list[Example]:
             **VARIANTS[0].facts(),
             **asdict(trained),
         }
-        a = desk.kept_arrays(facts, make)
+        a = workspace.kept_arrays(facts, make)
         title = f"{geometry}, {touches}"
         found.append(
             Example(

@@ -1,4 +1,4 @@
-"""Scenes, frames and methods of the experiment; every result through the desk, a part of some
+"""Scenes, frames and methods of the experiment; every result through the workspace, a part of some
 seconds each."""
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.compare.families import Family, Method, Setup, setup_for
 from eitskin_studies.compare.methods import baseline_methods
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk, plain
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace, plain
 from eitskin_studies.experiments.multitouch.cells import Cell, draw, mixed_cells
 from eitskin_studies.experiments.multitouch.variants import (
     Seen,
@@ -39,13 +39,13 @@ TRAINING_PARTS = 2
 
 
 class Lab:
-    """One desk's scenes and methods. Models and meshes are made when a result is not kept yet, not
-    before."""
+    """One workspace's scenes and methods. Models and meshes are made when a result is not kept yet,
+    not before."""
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk, self.skin = desk, paper_skin()
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace, self.skin = workspace, paper_skin()
         self.protocol = adjacent(self.skin.electrodes.count)
-        self._scenes = desk.scenes(self.skin, self.protocol)
+        self._scenes = workspace.scenes(self.skin, self.protocol)
         self._drawn: dict[tuple[str, bool], TouchSet] = {}
         self._sessions: dict[tuple[str, bool], Session] = {}
         self._models: dict[str, Model] = {}
@@ -73,7 +73,7 @@ class Lab:
     def scenes(self, cell: Cell, tuning: bool = False) -> TouchSet:
         """What is touched; raises GeometryError where it does not fit."""
         if (cell.name, tuning) not in self._drawn:
-            settings = self.desk.settings
+            settings = self.workspace.settings
             seed = settings.tuning_seed if tuning else settings.seed
             self._drawn[cell.name, tuning] = draw(
                 cell, self.skin.outline, seed, settings.count(cell.usual, 3)
@@ -109,7 +109,7 @@ class Lab:
             ]
 
         facts = {**self.facts("core", cell, snr_db, tuning), **variant.facts()}
-        return [Seen(**values) for values in self.desk.kept(facts, make)]
+        return [Seen(**values) for values in self.workspace.kept(facts, make)]
 
     @cached_property
     def _families(self) -> dict[str, Family]:
@@ -141,9 +141,9 @@ class Lab:
         facts = {
             "part": "training",
             "method": name,
-            "scenes": self.desk.settings.count(mixed_cells()[0].usual, 3),
+            "scenes": self.workspace.settings.count(mixed_cells()[0].usual, 3),
         }
-        return Trained(**self.desk.kept(facts, make))
+        return Trained(**self.workspace.kept(facts, make))
 
     def classical(self, cell: Cell, name: str) -> list[FloatArray]:
         """Places that a classical method's images show at 60 dB, of the first scenes."""
@@ -164,5 +164,5 @@ class Lab:
             "method": name,
             **asdict(trained),
         }
-        kept = self.desk.kept(facts, make)
+        kept = self.workspace.kept(facts, make)
         return [np.array(places, dtype=np.float64).reshape(-1, 2) for places in kept]

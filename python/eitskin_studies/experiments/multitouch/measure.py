@@ -11,7 +11,7 @@ import numpy.typing as npt
 from eitskin.errors import GeometryError
 from eitskin.scoring.matching import match
 from eitskin.scoring.snr import noise_deviation_v
-from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch import ceiling
 from eitskin_studies.experiments.multitouch.cells import (
     MIXED,
@@ -91,10 +91,10 @@ class Doubts:
     touches: dict[str, Confidences]
 
 
-def count_all(lab: Lab, desk: Desk) -> Counted:
+def count_all(lab: Lab, workspace: Workspace) -> Counted:
     """The core at each SNR, and the classical methods at 60 dB."""
     counted = Counted({}, {})
-    for cell in desk.progress(
+    for cell in workspace.progress(
         (*counting_cells(), single_cell(), *uneven_cells()), "counting touches"
     ):
         try:
@@ -117,12 +117,12 @@ def count_all(lab: Lab, desk: Desk) -> Counted:
     return counted
 
 
-def limits(lab: Lab, desk: Desk) -> list[Limit]:
+def limits(lab: Lab, workspace: Workspace) -> list[Limit]:
     """Of ``CEILING_CELLS``, each kept."""
     found = []
     usual = {(cell.geometry, cell.touches): cell for cell in counting_cells()}
-    for geometry, touches, snr_db in desk.progress(CEILING_CELLS, "fitting from the truth"):
-        cell, count = usual[geometry, touches], desk.settings.count(CEILING_SCENES)
+    for geometry, touches, snr_db in workspace.progress(CEILING_CELLS, "fitting from the truth"):
+        cell, count = usual[geometry, touches], workspace.settings.count(CEILING_SCENES)
         facts = {
             **lab.facts("ceiling", cell, snr_db, False),
             "scenes": count,
@@ -130,7 +130,7 @@ def limits(lab: Lab, desk: Desk) -> list[Limit]:
         }
         found.append(
             Limit(
-                **desk.kept(
+                **workspace.kept(
                     facts,
                     lambda cell=cell, snr=snr_db, n=count: asdict(  # type: ignore[misc]
                         _limit(lab, cell, snr, n)
@@ -168,7 +168,7 @@ def _limit(lab: Lab, cell: Cell, snr_db: float, count: int) -> Limit:
     )  # fmt: skip
 
 
-def doubts(lab: Lab, desk: Desk, counted: Counted) -> Doubts:
+def doubts(lab: Lab, workspace: Workspace, counted: Counted) -> Doubts:
     """The core's own signal on all that was counted, and on mixed scenes; the rule from mixed
     tuning scenes."""
 
@@ -191,7 +191,7 @@ def doubts(lab: Lab, desk: Desk, counted: Counted) -> Doubts:
         {},
         {},
     )
-    for variant in desk.progress(VARIANTS, "judging doubt"):
+    for variant in workspace.progress(VARIANTS, "judging doubt"):
         found.cells[variant.name], found.mixed[variant.name] = (
             frames(cells, variant),
             frames(parts, variant),
@@ -214,10 +214,10 @@ def _pairs(
     )
 
 
-def prepare_mixed(lab: Lab, desk: Desk) -> None:
+def prepare_mixed(lab: Lab, workspace: Workspace) -> None:
     """Mixed scenes, solved and counted part by part, so that a run that is cut goes on with the
     next."""
-    for cell in desk.progress(mixed_cells(), f"{MIXED} scenes"):
+    for cell in workspace.progress(mixed_cells(), f"{MIXED} scenes"):
         for tuning in (True, False):
             for variant in VARIANTS:
                 for snr_db in SNRS_DB:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Desk
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
 from eitskin_studies.experiments.multitouch.cells import (
     GEOMETRIES,
     MAX,
@@ -20,9 +20,9 @@ from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
 GOOD = 0.90
 
 
-def conditions(lab: Lab, desk: Desk) -> str:
+def conditions(lab: Lab, workspace: Workspace) -> str:
     """What all tables share."""
-    settings = desk.settings
+    settings = workspace.settings
     chosen = ((name, lab.trained(name)) for name in CLASSICAL)
     trained = "; ".join(
         f"{SHORT.get(name, name)}: {one.value:g} and t' = {one.threshold:g}" for name, one in chosen

@@ -6,7 +6,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from eitskin_studies.experiments.experiment import Desk, Outcome
+from eitskin_studies.experiments.experiment import Outcome, Workspace
 from eitskin_studies.experiments.shapes.measuring import SNR_DB, TEST, TUNING, Maker
 from eitskin_studies.experiments.shapes.tables import all_tables
 from eitskin_studies.experiments.shapes.variants import variants
@@ -21,14 +21,14 @@ SAID = (
 )
 
 
-def run(desk: Desk) -> Outcome:
+def run(workspace: Workspace) -> Outcome:
     """Each shape: its model, random touches on it, and where they are found."""
-    makers = {one.name: Maker(desk, one) for one in variants(desk.folder / "drawings")}
+    makers = {one.name: Maker(workspace, one) for one in variants(workspace.folder / "drawings")}
     measured: dict[str, Any] = {
-        name: makers[name].measured() for name in desk.progress(list(makers), "shapes")
+        name: makers[name].measured() for name in workspace.progress(list(makers), "shapes")
     }
     both = {name: (makers[name].variant, result) for name, result in measured.items()}
-    settings = desk.settings
+    settings = workspace.settings
     said = SAID.format(
         test=settings.count(TEST),
         tuning=settings.count(TUNING),

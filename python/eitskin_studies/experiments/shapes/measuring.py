@@ -14,8 +14,8 @@ from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.solve.batch import reconstruct_many
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk
-from eitskin_studies.experiments.scored import Bench, session_in_parts
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
+from eitskin_studies.experiments.scored import Evaluator, session_in_parts
 from eitskin_studies.experiments.shapes.variants import Variant
 from eitskin_studies.harness.sessions import SceneSolver, Session
 
@@ -29,7 +29,7 @@ class Maker:
     """A variant's meshes, model and frames, each made when first asked for: a run that finds every
     result makes none."""
 
-    desk: Desk
+    workspace: Workspace
     variant: Variant
 
     @cached_property
@@ -43,7 +43,7 @@ class Maker:
         return linearise(self.variant.skin, self.protocol, elements=MODEL_ELEMENTS)
 
     @cached_property
-    def bench(self) -> Bench:
+    def evaluator(self) -> Evaluator:
         """The model and its judge, lengths in proportion to the skin."""
         settings = BuildSettings(
             rank=RANKS[self.variant.skin.electrodes.count], elements=MODEL_ELEMENTS
@@ -55,20 +55,20 @@ class Maker:
         image_scorer = metrics.judge_for(
             self.variant.skin.outline, model.grid, metrics.RASTER_MM * scale
         )
-        return Bench(model, image_scorer, GATE_MM * scale)
+        return Evaluator(model, image_scorer, GATE_MM * scale)
 
     @cached_property
     def tuning(self) -> TouchSet:
         """Scenes to choose t on."""
-        return self._drawn("shapes train", self.desk.settings.tuning_seed, TUNING)
+        return self._drawn("shapes train", self.workspace.settings.tuning_seed, TUNING)
 
     @cached_property
     def test(self) -> TouchSet:
         """Scenes to report."""
-        return self._drawn("shapes test", self.desk.settings.seed, TEST)
+        return self._drawn("shapes test", self.workspace.settings.seed, TEST)
 
     def _drawn(self, role: str, seed: int, usual: int) -> TouchSet:
-        count = self.desk.settings.count(usual)
+        count = self.workspace.settings.count(usual)
         return random_touches(self.variant.skin.outline, seed, count, role, self.variant.rules)
 
     def session(self, drawn: TouchSet) -> Session:
@@ -76,24 +76,26 @@ class Maker:
         return session_in_parts(
             self._solver,
             drawn,
-            self.desk.progress,
+            self.workspace.progress,
             f"{self.variant.name.replace(',', '')} {drawn.role}",
         )
 
     @cached_property
     def _solver(self) -> SceneSolver:
-        return self.desk.scenes(self.variant.skin, self.protocol)
+        return self.workspace.scenes(self.variant.skin, self.protocol)
 
     def measured(self) -> dict[str, Any]:
         """Everything of the shape in plain values: ``t``, ``scores`` of the test scenes, and
         ``about`` skin and model."""
-        desk = self.desk
-        t = desk.kept(self._facts("threshold", self.tuning), self._threshold)
-        scores = desk.kept({**self._facts("scores", self.test), "t": t}, lambda: self._scores(t))
+        workspace = self.workspace
+        t = workspace.kept(self._facts("threshold", self.tuning), self._threshold)
+        scores = workspace.kept(
+            {**self._facts("scores", self.test), "t": t}, lambda: self._scores(t)
+        )
         return {
             "t": t,
             "scores": scores,
-            "about": desk.kept(self._facts("about", self.test), self._about),
+            "about": workspace.kept(self._facts("about", self.test), self._about),
         }
 
     def _facts(self, what: str, drawn: TouchSet) -> dict[str, Any]:
@@ -120,14 +122,22 @@ class Maker:
 
     def _threshold(self) -> float:
         measured = self.session(self.tuning).measured(SNR_DB)
-        return self.bench.threshold(self.tuning.scenes, measured.quiet_v, measured.frames_v[:, -1])
+        return self.evaluator.threshold(
+            self.tuning.scenes, measured.quiet_v, measured.frames_v[:, -1]
+        )
 
     def _scores(self, t: float) -> dict[str, Any]:
         measured = self.session(self.test).measured(SNR_DB)
-        return self.bench.scores(self.test.scenes, measured.quiet_v, measured.frames_v[:, -1], t)
+        return self.evaluator.scores(
+            self.test.scenes, measured.quiet_v, measured.frames_v[:, -1], t
+        )
 
     def _about(self) -> dict[str, Any]:
-        model, image_scorer, scenes = self.bench.model, self.bench.image_scorer, self.test.scenes
+        model, image_scorer, scenes = (
+            self.evaluator.model,
+            self.evaluator.image_scorer,
+            self.test.scenes,
+        )
         norm = np.linalg.norm(self.linear.jacobian, axis=0)
         perfect = np.array(
             [
@@ -150,7 +160,9 @@ class Maker:
                 rim_distance_mm(self.variant.skin.outline, model.grid.centres_mm()).max()
             ),
             "sensitivity_log10": np.log10(norm / norm.max()).round(3).tolist(),
-            "ceiling": float(image_scorer.curves(perfect, self.bench.truths(scenes), [0.5]).mean()),
+            "ceiling": float(
+                image_scorer.curves(perfect, self.evaluator.truths(scenes), [0.5]).mean()
+            ),
             "scene_image": [float(f"{value:.4g}") for value in one.image],
             "scene_found": [[t.x_mm, t.y_mm, t.radius_mm] for t in one.touches],
             "scene_true": [[t.x_mm, t.y_mm, t.radius_mm] for t in scenes[chosen].touches],

@@ -15,7 +15,7 @@ from eitskin.model.build import linearise
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM
 from eitskin.skin.skin import size_to_paper
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk, Outcome
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Outcome, Workspace
 from eitskin_studies.experiments.tank import levers as lever_work
 from eitskin_studies.experiments.tank import tables
 from eitskin_studies.experiments.tank.contest import Grounds, contest
@@ -55,16 +55,16 @@ TRUTH_ERRORS = (
 DRAWS = 200
 
 
-def run(desk: Desk) -> Outcome:
+def run(workspace: Workspace) -> Outcome:
     """All of it.
 
     Raises:
         UsageError: no folder of measured frames is given, or it lacks one of them.
     """
-    folder = folder_of(desk.settings.data)
+    folder = folder_of(workspace.settings.data)
     ours = _tank()
-    grounds, facts = _grounds(desk, ours, folder)
-    levers = lever_work.tried(desk, ours, grounds, facts)
+    grounds, facts = _grounds(workspace, ours, folder)
+    levers = lever_work.tried(workspace, ours, grounds, facts)
     best = lever_work.chosen(levers)
     entries = [
         entry
@@ -73,18 +73,18 @@ def run(desk: Desk) -> Outcome:
     ]
     entries.append(lever_work.entry_of(ours, tables.CHOSEN, best))
     results = []
-    for entry in _watched(desk, entries):
+    for entry in _watched(workspace, entries):
         asked = {**facts, "entry": entry.name, "kind": entry.kind, "values": entry.values}
         if entry.name == tables.CHOSEN:
             asked["levers"] = repr(best)
-        results.append(desk.kept(asked, partial(contest, entry, grounds)))
-    ceiling = desk.kept({**facts, "what": "ceiling"}, lambda: _ceiling(desk, grounds))
-    discs = varied(desk, ours, grounds, facts)
-    return tables.outcome(grounds, results, levers, best, discs, ceiling, desk.settings)
+        results.append(workspace.kept(asked, partial(contest, entry, grounds)))
+    ceiling = workspace.kept({**facts, "what": "ceiling"}, lambda: _ceiling(workspace, grounds))
+    discs = varied(workspace, ours, grounds, facts)
+    return tables.outcome(grounds, results, levers, best, discs, ceiling, workspace.settings)
 
 
-def _watched(desk: Desk, entries: list[Entry]) -> Iterable[Entry]:
-    return desk.progress(entries, "methods")
+def _watched(workspace: Workspace, entries: list[Entry]) -> Iterable[Entry]:
+    return workspace.progress(entries, "methods")
 
 
 def _tank() -> Tank:
@@ -92,20 +92,20 @@ def _tank() -> Tank:
     return Tank(skin, protocol, linearise(skin, protocol, elements=MODEL_ELEMENTS))
 
 
-def _grounds(desk: Desk, ours: Tank, folder: Path) -> tuple[Grounds, dict[str, Any]]:
+def _grounds(workspace: Workspace, ours: Tank, folder: Path) -> tuple[Grounds, dict[str, Any]]:
     """What is judged on, and what all results depend on."""
     measured = phantoms(folder)
     scale = size_to_paper(ours.skin.outline)
     image_scorer = metrics.judge_for(ours.skin.outline, ours.grid, metrics.RASTER_MM * scale)
     share = float(np.median(reciprocal_share(measured)))
-    settings = desk.settings
+    settings = workspace.settings
     tuning, test = settings.count(TUNING_SCENES), settings.count(TEST_SCENES)
     grounds = Grounds(
         image_scorer,
         ours.grid,
-        simulated(desk, settings.tuning_seed, tuning, False, image_scorer.raster, share),
-        simulated(desk, settings.tuning_seed, tuning, True, image_scorer.raster, share),
-        simulated(desk, settings.seed, test, False, image_scorer.raster, share),
+        simulated(workspace, settings.tuning_seed, tuning, False, image_scorer.raster, share),
+        simulated(workspace, settings.tuning_seed, tuning, True, image_scorer.raster, share),
+        simulated(workspace, settings.seed, test, False, image_scorer.raster, share),
         measured,
         rods(folder),
         GATE_MM * scale,
@@ -122,12 +122,12 @@ def _grounds(desk: Desk, ours: Tank, folder: Path) -> tuple[Grounds, dict[str, A
     }
 
 
-def _ceiling(desk: Desk, grounds: Grounds) -> list[dict[str, Any]]:
+def _ceiling(workspace: Workspace, grounds: Grounds) -> list[dict[str, Any]]:
     """MIoU of the true discs, moved by so much, against the truth, for each touch-like frame."""
     frames, points = grounds.phantoms, grounds.image_scorer.raster.points_mm
     assert frames.touch_xy_mm is not None and frames.touch_radius_mm is not None
     conductive, _ = truth_of(frames, grounds.image_scorer.raster)
-    found, draws = [], desk.settings.count(DRAWS)
+    found, draws = [], workspace.settings.count(DRAWS)
     for off in TRUTH_ERRORS:
         scores = []
         for k in touch_like(frames):
@@ -140,7 +140,7 @@ def _ceiling(desk: Desk, grounds: Grounds) -> list[dict[str, Any]]:
                     centres,
                     radii,
                     off * RADIUS_MM,
-                    desk.settings.seed,
+                    workspace.settings.seed,
                     draws,
                 )
             )

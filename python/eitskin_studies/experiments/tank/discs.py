@@ -12,7 +12,7 @@ import numpy as np
 
 from eitskin.model.build import linearise
 from eitskin.scoring.image_touches import match_all
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Desk
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.tank.contest import Grounds, curves_of, increases, places_of
 from eitskin_studies.experiments.tank.imagers import CoreImager, Levers, Tank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
@@ -36,11 +36,13 @@ VARIANTS: tuple[tuple[str, dict[str, Any], dict[str, Any], bool], ...] = (
 )
 
 
-def varied(desk: Desk, tank: Tank, grounds: Grounds, facts: dict[str, Any]) -> list[dict[str, Any]]:
+def varied(
+    workspace: Workspace, tank: Tank, grounds: Grounds, facts: dict[str, Any]
+) -> list[dict[str, Any]]:
     """Every variant on the metal set that is chosen by, and on the touch-like frames."""
-    watched: Iterable[Any] = desk.progress(VARIANTS, "discs")
+    watched: Iterable[Any] = workspace.progress(VARIANTS, "discs")
     return [
-        desk.kept({**facts, "discs": repr(one)}, partial(_variant, tank, grounds, *one))
+        workspace.kept({**facts, "discs": repr(one)}, partial(_variant, tank, grounds, *one))
         for one in watched
     ]
 

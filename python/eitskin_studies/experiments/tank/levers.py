@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.scoring import metrics
-from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tank.contest import Grounds
 from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, Tank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
@@ -47,15 +47,15 @@ def together(kind: str) -> list[Levers]:
 
 
 def tried(
-    desk: Desk, tank: Tank, grounds: Grounds, facts: dict[str, Any]
+    workspace: Workspace, tank: Tank, grounds: Grounds, facts: dict[str, Any]
 ) -> dict[Levers, dict[str, Any]]:
     """Every setting of levers that is looked at, with what it gave."""
     wanted = list(
         dict.fromkeys([one for kind in KINDS for one in one_by_one(kind)] + together("difference"))
     )
     found = {}
-    for levers in _watched(desk, wanted):
-        found[levers] = desk.kept(
+    for levers in _watched(workspace, wanted):
+        found[levers] = workspace.kept(
             {**facts, "levers": asdict(levers)}, partial(_measured, tank, grounds, levers)
         )
     return found
@@ -84,8 +84,8 @@ def words_of(levers: Levers) -> str:
     return ", ".join(words) or "defaults"
 
 
-def _watched(desk: Desk, wanted: list[Levers]) -> Iterable[Levers]:
-    return desk.progress(wanted, "levers")
+def _watched(workspace: Workspace, wanted: list[Levers]) -> Iterable[Levers]:
+    return workspace.progress(wanted, "levers")
 
 
 def _measured(tank: Tank, grounds: Grounds, levers: Levers) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from eitskin.scene.random_touches import Scene, TouchRules, TouchSet, random_touches
 from eitskin.scene.streams import stream
 from eitskin.scoring.metrics import Raster, disc_mask
-from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tank.tanks import tank
 from eitskin_studies.harness.sessions import Session
 
@@ -51,7 +51,9 @@ def with_signs(drawn: TouchSet) -> TouchSet:
     return TouchSet(drawn.role, drawn.seed, tuple(scenes))
 
 
-def simulated(desk: Desk, seed: int, count: int, mixed: bool, raster: Raster, share: float) -> Set:
+def simulated(
+    workspace: Workspace, seed: int, count: int, mixed: bool, raster: Raster, share: float
+) -> Set:
     """``count`` scenes of one to three objects, metal, or where ``mixed`` of both kinds. The noise
     of a frame is ``share`` of the rms of its change, as reciprocal readings of the measured frames
     have it; the reference has none.
@@ -59,8 +61,8 @@ def simulated(desk: Desk, seed: int, count: int, mixed: bool, raster: Raster, sh
     skin, protocol = tank()
     role = "tank mixed" if mixed else "tank metal"
     drawn = random_touches(skin.outline, seed, count, role, RULES)
-    session = desk.scenes(skin, protocol).session(
-        with_signs(drawn) if mixed else drawn, desk.progress
+    session = workspace.scenes(skin, protocol).session(
+        with_signs(drawn) if mixed else drawn, workspace.progress
     )
     parts = [[_discs(scene, sign) for scene in session.touches.scenes] for sign in (1, -1)]
     masks = [

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.experiments.experiment import Desk, Outcome, Table
+from eitskin_studies.experiments.experiment import Outcome, Table, Workspace
 from eitskin_studies.experiments.tracking.counted import Count, total
 from eitskin_studies.experiments.tracking.measured import PAIRINGS, Measurer, choices, counts, ways
 from eitskin_studies.experiments.tracking.streams import (
@@ -38,11 +38,11 @@ PLACE_HEAD = ("median mm", "p95 mm", "reported, frames late", "ended, frames lat
 Counts = Mapping[tuple[int, int, str], list[Count]]
 
 
-def run(desk: Desk) -> Outcome:
+def run(workspace: Workspace) -> Outcome:
     """All tables and pictures."""
     from eitskin_studies.pictures.tracking_pictures import draw_stream_told, draw_worth
 
-    measurer, settings = Measurer(desk), desk.settings
+    measurer, settings = Measurer(workspace), workspace.settings
     streams = _streams(settings.seed, "test", settings.count(STREAMS))
     done: dict[tuple[int, int, str], list[Count]] = {}
     for snr_db in SNRS_DB:

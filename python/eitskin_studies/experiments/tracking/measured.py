@@ -15,12 +15,12 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.reference.tracker import Pairing, Tracker, nearest_pairs
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.runner import simulate_frames
-from eitskin.scene.session import Bench
+from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scoring.snr import noise_deviation_v
 from eitskin.solve.options import default_options, tracking
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.experiments.experiment import Desk
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tracking.counted import Count, count_stream
 from eitskin_studies.experiments.tracking.streams import ELEMENTS, Stream
 from eitskin_studies.harness.sessions import converter_for
@@ -73,13 +73,13 @@ def choices(model: Model) -> tuple[Way, ...]:
 
 
 class Measurer:
-    """Solves, measures and reconstructs streams; everything is kept at the desk."""
+    """Solves, measures and reconstructs streams; everything is kept at the workspace."""
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk = desk
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
         self.model, blob = load_prebuilt()
         self._skin = Reconstructor(self.model, blob=blob)
-        self._bench = Bench()
+        self._bench = MeshCache()
 
     def count(self, stream: Stream, snr_db: float, way: Way) -> Count:
         """The core's own tracking."""
@@ -94,7 +94,7 @@ class Measurer:
             told, macs = self.told(stream, snr_db, way.options)
             return count_stream(stream, told, macs).as_dict()
 
-        return Count(**self.desk.kept(facts, make))
+        return Count(**self.workspace.kept(facts, make))
 
     def count_paired(self, stream: Stream, snr_db: float, pairing: Pairing, name: str) -> Count:
         """Tracking by the numpy reference with another rule for who is who."""
@@ -108,7 +108,7 @@ class Measurer:
         def make() -> dict[str, object]:
             return count_stream(stream, self._told_paired(stream, snr_db, pairing), 0).as_dict()
 
-        return Count(**self.desk.kept(facts, make))
+        return Count(**self.workspace.kept(facts, make))
 
     def told(
         self, stream: Stream, snr_db: float, options: Options
@@ -141,7 +141,7 @@ class Measurer:
         noise_v = noise_deviation_v(exact_v[0], snr_db)
         span_v = how.adc_headroom * float(np.abs(exact_v[0]).max())
         assert how.adc_bits is not None
-        converter = (noise_v, 2 * span_v / 2**how.adc_bits, span_v, self.desk.settings.seed)
+        converter = (noise_v, 2 * span_v / 2**how.adc_bits, span_v, self.workspace.settings.seed)
         quiet_v, _ = measure(
             np.tile(exact_v[0], (Measurement.quiet_frames, 1)), *converter, f"quiet {stream.name}"
         )
@@ -157,11 +157,11 @@ class Measurer:
         def make() -> dict[str, FloatArray]:
             return {
                 "voltage_v": (
-                    simulate_frames(compile_scene(stream.scene(), bench=self._bench)).voltage_v
+                    simulate_frames(compile_scene(stream.scene(), mesh_cache=self._bench)).voltage_v
                 )
             }
 
-        return self.desk.kept_arrays(
+        return self.workspace.kept_arrays(
             {"what": "stream", "stream": stream.facts(), "elements": ELEMENTS}, make
         )["voltage_v"]
 
@@ -195,4 +195,4 @@ def counts(
     measurer: Measurer, streams: Sequence[Stream], snr_db: float, way: Way, what: str
 ) -> list[Count]:
     """Of each stream."""
-    return [measurer.count(one, snr_db, way) for one in measurer.desk.progress(streams, what)]
+    return [measurer.count(one, snr_db, way) for one in measurer.workspace.progress(streams, what)]
