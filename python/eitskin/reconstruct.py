@@ -29,7 +29,7 @@ from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
 
 if TYPE_CHECKING:
     from eitskin.scoring.score import FrameScore
-    from eitskin.tuning.front import Point, Wish
+    from eitskin.tuning.front import Point, Target
 
 Results = dict[int, Reconstruction]
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -52,7 +52,7 @@ class Settings:
     model: Path | None = None
     engine: str = "c"
     changes: dict[str, Any] = field(default_factory=dict)
-    wish: Wish | None = None
+    target: Target | None = None
     track: bool = False
     threads: int = 1
     only: tuple[str, ...] | None = None
@@ -133,7 +133,7 @@ def check(how: Settings, output: Path | None, picture: Path | None) -> None:
         for reason, applies in reasons.items():
             if applies:
                 raise UsageError(f"--threads {how.threads}: {reason}; use --threads 1")
-    if how.wish is not None and how.engine != "c":
+    if how.target is not None and how.engine != "c":
         raise UsageError(
             "--budget and --accuracy are of the C core in float32; leave  --engine"
             f" {how.engine}  out"
@@ -176,13 +176,13 @@ def apply_options(reconstructor: Reconstructor, how: Settings, notes: list[str])
     reconstructor.with_options(**how.changes)
     if how.track:
         reconstructor.set_options(tracking(reconstructor.options))
-    if how.wish is None:
+    if how.target is None:
         return None
     from eitskin.tuning.for_model import chosen_point, settings_text
 
-    point = chosen_point(how.wish, reconstructor.model, reconstructor.options)
+    point = chosen_point(how.target, reconstructor.model, reconstructor.options)
     reconstructor.with_options(**point.configuration.solver_settings)
-    notes.append(settings_text(point, how.wish.board))
+    notes.append(settings_text(point, how.target.board))
     return point
 
 

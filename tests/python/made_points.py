@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.front import Point, Where, Wish, check_wish, read_budget
+from eitskin.tuning.front import Conditions, Point, Target, check_wish, read_budget
 
-HERE = Where()
+HERE = Conditions()
 
 
 def point(name: str, accuracy: float, instructions: float, **more: Any) -> Point:
@@ -61,9 +61,9 @@ POINTS = (
 COLD = POINTS[:-1]
 
 
-def wish(
+def target(
     budget: str | None = None, accuracy: float | None = None, board: str = "f767", **more: Any
-) -> Wish:
+) -> Target:
     return check_wish(
-        Wish(None if budget is None else read_budget(budget), accuracy, board, HERE, **more)
+        Target(None if budget is None else read_budget(budget), accuracy, board, HERE, **more)
     )

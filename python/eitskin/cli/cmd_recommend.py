@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.budget_options import add_wish, read_wish
+from eitskin.cli.budget_options import add_wish, read_target
 from eitskin.errors import UsageError
 
 
@@ -49,11 +49,14 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.fileio import refuse_unwritable
     from eitskin.skin.protocol import adjacent
     from eitskin.skin.skin import load_skin, paper_skin
-    from eitskin.tuning.front import Where, choose, load_front
+    from eitskin.tuning.front import Conditions, choose, load_front
     from eitskin.tuning.recommend import Recommendation, write_model
 
-    wish = read_wish(
-        options, options.board, Where(options.scenes, options.snr_db, options.by), options.period
+    target = read_target(
+        options,
+        options.board,
+        Conditions(options.scenes, options.snr_db, options.by),
+        options.period,
     )
     refuse_unwritable(options.output)
     if options.skin is not None and options.output is None:
@@ -63,9 +66,9 @@ def run(options: argparse.Namespace) -> int:
     )
     front = load_front(options.front)
     point = choose(
-        [one for one in front.points if options.warm or not one.configuration.warm_start], wish
+        [one for one in front.points if options.warm or not one.configuration.warm_start], target
     )
-    chosen = Recommendation(point, wish)
+    chosen = Recommendation(point, target)
     size = None if options.output is None else write_model(options.output, point, skin, protocol)
     if options.json:
         model = None if options.output is None else str(options.output)

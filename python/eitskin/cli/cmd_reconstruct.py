@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.budget_options import add_wish, named_wish
+from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.cli.device_options import add_solver, named_solver
 from eitskin.cli.progress import bar
 from eitskin.errors import FrameError, UsageError
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
         model=options.model,
         engine=options.engine,
         changes=changes | named_solver(options),
-        wish=named_wish(options, "host"),
+        target=named_target(options, "host"),
         track=options.track,
         threads=options.threads,
         only=None if options.only is None else tuple(options.only.split(",")),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import option
-from eitskin.cli.budget_options import add_wish, named_wish
+from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.errors import FileError, UsageError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from eitskin.device.settings import ScanSettings, SolverSettings
     from eitskin.device.wire.packets import Stream
     from eitskin.scoring.scene_truth import SceneTruth
-    from eitskin.tuning.front import Wish
+    from eitskin.tuning.front import Target
 
 DEVICE_HELP = (
     "auto (the one board that is plugged in), serial:/dev/ttyACM0, sim:SCENE (simulated),"
@@ -278,7 +278,7 @@ def check_scan(options: argparse.Namespace) -> None:
 
     read_scan(options)
     read_solver(options)
-    named_wish(options, "f767")
+    named_target(options, "f767")
     if options.tare is not None:
         check_tare_frames(options.tare)
 
@@ -345,9 +345,9 @@ def prepare(
     if device.transport.replays:
         _refuse_settings(options, device.transport.name)
         return None
-    wish = named_wish(options, "f767")
+    target = named_target(options, "f767")
     settings = (
-        read_solver(options) if wish is None else _wished_solver(options, wish, device, known)
+        read_solver(options) if target is None else _wished_solver(options, target, device, known)
     )
     solver = set_up(device, read_scan(options), settings, known)
     recorder = None if record is None else Recorder(record, device, solver, overwrite=True)
@@ -380,7 +380,7 @@ def prepare(
 
 
 def _wished_solver(
-    options: argparse.Namespace, wish: Wish, device: Device, known: KnownModel | None
+    options: argparse.Namespace, target: Target, device: Device, known: KnownModel | None
 ) -> SolverSettings:
     """The settings of the measured point that ``--budget`` and ``--accuracy`` choose for the
     board's model.
@@ -399,7 +399,7 @@ def _wished_solver(
     if known is None:
         known = need_model(device.board, options.model, device.transport.name, "a budget")
     named = read_solver(options)
-    point = chosen_point(wish, known.model, named.applied(known.model), board_takes())
+    point = chosen_point(target, known.model, named.applied(known.model), board_takes())
     say(settings_text(point, "f767"))
     kept = {
         name: value

@@ -9,11 +9,13 @@ from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
 from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.front import Point, Where, Wish, choose, load_front
+from eitskin.tuning.front import Conditions, Point, Target, choose, load_front
 
 
-def chosen_point(wish: Wish, model: Model, now: Options, settable: set[str] | None = None) -> Point:
-    """The measured point that fulfils ``wish`` with ``model``: of its rank, grid, storage and
+def chosen_point(
+    target: Target, model: Model, now: Options, settable: set[str] | None = None
+) -> Point:
+    """The measured point that fulfils ``target`` with ``model``: of its rank, grid, storage and
     reduction, scanned fully with 80 samples, and with no other settings than ``now`` but those in
     ``settable`` (None: any).
 
@@ -44,7 +46,7 @@ def chosen_point(wish: Wish, model: Model, now: Options, settable: set[str] | No
             f" {model.stored.storage}{' and starts warm' if now.warm_start else ''}; make a model"
             " of one by  eitskin recommend -o MODEL.eitm"
         )
-    return choose(points, wish, "measured point of this model")
+    return choose(points, target, "measured point of this model")
 
 
 def _same(value: Any, other: Any) -> bool:
@@ -75,9 +77,9 @@ def settings_text(point: Point, board: str) -> str:
     """What was chosen, in a line."""
     one = point.configuration
     score, typical, most = (
-        point.accuracy(Where()),
-        point.cost("us", board, Where()),
-        point.cost("us", board, Where(), True),
+        point.accuracy(Conditions()),
+        point.cost("us", board, Conditions()),
+        point.cost("us", board, Conditions(), True),
     )
     text = (
         f"settings of {point.name!r}: {one.solver}, {one.iterations} iterations at most, lambda_rel"

@@ -95,16 +95,16 @@ class Point:
         """The configuration's."""
         return self.configuration.name
 
-    def score(self, where: Where) -> dict[str, Any] | None:
+    def score(self, where: Conditions) -> dict[str, Any] | None:
         """The scores on a set at an SNR; None where that was not measured."""
         return self.scores.get(where.scenes, {}).get(f"{where.snr_db:g}")
 
-    def accuracy(self, where: Where) -> float | None:
+    def accuracy(self, where: Conditions) -> float | None:
         """Mean MIoU there."""
         score = self.score(where)
         return None if score is None else float(score[where.judged]["mean"])
 
-    def macs(self, where: Where) -> tuple[float, float] | None:
+    def macs(self, where: Conditions) -> tuple[float, float] | None:
         """Mean and most MACs of solve and touches there."""
         score = self.score(where)
         return (
@@ -113,7 +113,7 @@ class Point:
             else (score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"])
         )
 
-    def cost(self, unit: str, board: str, where: Where, worst: bool = False) -> float | None:
+    def cost(self, unit: str, board: str, where: Conditions, worst: bool = False) -> float | None:
         """Solve and touches of a frame in ``unit``: the mean (host: the median), or of the
         costliest frame that was counted or timed; None if unknown. Times of the F767 are estimates:
         an instruction a cycle."""
@@ -151,7 +151,7 @@ def board_takes() -> set[str]:
 
 
 @dataclass(frozen=True)
-class Where:
+class Conditions:
     """What accuracy means: which scenes, at which SNR, and whether images or discs are judged."""
 
     scenes: str = "random"
@@ -236,14 +236,14 @@ def load_front(path: Path | None = None) -> Front:
 
 
 @dataclass(frozen=True)
-class Wish:
+class Target:
     """What is asked for: at most ``budget``, for the mean frame or the ``worst``, at least
     ``accuracy``, on ``board``; a frame measured within ``period_us``."""
 
     budget: Budget | None
     accuracy: float | None
     board: str
-    where: Where
+    where: Conditions
     period_us: float | None = None
     worst: bool = False
 
@@ -262,27 +262,31 @@ class Wish:
         return "us" if self.budget is None else self.budget.unit
 
 
-def check_wish(wish: Wish) -> Wish:
-    """``wish`` if it can be.
+def check_wish(target: Target) -> Target:
+    """``target`` if it can be.
 
     Raises:
         UsageError: nothing is asked for, or a number is out of range.
     """
-    if wish.budget is None and wish.accuracy is None:
+    if target.budget is None and target.accuracy is None:
         raise UsageError("name what to choose by:  --budget 10ms  or  --accuracy 0.86")
-    if wish.accuracy is not None and not 0 < wish.accuracy < 1:
-        raise UsageError(f"--accuracy {wish.accuracy:g} is an MIoU; use above 0 to below 1")
-    if wish.period_us is not None and not wish.period_us > 0:
+    if target.accuracy is not None and not 0 < target.accuracy < 1:
+        raise UsageError(f"--accuracy {target.accuracy:g} is an MIoU; use above 0 to below 1")
+    if target.period_us is not None and not target.period_us > 0:
         raise UsageError("--period must be above 0")
-    if wish.board == "host" and wish.budget is not None and wish.budget.unit == "instructions":
+    if (
+        target.board == "host"
+        and target.budget is not None
+        and target.budget.unit == "instructions"
+    ):
         raise UsageError(
             "instructions are counted on the Cortex-M7; use a time or MACs for the host, or "
             " --board f767"
         )
-    return wish
+    return target
 
 
-def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") -> Point:
+def choose(points: Iterable[Point], target: Target, what: str = "measured point") -> Point:
     """With a budget the most accurate point within it; with an accuracy the cheapest that reaches
     it; with both the cheapest that does both. Points that save on the fit of touches are left out.
     ``what`` names the points in the refusal.
@@ -293,38 +297,39 @@ def choose(points: Iterable[Point], wish: Wish, what: str = "measured point") ->
     known = []
     for one in points:
         cost, accuracy = (
-            one.cost(wish.unit, wish.board, wish.where, wish.worst),
-            one.accuracy(wish.where),
+            one.cost(target.unit, target.board, target.where, target.worst),
+            one.accuracy(target.where),
         )
         usable = one.configuration.touch_sweeps >= MIN_SWEEPS and (
-            wish.board == "host" or one.fits_f767
+            target.board == "host" or one.fits_f767
         )
         if cost is not None and accuracy is not None and usable:
             known.append((cost, accuracy, one))
     if not known:
         raise UsageError(
-            f"no {what} has {wish.where} and a cost in {wish.unit} on the {wish.board}; run "
+            f"no {what} has {target.where} and a cost in {target.unit} on the {target.board}; run "
             " eitskin tradeoff run"
         )
-    known = [row for row in known if row[2].costs["acquisition_us"] <= wish.acquisition_us]
+    known = [row for row in known if row[2].costs["acquisition_us"] <= target.acquisition_us]
     if not known:
         raise UsageError(
-            f"no {what} measures a frame within {wish.acquisition_us / 1000:g} ms; allow more with "
+            f"no {what} measures a frame within {target.acquisition_us / 1000:g} ms; allow more"
+            f" with "
             " --period"
         )
-    within = [row for row in known if wish.budget is None or row[0] <= wish.budget.value]
+    within = [row for row in known if target.budget is None or row[0] <= target.budget.value]
     if not within:
         least = min(known, key=lambda row: row[0])
-        takes = Budget(least[0], wish.unit)
+        takes = Budget(least[0], target.unit)
         raise UsageError(
-            f"no {what} keeps to {wish.budget}; the cheapest, {least[2].name!r}, takes {takes}"
+            f"no {what} keeps to {target.budget}; the cheapest, {least[2].name!r}, takes {takes}"
         )
-    if wish.accuracy is None:
+    if target.accuracy is None:
         return min(within, key=lambda row: (-row[1], row[0]))[2]
-    reached = [row for row in within if row[1] >= wish.accuracy]
+    reached = [row for row in within if row[1] >= target.accuracy]
     if not reached:
         best = max(within, key=lambda row: row[1])
-        bound = "" if wish.budget is None else f" within {wish.budget}"
-        found = f"the best, {best[2].name!r}, has {best[1]:.3f} ({wish.where})"
-        raise UsageError(f"no {what} reaches {wish.accuracy:g}{bound}; {found}")
+        bound = "" if target.budget is None else f" within {target.budget}"
+        found = f"the best, {best[2].name!r}, has {best[1]:.3f} ({target.where})"
+        raise UsageError(f"no {what} reaches {target.accuracy:g}{bound}; {found}")
     return min(reached, key=lambda row: (row[0], -row[1]))[2]

@@ -10,21 +10,21 @@ from typing import Any
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import build_settings
-from eitskin.tuning.front import Point, Wish
+from eitskin.tuning.front import Point, Target
 
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """A point and why: ``wish`` is what was asked for."""
+    """A point and why: ``target`` is what was asked for."""
 
     point: Point
-    wish: Wish
+    target: Target
 
     @property
     def frame_us(self) -> float | None:
         """From frame to frame: the longer of measuring and solving, which go on at the same
         time."""
-        solve = self.point.cost("us", self.wish.board, self.wish.where)
+        solve = self.point.cost("us", self.target.board, self.target.where)
         return None if solve is None else max(solve, self.point.costs["acquisition_us"])
 
     @property
@@ -43,26 +43,26 @@ class Recommendation:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        point, wish = self.point, self.wish
+        point, target = self.point, self.target
         return {
             "name": point.name,
             "configuration": point.configuration.as_dict(),
             "threshold": point.threshold,
             "force_scale": point.force_scale,
-            "judged": str(wish.where),
-            "accuracy": point.accuracy(wish.where),
-            "score": point.score(wish.where),
-            "board": wish.board,
+            "judged": str(target.where),
+            "accuracy": point.accuracy(target.where),
+            "score": point.score(target.where),
+            "board": target.board,
             "budget": (
                 None
-                if wish.budget is None
-                else {"value": wish.budget.value, "unit": wish.budget.unit}
+                if target.budget is None
+                else {"value": target.budget.value, "unit": target.budget.unit}
             ),
-            "cost": point.cost(wish.unit, wish.board, wish.where, wish.worst),
-            "worst": wish.worst,
-            "unit": wish.unit,
-            "solve_us": point.cost("us", wish.board, wish.where),
-            "solve_most_us": point.cost("us", wish.board, wish.where, True),
+            "cost": point.cost(target.unit, target.board, target.where, target.worst),
+            "worst": target.worst,
+            "unit": target.unit,
+            "solve_us": point.cost("us", target.board, target.where),
+            "solve_most_us": point.cost("us", target.board, target.where, True),
             "acquisition_us": point.costs["acquisition_us"],
             "frame_us": self.frame_us,
             "instructions": point.instructions,
@@ -73,18 +73,20 @@ class Recommendation:
 
     def text(self) -> str:
         """In words."""
-        point, wish, one = self.point, self.wish, self.point.configuration
-        score = point.score(wish.where)
+        point, target, one = self.point, self.target, self.point.configuration
+        score = point.score(target.where)
         assert score is not None
         image, discs = score["image"], score["discs"]
-        solve, most = (point.cost("us", wish.board, wish.where, worst) for worst in (False, True))
+        solve, most = (
+            point.cost("us", target.board, target.where, worst) for worst in (False, True)
+        )
         acquisition = point.costs["acquisition_us"]
         lines = [
             (
                 f"{point.name}: image MIoU {image['mean']:.3f} ({image['low']:.3f} to"
                 f" {image['high']:.3f}; worst tenth {image['worst_tenth']:.3f}), discs"
                 f" {discs['mean']:.3f}, exact count {100 * score['exact_count']:.0f} %;"
-                f" {wish.where.scenes}, {wish.where.snr_db:g} dB"
+                f" {target.where.scenes}, {target.where.snr_db:g} dB"
             ),
             (
                 f"model: rank {one.rank}, {one.pixels} pixels across, {one.storage}, mu"
@@ -99,7 +101,7 @@ class Recommendation:
             f" {point.threshold:g}",
         ]
         if solve is not None and most is not None and self.frame_us is not None:
-            lines.append(_time_line(wish.board, solve, most, point))
+            lines.append(_time_line(target.board, solve, most, point))
             bound = "measuring" if acquisition >= solve else "solving"
             lines.append(
                 f"scan: {one.scan}, {one.samples} samples: {acquisition / 1000:.1f} ms a frame;"

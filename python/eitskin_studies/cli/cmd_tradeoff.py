@@ -49,7 +49,7 @@ def add_parser(subparsers: Any) -> None:
 def run_run(options: argparse.Namespace) -> int:
     """Measure, and write tables and pictures."""
     from eitskin.fileio import refuse_unwritable, write_bytes
-    from eitskin.tuning.front import Where
+    from eitskin.tuning.front import Conditions
     from eitskin_studies.cli.cmd_compare import progress
     from eitskin_studies.tradeoff.configuration_sets import load_set
     from eitskin_studies.tradeoff.default_set import default_set
@@ -85,7 +85,7 @@ def run_run(options: argparse.Namespace) -> int:
         from eitskin_studies.tradeoff.page import fill_page
 
         fill_page(options.page, recorded, options.output, PICTURES)
-    print(to_json(as_dict(front)) if options.json else to_text(front, Where()))
+    print(to_json(as_dict(front)) if options.json else to_text(front, Conditions()))
     return 0
 
 

@@ -98,7 +98,7 @@ def draw_masks(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Result])
                     here: Axes = axes[2 * k + below, column]
                     draw_panel(here, skin, grid, Panel("", None), small=True)
                     _show_cells(here, raster, truth, mask)
-                    name = f"{one.entrant.short}\n" if k == below == 0 else ""
+                    name = f"{one.candidate.short}\n" if k == below == 0 else ""
                     here.set_title(f"{name}t = {t:g}: {metrics.miou(mask, truth):.2f}", fontsize=8)
         handles = [Patch(color=HIT, label="touch, found"),
             Patch(color=FALSE, label="taken for touch, is none"),
@@ -123,7 +123,7 @@ def draw_curves(path: Path, *, results: Sequence[Result]) -> None:
             for k, one in enumerate(results):
                 curve = one.curve(fixed)
                 (line,) = axes.plot(
-                    metrics.THRESHOLDS, curve, **_line(one, k), label=one.entrant.name
+                    metrics.THRESHOLDS, curve, **_line(one, k), label=one.candidate.name
                 )
                 t = FIXED_THRESHOLD if fixed else one.chosen.threshold
                 axes.plot(
@@ -186,8 +186,8 @@ def draw_bars(path: Path, *, results: Sequence[Result]) -> None:
                     0.01, place + up, f"{summary.mean:.2f}", va="center", fontsize=7, color=ink
                 )
         for place, one in zip(places, results, strict=True):
-            if one.entrant.claimed is not None:
-                low, high = one.entrant.claimed
+            if one.candidate.claimed is not None:
+                low, high = one.candidate.claimed
                 axes.plot(
                     [low, high],
                     [place, place],
@@ -202,7 +202,7 @@ def draw_bars(path: Path, *, results: Sequence[Result]) -> None:
         axes.legend(handles, [*labels, "the paper, on its own images"], frameon=False, fontsize=8,
             loc="upper center",
                     bbox_to_anchor=(0.5, -0.1), ncols=3)  # fmt: skip
-        axes.set_yticks(places, [one.entrant.name for one in results])
+        axes.set_yticks(places, [one.candidate.name for one in results])
         axes.set_xlim(0, 1.0)
         axes.set_xlabel("mean MIoU of all test scenes; thin lines: 95 % interval")
         axes.set_title("One rule for all, or each at its best")
@@ -212,11 +212,11 @@ def draw_bars(path: Path, *, results: Sequence[Result]) -> None:
 
 
 def _kept(results: Sequence[Result]) -> list[Result]:
-    return [one for one in results if one.entrant.name not in LEFT_OUT]
+    return [one for one in results if one.candidate.name not in LEFT_OUT]
 
 
 def _title(one: Result, row: int, miou: float) -> str:
-    return f"{one.entrant.short}\n{miou:.2f}" if row == 0 else f"{miou:.2f}"
+    return f"{one.candidate.short}\n{miou:.2f}" if row == 0 else f"{miou:.2f}"
 
 
 def _panels(matplotlib: Any, rows: int, columns: int) -> tuple[Any, Any]:
@@ -253,18 +253,18 @@ def _show_cells(
 def _line(one: Result, place: int) -> dict[str, Any]:
     """Plain FISTA in reds by its iterations, dashed where signed; what is here in black; the others
     by turns."""
-    if one.entrant.own:
+    if one.candidate.own:
         return {
             "color": INK,
             "linewidth": 2.0,
-            "linestyle": "-" if "image" in one.entrant.name else "--",
+            "linestyle": "-" if "image" in one.candidate.name else "--",
         }
     for iterations, colour in ((3000, "#8c1515"), (300, "#d9534f"), (30, "#f0a8a0")):
-        if one.entrant.name.startswith(f"plain FISTA {iterations},"):
+        if one.candidate.name.startswith(f"plain FISTA {iterations},"):
             return {
                 "color": colour,
                 "linewidth": 1.3,
-                "linestyle": "--" if "signed" in one.entrant.name else "-",
+                "linestyle": "--" if "signed" in one.candidate.name else "-",
             }
     return {
         "color": ("#7f7f7f", "#1f77b4", "#17a2b8", "#2ca02c", "#9467bd")[place % 5],

@@ -1,4 +1,4 @@
-"""What each lever gives for what it costs."""
+"""What each ablation gives for what it costs."""
 
 from __future__ import annotations
 

@@ -13,14 +13,14 @@ import numpy.typing as npt
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
+from eitskin_studies.experiments.multitouch.ambiguity import ScoredFrame
+from eitskin_studies.experiments.multitouch.ambiguity_tables import found_some, reliabilities
 from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, MAX, MIN, NARROW, RING, WIDE
 from eitskin_studies.experiments.multitouch.counts import Score, Share, auc, roc, share_of
-from eitskin_studies.experiments.multitouch.doubt import ScoredFrame
-from eitskin_studies.experiments.multitouch.doubt_tables import found_some, reliabilities
 from eitskin_studies.experiments.multitouch.gallery import Example
-from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, SNRS_DB
-from eitskin_studies.experiments.multitouch.measure import Counted, Doubts
+from eitskin_studies.experiments.multitouch.measure import Ambiguities, Counted
 from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
+from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, SNRS_DB
 from eitskin_studies.pictures.comparison_pictures import truth_marks
 
 FloatArray = npt.NDArray[np.float64]
@@ -139,7 +139,7 @@ def draw_gallery(path: str | Path, skin: Skin, examples: Sequence[Example]) -> N
     )
 
 
-def draw_doubt(path: str | Path, doubts: Doubts) -> None:
+def draw_ambiguity(path: str | Path, ambiguities: Ambiguities) -> None:
     """What ``crowded`` and the score are worth, by what can be known of a frame; mixed test scenes,
     the usual variant.
 
@@ -148,10 +148,10 @@ def draw_doubt(path: str | Path, doubts: Doubts) -> None:
         FileError: the file cannot be written.
     """
     matplotlib = load_matplotlib()
-    frames = doubts.mixed[NAMES[0]]
+    frames = ambiguities.mixed[NAMES[0]]
     says = {
         "crowded": np.array([f.said for f in frames], dtype=np.bool_),
-        "score": doubts.rule.says(frames),
+        "score": ambiguities.rule.says(frames),
     }
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(11.5, 6.8), layout="constrained")
@@ -166,9 +166,9 @@ def draw_doubt(path: str | Path, doubts: Doubts) -> None:
                 if column == 0:
                     axes.set_ylabel("share with the right count")
         axes = figure.add_subplot(2, 4, 4)
-        _chances(axes, doubts)
+        _chances(axes, ambiguities)
         axes = figure.add_subplot(2, 4, 8)
-        _trade(axes, doubts)
+        _trade(axes, ambiguities)
         save_png(figure, path)
 
 
@@ -224,10 +224,10 @@ def _points(
     )
 
 
-def _chances(axes: Axes, doubts: Doubts) -> None:
+def _chances(axes: Axes, ambiguities: Ambiguities) -> None:
     axes.plot([0, 1], [0, 1], color=INK, linewidth=0.7, linestyle=":")
     for number, name in enumerate(NAMES):
-        one = reliabilities(doubts, name)["all"]
+        one = reliabilities(ambiguities, name)["all"]
         kept = [(c, t) for c, t in zip(one.chance, one.truth, strict=True) if t.count >= 5]
         _points(
             axes,
@@ -241,16 +241,16 @@ def _chances(axes: Axes, doubts: Doubts) -> None:
     axes.legend(frameon=False, fontsize=7, loc="upper left")
 
 
-def _trade(axes: Axes, doubts: Doubts) -> None:
+def _trade(axes: Axes, ambiguities: Ambiguities) -> None:
     """Exact frames of those not said, over how many are not said: as the bar moves, and where
     ``crowded`` is."""
     name = NAMES[0]
     for snr_db, colour in SNR_COLOURS.items():
-        mine = [f for f in found_some(doubts.mixed[name]) if f.snr_db == snr_db]
+        mine = [f for f in found_some(ambiguities.mixed[name]) if f.snr_db == snr_db]
         if not mine:
             continue
         exact = np.array([f.exact for f in mine])[
-            np.argsort(-doubts.rule.scores(mine), kind="stable")
+            np.argsort(-ambiguities.rule.scores(mine), kind="stable")
         ]
         part = np.arange(1, len(exact) + 1) / len(exact)
         so_far = np.cumsum(exact) / np.arange(1, len(exact) + 1)
@@ -272,7 +272,7 @@ def _trade(axes: Axes, doubts: Doubts) -> None:
     axes.legend(frameon=False, fontsize=7, loc="lower left")
 
 
-def draw_confidence(path: str | Path, doubts: Doubts) -> None:
+def draw_confidence(path: str | Path, ambiguities: Ambiguities) -> None:
     """How a touch's numbers order true and false touches: ROC curves, a panel a variant.
 
     Raises:
@@ -284,7 +284,7 @@ def draw_confidence(path: str | Path, doubts: Doubts) -> None:
         figure = matplotlib.figure.Figure(figsize=(3.9 * len(NAMES), 3.9), layout="constrained")
         for number, name in enumerate(NAMES):
             axes = figure.add_subplot(1, len(NAMES), number + 1)
-            one = doubts.touches[name]
+            one = ambiguities.touches[name]
             named = (
                 ("confidence", one.explained),
                 ("its root over noise", one.over_noise),

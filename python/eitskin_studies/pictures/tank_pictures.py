@@ -12,7 +12,7 @@ import numpy as np
 from eitskin.scoring.metrics import THRESHOLDS
 from eitskin.view.frame_pictures import true_marks
 from eitskin.view.pictures import STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
-from eitskin_studies.experiments.tank.contest import Grounds
+from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.tanks import tank, touch_like
 
 ROD_MM = 8.0  # as drawn; how thick the rods were is not stated
@@ -29,7 +29,7 @@ SHORT = (
 
 
 def draw_gallery(
-    path: str | Path, grounds: Grounds, results: Sequence[dict[str, Any]], both: bool
+    path: str | Path, evaluation_sets: EvaluationSets, results: Sequence[dict[str, Any]], both: bool
 ) -> None:
     """A row a frame, a column a method, truth first, as a PNG; all frames and the rods where
     ``both`` signs are shown, else those of metal.
@@ -38,7 +38,7 @@ def draw_gallery(
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    frames = grounds.phantoms
+    frames = evaluation_sets.phantoms
     numbers = list(range(frames.n_frames)) if both else touch_like(frames)
     images, discs, scores = (
         ("images_both", "discs_both", "nine") if both else ("images", "discs", "touch_like")
@@ -57,7 +57,7 @@ def draw_gallery(
             panels.append(
                 Panel(f"{name}{one[scores][row]:.2f}", np.array(one[images][row]), marks, found)
             )
-    for k, rods in enumerate(grounds.rods if both else ()):
+    for k, rods in enumerate(evaluation_sets.rods if both else ()):
         marks = tuple(Mark(x, y, ROD_MM, 1.0) for x, y in rods.metal_mm)
         marks += tuple(Mark(x, y, ROD_MM, -1.0) for x, y in rods.plastic_mm)
         panels.append(Panel(f"rods {k + 1}, as stated", None, marks, fill_truth=True))
@@ -71,7 +71,7 @@ def draw_gallery(
     draw_panels(
         path,
         tank()[0],
-        grounds.grid,
+        evaluation_sets.grid,
         panels,
         1 + len(results),
         title=(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.tuning.front import F767_MHZ, Front, Point, Where
+from eitskin.tuning.front import F767_MHZ, Conditions, Front, Point
 from eitskin.view.pictures import INK, STYLE, load_matplotlib, save_png
 from eitskin_studies.tradeoff.table import best_points, x_of
 
@@ -54,7 +54,7 @@ def draw_front(path: Path, front: Front) -> None:
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(11.0, 5.2), layout="constrained")
         for axes, judged in zip(figure.subplots(1, 2), ("image", "discs"), strict=True):
-            _draw_one_front(axes, front.points, Where(judged=judged), counted)
+            _draw_one_front(axes, front.points, Conditions(judged=judged), counted)
         how = front.settings
         figure.suptitle(
             f"What accuracy costs: {how.get('scenes')} scenes of 1 to 3 random touches, 60 dB, seed"
@@ -63,7 +63,7 @@ def draw_front(path: Path, front: Front) -> None:
         save_png(figure, path)
 
 
-def _draw_one_front(axes: Axes, points: Sequence[Point], where: Where, counted: bool) -> None:
+def _draw_one_front(axes: Axes, points: Sequence[Point], where: Conditions, counted: bool) -> None:
     best = best_points(points, where)
     named = {one.name for one in best}
     for point in points:
@@ -197,7 +197,7 @@ def _draw_knob(axes: Axes, groups: Sequence[Sequence[Point]], knob: str) -> None
         places = list(range(len(values))) if knob in WORDS else values
         base = _base_name(group)
         for judged, colour in (("image", IMAGE), ("discs", DISCS)):
-            scores = [one.score(Where()) for one in group]
+            scores = [one.score(Conditions()) for one in group]
             means = [score[judged]["mean"] for score in scores if score is not None]
             spread = [
                 [
@@ -250,7 +250,7 @@ def draw_noise(path: Path, front: Front) -> None:
             snrs = sorted({float(snr) for one in group for snr in one.scores.get("random", {})})
             for number, snr_db in enumerate(snrs):
                 for judged, style in (("image", "o-"), ("discs", "s--")):
-                    ys = [one.accuracy(Where(snr_db=snr_db, judged=judged)) for one in group]
+                    ys = [one.accuracy(Conditions(snr_db=snr_db, judged=judged)) for one in group]
                     axes.plot([getattr(one.configuration, knob) for one in group], ys, style,
                         color=f"C{number}", markersize=4,
                               linewidth=1.1, label=f"{judged}, {snr_db:g} dB")  # fmt: skip
@@ -287,7 +287,7 @@ def draw_samples(path: Path, front: Front) -> None:
             snrs = sorted({float(snr) for one in chosen for snr in one.scores.get("random", {})})
             for number, snr_db in enumerate(snrs):
                 for judged, style in (("image", "o-"), ("discs", "s--")):
-                    ys = [one.accuracy(Where(snr_db=snr_db, judged=judged)) for one in chosen]
+                    ys = [one.accuracy(Conditions(snr_db=snr_db, judged=judged)) for one in chosen]
                     axes.plot([one.configuration.samples for one in chosen], ys, style,
                         color=f"C{number}", markersize=4,
                               linewidth=1.1, label=f"{judged}, {snr_db:g} dB")  # fmt: skip
@@ -313,7 +313,7 @@ def draw_samples(path: Path, front: Front) -> None:
 def draw_scenes(path: Path, front: Front) -> None:
     """The points of the front on every set of scenes at 60 dB: image, discs, exact count."""
     matplotlib = load_matplotlib()
-    points = best_points(front.points, Where()) or list(front.points)
+    points = best_points(front.points, Conditions()) or list(front.points)
     kinds: tuple[tuple[str, Callable[[dict[str, Any]], float]], ...] = (
         ("image MIoU", lambda score: float(score["image"]["mean"])),
         ("discs MIoU", lambda score: float(score["discs"]["mean"])),
@@ -329,7 +329,7 @@ def draw_scenes(path: Path, front: Front) -> None:
         ):
             table = [
                 [
-                    value(score) if (score := one.score(Where(name))) else float("nan")
+                    value(score) if (score := one.score(Conditions(name))) else float("nan")
                     for name in sets
                 ]
                 for one in points
@@ -372,7 +372,7 @@ def draw_objective(path: Path, front: Front) -> None:
             scores = [
                 (one, score)
                 for one in group
-                if (score := one.score(Where())) is not None and score["gap_rel"] > 0
+                if (score := one.score(Conditions())) is not None and score["gap_rel"] > 0
             ]
             for judged, style in (("image", "o-"), ("discs", "s--")):
                 axes.plot([score["gap_rel"] for _, score in scores],

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from eitskin.errors import UsageError
 from eitskin.fileio import write_beside
-from eitskin.tuning.front import Budget, Front, Point, Where, Wish, choose
+from eitskin.tuning.front import Budget, Conditions, Front, Point, Target, choose
 from eitskin_studies.harness.sections import Tabular, fill_marks
 from eitskin_studies.tradeoff.table import best_points
 
@@ -49,14 +49,14 @@ RECOMMENDED_HEAD = (
 
 def front_table(front: Front) -> Tabular:
     """The front of images: model, solver, accuracy and cost of each point."""
-    where = Where()
+    where = Conditions()
     rows = []
     for point in best_points(front.points, where):
         one, score = point.configuration, point.score(where)
         macs, counted, host = point.macs(where), point.instructions, point.host_us
         assert score is not None and macs is not None
         image = score["image"]
-        at_snr = (point.accuracy(Where(snr_db=snr)) for snr in (40.0, 80.0))
+        at_snr = (point.accuracy(Conditions(snr_db=snr)) for snr in (40.0, 80.0))
         both = [] if counted is None else [counted["mean"], counted["most"]]
         rows.append(
             (
@@ -84,32 +84,36 @@ def recommendation_table(front: Front) -> Tabular:
     points = [one for one in front.points if not one.configuration.warm_start]
     for board, budgets in (("f767", F767_MS), ("host", HOST_MS)):
         for ms in budgets:
-            wish = Wish(Budget(1000.0 * ms, "us"), None, board, Where())
-            noisy = Wish(wish.budget, None, board, Where(snr_db=40.0), 20_800.0)
+            target = Target(Budget(1000.0 * ms, "us"), None, board, Conditions())
+            noisy = Target(target.budget, None, board, Conditions(snr_db=40.0), 20_800.0)
             mean, worst, calm = (
                 _chosen(points, one)
-                for one in (wish, Wish(wish.budget, None, board, Where(), worst=True), noisy)
+                for one in (
+                    target,
+                    Target(target.budget, None, board, Conditions(), worst=True),
+                    noisy,
+                )
             )
             rows.append(
                 (
                     f"{board}, {ms:g} ms",
-                    *_cells(mean, Where()),
+                    *_cells(mean, Conditions()),
                     _times(mean, board),
-                    *_cells(worst, Where()),
+                    *_cells(worst, Conditions()),
                     *_cells(calm, noisy.where),
                 )
             )
     return RECOMMENDED_HEAD, rows
 
 
-def _chosen(points: list[Point], wish: Wish) -> Point | None:
+def _chosen(points: list[Point], target: Target) -> Point | None:
     try:
-        return choose(points, wish)
+        return choose(points, target)
     except UsageError:
         return None
 
 
-def _cells(point: Point | None, where: Where) -> tuple[str, str]:
+def _cells(point: Point | None, where: Conditions) -> tuple[str, str]:
     accuracy = None if point is None else point.accuracy(where)
     return ("none", "-") if point is None or accuracy is None else (point.name, _share(accuracy))
 
@@ -117,7 +121,7 @@ def _cells(point: Point | None, where: Where) -> tuple[str, str]:
 def _times(point: Point | None, board: str) -> str:
     if point is None:
         return "-"
-    both = [point.cost("us", board, Where(), worst) for worst in (False, True)]
+    both = [point.cost("us", board, Conditions(), worst) for worst in (False, True)]
     return " / ".join("-" if us is None else f"{us / 1000:.3g}" for us in both)
 
 

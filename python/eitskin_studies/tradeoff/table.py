@@ -7,14 +7,14 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from eitskin.tuning.front import MIN_SWEEPS, Front, Point, Where
+from eitskin.tuning.front import MIN_SWEEPS, Conditions, Front, Point
 from eitskin_studies.tradeoff.fronts import pareto
 
 MIN_GAIN = 0.002  # of MIoU: a fifth of the 95 % interval of 180 scenes
 COSTS = ("flash_bytes", "ram_bytes", "pixels_kept", "acquisition_us")
 
 
-def x_of(point: Point, where: Where) -> float | None:
+def x_of(point: Point, where: Conditions) -> float | None:
     """What the front is drawn over: mean instructions of solve and touches, or where none are known
     MACs."""
     if point.instructions is not None:
@@ -23,7 +23,7 @@ def x_of(point: Point, where: Where) -> float | None:
     return None if macs is None else macs[0]
 
 
-def best_points(points: Sequence[Point], where: Where) -> list[Point]:
+def best_points(points: Sequence[Point], where: Conditions) -> list[Point]:
     """The Pareto front of points that begin each frame anew and fit touches fully, in steps of
     ``MIN_GAIN`` or more."""
     alike = [
@@ -84,7 +84,7 @@ def _rows(point: Point) -> list[dict[str, Any]]:
     return rows
 
 
-def to_text(front: Front, where: Where) -> str:
+def to_text(front: Front, where: Conditions) -> str:
     """Every configuration at ``where``, cheapest first; those on the front are marked."""
     best = {one.name for one in best_points(front.points, where)}
     how = front.settings

@@ -16,7 +16,7 @@ from eitskin.cli.main import main
 from eitskin.model.eitm import load_model
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin.tuning.front import Where, load_front
+from eitskin.tuning.front import Conditions, load_front
 from eitskin_studies.tradeoff.engines import ModelShop
 from small_models import prebuilt
 
@@ -126,7 +126,7 @@ def test_reconstruct_within_a_budget(
     fine = json.loads(out)
     assert "settings of" in err and fine["settings"]["rank"] == prebuilt()[0].rank
     point = next(one for one in load_front().points if one.name == fine["settings"]["name"])
-    assert (point.accuracy(Where()) or 0) >= 0.87
+    assert (point.accuracy(Conditions()) or 0) >= 0.87
     assert (
         max(f["info"]["iterations"] for f in fine["frames"]) == fine["settings"]["iterations"] != 60
     )

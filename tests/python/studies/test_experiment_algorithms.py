@@ -19,10 +19,10 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import algorithms
 from eitskin_studies.experiments.algorithms import measure
-from eitskin_studies.experiments.algorithms.entrants import (
+from eitskin_studies.experiments.algorithms.candidates import (
     FIXED_STRENGTH,
-    Entrant,
-    entrants,
+    Candidate,
+    candidates,
     macs_of,
 )
 from eitskin_studies.experiments.algorithms.measure import TUNING, Field
@@ -37,10 +37,10 @@ KEPT = (
 )
 
 
-def few() -> tuple[Entrant, ...]:
+def few() -> tuple[Candidate, ...]:
     """Those that the tables speak of, with two values each."""
     return tuple(
-        Entrant(
+        Candidate(
             e.name,
             e.short,
             e.parameter,
@@ -50,7 +50,7 @@ def few() -> tuple[Entrant, ...]:
             e.claimed,
             e.own,
         )
-        for e in entrants()
+        for e in candidates()
         if e.name in KEPT
     )
 
@@ -183,7 +183,7 @@ def test_every_method_says_what_it_costs(outcome: Outcome) -> None:
 
 
 def test_entrants() -> None:
-    all_of_them = entrants()
+    all_of_them = candidates()
     assert len({one.name for one in all_of_them}) == len(all_of_them) == 13
     assert all(one.fixed in one.values for one in all_of_them)
     assert set(KEPT) <= {one.name for one in all_of_them}

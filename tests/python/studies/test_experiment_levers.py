@@ -12,7 +12,7 @@ from eitskin.core.results import ALL_TOUCH_FIT
 from eitskin_studies.experiments import levers
 from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
-from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM, Lab
+from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM, AblationRuns
 
 SETTINGS = Settings(share=0.05)
 
@@ -70,7 +70,7 @@ def test_a_run_goes_on_where_it_was(
 ) -> None:
     folder, first = done
     lines = (folder / "results.jsonl").read_text(encoding="utf-8")
-    monkeypatch.setattr(Lab, "_solve", lambda *_: pytest.fail("solved again"))
+    monkeypatch.setattr(AblationRuns, "_solve", lambda *_: pytest.fail("solved again"))
     again = _run(folder, monkeypatch)
     assert (
         again.data == first.data and (folder / "results.jsonl").read_text(encoding="utf-8") == lines

@@ -18,6 +18,15 @@ from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import multitouch
 from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
 from eitskin_studies.experiments.multitouch import measure
+from eitskin_studies.experiments.multitouch.ambiguity import (
+    FEATURES,
+    ScoredFrame,
+    calibration,
+    features,
+    fit_rule,
+    nearest,
+    reliability,
+)
 from eitskin_studies.experiments.multitouch.ceiling import STEP_MM, Truthful
 from eitskin_studies.experiments.multitouch.cells import (
     MIXED,
@@ -30,15 +39,6 @@ from eitskin_studies.experiments.multitouch.cells import (
     mixed_cells,
 )
 from eitskin_studies.experiments.multitouch.counts import auc, quantile, roc, score, share
-from eitskin_studies.experiments.multitouch.doubt import (
-    FEATURES,
-    ScoredFrame,
-    calibration,
-    features,
-    fit_rule,
-    nearest,
-    reliability,
-)
 from eitskin_studies.experiments.multitouch.variants import VARIANTS, Seen
 from eitskin_studies.experiments.write import write_all
 from eitskin_studies.harness.sessions import SceneSolver
@@ -97,7 +97,7 @@ def test_goes_on_without_computing(
         raise AssertionError("this was computed again")
 
     monkeypatch.setattr(SceneSolver, "session", refuse)
-    monkeypatch.setattr("eitskin_studies.experiments.multitouch.lab.setup_for", refuse)
+    monkeypatch.setattr("eitskin_studies.experiments.multitouch.test_data.setup_for", refuse)
     again = _run(folder, monkeypatch)
     assert again.tables == first.tables and again.words == first.words
     assert (folder / "results.jsonl").read_text().count("\n") == lines
@@ -147,14 +147,14 @@ def test_too_many_are_refused() -> None:
 
 
 def test_what_does_not_fit_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eitskin_studies.experiments.multitouch.lab import Lab
     from eitskin_studies.experiments.multitouch.tables import exact_table
+    from eitskin_studies.experiments.multitouch.test_data import TouchData
 
     monkeypatch.setattr(measure, "counting_cells", lambda: (Cell(WIDE, 40, 1),))
     monkeypatch.setattr(measure, "single_cell", lambda: Cell(WIDE, 41, 1))
     monkeypatch.setattr(measure, "uneven_cells", tuple)
     workspace = workspace_in(tmp_path, Settings(), plain)
-    counted = measure.count_all(Lab(workspace), workspace)
+    counted = measure.count_all(TouchData(workspace), workspace)
     assert set(counted.unfit) == {(WIDE, 40), (WIDE, 41)} and not counted.scores
     twelve = measure.Counted({}, {(WIDE, k): "full" for k in range(2, 13)})
     assert all("do not fit" in row[1] for row in exact_table(twelve, WIDE, "x").rows)

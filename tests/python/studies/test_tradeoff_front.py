@@ -12,7 +12,7 @@ pytest.importorskip("scipy")
 
 from eitskin.errors import ConfigError
 from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.front import Front, Where, choose, front_from, load_front
+from eitskin.tuning.front import Conditions, Front, choose, front_from, load_front
 from eitskin_studies.pictures.tradeoff_pictures import PICTURES as DRAWN
 from eitskin_studies.tradeoff.default_set import default_set
 from eitskin_studies.tradeoff.fronts import (
@@ -24,7 +24,7 @@ from eitskin_studies.tradeoff.fronts import (
 )
 from eitskin_studies.tradeoff.page import PICTURES, fill_page
 from eitskin_studies.tradeoff.table import best_points
-from made_points import COLD, HERE, POINTS, point, wish
+from made_points import COLD, HERE, POINTS, point, target
 
 
 def test_the_front_is_what_nothing_beats() -> None:
@@ -60,8 +60,8 @@ def test_the_recorded_results_are_of_the_built_in_set_and_reach_the_targets() ->
         one.instructions is not None and one.instructions["kind"] == "counted"
         for one in front.points
     )
-    assert choose(front.points, wish("2.5Minstructions")).accuracy(HERE) >= 0.84  # type: ignore[operator]
-    assert choose(front.points, wish("2.5Minstructions", worst=True)).accuracy(HERE) >= 0.84  # type: ignore[operator]
+    assert choose(front.points, target("2.5Minstructions")).accuracy(HERE) >= 0.84  # type: ignore[operator]
+    assert choose(front.points, target("2.5Minstructions", worst=True)).accuracy(HERE) >= 0.84  # type: ignore[operator]
     assert max(one.accuracy(HERE) or 0 for one in front.points) >= 0.87
     by_name = {one.name: one for one in front.points}
     for base in ("standard", "fine"):
@@ -73,20 +73,20 @@ def test_the_recorded_results_are_of_the_built_in_set_and_reach_the_targets() ->
             assert packed == pytest.approx(plain, abs=0.005)
     for budget in ("2ms", "5ms", "10ms", "50ms"):
         assert choose(
-            [one for one in front.points if not one.configuration.warm_start], wish(budget)
+            [one for one in front.points if not one.configuration.warm_start], target(budget)
         ).fits_f767
 
 
 def test_what_ships_is_short_and_chooses_the_same() -> None:
     made = front_from(json.loads(to_json(in_short(Front({"seed": 1}, POINTS)))), "file")
     assert [one.name for one in made.points] == [one.name for one in POINTS]
-    assert choose(made.points[:-1], wish("10ms")).name == "c"
+    assert choose(made.points[:-1], target("10ms")).name == "c"
     recorded, shipped = recorded_front(), load_front()
     assert in_short(shipped) == in_short(recorded), "write the shipped front again (--front)"
     for whole, short in zip(recorded.points, shipped.points, strict=True):
         assert (whole.configuration, whole.costs) == (short.configuration, short.costs)
         for judged in ("image", "discs"):
-            where = Where("six close", 60.0, judged)
+            where = Conditions("six close", 60.0, judged)
             assert whole.accuracy(where) == short.accuracy(where)
         for worst in (False, True):
             for unit, board in (("MACs", "f767"), ("us", "f767"), ("us", "host")):

@@ -27,7 +27,7 @@ from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.front import Front, Where, front_from
+from eitskin.tuning.front import Conditions, Front, front_from
 from eitskin_studies.harness.sessions import Session, copied
 from eitskin_studies.tradeoff.fronts import as_dict, to_json
 from eitskin_studies.tradeoff.run import RESULTS, RunSettings, run
@@ -73,14 +73,14 @@ def test_every_configuration_is_measured_on_every_set(front: Front) -> None:
         assert {name: set(cells) for name, cells in one.scores.items()} == {
             name: {"40", "60"} for name in ("random", "pairs", "drift")
         }
-        score = one.score(Where())
+        score = one.score(Conditions())
         assert score is not None and score["scenes"] == 6
         assert 0.4 < score["image"]["worst_tenth"] <= score["image"]["mean"] < 1
         assert score["image"]["low"] <= score["image"]["mean"] <= score["image"]["high"]
         assert one.instructions is None or one.instructions["kind"] == "estimated"
         assert one.host_us is not None and 0 < one.host_us["p50"] <= one.host_us["p99"]
     cheap, dear, warm = front.points
-    where = Where()
+    where = Conditions()
     assert (cheap.accuracy(where) or 1) < (dear.accuracy(where) or 0)
     assert (cheap.macs(where) or (9e9,))[0] < (dear.macs(where) or (0,))[0]
     assert (
@@ -105,7 +105,7 @@ def test_tables_hold_a_row_a_cell(front: Front) -> None:
     assert all(line.count(",") == lines[0].count(",") for line in lines)
     again = front_from(json.loads(to_json(as_dict(front))), "file")
     assert comparable(again) == comparable(front)
-    assert "* dear" in to_text(front, Where())
+    assert "* dear" in to_text(front, Conditions())
 
 
 def test_a_second_run_measures_nothing(front: Front, folder: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from eitskin.errors import ConfigError, FileError, UsageError
 from eitskin.tuning.front import Budget, choose, load_front, read_budget
-from made_points import COLD, HERE, point, wish
+from made_points import COLD, HERE, point, target
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ from made_points import COLD, HERE, point, wish
     ],
 )
 def test_the_right_point_is_chosen(asked: dict[str, Any], name: str) -> None:
-    wanted = wish(**asked)
+    wanted = target(**asked)
     chosen = choose(COLD, wanted)
     assert chosen.name == name
     cost = chosen.cost(wanted.unit, wanted.board, HERE, wanted.worst)
@@ -59,20 +59,20 @@ def test_what_cannot_be_is_refused_with_how_near_one_comes(
     asked: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(UsageError, match=said) as caught:
-        choose(COLD, wish(**asked))
+        choose(COLD, target(**asked))
     assert "\n" not in str(caught.value)
 
 
 def test_a_longer_scan_is_chosen_only_where_there_is_time() -> None:
     slow = point("slow", 0.88, 2200e3, samples=320, acquisition_us=70_700)
-    assert choose([*COLD, slow], wish("12ms")).name == "c"
-    assert choose([*COLD, slow], wish("80ms")).name == "slow"
-    assert choose([*COLD, slow], wish("12ms", period_us=71_000.0)).name == "slow"
+    assert choose([*COLD, slow], target("12ms")).name == "c"
+    assert choose([*COLD, slow], target("80ms")).name == "slow"
+    assert choose([*COLD, slow], target("12ms", period_us=71_000.0)).name == "slow"
 
 
 def test_boards_get_only_what_they_can_be_told() -> None:
     half = point("half", 0.89, 300e3, touch_sweeps=2)
-    assert choose([*COLD, half], wish("10ms")).name == "c"
+    assert choose([*COLD, half], target("10ms")).name == "c"
     assert (
         not point("limited", 0.9, 1e5, mac_limit=5).fits_f767
         or "mac_limit"

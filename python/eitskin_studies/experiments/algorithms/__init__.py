@@ -8,7 +8,7 @@ from functools import partial
 from eitskin.fem.grid import grid_for
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.experiments.algorithms.entrants import entrants
+from eitskin_studies.experiments.algorithms.candidates import candidates
 from eitskin_studies.experiments.algorithms.measure import Field
 from eitskin_studies.experiments.algorithms.results import result_of
 from eitskin_studies.experiments.algorithms.tables import data, tables, words
@@ -30,7 +30,9 @@ def run(workspace: Workspace) -> Outcome:
 
     count = workspace.settings.count
     field = Field(workspace, paper_skin(), adjacent(16), count(TUNING_SCENES), count(TEST_SCENES))
-    results = [result_of(field, entrant) for entrant in workspace.progress(entrants(), "methods")]
+    results = [
+        result_of(field, candidate) for candidate in workspace.progress(candidates(), "methods")
+    ]
     grid = grid_for(field.skin.outline)
     drawn = {
         "images.png": partial(pictures.draw_images, skin=field.skin, grid=grid, results=results),

@@ -16,7 +16,7 @@ from eitskin.scoring.image_touches import match_all, touches_in_image
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin_studies.compare.families import FindsTouches, Learns, Method, Setup, setup_for
-from eitskin_studies.experiments.algorithms.entrants import Entrant, macs_of
+from eitskin_studies.experiments.algorithms.candidates import Candidate, macs_of
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
 from eitskin_studies.harness.sessions import SceneSolver, Session
@@ -101,41 +101,47 @@ class Field:
         return self._sessions[role, number]
 
     def facts(
-        self, part: str, entrant: Entrant, value: float, role: str, number: int, **more: Any
+        self, part: str, candidate: Candidate, value: float, role: str, number: int, **more: Any
     ) -> dict[str, Any]:
         """All that a part depends on."""
         elements = [SIMULATED_ELEMENTS, MODEL_ELEMENTS]
         sets = [role, number, *(() if role == SHOWN else self.seed_and_count(role))]
-        return {"experiment": "algorithms", "part": part, "method": entrant.name, "value": value,
+        return {"experiment": "algorithms", "part": part, "method": candidate.name, "value": value,
             "set": sets, "snr_db": SNR_DB,
                 "elements": elements, **more}  # fmt: skip
 
 
-def choose(field: Field, entrant: Entrant) -> Chosen:
+def choose(field: Field, candidate: Candidate) -> Chosen:
     """The value and t with the best mean MIoU on all tuning scenes, each value at its own best t,
     as ``eitskin compare`` does."""
-    curves = {value: tuning_curves(field, entrant, value) for value in entrant.values}
+    curves = {value: tuning_curves(field, candidate, value) for value in candidate.values}
     value = max(curves, key=lambda v: curves[v][metrics.LOOKUP].max())
     thresholds = {
         lookup: metrics.best_threshold(curve[None]) for lookup, curve in curves[value].items()
     }
-    scores = np.array([_counting(field, entrant, value, number) for number in NUMBERS]).sum(axis=0)
+    scores = np.array([_counting(field, candidate, value, number) for number in NUMBERS]).sum(
+        axis=0
+    )
     if not len(scores):
         return Chosen(value, thresholds, None)
     best = max(range(len(scores)), key=lambda k: (*scores[k], -k))
     return Chosen(value, thresholds, TOUCH_THRESHOLDS[best])
 
 
-def tuning_curves(field: Field, entrant: Entrant, value: float) -> dict[str, FloatArray]:
+def tuning_curves(field: Field, candidate: Candidate, value: float) -> dict[str, FloatArray]:
     """Mean MIoU over all tuning scenes at each of ``metrics.THRESHOLDS``, (T,), by lookup."""
-    of_number = [_tuning(field, entrant, value, number) for number in NUMBERS]
+    of_number = [_tuning(field, candidate, value, number) for number in NUMBERS]
     return {
         lookup: np.mean([one[lookup] for one in of_number], axis=0) for lookup in metrics.LOOKUPS
     }
 
 
 def judged(
-    field: Field, entrant: Entrant, value: float, number: int, touch_threshold: float | None = None
+    field: Field,
+    candidate: Candidate,
+    value: float,
+    number: int,
+    touch_threshold: float | None = None,
 ) -> Arrays:
     """The test scenes of ``number`` touches: MIoU (k, T) by lookup, "macs" (k,), and with t of
     positions, or where the method reports touches itself, "exact" (k,) 0 or 1, "hits", "false" (k,)
@@ -144,23 +150,25 @@ def judged(
 
     def make() -> Arrays:
         session, dv = field.session(TEST, number), _differences(field.session(TEST, number))
-        method, images = _reconstructed(field, entrant, value, session, dv)
+        method, images = _reconstructed(field, candidate, value, session, dv)
         found = _found(field, method, dv, images, touch_threshold)
         positions = {} if found is None else _positions(session, found)
         return {**_curves(field, session, images), "macs": macs_of(method, dv), **positions}
 
     return field.workspace.kept_arrays(
-        field.facts("test", entrant, value, TEST, number, touch_threshold=touch_threshold), make
+        field.facts("test", candidate, value, TEST, number, touch_threshold=touch_threshold), make
     )
 
 
-def shown(field: Field, entrant: Entrant, value: float, touch_threshold: float | None) -> Arrays:
+def shown(
+    field: Field, candidate: Candidate, value: float, touch_threshold: float | None
+) -> Arrays:
     """The scenes of the pictures: "images" (3, n), MIoU (3, T) by lookup, "found_mm" (f, 2), each
     in scene "found_in"."""
 
     def make() -> Arrays:
         session, dv = field.session(SHOWN), _differences(field.session(SHOWN))
-        method, images = _reconstructed(field, entrant, value, session, dv)
+        method, images = _reconstructed(field, candidate, value, session, dv)
         found = _found(field, method, dv, images, touch_threshold) or []
         where = np.array([k for k, places in enumerate(found) for _ in places], dtype=np.int64)
         places = np.concatenate([np.zeros((0, 2)), *found])
@@ -172,31 +180,31 @@ def shown(field: Field, entrant: Entrant, value: float, touch_threshold: float |
         }
 
     return field.workspace.kept_arrays(
-        field.facts("shown", entrant, value, SHOWN, 0, touch_threshold=touch_threshold), make
+        field.facts("shown", candidate, value, SHOWN, 0, touch_threshold=touch_threshold), make
     )
 
 
-def _tuning(field: Field, entrant: Entrant, value: float, number: int) -> dict[str, FloatArray]:
+def _tuning(field: Field, candidate: Candidate, value: float, number: int) -> dict[str, FloatArray]:
     def make() -> dict[str, list[float]]:
         session = field.session(TUNING, number)
-        images = _reconstructed(field, entrant, value, session, _differences(session))[1]
+        images = _reconstructed(field, candidate, value, session, _differences(session))[1]
         return {
             lookup: curves.mean(axis=0).round(7).tolist()
             for lookup, curves in _curves(field, session, images).items()
         }
 
-    kept = field.workspace.kept(field.facts("tuning", entrant, value, TUNING, number), make)
+    kept = field.workspace.kept(field.facts("tuning", candidate, value, TUNING, number), make)
     return {lookup: np.array(curve) for lookup, curve in kept.items()}
 
 
-def _counting(field: Field, entrant: Entrant, value: float, number: int) -> list[list[int]]:
+def _counting(field: Field, candidate: Candidate, value: float, number: int) -> list[list[int]]:
     """For each t of positions: exactly counted tuning scenes, hits less false touches. Empty where
     the method reports touches."""
 
     def make() -> list[list[int]]:
         session = field.session(TUNING, number)
         dv = _differences(session)
-        method, images = _reconstructed(field, entrant, value, session, dv)
+        method, images = _reconstructed(field, candidate, value, session, dv)
         if isinstance(method, FindsTouches):
             return []
         truths = [scene.centres_mm() for scene in session.touches.scenes]
@@ -210,7 +218,7 @@ def _counting(field: Field, entrant: Entrant, value: float, number: int) -> list
         return scores
 
     scores: list[list[int]] = field.workspace.kept(
-        field.facts("counting", entrant, value, TUNING, number), make
+        field.facts("counting", candidate, value, TUNING, number), make
     )
     return scores
 
@@ -221,9 +229,9 @@ def _differences(session: Session) -> FloatArray:
 
 
 def _reconstructed(
-    field: Field, entrant: Entrant, value: float, session: Session, dv: FloatArray
+    field: Field, candidate: Candidate, value: float, session: Session, dv: FloatArray
 ) -> tuple[Method, FloatArray]:
-    method = entrant.make(field.setup, value)
+    method = candidate.make(field.setup, value)
     if isinstance(method, Learns):
         method.learn(session.measured(SNR_DB).quiet_v)
     return method, np.asarray(method.reconstruct(dv), dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.scoring import metrics
-from eitskin_studies.experiments.algorithms.entrants import Entrant
+from eitskin_studies.experiments.algorithms.candidates import Candidate
 from eitskin_studies.experiments.algorithms.measure import (
     Arrays,
     Chosen,
@@ -42,7 +42,7 @@ class Result:
         shown: the scenes of the pictures, at the chosen value; ``shown_fixed`` at the fixed one.
     """
 
-    entrant: Entrant
+    candidate: Candidate
     chosen: Chosen
     fixed: dict[int, Arrays]
     best: dict[int, Arrays]
@@ -93,25 +93,25 @@ def column(curves: FloatArray, t: float) -> FloatArray:
     return np.asarray(curves[:, metrics.THRESHOLDS.index(t)])
 
 
-def result_of(field: Field, entrant: Entrant) -> Result:
+def result_of(field: Field, candidate: Candidate) -> Result:
     """All of a method; what is kept is read."""
-    chosen = choose(field, entrant)
+    chosen = choose(field, candidate)
     tuned = {
-        value: tuning_curves(field, entrant, value)[metrics.LOOKUP] for value in entrant.values
+        value: tuning_curves(field, candidate, value)[metrics.LOOKUP] for value in candidate.values
     }
     low_t = [float(curve[metrics.THRESHOLDS.index(FIXED_THRESHOLD)]) for curve in tuned.values()]
     return Result(
-        entrant=entrant,
+        candidate=candidate,
         chosen=chosen,
-        fixed={number: judged(field, entrant, entrant.fixed, number) for number in NUMBERS},
+        fixed={number: judged(field, candidate, candidate.fixed, number) for number in NUMBERS},
         best={
-            number: judged(field, entrant, chosen.value, number, chosen.touch_threshold)
+            number: judged(field, candidate, chosen.value, number, chosen.touch_threshold)
             for number in NUMBERS
         },
-        fixed_t=metrics.best_threshold(tuned[entrant.fixed][None]),
+        fixed_t=metrics.best_threshold(tuned[candidate.fixed][None]),
         low_t_range=(min(low_t), max(low_t)),
-        shown=shown(field, entrant, chosen.value, chosen.touch_threshold),
-        shown_fixed=shown(field, entrant, entrant.fixed, chosen.touch_threshold),
+        shown=shown(field, candidate, chosen.value, chosen.touch_threshold),
+        shown_fixed=shown(field, candidate, candidate.fixed, chosen.touch_threshold),
     )
 
 

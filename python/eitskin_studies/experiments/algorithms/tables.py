@@ -32,7 +32,7 @@ def tables(results: Sequence[Result]) -> tuple[Table, ...]:
         *(f"exact, {n}" for n in TOUCHES)),
               _counts(results)),
         Table("thresholds", ("method", *(f"t = {t:g}" for t in SHOWN_AT)), _thresholds(results)),
-        Table("why", ("what changes", *(one.entrant.name for one in _explained(results))),
+        Table("why", ("what changes", *(one.candidate.name for one in _explained(results))),
         _why(results)),
     )  # fmt: skip
 
@@ -55,10 +55,10 @@ def data(field: Field, results: Sequence[Result]) -> dict[str, Any]:
 def _method(one: Result) -> dict[str, Any]:
     chosen = one.chosen
     return {
-        "name": one.entrant.name,
-        "parameter": one.entrant.parameter,
+        "name": one.candidate.name,
+        "parameter": one.candidate.parameter,
         "fixed": {
-            "value": one.entrant.fixed,
+            "value": one.candidate.fixed,
             "miou": (
                 {str(n): vars(one.at_fixed(n)) for n in NUMBERS} | {"all": vars(one.at_fixed())}
             ),
@@ -82,14 +82,14 @@ def _method(one: Result) -> dict[str, Any]:
 def _fixed(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
-            one.entrant.name,
-            _parameter(one, one.entrant.fixed),
+            one.candidate.name,
+            _parameter(one, one.candidate.fixed),
             *(_with_interval(one.at_fixed(number)) for number in NUMBERS),
             _with_interval(one.at_fixed()),
             short(one.at_fixed().worst_tenth),
             (
                 ""
-                if one.entrant.own
+                if one.candidate.own
                 else f"{short(one.low_t_range[0])} to {short(one.low_t_range[1])}"
             ),
             _claimed(one),
@@ -101,7 +101,7 @@ def _fixed(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
 def _best(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
-            one.entrant.name,
+            one.candidate.name,
             _parameter(one, one.chosen.value),
             f"{one.chosen.threshold:.2f}",
             *(_with_interval(one.at_best(number)) for number in NUMBERS),
@@ -115,7 +115,7 @@ def _best(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
 def _counts(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
-            one.entrant.name,
+            one.candidate.name,
             f"{one.kmacs:,.0f}",
             *(_mm(one.position_mm(number)) for number in NUMBERS),
             *(f"{100 * one.exact_count(number):.0f} %" for number in NUMBERS),
@@ -128,7 +128,7 @@ def _thresholds(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     """At the chosen parameter."""
     return tuple(
         (
-            one.entrant.name,
+            one.candidate.name,
             *(short(float(one.curve(fixed=False)[metrics.THRESHOLDS.index(t)])) for t in SHOWN_AT),
         )
         for one in results
@@ -139,7 +139,7 @@ def _explained(results: Sequence[Result]) -> list[Result]:
     wanted = ("Gauss-Newton (Tikhonov)", "NOSER", "plain FISTA 30, non-negative",
         "plain FISTA 300, non-negative",
               "plain FISTA 3000, non-negative", "eitskin 60, image")  # fmt: skip
-    return [one for one in results if one.entrant.name in wanted]
+    return [one for one in results if one.candidate.name in wanted]
 
 
 def _why(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
@@ -177,11 +177,11 @@ def _conditions(field: Field) -> str:
 
 
 def _verdict(results: Sequence[Result]) -> str:
-    by_name = {one.entrant.name: one for one in results}
-    claimed_low = [one for one in results if one.entrant.claimed == (0.4, 0.5)]
+    by_name = {one.candidate.name: one for one in results}
+    claimed_low = [one for one in results if one.candidate.claimed == (0.4, 0.5)]
     low = min(one.low_t_range[0] for one in claimed_low)
     high = max(one.low_t_range[1] for one in claimed_low)
-    best = ", ".join(f"{one.entrant.name} {short(one.at_best().mean)}" for one in claimed_low)
+    best = ", ".join(f"{one.candidate.name} {short(one.at_best().mean)}" for one in claimed_low)
     fista = [by_name[f"plain FISTA {k}, non-negative"] for k in (30, 300, 3000)]
     fixed = " / ".join(short(one.at_fixed().mean) for one in fista)
     chosen = " / ".join(short(one.at_best().mean) for one in fista)
@@ -200,13 +200,13 @@ def _verdict(results: Sequence[Result]) -> str:
 
 
 def _parameter(one: Result, value: float) -> str:
-    return f"{one.entrant.parameter} {value:g}" if one.entrant.parameter else ""
+    return f"{one.candidate.parameter} {value:g}" if one.candidate.parameter else ""
 
 
 def _claimed(one: Result) -> str:
-    if one.entrant.claimed is None:
+    if one.candidate.claimed is None:
         return ""
-    low, high = one.entrant.claimed
+    low, high = one.candidate.claimed
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 

@@ -1,11 +1,11 @@
-"""What was tried to do better than discs fitted to an image's peaks, each lever for itself, with
+"""What was tried to do better than discs fitted to an image's peaks, each ablation for itself, with
 what it costs."""
 
 from __future__ import annotations
 
 from eitskin_studies.experiments.experiment import Outcome, Workspace
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
-from eitskin_studies.experiments.levers.measure import Lab
+from eitskin_studies.experiments.levers.measure import AblationRuns
 from eitskin_studies.experiments.levers.tables import (
     asked_table,
     conditions,
@@ -19,9 +19,9 @@ TITLE = "Levers: what helps for its multiply-accumulates, and what does not"
 
 def run(workspace: Workspace) -> Outcome:
     """Every search of touches on every set, every image at every SNR."""
-    lab = Lab(workspace)
-    searches = {one.name: lab.searched(one) for one in workspace.progress(SEARCHES, "searching")}
-    images = {one.name: lab.imaged(one) for one in workspace.progress(IMAGES, "imaging")}
+    runs = AblationRuns(workspace)
+    searches = {one.name: runs.searched(one) for one in workspace.progress(SEARCHES, "searching")}
+    images = {one.name: runs.imaged(one) for one in workspace.progress(IMAGES, "imaging")}
     return Outcome(
         tables=(asked_table(images), search_table(searches), image_table(images)),
         data={"searches": searches, "images": images, "seed": workspace.settings.seed},

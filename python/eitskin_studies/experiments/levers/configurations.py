@@ -11,7 +11,7 @@ from eitskin.model.build import BuildSettings
 
 
 @dataclass(frozen=True)
-class Lever:
+class Ablation:
     """The core with a model of ``settings`` and with ``options``."""
 
     name: str
@@ -23,8 +23,8 @@ class Lever:
         return {"settings": repr(self.settings), "options": repr(sorted(self.options.items()))}
 
 
-def _searching(name: str, bits: int, **options: Any) -> Lever:
-    return Lever(name, options={"touch_fit": bits, **options})
+def _searching(name: str, bits: int, **options: Any) -> Ablation:
+    return Ablation(name, options={"touch_fit": bits, **options})
 
 
 SEARCHES = (
@@ -36,7 +36,7 @@ SEARCHES = (
     _searching("split and merge, interaction", SPLIT_MERGE | INTERACTION),
     _searching("all (the default)", ALL_TOUCH_FIT),
     _searching("all, 12 sweeps", ALL_TOUCH_FIT, touch_sweeps=12),
-    Lever("log-ratio model", BuildSettings(data_kind="log-ratio")),
+    Ablation("log-ratio model", BuildSettings(data_kind="log-ratio")),
 )
 
 CALM = {"iterations": 120, "lambda_rel": 0.01}
@@ -46,16 +46,16 @@ BEST = BuildSettings(rank=80, pixels_across=40, regularisation=0.05)
 LONG = {"iterations": 150, "lambda_rel": 0.003}
 
 IMAGES = (
-    Lever("standard"),
-    Lever("standard, refined", options={"second_pass": True}),
-    Lever("good", options=GOOD),
-    Lever("good, refined", options={**GOOD, "second_pass": True}),
-    Lever("fine", options=FINE),
-    Lever("fine, refined", options={**FINE, "second_pass": True}),
-    Lever("calm", BuildSettings(regularisation=0.1), CALM),
-    Lever("calm, refined", BuildSettings(regularisation=0.1), {**CALM, "second_pass": True}),
-    Lever("best", BEST, LONG),
-    Lever("best, refined", BEST, {**LONG, "second_pass": True}),
-    Lever("log-ratio", BuildSettings(data_kind="log-ratio")),
-    Lever("log-ratio, fine", BuildSettings(data_kind="log-ratio"), FINE),
+    Ablation("standard"),
+    Ablation("standard, refined", options={"second_pass": True}),
+    Ablation("good", options=GOOD),
+    Ablation("good, refined", options={**GOOD, "second_pass": True}),
+    Ablation("fine", options=FINE),
+    Ablation("fine, refined", options={**FINE, "second_pass": True}),
+    Ablation("calm", BuildSettings(regularisation=0.1), CALM),
+    Ablation("calm, refined", BuildSettings(regularisation=0.1), {**CALM, "second_pass": True}),
+    Ablation("best", BEST, LONG),
+    Ablation("best, refined", BEST, {**LONG, "second_pass": True}),
+    Ablation("log-ratio", BuildSettings(data_kind="log-ratio")),
+    Ablation("log-ratio, fine", BuildSettings(data_kind="log-ratio"), FINE),
 )

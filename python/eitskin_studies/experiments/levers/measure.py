@@ -21,7 +21,7 @@ from eitskin.skin.skin import paper_skin
 from eitskin.solve.batch import reconstruct_many
 from eitskin.solve.options import default_options
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
-from eitskin_studies.experiments.levers.configurations import Lever
+from eitskin_studies.experiments.levers.configurations import Ablation
 from eitskin_studies.experiments.scored import session_in_parts
 from eitskin_studies.harness.sessions import Session, apparent_change_s_per_m_mm2
 from eitskin_studies.harness.summary import summarise
@@ -40,7 +40,7 @@ COUNTED: dict[str, tuple[int, float, float, int]] = {
 DIGITS = 6
 
 
-class Lab:
+class AblationRuns:
     """Scenes, models and judges, each made when it is first needed."""
 
     def __init__(self, workspace: Workspace) -> None:
@@ -56,35 +56,35 @@ class Lab:
     def _raster(self) -> metrics.Raster:
         return metrics.raster_inside(self.skin.outline)
 
-    def searched(self, lever: Lever) -> dict[str, Any]:
+    def searched(self, ablation: Ablation) -> dict[str, Any]:
         """How a search does on every set; by set."""
         found: dict[str, Any] = {}
         for name in (RANDOM, *COUNTED):
             snr_db = 60.0 if name == RANDOM else COUNTED[name][2]
-            facts = self._facts("search", lever, name, snr_db)
-            found[name] = self.workspace.kept(facts, partial(self._search, lever, name, snr_db))
+            facts = self._facts("search", ablation, name, snr_db)
+            found[name] = self.workspace.kept(facts, partial(self._search, ablation, name, snr_db))
         return found
 
-    def imaged(self, lever: Lever) -> dict[str, Any]:
+    def imaged(self, ablation: Ablation) -> dict[str, Any]:
         """MIoU of the image and cost at every SNR, t chosen on tuning scenes at 60 dB; by SNR."""
         threshold = self.workspace.kept(
-            self._facts("t", lever, RANDOM, 60.0), partial(self._threshold, lever)
+            self._facts("t", ablation, RANDOM, 60.0), partial(self._threshold, ablation)
         )
         found: dict[str, Any] = {"threshold": threshold}
         for snr_db in IMAGE_SNRS_DB:
-            facts = self._facts("image", lever, RANDOM, snr_db)
+            facts = self._facts("image", ablation, RANDOM, snr_db)
             found[f"{snr_db:g}"] = self.workspace.kept(
-                facts, partial(self._image, lever, snr_db, threshold)
+                facts, partial(self._image, ablation, snr_db, threshold)
             )
         return found
 
-    def _facts(self, part: str, lever: Lever, name: str, snr_db: float) -> dict[str, Any]:
+    def _facts(self, part: str, ablation: Ablation, name: str, snr_db: float) -> dict[str, Any]:
         return {
             "part": part,
             "set": name,
             "snr_db": snr_db,
             "share": self.workspace.settings.share,
-            **lever.facts(),
+            **ablation.facts(),
         }
 
     def session(self, name: str, tuning: bool = False) -> Session:
@@ -105,30 +105,30 @@ class Lab:
         touches, spacing, _, usual = COUNTED[name]
         return spaced_touches(outline, seed, how.count(usual), touches, spacing)
 
-    def model(self, lever: Lever) -> Model:
-        """Of a lever; those of equal settings are one."""
-        key = repr(lever.settings)
+    def model(self, ablation: Ablation) -> Model:
+        """Of a ablation; those of equal settings are one."""
+        key = repr(ablation.settings)
         if key not in self._models:
             linear = linearise(
                 self.skin,
                 self.protocol,
-                pixels_across=lever.settings.pixels_across,
+                pixels_across=ablation.settings.pixels_across,
                 elements=MODEL_ELEMENTS,
             )
-            self._models[key] = make_model(self.skin, self.protocol, linear, lever.settings)
+            self._models[key] = make_model(self.skin, self.protocol, linear, ablation.settings)
         return self._models[key]
 
-    def _solve(self, lever: Lever, session: Session, snr_db: float) -> list[Reconstruction]:
-        model, measured = self.model(lever), session.measured(snr_db)
-        options = replace(default_options(model), **lever.options)
+    def _solve(self, ablation: Ablation, session: Session, snr_db: float) -> list[Reconstruction]:
+        model, measured = self.model(ablation), session.measured(snr_db)
+        options = replace(default_options(model), **ablation.options)
         return list(
             reconstruct_many(model, measured.frames_v[:, -1], measured.quiet_v, options=options)
         )
 
     def _curves(
-        self, lever: Lever, session: Session, results: Sequence[Reconstruction]
+        self, ablation: Ablation, session: Session, results: Sequence[Reconstruction]
     ) -> FloatArray:
-        grid = self.model(lever).grid
+        grid = self.model(ablation).grid
         image_scorer = metrics.ImageScorer(
             self._raster, metrics.lookup_for(self._raster.points_mm, grid), grid.n_pixels
         )
@@ -136,24 +136,24 @@ class Lab:
             np.array([one.image for one in results], dtype=np.float64), session.truths(self._raster)
         )
 
-    def _threshold(self, lever: Lever) -> float:
+    def _threshold(self, ablation: Ablation) -> float:
         session = self.session(RANDOM, tuning=True)
         return metrics.best_threshold(
-            self._curves(lever, session, self._solve(lever, session, 60.0))
+            self._curves(ablation, session, self._solve(ablation, session, 60.0))
         )
 
-    def _image(self, lever: Lever, snr_db: float, threshold: float) -> dict[str, Any]:
+    def _image(self, ablation: Ablation, snr_db: float, threshold: float) -> dict[str, Any]:
         session = self.session(RANDOM)
-        results = self._solve(lever, session, snr_db)
-        values = self._curves(lever, session, results)[:, metrics.THRESHOLDS.index(threshold)]
+        results = self._solve(ablation, session, snr_db)
+        values = self._curves(ablation, session, results)[:, metrics.THRESHOLDS.index(threshold)]
         return {
             "image": vars(summarise(values.round(DIGITS))),
             "macs": float(np.mean([_macs(one) for one in results])),
         }
 
-    def _search(self, lever: Lever, name: str, snr_db: float) -> dict[str, Any]:
+    def _search(self, ablation: Ablation, name: str, snr_db: float) -> dict[str, Any]:
         session = self.session(name)
-        results, scenes = self._solve(lever, session, snr_db), session.touches.scenes
+        results, scenes = self._solve(ablation, session, snr_db), session.touches.scenes
         discs = [self._disc_miou(one, scene) for one, scene in zip(results, scenes, strict=True)]
         matchings = [
             match(scene.centres_mm(), _places(one))

@@ -7,20 +7,20 @@ from dataclasses import asdict
 from typing import Any
 
 from eitskin_studies.experiments.experiment import Outcome, Workspace
-from eitskin_studies.experiments.multitouch import doubt_tables, tables
+from eitskin_studies.experiments.multitouch import ambiguity_tables, tables
 from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE
 from eitskin_studies.experiments.multitouch.gallery import gallery
-from eitskin_studies.experiments.multitouch.lab import Lab
 from eitskin_studies.experiments.multitouch.measure import (
+    Ambiguities,
     Counted,
-    Doubts,
     Limit,
+    ambiguities,
     count_all,
-    doubts,
     limits,
     prepare_mixed,
 )
-from eitskin_studies.experiments.multitouch.words import closing, conditions
+from eitskin_studies.experiments.multitouch.test_data import TouchData
+from eitskin_studies.experiments.multitouch.text import closing, conditions
 
 TITLE = "Many touches at once: how many, where, and when to say that it cannot be told"
 
@@ -34,12 +34,12 @@ def run(workspace: Workspace) -> Outcome:
     """
     from eitskin_studies.pictures import multitouch_pictures as pictures
 
-    lab = Lab(workspace)
-    prepare_mixed(lab, workspace)
-    counted = count_all(lab, workspace)
-    limited = limits(lab, workspace)
-    doubted = doubts(lab, workspace, counted)
-    examples = gallery(lab, workspace)
+    touch_data = TouchData(workspace)
+    prepare_mixed(touch_data, workspace)
+    counted = count_all(touch_data, workspace)
+    limited = limits(touch_data, workspace)
+    ambiguous = ambiguities(touch_data, workspace, counted)
+    examples = gallery(touch_data, workspace)
     made = (
         tables.asked_table(counted),
         tables.exact_table(counted, RING, "exact-ring"),
@@ -49,25 +49,28 @@ def run(workspace: Workspace) -> Outcome:
         tables.single_table(counted),
         tables.uneven_table(counted),
         tables.limit_table(limited),
-        doubt_tables.doubt_table(doubted),
-        doubt_tables.rule_table(doubted),
-        doubt_tables.chance_table(doubted),
-        doubt_tables.confidence_table(doubted),
+        ambiguity_tables.ambiguity_table(ambiguous),
+        ambiguity_tables.rule_table(ambiguous),
+        ambiguity_tables.chance_table(ambiguous),
+        ambiguity_tables.confidence_table(ambiguous),
     )
     return Outcome(
         made,
-        data(counted, limited, doubted),
+        data(counted, limited, ambiguous),
         {
             "exact.png": lambda path: pictures.draw_counts(path, counted),
-            "gallery.png": lambda path: pictures.draw_gallery(path, lab.skin, examples),
-            "doubt.png": lambda path: pictures.draw_doubt(path, doubted),
-            "confidence.png": lambda path: pictures.draw_confidence(path, doubted),
+            "gallery.png": lambda path: pictures.draw_gallery(path, touch_data.skin, examples),
+            "doubt.png": lambda path: pictures.draw_ambiguity(path, ambiguous),
+            "confidence.png": lambda path: pictures.draw_confidence(path, ambiguous),
         },
-        {"conditions": conditions(lab, workspace), "closing": closing(counted, limited, doubted)},
+        {
+            "conditions": conditions(touch_data, workspace),
+            "closing": closing(counted, limited, ambiguous),
+        },
     )
 
 
-def data(counted: Counted, limited: list[Limit], doubted: Doubts) -> dict[str, Any]:
+def data(counted: Counted, limited: list[Limit], ambiguous: Ambiguities) -> dict[str, Any]:
     """Everything, for JSON."""
     return {
         "counts": [
@@ -85,15 +88,19 @@ def data(counted: Counted, limited: list[Limit], doubted: Doubts) -> dict[str, A
             for (geometry, k), why in counted.unfit.items()
         ],
         "ceiling": [asdict(one) for one in limited],
-        "rule": asdict(doubted.rule),
+        "rule": asdict(ambiguous.rule),
         "reliability": {
             name: {
-                snr: asdict(one) for snr, one in doubt_tables.reliabilities(doubted, name).items()
+                snr: asdict(one)
+                for snr, one in ambiguity_tables.reliabilities(ambiguous, name).items()
             }
-            for name in doubted.mixed
+            for name in ambiguous.mixed
         },
         "tables": {
             table.name: [dict(zip(table.head, row, strict=True)) for row in table.rows]
-            for table in (doubt_tables.doubt_table(doubted), doubt_tables.confidence_table(doubted))
+            for table in (
+                ambiguity_tables.ambiguity_table(ambiguous),
+                ambiguity_tables.confidence_table(ambiguous),
+            )
         },
     }

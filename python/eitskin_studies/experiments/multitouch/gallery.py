@@ -15,7 +15,7 @@ from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE, Cell, counting_cells
-from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, Lab
+from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, TouchData
 from eitskin_studies.experiments.multitouch.variants import (
     VARIANTS,
     Trained,
@@ -52,7 +52,7 @@ class Example:
     classical: FloatArray
 
 
-def gallery(lab: Lab, workspace: Workspace) -> list[Example]:
+def gallery(touch_data: TouchData, workspace: Workspace) -> list[Example]:
     """The first scene of each of ``EXAMPLES``, at 60 dB; what does not fit on the skin is left
     out."""
     usual = {(cell.geometry, cell.touches): cell for cell in counting_cells()}
@@ -60,20 +60,23 @@ def gallery(lab: Lab, workspace: Workspace) -> list[Example]:
     for geometry, touches in EXAMPLES:
         cell = usual[geometry, touches]
         try:
-            scene = lab.scenes(cell).scenes[SCENE]
+            scene = touch_data.scenes(cell).scenes[SCENE]
         except GeometryError:
             continue
-        trained = lab.trained(CLASSICAL[0])
+        trained = touch_data.trained(CLASSICAL[0])
 
         def make(cell: Cell = cell, trained: Trained = trained) -> dict[str, npt.NDArray[Any]]:
-            measured, grid = lab.session(cell).measured(HEADLINE_DB), lab.setup.grid
-            model = lab.model(VARIANTS[0])
+            measured, grid = touch_data.session(cell).measured(HEADLINE_DB), touch_data.setup.grid
+            model = touch_data.model(VARIANTS[0])
             solver = Reconstructor(
                 model, options=replace(default_options(model), **VARIANTS[0].options)
             )
             solver.tare(measured.quiet_v)
             result = solver.reconstruct(measured.frames_v[SCENE, -1])
-            method, frame = lab.method(CLASSICAL[0]), differences_v(measured)[SCENE : SCENE + 1]
+            method, frame = (
+                touch_data.method(CLASSICAL[0]),
+                differences_v(measured)[SCENE : SCENE + 1],
+            )
             return {
                 "image": np.asarray(result.image, dtype=np.float64),
                 "found": (
@@ -87,7 +90,7 @@ def gallery(lab: Lab, workspace: Workspace) -> list[Example]:
             }
 
         facts = {
-            **lab.facts("gallery", cell, HEADLINE_DB, False),
+            **touch_data.facts("gallery", cell, HEADLINE_DB, False),
             **VARIANTS[0].facts(),
             **asdict(trained),
         }

@@ -13,6 +13,14 @@ from eitskin.scoring.matching import match
 from eitskin.scoring.snr import noise_deviation_v
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.multitouch import ceiling
+from eitskin_studies.experiments.multitouch.ambiguity import (
+    Confidences,
+    Rule,
+    ScoredFrame,
+    confidences,
+    fit_rule,
+    score_frame,
+)
 from eitskin_studies.experiments.multitouch.cells import (
     MIXED,
     NARROW,
@@ -25,20 +33,12 @@ from eitskin_studies.experiments.multitouch.cells import (
     uneven_cells,
 )
 from eitskin_studies.experiments.multitouch.counts import Score, score
-from eitskin_studies.experiments.multitouch.doubt import (
-    Confidences,
-    Rule,
-    ScoredFrame,
-    confidences,
-    fit_rule,
-    score_frame,
-)
-from eitskin_studies.experiments.multitouch.lab import (
+from eitskin_studies.experiments.multitouch.test_data import (
     CLASSICAL,
     CLASSICAL_SCENES,
     HEADLINE_DB,
     SNRS_DB,
-    Lab,
+    TouchData,
 )
 from eitskin_studies.experiments.multitouch.variants import VARIANTS, Seen, Variant
 from eitskin_studies.harness.sessions import Measured
@@ -81,7 +81,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Doubts:
+class Ambiguities:
     """Frames of every test cell and of the mixed test set, and each found touch of these, by
     variant; and the one rule that the tuning frames of all variants gave: the core has one."""
 
@@ -91,40 +91,40 @@ class Doubts:
     touches: dict[str, Confidences]
 
 
-def count_all(lab: Lab, workspace: Workspace) -> Counted:
+def count_all(touch_data: TouchData, workspace: Workspace) -> Counted:
     """The core at each SNR, and the classical methods at 60 dB."""
     counted = Counted({}, {})
     for cell in workspace.progress(
         (*counting_cells(), single_cell(), *uneven_cells()), "counting touches"
     ):
         try:
-            truths = lab.truths_mm(cell)
+            truths = touch_data.truths_mm(cell)
         except GeometryError as error:
             counted.unfit[cell.geometry, cell.touches] = str(error)
             continue
         for variant in VARIANTS:
             for snr_db in SNRS_DB:
-                seen = lab.seen(cell, variant, snr_db)
+                seen = touch_data.seen(cell, variant, snr_db)
                 key = cell.geometry, cell.touches, variant.name, snr_db
                 counted.scores[key] = score(
                     truths, [one.places_mm for one in seen], [one.macs for one in seen]
                 )
         for name in CLASSICAL:
-            found = lab.classical(cell, name)
+            found = touch_data.classical(cell, name)
             counted.scores[cell.geometry, cell.touches, name, HEADLINE_DB] = score(
                 truths[:CLASSICAL_SCENES], found
             )
     return counted
 
 
-def limits(lab: Lab, workspace: Workspace) -> list[Limit]:
+def limits(touch_data: TouchData, workspace: Workspace) -> list[Limit]:
     """Of ``CEILING_CELLS``, each kept."""
     found = []
     usual = {(cell.geometry, cell.touches): cell for cell in counting_cells()}
     for geometry, touches, snr_db in workspace.progress(CEILING_CELLS, "fitting from the truth"):
         cell, count = usual[geometry, touches], workspace.settings.count(CEILING_SCENES)
         facts = {
-            **lab.facts("ceiling", cell, snr_db, False),
+            **touch_data.facts("ceiling", cell, snr_db, False),
             "scenes": count,
             "variants": [v.facts() for v in VARIANTS],
         }
@@ -133,7 +133,7 @@ def limits(lab: Lab, workspace: Workspace) -> list[Limit]:
                 **workspace.kept(
                     facts,
                     lambda cell=cell, snr=snr_db, n=count: asdict(  # type: ignore[misc]
-                        _limit(lab, cell, snr, n)
+                        _limit(touch_data, cell, snr, n)
                     ),
                 )
             )
@@ -141,8 +141,8 @@ def limits(lab: Lab, workspace: Workspace) -> list[Limit]:
     return found
 
 
-def _limit(lab: Lab, cell: Cell, snr_db: float, count: int) -> Limit:
-    session, fits = lab.session(cell), ceiling.Truthful(lab.skin, lab.protocol)
+def _limit(touch_data: TouchData, cell: Cell, snr_db: float, count: int) -> Limit:
+    session, fits = touch_data.session(cell), ceiling.Truthful(touch_data.skin, touch_data.protocol)
     scenes, whole = session.touches.scenes[:count], session.measured(snr_db)
     measured = Measured(whole.quiet_v, whole.frames_v[: len(scenes)])
     quiet_v, noise_v = (
@@ -155,11 +155,11 @@ def _limit(lab: Lab, cell: Cell, snr_db: float, count: int) -> Limit:
     ]
     core, told = {}, {}
     for variant in VARIANTS:
-        seen = lab.seen(cell, variant, snr_db)[: len(scenes)]
+        seen = touch_data.seen(cell, variant, snr_db)[: len(scenes)]
         core[variant.name] = sum(
             match(s.centres_mm(), one.places_mm).exact for s, one in zip(scenes, seen, strict=True)
         )
-        told[variant.name] = sum(ceiling.core_told(lab.model(variant), measured, scenes))
+        told[variant.name] = sum(ceiling.core_told(touch_data.model(variant), measured, scenes))
     return Limit(
         cell.geometry, cell.touches, snr_db, len(scenes), core, told,
         sum(one.exact for one in fitted),
@@ -168,15 +168,15 @@ def _limit(lab: Lab, cell: Cell, snr_db: float, count: int) -> Limit:
     )  # fmt: skip
 
 
-def doubts(lab: Lab, workspace: Workspace, counted: Counted) -> Doubts:
+def ambiguities(touch_data: TouchData, workspace: Workspace, counted: Counted) -> Ambiguities:
     """The core's own signal on all that was counted, and on mixed scenes; the rule from mixed
     tuning scenes."""
 
     def frames(which: Sequence[Cell], variant: Variant, tuning: bool = False) -> list[ScoredFrame]:
         return [
-            score_frame(seen, truth, snr_db, lab.seed_radius_mm(variant))
+            score_frame(seen, truth, snr_db, touch_data.seed_radius_mm(variant))
             for cell in which for snr_db in SNRS_DB for seen,
-            truth in _pairs(lab, cell, variant, snr_db, tuning)
+            truth in _pairs(touch_data, cell, variant, snr_db, tuning)
         ]  # fmt: skip
 
     cells = [
@@ -185,7 +185,7 @@ def doubts(lab: Lab, workspace: Workspace, counted: Counted) -> Doubts:
         if (c.geometry, c.touches) not in counted.unfit
     ]
     parts = mixed_cells()
-    found = Doubts(
+    found = Ambiguities(
         fit_rule([frame for variant in VARIANTS for frame in frames(parts, variant, tuning=True)]),
         {},
         {},
@@ -200,25 +200,29 @@ def doubts(lab: Lab, workspace: Workspace, counted: Counted) -> Doubts:
             pair
             for cell in parts
             for snr_db in SNRS_DB
-            for pair in _pairs(lab, cell, variant, snr_db)
+            for pair in _pairs(touch_data, cell, variant, snr_db)
         ]
         found.touches[variant.name] = confidences(pairs)
     return found
 
 
 def _pairs(
-    lab: Lab, cell: Cell, variant: Variant, snr_db: float, tuning: bool = False
+    touch_data: TouchData, cell: Cell, variant: Variant, snr_db: float, tuning: bool = False
 ) -> list[tuple[Seen, FloatArray]]:
     return list(
-        zip(lab.seen(cell, variant, snr_db, tuning), lab.truths_mm(cell, tuning), strict=True)
+        zip(
+            touch_data.seen(cell, variant, snr_db, tuning),
+            touch_data.truths_mm(cell, tuning),
+            strict=True,
+        )
     )
 
 
-def prepare_mixed(lab: Lab, workspace: Workspace) -> None:
+def prepare_mixed(touch_data: TouchData, workspace: Workspace) -> None:
     """Mixed scenes, solved and counted part by part, so that a run that is cut goes on with the
     next."""
     for cell in workspace.progress(mixed_cells(), f"{MIXED} scenes"):
         for tuning in (True, False):
             for variant in VARIANTS:
                 for snr_db in SNRS_DB:
-                    lab.seen(cell, variant, snr_db, tuning)
+                    touch_data.seen(cell, variant, snr_db, tuning)

@@ -19,8 +19,8 @@ from eitskin_studies.experiments.multitouch.cells import (
     WIDE,
 )
 from eitskin_studies.experiments.multitouch.counts import Quantile, Score, Share
-from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, SNRS_DB
 from eitskin_studies.experiments.multitouch.measure import Counted, Limit
+from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, SNRS_DB
 from eitskin_studies.experiments.multitouch.variants import VARIANTS
 
 SHORT = {CLASSICAL[0]: "Gauss-Newton", CLASSICAL[2]: "plain FISTA 300"}

@@ -18,8 +18,8 @@ from eitskin.skin.skin import size_to_paper
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Outcome, Workspace
 from eitskin_studies.experiments.tank import levers as lever_work
 from eitskin_studies.experiments.tank import tables
-from eitskin_studies.experiments.tank.contest import Grounds, contest
 from eitskin_studies.experiments.tank.discs import varied
+from eitskin_studies.experiments.tank.evaluation import EvaluationSets, evaluate
 from eitskin_studies.experiments.tank.imagers import (
     KINDS,
     Entry,
@@ -63,8 +63,8 @@ def run(workspace: Workspace) -> Outcome:
     """
     folder = folder_of(workspace.settings.data)
     ours = _tank()
-    grounds, facts = _grounds(workspace, ours, folder)
-    levers = lever_work.tried(workspace, ours, grounds, facts)
+    evaluation_sets, facts = _grounds(workspace, ours, folder)
+    levers = lever_work.tried(workspace, ours, evaluation_sets, facts)
     best = lever_work.chosen(levers)
     entries = [
         entry
@@ -77,10 +77,14 @@ def run(workspace: Workspace) -> Outcome:
         asked = {**facts, "entry": entry.name, "kind": entry.kind, "values": entry.values}
         if entry.name == tables.CHOSEN:
             asked["levers"] = repr(best)
-        results.append(workspace.kept(asked, partial(contest, entry, grounds)))
-    ceiling = workspace.kept({**facts, "what": "ceiling"}, lambda: _ceiling(workspace, grounds))
-    discs = varied(workspace, ours, grounds, facts)
-    return tables.outcome(grounds, results, levers, best, discs, ceiling, workspace.settings)
+        results.append(workspace.kept(asked, partial(evaluate, entry, evaluation_sets)))
+    ceiling = workspace.kept(
+        {**facts, "what": "ceiling"}, lambda: _ceiling(workspace, evaluation_sets)
+    )
+    discs = varied(workspace, ours, evaluation_sets, facts)
+    return tables.outcome(
+        evaluation_sets, results, levers, best, discs, ceiling, workspace.settings
+    )
 
 
 def _watched(workspace: Workspace, entries: list[Entry]) -> Iterable[Entry]:
@@ -92,7 +96,9 @@ def _tank() -> Tank:
     return Tank(skin, protocol, linearise(skin, protocol, elements=MODEL_ELEMENTS))
 
 
-def _grounds(workspace: Workspace, ours: Tank, folder: Path) -> tuple[Grounds, dict[str, Any]]:
+def _grounds(
+    workspace: Workspace, ours: Tank, folder: Path
+) -> tuple[EvaluationSets, dict[str, Any]]:
     """What is judged on, and what all results depend on."""
     measured = phantoms(folder)
     scale = size_to_paper(ours.skin.outline)
@@ -100,7 +106,7 @@ def _grounds(workspace: Workspace, ours: Tank, folder: Path) -> tuple[Grounds, d
     share = float(np.median(reciprocal_share(measured)))
     settings = workspace.settings
     tuning, test = settings.count(TUNING_SCENES), settings.count(TEST_SCENES)
-    grounds = Grounds(
+    evaluation_sets = EvaluationSets(
         image_scorer,
         ours.grid,
         simulated(workspace, settings.tuning_seed, tuning, False, image_scorer.raster, share),
@@ -114,7 +120,7 @@ def _grounds(workspace: Workspace, ours: Tank, folder: Path) -> tuple[Grounds, d
     digest = hashlib.sha256(
         b"".join((folder / name).read_bytes() for name in (PHANTOMS, *(one[0] for one in RODS)))
     )
-    return grounds, {
+    return evaluation_sets, {
         "frames": digest.hexdigest()[:16],
         "tuning": tuning,
         "test": test,
@@ -122,11 +128,11 @@ def _grounds(workspace: Workspace, ours: Tank, folder: Path) -> tuple[Grounds, d
     }
 
 
-def _ceiling(workspace: Workspace, grounds: Grounds) -> list[dict[str, Any]]:
+def _ceiling(workspace: Workspace, evaluation_sets: EvaluationSets) -> list[dict[str, Any]]:
     """MIoU of the true discs, moved by so much, against the truth, for each touch-like frame."""
-    frames, points = grounds.phantoms, grounds.image_scorer.raster.points_mm
+    frames, points = evaluation_sets.phantoms, evaluation_sets.image_scorer.raster.points_mm
     assert frames.touch_xy_mm is not None and frames.touch_radius_mm is not None
-    conductive, _ = truth_of(frames, grounds.image_scorer.raster)
+    conductive, _ = truth_of(frames, evaluation_sets.image_scorer.raster)
     found, draws = [], workspace.settings.count(DRAWS)
     for off in TRUTH_ERRORS:
         scores = []

@@ -13,7 +13,12 @@ import numpy as np
 from eitskin.model.build import linearise
 from eitskin.scoring.image_touches import match_all
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
-from eitskin_studies.experiments.tank.contest import Grounds, curves_of, increases, places_of
+from eitskin_studies.experiments.tank.evaluation import (
+    EvaluationSets,
+    curves_of,
+    increases,
+    places_of,
+)
 from eitskin_studies.experiments.tank.imagers import CoreImager, Levers, Tank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
 
@@ -37,19 +42,21 @@ VARIANTS: tuple[tuple[str, dict[str, Any], dict[str, Any], bool], ...] = (
 
 
 def varied(
-    workspace: Workspace, tank: Tank, grounds: Grounds, facts: dict[str, Any]
+    workspace: Workspace, tank: Tank, evaluation_sets: EvaluationSets, facts: dict[str, Any]
 ) -> list[dict[str, Any]]:
     """Every variant on the metal set that is chosen by, and on the touch-like frames."""
     watched: Iterable[Any] = workspace.progress(VARIANTS, "discs")
     return [
-        workspace.kept({**facts, "discs": repr(one)}, partial(_variant, tank, grounds, *one))
+        workspace.kept(
+            {**facts, "discs": repr(one)}, partial(_variant, tank, evaluation_sets, *one)
+        )
         for one in watched
     ]
 
 
 def _variant(
     tank: Tank,
-    grounds: Grounds,
+    evaluation_sets: EvaluationSets,
     name: str,
     options: dict[str, Any],
     electrodes: dict[str, Any],
@@ -59,25 +66,31 @@ def _variant(
         skin = replace(tank.skin, electrodes=replace(tank.skin.electrodes, **electrodes))
         tank = Tank(skin, tank.protocol, linearise(skin, tank.protocol, elements=MODEL_ELEMENTS))
     imager = CoreImager(tank, Levers(kind=KIND), painted=True, options=options)
-    frames, chosen = grounds.phantoms, touch_like(grounds.phantoms)
-    tuned = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, signed)
+    frames, chosen = evaluation_sets.phantoms, touch_like(evaluation_sets.phantoms)
+    tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, signed)
     shown = imager.show(frames.reference_voltage_v, frames.voltage_v[chosen], signed)
-    truth = truth_of(frames, grounds.image_scorer.raster)[0][chosen]
+    truth = truth_of(frames, evaluation_sets.image_scorer.raster)[0][chosen]
     at_tuned = match_all(
-        grounds.metal.conductive_mm, increases(tuned, None, grounds.grid), grounds.gate_mm
+        evaluation_sets.metal.conductive_mm,
+        increases(tuned, None, evaluation_sets.grid),
+        evaluation_sets.gate_mm,
     )
     at_shown = match_all(
         [places_of(frames, k, 1) for k in chosen],
-        increases(shown, None, grounds.grid),
-        grounds.gate_mm,
+        increases(shown, None, evaluation_sets.grid),
+        evaluation_sets.gate_mm,
     )
     return {
         "name": name,
         "tuned": float(
-            np.mean(curves_of(tuned, grounds.metal.conductive, grounds.image_scorer)[:, 0])
+            np.mean(
+                curves_of(tuned, evaluation_sets.metal.conductive, evaluation_sets.image_scorer)[
+                    :, 0
+                ]
+            )
         ),
         "touch_like": [
-            float(value) for value in curves_of(shown, truth, grounds.image_scorer)[:, 0]
+            float(value) for value in curves_of(shown, truth, evaluation_sets.image_scorer)[:, 0]
         ],
         "tuned_exact": float(np.mean([one.exact for one in at_tuned])),
         "found": sum(one.hits for one in at_shown),

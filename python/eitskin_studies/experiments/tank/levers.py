@@ -13,7 +13,7 @@ import numpy as np
 
 from eitskin.scoring import metrics
 from eitskin_studies.experiments.experiment import Workspace
-from eitskin_studies.experiments.tank.contest import Grounds
+from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, Tank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
 
@@ -47,7 +47,7 @@ def together(kind: str) -> list[Levers]:
 
 
 def tried(
-    workspace: Workspace, tank: Tank, grounds: Grounds, facts: dict[str, Any]
+    workspace: Workspace, tank: Tank, evaluation_sets: EvaluationSets, facts: dict[str, Any]
 ) -> dict[Levers, dict[str, Any]]:
     """Every setting of levers that is looked at, with what it gave."""
     wanted = list(
@@ -56,7 +56,7 @@ def tried(
     found = {}
     for levers in _watched(workspace, wanted):
         found[levers] = workspace.kept(
-            {**facts, "levers": asdict(levers)}, partial(_measured, tank, grounds, levers)
+            {**facts, "levers": asdict(levers)}, partial(_measured, tank, evaluation_sets, levers)
         )
     return found
 
@@ -88,18 +88,20 @@ def _watched(workspace: Workspace, wanted: list[Levers]) -> Iterable[Levers]:
     return workspace.progress(wanted, "levers")
 
 
-def _measured(tank: Tank, grounds: Grounds, levers: Levers) -> dict[str, Any]:
+def _measured(tank: Tank, evaluation_sets: EvaluationSets, levers: Levers) -> dict[str, Any]:
     imager = CoreImager(tank, levers)
-    tuned = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, False)
-    curves = grounds.image_scorer.curves(tuned.images, grounds.metal.conductive)
+    tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, False)
+    curves = evaluation_sets.image_scorer.curves(tuned.images, evaluation_sets.metal.conductive)
     threshold = metrics.best_threshold(curves)
     at = metrics.THRESHOLDS.index(threshold)
-    places = touch_like(grounds.phantoms)
+    places = touch_like(evaluation_sets.phantoms)
     real = imager.show(
-        grounds.phantoms.reference_voltage_v, grounds.phantoms.voltage_v[places], False
+        evaluation_sets.phantoms.reference_voltage_v,
+        evaluation_sets.phantoms.voltage_v[places],
+        False,
     )
-    truth = truth_of(grounds.phantoms, grounds.image_scorer.raster)[0][places]
-    measured = grounds.image_scorer.curves(real.images, truth)
+    truth = truth_of(evaluation_sets.phantoms, evaluation_sets.image_scorer.raster)[0][places]
+    measured = evaluation_sets.image_scorer.curves(real.images, truth)
     return {
         "tuned": float(curves.mean(axis=0).max()),
         "threshold": threshold,

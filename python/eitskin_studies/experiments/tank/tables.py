@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from eitskin_studies.experiments.experiment import Outcome, Settings, Table
-from eitskin_studies.experiments.tank.contest import Grounds
+from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.imagers import DISCS, KINDS, TUNED_DISCS, Levers
 from eitskin_studies.experiments.tank.levers import one_by_one, words_of
 from eitskin_studies.experiments.tank.tanks import TOUCH_LIKE
@@ -19,7 +19,7 @@ Found = dict[str, Any]
 
 
 def outcome(
-    grounds: Grounds,
+    evaluation_sets: EvaluationSets,
     results: list[Found],
     levers: dict[Levers, Found],
     best: Levers,
@@ -31,7 +31,7 @@ def outcome(
     tables = (
         touch_like_table(results),
         kinds_table(results),
-        nine_table(grounds, results),
+        nine_table(evaluation_sets, results),
         rods_table(results),
         levers_table(levers, best),
         discs_table(discs),
@@ -46,16 +46,18 @@ def outcome(
     ]
 
     def draw_metal(path: Path) -> None:
-        tank_pictures.draw_gallery(path, grounds, columns(of_best_kind(results, "tuned")), False)
+        tank_pictures.draw_gallery(
+            path, evaluation_sets, columns(of_best_kind(results, "tuned")), False
+        )
 
     def draw_signs(path: Path) -> None:
         tank_pictures.draw_gallery(
-            path, grounds, columns(of_best_kind(results, "tuned_both")), True
+            path, evaluation_sets, columns(of_best_kind(results, "tuned_both")), True
         )
 
     data = {
-        "noise_share": grounds.noise_share,
-        "sets": [grounds.metal.name, grounds.mixed.name, grounds.test.name],
+        "noise_share": evaluation_sets.noise_share,
+        "sets": [evaluation_sets.metal.name, evaluation_sets.mixed.name, evaluation_sets.test.name],
         "results": [
             {key: value for key, value in one.items() if "images" not in key} for one in results
         ],
@@ -72,7 +74,7 @@ def outcome(
             "all_frames.png": draw_signs,
             "curves.png": lambda path: tank_pictures.draw_curves(path, shown),
         },
-        {"conditions": conditions(grounds, settings), "chosen": chosen_words(levers, best)},
+        {"conditions": conditions(evaluation_sets, settings), "chosen": chosen_words(levers, best)},
     )
 
 
@@ -155,9 +157,9 @@ def kinds_table(results: list[Found]) -> Table:
     )
 
 
-def nine_table(grounds: Grounds, results: list[Found]) -> Table:
+def nine_table(evaluation_sets: EvaluationSets, results: list[Found]) -> Table:
     """All frames, both signs."""
-    names = grounds.phantoms.frame_name
+    names = evaluation_sets.phantoms.frame_name
     head = ("method", "data", "t", *names, "mean", "found, false", "error")
     rows = [
         (
@@ -247,15 +249,16 @@ def ceiling_table(ceiling: list[Found]) -> Table:
     return Table("ceiling", ("truth off by", *TOUCH_LIKE, "mean"), tuple(rows))
 
 
-def conditions(grounds: Grounds, settings: Settings) -> str:
+def conditions(evaluation_sets: EvaluationSets, settings: Settings) -> str:
     """Sets, seeds, noise, thresholds."""
-    tuned, tested = len(grounds.metal.frames_v), len(grounds.test.frames_v)
+    tuned, tested = len(evaluation_sets.metal.frames_v), len(evaluation_sets.test.frames_v)
     return (
         f"Parameters and t: {tuned} simulated scenes of metal, for both signs as many of metal and"
         " plastic, seed "
         f'{settings.tuning_seed}; columns "simulated": {tested} scenes of metal, seed'
         f" {settings.seed}. Noise "
-        f"{100 * grounds.noise_share:.1f} % of the rms of each frame's change, the median of what"
+        f"{100 * evaluation_sets.noise_share:.1f} % of the rms of each frame's change, the median"
+        f" of what"
         " reciprocal readings of "
         "the measured frames show. MIoU bilinear, mask x > t max(x)."
     )

@@ -38,7 +38,7 @@ CLASSICAL_SCENES = 24
 TRAINING_PARTS = 2
 
 
-class Lab:
+class TouchData:
     """One workspace's scenes and methods. Models and meshes are made when a result is not kept yet,
     not before."""
 

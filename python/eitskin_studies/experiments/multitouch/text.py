@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
+from eitskin_studies.experiments.multitouch.ambiguity import ScoredFrame, calibration
 from eitskin_studies.experiments.multitouch.cells import (
     GEOMETRIES,
     MAX,
@@ -12,18 +13,22 @@ from eitskin_studies.experiments.multitouch.cells import (
     MIXED_SCENES,
 )
 from eitskin_studies.experiments.multitouch.counts import Share
-from eitskin_studies.experiments.multitouch.doubt import ScoredFrame, calibration
-from eitskin_studies.experiments.multitouch.lab import CLASSICAL, HEADLINE_DB, TRAINING_PARTS, Lab
-from eitskin_studies.experiments.multitouch.measure import Counted, Doubts, Limit
+from eitskin_studies.experiments.multitouch.measure import Ambiguities, Counted, Limit
 from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
+from eitskin_studies.experiments.multitouch.test_data import (
+    CLASSICAL,
+    HEADLINE_DB,
+    TRAINING_PARTS,
+    TouchData,
+)
 
 GOOD = 0.90
 
 
-def conditions(lab: Lab, workspace: Workspace) -> str:
+def conditions(touch_data: TouchData, workspace: Workspace) -> str:
     """What all tables share."""
     settings = workspace.settings
-    chosen = ((name, lab.trained(name)) for name in CLASSICAL)
+    chosen = ((name, touch_data.trained(name)) for name in CLASSICAL)
     trained = "; ".join(
         f"{SHORT.get(name, name)}: {one.value:g} and t' = {one.threshold:g}" for name, one in chosen
     )
@@ -38,7 +43,7 @@ def conditions(lab: Lab, workspace: Workspace) -> str:
     )
 
 
-def closing(counted: Counted, limited: Sequence[Limit], doubted: Doubts) -> str:
+def closing(counted: Counted, limited: Sequence[Limit], ambiguous: Ambiguities) -> str:
     """How far each variant counts, what limits it, and what its reports are worth."""
     far = "; ".join(
         f"{name}: {', '.join(f'{where} {_far(counted, where, name)}' for where in GEOMETRIES)}"
@@ -49,7 +54,7 @@ def closing(counted: Counted, limited: Sequence[Limit], doubted: Doubts) -> str:
         f" and {sum(one.told[name] for one in limited)}"
         for name in NAMES
     )
-    sure = "; ".join(f"{name} {_sure(doubted.mixed[name])}" for name in NAMES)
+    sure = "; ".join(f"{name} {_sure(ambiguous.mixed[name])}" for name in NAMES)
     return (
         f"- Most touches up to which at least {100 * GOOD:.0f} % of the scenes are exact at"
         f" {HEADLINE_DB:g} dB: {far}.\n"

@@ -23,7 +23,7 @@ CONVERGED = 3000
 
 
 @dataclass(frozen=True)
-class Entrant:
+class Candidate:
     """A method under comparison.
 
     Attributes:
@@ -46,14 +46,14 @@ class Entrant:
     own: bool = False
 
 
-def entrants() -> tuple[Entrant, ...]:
+def candidates() -> tuple[Candidate, ...]:
     """In the order of the tables."""
     others = (0.4, 0.5)
     return (
-        Entrant(
+        Candidate(
             "linear back projection", "back projection", "norm", (1.0, 2.0), 1.0, _back_projection
         ),
-        Entrant(
+        Candidate(
             "Gauss-Newton (Tikhonov)",
             "Gauss-Newton",
             "strength",
@@ -62,7 +62,7 @@ def entrants() -> tuple[Entrant, ...]:
             _gauss_newton,
             others,
         ),
-        Entrant(
+        Candidate(
             "conjugate gradient",
             "conj. gradient",
             "steps",
@@ -71,15 +71,15 @@ def entrants() -> tuple[Entrant, ...]:
             _gradient,
             others,
         ),
-        Entrant("NOSER", "NOSER", "strength", STRENGTHS, FIXED_STRENGTH, _noser, others),
-        Entrant("GREIT-like", "GREIT-like", "noise weight", STRENGTHS, FIXED_STRENGTH, _greit),
+        Candidate("NOSER", "NOSER", "strength", STRENGTHS, FIXED_STRENGTH, _noser, others),
+        Candidate("GREIT-like", "GREIT-like", "noise weight", STRENGTHS, FIXED_STRENGTH, _greit),
         *(
             _fista(iterations, signed)
             for signed in (True, False)
             for iterations in (30, 300, CONVERGED)
         ),
-        Entrant("eitskin 60, image", "eitskin, image", "", (0.0,), 0.0, _own(1), None, True),
-        Entrant(
+        Candidate("eitskin 60, image", "eitskin, image", "", (0.0,), 0.0, _own(1), None, True),
+        Candidate(
             "eitskin 60, touches as discs", "eitskin, discs", "", (0.0,), 0.0, _own(2), None, True
         ),
     )
@@ -119,7 +119,7 @@ def _gradient(setup: Setup, steps: float) -> Method:
     return baselines.ConjugateGradient(setup.jacobian, int(steps))
 
 
-def _fista(iterations: int, signed: bool) -> Entrant:
+def _fista(iterations: int, signed: bool) -> Candidate:
     """With many iterations the smaller half of the ratios only: there larger ones shrink touches to
     specks, and it takes long."""
 
@@ -129,7 +129,7 @@ def _fista(iterations: int, signed: bool) -> Entrant:
     values = RATIOS[: len(RATIOS) // 2] if iterations >= CONVERGED else RATIOS
     sign = "signed" if signed else "non-negative"
     short = f"FISTA {iterations}\n{sign}"
-    return Entrant(
+    return Candidate(
         f"plain FISTA {iterations}, {sign}",
         short,
         "lambda / lambda_max",

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from eitskin_studies.experiments.experiment import Table
-from eitskin_studies.experiments.multitouch.counts import auc
-from eitskin_studies.experiments.multitouch.doubt import (
+from eitskin_studies.experiments.multitouch.ambiguity import (
     FEATURES,
     Calibration,
     Reliability,
@@ -16,9 +15,10 @@ from eitskin_studies.experiments.multitouch.doubt import (
     calibration,
     reliability,
 )
-from eitskin_studies.experiments.multitouch.lab import SNRS_DB
-from eitskin_studies.experiments.multitouch.measure import Doubts
+from eitskin_studies.experiments.multitouch.counts import auc
+from eitskin_studies.experiments.multitouch.measure import Ambiguities
 from eitskin_studies.experiments.multitouch.tables import NAMES, percent
+from eitskin_studies.experiments.multitouch.test_data import SNRS_DB
 
 HEAD = (
     "count right, not reported", "exact, not reported", "not reported", "count right, reported",
@@ -27,11 +27,14 @@ HEAD = (
 )  # fmt: skip
 
 
-def doubt_table(doubts: Doubts) -> Table:
+def ambiguity_table(ambiguities: Ambiguities) -> Table:
     """The core's ``crowded`` and the linear score on the same test frames."""
     rows = []
     for name in NAMES:
-        for text, frames in (("mixed", doubts.mixed[name]), ("cells", doubts.cells[name])):
+        for text, frames in (
+            ("mixed", ambiguities.mixed[name]),
+            ("cells", ambiguities.cells[name]),
+        ):
             for snr_db in (*SNRS_DB, None):
                 mine = [one for one in frames if snr_db in (None, one.snr_db)]
                 at = "all" if snr_db is None else f"{snr_db:g}"
@@ -43,7 +46,7 @@ def doubt_table(doubts: Doubts) -> Table:
                         at,
                         str(len(mine)),
                         "score",
-                        *_cells(calibration(mine, doubts.rule.says(mine))),
+                        *_cells(calibration(mine, ambiguities.rule.says(mine))),
                     )
                 )
     return Table("doubt", ("method", "set", "SNR, dB", "frames", "signal", *HEAD), tuple(rows))
@@ -63,9 +66,9 @@ def _cells(one: Calibration) -> tuple[str, ...]:
     )
 
 
-def rule_table(doubts: Doubts) -> Table:
+def rule_table(ambiguities: Ambiguities) -> Table:
     """The score's coefficients, as the core could take them."""
-    rule = doubts.rule
+    rule = ambiguities.rule
     rows = [(text, f"{weight:.4g}") for text, weight in zip(FEATURES, rule.weights, strict=True)]
     rows += [("offset", f"{rule.offset:.4g}"), ("reported below a score of", f"{rule.bar:.3f}")]
     return Table("rule", ("feature", "coefficient"), tuple(rows))
@@ -76,27 +79,29 @@ def found_some(frames: Sequence[ScoredFrame]) -> list[ScoredFrame]:
     return [one for one in frames if one.found > 0]
 
 
-def reliabilities(doubts: Doubts, name: str) -> dict[str, Reliability]:
+def reliabilities(ambiguities: Ambiguities, name: str) -> dict[str, Reliability]:
     """Of the score's chances on test frames, by SNR in dB as text, and "all"."""
     result = {}
     for snr_db in (*SNRS_DB, None):
-        mine = [one for one in found_some(doubts.mixed[name]) if snr_db in (None, one.snr_db)]
+        mine = [one for one in found_some(ambiguities.mixed[name]) if snr_db in (None, one.snr_db)]
         exact = np.array([one.exact for one in mine], dtype=np.bool_)
         result["all" if snr_db is None else f"{snr_db:g}"] = reliability(
-            doubts.rule.chances(mine), exact
+            ambiguities.rule.chances(mine), exact
         )
     return result
 
 
-def chance_table(doubts: Doubts) -> Table:
+def chance_table(ambiguities: Ambiguities) -> Table:
     """How good the score's chances are."""
     rows = []
     for name in NAMES:
-        for snr, one in reliabilities(doubts, name).items():
-            mine = [f for f in found_some(doubts.mixed[name]) if snr in ("all", f"{f.snr_db:g}")]
+        for snr, one in reliabilities(ambiguities, name).items():
+            mine = [
+                f for f in found_some(ambiguities.mixed[name]) if snr in ("all", f"{f.snr_db:g}")
+            ]
             exact = np.array([f.exact for f in mine], dtype=np.bool_)
             base = float(exact.mean()) if len(exact) else float("nan")
-            area = auc(doubts.rule.scores(mine), exact)
+            area = auc(ambiguities.rule.scores(mine), exact)
             rows.append((name, snr, str(len(mine)), f"{100 * base:.0f}", f"{area:.3f}",
                 f"{one.brier:.3f}",
                          f"{base * (1 - base):.3f}", f"{one.error:.3f}"))  # fmt: skip
@@ -113,11 +118,11 @@ def chance_table(doubts: Doubts) -> Table:
     return Table("chance", head, tuple(rows))
 
 
-def confidence_table(doubts: Doubts) -> Table:
+def confidence_table(ambiguities: Ambiguities) -> Table:
     """How well a touch's own numbers tell true from false touches."""
     rows = []
     for name in NAMES:
-        one = doubts.touches[name]
+        one = ambiguities.touches[name]
         areas = (
             f"{auc(values, one.true):.3f}"
             for values in (one.explained, one.over_noise, one.strength)

@@ -33,7 +33,7 @@ PLACE_THRESHOLDS = metrics.THRESHOLDS[4::5]
 
 
 @dataclass(frozen=True, eq=False)
-class Grounds:
+class EvaluationSets:
     """What entries are judged on: sets to choose by (``metal``, ``mixed``), a set to report
     (``test``), the measured frames; ``noise_share`` is the simulated noise over the rms of a
     frame's change."""
@@ -49,7 +49,7 @@ class Grounds:
     noise_share: float
 
 
-def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
+def evaluate(entry: Entry, evaluation_sets: EvaluationSets) -> dict[str, Any]:
     """Everything about an entry in plain values, fit for JSON.
 
     The parameter is the one with the best mean MIoU on the metal set, each value at its own best
@@ -59,8 +59,8 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
     best: tuple[float, float, Imager, FloatArray, Shown] | None = None
     for value in entry.values:
         imager = entry.make(value)
-        shown = imager.show(grounds.metal.quiet_v, grounds.metal.frames_v, False)
-        curves = curves_of(shown, grounds.metal.conductive, grounds.image_scorer)
+        shown = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, False)
+        curves = curves_of(shown, evaluation_sets.metal.conductive, evaluation_sets.image_scorer)
         score = float(curves.mean(axis=0).max())
         if best is None or score > best[0] + 1e-12:
             best = score, value, imager, curves, shown
@@ -68,22 +68,24 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
     trained, value, imager, curves, metal = best
     threshold = metrics.best_threshold(curves)
     at = metrics.THRESHOLDS.index(threshold)
-    test = imager.show(grounds.test.quiet_v, grounds.test.frames_v, False)
-    test_curves = curves_of(test, grounds.test.conductive, grounds.image_scorer)
-    chosen = touch_like(grounds.phantoms)
-    frames = grounds.phantoms.voltage_v[chosen]
-    measured = imager.show(grounds.phantoms.reference_voltage_v, frames, False)
-    conductive, _ = truth_of(grounds.phantoms, grounds.image_scorer.raster)
-    measured_curves = curves_of(measured, conductive[chosen], grounds.image_scorer)
+    test = imager.show(evaluation_sets.test.quiet_v, evaluation_sets.test.frames_v, False)
+    test_curves = curves_of(test, evaluation_sets.test.conductive, evaluation_sets.image_scorer)
+    chosen = touch_like(evaluation_sets.phantoms)
+    frames = evaluation_sets.phantoms.voltage_v[chosen]
+    measured = imager.show(evaluation_sets.phantoms.reference_voltage_v, frames, False)
+    conductive, _ = truth_of(evaluation_sets.phantoms, evaluation_sets.image_scorer.raster)
+    measured_curves = curves_of(measured, conductive[chosen], evaluation_sets.image_scorer)
     place_threshold = None
     if metal.touches is None:
-        place_threshold = best_place_threshold(metal.images, grounds)
-    found = increases(measured, place_threshold, grounds.grid)
+        place_threshold = best_place_threshold(metal.images, evaluation_sets)
+    found = increases(measured, place_threshold, evaluation_sets.grid)
     matchings = match_all(
-        [places_of(grounds.phantoms, k, 1) for k in chosen], found, grounds.gate_mm
+        [places_of(evaluation_sets.phantoms, k, 1) for k in chosen], found, evaluation_sets.gate_mm
     )
     simulated = match_all(
-        grounds.test.conductive_mm, increases(test, place_threshold, grounds.grid), grounds.gate_mm
+        evaluation_sets.test.conductive_mm,
+        increases(test, place_threshold, evaluation_sets.grid),
+        evaluation_sets.gate_mm,
     )
     result = {
         "name": entry.name,
@@ -103,7 +105,10 @@ def contest(entry: Entry, grounds: Grounds) -> dict[str, Any]:
         "images": [_plain(image) for image in measured.images],
         "discs": _touches(measured),
     }
-    return {**result, **(_both_signs(imager, place_threshold, grounds) if entry.both_signs else {})}
+    return {
+        **result,
+        **(_both_signs(imager, place_threshold, evaluation_sets) if entry.both_signs else {}),
+    }
 
 
 def curves_of(shown: Shown, truth: BoolArray, image_scorer: metrics.ImageScorer) -> FloatArray:
@@ -137,41 +142,45 @@ def _discs(touches: Sequence[Touch], sign: int, image_scorer: metrics.ImageScore
     )
 
 
-def best_place_threshold(images: FloatArray, grounds: Grounds) -> float:
+def best_place_threshold(images: FloatArray, evaluation_sets: EvaluationSets) -> float:
     """Of the metal set's ``images``: the threshold with most scenes counted exactly, then most hits
     less false ones."""
     best, best_score = PLACE_THRESHOLDS[0], (-1, 0)
-    index, centres = grounds.grid.index, grounds.grid.centres_mm()
+    index, centres = evaluation_sets.grid.index, evaluation_sets.grid.centres_mm()
     for threshold in PLACE_THRESHOLDS:
         found = [touches_in_image(image, index, centres, threshold) for image in images]
-        matchings = match_all(grounds.metal.conductive_mm, found, grounds.gate_mm)
+        matchings = match_all(evaluation_sets.metal.conductive_mm, found, evaluation_sets.gate_mm)
         score = (sum(m.exact for m in matchings), sum(m.hits - m.false_touches for m in matchings))
         if score > best_score:
             best, best_score = threshold, score
     return best
 
 
-def _both_signs(imager: Imager, place_threshold: float | None, grounds: Grounds) -> dict[str, Any]:
+def _both_signs(
+    imager: Imager, place_threshold: float | None, evaluation_sets: EvaluationSets
+) -> dict[str, Any]:
     """All nine frames and the rods, with both signs."""
-    mixed, frames = grounds.mixed, grounds.phantoms
+    mixed, frames = evaluation_sets.mixed, evaluation_sets.phantoms
     tuned = imager.show(mixed.quiet_v, mixed.frames_v, True)
-    curves = signed_curves_of(tuned, mixed.conductive, mixed.resistive, grounds.image_scorer)
+    curves = signed_curves_of(
+        tuned, mixed.conductive, mixed.resistive, evaluation_sets.image_scorer
+    )
     threshold = metrics.best_threshold(curves)
     shown = imager.show(frames.reference_voltage_v, frames.voltage_v, True)
-    truths = truth_of(frames, grounds.image_scorer.raster)
-    scores = signed_curves_of(shown, *truths, grounds.image_scorer)[
+    truths = truth_of(frames, evaluation_sets.image_scorer.raster)
+    scores = signed_curves_of(shown, *truths, evaluation_sets.image_scorer)[
         :, metrics.THRESHOLDS.index(threshold)
     ]
     matchings: list[Matching] = []
-    for k, found in enumerate(_both(shown, place_threshold, grounds.grid)):
+    for k, found in enumerate(_both(shown, place_threshold, evaluation_sets.grid)):
         matchings += match_signs(
-            (places_of(frames, k, 1), places_of(frames, k, -1)), found, grounds.gate_mm
+            (places_of(frames, k, 1), places_of(frames, k, -1)), found, evaluation_sets.gate_mm
         )
     at_rods, rod_images, rod_discs = [], [], []
-    for one in grounds.rods:
+    for one in evaluation_sets.rods:
         seen = imager.show(one.frames.reference_voltage_v, one.frames.voltage_v, True)
-        found = _both(seen, place_threshold, grounds.grid)[0]
-        metal, plastic = match_signs((one.metal_mm, one.plastic_mm), found, grounds.gate_mm)
+        found = _both(seen, place_threshold, evaluation_sets.grid)[0]
+        metal, plastic = match_signs((one.metal_mm, one.plastic_mm), found, evaluation_sets.gate_mm)
         at_rods.append({"metal": _counts([metal]), "plastic": _counts([plastic])})
         rod_images.append(_plain(seen.images[0]))
         rod_discs += _touches(seen)
