@@ -36,7 +36,7 @@ Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 
 
 @dataclass(frozen=True)
-class Settings:
+class ReconstructSettings:
     """How frames are reconstructed.
 
     Attributes:
@@ -64,7 +64,7 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class ReconstructOutcome:
     """What came of the frames.
 
     Attributes:
@@ -90,12 +90,12 @@ class Outcome:
 
 def reconstruct_frames(
     path: Path,
-    settings: Settings | None = None,
+    settings: ReconstructSettings | None = None,
     *,
     output: Path | None = None,
     picture: Path | None = None,
     progress: Progress = lambda frames, _: frames,
-) -> Outcome:
+) -> ReconstructOutcome:
     """Reconstruct the frames of the file ``path``; those that cannot be used are named in
     ``refused``, and the others are still done. Images, touches and info go into the file ``output``
     (.npz), a ``picture`` shows all frames.
@@ -105,7 +105,7 @@ def reconstruct_frames(
             reference cannot be used.
         MissingExtraError: the picture needs matplotlib.
     """
-    how = settings or Settings()
+    how = settings or ReconstructSettings()
     check(how, output, picture)
     notes: list[str] = []
     frames, chosen = read(path, how.only)
@@ -114,7 +114,7 @@ def reconstruct_frames(
     reference = take_reference(path, reconstructor, frames, notes)
     results, refused = solve(reconstructor, blob, frames, chosen, how, progress)
     scores = score(reconstructor.model, frames, results, reconstructor.options.sign, point, notes)
-    outcome = Outcome(
+    outcome = ReconstructOutcome(
         frames, reconstructor.model, name, how.engine, point, reference, results, refused, scores,
         tuple(notes),
     )  # fmt: skip
@@ -122,7 +122,7 @@ def reconstruct_frames(
     return outcome
 
 
-def check(how: Settings, output: Path | None, picture: Path | None) -> None:
+def check(how: ReconstructSettings, output: Path | None, picture: Path | None) -> None:
     """Refuse what cannot be, before any file is read."""
     if check_threads(how.threads) > 1:
         reasons = {
@@ -160,7 +160,9 @@ def read(path: Path, only: tuple[str, ...] | None) -> tuple[Frames, list[int]]:
     return frames, [k for k, name in enumerate(frames.frame_name) if name in names]
 
 
-def choose_model(path: Path, frames: Frames, how: Settings) -> tuple[Reconstructor, bytes, str]:
+def choose_model(
+    path: Path, frames: Frames, how: ReconstructSettings
+) -> tuple[Reconstructor, bytes, str]:
     """The model that fits the frames, its bytes and name."""
     model, blob, name = load_or_prebuilt(how.model)
     reconstructor = Reconstructor(model, engine=how.engine, blob=blob)
@@ -171,7 +173,9 @@ def choose_model(path: Path, frames: Frames, how: Settings) -> tuple[Reconstruct
     return reconstructor, blob, name
 
 
-def apply_options(reconstructor: Reconstructor, how: Settings, notes: list[str]) -> Point | None:
+def apply_options(
+    reconstructor: Reconstructor, how: ReconstructSettings, notes: list[str]
+) -> Point | None:
     """Give the solver its options; with a wish those of the measured point that fulfils it."""
     reconstructor.with_options(**how.changes)
     if how.track:
@@ -211,7 +215,7 @@ def solve(
     blob: bytes,
     frames: Frames,
     chosen: list[int],
-    how: Settings,
+    how: ReconstructSettings,
     progress: Progress,
 ) -> tuple[Results, dict[int, str]]:
     """The results of the ``chosen`` frames, and why there is none, by number."""
@@ -273,7 +277,7 @@ def score(
     return {k: one for k, one in scored.items() if one is not None}
 
 
-def write(outcome: Outcome, output: Path | None, picture: Path | None) -> None:
+def write(outcome: ReconstructOutcome, output: Path | None, picture: Path | None) -> None:
     """The file of results and the picture, where there is something to show."""
     if output is not None and outcome.results:
         from eitskin.frames.results_file import save_results
@@ -285,7 +289,7 @@ def write(outcome: Outcome, output: Path | None, picture: Path | None) -> None:
         draw_results(picture, outcome.model, outcome.frames, outcome.results, outcome.scores)
 
 
-def to_text(outcome: Outcome) -> str:
+def to_text(outcome: ReconstructOutcome) -> str:
     """A table of the touches, then what they cost and how true they are."""
     results, scores = outcome.results, outcome.scores
     weighed = any(touch.force_n for result in results.values() for touch in result.touches)
@@ -354,7 +358,7 @@ def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
     }
 
 
-def to_json(outcome: Outcome) -> dict[str, Any]:
+def to_json(outcome: ReconstructOutcome) -> dict[str, Any]:
     """Everything that the text says, and more, for programs."""
     listed = []
     for number in sorted({*outcome.results, *outcome.refused}):

@@ -41,7 +41,7 @@ MAX_F0 = 30.0  # times the greatest load: beyond, a saturating law is a straight
 
 
 @dataclass(frozen=True)
-class Form:
+class LawForm:
     """A law of some positive numbers: strength by load, and load by strength; their names, where a
     fit begins, its bounds.
 
@@ -60,19 +60,19 @@ class Form:
 
 
 FORMS = {
-    "saturating": Form(
+    "saturating": LawForm(
         lambda f, most, f0: np.asarray(-most * np.expm1(-f / f0)),
         lambda s, most, f0: np.asarray(-f0 * np.log1p(-s / most)),
         ("s_max_s_per_m_mm2", "f0_n"), "s_max (1 - exp(-F / F0))", 3, (2.0, 2.0), (1e-9, 0.05),
         (1e9, MAX_F0),
     ),
-    "power": Form(
+    "power": LawForm(
         lambda f, c, p: np.asarray(c * f**p),
         lambda s, c, p: np.asarray((s / c) ** (1 / p)),
         ("c_s_per_m_mm2_at_1_n", "exponent"), "c F^p", 3, (1.0, 0.9), (1e-9, MIN_EXPONENT),
         (1e9, 20.0),
     ),
-    "stretched": Form(
+    "stretched": LawForm(
         lambda f, most, f0, p: np.asarray(-most * np.expm1(-((f / f0) ** p))),
         lambda s, most, f0, p: np.asarray(f0 * (-np.log1p(-s / most)) ** (1 / p)),
         ("s_max_s_per_m_mm2", "f0_n", "exponent"), "s_max (1 - exp(-(F / F0)^p))", 4,
@@ -82,7 +82,7 @@ FORMS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedLaw:
     """One fit: the ``form``'s numbers, and the ``gain``'s coefficients (t,), the first of them
     1."""
 
@@ -108,7 +108,7 @@ class Calibration:
     """
 
     law: LoadLaw
-    fitted: Fitted
+    fitted: FittedLaw
     interval: tuple[tuple[float, float], ...]
     left_out: FloatArray
     groups: int
@@ -239,14 +239,14 @@ def calibrate(
     )  # fmt: skip
 
 
-def _steepness(fitted: Fitted, force_n: FloatArray) -> float:
+def _steepness(fitted: FittedLaw, force_n: FloatArray) -> float:
     """The exponent of load that strength grows with between the least and the greatest weight."""
     ends = np.array([force_n.min(), force_n.max()])
     low, high = np.log(np.maximum(FORMS[fitted.form].strength(ends, *fitted.numbers), 1e-300))
     return float((high - low) / np.log(ends[1] / ends[0]))
 
 
-def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
+def fit(presses: Presses, radius_mm: float, form: str, order: int) -> FittedLaw:
     """One law and order to all ``presses``.
 
     Raises:
@@ -294,12 +294,12 @@ def fit(presses: Presses, radius_mm: float, form: str, order: int) -> Fitted:
     solved = least_squares(
         misfit, start + free * [0.0], slope, bounds=bounds, max_nfev=100, ftol=1e-7, xtol=1e-7
     ).x
-    return Fitted(
+    return FittedLaw(
         form, tuple(np.exp(solved[:count]).tolist()), order, np.concatenate([[1.0], solved[count:]])
     )
 
 
-def law_of(fitted: Fitted, presses: Presses, radius_mm: float, uncertainty: float) -> LoadLaw:
+def law_of(fitted: FittedLaw, presses: Presses, radius_mm: float, uncertainty: float) -> LoadLaw:
     """``fitted`` as a model holds it: the law as a table up to the greatest load of ``presses``,
     evenly by strength."""
     shape, most = FORMS[fitted.form], float(presses.force_n.max())
@@ -345,7 +345,7 @@ def _rms_log(errors: FloatArray) -> float:
 
 
 def _interval(
-    presses: Presses, radius_mm: float, fitted: Fitted, fold: IntArray, seed: int, resamples: int
+    presses: Presses, radius_mm: float, fitted: FittedLaw, fold: IntArray, seed: int, resamples: int
 ) -> tuple[tuple[float, float], ...]:
     """95 % of the law's numbers over fits to folds drawn with replacement."""
     generator, count = np.random.default_rng(seed), int(fold.max()) + 1

@@ -72,7 +72,7 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Reconstruct all frames; those that cannot be used are named, and the others are still done
     and written."""
-    from eitskin.reconstruct import Settings, reconstruct_frames, to_json, to_text
+    from eitskin.reconstruct import ReconstructSettings, reconstruct_frames, to_json, to_text
 
     changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
     if options.second_pass:
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         if not options.saturation_v > 0:
             raise UsageError(f"--saturation-v {options.saturation_v:g} must be above 0")
         changes["saturation_v"] = options.saturation_v
-    settings = Settings(
+    settings = ReconstructSettings(
         model=options.model,
         engine=options.engine,
         changes=changes | named_solver(options),

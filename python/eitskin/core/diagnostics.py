@@ -19,7 +19,7 @@ DIAGNOSTICS = (
 ALL_DIAGNOSTICS = 2 ** len(DIAGNOSTICS) - 1
 
 
-class Found(Protocol):
+class DiagnosticFields(Protocol):
     """What eits_info says of diagnostics."""
 
     @property
@@ -56,7 +56,7 @@ def names(diagnostics: int) -> tuple[str, ...]:
     return tuple(name for bit, name in enumerate(DIAGNOSTICS) if diagnostics >> bit & 1)
 
 
-def words(found: Found) -> tuple[str, ...]:
+def words(found: DiagnosticFields) -> tuple[str, ...]:
     """Each diagnostic in a few words: "electrode 5 open", "2 rows left out as outliers"..."""
     details = {
         "saturated": f"{plural(found.saturated, 'row')} saturated",
@@ -76,7 +76,7 @@ def words(found: Found) -> tuple[str, ...]:
     return tuple(details[name] for name in names(found.diagnostics))
 
 
-def with_diagnostics(text: str, found: Found) -> str:
+def with_diagnostics(text: str, found: DiagnosticFields) -> str:
     """``text``, why a frame is refused, and what was found wrong with it."""
     return "; ".join((text, *words(found)))
 

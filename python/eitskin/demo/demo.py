@@ -15,14 +15,18 @@ from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin.scoring.score import FrameScore, scorer_for
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 
-TOUCHES = (Touch(-38.0, 34.0, 9.0, 8.0), Touch(44.0, 22.0, 7.0, 5.0), Touch(-6.0, -52.0, 11.0, 4.0))
+TOUCHES = (
+    TrueTouch(-38.0, 34.0, 9.0, 8.0),
+    TrueTouch(44.0, 22.0, 7.0, 5.0),
+    TrueTouch(-6.0, -52.0, 11.0, 4.0),
+)
 TIMED_RUNS = 200
 
 
@@ -60,7 +64,7 @@ def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
         MissingExtraError: scipy or netgen is not installed.
     """
     step("simulating three touches: mesh, electrodes, forward model, noise")
-    touches = TouchSet("demo", seed, (Scene("demo", TOUCHES),))
+    touches = TouchSet("demo", seed, (TouchScene("demo", TOUCHES),))
     frames = simulate(
         paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=snr_db)
     ).as_frames()

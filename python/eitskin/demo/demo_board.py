@@ -19,7 +19,7 @@ from eitskin.device.recordings.packet_log import PacketLog
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.packets import BoardInfo, Stream
 from eitskin.errors import DeviceError
-from eitskin.scene.random_touches import Touch as TrueTouch
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import Matching
 from eitskin.scoring.scene_truth import truth_of
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from eitskin.core.results import SIGNS, SOLVERS, Options, check_options
-from eitskin.device.exchange import ANSWER_S, Exchange, Streamed
+from eitskin.device.exchange import ANSWER_S, CommandExchange, Streamed
 from eitskin.device.streaming import stream
 from eitskin.device.upload import upload
 from eitskin.device.wire import commands
@@ -26,9 +26,9 @@ def _asked_millihz(info: BoardInfo) -> int:
     return periods * rate_millihz // info.samples
 
 
-class Device(Exchange):
+class Device(CommandExchange):
     """All that a board can be told and asked; ``open_device`` makes one from a URL. Raises as
-    ``Exchange``."""
+    ``CommandExchange``."""
 
     # ---- commands ----
 

@@ -23,7 +23,7 @@ NOT_FOR_THE_SKIN = frozenset(
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredBoard:
     """What a board gave: ``quiet`` and ``touched`` frames, what it is, what it counted (None: a
     recording)."""
 
@@ -35,7 +35,7 @@ class Measured:
 
 def measure(
     device: Device, frames: int, *, touched: bool, before_touches: Callable[[], None]
-) -> Measured:
+) -> MeasuredBoard:
     """``frames`` raw frames of the untouched skin, and where ``touched`` as many after
     ``before_touches`` was called. A recording gives its own quiet frames, where it has some.
 
@@ -46,20 +46,20 @@ def measure(
     if device.transport.replays:
         quiet = _with_frames(first, first.quiet or first.frames[:frames])
         after = _with_frames(first, first.frames if first.quiet else first.frames[frames:])
-        return Measured(quiet, after if touched else RawRun(), device.board, None)
+        return MeasuredBoard(quiet, after if touched else RawRun(), device.board, None)
     after = RawRun()
     if touched:
         before_touches()
         begin_scene(device)
         after = collect(device, frames)
     ended = device.link.ended
-    return Measured(
+    return MeasuredBoard(
         first, after, device.board if ended else device.info(), None if ended else device.stats()
     )
 
 
 def board_subject(
-    device: Device, measured: Measured, known: KnownModel | None, skin: Skin | None
+    device: Device, measured: MeasuredBoard, known: KnownModel | None, skin: Skin | None
 ) -> Subject:
     """For the doctor's checks; the skin is the model's own unless another is given.
 
@@ -84,7 +84,7 @@ def board_subject(
     return Subject(device.transport.url, AS_GIVEN, ((AS_GIVEN, frames),), skin, remarks)
 
 
-def board_findings(report: Report, measured: Measured) -> Report:
+def board_findings(report: Report, measured: MeasuredBoard) -> Report:
     """``report`` with what the board itself says. Remedies of ``eitskin import`` are taken out: a
     board is repaired by hand."""
     raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]

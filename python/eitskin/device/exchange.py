@@ -32,7 +32,7 @@ from eitskin.errors import DeviceError, UsageError
 Answer = Reply | BoardInfo | BoardStats
 Streamed = RawFrame | SolvedImage | SolvedTouches | Fault | BoardStats | LinkEvent
 
-Self = TypeVar("Self", bound="Exchange")
+Self = TypeVar("Self", bound="CommandExchange")
 
 TRIES = 3
 ANSWER_S = 1.0
@@ -57,7 +57,7 @@ class Deadline:
         return self._rest_s
 
 
-class Exchange:
+class CommandExchange:
     """A board that was found, whose version fits and that answers. ``board`` is what INFO last
     said.
 

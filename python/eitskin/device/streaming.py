@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 
-from eitskin.device.exchange import Exchange, Streamed
+from eitskin.device.exchange import CommandExchange, Streamed
 from eitskin.device.link import LinkEvent
 from eitskin.device.wire.commands import StreamCommand
 from eitskin.device.wire.explain import reply_text
@@ -52,7 +52,7 @@ _KIND: dict[type, Stream] = {
 }
 
 
-def stream(device: Exchange, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
+def stream(device: CommandExchange, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
     """See ``Device.stream``."""
     if device.transport.replays:
         yield from _replay(device, what, every, frames)
@@ -81,21 +81,21 @@ def stream(device: Exchange, what: Stream, every: int, frames: int) -> Iterator[
         _stop(device)
 
 
-def _start(device: Exchange, progress: _Progress, every: int) -> None:
+def _start(device: CommandExchange, progress: _Progress, every: int) -> None:
     reply = device.send_command(StreamCommand(int(progress.what), every, progress.rest), COMMAND_S)
     if not reply.ok:
         raise DeviceError(f"{device.transport.name}: {reply_text(reply)}")
     progress.restarts = device.counters.restarts
 
 
-def _stop(device: Exchange) -> None:
+def _stop(device: CommandExchange) -> None:
     """However the stream ended; a board that is gone cannot be stopped, and that is not what went
     wrong."""
     with suppress(EitskinError):
         device.send_command(StreamCommand(0), COMMAND_S)
 
 
-def _resume(device: Exchange, progress: _Progress, every: int) -> None:
+def _resume(device: CommandExchange, progress: _Progress, every: int) -> None:
     """Go on after the board was away: only if it is the same, with the same model and, for images,
     still with its reference."""
     before = device.board
@@ -115,7 +115,7 @@ def _resume(device: Exchange, progress: _Progress, every: int) -> None:
     _start(device, progress, every)
 
 
-def _is_over(device: Exchange, progress: _Progress, every: int, silent: int) -> bool:
+def _is_over(device: CommandExchange, progress: _Progress, every: int, silent: int) -> bool:
     """Nothing came for a while: whether that is because the board has sent all, found out by asking
     it."""
     before = device.board
@@ -140,7 +140,7 @@ def _is_over(device: Exchange, progress: _Progress, every: int, silent: int) -> 
     return False
 
 
-def _replay(device: Exchange, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
+def _replay(device: CommandExchange, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
     """What was recorded, of the kinds asked for."""
     numbers: dict[int, int] = {}
     while True:

@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from eitskin.device.exchange import Exchange
+from eitskin.device.exchange import CommandExchange
 from eitskin.device.wire.commands import ModelBegin, ModelCommit, ModelData
 from eitskin.device.wire.explain import reply_text
 from eitskin.device.wire.packets import MAX_PAYLOAD, Reply, ReplyStatus
@@ -20,7 +20,7 @@ GOING_BACK = 10
 
 
 def upload(
-    device: Exchange, model: str | Path | bytes, progress: Callable[[int, int], None] | None
+    device: CommandExchange, model: str | Path | bytes, progress: Callable[[int, int], None] | None
 ) -> None:
     """See ``Device.upload_model``."""
     blob = _checked(device, model)
@@ -53,12 +53,12 @@ class _Refused(DeviceError):
     """The board said why."""
 
 
-def _demand(device: Exchange, reply: Reply) -> None:
+def _demand(device: CommandExchange, reply: Reply) -> None:
     if not reply.ok:
         raise _Refused(f"{device.transport.name}: {reply_text(reply)}")
 
 
-def _checked(device: Exchange, model: str | Path | bytes) -> bytes:
+def _checked(device: CommandExchange, model: str | Path | bytes) -> bytes:
     """The model's bytes, refused here rather than after minutes on the wire."""
     from eitskin.model.eitm import decode_model, load_model
 
@@ -81,7 +81,7 @@ def _checked(device: Exchange, model: str | Path | bytes) -> bytes:
     return blob
 
 
-def _send_pieces(device: Exchange, blob: bytes, done: int) -> Iterator[int]:
+def _send_pieces(device: CommandExchange, blob: bytes, done: int) -> Iterator[int]:
     """Send from ``done`` on; yields how far the board has it."""
     size = max(min(device.board.data_bytes, MAX_PAYLOAD - ModelData.LAYOUT.size) // 4 * 4, 4)
     back = 0

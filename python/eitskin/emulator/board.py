@@ -15,10 +15,10 @@ from collections.abc import Callable
 from eitskin.emulator.analog.ad9833 import Ad9833
 from eitskin.emulator.analog.adg1206 import Multiplexers
 from eitskin.emulator.analog.front_end import FrontEnd
-from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.bus import Bus, Peripheral
 from eitskin.emulator.clocktime import TICKS_PER_S, BoardClock
-from eitskin.emulator.cpu import Cpu, Stop
+from eitskin.emulator.cpu import Cpu, CpuStop
 from eitskin.emulator.exceptions import Exceptions
 from eitskin.emulator.memory import BANK_BYTES, BANKS, FLASH, PROGRAM_BYTES, Memories
 from eitskin.emulator.peripherals import scb
@@ -62,7 +62,11 @@ class EmulatedBoard:
     """
 
     def __init__(
-        self, image: bytes, skin: Skin, banks: tuple[bytes, ...] = (), hse_hz: int | None = HSE_HZ
+        self,
+        image: bytes,
+        skin: AnalogSkin,
+        banks: tuple[bytes, ...] = (),
+        hse_hz: int | None = HSE_HZ,
     ) -> None:
         if not 8 <= len(image) <= PROGRAM_BYTES:
             raise DeviceError(
@@ -349,13 +353,13 @@ class EmulatedBoard:
         trespass = self.mpu.trespassed()
         if trespass is not None:
             self._fault(MEMORY_FAULT, scb.DACCVIOL, "store to a guarded region", trespass)
-        elif stop is Stop.SLEEP:
+        elif stop is CpuStop.SLEEP:
             self._asleep = True
-        elif stop is Stop.RETURN:
+        elif stop is CpuStop.RETURN:
             self._return()
-        elif stop is Stop.CALL:
+        elif stop is CpuStop.CALL:
             self.nvic.pend(SVCALL)
-        elif stop is not Stop.COUNT:
+        elif stop is not CpuStop.COUNT:
             self._stopped_by(stop)
 
     def _only_masked(self) -> bool:
@@ -368,14 +372,14 @@ class EmulatedBoard:
             return
         self.nvic.leave()
 
-    def _stopped_by(self, stop: Stop) -> None:
+    def _stopped_by(self, stop: CpuStop) -> None:
         address = self.cpu.fault_address
-        if stop in (Stop.READ_FAULT, Stop.WRITE_FAULT):
+        if stop in (CpuStop.READ_FAULT, CpuStop.WRITE_FAULT):
             if self.mpu.denies(address):
                 self._fault(MEMORY_FAULT, scb.DACCVIOL, stop.name, address)
             else:
                 self._fault(BUS_FAULT, scb.PRECISERR, stop.name, address)
-        elif stop is Stop.FETCH_FAULT:
+        elif stop is CpuStop.FETCH_FAULT:
             denied = self.mpu.denies(address)
             self._fault(
                 MEMORY_FAULT if denied else BUS_FAULT,

@@ -21,7 +21,7 @@ def period_ticks(hz: float) -> int:
     return max(round(TICKS_PER_S / hz), 1)
 
 
-class Count(Protocol):
+class TickCount(Protocol):
     """A number that counts by itself, as ctypes holds it."""
 
     value: int
@@ -33,7 +33,7 @@ class BoardClock:
     def __init__(self) -> None:
         self.cycle_ticks = 27
         self._base = 0
-        self._count: Count | None = None  # of the running slice's instructions
+        self._count: TickCount | None = None  # of the running slice's instructions
         self._counted = 0  # of which are in _base
 
     @property
@@ -51,7 +51,7 @@ class BoardClock:
         """Seconds since power came."""
         return self.now / TICKS_PER_S
 
-    def slice_begins(self, count: Count) -> None:
+    def slice_begins(self, count: TickCount) -> None:
         """From now on ``count`` counts instructions, from 0."""
         self._count, self._counted = count, 0
 

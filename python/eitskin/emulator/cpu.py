@@ -35,7 +35,7 @@ SVC, BREAKPOINT, EXCEPTION_RETURN, FETCH_ABORT = (
 )  # numbers by which Unicorn tells of them
 
 
-class Stop(Enum):
+class CpuStop(Enum):
     """Why a slice ended."""
 
     COUNT = auto()
@@ -50,18 +50,18 @@ class Stop(Enum):
 
 
 FAULT_OF = {
-    uc.UC_ERR_READ_UNMAPPED: Stop.READ_FAULT,
-    uc.UC_ERR_READ_PROT: Stop.READ_FAULT,
-    uc.UC_ERR_WRITE_UNMAPPED: Stop.WRITE_FAULT,
-    uc.UC_ERR_WRITE_PROT: Stop.WRITE_FAULT,
-    uc.UC_ERR_FETCH_UNMAPPED: Stop.FETCH_FAULT,
-    uc.UC_ERR_FETCH_PROT: Stop.FETCH_FAULT,
-    uc.UC_ERR_INSN_INVALID: Stop.INSTRUCTION_FAULT,
-    uc.UC_ERR_EXCEPTION: Stop.INSTRUCTION_FAULT,
+    uc.UC_ERR_READ_UNMAPPED: CpuStop.READ_FAULT,
+    uc.UC_ERR_READ_PROT: CpuStop.READ_FAULT,
+    uc.UC_ERR_WRITE_UNMAPPED: CpuStop.WRITE_FAULT,
+    uc.UC_ERR_WRITE_PROT: CpuStop.WRITE_FAULT,
+    uc.UC_ERR_FETCH_UNMAPPED: CpuStop.FETCH_FAULT,
+    uc.UC_ERR_FETCH_PROT: CpuStop.FETCH_FAULT,
+    uc.UC_ERR_INSN_INVALID: CpuStop.INSTRUCTION_FAULT,
+    uc.UC_ERR_EXCEPTION: CpuStop.INSTRUCTION_FAULT,
 }
 
 # stops after which the last instruction that was begun has been executed
-WHOLE = (Stop.SLEEP, Stop.RETURN, Stop.CALL)
+WHOLE = (CpuStop.SLEEP, CpuStop.RETURN, CpuStop.CALL)
 LOAD = ctypes.CFUNCTYPE(
     ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_void_p
 )
@@ -127,11 +127,11 @@ class Cpu:
     def pc(self, value: int) -> None:
         self.pc_register.write((value | 1,))
 
-    def run(self, instructions: int, horizon: int) -> Stop:
+    def run(self, instructions: int, horizon: int) -> CpuStop:
         """Execute at most so many instructions, meant to last until ``horizon`` (ticks); tells why
         it stopped."""
         self._told_of, self.horizon = 0, horizon
-        stop, begun = Stop.COUNT, self._counter.begun
+        stop, begun = CpuStop.COUNT, self._counter.begun
         begun.value = 0
         self._running = True
         self.clock.slice_begins(begun)
@@ -143,7 +143,7 @@ class Cpu:
             stop = FAULT_OF[error.errno]
         finally:
             self._running = False
-            if stop is Stop.COUNT:
+            if stop is CpuStop.COUNT:
                 stop = self._why(begun.value)
             executed = begun.value - (stop not in WHOLE)
             self.record.instructions += executed
@@ -174,19 +174,19 @@ class Cpu:
             self.horizon = 0
             self._counter.stop_after(0)
 
-    def _why(self, started: int) -> Stop:
+    def _why(self, started: int) -> CpuStop:
         if self._told_of == EXCEPTION_RETURN:
-            return Stop.RETURN
+            return CpuStop.RETURN
         if self._told_of == SVC:
-            return Stop.CALL
+            return CpuStop.CALL
         if self._told_of == BREAKPOINT:
-            return Stop.BREAKPOINT
+            return CpuStop.BREAKPOINT
         if self._told_of == FETCH_ABORT:
             self.fault_address = self.pc
-            return Stop.FETCH_FAULT
+            return CpuStop.FETCH_FAULT
         if self._told_of:
-            return Stop.INSTRUCTION_FAULT
-        return Stop.COUNT if started > self._counter.limit else Stop.SLEEP
+            return CpuStop.INSTRUCTION_FAULT
+        return CpuStop.COUNT if started > self._counter.limit else CpuStop.SLEEP
 
     def _told(self, engine: Any, number: int, data: object) -> None:
         self._told_of = number

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.errors import ProtocolError
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import Scene
@@ -11,7 +11,7 @@ from eitskin.skin.protocol import Protocol
 DONE_BY_THE_BOARD = ("adc",)
 
 
-def skin_of(scene: Scene, protocol: Protocol) -> Skin:
+def skin_of(scene: Scene, protocol: Protocol) -> AnalogSkin:
     """The skin of ``scene``, scanned by the rows of ``protocol``; its ``adc`` effect is left to the
     emulated converter.
 
@@ -28,4 +28,4 @@ def skin_of(scene: Scene, protocol: Protocol) -> Skin:
         )
     voltage_v = BoardFrames(scene, DONE_BY_THE_BOARD).voltage_v(protocol)
     quiet = scene.quiet_frames
-    return Skin(protocol, voltage_v[:quiet], voltage_v[quiet:], scene.rate_hz)
+    return AnalogSkin(protocol, voltage_v[:quiet], voltage_v[quiet:], scene.rate_hz)

@@ -16,7 +16,7 @@ TOLERANCE = 0.03
 
 
 @dataclass
-class Run:
+class ByteRun:
     """Bytes one after the other: byte k is whole at ``first_end + k * frame_ticks``."""
 
     data: bytes
@@ -43,8 +43,8 @@ class SerialLine:
     def __init__(self, clock: BoardClock, baud: int = BAUD) -> None:
         self._clock = clock
         self.frame_ticks = FRAME_BITS * TICKS_PER_S // baud
-        self._down: deque[Run] = deque()
-        self._up: deque[Run] = deque()
+        self._down: deque[ByteRun] = deque()
+        self._up: deque[ByteRun] = deque()
         self._host_free_at = 0
         self.host_sends: Callable[[], None] = lambda: None
 
@@ -59,7 +59,7 @@ class SerialLine:
         if data:
             start = max(self._clock.now, self._host_free_at)
             self._host_free_at = start + len(data) * self.frame_ticks
-            self._down.append(Run(data, start + self.frame_ticks, self.frame_ticks))
+            self._down.append(ByteRun(data, start + self.frame_ticks, self.frame_ticks))
             self.host_sends()
 
     def receive(self, at: int) -> bytes:
@@ -79,7 +79,7 @@ class SerialLine:
     def from_board(self, data: bytes, start: int, frame_ticks: int) -> None:
         """The board sends ``data`` from ``start`` on."""
         if data:
-            self._up.append(Run(data, start + frame_ticks, frame_ticks))
+            self._up.append(ByteRun(data, start + frame_ticks, frame_ticks))
 
     def to_board(self, at: int) -> tuple[bytes, int]:
         """What has arrived at the board by ``at`` and was not taken before, and when the last of it
@@ -111,7 +111,7 @@ class SerialLine:
         self._up.clear()
 
 
-def _take(runs: deque[Run], at: int) -> bytes:
+def _take(runs: deque[ByteRun], at: int) -> bytes:
     out = bytearray()
     while runs:
         run = runs[0]

@@ -58,7 +58,7 @@ PRIVATE = ("names", "no_signal")  # fields of Found that Info has not
 
 
 @dataclass
-class Found:
+class FrameDiagnostics:
     """What a frame's examination has found so far."""
 
     names: set[str] = field(default_factory=set)
@@ -137,7 +137,7 @@ class Examiner:
         self.rows = model.protocol.drive_measure.astype(np.int64)
         self._p = model.projection.astype(np.float64)
         self.wanted: set[str] = set(DIAGNOSTICS)
-        self.found = Found()
+        self.found = FrameDiagnostics()
 
     @cached_property
     def sheet(self) -> Sheet | None:

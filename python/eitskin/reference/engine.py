@@ -28,12 +28,19 @@ from eitskin.core.results import (
 )
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
-from eitskin.reference.diagnostics import Examiner, Folded, Found, Reference
+from eitskin.reference.diagnostics import Examiner, Folded, FrameDiagnostics, Reference
 from eitskin.reference.disc_fit import Disc, Reduced
 from eitskin.reference.exact import ActiveSet, coordinate
 from eitskin.reference.fista import fista
 from eitskin.reference.interaction import interplay
-from eitskin.reference.problem import Certificate, FloatArray, Problem, Result, greatest, project
+from eitskin.reference.problem import (
+    Certificate,
+    FloatArray,
+    Problem,
+    SolveResult,
+    greatest,
+    project,
+)
 from eitskin.reference.reference_outliers import clean
 from eitskin.reference.touches import find_touches
 from eitskin.reference.tracker import Tracker
@@ -213,7 +220,7 @@ class ReferenceEngine:
         if self._v0 is None:
             raise FrameError("frame: no reference frame has been set")
         limit, look = self.options.saturation_v, self._examiner
-        look.found = Found()
+        look.found = FrameDiagnostics()
         masked = self._bad | self._without_reference
         saturated = (np.abs(np.nan_to_num(frame)) >= limit) & (limit > 0)
         unusable = masked | ~np.isfinite(frame) | saturated
@@ -411,7 +418,7 @@ class ReferenceEngine:
             replace(t, force_n=float(load)) for t, load in zip(touches, loads, strict=True)
         )
 
-    def _image(self, result: Result) -> FloatArray:
+    def _image(self, result: SolveResult) -> FloatArray:
         return np.asarray(result.x * self.model.column_weight.astype(np.float64))
 
     @property
@@ -431,22 +438,22 @@ class ReferenceEngine:
 
     def _solve(
         self, y: FloatArray, basis: FloatArray, lambda_noise: float, start: FloatArray | None
-    ) -> tuple[Result, float, float]:
+    ) -> tuple[SolveResult, float, float]:
         """The coefficients for ``y``, with lambda and lambda_max."""
         o, norm = self.options, float(np.linalg.norm(y))
         lambda_max = greatest(self.seen.T @ y, o.sign)
         lam = o.lambda_abs or max(o.lambda_rel * lambda_max, o.lambda_noise_factor * lambda_noise)
         nothing, zero = Certificate(0.0, 0.5 * norm**2, norm), np.zeros(self.model.grid.n_pixels)
         if o.detection_factor > 0 and lambda_max < o.detection_factor * lambda_noise:
-            return Result(zero, 0, "below-threshold", nothing, 0), lam, lambda_max
+            return SolveResult(zero, 0, "below-threshold", nothing, 0), lam, lambda_max
         if not lambda_max > lam or norm**2 < MIN_SQUARE:
-            return Result(zero, 0, "zero", nothing, 0), lam, lambda_max
+            return SolveResult(zero, 0, "zero", nothing, 0), lam, lambda_max
         result = self._run(Problem(self.seen, y, lam, o.sign, basis), start)
         if result.stop == "diverged":
-            result = Result(zero, result.iterations, "diverged", nothing, result.step_halvings)
+            result = SolveResult(zero, result.iterations, "diverged", nothing, result.step_halvings)
         return result, lam, lambda_max
 
-    def _run(self, problem: Problem, last: FloatArray | None) -> Result:
+    def _run(self, problem: Problem, last: FloatArray | None) -> SolveResult:
         """The chosen solver, from the ``last`` coefficients or from zero."""
         start, o = self._start(problem, last), self.options
         if o.solver == "coordinate":

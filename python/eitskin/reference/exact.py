@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
-from eitskin.reference.problem import FloatArray, Problem, Result, shrink
+from eitskin.reference.problem import FloatArray, Problem, SolveResult, shrink
 
 IntArray = npt.NDArray[np.int64]
 
@@ -27,7 +27,7 @@ WORTHWHILE, LOOKS_NEARBY = 1e-6, 20
 
 def coordinate(
     problem: Problem, options: Options, start: FloatArray | None = None, done: int = 0
-) -> Result:
+) -> SolveResult:
     """Sweeps over the columns that are not zero or that a look found to move; ``done`` sweeps count
     as made."""
     p, lam = problem, problem.lam
@@ -57,7 +57,7 @@ def coordinate(
             first = worth if first == np.inf else first
         certificate, gradient = p.check_gap(x)
         if not certificate.objective <= p.ceiling:
-            return Result(x, sweeps, "diverged", certificate, 0)
+            return SolveResult(x, sweeps, "diverged", certificate, 0)
         if options.gap_rel > 0 and certificate.gap <= options.gap_rel * p.scale:
             stop = "gap"
             break
@@ -65,7 +65,7 @@ def coordinate(
             stop = "optimum"
             break
         interval *= 1 if options.gap_rel > 0 else LOOK_GROWTH
-    return Result(x, sweeps, stop, certificate, 0)
+    return SolveResult(x, sweeps, stop, certificate, 0)
 
 
 @dataclass
@@ -220,7 +220,7 @@ class ActiveSet:
         missing = self._missing(gradient)
         return (now, *self._take_in(missing, gradient)) if missing else (now, False, False)
 
-    def run(self, start: FloatArray | None) -> Result:
+    def run(self, start: FloatArray | None) -> SolveResult:
         """Rounds until something ends them; where they fail, coordinate descent goes on."""
         p, o, held = self.p, self.options, self.held
         if start is not None:
@@ -232,9 +232,9 @@ class ActiveSet:
         rounds, stalls = 0, 0
         while True:
             if o.gap_rel > 0 and c.gap <= o.gap_rel * p.scale:
-                return Result(held.spread(p.n), rounds, "gap", c, 0)
+                return SolveResult(held.spread(p.n), rounds, "gap", c, 0)
             if rounds == o.iterations:
-                return Result(held.spread(p.n), rounds, "iterations", c, 0)
+                return SolveResult(held.spread(p.n), rounds, "iterations", c, 0)
             held.pull = [
                 float(gradient[j]) - s * p.lam for j, s in zip(held.columns, held.sign, strict=True)
             ]
@@ -242,7 +242,7 @@ class ActiveSet:
             gradient[held.columns] = 0.0
             missing = self._missing(gradient)
             if stalls == 2 or (not missing and pull <= self.tolerance):
-                return Result(held.spread(p.n), rounds, "optimum", c, 0)
+                return SolveResult(held.spread(p.n), rounds, "optimum", c, 0)
             rounds += 1
             moved, failed = self._take_in(missing[: 1 if stalls else None], gradient)
             objective, looks, more = c.objective, 0, moved and not failed

@@ -6,7 +6,14 @@ from __future__ import annotations
 import numpy as np
 
 from eitskin.core.results import Options
-from eitskin.reference.problem import Certificate, FloatArray, Result, check_gap, project, shrink
+from eitskin.reference.problem import (
+    Certificate,
+    FloatArray,
+    SolveResult,
+    check_gap,
+    project,
+    shrink,
+)
 
 MAX_STEP_HALVINGS = 8
 PRUNE_EVERY, LOOK_GROWTH = 5, 6
@@ -20,7 +27,7 @@ def fista(
     options: Options,
     basis: FloatArray,
     start: FloatArray | None = None,
-) -> Result:
+) -> SolveResult:
     """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the model_mismatch.
 
     With the solver "working-set", columns outside the working set see no gradient until it is
@@ -70,4 +77,4 @@ def fista(
         if options.gap_rel > 0 and certificate.gap <= options.gap_rel * scale:
             stop = "gap"
             break
-    return Result(x, k, stop, certificate, halvings)
+    return SolveResult(x, k, stop, certificate, halvings)

@@ -103,7 +103,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class SolveResult:
     """Coefficients ``x`` (n,), and how it went; the certificate is that of ``x``."""
 
     x: FloatArray

@@ -21,7 +21,7 @@ PROBES, NOISE_POWER = 8, 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class WhitenedForm:
     """The builder's P = diag(w) U' and S = diag(s w) V', with w = (s^2 + mu s_1^2)^-1/2, taken
     apart.
 
@@ -52,7 +52,7 @@ class Whitening:
     energy_ratio: float = 1.0
 
 
-def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
+def form_of(projection: FloatArray, sensitivity: FloatArray) -> WhitenedForm | None:
     """What P (r, k) and S (r, n) are made of; None where they have another form."""
     w = np.linalg.norm(projection, axis=1)
     if not w.min() > 0:
@@ -68,7 +68,7 @@ def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
         return None
     s = np.sqrt(squares) / w
     first = int(np.argmax(s))
-    return Form(
+    return WhitenedForm(
         left,
         1 / (w * s[first]),
         (s / s[first]) ** 2,
@@ -77,7 +77,7 @@ def form_of(projection: FloatArray, sensitivity: FloatArray) -> Form | None:
     )
 
 
-def whiten(form: Form, known: BoolArray, asked: float) -> Whitening | None:
+def whiten(form: WhitenedForm, known: BoolArray, asked: float) -> Whitening | None:
     """The whitening of the folded rows where ``known`` (k,), the noise asking for a regularisation
     of at least ``asked`` for all of them: None for the model's own."""
     least = min(asked, MAX_REGULARISATION)
@@ -93,7 +93,7 @@ def whiten(form: Form, known: BoolArray, asked: float) -> Whitening | None:
     return _raised(form, of_all) if of_all > form.regularisation else None
 
 
-def _raised(form: Form, regularisation: float) -> Whitening:
+def _raised(form: WhitenedForm, regularisation: float) -> Whitening:
     """Of all rows, with a higher regularisation: a weight for each direction, that of the strongest
     kept."""
     weight = _weights(form, regularisation)
@@ -107,21 +107,23 @@ def _raised(form: Form, regularisation: float) -> Whitening:
     )
 
 
-def _weights(form: Form, regularisation: float) -> FloatArray:
+def _weights(form: WhitenedForm, regularisation: float) -> FloatArray:
     return np.minimum(
         np.sqrt(form.square * (1 + regularisation) / (form.strength + regularisation)) * form.scale,
         1.0,
     )
 
 
-def _noise_of_all(form: Form, regularisation: float) -> float:
+def _noise_of_all(form: WhitenedForm, regularisation: float) -> float:
     if not regularisation > form.regularisation:
         return 1.0
     square = form.strength / form.scale**4
     return float(np.sqrt(np.sum(square * _weights(form, regularisation) ** 4) / np.sum(square)))
 
 
-def _of_rest(form: Form, known: BoolArray, regularisation: float, noise_of_all: float) -> Whitening:
+def _of_rest(
+    form: WhitenedForm, known: BoolArray, regularisation: float, noise_of_all: float
+) -> Whitening:
     """Of some rows; ``noise_of_all``: the noise ratio of all of them."""
     lost = LOST * regularisation
     unit, missing = np.eye(len(form.scale)), ~known
@@ -142,7 +144,7 @@ def _of_rest(form: Form, known: BoolArray, regularisation: float, noise_of_all: 
     return Whitening(see, data, noise_of_all * by_rows**NOISE_POWER, regularisation)
 
 
-def _noise_ratio(form: Form, spread: FloatArray, share: float) -> float:
+def _noise_ratio(form: WhitenedForm, spread: FloatArray, share: float) -> float:
     """By sign vectors that are orthogonal within each eight directions; ``spread`` is G'^-1 F."""
     i = np.arange(len(form.scale))
     odd = [(i & p ^ (i & p) >> 1 ^ (i & p) >> 2) & 1 for p in range(PROBES)]

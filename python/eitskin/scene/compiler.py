@@ -29,10 +29,10 @@ from eitskin.scene.effect import (
     Step,
     VoltageStep,
 )
-from eitskin.scene.forward_steps import Change, Counted, count_costs, touched_unknowns
+from eitskin.scene.forward_steps import Change, UpdateCost, count_costs, touched_unknowns
 from eitskin.scene.parameters import parse_parameters
 from eitskin.scene.plan import Plan, make_plan
-from eitskin.scene.random_touches import Touch
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.reading import live_rows, solved_impedance, with_bridges
 from eitskin.scene.registry import Registry
 from eitskin.scene.session import MeshCache, SessionWork, check_shared, load_effects, make_steps
@@ -52,7 +52,7 @@ class State:
     """A distinct state of sheet, touches and contacts: one forward solve. ``frame`` is the first
     that has it."""
 
-    touches: tuple[Touch, ...]
+    touches: tuple[TrueTouch, ...]
     change: Change
     contacts: Contacts
     frame: int
@@ -88,7 +88,7 @@ class Compiled:
     bridge_pairs: tuple[tuple[int, int], ...]
     method: str
     reach: IntArray
-    counted: Counted | None
+    counted: UpdateCost | None
     plan: Plan
     work: SessionWork
 
@@ -222,7 +222,7 @@ def _states(
     varies = any(isinstance(step, MaterialStep) and step.varies for step in steps)
     contacts = _contacts(scene, steps)
     samples = scene.samples()
-    changes: dict[tuple[Touch, ...], Change] = {(): NO_CHANGE}
+    changes: dict[tuple[TrueTouch, ...], Change] = {(): NO_CHANGE}
     states: dict[Any, State] = {}
     state_of_frame = np.zeros(scene.n_frames, dtype=np.int64)
     number: dict[Any, int] = {}
@@ -286,7 +286,7 @@ def _check_contacts(contacts: Contacts, count: int, where: str) -> None:
 
 def _choose_method(
     scene: Scene, model: ForwardModel, states: Sequence[State], steps: Sequence[Step]
-) -> tuple[str, IntArray, Counted | None]:
+) -> tuple[str, IntArray, UpdateCost | None]:
     """How to solve, the unknowns that touches reach (for the update), and the count that decided
     it."""
     nothing = np.zeros(0, np.int64)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.fem.mesh import Mesh
-from eitskin.scene.random_touches import Touch
+from eitskin.scene.random_touches import TrueTouch
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -30,7 +30,7 @@ class Cover:
         self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
         self._weights = _sub_triangle_weights(subdivision)
 
-    def of(self, touch: Touch) -> tuple[IntArray, FloatArray]:
+    def of(self, touch: TrueTouch) -> tuple[IntArray, FloatArray]:
         """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,),
         in (0, 1]."""
         centre = np.array([touch.x_mm, touch.y_mm])
@@ -42,7 +42,7 @@ class Cover:
         met = part > 0
         return near[met], part[met]
 
-    def factor(self, touches: Iterable[Touch]) -> tuple[IntArray, FloatArray]:
+    def factor(self, touches: Iterable[TrueTouch]) -> tuple[IntArray, FloatArray]:
         """Elements (e,) that ``touches`` meet, ascending, and what each one's conductivity is
         multiplied by (e,).
 

@@ -59,7 +59,7 @@ class Stage(IntEnum):
 
 
 @dataclass(frozen=True)
-class Cost:
+class EffectCost:
     """What a step adds, once a session and once a frame.
 
     A vector pass reads or writes a vector of all voltages, elements or electrodes once.
@@ -74,7 +74,7 @@ class Cost:
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class EffectSession:
     """What an effect's ``make`` is given.
 
     Attributes:
@@ -162,7 +162,7 @@ class GeometryStep:
     """``apply(skin) -> skin``: what is meshed. Once."""
 
     name: str
-    cost: Cost
+    cost: EffectCost
     note: str
     apply: Callable[[Skin], Skin]
     stage: Stage = Stage.GEOMETRY
@@ -174,7 +174,7 @@ class MaterialStep:
     it ``varies``."""
 
     name: str
-    cost: Cost
+    cost: EffectCost
     note: str
     apply: Callable[[FloatArray, float, int], FloatArray]
     varies: bool = False
@@ -186,7 +186,7 @@ class ContactStep:
     """``apply(contacts, time_s, frame) -> Contacts``; applied once unless it ``varies``."""
 
     name: str
-    cost: Cost
+    cost: EffectCost
     note: str
     apply: Callable[[Contacts, float, int], Contacts]
     varies: bool = False
@@ -203,7 +203,7 @@ class PhaseStep:
     """
 
     name: str
-    cost: Cost
+    cost: EffectCost
     note: str
     frequency_hz: float
     admittivity: Callable[[FloatArray], ComplexArray]
@@ -219,7 +219,7 @@ class LoadedStep:
 
     name: str
     stage: Stage
-    cost: Cost
+    cost: EffectCost
     note: str
     apply: Callable[[Voltages, Loads, float, int], Voltages]
 
@@ -231,7 +231,7 @@ class VoltageStep:
 
     name: str
     stage: Stage
-    cost: Cost
+    cost: EffectCost
     note: str
     apply: Callable[[Voltages, float, int], Voltages]
 
@@ -249,6 +249,6 @@ class EffectModule(Protocol):
     SUMMARY: str
     Parameters: type[Any]
 
-    def make(self, parameters: Any, session: Session) -> Step:
+    def make(self, parameters: Any, session: EffectSession) -> Step:
         """The effect's step in this session."""
         ...

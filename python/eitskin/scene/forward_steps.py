@@ -246,7 +246,7 @@ def touched_unknowns(
 
 
 @dataclass(frozen=True)
-class Counted:
+class UpdateCost:
     """Multiplications that each way would take for a whole session, and the solves of the
     update."""
 
@@ -262,7 +262,7 @@ class Counted:
 
 def count_costs(
     model: ForwardModel, shunted: npt.NDArray[np.bool_], ranks: IntArray, reach: int
-) -> Counted:
+) -> UpdateCost:
     """Count both ways for states that touch ``ranks`` (s,) unknowns each, ``reach`` different ones
     together.
 
@@ -276,7 +276,7 @@ def count_costs(
     once = 10 * n**1.5 + SYMBOLIC_PER_VALUE * len(system.indices)
     rank = ranks.astype(np.float64)
     dense = 4 * rank**3 / 3 + 2 * rank**2 * patterns + rank * patterns * len(shunted)
-    return Counted(
+    return UpdateCost(
         factorise=float(len(ranks) * (once + patterns * solve)),
         update=float(once + (patterns + reach) * solve + dense.sum()),
         update_solves=patterns + reach,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from eitskin.scene.effect import (
     ContactStep,
-    Cost,
+    EffectCost,
     GeometryStep,
     MaterialStep,
     PhaseStep,
@@ -30,7 +30,7 @@ class PlanStep:
     name: str
     stage: Stage
     note: str
-    cost: Cost
+    cost: EffectCost
     effect: bool
 
 
@@ -96,7 +96,7 @@ class Plan:
         return "\n".join(lines)
 
 
-def cost_text(cost: Cost) -> str:
+def cost_text(cost: EffectCost) -> str:
     """A cost in words; what is 0 is left out."""
     parts = [
         (cost.factorisations, "factorisations"),
@@ -134,7 +134,7 @@ def make_plan(
         note = f"a factorisation for each distinct state, {states}" + (
             f", of which V0 is {known}" if known else ""
         )
-    solve = Cost(
+    solve = EffectCost(
         factorisations_per_frame=factorisations / total,
         solves_per_frame=solves / total,
         vector_passes_per_frame=4 * states / total,
@@ -146,18 +146,18 @@ def make_plan(
             "mesh",
             Stage.GEOMETRY,
             f"{mesh.n_elements} elements, {mesh.n_nodes} nodes",
-            Cost(),
+            EffectCost(),
             False,
         ),
-        PlanStep("sheet", Stage.MATERIAL, sheet, Cost(), False),
+        PlanStep("sheet", Stage.MATERIAL, sheet, EffectCost(), False),
     ]
     touches = []
     if scene.touches:
         moving = sum(track.moves for track in scene.touches)
         note_touches = f"{len(scene.touches)}, of which {moving} change while they are there"
-        cost = Cost(vector_passes_per_frame=states / total)
+        cost = EffectCost(vector_passes_per_frame=states / total)
         touches = [PlanStep("touches", Stage.MATERIAL, note_touches, cost, False)]
-    read = Cost(vector_passes_per_frame=1)
+    read = EffectCost(vector_passes_per_frame=1)
     forward = [PlanStep("solve", Stage.BOUNDARY, f"{patterns} patterns; {note}", solve, False)]
     forward.append(
         PlanStep("read", Stage.BOUNDARY, f"{scene.protocol.n_rows} voltages", read, False)

@@ -23,7 +23,7 @@ TRIES = 20_000
 
 
 @dataclass(frozen=True)
-class Touch:
+class TrueTouch:
     """A disc of another conductivity.
 
     Attributes:
@@ -39,11 +39,11 @@ class Touch:
 
 
 @dataclass(frozen=True)
-class Scene:
+class TouchScene:
     """Touches that are there at one time; ``name`` says set and number."""
 
     name: str
-    touches: tuple[Touch, ...]
+    touches: tuple[TrueTouch, ...]
 
     def centres_mm(self) -> FloatArray:
         """(k, 2)."""
@@ -91,7 +91,7 @@ class TouchSet:
 
     role: str
     seed: int
-    scenes: tuple[Scene, ...]
+    scenes: tuple[TouchScene, ...]
 
     @property
     def name(self) -> str:
@@ -112,7 +112,7 @@ def random_touches(
         raise UsageError(f"a set needs at least 1 scene, not {count}")
     drawn = TouchRules() if rules is None else rules
     scenes = tuple(
-        Scene(f"{role}-s{seed}-{k}", _draw(outline, drawn, stream(seed, f"touches {role}", k)))
+        TouchScene(f"{role}-s{seed}-{k}", _draw(outline, drawn, stream(seed, f"touches {role}", k)))
         for k in range(count)
     )
     return TouchSet(role, seed, scenes)
@@ -164,7 +164,9 @@ def rim_distance_mm(outline: Outline, points_mm: npt.ArrayLike) -> FloatArray:
     return np.asarray(np.where(outline.contains(points), distance, -distance))
 
 
-def _draw(outline: Outline, rules: TouchRules, generator: np.random.Generator) -> tuple[Touch, ...]:
+def _draw(
+    outline: Outline, rules: TouchRules, generator: np.random.Generator
+) -> tuple[TrueTouch, ...]:
     """One scene: sizes first, then places until all fit; after 200 misses for one touch all places
     are drawn anew."""
     number = int(generator.integers(rules.count[0], rules.count[1], endpoint=True))
@@ -187,7 +189,7 @@ def _draw(outline: Outline, rules: TouchRules, generator: np.random.Generator) -
             misses += 1
         if len(places) == number:
             return tuple(
-                Touch(x, y, float(r), float(c))
+                TrueTouch(x, y, float(r), float(c))
                 for (x, y), r, c in zip(places, radii, contrasts, strict=True)
             )
         if misses >= 200:

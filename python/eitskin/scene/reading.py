@@ -31,7 +31,7 @@ OPEN_BRIDGED_OHM_M2 = 1e5
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class TrueVoltages:
     """One state's true boundary voltages (m,) and, where a step needs them, the rows' loads."""
 
     v: AnyArray
@@ -46,9 +46,9 @@ class PlainReader:
     patterns: Patterns
     current_a: float
 
-    def read(self, electrodes: AnyArray, contacts: Contacts) -> Reading:
+    def read(self, electrodes: AnyArray, contacts: Contacts) -> TrueVoltages:
         """From potentials (L, P) in V per A."""
-        return Reading(self.patterns.voltages(electrodes) * self.current_a)
+        return TrueVoltages(self.patterns.voltages(electrodes) * self.current_a)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class WholeReader:
     protocol: Protocol
     pairs: tuple[tuple[int, int], ...]
 
-    def read(self, electrodes: AnyArray, contacts: Contacts) -> Reading:
+    def read(self, electrodes: AnyArray, contacts: Contacts) -> TrueVoltages:
         """From potentials (L, P + b) in V per A."""
         potentials = electrodes @ self.patterns.mix.T
         if contacts.bridges:
@@ -75,7 +75,7 @@ class WholeReader:
             potentials[rows[:, k], self.patterns.drive] * scale for k in range(4)
         )
         v = np.where(live, (plus - minus), 0.0)
-        return Reading(v, Loads(source, sink, plus, minus, current_a))
+        return TrueVoltages(v, Loads(source, sink, plus, minus, current_a))
 
     def _bridged(self, potentials: AnyArray, electrodes: AnyArray, contacts: Contacts) -> AnyArray:
         first = electrodes.shape[1] - len(self.pairs)

@@ -17,7 +17,7 @@ from eitskin.frames.frames import Frames
 from eitskin.scene.compiler import Compiled, State, background_of, compile_scene
 from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
-from eitskin.scene.reading import PlainReader, Reading, WholeReader, solved_impedance
+from eitskin.scene.reading import PlainReader, TrueVoltages, WholeReader, solved_impedance
 from eitskin.scene.truth import Truth, truth_of
 from eitskin.skin.skin import skin_to_table
 
@@ -25,7 +25,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class SceneRun:
     """What running gave: all frames (n, m) in V, quiet ones first, and the work it took.
 
     ``true_v`` (s, m) are the states' voltages before excitation, front end and converter.
@@ -49,7 +49,7 @@ def forward_of(compiled: Compiled, work: Work) -> Forward:
 
 def simulate_frames(
     compiled: Compiled, progress: Callable[[range], Iterable[int]] | None = None
-) -> Run:
+) -> SceneRun:
     """Solve every state, then take every frame through the steps; ``progress`` wraps the states'
     numbers.
 
@@ -91,10 +91,10 @@ def simulate_frames(
         )
     true_v = np.array([readings[k].v for k in range(len(compiled.states))])
     recorded = int(factorised[scene.quiet_frames :].sum())
-    return Run(voltage_v, true_v, work, recorded, compiled.work.generators)
+    return SceneRun(voltage_v, true_v, work, recorded, compiled.work.generators)
 
 
-def _reader(compiled: Compiled) -> Callable[[npt.NDArray[Any], State], Reading]:
+def _reader(compiled: Compiled) -> Callable[[npt.NDArray[Any], State], TrueVoltages]:
     patterns, protocol = compiled.model.patterns, compiled.scene.protocol
     if compiled.needs_whole_reader:
         whole = WholeReader(patterns, protocol, compiled.bridge_pairs)
@@ -146,7 +146,7 @@ def truth_fields(truth: Truth) -> dict[str, Any]:
     return {one.name: getattr(truth, one.name) for one in dataclasses.fields(truth)}
 
 
-def meta_of(compiled: Compiled, done: Run) -> dict[str, Any]:
+def meta_of(compiled: Compiled, done: SceneRun) -> dict[str, Any]:
     """How the frames were made, as JSON values."""
     scene = compiled.scene
     return {

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.scene.effect import Session
+from eitskin.scene.effect import EffectSession
 from eitskin.skin.protocol import Protocol
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
-def row_delays_s(session: Session) -> FloatArray:
+def row_delays_s(session: EffectSession) -> FloatArray:
     """When each row (m,) is read, in s after its frame's time: rows follow each other evenly over
     the frame."""
     rows = session.protocol.n_rows

@@ -15,7 +15,7 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.scene.cover import Cover
 from eitskin.scene.description import Scene
-from eitskin.scene.effect import EffectModule, GeometryStep, Session, Stage, Step
+from eitskin.scene.effect import EffectModule, EffectSession, GeometryStep, Stage, Step
 from eitskin.scene.registry import Registry
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import Protocol
@@ -140,7 +140,7 @@ def make_steps(
         work.generators += 1
         return stream(scene.seed, name, index)
 
-    session = Session(
+    session = EffectSession(
         skin=scene.skin,
         protocol=scene.protocol,
         n_frames=scene.n_frames,

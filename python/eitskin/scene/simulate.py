@@ -20,7 +20,7 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.frames.frames import Frames
 from eitskin.scene.cover import SUBDIVISION, Cover
-from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
@@ -136,14 +136,14 @@ class Simulated:
 
 
 def element_cover(
-    mesh: Mesh, touch: Touch, subdivision: int = SUBDIVISION
+    mesh: Mesh, touch: TrueTouch, subdivision: int = SUBDIVISION
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Which elements a touch meets (e,), and what part of each it covers (e,), in (0, 1]; see
     ``cover.Cover``."""
     return Cover(mesh, subdivision).of(touch)
 
 
-def conductivity_with(mesh: Mesh, touches: Iterable[Touch], sheet_s_per_m: float) -> FloatArray:
+def conductivity_with(mesh: Mesh, touches: Iterable[TrueTouch], sheet_s_per_m: float) -> FloatArray:
     """Conductivity (E,) in S/m of a sheet with touches: each element's mean over its area.
 
     Touches are taken to lie apart; where they overlap, their changes add (never below a thousandth
@@ -164,7 +164,7 @@ def simulate(
     measurement: Measurement | None = None,
     seed: int | None = None,
     mesh: Mesh | None = None,
-    progress: Callable[[Sequence[Scene]], Iterable[Scene]] | None = None,
+    progress: Callable[[Sequence[TouchScene]], Iterable[TouchScene]] | None = None,
 ) -> Simulated:
     """Simulate a session with ``touches``.
 
@@ -193,7 +193,7 @@ def simulate(
     forward = ForwardModel(solved_on, skin, protocol, contact)
     sheet = skin.conductivity_s_per_m
     quiet = forward.voltages(np.full(solved_on.n_elements, sheet))
-    scenes: Iterable[Scene] = touches.scenes if progress is None else progress(touches.scenes)
+    scenes: Iterable[TouchScene] = touches.scenes if progress is None else progress(touches.scenes)
     exact = np.array(
         [forward.voltages(conductivity_with(solved_on, scene.touches, sheet)) for scene in scenes]
     )

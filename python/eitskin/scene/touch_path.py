@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.scene.laws import Law, ShortCircuit
-from eitskin.scene.random_touches import Touch
+from eitskin.scene.random_touches import TrueTouch
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -88,10 +88,10 @@ def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
     )
 
 
-def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[Touch, ...]:
+def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[TrueTouch, ...]:
     """The touches that are there in ``frame``, in the tracks' order."""
     return tuple(
-        Touch(
+        TrueTouch(
             float(s.x_mm[frame]),
             float(s.y_mm[frame]),
             float(s.radius_mm[frame]),

@@ -14,7 +14,7 @@ from eitskin.fem.grid import grid_for
 from eitskin.fem.sensitivity import element_to_pixel
 from eitskin.scene.compiler import Compiled, background_of
 from eitskin.scene.forward_steps import touched
-from eitskin.scene.random_touches import Touch
+from eitskin.scene.random_touches import TrueTouch
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -63,7 +63,9 @@ def truth_of(compiled: Compiled, pixels: int = 64) -> Truth:
     )
 
 
-def mask_of(touches: tuple[Touch, ...], x_mm: FloatArray, y_mm: FloatArray) -> npt.NDArray[np.int8]:
+def mask_of(
+    touches: tuple[TrueTouch, ...], x_mm: FloatArray, y_mm: FloatArray
+) -> npt.NDArray[np.int8]:
     """+1 where the centres (h, w) lie in a conductive touch, -1 in a resistive one, else 0."""
     mask = np.zeros(x_mm.shape, dtype=np.int8)
     for touch in touches:

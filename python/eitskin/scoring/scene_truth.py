@@ -14,7 +14,7 @@ from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Fault
 from eitskin.scene.description import Scene
 from eitskin.scene.library_scenes import find_scene
-from eitskin.scene.random_touches import Touch
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import touches_at
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.skin.skin import size_to_paper
@@ -43,7 +43,7 @@ class SceneTruth:
         frame's that is asked for."""
         self._began_us = time_us
 
-    def touches(self, time_us: int) -> tuple[Touch, ...]:
+    def touches(self, time_us: int) -> tuple[TrueTouch, ...]:
         """What was there when the scan of a frame began at ``time_us``."""
         if self._began_us is None:
             self._began_us = time_us
@@ -62,7 +62,7 @@ class SceneTruth:
         elapsed_s = ((time_us - (self._began_us or 0)) % WRAP_US) / 1e6
         return int(elapsed_s * self.scene.rate_hz + self._ahead)
 
-    def image_scorer(self, true: Sequence[Touch], found_mm: npt.ArrayLike) -> Matching:
+    def image_scorer(self, true: Sequence[TrueTouch], found_mm: npt.ArrayLike) -> Matching:
         """Which of the found places (k, 2) in mm is which true touch; within 10 mm on the paper's
         skin, else in proportion."""
         return match([(t.x_mm, t.y_mm) for t in true], found_mm, self.gate_mm)

@@ -17,7 +17,7 @@ from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import quality_text
 from eitskin.errors import MissingExtraError
-from eitskin.scene.random_touches import Touch as TrueTouch
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.image_touches import touches_in_image
 from eitskin.scoring.scene_truth import SceneTruth, TruthScore
 
@@ -37,7 +37,7 @@ class ImageView:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class ComparedFrame:
     """A frame and what it shows. ``true``: the touches that were there, None where no truth is
     known; ``errors_mm``: position error by number of the found touch (of the touches, or without
     them of the image's places)."""
@@ -64,12 +64,12 @@ class Watcher:
         self._known, self._truth = known, truth
         self.score = TruthScore()
 
-    def see(self, frame: LiveFrame) -> Seen:
+    def see(self, frame: LiveFrame) -> ComparedFrame:
         """What ``frame`` shows."""
         view = None
         if frame.image is not None and self._known is not None and not frame.refused:
             view = image_view(self._known, frame.image.image)
-        seen = Seen(frame, view)
+        seen = ComparedFrame(frame, view)
         found = seen.found_mm
         if self._truth is None or found is None or frame.refused:
             return seen
@@ -79,7 +79,7 @@ class Watcher:
         errors = {
             number: d for (_, number), d in zip(matching.pairs, matching.distances_mm, strict=True)
         }
-        return Seen(frame, view, true, errors)
+        return ComparedFrame(frame, view, true, errors)
 
 
 def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
@@ -99,7 +99,7 @@ def image_view(known: KnownModel, image: npt.NDArray[np.float32]) -> ImageView:
     return ImageView(float(values[top]), (float(centres[top, 0]), float(centres[top, 1])), places)
 
 
-def line(seen: Seen) -> str:
+def line(seen: ComparedFrame) -> str:
     """A frame in a line."""
     frame = seen.frame
     parts = [_touches_text(seen), _image_text(seen), _raw_text(frame), _solve_text(frame)]
@@ -121,13 +121,13 @@ def _found_text(frame: LiveFrame) -> str:
     return "" if frame.solved is None else ", ".join(words(frame.solved))
 
 
-def _error(seen: Seen, number: int) -> str:
+def _error(seen: ComparedFrame, number: int) -> str:
     if seen.errors_mm is None:
         return ""
     return f", off by {seen.errors_mm[number]:.2f} mm" if number in seen.errors_mm else ", false"
 
 
-def _touches_text(seen: Seen) -> str:
+def _touches_text(seen: ComparedFrame) -> str:
     if seen.frame.touches is None:
         return ""
     found = [
@@ -139,7 +139,7 @@ def _touches_text(seen: Seen) -> str:
     return " | ".join(found) or "no touch"
 
 
-def _image_text(seen: Seen) -> str:
+def _image_text(seen: ComparedFrame) -> str:
     if seen.frame.image is None:
         return ""
     if seen.view is None:
@@ -167,7 +167,7 @@ def _raw_text(frame: LiveFrame) -> str:
     return text + "".join(f", {count} {what}" for what, count in said.items())
 
 
-def table(seen: Seen) -> dict[str, Any]:
+def table(seen: ComparedFrame) -> dict[str, Any]:
     """A frame as JSON values; what is not finite becomes null."""
     frame = seen.frame
     facts: dict[str, Any] = {
@@ -217,7 +217,7 @@ def true_table(touch: TrueTouch) -> dict[str, float]:
     }
 
 
-def _error_entry(seen: Seen, number: int) -> dict[str, float | None]:
+def _error_entry(seen: ComparedFrame, number: int) -> dict[str, float | None]:
     return {} if seen.errors_mm is None else {"error_mm": seen.errors_mm.get(number)}
 
 
@@ -225,7 +225,7 @@ def _finite(value: Any) -> bool:
     return not isinstance(value, float) or bool(np.isfinite(value))
 
 
-def spread(frames: Sequence[Seen], most: int) -> list[Seen]:
+def spread(frames: Sequence[ComparedFrame], most: int) -> list[ComparedFrame]:
     """At most ``most`` of ``frames``, evenly, the first and the last among them."""
     if len(frames) <= most:
         return list(frames)

@@ -16,7 +16,7 @@ import numpy as np
 
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.fileio import read_bytes
-from eitskin.skin.drawing_shapes import FloatArray, Reading, Shape
+from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape, FloatArray
 from eitskin.skin.outline import Outline, polygon
 
 MAX_BYTES = 20_000_000
@@ -28,9 +28,9 @@ class Drawing:
     """What a file draws; ``where`` names it in errors."""
 
     where: str
-    shapes: tuple[Shape, ...]
+    shapes: tuple[DrawnShape, ...]
 
-    def marked(self, mark: str) -> tuple[Shape, ...]:
+    def marked(self, mark: str) -> tuple[DrawnShape, ...]:
         """The shapes that ``mark`` names by id, class, layer or group, or whose id is ``mark`` and
         a number, in any order.
 
@@ -79,7 +79,7 @@ class Drawing:
         return _names_of(self.shapes)
 
 
-def read_drawing(path: Path, reading: Reading) -> Drawing:
+def read_drawing(path: Path, reading: DrawingReading) -> Drawing:
     """The drawing in the file ``path``, SVG or DXF by its ending.
 
     Raises:
@@ -105,7 +105,7 @@ def read_drawing(path: Path, reading: Reading) -> Drawing:
     return Drawing(str(path), tuple(shapes))
 
 
-def joined(open_shapes: Sequence[Shape]) -> list[Shape]:
+def joined(open_shapes: Sequence[DrawnShape]) -> list[DrawnShape]:
     """Closed shapes made of open ones whose ends meet, two at each joint; what does not close is
     left out."""
     left, closed = [one for one in open_shapes if len(one.points_mm) > 1], []
@@ -128,7 +128,7 @@ def joined(open_shapes: Sequence[Shape]) -> list[Shape]:
             names.append(piece.names)
         else:
             if len(chain) > 3:
-                closed.append(Shape("", frozenset().union(*names), chain[:-1], True))
+                closed.append(DrawnShape("", frozenset().union(*names), chain[:-1], True))
     return closed
 
 
@@ -146,7 +146,7 @@ def _without_repeats(points_mm: FloatArray) -> FloatArray:
     return points_mm[np.hypot(steps[:, 0], steps[:, 1]) > 2e-6 * size]
 
 
-def _names_of(shapes: Sequence[Shape]) -> str:
+def _names_of(shapes: Sequence[DrawnShape]) -> str:
     known = sorted({name for one in shapes for name in one.names if name})
     listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
     return f"names in it are: {listed}" if known else "no shape in it has a name"

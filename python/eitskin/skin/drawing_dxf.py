@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.errors import ConfigError, EitskinError, missing_extra
-from eitskin.skin.drawing_shapes import MAX_PIECES, MAX_SHAPES, Reading, Shape
+from eitskin.skin.drawing_shapes import MAX_PIECES, MAX_SHAPES, DrawingReading, DrawnShape
 
 try:
     import ezdxf.disassemble
@@ -28,7 +28,7 @@ UNITS_MM = {1: 25.4, 2: 304.8, 4: 1.0, 5: 10.0, 6: 1000.0, 9: 0.0254, 13: 1e-3, 
 DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"}
 
 
-def read_dxf(content: bytes, where: str, reading: Reading) -> list[Shape]:
+def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
     """Every line and point of the DXF file ``content``; blocks are taken apart.
 
     Raises:
@@ -70,11 +70,11 @@ def _scale_of(document: Any, where: str) -> float:
     return UNITS_MM[unit]
 
 
-def _shapes(entity: Any, scale: float, tolerance: float) -> Iterator[Shape]:
+def _shapes(entity: Any, scale: float, tolerance: float) -> Iterator[DrawnShape]:
     names = frozenset({str(entity.dxf.get("layer", "0"))})
     if entity.dxftype() == "POINT":
         place = entity.dxf.location
-        yield Shape("", names, scale * np.array([[place.x, place.y]]), False)
+        yield DrawnShape("", names, scale * np.array([[place.x, place.y]]), False)
     if entity.dxftype() not in DRAWN:
         return
     for path in ezdxf.path.make_path(entity).sub_paths():
@@ -89,4 +89,4 @@ def _shapes(entity: Any, scale: float, tolerance: float) -> Iterator[Shape]:
         closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(
             np.ptp(points, axis=0).max()
         )
-        yield Shape("", names, points[:-1] if closed else points, closed)
+        yield DrawnShape("", names, points[:-1] if closed else points, closed)

@@ -17,7 +17,7 @@ MAX_PIECES = 2_000
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class DrawnShape:
     """One line of a drawing: ``points_mm`` (k, 2), y up, curves flattened; a closed one's last
     point is not its first.
 
@@ -37,7 +37,7 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Reading:
+class DrawingReading:
     """How a drawing is read: mm a unit of the drawing (None: the file's own units), and how far a
     flattened curve may be from the true one."""
 

@@ -16,8 +16,8 @@ import numpy as np
 from eitskin.errors import ConfigError, EitskinError, missing_extra
 from eitskin.skin.drawing_shapes import (
     MAX_SHAPES,
-    Reading,
-    Shape,
+    DrawingReading,
+    DrawnShape,
     arc_pieces,
     bezier_pieces,
     flattened,
@@ -43,7 +43,7 @@ class Page:
     bottom: float
 
 
-def read_svg(content: bytes, where: str, reading: Reading) -> list[Shape]:
+def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
     """Every shape of the SVG file ``content``.
 
     Raises:
@@ -74,7 +74,7 @@ def read_svg(content: bytes, where: str, reading: Reading) -> list[Shape]:
         ) from None
 
 
-def _page(root: ET.Element, where: str, reading: Reading) -> Page:
+def _page(root: ET.Element, where: str, reading: DrawingReading) -> Page:
     try:
         box = [float(word) for word in re.split(r"[\s,]+", root.get("viewBox", "").strip()) if word]
     except ValueError:
@@ -144,7 +144,9 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
         raise ConfigError(f"{where}: over {MAX_SHAPES} elements; export the outline alone")
 
 
-def _shapes(one: Any, around: frozenset[str], page: Page, tolerance_mm: float) -> Iterator[Shape]:
+def _shapes(
+    one: Any, around: frozenset[str], page: Page, tolerance_mm: float
+) -> Iterator[DrawnShape]:
     attributes = one.values.get("attributes", {}) if isinstance(one.values, dict) else {}
     if attributes.get("display") == "none" or "display:none" in str(
         attributes.get("style", "")
@@ -152,16 +154,16 @@ def _shapes(one: Any, around: frozenset[str], page: Page, tolerance_mm: float) -
         return
     own = {attributes.get("id"), attributes.get(LABEL), *str(attributes.get("class", "")).split()}
     names = around | {str(name) for name in own if name}
-    if isinstance(one, list) and not isinstance(one, svgelements.Shape):
+    if isinstance(one, list) and not isinstance(one, svgelements.DrawnShape):
         for child in one:
             yield from _shapes(child, names, page, tolerance_mm)
-    elif isinstance(one, svgelements.Shape):
+    elif isinstance(one, svgelements.DrawnShape):
         for run in _runs(abs(svgelements.Path(one)), tolerance_mm / page.scale_mm):
             points = (np.array(run) - (page.left, page.bottom)) * (page.scale_mm, -page.scale_mm)
             closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(
                 np.ptp(points, axis=0).max()
             )
-            yield Shape(
+            yield DrawnShape(
                 str(attributes.get("id") or ""), names, points[:-1] if closed else points, closed
             )
 

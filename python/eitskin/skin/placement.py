@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import GeometryError
-from eitskin.skin.drawing_shapes import Shape
+from eitskin.skin.drawing_shapes import DrawnShape
 from eitskin.skin.outline import Outline
 
 FloatArray = npt.NDArray[np.float64]
@@ -85,7 +85,7 @@ def by_points(
 
 def by_marks(
     outline: Outline,
-    marks: Sequence[Shape],
+    marks: Sequence[DrawnShape],
     start_angle_deg: float,
     clockwise: bool | None,
     snap_mm: float = SNAP_MM,

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from eitskin.config import check_keys, choice, integer, load_toml, number
 from eitskin.errors import ConfigError, GeometryError
 from eitskin.skin.drawing import Drawing, read_drawing
-from eitskin.skin.drawing_shapes import TOLERANCE_MM, Reading
+from eitskin.skin.drawing_shapes import TOLERANCE_MM, DrawingReading
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT, Electrodes
 from eitskin.skin.outline import MAX_SIZE_MM, MIN_SIZE_MM, Outline, disk, polygon
 from eitskin.skin.placement import SNAP_MM, Placed, by_fractions, by_marks, by_points
@@ -235,7 +235,7 @@ def _drawing_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> Dr
         else None
     )
     tolerance = number(sheet, "tolerance_mm", TOLERANCE_MM, where, low=1e-3, high=10)
-    return read_drawing(folder / name, Reading(scale, tolerance))
+    return read_drawing(folder / name, DrawingReading(scale, tolerance))
 
 
 def _outline_from_table(

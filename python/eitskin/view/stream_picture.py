@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.model.model import Model
-from eitskin.scoring.stream_check import Seen, spread
+from eitskin.scoring.stream_check import ComparedFrame, spread
 from eitskin.view.pictures import Mark, Panel, draw_frame, draw_panels
 
 MAX_PANELS = 36
@@ -20,11 +20,11 @@ class Album:
     last."""
 
     def __init__(self) -> None:
-        self._kept: list[Seen] = []
+        self._kept: list[ComparedFrame] = []
         self._step, self._count = 1, 0
-        self._last: Seen | None = None
+        self._last: ComparedFrame | None = None
 
-    def add(self, seen: Seen) -> None:
+    def add(self, seen: ComparedFrame) -> None:
         """Another frame."""
         if self._count % self._step == 0:
             self._kept.append(seen)
@@ -34,7 +34,7 @@ class Album:
         self._last = seen
 
     @property
-    def frames(self) -> list[Seen]:
+    def frames(self) -> list[ComparedFrame]:
         """At most 36, the first and the last among them."""
         kept = (
             self._kept
@@ -93,14 +93,14 @@ def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> 
     )
 
 
-def _true_marks(model: Model, seen: Seen) -> tuple[Mark, ...]:
+def _true_marks(model: Model, seen: ComparedFrame) -> tuple[Mark, ...]:
     conductivity = model.skin.conductivity_s_per_m
     return tuple(
         Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1) * conductivity) for t in seen.true or ()
     )
 
 
-def _found_marks(seen: Seen) -> tuple[Mark, ...]:
+def _found_marks(seen: ComparedFrame) -> tuple[Mark, ...]:
     if seen.frame.touches is not None:
         return tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in seen.frame.touches.touches)
     places = seen.found_mm

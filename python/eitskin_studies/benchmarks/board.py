@@ -53,7 +53,7 @@ CODE, STATICS, STACK = (
 
 
 @dataclass(frozen=True)
-class Cost:
+class ConfigurationCost:
     """One storage, start and build of the kernels over all scenes; instructions of solve and
     touches, MACs likewise."""
 
@@ -91,7 +91,7 @@ class ImageSize:
 
 
 @dataclass(frozen=True)
-class Rate:
+class BoardRate:
     """The emulated NUCLEO-F767ZI on a scene of two touches: rows and samples measured a frame, the
     time that takes, solve and touches on the board (interrupts included), frames a second, and the
     stack that the firmware used.
@@ -120,9 +120,9 @@ class BoardCost:
     seed: int
     compiler: str
     qemu: str
-    costs: tuple[Cost, ...]
+    costs: tuple[ConfigurationCost, ...]
     images: tuple[ImageSize, ...]
-    rates: tuple[Rate, ...]
+    rates: tuple[BoardRate, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -170,7 +170,7 @@ def run(
             _cost(program, folder, model, blobs, session, *plan) for plan in progress(plans)
         )
         images = tuple(size_of(built / "firmware" / f"{image}.elf") for image in TARGETS[1:])
-        rates: tuple[Rate, ...] = ()
+        rates: tuple[BoardRate, ...] = ()
         if frames:
             image = built / "firmware" / f"{IMAGE}.bin"
             scans = [(storage, check_every) for storage in STORAGES for check_every in (1, 0)]
@@ -203,14 +203,14 @@ def _cost(
     storage: str,
     portable: bool,
     warm: bool,
-) -> Cost:
+) -> ConfigurationCost:
     options: Options = replace(default_options(model), warm_start=warm)
     blob = blobs[storage]
     done = run_frames(
         program, folder, blob, session.quiet_v, session.frames_v, options, portable=portable
     )
     each = np.sort([frame.instructions for frame in done.frames])
-    return Cost(
+    return ConfigurationCost(
         storage=storage,
         kernels=done.kernels,
         warm=warm,
@@ -242,7 +242,9 @@ def size_of(elf: Path) -> ImageSize:
     return ImageSize(elf.stem.removeprefix("eitskin_"), code, statics, sizes.get(STACK, 0))
 
 
-def measure_rate(blob: bytes, storage: str, image: Path, check_every: int, frames: int) -> Rate:
+def measure_rate(
+    blob: bytes, storage: str, image: Path, check_every: int, frames: int
+) -> BoardRate:
     """Let the emulated board with the firmware ``image`` solve ``frames`` frames; ``check_every``
     as in ``ScanSettings``.
 
@@ -266,7 +268,7 @@ def measure_rate(blob: bytes, storage: str, image: Path, check_every: int, frame
         stats, info = device.stats(), device.board
     times, costs = np.array(solved).T
     rate = 1e6 * (len(times) - 1) / float(times[-1] - times[0])
-    return Rate(
+    return BoardRate(
         storage, info.measured_rows, info.samples, info.measured_rows * info.slot_us,
         float(np.median(costs)),
         int(costs.max()), rate, stats.stack_used,

@@ -18,18 +18,24 @@ import numpy.typing as npt
 from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import FrameError
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.scene.random_touches import Scene, spaced_touches
+from eitskin.scene.random_touches import TouchScene, spaced_touches
 from eitskin.scoring import metrics
 from eitskin.scoring.score import scorer_for
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.benchmarks.diagnostics_faults import CROWDED, DETACHED, FAULTS, NONE, Fault
+from eitskin_studies.benchmarks.diagnostics_faults import (
+    CROWDED,
+    DETACHED,
+    FAULTS,
+    NONE,
+    InjectedFault,
+)
 from eitskin_studies.benchmarks.diagnostics_scenes import (
     IMPERFECT,
     PROTOCOL,
     QUIET_FRAMES,
-    Case,
-    Table,
+    CaseMaker,
+    SceneCase,
     drawn,
 )
 from eitskin_studies.harness.sessions import copied
@@ -55,7 +61,7 @@ class Mean:
 
 
 @dataclass(frozen=True)
-class Rate:
+class DetectionRate:
     """A fault at one SNR over all scenes.
 
     ``named``: share called by its name; ``other``: share about which anything but "crowded" was
@@ -107,7 +113,7 @@ class Findings:
     """All of a run."""
 
     seed: int
-    rates: tuple[Rate, ...]
+    rates: tuple[DetectionRate, ...]
     crowds: tuple[Crowd, ...]
     imperfect: tuple[Imperfect, ...]
 
@@ -115,7 +121,7 @@ class Findings:
         """For JSON."""
         return asdict(self)
 
-    def rate(self, fault: str, snr_db: float = HEADLINE_DB) -> Rate:
+    def rate(self, fault: str, snr_db: float = HEADLINE_DB) -> DetectionRate:
         """One of them."""
         return next(one for one in self.rates if (one.fault, one.snr_db) == (fault, snr_db))
 
@@ -149,7 +155,7 @@ class _Eye:
         )
         self._points = self._image_scorer.raster.points_mm
 
-    def truth(self, scene: Scene) -> BoolArray:
+    def truth(self, scene: TouchScene) -> BoolArray:
         return metrics.disc_mask(self._points, scene.centres_mm(), scene.radii_mm())
 
     def tare(self, quiet_v: FloatArray) -> None:
@@ -195,28 +201,28 @@ class _Sample:
 Samples = dict[tuple[str, float], list[_Sample]]
 
 
-def _frames(case: Case, fault: Fault, snr_db: float) -> FloatArray:
+def _frames(case: SceneCase, fault: InjectedFault, snr_db: float) -> FloatArray:
     """The frame with the fault (m,) V."""
     exact = fault.volts(case, case.volts["touched"])
     reading = fault.readings(case, case.measured(exact[None], snr_db, "frame")[0])
     return copied(reading, PROTOCOL) if fault.half else reading
 
 
-def _quiet(case: Case, fault: Fault, snr_db: float) -> FloatArray:
+def _quiet(case: SceneCase, fault: InjectedFault, snr_db: float) -> FloatArray:
     rest = case.volts["touched" if fault.lifted else "quiet"]
     measured = case.measured(np.tile(rest, (QUIET_FRAMES, 1)), snr_db, "quiet")
     return copied(measured, PROTOCOL) if fault.half else measured
 
 
 def _look_at(
-    case: Case, snr_db: float, faults: Sequence[Fault], eye: _Eye, samples: Samples
+    case: SceneCase, snr_db: float, faults: Sequence[InjectedFault], eye: _Eye, samples: Samples
 ) -> None:
     """All ``faults`` of a case, those of a kind of reference after one another."""
     truth = eye.truth(case.scene)
     for half, lifted in sorted({(fault.half, fault.lifted) for fault in faults}):
         of_kind = [fault for fault in faults if (fault.half, fault.lifted) == (half, lifted)]
         eye.tare(_quiet(case, of_kind[0], snr_db))
-        frame = _frames(case, Fault(NONE, None, half=half), snr_db)
+        frame = _frames(case, InjectedFault(NONE, None, half=half), snr_db)
         clean = eye.see(frame, truth)
         judged_blind = snr_db == HEADLINE_DB and not lifted
         clean_blind = eye.see(frame, truth, blind=True) if judged_blind else None
@@ -244,13 +250,13 @@ def mean_of(differences: Iterable[float]) -> Mean | None:
     )
 
 
-def _rate(fault: Fault, snr_db: float, samples: Sequence[_Sample]) -> Rate:
+def _rate(fault: InjectedFault, snr_db: float, samples: Sequence[_Sample]) -> DetectionRate:
     named = None if fault.named is None else float(np.mean([one.named for one in samples]))
     other = float(np.mean([one.seen.says_other() for one in samples]))
     crowded = float(np.mean([one.seen.says_crowded() for one in samples]))
     refused = sum(one.seen.info is None for one in samples)
     if fault.lifted:
-        return Rate(
+        return DetectionRate(
             fault.name,
             snr_db,
             len(samples),
@@ -270,7 +276,7 @@ def _rate(fault: Fault, snr_db: float, samples: Sequence[_Sample]) -> Rate:
         if o.blind is not None and o.clean_blind is not None
     ]
     gain = fault.gain
-    return Rate(
+    return DetectionRate(
         fault.name, snr_db, len(samples), refused, named, other, crowded,
         float(np.mean([one.seen.image for one in samples])),
         mean_of(one.clean.image - one.seen.image for one in samples),
@@ -283,8 +289,8 @@ def _rate(fault: Fault, snr_db: float, samples: Sequence[_Sample]) -> Rate:
 
 
 def rates(
-    seed: int, scenes: int, eye: _Eye, table: Table, progress: Progress = iter
-) -> tuple[Rate, ...]:
+    seed: int, scenes: int, eye: _Eye, table: CaseMaker, progress: Progress = iter
+) -> tuple[DetectionRate, ...]:
     """Every fault at 40, 60 and 80 dB, and clean and detached frames at 50 dB."""
     samples: Samples = defaultdict(list)
     few = [fault for fault in FAULTS if fault.name in (NONE, DETACHED)]
@@ -299,7 +305,7 @@ def rates(
 
 
 def crowds(
-    seed: int, frames: int, eye: _Eye, table: Table, progress: Progress = iter
+    seed: int, frames: int, eye: _Eye, table: CaseMaker, progress: Progress = iter
 ) -> tuple[Crowd, ...]:
     """``frames`` scenes of 1 to 12 touches of radius 9 mm and contrast 5, half of them at least
     2.5, half 4 radii apart."""
@@ -331,7 +337,7 @@ def crowds(
 
 
 def imperfect(
-    seed: int, frames: int, eye: _Eye, table: Table, progress: Progress = iter
+    seed: int, frames: int, eye: _Eye, table: CaseMaker, progress: Progress = iter
 ) -> tuple[Imperfect, ...]:
     """``frames`` scenes behind each front end, the reference taken behind the same."""
     scenes, found = drawn(seed, frames), []
@@ -360,7 +366,7 @@ def run(
         UsageError: the C core is not built.
         MissingExtraError: the mesher or scipy is not installed.
     """
-    eye, table = _Eye(), Table(seed)
+    eye, table = _Eye(), CaseMaker(seed)
     return Findings(
         seed,
         rates(seed, scenes, eye, table, progress),

@@ -10,19 +10,19 @@ import numpy.typing as npt
 
 from eitskin.core.results import Info
 from eitskin.scene.streams import stream
-from eitskin_studies.benchmarks.diagnostics_scenes import PROTOCOL, ROLE, ROWS, Case
+from eitskin_studies.benchmarks.diagnostics_scenes import PROTOCOL, ROLE, ROWS, SceneCase
 
 FloatArray = npt.NDArray[np.float64]
-Spoil = Callable[[Case, FloatArray], FloatArray]
+Spoil = Callable[[SceneCase, FloatArray], FloatArray]
 CROWDED = "crowded"
 
 
-def _same(case: Case, values: FloatArray) -> FloatArray:
+def _same(case: SceneCase, values: FloatArray) -> FloatArray:
     return values
 
 
 @dataclass(frozen=True)
-class Fault:
+class InjectedFault:
     """One row of the table.
 
     ``volts`` makes the exact voltages from those of the touched frame; ``readings`` spoils what
@@ -33,7 +33,7 @@ class Fault:
     """
 
     name: str
-    named: Callable[[Case, Info], bool] | None
+    named: Callable[[SceneCase, Info], bool] | None
     volts: Spoil = _same
     readings: Spoil = _same
     half: bool = False
@@ -45,31 +45,31 @@ def _solved(name: str) -> Spoil:
     return lambda case, _: case.volts[name]
 
 
-def _says(*names: str) -> Callable[[Case, Info], bool]:
+def _says(*names: str) -> Callable[[SceneCase, Info], bool]:
     return lambda _, info: any(name in info.diagnostics_by_name for name in names)
 
 
-def _pair(case: Case) -> tuple[int, ...]:
+def _pair(case: SceneCase) -> tuple[int, ...]:
     return tuple(sorted((case.electrode, case.neighbour())))
 
 
-def _open(case: Case, info: Info) -> bool:
+def _open(case: SceneCase, info: Info) -> bool:
     return info.open_electrodes == (case.electrode,) and not info.bridged_electrodes
 
 
-def _bridged(case: Case, info: Info) -> bool:
+def _bridged(case: SceneCase, info: Info) -> bool:
     return info.bridged_electrodes == _pair(case) and not info.open_electrodes
 
 
-def _noisy(case: Case, info: Info) -> bool:
+def _noisy(case: SceneCase, info: Info) -> bool:
     return info.noisy_electrodes == (case.electrode,)
 
 
-def _channel(case: Case, info: Info) -> bool:
+def _channel(case: SceneCase, info: Info) -> bool:
     return info.noisy_electrodes == _pair(case)
 
 
-def _rubs(case: Case, values: FloatArray) -> FloatArray:
+def _rubs(case: SceneCase, values: FloatArray) -> FloatArray:
     own = np.isin(ROWS, case.electrode).any(axis=1)
     by = 1 + 0.2 * stream(case.seed, f"{ROLE} rubs", case.number).standard_normal(len(values))
     return np.asarray(np.where(own, values * by, values))
@@ -89,7 +89,7 @@ def _shifted(by: int) -> Spoil:
 def _outlier(size: float, rows: npt.NDArray[np.int64]) -> Spoil:
     """One reading of ``rows`` off, up or down; the same row for each size."""
 
-    def spoil(case: Case, values: FloatArray) -> FloatArray:
+    def spoil(case: SceneCase, values: FloatArray) -> FloatArray:
         generator, spoilt = stream(case.seed, f"{ROLE} outlier", case.number), values.copy()
         spoilt[generator.choice(rows)] += size * case.rms_v * generator.choice((-1, 1))
         return spoilt
@@ -115,42 +115,42 @@ GAINS = (0.8, 0.95, 0.99, 1.01, 1.05, 1.2)
 NONE, DETACHED, OUTLIER = "none", "an electrode detached", "one row off by {:g} rms(V0)"
 HALF = ", half scan"
 
-FAULTS: tuple[Fault, ...] = (
-    Fault(NONE, None),
-    Fault("none" + HALF, None, half=True),
-    Fault(DETACHED, _open, _solved("detached")),
-    Fault("neighbours bridged by 10 ohm", _bridged, _solved("bridged")),
-    Fault(
+FAULTS: tuple[InjectedFault, ...] = (
+    InjectedFault(NONE, None),
+    InjectedFault("none" + HALF, None, half=True),
+    InjectedFault(DETACHED, _open, _solved("detached")),
+    InjectedFault("neighbours bridged by 10 ohm", _bridged, _solved("bridged")),
+    InjectedFault(
         "electrodes 3 apart bridged by 10 ohm", _says("model mismatch"), _solved("bridged apart")
     ),
-    Fault("neighbours swapped", _says("model mismatch"), _solved("swapped")),
-    Fault("electrodes 5 apart swapped", _says("model mismatch"), _solved("swapped apart")),
+    InjectedFault("neighbours swapped", _says("model mismatch"), _solved("swapped")),
+    InjectedFault("electrodes 5 apart swapped", _says("model mismatch"), _solved("swapped apart")),
     *(
-        Fault(
+        InjectedFault(
             f"frame shifted by {n} row{'s' * (n > 1)}",
             _says("model mismatch"),
             readings=_shifted(n),
         )
         for n in (1, 13)
     ),
-    Fault(
+    InjectedFault(
         "frame shifted by 13 rows" + HALF, _says("model mismatch"), readings=_shifted(13), half=True
     ),
-    Fault("a channel's polarity flipped", _channel, _channel_times(-1.0)),
-    Fault(
+    InjectedFault("a channel's polarity flipped", _channel, _channel_times(-1.0)),
+    InjectedFault(
         "a channel's polarity flipped" + HALF,
         _says("model mismatch"),
         _channel_times(-1.0),
         half=True,
     ),
-    Fault("a channel's gain off by 10 %", _channel, _channel_times(1.1)),
-    Fault("an electrode's readings off by 20 % at random", _noisy, _rubs),
+    InjectedFault("a channel's gain off by 10 %", _channel, _channel_times(1.1)),
+    InjectedFault("an electrode's readings off by 20 % at random", _noisy, _rubs),
     *(
-        Fault(OUTLIER.format(size), _says("outlier"), readings=_outlier(size, EVERY))
+        InjectedFault(OUTLIER.format(size), _says("outlier"), readings=_outlier(size, EVERY))
         for size in OUTLIERS
     ),
     *(
-        Fault(
+        InjectedFault(
             OUTLIER.format(size) + HALF,
             _says("outlier"),
             readings=_outlier(size, MEASURED),
@@ -158,14 +158,14 @@ FAULTS: tuple[Fault, ...] = (
         )
         for size in OUTLIERS
     ),
-    Fault(
+    InjectedFault(
         "touch during the tare, then lifted",
         _says("stale reference"),
         lambda case, _: case.volts["quiet"],
         lifted=True,
     ),
     *(
-        Fault(
+        InjectedFault(
             f"common mode of {100 * size:+g} % of rms(V0)",
             _says(CROWDED, "stale reference"),
             _jump(size),
@@ -173,7 +173,7 @@ FAULTS: tuple[Fault, ...] = (
         for size in JUMPS
     ),
     *(
-        Fault(f"gain off by {100 * (gain - 1):+.0f} %", None, _times(gain), gain=gain)
+        InjectedFault(f"gain off by {100 * (gain - 1):+.0f} %", None, _times(gain), gain=gain)
         for gain in GAINS
     ),
 )

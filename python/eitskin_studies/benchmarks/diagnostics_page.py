@@ -9,9 +9,9 @@ from eitskin_studies.benchmarks.diagnostics import (
     HEADLINE_DB,
     SNRS_DB,
     Crowd,
+    DetectionRate,
     Findings,
     Mean,
-    Rate,
 )
 from eitskin_studies.benchmarks.diagnostics_faults import DETACHED, FAULTS, NONE
 from eitskin_studies.harness.sections import Filling, text_table
@@ -150,7 +150,7 @@ def false_alarms(result: Findings) -> str:
     return f"- **False alarms**: {said}; `crowded` is reported of {crowded}."
 
 
-def refused(rates: Sequence[Rate]) -> str:
+def refused(rates: Sequence[DetectionRate]) -> str:
     """How many frames were refused, by fault."""
     named = {f"{one.fault} at {one.snr_db:g} dB: {one.refused}" for one in rates if one.refused}
     return "; ".join(sorted(named)) or "none"

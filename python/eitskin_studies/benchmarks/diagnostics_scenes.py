@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
-from eitskin.scene.random_touches import Scene, random_touches
+from eitskin.scene.random_touches import TouchScene, random_touches
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import measure
@@ -55,7 +55,7 @@ IMPERFECT: dict[str, dict[str, Any]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class SceneCase:
     """Scene ``number`` of ``seed``; ``volts`` (m,) by name, without noise: "quiet", "touched", and
     the touched frame with what is wrong with contacts and wires: "detached", "bridged", "bridged
     apart", "swapped", "swapped apart".
@@ -63,7 +63,7 @@ class Case:
 
     seed: int
     number: int
-    scene: Scene
+    scene: TouchScene
     volts: Mapping[str, FloatArray]
 
     @property
@@ -98,13 +98,13 @@ class Case:
         )[0]
 
 
-class Table:
+class CaseMaker:
     """Makes cases; meshes are kept."""
 
     def __init__(self, seed: int) -> None:
         self.seed, self._bench = seed, MeshCache()
 
-    def cases(self, numbers: Iterable[int], scenes: tuple[Scene, ...]) -> Iterator[Case]:
+    def cases(self, numbers: Iterable[int], scenes: tuple[TouchScene, ...]) -> Iterator[SceneCase]:
         """Each scene, with every fault that has to be solved for."""
         for k in numbers:
             at, one, three, five = (int((k + step) % ELECTRODES) for step in (0, 1, 3, 5))
@@ -117,17 +117,17 @@ class Table:
                 volts[name] = self.frames(k, scenes[k], {"bridged": bridge})[-1]
             for name, other in (("swapped", one), ("swapped apart", five)):
                 volts[name] = self.frames(k, scenes[k], {}, protocol=swapped(at, other))[-1]
-            yield Case(self.seed, k, scenes[k], volts)
+            yield SceneCase(self.seed, k, scenes[k], volts)
 
-    def plain(self, number: int, scene: Scene) -> Case:
+    def plain(self, number: int, scene: TouchScene) -> SceneCase:
         """A scene that nothing is wrong with."""
         quiet, touched = self.frames(number, scene, {})
-        return Case(self.seed, number, scene, {"quiet": quiet, "touched": touched})
+        return SceneCase(self.seed, number, scene, {"quiet": quiet, "touched": touched})
 
     def frames(
         self,
         number: int,
-        scene: Scene,
+        scene: TouchScene,
         effects: Mapping[str, Any],
         frames: int = 1,
         quiet_frames: int = 1,
@@ -151,7 +151,7 @@ class Table:
         return simulate_frames(compile_scene(made, mesh_cache=self._bench)).voltage_v
 
 
-def drawn(seed: int, count: int) -> tuple[Scene, ...]:
+def drawn(seed: int, count: int) -> tuple[TouchScene, ...]:
     """One to three touches each, as ``eitskin compare`` draws them."""
     return random_touches(paper_skin().outline, seed, count, ROLE).scenes
 

@@ -41,7 +41,7 @@ SNR_DB, SCENES, SEED, ELEMENTS = 60.0, 8, 5, 3000
 
 
 @dataclass(frozen=True)
-class Point:
+class GrowthPoint:
     """What is run: electrodes of the adjacent protocol, pixels across, rank, touches; ``sweep`` is
     the series it stands in."""
 
@@ -53,11 +53,14 @@ class Point:
 
 
 SWEEPS = (
-    *(Point("pixels n", across=across) for across in (16, 24, 32, 48, 64)),
-    *(Point("rank", rank=rank) for rank in (16, 32, 64, 104)),
-    *(Point("touches", touches=count) for count in (1, 2, 3, 4, 6)),
-    *(Point("rows m, rank 64", electrodes=count) for count in (16, 32, 64)),
-    *(Point("electrodes, rank 4 each", electrodes=count, rank=4 * count) for count in (16, 32, 64)),
+    *(GrowthPoint("pixels n", across=across) for across in (16, 24, 32, 48, 64)),
+    *(GrowthPoint("rank", rank=rank) for rank in (16, 32, 64, 104)),
+    *(GrowthPoint("touches", touches=count) for count in (1, 2, 3, 4, 6)),
+    *(GrowthPoint("rows m, rank 64", electrodes=count) for count in (16, 32, 64)),
+    *(
+        GrowthPoint("electrodes, rank 4 each", electrodes=count, rank=4 * count)
+        for count in (16, 32, 64)
+    ),
 )
 VARIED = {
     "pixels n": "n_pixels",
@@ -111,14 +114,14 @@ class GrowthTimes:
 
 @dataclass(frozen=True, eq=False)
 class _Ready:
-    point: Point
+    point: GrowthPoint
     model: Model
     blob: bytes
     engine: CoreEngine
     frames: FloatArray
 
 
-def _model_for(point: Point, cache: Path) -> bytes:
+def _model_for(point: GrowthPoint, cache: Path) -> bytes:
     """The model's bytes, made once a ``cache``: keyed by all that it is made from."""
     key = hashlib.sha256(
         repr((point.electrodes, point.across, point.rank, ELEMENTS)).encode()
@@ -135,7 +138,7 @@ def _model_for(point: Point, cache: Path) -> bytes:
     return path.read_bytes()
 
 
-def _ready(point: Point, cache: Path) -> _Ready:
+def _ready(point: GrowthPoint, cache: Path) -> _Ready:
     blob = _model_for(point, cache)
     model = decode_model(blob, "growth model")
     key = hashlib.sha256(
@@ -166,7 +169,7 @@ def run(
     rounds: int = 15,
     cache: Path | None = None,
     *,
-    points: Sequence[Point] = SWEEPS,
+    points: Sequence[GrowthPoint] = SWEEPS,
     progress: Progress = iter,
 ) -> GrowthTimes:
     """Time ``rounds`` rounds over all ``points``; models are kept in the folder ``cache`` (by

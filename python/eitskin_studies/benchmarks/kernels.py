@@ -44,7 +44,7 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Judged:
+class KernelAgainstLimit:
     """A kernel beside its limit: ``binds`` says which; ``times`` how many times slower it is."""
 
     timing: Timing
@@ -71,7 +71,7 @@ class Width:
     fma_per_ns: float
     chain_ns: float
     read_gb_s: dict[int, float]
-    judged: tuple[Judged, ...]
+    judged: tuple[KernelAgainstLimit, ...]
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def judge(width: str, output: str) -> Width:
             "chain": t.chain * chain,
         }
         binds = max(limits, key=lambda one: limits[one])
-        judged.append(Judged(t, limits[binds], binds, t.ns / limits[binds]))
+        judged.append(KernelAgainstLimit(t, limits[binds], binds, t.ns / limits[binds]))
     return Width(width, kernels, 1 / fma, chain, reads, tuple(judged))
 
 

@@ -38,7 +38,7 @@ STEPS: dict[str, tuple[dict[str, int], ...]] = {
 
 
 @dataclass(frozen=True)
-class Stop:
+class StopPoint:
     """One solver stopped at one point: means over the test scenes; ``threshold`` was chosen on the
     training scenes."""
 
@@ -52,10 +52,10 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Curves:
+class GapCurves:
     """All stops; ``train`` and ``test`` name the scenes."""
 
-    stops: tuple[Stop, ...]
+    stops: tuple[StopPoint, ...]
     train: str
     test: str
 
@@ -64,7 +64,7 @@ class Curves:
         return asdict(self)
 
 
-def run(scenes: int, seed: int, progress: Progress) -> Curves:
+def run(scenes: int, seed: int, progress: Progress) -> GapCurves:
     """The curves on ``scenes`` test scenes and half as many training scenes of ``seed``, 60 dB."""
     name, model, blob = models()[0]
     test, train = sessions(scenes, seed), sessions(max(2, scenes // 2), seed, "train")
@@ -87,7 +87,7 @@ def run(scenes: int, seed: int, progress: Progress) -> Curves:
         worst = np.sort(scores)[: max(1, -(-len(scores) // 10))]
         effort = settings.get("mac_limit", settings["iterations"])
         stops.append(
-            Stop(
+            StopPoint(
                 solver,
                 effort,
                 float(np.mean(off)),
@@ -97,7 +97,7 @@ def run(scenes: int, seed: int, progress: Progress) -> Curves:
                 threshold,
             )
         )
-    return Curves(tuple(stops), train.touches.name, test.touches.name)
+    return GapCurves(tuple(stops), train.touches.name, test.touches.name)
 
 
 def _images(engine: CoreEngine, session: Simulated) -> tuple[FloatArray, FloatArray, list[int]]:
@@ -112,7 +112,7 @@ def _images(engine: CoreEngine, session: Simulated) -> tuple[FloatArray, FloatAr
     return np.array(images, dtype=np.float64), np.array(coefficients, dtype=np.float64), macs
 
 
-def text(curves: Curves) -> str:
+def text(curves: GapCurves) -> str:
     """A table."""
     lines = [
         f"thresholds from {curves.train}, numbers of {curves.test}, 60 dB, rank 64, float32",

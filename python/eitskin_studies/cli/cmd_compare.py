@@ -53,14 +53,14 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.skin.protocol import adjacent
     from eitskin.skin.skin import load_skin, paper_skin
     from eitskin_studies.compare.methods import methods
-    from eitskin_studies.compare.run import Settings, compare
+    from eitskin_studies.compare.run import CompareSettings, compare
     from eitskin_studies.compare.table import to_csv, to_json, to_text
 
     _check(options)
     skin, protocol = (
         (paper_skin(), adjacent(16)) if options.skin is None else load_skin(options.skin)
     )
-    settings = Settings(
+    settings = CompareSettings(
         scenes=options.scenes,
         train_scenes=options.train,
         seed=options.seed,

@@ -34,7 +34,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run, write, print."""
-    from eitskin_studies.experiments.experiment import Settings, workspace_in
+    from eitskin_studies.experiments.experiment import ExperimentSettings, workspace_in
     from eitskin_studies.experiments.registry import EXPERIMENTS, load
 
     if options.name == "list":
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.page)
     if options.data is not None and not options.data.is_dir():
         raise FileError(f"--data {options.data}: no such folder; name that of the measured frames")
-    settings = Settings(options.seed, options.share, options.data)
+    settings = ExperimentSettings(options.seed, options.share, options.data)
     if not options.no_pictures:
         from eitskin.view.pictures import load_matplotlib
 

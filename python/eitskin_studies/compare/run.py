@@ -36,7 +36,7 @@ TOUCH_THRESHOLDS = metrics.THRESHOLDS[4::5]
 
 
 @dataclass(frozen=True)
-class Settings:
+class CompareSettings:
     """What is compared on what.
 
     Attributes:
@@ -71,7 +71,7 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class CompareResult:
     """One method on the test scenes.
 
     Attributes:
@@ -139,11 +139,11 @@ class Comparison:
             threshold ``ceiling_threshold``: what no image on this grid can do much better than.
     """
 
-    settings: Settings
+    settings: CompareSettings
     setup: Setup
     train: Simulated
     test: Simulated
-    results: tuple[Result, ...]
+    results: tuple[CompareResult, ...]
     ceiling: float
     ceiling_threshold: float
 
@@ -166,7 +166,7 @@ def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
 def compare(
     skin: Skin,
     protocol: Protocol,
-    settings: Settings | None = None,
+    settings: CompareSettings | None = None,
     *,
     families: Callable[[Setup], Sequence[Family]] = methods,
     progress: Progress = plain,
@@ -183,7 +183,7 @@ def compare(
         UsageError, GeometryError, ProtocolError, MissingExtraError: from drawing, meshing and
             simulating.
     """
-    how = Settings() if settings is None else settings
+    how = CompareSettings() if settings is None else settings
     setup = setup_for(skin, protocol, elements=how.elements)
     image_scorer = metrics.judge_for(skin.outline, setup.grid, how.raster_mm, how.lookup)
     mesh = mesh_for_elements(skin, how.simulated_elements)
@@ -245,7 +245,7 @@ def _run(
     train: _Session,
     test: _Session,
     gate_mm: float,
-) -> Result:
+) -> CompareResult:
     """Train a family, then test what came of it."""
     best: tuple[float, float, Method, FloatArray, FloatArray] | None = None
     for value in family.values:
@@ -275,7 +275,7 @@ def _run(
         assert touch_threshold is not None
         found = tuple(touches_in_image(image, index, centres, touch_threshold) for image in images)
     curves = image_scorer.curves(images, test.truths)
-    return Result(
+    return CompareResult(
         name=method.name,
         parameter=family.parameter,
         value=value,

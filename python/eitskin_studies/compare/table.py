@@ -10,7 +10,7 @@ from dataclasses import asdict
 from typing import Any
 
 from eitskin.scoring import metrics
-from eitskin_studies.compare.run import Comparison, Result
+from eitskin_studies.compare.run import CompareResult, Comparison
 from eitskin_studies.harness.summary import Summary
 
 SNR_DEFINITION = "SNR = 20 log10(rms(V0) / sigma), V0 the untouched skin's frame, rms over its rows"
@@ -135,7 +135,7 @@ def to_text(comparison: Comparison) -> str:
     return "\n".join(lines)
 
 
-def _cells(result: Result) -> tuple[str, ...]:
+def _cells(result: CompareResult) -> tuple[str, ...]:
     miou, position = result.miou_summary, result.position_summary
     return (
         result.name,
@@ -173,7 +173,7 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _result_json(result: Result) -> dict[str, Any]:
+def _result_json(result: CompareResult) -> dict[str, Any]:
     return {
         "name": result.name,
         "parameter": result.parameter,

@@ -28,7 +28,7 @@ MODEL_ELEMENTS = 6_000
 
 
 @dataclass(frozen=True)
-class Settings:
+class ExperimentSettings:
     """How much an experiment does.
 
     Attributes:
@@ -68,7 +68,7 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class ExperimentOutcome:
     """What came of an experiment.
 
     Attributes:
@@ -89,7 +89,7 @@ class Workspace:
     """Where an experiment works: its settings, its folder, and what is kept there. Use
     :func:`workspace_in`."""
 
-    settings: Settings
+    settings: ExperimentSettings
     folder: Path
     progress: Progress
     store: Store
@@ -146,11 +146,11 @@ class Experiment(Protocol):
 
     TITLE: str
 
-    def run(self, workspace: Workspace) -> Outcome:
+    def run(self, workspace: Workspace) -> ExperimentOutcome:
         """All of it; what the workspace has kept is not computed again."""
 
 
-def workspace_in(folder: Path, settings: Settings, progress: Progress) -> Workspace:
+def workspace_in(folder: Path, settings: ExperimentSettings, progress: Progress) -> Workspace:
     """A workspace in ``folder``, which is made.
 
     Raises:

@@ -13,11 +13,11 @@ import numpy.typing as npt
 
 from eitskin.core.results import Reconstruction
 from eitskin.model.model import Model
-from eitskin.scene.random_touches import Scene, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM, Matching, match
 from eitskin.solve.batch import reconstruct_many
-from eitskin_studies.harness.sessions import Progress, SceneSolver, Session
+from eitskin_studies.harness.sessions import FrameSession, Progress, SceneSolver
 from eitskin_studies.harness.summary import Summary
 
 FloatArray = npt.NDArray[np.float64]
@@ -28,7 +28,7 @@ DIGITS = 5
 
 def session_in_parts(
     solver: SceneSolver, drawn: TouchSet, progress: Progress, name: str
-) -> Session:
+) -> FrameSession:
     """``solver.session`` of ``drawn``, kept every few scenes, so that a run that is killed loses no
     more than those.
 
@@ -45,7 +45,9 @@ def session_in_parts(
     ]
     exact_v = np.concatenate([part.exact_v for part in parts])
     first = parts[0]
-    return Session(name, first.protocol, first.sheet_s_per_m, drawn, exact_v, first.exact_quiet_v)
+    return FrameSession(
+        name, first.protocol, first.sheet_s_per_m, drawn, exact_v, first.exact_quiet_v
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,7 @@ class Evaluator:
     image_scorer: metrics.ImageScorer
     gate_mm: float = GATE_MM
 
-    def truths(self, scenes: Sequence[Scene]) -> npt.NDArray[np.bool_]:
+    def truths(self, scenes: Sequence[TouchScene]) -> npt.NDArray[np.bool_]:
         """The true discs on the scorer's cells, (k, p)."""
         points = self.image_scorer.raster.points_mm
         return np.array(
@@ -71,14 +73,14 @@ class Evaluator:
             self.image_scorer.raster.points_mm, places, [touch.radius_mm for touch in one.touches]
         )
 
-    def matched(self, scene: Scene, one: Reconstruction) -> Matching:
+    def matched(self, scene: TouchScene, one: Reconstruction) -> Matching:
         """The touches found paired with the true ones."""
         return match(
             scene.centres_mm(), [(touch.x_mm, touch.y_mm) for touch in one.touches], self.gate_mm
         )
 
     def threshold(
-        self, scenes: Sequence[Scene], quiet_v: FloatArray, frames_v: FloatArray
+        self, scenes: Sequence[TouchScene], quiet_v: FloatArray, frames_v: FloatArray
     ) -> float:
         """t of the mask x > t max(x) with the best mean MIoU of these scenes; for sets of the
         tuning seed."""
@@ -87,7 +89,7 @@ class Evaluator:
         return metrics.best_threshold(self.image_scorer.curves(images, self.truths(scenes)))
 
     def scores(
-        self, scenes: Sequence[Scene], quiet_v: FloatArray, frames_v: FloatArray, t: float
+        self, scenes: Sequence[TouchScene], quiet_v: FloatArray, frames_v: FloatArray, t: float
     ) -> dict[str, list[Any]]:
         """Lists fit for JSON: a scene's image and disc MIoU, exact count, false touches, kMAC; of
         each true touch its scene and place, and the distance of the found one, None where it was

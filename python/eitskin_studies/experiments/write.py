@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.fileio import write_beside, write_bytes
-from eitskin_studies.experiments.experiment import Outcome, Settings, Table
+from eitskin_studies.experiments.experiment import ExperimentOutcome, ExperimentSettings, Table
 from eitskin_studies.harness.sections import Tabular, fill_marks, text_table
 
 
-def write_all(outcome: Outcome, folder: Path, pictures: bool = True) -> None:
+def write_all(outcome: ExperimentOutcome, folder: Path, pictures: bool = True) -> None:
     """``data.json``, a CSV file a table, and the pictures, into ``folder``; each whole or not at
     all.
 
@@ -32,7 +32,9 @@ def write_all(outcome: Outcome, folder: Path, pictures: bool = True) -> None:
             draw(temporary)
 
 
-def write_page(outcome: Outcome, folder: Path, page: Path, name: str, settings: Settings) -> None:
+def write_page(
+    outcome: ExperimentOutcome, folder: Path, page: Path, name: str, settings: ExperimentSettings
+) -> None:
     """Fill the marks of ``page``: each table, the outcome's words, and ``command``; pictures go to
     ``pictures/NAME/`` beside it.
 
@@ -51,14 +53,14 @@ def write_page(outcome: Outcome, folder: Path, page: Path, name: str, settings: 
                 shutil.copyfile(folder / picture, temporary)
 
 
-def to_text(outcome: Outcome) -> str:
+def to_text(outcome: ExperimentOutcome) -> str:
     """The tables, for a terminal."""
     return "\n\n".join(
         f"{table.name}\n{text_table(table.head, table.rows)}" for table in outcome.tables
     )
 
 
-def to_json(outcome: Outcome) -> str:
+def to_json(outcome: ExperimentOutcome) -> str:
     """Everything; numbers that are none become null."""
     return json.dumps(_finite(outcome.data), indent=1, allow_nan=False) + "\n"
 
@@ -71,9 +73,9 @@ def _finite(value: Any) -> Any:
     return [_finite(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
-def _command(name: str, page: Path, settings: Settings) -> str:
-    more = f" --seed {settings.seed}" if settings.seed != Settings.seed else ""
-    more += f" --share {settings.share:g}" if settings.share != Settings.share else ""
+def _command(name: str, page: Path, settings: ExperimentSettings) -> str:
+    more = f" --seed {settings.seed}" if settings.seed != ExperimentSettings.seed else ""
+    more += f" --share {settings.share:g}" if settings.share != ExperimentSettings.share else ""
     more += "" if settings.data is None else " --data FOLDER"
     return (
         f"Tables and pictures are written by `eitskin study {name} -o out/{name}{more} --page"

@@ -25,7 +25,7 @@ from eitskin_studies.harness.emulated_steps import (
     Play,
     Solve,
     Step,
-    Tare,
+    TareStep,
     write_steps,
 )
 
@@ -164,7 +164,7 @@ def run_frames(
     done = run_steps(
         program,
         folder,
-        (Load(blob), Choose(options), Tare(quiet_v), Play(frames_v)),
+        (Load(blob), Choose(options), TareStep(quiet_v), Play(frames_v)),
         portable=portable,
     )
     refused = [f"{word} (status {status})" for word, status in done.statuses if status != 0]

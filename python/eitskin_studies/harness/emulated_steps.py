@@ -36,7 +36,7 @@ class Mask:
 
 
 @dataclass(frozen=True, eq=False)
-class Tare:
+class TareStep:
     """Take the reference from quiet frames (k, m), volts, until one is refused; fewer than four:
     each anew."""
 
@@ -62,7 +62,7 @@ class Forget:
     """Forget the warm start and the touches that were followed."""
 
 
-Step = Load | Choose | Mask | Tare | Play | Solve | Forget
+Step = Load | Choose | Mask | TareStep | Play | Solve | Forget
 
 
 def write_steps(folder: Path, steps: Sequence[Step], *, portable: bool = False) -> None:
@@ -87,8 +87,8 @@ def write_steps(folder: Path, steps: Sequence[Step], *, portable: bool = False) 
     (folder / "frames.f32").write_bytes(b"".join(numbers))
 
 
-def _numbers_of(step: Tare | Play | Solve) -> tuple[str, npt.NDArray[Any]]:
-    if isinstance(step, Tare):
+def _numbers_of(step: TareStep | Play | Solve) -> tuple[str, npt.NDArray[Any]]:
+    if isinstance(step, TareStep):
         return "quiet", step.quiet_v
     return ("frames", step.frames_v) if isinstance(step, Play) else ("solve", step.data)
 

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
 from eitskin.fileio import write_beside
-from eitskin.scene.random_touches import Touch, TouchSet
+from eitskin.scene.random_touches import TouchSet, TrueTouch
 from eitskin.scene.simulate import Measurement, conductivity_with, measure
 from eitskin.scene.streams import stream
 from eitskin.scoring.metrics import Raster, disc_mask
@@ -46,7 +46,7 @@ class Drift:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredFrames:
     """What a configuration gets: ``quiet_v`` (q, m), and ``frames_v`` (k, h, m): scene k held for h
     frames, the last judged."""
 
@@ -55,7 +55,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class FrameSession:
     """A set's scenes, solved: ``exact_v`` (k, m) and ``exact_quiet_v`` (m,) V without noise and
     converter."""
 
@@ -98,16 +98,16 @@ class Session:
 
     def measured(
         self, snr_db: float, samples: int = BASE_SAMPLES, scan: str = "full", held: int = 1
-    ) -> Measured:
+    ) -> MeasuredFrames:
         """The frames with noise: sigma = rms(V0) 10^(-snr_db / 20) sqrt(80 / samples), then the
         converter of ``Measurement``, with 16 bits from 70 dB on, where the steps of 12 bits would
         be the noise. A reciprocal scan copies each measured row, with its sign, to the reciprocal
         one. Configurations share the random numbers, so that their differences are paired.
         """
-        measured: Measured = self._cache(snr_db, samples, scan, held)
+        measured: MeasuredFrames = self._cache(snr_db, samples, scan, held)
         return measured
 
-    def _measure(self, snr_db: float, samples: int, scan: str, held: int) -> Measured:
+    def _measure(self, snr_db: float, samples: int, scan: str, held: int) -> MeasuredFrames:
         how = converter_for(snr_db)
         role, seed, quiet = self.touches.role, self.touches.seed, self.exact_quiet_v
         noise_v = noise_deviation_v(quiet, snr_db, samples)
@@ -119,7 +119,7 @@ class Session:
         frames_v = np.stack([measure(self.exact_v, *converter, name)[0] for name in names], axis=1)
         if scan == "reciprocal":
             quiet_v, frames_v = copied(quiet_v, self.protocol), copied(frames_v, self.protocol)
-        return Measured(quiet_v, frames_v)
+        return MeasuredFrames(quiet_v, frames_v)
 
 
 def converter_for(snr_db: float) -> Measurement:
@@ -158,7 +158,7 @@ class SceneSolver:
 
     def session(
         self, drawn: TouchSet, progress: Progress, name: str = "", drift: Drift | None = None
-    ) -> Session:
+    ) -> FrameSession:
         """The set ``drawn`` with the contacts of its own session, +-20 % under its seed and role.
 
         Raises:
@@ -166,7 +166,7 @@ class SceneSolver:
         """
         named = name or drawn.role
         volts = self._kept(named, drawn, progress, drift)
-        return Session(
+        return FrameSession(
             named, self.protocol, self.skin.conductivity_s_per_m, drawn, volts[1:], volts[0]
         )
 
@@ -229,7 +229,7 @@ class SceneSolver:
         return np.array(volts)
 
 
-def apparent_change_s_per_m_mm2(touch: Touch, sheet_s_per_m: float) -> float:
+def apparent_change_s_per_m_mm2(touch: TrueTouch, sheet_s_per_m: float) -> float:
     """What a touch changes in all: its disc's area times 2 (c - 1) / (c + 1) of the sheet's
     conductivity, which is how a disc of contrast c answers. A linear method can find no more,
     however strong the contrast."""

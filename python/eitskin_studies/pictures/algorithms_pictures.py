@@ -14,7 +14,7 @@ from eitskin.fem.grid import Grid
 from eitskin.scoring import metrics
 from eitskin.skin.skin import Skin
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panel, load_matplotlib, save_png
-from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, Result
+from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, AlgorithmResult
 from eitskin_studies.experiments.algorithms.scenes import shown_set
 from eitskin_studies.pictures.comparison_pictures import truth_marks
 
@@ -32,7 +32,7 @@ FIXED, BEST, PAPER = "#b9c7d8", "#1f5fa8", "#b3261e"
 PANEL_INCH = 1.3
 
 
-def draw_images(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Result]) -> None:
+def draw_images(path: Path, *, skin: Skin, grid: Grid, results: Sequence[AlgorithmResult]) -> None:
     """A row a scene, a column a method at its best parameter, the truth first and drawn into each,
     as a PNG.
 
@@ -70,7 +70,7 @@ def draw_images(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Result]
         save_png(figure, path)
 
 
-def draw_masks(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Result]) -> None:
+def draw_masks(path: Path, *, skin: Skin, grid: Grid, results: Sequence[AlgorithmResult]) -> None:
     """What is taken for touch: two rows a scene, at the fixed parameter and t, and at the chosen
     ones; raises as draw_images."""
     from matplotlib.patches import Patch
@@ -112,7 +112,7 @@ def draw_masks(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Result])
         save_png(figure, path)
 
 
-def draw_curves(path: Path, *, results: Sequence[Result]) -> None:
+def draw_curves(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
     """Mean MIoU of all test scenes over t, at fixed parameters and at the chosen ones; raises as
     draw_images."""
     matplotlib = load_matplotlib()
@@ -144,7 +144,7 @@ def draw_curves(path: Path, *, results: Sequence[Result]) -> None:
         save_png(figure, path)
 
 
-def draw_bars(path: Path, *, results: Sequence[Result]) -> None:
+def draw_bars(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
     """MIoU at fixed parameters and threshold, at the chosen ones, and what the paper gives; raises
     as draw_images."""
     from matplotlib.lines import Line2D
@@ -211,11 +211,11 @@ def draw_bars(path: Path, *, results: Sequence[Result]) -> None:
         save_png(figure, path)
 
 
-def _kept(results: Sequence[Result]) -> list[Result]:
+def _kept(results: Sequence[AlgorithmResult]) -> list[AlgorithmResult]:
     return [one for one in results if one.candidate.name not in LEFT_OUT]
 
 
-def _title(one: Result, row: int, miou: float) -> str:
+def _title(one: AlgorithmResult, row: int, miou: float) -> str:
     return f"{one.candidate.short}\n{miou:.2f}" if row == 0 else f"{miou:.2f}"
 
 
@@ -250,7 +250,7 @@ def _show_cells(
     )
 
 
-def _line(one: Result, place: int) -> dict[str, Any]:
+def _line(one: AlgorithmResult, place: int) -> dict[str, Any]:
     """Plain FISTA in reds by its iterations, dashed where signed; what is here in black; the others
     by turns."""
     if one.candidate.own:

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from eitskin.scene.random_touches import Scene
+from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
-from eitskin_studies.compare.run import Comparison, Result
+from eitskin_studies.compare.run import CompareResult, Comparison
 
 
-def truth_marks(scene: Scene, sheet_s_per_m: float) -> tuple[Mark, ...]:
+def truth_marks(scene: TouchScene, sheet_s_per_m: float) -> tuple[Mark, ...]:
     """A scene's touches with their change of conductivity in S/m."""
     return tuple(
         Mark(t.x_mm, t.y_mm, t.radius_mm, (t.contrast - 1.0) * sheet_s_per_m) for t in scene.touches
     )
 
 
-def found_marks(result: Result, scene: int) -> tuple[Mark, ...]:
+def found_marks(result: CompareResult, scene: int) -> tuple[Mark, ...]:
     """What a method found in one test scene."""
     return tuple(Mark(float(x), float(y)) for x, y in result.found_mm[scene])
 

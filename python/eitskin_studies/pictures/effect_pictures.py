@@ -22,7 +22,7 @@ from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fileio import write_beside
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
-from eitskin.scene.effect import Session
+from eitskin.scene.effect import EffectSession
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.streams import stream
 from eitskin.view.pictures import STYLE, load_matplotlib
@@ -90,7 +90,7 @@ def draw_effect(path: str | Path, name: str) -> None:
         _save_small_png(figure, path)
 
 
-def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], Session]:
+def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], EffectSession]:
     """All frames (n, m) of the press, the effects' parameters, and a session to make effects in."""
     table = {
         "scene": {
@@ -112,7 +112,7 @@ def press_frames(effects: dict[str, Any]) -> tuple[FloatArray, dict[str, Any], S
             scene.skin.conductivity_s_per_m
         )
 
-    session = Session(
+    session = EffectSession(
         skin=scene.skin,
         protocol=scene.protocol,
         n_frames=scene.n_frames,

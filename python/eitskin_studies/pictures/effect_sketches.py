@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from eitskin.scene.effect import Session
+from eitskin.scene.effect import EffectSession
 from eitskin.scene.scan import channels, row_delays_s
 from eitskin.view.pictures import ELECTRODE, FOUND, INK, RIM
 
@@ -24,7 +24,7 @@ LIGHT = "#b9c4cc"
 STRONG = "#b2182b"
 
 
-def gel_drying(axes: Axes, session: Session, parameters: Any) -> None:
+def gel_drying(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Conductivity against hours."""
     from eitskin.scene.effects.gel_drying import drying_factor
 
@@ -40,7 +40,7 @@ def gel_drying(axes: Axes, session: Session, parameters: Any) -> None:
     axes.locator_params(axis="x", nbins=5)
 
 
-def temperature(axes: Axes, session: Session, parameters: Any) -> None:
+def temperature(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Conductivity against minutes."""
     from eitskin.scene.effects.temperature import temperature_factor
 
@@ -51,7 +51,7 @@ def temperature(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="time (min)", ylabel="conductivity / described", title=title)
 
 
-def background(axes: Axes, session: Session, parameters: Any) -> None:
+def background(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The pattern on the mesh."""
     from eitskin.scene.effects.background import NAME, pattern
 
@@ -71,7 +71,7 @@ def background(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="x (mm)", ylabel="y (mm)", title="the pattern")
 
 
-def misplacement(axes: Axes, session: Session, parameters: Any) -> None:
+def misplacement(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Where electrodes are described and where they are."""
     from eitskin.scene.effects.misplacement import make
 
@@ -89,7 +89,7 @@ def misplacement(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="x (mm)", ylabel="y (mm)", title="electrodes along the rim")
 
 
-def contact_impedance(axes: Axes, session: Session, parameters: Any) -> None:
+def contact_impedance(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Each electrode's impedance."""
     from eitskin.scene.effects.contact_impedance import impedances
 
@@ -103,7 +103,7 @@ def contact_impedance(axes: Axes, session: Session, parameters: Any) -> None:
     )
 
 
-def detached(axes: Axes, session: Session, parameters: Any) -> None:
+def detached(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Which rows of the scan are lost."""
     count = session.skin.electrodes.count
     state = np.full((count, count), np.nan)
@@ -115,7 +115,7 @@ def detached(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="driven pair (k, k + 1)", ylabel="measuring pair (k, k + 1)", title=title)
 
 
-def bridged(axes: Axes, session: Session, parameters: Any) -> None:
+def bridged(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The circuit's conductance against the resistor: the chord that the bridge adds on the rim."""
     skin = session.skin
     rim = skin.outline.points_at(np.linspace(0, skin.outline.perimeter_mm, 361))
@@ -132,7 +132,7 @@ def bridged(axes: Axes, session: Session, parameters: Any) -> None:
     )
 
 
-def phase(axes: Axes, session: Session, parameters: Any) -> None:
+def phase(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The interface's impedance over frequency, in the complex plane."""
     from eitskin.scene.effects.phase import interface
 
@@ -156,7 +156,7 @@ def phase(axes: Axes, session: Session, parameters: Any) -> None:
     axes.margins(0.12)
 
 
-def source_impedance(axes: Axes, session: Session, parameters: Any) -> None:
+def source_impedance(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The load's share of the current."""
     from eitskin.scene.effects.source_impedance import share
 
@@ -168,7 +168,7 @@ def source_impedance(axes: Axes, session: Session, parameters: Any) -> None:
     )
 
 
-def amplitude_drift(axes: Axes, session: Session, parameters: Any) -> None:
+def amplitude_drift(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The current by time."""
     from eitskin.scene.effects.amplitude_drift import make
 
@@ -180,7 +180,7 @@ def amplitude_drift(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="time (s)", ylabel="current / described", title="slope and random walk")
 
 
-def channel_gain(axes: Axes, session: Session, parameters: Any) -> None:
+def channel_gain(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Each channel's gain."""
     from eitskin.scene.effects.channel_gain import gains
 
@@ -192,7 +192,7 @@ def channel_gain(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="channel: measuring pair", ylabel="gain - 1 (%)", title="drawn once a session")
 
 
-def mux(axes: Axes, session: Session, parameters: Any) -> None:
+def mux(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """A row's voltage after switching."""
     t = np.linspace(0, 2 * parameters.dwell_us, 300)
     axes.plot(t, 1 - np.exp(-t / parameters.settling_us), color=STRONG)
@@ -213,7 +213,7 @@ def mux(axes: Axes, session: Session, parameters: Any) -> None:
     )
 
 
-def charge_injection(axes: Axes, session: Session, parameters: Any) -> None:
+def charge_injection(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The charge's voltage, and the demodulator's window."""
     start, end = parameters.dwell_us, parameters.dwell_us + parameters.window_us
     t = np.linspace(0, end, 400)
@@ -228,7 +228,7 @@ def charge_injection(axes: Axes, session: Session, parameters: Any) -> None:
     )
 
 
-def crosstalk(axes: Axes, session: Session, parameters: Any) -> None:
+def crosstalk(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """How often driven wires couple into each measuring pair."""
     from eitskin.scene.effects.crosstalk import pick_up
 
@@ -242,7 +242,7 @@ def crosstalk(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="driven pair (k, k + 1)", ylabel="measuring pair (k, k + 1)", title=title)
 
 
-def mains(axes: Axes, session: Session, parameters: Any) -> None:
+def mains(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The hum, and how one row samples it."""
     from eitskin.scene.effects.mains import alias_hz, make
 
@@ -263,7 +263,7 @@ def mains(axes: Axes, session: Session, parameters: Any) -> None:
     )
 
 
-def common_mode(axes: Axes, session: Session, parameters: Any) -> None:
+def common_mode(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """What is rejected against the rejection."""
     decibels = np.linspace(20, 100, 100)
     axes.semilogy(decibels, 10 ** (-decibels / 20), color=STRONG)
@@ -272,7 +272,7 @@ def common_mode(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="CMRR (dB)", ylabel="part of the common voltage that is read", title=title)
 
 
-def noise(axes: Axes, session: Session, parameters: Any) -> None:
+def noise(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The errors' distribution over all frames."""
     from eitskin.scene.effects.noise import deviation_v, make
 
@@ -285,14 +285,16 @@ def noise(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="noise (mV)", ylabel="density (1/mV)", title=f"sigma = {sigma_mv:.3g} mV")
 
 
-def _transfer(axes: Axes, session: Session, effect: Any, parameters: Any, span_v: float) -> None:
+def _transfer(
+    axes: Axes, session: EffectSession, effect: Any, parameters: Any, span_v: float
+) -> None:
     v = np.linspace(-span_v, span_v, 3000)
     axes.plot(v * 1e3, v * 1e3, color=LIGHT, linestyle="--")
     axes.plot(v * 1e3, effect.make(parameters, session).apply(v, 0.0, 0) * 1e3, color=STRONG)
     axes.set(xlabel="in (mV)", ylabel="out (mV)")
 
 
-def saturation(axes: Axes, session: Session, parameters: Any) -> None:
+def saturation(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The limiter's characteristic."""
     from eitskin.scene.effects import saturation as effect
 
@@ -300,7 +302,7 @@ def saturation(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set_title("clipped")
 
 
-def adc(axes: Axes, session: Session, parameters: Any) -> None:
+def adc(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """The converter's characteristic."""
     from eitskin.scene.effects import adc as effect
 
@@ -308,7 +310,7 @@ def adc(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set_title(f"{parameters.bits} bits")
 
 
-def jitter(axes: Axes, session: Session, parameters: Any) -> None:
+def jitter(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """A sine sampled a little off, with the jitter enlarged to be seen."""
     s = 0.25
     t = np.linspace(0, 1, 300)
@@ -321,7 +323,7 @@ def jitter(axes: Axes, session: Session, parameters: Any) -> None:
     axes.set(xlabel="time (periods)", ylabel="signal", title=f"samples off by {s:g} rad (enlarged)")
 
 
-SKETCHES: dict[str, Callable[[Any, Session, Any], None]] = {
+SKETCHES: dict[str, Callable[[Any, EffectSession, Any], None]] = {
     sketch.__name__: sketch
     for sketch in (
         misplacement, background, temperature, gel_drying, contact_impedance, detached, bridged,

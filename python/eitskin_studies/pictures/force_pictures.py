@@ -17,7 +17,7 @@ from eitskin_studies.experiments.force.scenes import RADIUS_SHARES
 
 if TYPE_CHECKING:
     from eitskin_studies.experiments.force.anywhere import Anywhere
-    from eitskin_studies.experiments.force.curves import Curves
+    from eitskin_studies.experiments.force.curves import ForceCurves
     from eitskin_studies.experiments.force.detection import Detection
 
 FloatArray = npt.NDArray[np.float64]
@@ -27,7 +27,7 @@ NAMES = ("centre", *(f"{share:g} R" for share in RADIUS_SHARES[1:]))
 SHOWN = ((PEAK, "peak (S/m)"), (INTEGRAL, "integral (S/m mm²)"), (TOUCH, "strength (S/m mm²)"))
 
 
-def draw_curves(path: Path, curves: dict[str, Curves]) -> None:
+def draw_curves(path: Path, curves: dict[str, ForceCurves]) -> None:
     """Readings over load at the four radii, three readouts side by side, with 90 % bands over the
     laws.
 

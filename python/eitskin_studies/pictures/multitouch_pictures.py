@@ -18,7 +18,7 @@ from eitskin_studies.experiments.multitouch.ambiguity_tables import found_some, 
 from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, MAX, MIN, NARROW, RING, WIDE
 from eitskin_studies.experiments.multitouch.counts import Score, Share, auc, roc, share_of
 from eitskin_studies.experiments.multitouch.gallery import Example
-from eitskin_studies.experiments.multitouch.measure import Ambiguities, Counted
+from eitskin_studies.experiments.multitouch.measure import Ambiguities, CountedScenes
 from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
 from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, SNRS_DB
 from eitskin_studies.pictures.comparison_pictures import truth_marks
@@ -36,7 +36,7 @@ NEAREST_EDGES = (0.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.5, 20.0)
 SAID, NOT_SAID = "#c62828", "#00796b"
 
 
-def draw_counts(path: str | Path, counted: Counted) -> None:
+def draw_counts(path: str | Path, counted: CountedScenes) -> None:
     """Exact counts over the number of touches: a row a variant of the core beside the classical
     methods, a column a geometry.
 

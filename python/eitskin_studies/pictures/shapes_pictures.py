@@ -28,7 +28,7 @@ MISSED = "#c62828"
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class ShapePanel:
     """What is drawn of a skin.
 
     Attributes:
@@ -49,7 +49,7 @@ class Shape:
     hit: Sequence[bool]
 
 
-def draw_shapes(path: str | Path, shapes: Sequence[Shape]) -> None:
+def draw_shapes(path: str | Path, shapes: Sequence[ShapePanel]) -> None:
     """A column a skin: sensitivity with electrodes | a reconstruction with its truth | every test
     touch, found or missed; PNG.
 

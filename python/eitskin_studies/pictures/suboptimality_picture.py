@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from eitskin.view.pictures import load_matplotlib, save_png
-from eitskin_studies.benchmarks.suboptimality import MIN, Curves
+from eitskin_studies.benchmarks.suboptimality import MIN, GapCurves
 
 COLOURS = {
     "fista": "#777777",
@@ -21,7 +21,7 @@ NAMES = {
 }
 
 
-def draw(path: Path, curves: Curves) -> None:
+def draw(path: Path, curves: GapCurves) -> None:
     """Write the picture.
 
     Raises:

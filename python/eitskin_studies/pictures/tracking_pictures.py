@@ -13,15 +13,15 @@ from eitskin.core.results import Touch
 from eitskin.view.pictures import STYLE, load_matplotlib, save_png
 
 if TYPE_CHECKING:
-    from eitskin_studies.experiments.tracking.counted import Count
-    from eitskin_studies.experiments.tracking.streams import Stream
+    from eitskin_studies.experiments.tracking.counted import TrackCount
+    from eitskin_studies.experiments.tracking.streams import TouchStream
 
 COLOURS = ("#00796b", "#c2185b", "#3949ab", "#ef6c00", "#6d4c41", "#00838f", "#7b1fa2", "#558b2f")
 TRUE = "#c8c8c8"
 
 
 def draw_stream_told(
-    path: Path, stream: Stream, told: Mapping[str, Sequence[Sequence[Touch]]], note: str
+    path: Path, stream: TouchStream, told: Mapping[str, Sequence[Sequence[Touch]]], note: str
 ) -> None:
     """x and y of every touch by frame, a colour an id, over the true places; a row of panels for
     each way in ``told``.
@@ -72,7 +72,7 @@ def draw_stream_told(
 
 def draw_worth(
     path: Path,
-    counts: Mapping[tuple[int, int, str], Count],
+    counts: Mapping[tuple[int, int, str], TrackCount],
     snrs_db: Sequence[int],
     speeds: Sequence[int],
 ) -> None:
@@ -84,7 +84,7 @@ def draw_worth(
     matplotlib = load_matplotlib()
     from matplotlib.figure import Figure
 
-    panels: tuple[tuple[str, Callable[[Count], float]], ...] = (
+    panels: tuple[tuple[str, Callable[[TrackCount], float]], ...] = (
         ("exact counts, % of frames", lambda count: 100 * count.exact / count.frames),
         ("id switches a finger", lambda count: count.switches / count.fingers),
         (

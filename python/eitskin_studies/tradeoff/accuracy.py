@@ -10,11 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.results import Reconstruction
-from eitskin.scene.random_touches import Scene
+from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import Matching, match
 from eitskin.tuning.configuration import Configuration
-from eitskin_studies.harness.sessions import Measured, Session, apparent_change_s_per_m_mm2
+from eitskin_studies.harness.sessions import (
+    FrameSession,
+    MeasuredFrames,
+    apparent_change_s_per_m_mm2,
+)
 from eitskin_studies.harness.summary import Summary, summarise
 from eitskin_studies.tradeoff.engines import Built
 
@@ -23,7 +27,7 @@ DIGITS = 6
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedPoint:
     """What was chosen on training scenes: ``threshold``, t of the mask x > t max(x), and
     ``force_scale``, what the strengths of found touches are multiplied by: the median of true over
     found."""
@@ -33,7 +37,7 @@ class Trained:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolvedSet:
     """Every scene of a session as a configuration sees it at its last frame."""
 
     results: tuple[Reconstruction, ...]
@@ -45,7 +49,9 @@ class Solved:
         return np.array([one.image for one in self.results], dtype=np.float64)
 
 
-def solve_session(one: Configuration, built: Built, session: Session, snr_db: float) -> Solved:
+def solve_session(
+    one: Configuration, built: Built, session: FrameSession, snr_db: float
+) -> SolvedSet:
     """Tare on the session's quiet frames, then reconstruct each scene: cold, or warm where held for
     some frames."""
     measured = session.measured(snr_db, one.samples, one.scan, one.held)
@@ -53,8 +59,8 @@ def solve_session(one: Configuration, built: Built, session: Session, snr_db: fl
 
 
 def solve_frames(
-    one: Configuration, built: Built, measured: Measured, scenes: tuple[Scene, ...]
-) -> Solved:
+    one: Configuration, built: Built, measured: MeasuredFrames, scenes: tuple[TouchScene, ...]
+) -> SolvedSet:
     """The same of measured frames."""
     solver = built.reconstructor(one)
     solver.tare(measured.quiet_v)
@@ -67,19 +73,21 @@ def solve_frames(
         result = solver.reconstruct(frames_v[-1])
         results.append(result)
         matchings.append(match(scene.centres_mm(), [(t.x_mm, t.y_mm) for t in result.touches]))
-    return Solved(tuple(results), tuple(matchings))
+    return SolvedSet(tuple(results), tuple(matchings))
 
 
-def train(built: Built, session: Session, solved: Solved) -> Trained:
+def train(built: Built, session: FrameSession, solved: SolvedSet) -> TrainedPoint:
     """t with the best mean MIoU, and the scale of force."""
     curves = built.image_scorer.curves(solved.images, session.truths(built.image_scorer.raster))
     found, true = _forces(session, solved)
     usable = found > 0
     scale = float(np.median(true[usable] / found[usable])) if usable.any() else 1.0
-    return Trained(metrics.best_threshold(curves), round(scale, DIGITS))
+    return TrainedPoint(metrics.best_threshold(curves), round(scale, DIGITS))
 
 
-def score(built: Built, session: Session, solved: Solved, trained: Trained) -> dict[str, Any]:
+def score(
+    built: Built, session: FrameSession, solved: SolvedSet, trained: TrainedPoint
+) -> dict[str, Any]:
     """Everything about the accuracy in plain values fit for JSON; see ``docs/results/tradeoff.md``
     for what each is."""
     truths = session.truths(built.image_scorer.raster)
@@ -135,7 +143,7 @@ def _discs(built: Built, result: Reconstruction) -> npt.NDArray[np.bool_]:
     )
 
 
-def _forces(session: Session, solved: Solved) -> tuple[FloatArray, FloatArray]:
+def _forces(session: FrameSession, solved: SolvedSet) -> tuple[FloatArray, FloatArray]:
     """Strengths of all found touches and of their true ones, S/m mm2, (h,) each."""
     found, true = [], []
     for scene, result, matching in zip(

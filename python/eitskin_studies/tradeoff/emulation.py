@@ -22,8 +22,8 @@ from eitskin_studies.harness.emulated import (
     need_tools,
     run_frames,
 )
-from eitskin_studies.harness.sessions import Measured
-from eitskin_studies.tradeoff.accuracy import Solved
+from eitskin_studies.harness.sessions import MeasuredFrames
+from eitskin_studies.tradeoff.accuracy import SolvedSet
 from eitskin_studies.tradeoff.engines import Built
 
 
@@ -45,7 +45,7 @@ def make_emulator(folder: Path) -> Emulator | str:
         return str(error).splitlines()[0]
 
 
-def chosen_scenes(solved: Solved, spread: int, most: int) -> tuple[list[int], list[int]]:
+def chosen_scenes(solved: SolvedSet, spread: int, most: int) -> tuple[list[int], list[int]]:
     """``spread`` scenes evenly over all, for the mean; and the ``most`` with the most MACs, for the
     worst."""
     count = len(solved.results)
@@ -58,8 +58,8 @@ def count_instructions(
     emulator: Emulator,
     one: Configuration,
     built: Built,
-    measured: Measured,
-    solved: Solved,
+    measured: MeasuredFrames,
+    solved: SolvedSet,
     spread: int,
     most: int,
 ) -> dict[str, Any]:

@@ -13,14 +13,14 @@ import numpy.typing as npt
 from eitskin.core.engine import CoreEngine
 from eitskin.tuning.configuration import Configuration
 from eitskin_studies.harness.bare_core import bare_calls
-from eitskin_studies.harness.sessions import Measured, Progress
+from eitskin_studies.harness.sessions import MeasuredFrames, Progress
 from eitskin_studies.tradeoff.engines import Built
 
 SCENES = 8
 
 
 def host_times(
-    entries: Sequence[tuple[Configuration, Built, Measured]], rounds: int, progress: Progress
+    entries: Sequence[tuple[Configuration, Built, MeasuredFrames]], rounds: int, progress: Progress
 ) -> tuple[list[dict[str, Any]], str]:
     """p50 and p99 of each configuration over ``rounds`` rounds of eight scenes, ``most``: the
     median of the costliest scene (which, unlike p99, does not tell of whatever else the machine

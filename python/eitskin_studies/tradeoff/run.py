@@ -19,15 +19,15 @@ from eitskin.skin.skin import Skin, paper_skin
 from eitskin.tuning.configuration import ELEMENTS, Configuration
 from eitskin.tuning.front import Front, Point
 from eitskin_studies.harness.machine import machine
-from eitskin_studies.harness.sessions import Progress, Session
+from eitskin_studies.harness.sessions import FrameSession, Progress
 from eitskin_studies.harness.store import Store
-from eitskin_studies.tradeoff.accuracy import Solved, Trained, score, solve_session, train
+from eitskin_studies.tradeoff.accuracy import SolvedSet, TrainedPoint, score, solve_session, train
 from eitskin_studies.tradeoff.costs import static_costs
 from eitskin_studies.tradeoff.emulation import Emulator, count_instructions, make_emulator
 from eitskin_studies.tradeoff.engines import Built, ModelShop
 from eitskin_studies.tradeoff.fronts import estimated_instructions, recorded_front
 from eitskin_studies.tradeoff.host_times import host_times
-from eitskin_studies.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, Workshop
+from eitskin_studies.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, SceneFactory
 
 RESULTS = "results.jsonl"
 
@@ -89,7 +89,7 @@ class _Desk:
 
     settings: RunSettings
     store: Store
-    workshop: Workshop
+    workshop: SceneFactory
     shop: ModelShop
     world: dict[str, Any]
     progress: Progress
@@ -103,7 +103,7 @@ class _Desk:
             self._built[key] = self.shop.build(one)
         return self._built[key]
 
-    def session(self, name: str) -> Session:
+    def session(self, name: str) -> FrameSession:
         counts = {TRAIN: self.settings.train_scenes, HEADLINE: self.settings.scenes}
         return self.workshop.session(
             name, counts.get(name, self.settings.set_scenes), self.progress
@@ -138,7 +138,7 @@ def run(
     workspace = _Desk(
         settings,
         Store(folder / RESULTS),
-        Workshop(skin, protocol, settings.seed, settings.simulated_elements, folder / "frames"),
+        SceneFactory(skin, protocol, settings.seed, settings.simulated_elements, folder / "frames"),
         shop,
         _world(settings, skin, protocol),
         progress,
@@ -196,7 +196,7 @@ def _world(settings: RunSettings, skin: Skin, protocol: Protocol) -> dict[str, A
     }
 
 
-def _train(workspace: _Desk, one: Configuration) -> Trained:
+def _train(workspace: _Desk, one: Configuration) -> TrainedPoint:
     facts = workspace.facts(one, "train")
     kept = workspace.store.get(facts)
     if kept is None:
@@ -207,11 +207,11 @@ def _train(workspace: _Desk, one: Configuration) -> Trained:
             solve_session(one, workspace.built(one), session, HEADLINE_DB),
         )
         kept = workspace.store.put(facts, vars(done))
-    return Trained(**kept)
+    return TrainedPoint(**kept)
 
 
 def _score(
-    workspace: _Desk, one: Configuration, name: str, snr_db: float, trained: Trained
+    workspace: _Desk, one: Configuration, name: str, snr_db: float, trained: TrainedPoint
 ) -> dict[str, Any]:
     session = workspace.session(name)
     facts = workspace.facts(one, "score", set=name, scenes=session.scenes, snr_db=snr_db)
@@ -267,7 +267,7 @@ def _counting(workspace: _Desk, one: Configuration) -> dict[str, Any]:
 
 
 def _count(
-    workspace: _Desk, emulator: Emulator, one: Configuration, solved: Solved
+    workspace: _Desk, emulator: Emulator, one: Configuration, solved: SolvedSet
 ) -> dict[str, Any]:
     measured = workspace.session(HEADLINE).measured(HEADLINE_DB, one.samples, one.scan, one.held)
     how = workspace.settings

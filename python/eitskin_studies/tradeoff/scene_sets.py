@@ -16,10 +16,10 @@ import numpy as np
 
 from eitskin.errors import GeometryError, UsageError
 from eitskin.scene.random_touches import (
-    Scene,
-    Touch,
     TouchRules,
+    TouchScene,
     TouchSet,
+    TrueTouch,
     random_touches,
     rim_distance_mm,
     spaced_touches,
@@ -28,7 +28,7 @@ from eitskin.scene.streams import stream
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin_studies.harness.sessions import Drift, Progress, SceneSolver, Session
+from eitskin_studies.harness.sessions import Drift, FrameSession, Progress, SceneSolver
 
 TRAIN, HEADLINE = "train", "random"
 HEADLINE_DB = 60.0
@@ -78,9 +78,9 @@ def ring_touches(
                 " this skin"
             )
         scenes.append(
-            Scene(
+            TouchScene(
                 f"{role}-s{seed}-{k}",
-                tuple(Touch(float(x), float(y), radius_mm, 5.0) for x, y in places),
+                tuple(TrueTouch(float(x), float(y), radius_mm, 5.0) for x, y in places),
             )
         )
     return TouchSet(role, seed, tuple(scenes))
@@ -120,7 +120,7 @@ SETS: dict[str, SceneSet] = {
 }
 
 
-class Workshop:
+class SceneFactory:
     """Solves the scenes of sets, once: kept in ``folder`` where one is given, so that a run that
     goes on need not solve again."""
 
@@ -129,9 +129,9 @@ class Workshop:
     ) -> None:
         self.skin, self.seed = skin, seed
         self._solver = SceneSolver(skin, protocol, elements, folder)
-        self._sessions: dict[tuple[str, int], Session] = {}
+        self._sessions: dict[tuple[str, int], FrameSession] = {}
 
-    def session(self, name: str, count: int, progress: Progress) -> Session:
+    def session(self, name: str, count: int, progress: Progress) -> FrameSession:
         """``count`` scenes of the set ``name``.
 
         Raises:

@@ -19,7 +19,7 @@ import pytest
 
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
-from eitskin.scene.random_touches import Scene, random_touches
+from eitskin.scene.random_touches import TouchScene, random_touches
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scoring import metrics
@@ -45,7 +45,7 @@ class Case:
     """A scene and its frames: quiet (q, m), whole (m,) and with electrode ``electrode`` off (m,),
     volts."""
 
-    scene: Scene
+    scene: TouchScene
     electrode: int
     quiet_v: FloatArray
     whole_v: FloatArray

@@ -9,7 +9,7 @@ from bytes_damage import ODD_BYTES, any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
 
 from eitskin.skin.drawing import read_drawing
-from eitskin.skin.drawing_shapes import Reading
+from eitskin.skin.drawing_shapes import DrawingReading
 from eitskin.skin.outline import polygon
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -51,7 +51,7 @@ def test_any_dxf_is_read_or_refused_in_a_line(tmp_path: Path, content: bytes) ->
 
 
 def _read(path: Path, scale_mm: float | None) -> None:
-    drawing = read_or_refuse(lambda: read_drawing(path, Reading(scale_mm)))
+    drawing = read_or_refuse(lambda: read_drawing(path, DrawingReading(scale_mm)))
     if drawing is not None:
         for element in (None, "skin", "a"):
             outline = read_or_refuse(lambda element=element: drawing.outline(element))

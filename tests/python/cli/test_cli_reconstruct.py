@@ -14,8 +14,8 @@ from eitskin.cli.main import main
 from eitskin.core.results import SOLVERS
 from eitskin.frames.frames import load_frames, save_frames
 from eitskin.model.eitm import load_model
-from eitskin.scene.random_touches import Scene, TouchRules, TouchSet, random_touches
 from eitskin.scene.random_touches import Touch as Put
+from eitskin.scene.random_touches import TouchRules, TouchScene, TouchSet, random_touches
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import load_skin, paper_skin
@@ -324,7 +324,7 @@ def test_the_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_tracked_frames_keep_ids_and_confirm_births(done: Done, tmp_path: Path) -> None:
     """A finger that moves 2 mm a frame keeps one id; each frame by itself counts on."""
-    moving = tuple(Scene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
+    moving = tuple(TouchScene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
     made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()
     save_frames(tmp_path / "moving.npz", made)
     alone, tracked = (

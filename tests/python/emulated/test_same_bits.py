@@ -22,7 +22,7 @@ from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.model.storage import STORAGES, store
-from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -158,9 +158,9 @@ def moving_touches() -> tuple[np.ndarray, np.ndarray]:
     move by 2 mm a frame (100 mm/s at 48 frames a second) and are joined by a third at frame 6."""
     fingers = [(-50.0, 20.0, 9.0, 6.0), (30.0, -35.0, 11.0, 8.0), (45.0, 45.0, 8.0, 4.0)]
     scenes = tuple(
-        Scene(
+        TouchScene(
             str(k),
-            tuple(Touch(x + 2.0 * k, y, r, c) for x, y, r, c in fingers[: 2 if k < 6 else 3]),
+            tuple(TrueTouch(x + 2.0 * k, y, r, c) for x, y, r, c in fingers[: 2 if k < 6 else 3]),
         )
         for k in range(12)
     )

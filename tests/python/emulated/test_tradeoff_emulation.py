@@ -14,7 +14,7 @@ from eitskin.tuning.configuration import Configuration
 from eitskin_studies.tradeoff.accuracy import solve_session
 from eitskin_studies.tradeoff.emulation import Emulator, chosen_scenes, count_instructions
 from eitskin_studies.tradeoff.engines import ModelShop
-from eitskin_studies.tradeoff.scene_sets import Workshop
+from eitskin_studies.tradeoff.scene_sets import SceneFactory
 
 
 def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
@@ -23,7 +23,7 @@ def plain(items: Sequence[Any], what: str) -> Iterable[Any]:
 
 def test_counts_are_exact_and_follow_every_setting(cortex_m7: Path) -> None:
     emulator = Emulator(cortex_m7 / "tests" / "emulated" / "frames_m7.elf")
-    session = Workshop(paper_skin(), adjacent(16), 5, 1200).session("random", 6, plain)
+    session = SceneFactory(paper_skin(), adjacent(16), 5, 1200).session("random", 6, plain)
     shop = ModelShop(paper_skin(), adjacent(16))
     base = Configuration("base", rank=32, pixels=16, iterations=20)
     counted = {}

@@ -10,7 +10,7 @@ from eitskin.emulator.analog.ad9833 import FULL_TURN, Ad9833
 from eitskin.emulator.analog.adg1206 import OFF_TICKS, Multiplexers
 from eitskin.emulator.analog.converter import STEP_V, codes
 from eitskin.emulator.analog.front_end import TAU_TICKS, FrontEnd
-from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin.emulator.peripherals.spi import SpiFrame
 from eitskin.skin.protocol import adjacent, opposite, table
@@ -125,7 +125,7 @@ def test_rows_their_reciprocals_and_turned_pairs() -> None:
     assert skin.amplitude_v(0, (a, b, c, None)) == 0
     assert skin.amplitude_v(0, (0, 5, 3, 9)) == 0
     assert dict(skin.unknown_rows) == {(0, 5, 3, 9): 1}
-    one_way = Skin(table(16, [[0, 1, 4, 5]]), np.array([[0.5]]), np.array([[0.5]]), 20.0)
+    one_way = AnalogSkin(table(16, [[0, 1, 4, 5]]), np.array([[0.5]]), np.array([[0.5]]), 20.0)
     assert one_way.amplitude_v(0, (4, 5, 0, 1)) == 0.5
     assert one_way.amplitude_v(0, (5, 4, 0, 1)) == -0.5
     assert len(fold.first) == 104
@@ -135,7 +135,7 @@ def test_rows_their_reciprocals_and_turned_pairs() -> None:
 @pytest.mark.parametrize("protocol", [adjacent(16), opposite(16)], ids=["adjacent", "opposite"])
 def test_every_row_of_a_protocol_is_found(protocol: object) -> None:
     rows = 1e-3 * (1 + np.arange(protocol.n_rows))  # type: ignore[attr-defined]
-    skin = Skin(protocol, rows[None], rows[None], 20.0)  # type: ignore[arg-type]
+    skin = AnalogSkin(protocol, rows[None], rows[None], 20.0)  # type: ignore[arg-type]
     read = [skin.amplitude_v(0, tuple(int(k) for k in row)) for row in protocol.drive_measure]  # type: ignore[attr-defined, arg-type]
     assert np.allclose(read, rows)
 
@@ -144,7 +144,7 @@ def test_frames_are_chosen_when_a_scan_begins() -> None:
     protocol = adjacent(16)
     quiet = np.arange(3)[:, None] * 1.0 + np.zeros((3, protocol.n_rows))
     frames = 100 + np.arange(5)[:, None] + np.zeros((5, protocol.n_rows))
-    skin = Skin(protocol, quiet, frames, 10.0)
+    skin = AnalogSkin(protocol, quiet, frames, 10.0)
     rows = [tuple(int(k) for k in row) for row in protocol.drive_measure]
 
     def scan(begin: float, end: float) -> set[float]:

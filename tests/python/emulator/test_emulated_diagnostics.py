@@ -13,7 +13,7 @@ from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.wire.packets import CLEAR_FRAMES, Fault, FaultCode
-from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.scene_skin import skin_of
 from eitskin.model.prebuilt import load_prebuilt
@@ -26,7 +26,7 @@ def scene(effects: dict[str, Any]) -> Scene:
     return replace(find_scene("two_touch"), effects=effects, frames=16, rate_hz=20.0)
 
 
-def device_before(image: bytes, skin: Skin) -> Device:
+def device_before(image: bytes, skin: AnalogSkin) -> Device:
     return connect(EmulatedBoard(image, skin, (bank_bytes(load_prebuilt()[1], 1),)))
 
 
@@ -83,7 +83,7 @@ def test_bridged_electrodes_are_named_with_each_other(image: bytes) -> None:
         skin_of(scene({}), protocol),
         skin_of(scene({"bridged": {"electrodes": [6, 7]}}), protocol),
     )
-    device = device_before(image, Skin(protocol, whole.quiet_v, bridged.frames_v, 20.0))
+    device = device_before(image, AnalogSkin(protocol, whole.quiet_v, bridged.frames_v, 20.0))
     device.tare(4)
     device.start_scene()
     frames, faults = taken(device, 4)

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.clocktime import TICKS_PER_US
 from eitskin.emulator.memory import RAM
@@ -99,11 +99,11 @@ def compile_program(source: str, irqs: tuple[int, ...] = ()) -> bytes:
         return (folder / "a.bin").read_bytes()
 
 
-def flat_skin() -> Skin:
+def flat_skin() -> AnalogSkin:
     """A skin on which every row has another voltage: row k (k + 1) mV."""
     protocol = adjacent(16)
     rows = 1e-3 * (1 + np.arange(protocol.n_rows))
-    return Skin(protocol, rows[None], 2 * rows[None], 10.0)
+    return AnalogSkin(protocol, rows[None], 2 * rows[None], 10.0)
 
 
 def run_program(source: str, us: float, irqs: tuple[int, ...] = ()) -> EmulatedBoard:

@@ -25,7 +25,7 @@ from eitskin_studies.harness.emulated_steps import (
     Play,
     Solve,
     Step,
-    Tare,
+    TareStep,
 )
 
 NUMBERS = ("lambda_", "lambda_max", "lambda_noise", "gap", "gap_rel", "residual", "data_norm")
@@ -64,7 +64,7 @@ class Outcome:
 class Host(CoreEngine):
     """A context that keeps on after an error and gives its status."""
 
-    def status_of(self, step: Choose | Tare) -> int:
+    def status_of(self, step: Choose | TareStep) -> int:
         """Of options or quiet frames, as the C core itself sees them."""
         if isinstance(step, Choose):
             try:
@@ -124,8 +124,8 @@ def on_host(
             statuses.append(0)
             continue
         assert host is not None, "the first step must be a model"
-        if isinstance(step, Tare):
-            statuses.append(host.status_of(Tare(as_float32(step.quiet_v))))
+        if isinstance(step, TareStep):
+            statuses.append(host.status_of(TareStep(as_float32(step.quiet_v))))
         elif isinstance(step, Choose):
             statuses.append(host.status_of(step))
         elif isinstance(step, Mask):
@@ -222,7 +222,7 @@ class SameEverywhere:
         chosen = options or default_options(decode_model(blob, "model"))
         masks = [] if masked is None else [Mask(masked)]
         statuses, outcomes = self.steps(
-            [Load(blob), Choose(chosen), *masks, Tare(quiet_v), Play(frames_v)]
+            [Load(blob), Choose(chosen), *masks, TareStep(quiet_v), Play(frames_v)]
         )
         assert statuses == [0, 0, 0], statuses
         return outcomes

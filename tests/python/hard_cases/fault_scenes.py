@@ -12,7 +12,7 @@ import numpy as np
 
 from eitskin.scene.compiler import compile_scene
 from eitskin.scene.description import scene_from_table
-from eitskin.scene.random_touches import Scene, random_touches
+from eitskin.scene.random_touches import TouchScene, random_touches
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scoring import metrics
@@ -29,7 +29,7 @@ CONTACTS = {"contact_impedance": {"spread": 0.2}}
 
 
 @cache
-def scenes() -> tuple[Scene, ...]:
+def scenes() -> tuple[TouchScene, ...]:
     """What is touched."""
     return random_touches(paper_skin().outline, SEED, COUNT, "frames").scenes
 

@@ -10,7 +10,7 @@ import numpy as np
 from everywhere import Outcome
 
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Mask, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Mask, Play, Step, TareStep
 from small_models import small, small_blob, small_model
 
 COUNT = 12
@@ -53,7 +53,7 @@ def steps_of(kind: str, level: float) -> list[Step]:
     options = replace(
         default_options(small_model()), diagnostics=0
     )  # linear answers are no sheet's, and rows would be left out
-    return [Load(small_blob()), Choose(options), Mask(masked), Tare(quiet), Play(frames)]
+    return [Load(small_blob()), Choose(options), Mask(masked), TareStep(quiet), Play(frames)]
 
 
 def all_steps() -> list[Step]:

@@ -11,10 +11,10 @@ from everywhere import on_host
 from losses import LEVELS, UNITS, all_steps, errors_of
 from touch_scenes import frames_of, groups
 
-from eitskin.scene.random_touches import Scene
+from eitskin.scene.random_touches import TouchScene
 from eitskin.solve.options import default_options
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, draw_panels, load_matplotlib, save_png
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
 from eitskin_studies.pictures.comparison_pictures import truth_marks
 from small_models import prebuilt
 
@@ -40,9 +40,9 @@ def panel(group: str, which: int, sign: str, title: str) -> Panel:
     options = replace(default_options(model), sign=sign)
     frames = frames_of(group)[which : which + 1]
     _, (one,) = on_host(
-        [Load(blob), Choose(options), Tare(touch_scenes.simulated().quiet_v), Play(frames)]
+        [Load(blob), Choose(options), TareStep(touch_scenes.simulated().quiet_v), Play(frames)]
     )
-    truth = truth_marks(Scene(title, groups()[group][which]), model.skin.conductivity_s_per_m)
+    truth = truth_marks(TouchScene(title, groups()[group][which]), model.skin.conductivity_s_per_m)
     found = tuple(Mark(t.x_mm, t.y_mm, t.radius_mm) for t in one.touches)
     count = len(found)
     return Panel(

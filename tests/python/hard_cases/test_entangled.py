@@ -13,7 +13,7 @@ from touch_scenes import entangled, frames_of
 
 from eitskin.core.results import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE, Options
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
 from margins import Margins
 from small_models import prebuilt
 
@@ -47,7 +47,7 @@ def test_touches_in_each_others_field(same_everywhere: SameEverywhere, margins: 
     """Same bits everywhere, finite, on the skin, within max_touches; two that overlap lie within
     the outline of both."""
     model, blob = prebuilt()
-    steps: list[Step] = [Load(blob), Tare(touch_scenes.simulated().quiet_v)]
+    steps: list[Step] = [Load(blob), TareStep(touch_scenes.simulated().quiet_v)]
     frames, chosen = frames_of("entangled"), searches()
     for options in chosen:
         steps += [Choose(options), Forget(), Play(frames)]

@@ -25,11 +25,11 @@ from touch_scenes import (
     quiet_trials,
 )
 
-from eitskin.core.results import Touch as Found
-from eitskin.scene.random_touches import Touch
+from eitskin.core.results import TrueTouch as Found
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import match
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, TareStep
 from margins import Margins
 from small_models import prebuilt
 
@@ -41,7 +41,7 @@ def reconstruct(
     asked for."""
     model, blob = prebuilt()
     options = replace(default_options(model), sign=sign)
-    steps = [Load(blob), Choose(options), Tare(touch_scenes.simulated().quiet_v), Play(frames)]
+    steps = [Load(blob), Choose(options), TareStep(touch_scenes.simulated().quiet_v), Play(frames)]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     assert all(
@@ -59,13 +59,13 @@ def on_skin(touch: Found) -> bool:
     return bool((np.abs(grid.index - cell) <= 1).all(axis=1).any())
 
 
-def off_mm(found: Found, truth: Touch) -> float:
+def off_mm(found: Found, truth: TrueTouch) -> float:
     """From one centre to the other."""
     return float(np.hypot(found.x_mm - truth.x_mm, found.y_mm - truth.y_mm))
 
 
 def check_alone(
-    margins: Margins, case: str, what: str, one: Outcome, truth: Touch, share: float = 0.5
+    margins: Margins, case: str, what: str, one: Outcome, truth: TrueTouch, share: float = 0.5
 ) -> None:
     """One touch, its centre within ``share`` of the true radius."""
     margins.everywhere(
@@ -236,7 +236,7 @@ def says_that_there_are_too_many(one: Outcome) -> bool:
     return bool({"crowded", "stale reference"} & set(one.info.diagnostics_by_name))
 
 
-def is_one_group(one: Outcome, touches: tuple[Touch, ...]) -> bool:
+def is_one_group(one: Outcome, touches: tuple[TrueTouch, ...]) -> bool:
     """Whether a single touch was found in place of a group that it covers."""
     return len(one.touches) == 1 and all(
         np.hypot(t.x_mm - one.touches[0].x_mm, t.y_mm - one.touches[0].y_mm)

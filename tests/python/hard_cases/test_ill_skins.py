@@ -12,7 +12,7 @@ from hard_skins import SKINS, HardSkin, hard_skin
 
 from eitskin.core.results import SOLVERS, Options
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from margins import Margins
 
 CASE = "problem/ill-conditioned-skins"
@@ -20,13 +20,15 @@ FRAMES = 2
 
 
 def steps_for(h: HardSkin, options: Options) -> list[Step]:
-    return [Load(h.blob), Choose(options), Tare(h.quiet_v(8)), Play(h.frames_v(FRAMES))]
+    return [Load(h.blob), Choose(options), TareStep(h.quiet_v(8)), Play(h.frames_v(FRAMES))]
 
 
 def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
     """y of each frame, (r,), in float64."""
     host = Host(h.blob, width)
-    assert [host.status_of(step) for step in (Choose(options), Tare(as_float32(h.quiet_v(8))))] == [
+    assert [
+        host.status_of(step) for step in (Choose(options), TareStep(as_float32(h.quiet_v(8))))
+    ] == [
         0,
         0,
     ]

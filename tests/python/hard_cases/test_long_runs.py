@@ -14,7 +14,7 @@ from random_problems import gaussian
 
 from eitskin.core.results import SIGNS, SOLVERS
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
 from margins import Margins
 from small_models import small, small_blob, small_model
 
@@ -64,7 +64,7 @@ def test_warm_frames(same_everywhere: SameEverywhere, margins: Margins, solver: 
     quiet, (touched,) = s.quiet(93, 16), s.frames(92, 1)
     options = replace(default_options(model), solver=solver, warm_start=True, iterations=20)
     after = s.quiet(94, 3)
-    head: list[Step] = [Load(blob), Choose(options), Tare(quiet)]
+    head: list[Step] = [Load(blob), Choose(options), TareStep(quiet)]
     _, few = same_everywhere.steps([*head, Play(np.vstack([np.tile(touched, (FEW, 1)), after]))])
     _, many = on_host([*head, Play(np.vstack([np.tile(touched, (HELD, 1)), after]))])
     assert all(

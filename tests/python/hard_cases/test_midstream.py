@@ -10,7 +10,7 @@ from everywhere import Outcome, SameEverywhere, as_printed
 
 from eitskin.core.results import SIGNS, SOLVERS, Options
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
 from margins import Margins
 from small_models import small, small_blob, small_model
 
@@ -49,20 +49,24 @@ def test_model_swapped(same_everywhere: SameEverywhere, margins: Margins) -> Non
         small_blob(rank=16),
         small_blob("i16", "log-ratio"),
     ]
-    steps: list[Step] = [Load(small_blob()), Tare(quiet), Play(frames)]
+    steps: list[Step] = [Load(small_blob()), TareStep(quiet), Play(frames)]
     for blob in swaps:
-        steps += [Load(blob), Play(frames[:1]), Tare(quiet), Play(frames)]
+        steps += [Load(blob), Play(frames[:1]), TareStep(quiet), Play(frames)]
     steps += [
         Load(small_blob(outline="l")),
         Play(other.frames(102, 1)),
-        Tare(other.quiet(103, 8)),
+        TareStep(other.quiet(103, 8)),
         Play(other.frames(102, 2)),
     ]
     _, streamed = same_everywhere.steps(steps)
     fresh: list[Step] = []
     for blob in swaps:
-        fresh += [Load(blob), Tare(quiet), Play(frames)]
-    fresh += [Load(small_blob(outline="l")), Tare(other.quiet(103, 8)), Play(other.frames(102, 2))]
+        fresh += [Load(blob), TareStep(quiet), Play(frames)]
+    fresh += [
+        Load(small_blob(outline="l")),
+        TareStep(other.quiet(103, 8)),
+        Play(other.frames(102, 2)),
+    ]
     _, alone = same_everywhere.steps(fresh)
     after = streamed[2:]
     before_tare, taken = after[::3], [one for k, one in enumerate(after) if k % 3]
@@ -110,17 +114,17 @@ def test_options_changed(same_everywhere: SameEverywhere, margins: Margins) -> N
     once changed, leaves nothing that it forbids."""
     s, blob, case = small(), small_blob(), "time/options-changed"
     quiet, frames = s.quiet(111, 8), s.frames(110, 2)
-    stream: list[Step] = [Load(blob), Tare(quiet)]
+    stream: list[Step] = [Load(blob), TareStep(quiet)]
     alone: list[Step] = []
     for options in changes():
         stream += [Choose(options), Play(frames)]
-        alone += [Load(blob), Tare(quiet), Choose(options), Play(frames)]
+        alone += [Load(blob), TareStep(quiet), Choose(options), Play(frames)]
     _, streamed = same_everywhere.steps(stream)
     _, fresh = same_everywhere.steps(alone)
     margins.everywhere(
         case, "cold frames unlike those of a fresh context", unlike(streamed, fresh), 0, "frames"
     )
-    warm: list[Step] = [Load(blob), Tare(quiet)]
+    warm: list[Step] = [Load(blob), TareStep(quiet)]
     signs = [sign for _ in range(2) for sign in SIGNS]
     for sign in signs:
         for solver in SOLVERS:
@@ -154,20 +158,21 @@ def test_tare_in_midstream(same_everywhere: SameEverywhere, margins: Margins) ->
     broken[5, 7] = np.nan
     head: list[Step] = [Load(blob), Choose(options)]
     statuses, outcomes = same_everywhere.steps(
-        [*head, Tare(quiet), Play(frames), Tare(drifted), Play(1.1 * frames), Tare(held),
-        Play(frames), Tare(broken),
-         Play(frames[:1]), Tare(quiet), Forget(), Play(frames)]
+        [*head, TareStep(quiet), Play(frames), TareStep(drifted), Play(1.1 * frames),
+         TareStep(held),
+        Play(frames), TareStep(broken),
+         Play(frames[:1]), TareStep(quiet), Forget(), Play(frames)]
     )  # fmt: skip
     _, alone = same_everywhere.steps(
         [
             *head,
-            Tare(drifted),
+            TareStep(drifted),
             Play(1.1 * frames),
             *head,
-            Tare(held),
+            TareStep(held),
             Play(frames),
             *head,
-            Tare(quiet),
+            TareStep(quiet),
             Play(frames),
         ]
     )

@@ -12,7 +12,7 @@ from fault_scenes import COUNT, half, miou, noisy, quiet_frames, rms_v, simulate
 
 from eitskin.core.results import Options
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from margins import Margins
 from small_models import prebuilt
 
@@ -31,7 +31,7 @@ def run(
     """Outcomes of frames after a tare on quiet frames, pair by pair; all finite."""
     steps: list[Step] = [Load(prebuilt()[1]), Choose(chosen)]
     for quiet, frames in played:
-        steps += [Tare(quiet), Play(frames)]
+        steps += [TareStep(quiet), Play(frames)]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     assert all(one.finite() for one in outcomes)
@@ -184,7 +184,7 @@ def test_saturation_in_the_reference(same_everywhere: SameEverywhere) -> None:
     """A saturated quiet frame is no reference, whether the touch saturates too or not; the same
     status everywhere."""
     quiet, limit = quiet_frames(0), float(np.abs(quiet_frames(0)).max())
-    steps: list[Step] = [Load(prebuilt()[1]), Choose(options(saturation_v=limit)), Tare(quiet)]
+    steps: list[Step] = [Load(prebuilt()[1]), Choose(options(saturation_v=limit)), TareStep(quiet)]
     assert same_everywhere.steps(steps)[0] == [0, 0, CHANNELS]
 
 

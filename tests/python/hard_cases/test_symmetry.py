@@ -21,7 +21,7 @@ from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import Skin
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
 from margins import Margins
 from small_models import DATA_KINDS, ELEMENTS, PIXELS, small, small_blob, small_model
 
@@ -80,11 +80,11 @@ def test_polarity(same_everywhere: SameEverywhere, margins: Margins, data_kind: 
     steps = [
         Load(blob),
         Choose(options),
-        Tare(quiet),
+        TareStep(quiet),
         Play(frames),
         Load(blob),
         Choose(options),
-        Tare(-quiet),
+        TareStep(-quiet),
         Play(-frames),
     ]
     _, outcomes = same_everywhere.steps(steps)
@@ -101,13 +101,16 @@ def model_of(
 
 
 def steps_for(model: Model, options: Options, quiet: np.ndarray, frames: np.ndarray) -> list[Step]:
-    return [Load(encode_model(model)), Choose(options), Tare(quiet), Play(frames)]
+    return [Load(encode_model(model)), Choose(options), TareStep(quiet), Play(frames)]
 
 
 def data_of(model: Model, options: Options, quiet: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """y (r,) as the solver sees it."""
     host = Host(encode_model(model))
-    assert [host.status_of(step) for step in (Choose(options), Tare(as_float32(quiet)))] == [0, 0]
+    assert [host.status_of(step) for step in (Choose(options), TareStep(as_float32(quiet)))] == [
+        0,
+        0,
+    ]
     host.solve_frame(as_float32(frame))
     return host.reduced_data()[: model.rank].astype(np.float64)
 

@@ -10,7 +10,7 @@ from everywhere import Outcome, SameEverywhere
 
 from eitskin.core.results import Options
 from eitskin.solve.options import default_options, tracking
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from margins import Margins
 from small_models import small, small_blob, small_model
 
@@ -38,7 +38,7 @@ def frames_of(places_mm: list[tuple[float, float] | None], share: float, seed: i
 
 def head(chosen: Options) -> list[Step]:
     """A model, its options and a reference with noise."""
-    return [Load(small_blob()), Choose(chosen), Tare(small().quiet(131, 32, NOISE))]
+    return [Load(small_blob()), Choose(chosen), TareStep(small().quiet(131, 32, NOISE))]
 
 
 def ids(outcomes: list[Outcome]) -> list[tuple[int, ...]]:

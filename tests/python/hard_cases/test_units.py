@@ -18,7 +18,7 @@ from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.solve.options import default_options
-from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, Tare
+from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
 from margins import Margins
 from small_models import DATA_KINDS, small, small_blob, small_model
 
@@ -143,7 +143,7 @@ def test_units_of_frames(same_everywhere: SameEverywhere, margins: Margins, data
         steps += [
             Load(blob),
             Choose(options),
-            Tare(as_float32(quiet * 10.0**e)),
+            TareStep(as_float32(quiet * 10.0**e)),
             Play(as_float32(frames * 10.0**e)),
         ]
     statuses, outcomes = same_everywhere.steps(steps)

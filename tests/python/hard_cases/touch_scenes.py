@@ -9,7 +9,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from eitskin.fem.mesh import mesh_for_elements
-from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import Measurement, Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -24,21 +24,21 @@ PRESS_PLACES = 8
 QUIET_TRIALS = 200
 
 
-def ring(count: int, ring_mm: float, radius_mm: float, turn: float = 0.0) -> tuple[Touch, ...]:
+def ring(count: int, ring_mm: float, radius_mm: float, turn: float = 0.0) -> tuple[TrueTouch, ...]:
     """Equal touches on a circle."""
     angles = [turn + 2 * pi * k / count for k in range(count)]
-    return tuple(Touch(ring_mm * cos(a), ring_mm * sin(a), radius_mm, 5.0) for a in angles)
+    return tuple(TrueTouch(ring_mm * cos(a), ring_mm * sin(a), radius_mm, 5.0) for a in angles)
 
 
 def at(
     distance_mm: float, angle_deg: float, radius_mm: float = 9.0, contrast: float = 5.0
-) -> tuple[Touch, ...]:
+) -> tuple[TrueTouch, ...]:
     """One touch, by its distance from the centre."""
     a = angle_deg * pi / 180
-    return (Touch(distance_mm * cos(a), distance_mm * sin(a), radius_mm, contrast),)
+    return (TrueTouch(distance_mm * cos(a), distance_mm * sin(a), radius_mm, contrast),)
 
 
-def crowds() -> dict[str, tuple[Touch, ...]]:
+def crowds() -> dict[str, tuple[TrueTouch, ...]]:
     """More touches than can be told apart: many, and close ones."""
     return {
         "10 on a ring": ring(10, 70.0, 9.0),
@@ -46,27 +46,27 @@ def crowds() -> dict[str, tuple[Touch, ...]]:
         "12 and one in the middle": (*ring(12, 72.0, 8.0), *at(0.0, 0.0)),
         "5 within 30 mm": (*ring(4, 20.0, 6.0), *at(0.0, 0.0, 6.0)),
         "a row of 6, a millimetre apart": tuple(
-            Touch(-42.5 + 17.0 * k, 10.0, 8.0, 5.0) for k in range(6)
+            TrueTouch(-42.5 + 17.0 * k, 10.0, 8.0, 5.0) for k in range(6)
         ),
     }
 
 
-def entangled() -> dict[str, tuple[Touch, ...]]:
+def entangled() -> dict[str, tuple[TrueTouch, ...]]:
     """Touches that bend each other's field beyond what two dipoles tell, or hide each other's
     peaks."""
     return {
         "two that overlap": (*at(6.0, 30.0), *at(6.0, 210.0)),
         "two that touch, of opposite change": (*at(9.0, 80.0), *at(9.0, 260.0, 9.0, 0.1)),
-        "three metals in a row": tuple(Touch(x, 0.0, 12.0, 1000.0) for x in (-25.0, 0.0, 25.0)),
+        "three metals in a row": tuple(TrueTouch(x, 0.0, 12.0, 1000.0) for x in (-25.0, 0.0, 25.0)),
         "12 metals on a ring": tuple(
-            Touch(t.x_mm, t.y_mm, t.radius_mm, 1000.0) for t in ring(12, 70.0, 12.0)
+            TrueTouch(t.x_mm, t.y_mm, t.radius_mm, 1000.0) for t in ring(12, 70.0, 12.0)
         ),
         "a pair at the rim": (*at(88.0, 5.0), *at(88.0, 17.0)),
         "one of half the skin": at(20.0, 130.0, 60.0),
     }
 
 
-def groups() -> dict[str, list[tuple[Touch, ...]]]:
+def groups() -> dict[str, list[tuple[TrueTouch, ...]]]:
     """Touches of every scene, by what is hard."""
     return {
         "on an electrode": [at(RIM_MM - 9.0, 90.0 + 22.5 * k) for k in range(4)],
@@ -87,7 +87,7 @@ def groups() -> dict[str, list[tuple[Touch, ...]]]:
 def simulated() -> Simulated:
     """All scenes at 60 dB and 12 bits, 64 quiet frames."""
     scenes = tuple(
-        Scene(f"{name} {k}", touches)
+        TouchScene(f"{name} {k}", touches)
         for name, each in groups().items()
         for k, touches in enumerate(each)
     )
@@ -110,7 +110,7 @@ def frames_of(name: str) -> np.ndarray:
 @cache
 def quiet_trials() -> np.ndarray:
     """Frames of the untouched skin (k, m) V, of which none was in the reference."""
-    nothing = TouchSet("quiet trials", 2, (Scene("nothing", ()),))
+    nothing = TouchSet("quiet trials", 2, (TouchScene("nothing", ()),))
     one = simulate(
         paper_skin(), adjacent(16), nothing, seed=1, mesh=mesh_for_elements(paper_skin(), ELEMENTS),
         measurement=Measurement(quiet_frames=QUIET_TRIALS, contact_spread=0.0),

@@ -9,7 +9,7 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.reference.disc_fit import Disc
 from eitskin.reference.interaction import interplay
-from eitskin.scene.random_touches import Touch
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.simulate import conductivity_with
 from eitskin.skin.skin import paper_skin
 from small_models import prebuilt
@@ -40,7 +40,7 @@ def test_two_touches_differ_from_the_sum_of_each_by_the_interplay(
     forward = ForwardModel(mesh_for_elements(skin, 11_000), skin, model.protocol)
     off = 18 * np.array([np.cos(turn), np.sin(turn)])
     places = [np.array(middle) - off, np.array(middle) + off]
-    touches = [Touch(float(x), float(y), 9.0, 5.0) for x, y in places]
+    touches = [TrueTouch(float(x), float(y), 9.0, 5.0) for x, y in places]
     seen = [
         folded(forward.voltages_of(forward.solve(conductivity_with(forward.mesh, some, sheet))))
         for some in ([], touches[:1], touches[1:], touches)

@@ -12,7 +12,7 @@ from typing import Any
 
 from eitskin.cli import cmd_scene
 from eitskin.scene.description import Scene
-from eitskin.scene.effect import Cost, Session, Stage, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, Stage, VoltageStep
 from eitskin.scene.touch_path import Keyframe, TouchTrack, always
 
 ELEMENTS = 600
@@ -47,13 +47,15 @@ class Offset:
 
 
 def effect_module(
-    name: str, make: Callable[[Any, Session], Any] | None = None, stage: Stage = Stage.FRONT_END
+    name: str,
+    make: Callable[[Any, EffectSession], Any] | None = None,
+    stage: Stage = Stage.FRONT_END,
 ) -> str:
     """Put a module with the effect ``name`` into sys.modules, and return its name there."""
 
-    def add_offset(parameters: Offset, session: Session) -> VoltageStep:
+    def add_offset(parameters: Offset, session: EffectSession) -> VoltageStep:
         return VoltageStep(
-            name, stage, Cost(), "adds", lambda v, time_s, frame: v + parameters.offset_v
+            name, stage, EffectCost(), "adds", lambda v, time_s, frame: v + parameters.offset_v
         )
 
     module = ModuleType(f"effects_of_tests_{name}")

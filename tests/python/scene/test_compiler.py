@@ -19,7 +19,7 @@ from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.scene.compiler import compile_scene
-from eitskin.scene.effect import Contacts, ContactStep, Cost, Stage, VoltageStep
+from eitskin.scene.effect import Contacts, ContactStep, EffectCost, Stage, VoltageStep
 from eitskin.scene.forward_steps import count_costs
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import run_scene, simulate_frames
@@ -80,7 +80,11 @@ def test_the_reference_may_be_asked_for_in_the_middle_of_a_bridged_run(
 
     def make(parameters: Any, session: Any) -> VoltageStep:
         return VoltageStep(
-            "late", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v / session.v0_rms_v()
+            "late",
+            Stage.FRONT_END,
+            EffectCost(),
+            "",
+            lambda v, time_s, frame: v / session.v0_rms_v(),
         )
 
     registry = Registry({**BUILT_IN, "late": effect_module("late", make)}, entry_points=False)
@@ -223,15 +227,15 @@ def test_a_bridge_rescues_a_detached_electrode(mesh_cache: MeshCache) -> None:
 
 def test_bad_steps_are_said_to_be_the_effects(mesh_cache: MeshCache) -> None:
     def renamed(parameters: Any, session: Any) -> VoltageStep:
-        return VoltageStep("other", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v)
+        return VoltageStep("other", Stage.FRONT_END, EffectCost(), "", lambda v, time_s, frame: v)
 
     def negative(parameters: Any, session: Any) -> ContactStep:
         less = Contacts(np.full(16, -1.0), np.zeros(16, np.bool_))
-        return ContactStep("negative", Cost(), "", lambda contacts, time_s, frame: less)
+        return ContactStep("negative", EffectCost(), "", lambda contacts, time_s, frame: less)
 
     def endless(parameters: Any, session: Any) -> VoltageStep:
         return VoltageStep(
-            "endless", Stage.FRONT_END, Cost(), "", lambda v, time_s, frame: v * np.inf
+            "endless", Stage.FRONT_END, EffectCost(), "", lambda v, time_s, frame: v * np.inf
         )
 
     modules = {

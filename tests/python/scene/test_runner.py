@@ -17,7 +17,7 @@ from eitskin.errors import ConfigError
 from eitskin.frames.frames import load_frames, save_frames
 from eitskin.scene import session
 from eitskin.scene.compiler import compile_scene
-from eitskin.scene.effect import Cost, MaterialStep, Stage
+from eitskin.scene.effect import EffectCost, MaterialStep, Stage
 from eitskin.scene.registry import BUILT_IN, Registry
 from eitskin.scene.runner import run, run_scene, simulate_frames
 from eitskin.scene.session import MeshCache
@@ -129,7 +129,11 @@ def test_arithmetic_is_complex_only_with_phase(
 def test_a_conductivity_that_cannot_be_names_effect_and_time(mesh_cache: MeshCache) -> None:
     def make(parameters: Any, session: Any) -> MaterialStep:
         return MaterialStep(
-            "sinking", Cost(), "", lambda c, time_s, frame: c - 0.08 * max(time_s + 0.1, 0.0), True
+            "sinking",
+            EffectCost(),
+            "",
+            lambda c, time_s, frame: c - 0.08 * max(time_s + 0.1, 0.0),
+            True,
         )
 
     registry = Registry(

@@ -13,7 +13,7 @@ pytest.importorskip("netgen")
 
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import Mesh, mesh_for_elements
-from eitskin.scene.random_touches import Scene, Touch, TouchSet, random_touches
+from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch, random_touches
 from eitskin.scene.simulate import (
     Measurement,
     Simulated,
@@ -40,9 +40,9 @@ def session(mesh: Mesh) -> Simulated:
 
 
 @pytest.mark.parametrize(
-    "touch", [Touch(0, 0, 9, 5), Touch(40.3, -51.7, 6, 3), Touch(2, 80, 12, 8)]
+    "touch", [TrueTouch(0, 0, 9, 5), TrueTouch(40.3, -51.7, 6, 3), TrueTouch(2, 80, 12, 8)]
 )
-def test_a_touch_covers_its_area(mesh: Mesh, touch: Touch) -> None:
+def test_a_touch_covers_its_area(mesh: Mesh, touch: TrueTouch) -> None:
     elements, part = element_cover(mesh, touch)
     assert part.min() > 0 and 0.5 < part.max() <= 1.0
     assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(
@@ -51,24 +51,26 @@ def test_a_touch_covers_its_area(mesh: Mesh, touch: Touch) -> None:
 
 
 def test_a_touch_smaller_than_an_element_is_not_lost(mesh: Mesh) -> None:
-    elements, part = element_cover(mesh, Touch(10.0, 3.0, 1.0, 5.0), subdivision=32)
+    elements, part = element_cover(mesh, TrueTouch(10.0, 3.0, 1.0, 5.0), subdivision=32)
     assert (part * mesh.areas_mm2[elements]).sum() == pytest.approx(math.pi, rel=0.1)
     assert part.max() < 0.5
 
 
 def test_conductivity_is_the_mean_over_the_element(mesh: Mesh) -> None:
-    touch = Touch(20, 10, 9, 5.0)
+    touch = TrueTouch(20, 10, 9, 5.0)
     sigma = conductivity_with(mesh, [touch], 0.01)
     elements, part = element_cover(mesh, touch)
     assert sigma[elements] == pytest.approx(0.01 * (1 + 4 * part))
     assert (np.delete(sigma, elements) == 0.01).all()
-    both = conductivity_with(mesh, [Touch(20, 10, 12, 5.0), Touch(-40, 0, 12, 0.2)], 0.01)
+    both = conductivity_with(mesh, [TrueTouch(20, 10, 12, 5.0), TrueTouch(-40, 0, 12, 0.2)], 0.01)
     assert both.min() == pytest.approx(0.002) and both.max() == pytest.approx(0.05)
     assert (conductivity_with(mesh, [], 0.02) == 0.02).all()
 
 
 def test_a_touch_without_contrast_changes_nothing(mesh: Mesh) -> None:
-    touches = TouchSet("none", 0, (Scene("same", (Touch(10, 10, 9, 1.0),)), Scene("empty", ())))
+    touches = TouchSet(
+        "none", 0, (TouchScene("same", (TrueTouch(10, 10, 9, 1.0),)), TouchScene("empty", ()))
+    )
     clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
     assert np.abs(clean.differences_v()).max() < 1e-12 * np.abs(clean.exact_quiet_v).max()
     assert (clean.noise_v, clean.lsb_v, clean.clipped) == (0.0, 0.0, 0)
@@ -79,7 +81,12 @@ def test_conductive_touches_lower_the_voltages_that_drive(mesh: Mesh) -> None:
     """The power that a current source puts in falls when conductivity rises; adjacent rows sum to a
     drop across."""
     touches = TouchSet(
-        "one", 0, (Scene("one", (Touch(0, 60, 10, 8.0),)), Scene("hole", (Touch(0, 60, 10, 0.1),)))
+        "one",
+        0,
+        (
+            TouchScene("one", (TrueTouch(0, 60, 10, 8.0),)),
+            TouchScene("hole", (TrueTouch(0, 60, 10, 0.1),)),
+        ),
     )
     clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
     across = np.array(
@@ -189,7 +196,7 @@ def test_as_frames_carries_the_truth(session: Simulated) -> None:
 
 
 def test_progress_sees_every_scene(mesh: Mesh) -> None:
-    seen: list[Scene] = []
+    seen: list[TouchScene] = []
 
     def watch(scenes: object) -> object:
         for scene in scenes:  # type: ignore[attr-defined]

@@ -16,7 +16,7 @@ from eitskin.errors import ConfigError, EitskinError, FileError, GeometryError, 
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.drawing import read_drawing
-from eitskin.skin.drawing_shapes import Reading
+from eitskin.skin.drawing_shapes import DrawingReading
 from eitskin.skin.outline import Outline
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import Skin, load_skin, skin_from_table, skin_to_table
@@ -44,7 +44,7 @@ def svg(folder: Path, body: str, head: str = MM) -> Path:
 
 def outline(path: Path, element: str | None = None, **reading: float) -> Outline:
     """The outline in a drawing."""
-    return read_drawing(path, Reading(**reading)).outline(element)
+    return read_drawing(path, DrawingReading(**reading)).outline(element)
 
 
 def described(
@@ -194,7 +194,7 @@ def test_dxf_units(tmp_path: Path, units: int, scale_mm: float | None, width_mm:
     document, path = dxf(tmp_path, units)
     document.modelspace().add_lwpolyline([(0, 0), (60, 0), (60, 40), (0, 40)], close=True)
     document.saveas(path)
-    shape = read_drawing(path, Reading(scale_mm)).outline()
+    shape = read_drawing(path, DrawingReading(scale_mm)).outline()
     assert shape.bounding_box_mm == pytest.approx((0, 0, width_mm, width_mm * 2 / 3))
 
 
@@ -211,7 +211,7 @@ def test_dxf_pieces_blocks_and_layers(tmp_path: Path) -> None:
     for x, y in ((5, 7), (105, 7), (105, 67), (5, 67)):
         space.add_point((x, y), {"layer": "contacts"})
     document.saveas(path)
-    drawing = read_drawing(path, Reading())
+    drawing = read_drawing(path, DrawingReading())
     shape = drawing.outline("rim", "contacts")
     assert shape.area_mm2 == pytest.approx(6000 + math.pi * 900, rel=2e-3)
     assert shape.bounding_box_mm == pytest.approx((-25, 7, 135, 67), abs=0.1)
@@ -282,7 +282,7 @@ def test_copies_of_copies_are_refused_at_once(tmp_path: Path) -> None:
         f'<g id="c{k + 1}">{f"""<use href="#c{k}"/>""" * 10}</g>' for k in range(12)
     )
     with pytest.raises(ConfigError, match="over 20000 elements"):
-        read_drawing(svg(tmp_path, body), Reading())
+        read_drawing(svg(tmp_path, body), DrawingReading())
 
 
 def test_other_refusals(tmp_path: Path) -> None:
@@ -298,7 +298,7 @@ def test_other_refusals(tmp_path: Path) -> None:
         ("a.dxf", ConfigError, r"\$INSUNITS = 0 is no unit of length; give scale_mm"),
     ):
         with pytest.raises(error, match=message):
-            read_drawing(tmp_path / name, Reading())
+            read_drawing(tmp_path / name, DrawingReading())
     with pytest.raises(ConfigError, match="only a skin description's file names a drawing"):
         skin_from_table({"skin": {"outline": "a.svg"}}, "a model")
     with pytest.raises(ConfigError, match="goes with outline"):
@@ -316,7 +316,7 @@ def test_an_absent_library_is_named(
     monkeypatch.setitem(sys.modules, library, None)
     monkeypatch.delitem(sys.modules, f"eitskin.skin.{name}", raising=False)
     with pytest.raises(MissingExtraError, match=rf"needs {library}, .*eitskin\[drawing\]"):
-        read_drawing(path, Reading())
+        read_drawing(path, DrawingReading())
 
 
 def test_examples_are_what_the_script_draws(tmp_path: Path) -> None:

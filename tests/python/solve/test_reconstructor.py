@@ -11,7 +11,7 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options
 from eitskin.errors import EitskinError, FrameError, ModelError, ProtocolError, UsageError
-from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
@@ -281,12 +281,14 @@ def test_ids_follow_moving_touches(engine: str) -> None:
     steps = np.linspace(0, 1, 8)
     scenes = []
     for k, t in enumerate(steps):
-        touches = [Touch(-60 + 100 * t, 30.0, 9.0, 6.0)]
+        touches = [TrueTouch(-60 + 100 * t, 30.0, 9.0, 6.0)]
         if k != 4:
             touches.append(
-                Touch(50 - 90 * t, -35.0, 8.0, 4.0) if k < 4 else Touch(60.0, -40.0, 8.0, 4.0)
+                TrueTouch(50 - 90 * t, -35.0, 8.0, 4.0)
+                if k < 4
+                else TrueTouch(60.0, -40.0, 8.0, 4.0)
             )
-        scenes.append(Scene(str(k), tuple(touches)))
+        scenes.append(TouchScene(str(k), tuple(touches)))
     simulated = simulate(paper_skin(), adjacent(16), TouchSet("moving", 2, tuple(scenes)))
     reconstructor = made(engine, quiet=False)
     reconstructor.tare(simulated.quiet_v)

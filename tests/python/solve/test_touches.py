@@ -7,8 +7,8 @@ import pytest
 
 from eitskin.core.results import Touch
 from eitskin.model.model import Model
-from eitskin.scene.random_touches import Scene, TouchSet
 from eitskin.scene.random_touches import Touch as Put
+from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -86,7 +86,7 @@ def test_touches_are_where_they_were_put(engine: str) -> None:
     """One touch of 9 mm and contrast 5 at several places, simulated without noise on another
     mesh."""
     places = [(0.0, 0.0), (40.0, 10.0), (-20.0, -60.0), (55.0, -45.0), (-70.0, 20.0)]
-    scenes = tuple(Scene(str(k), (Put(x, y, 9.0, 5.0),)) for k, (x, y) in enumerate(places))
+    scenes = tuple(TouchScene(str(k), (Put(x, y, 9.0, 5.0),)) for k, (x, y) in enumerate(places))
     ideal = Measurement(snr_db=None, adc_bits=None, contact_spread=0.0, quiet_frames=1)
     frames = simulate(
         paper_skin(), adjacent(16), TouchSet("places", 1, scenes), measurement=ideal

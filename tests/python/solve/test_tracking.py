@@ -13,8 +13,8 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options, Touch
 from eitskin.fem.grid import Grid
 from eitskin.reference.tracker import Tracker, nearest_pairs
-from eitskin.scene.random_touches import Scene, TouchSet
 from eitskin.scene.random_touches import Touch as Put
+from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -36,7 +36,7 @@ def stream() -> tuple[np.ndarray, np.ndarray]:
             touches.append(Put(-10.0 + 3 * k, -45.0, 8.0, 4.0))
         if k >= 8:
             touches.append(Put(30.0, 60.0 - k, 9.0, 6.0))
-        scenes.append(Scene(str(k), tuple(touches)))
+        scenes.append(TouchScene(str(k), tuple(touches)))
     made = simulate(
         paper_skin(),
         adjacent(16),

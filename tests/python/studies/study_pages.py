@@ -6,17 +6,17 @@ import re
 from pathlib import Path
 
 from eitskin.config import load_toml
-from eitskin_studies.experiments.experiment import Outcome, Settings
+from eitskin_studies.experiments.experiment import ExperimentOutcome, ExperimentSettings
 from eitskin_studies.experiments.write import write_page
 from eitskin_studies.harness.sections import PARTS
 
 PAGES = Path(__file__).resolve().parents[3] / "docs" / "results"
 
 
-def fills_its_page(outcome: Outcome, name: str, folder: Path) -> str:
+def fills_its_page(outcome: ExperimentOutcome, name: str, folder: Path) -> str:
     """A copy of the page takes the outcome, all of its marks are of it, and it shows every picture;
     returns what it says then."""
-    page, settings = folder / f"{name}.md", Settings(share=0.01)
+    page, settings = folder / f"{name}.md", ExperimentSettings(share=0.01)
     page.write_bytes((PAGES / page.name).read_bytes())
     write_page(outcome, folder, page, name, settings)
     text = page.read_text(encoding="utf-8")

@@ -22,7 +22,7 @@ from eitskin_studies.benchmarks.diagnostics_scenes import (
     IMPERFECT,
     QUIET_FRAMES,
     ROWS,
-    Table,
+    CaseMaker,
     drawn,
     swapped,
 )
@@ -100,7 +100,7 @@ def test_counts_are_those_of_the_frames(result: dict[str, list[dict[str, object]
     """A detached electrode once more, by hand."""
     model, blob = load_prebuilt()
     solver, named = Reconstructor(model, blob=blob), 0
-    for case in Table(SEED).cases(range(SCENES), drawn(SEED, SCENES)):
+    for case in CaseMaker(SEED).cases(range(SCENES), drawn(SEED, SCENES)):
         off = np.isin(ROWS, case.electrode).any(axis=1)
         assert (case.volts["detached"][off] == 0).all() and (
             case.volts["detached"][~off] != 0

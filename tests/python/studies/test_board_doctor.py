@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("scipy")
 
 from eitskin.device.bandwidth import least_every
-from eitskin.device.diagnose_board import Measured, board_findings
+from eitskin.device.diagnose_board import MeasuredBoard, board_findings
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, finite_only, gather
 from eitskin.device.wire.packets import BoardInfo, Fault, FaultCode, Quality, RawFrame, Stream
@@ -57,7 +57,8 @@ def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board() -> Non
     known = KnownModel(*prebuilt())
     frames = as_frames(run.frames, [], known.model.protocol, board, known, allow_nonfinite=True)
     report = board_findings(
-        examine(subject_from_frames(frames, known.model.skin)), Measured(run, RawRun(), board, None)
+        examine(subject_from_frames(frames, known.model.skin)),
+        MeasuredBoard(run, RawRun(), board, None),
     )
     by_name = {finding.name: finding for finding in report.findings}
     assert "electrode 5 open, frame 3: it makes no contact" in by_name["board-electrode-open"].text

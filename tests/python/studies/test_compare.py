@@ -23,11 +23,11 @@ from eitskin.skin.skin import paper_skin
 from eitskin_studies.compare import baselines
 from eitskin_studies.compare.families import Family, FindsTouches, Learns, Setup
 from eitskin_studies.compare.methods import baseline_methods
-from eitskin_studies.compare.run import Comparison, Settings, compare, truth_masks
+from eitskin_studies.compare.run import CompareSettings, Comparison, compare, truth_masks
 from eitskin_studies.compare.table import CSV_COLUMNS, header, to_csv, to_json, to_text
 
 SKIN, PROTOCOL = paper_skin(), adjacent(16)
-SMALL = Settings(
+SMALL = CompareSettings(
     scenes=8, train_scenes=6, seed=3, elements=1500, simulated_elements=2500, lookup="nearest"
 )
 
@@ -238,6 +238,6 @@ def test_progress_is_told_all_work() -> None:
 
 def test_impossible_settings_are_refused() -> None:
     with pytest.raises(UsageError, match="at least 1 scene"):
-        Settings(scenes=0)
+        CompareSettings(scenes=0)
     with pytest.raises(UsageError, match="nearest, bilinear"):
-        Settings(lookup="cubic")
+        CompareSettings(lookup="cubic")

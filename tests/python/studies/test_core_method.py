@@ -11,7 +11,7 @@ pytest.importorskip("eitskin.core._core_f32", reason="the C core is not built")
 
 from eitskin.errors import UsageError
 from eitskin.fem.mesh import mesh_for_elements
-from eitskin.scene.random_touches import Scene, Touch, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import Simulated, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -31,7 +31,9 @@ def setup() -> Setup:
 @pytest.fixture(scope="module")
 def session() -> Simulated:
     touches = TouchSet(
-        "own", 1, tuple(Scene(str(k), (Touch(*place, 9.0, 5.0),)) for k, place in enumerate(PLACES))
+        "own",
+        1,
+        tuple(TouchScene(str(k), (TrueTouch(*place, 9.0, 5.0),)) for k, place in enumerate(PLACES)),
     )
     return simulate(SKIN, PROTOCOL, touches, mesh=mesh_for_elements(SKIN, 3000))
 

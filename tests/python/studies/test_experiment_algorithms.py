@@ -28,7 +28,13 @@ from eitskin_studies.experiments.algorithms.candidates import (
 from eitskin_studies.experiments.algorithms.measure import TUNING, Field
 from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, shown_set, touch_set
-from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
 
 KEPT = (
     *("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"),
@@ -64,19 +70,19 @@ def small(folder: Path, monkeypatch: pytest.MonkeyPatch, share: float = 0.03) ->
     monkeypatch.setattr(algorithms, "entrants", few)
     monkeypatch.setattr(measure, "SIMULATED_ELEMENTS", 4000)
     monkeypatch.setattr(measure, "MODEL_ELEMENTS", 2000)
-    workspace = workspace_in(folder, Settings(seed=2, share=share), plain)
+    workspace = workspace_in(folder, ExperimentSettings(seed=2, share=share), plain)
     real = workspace.scenes
     monkeypatch.setattr(workspace, "scenes", lambda skin, protocol: real(skin, protocol, 4000))
     return workspace
 
 
 @pytest.fixture(scope="module")
-def outcome(folder: Path) -> Outcome:
+def outcome(folder: Path) -> ExperimentOutcome:
     with pytest.MonkeyPatch.context() as patch:
         return algorithms.run(small(folder, patch))
 
 
-def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome: Outcome) -> None:
+def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome: ExperimentOutcome) -> None:
     """A fixed t of 0.1 puts them near the paper's 0.4 to 0.5, their own t does not; converged FISTA
     does not mind."""
     by_name = {one["name"]: one for one in outcome.data["methods"]}
@@ -97,7 +103,7 @@ def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome: Outcome) -> 
     )
 
 
-def test_tables_agree_with_the_data(outcome: Outcome) -> None:
+def test_tables_agree_with_the_data(outcome: ExperimentOutcome) -> None:
     tables = {table.name: table for table in outcome.tables}
     assert set(tables) == {"fixed", "best", "counts", "thresholds", "why"}
     assert all(len(row) == len(table.head) for table in tables.values() for row in table.rows)
@@ -115,7 +121,7 @@ def test_tables_agree_with_the_data(outcome: Outcome) -> None:
 
 
 def test_what_is_kept_is_not_computed_again(
-    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     workspace = small(folder, monkeypatch)
 
@@ -133,7 +139,7 @@ def test_what_is_kept_is_not_computed_again(
 
 
 def test_a_cut_run_goes_on_and_gives_the_same(
-    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The last third of the results gone, with a torn line: only what is missing is reconstructed
     again."""
@@ -168,12 +174,16 @@ def test_sets_are_apart_and_of_their_numbers() -> None:
 
 def test_tuning_and_test_scenes_have_seeds_of_their_own(tmp_path: Path) -> None:
     field = Field(
-        workspace_in(tmp_path, Settings(seed=4), plain), paper_skin(), adjacent(16), 20, 60
+        workspace_in(tmp_path, ExperimentSettings(seed=4), plain),
+        paper_skin(),
+        adjacent(16),
+        20,
+        60,
     )
     assert field.seed_and_count(TUNING) == (100_004, 20) and field.seed_and_count("test") == (4, 60)
 
 
-def test_every_method_says_what_it_costs(outcome: Outcome) -> None:
+def test_every_method_says_what_it_costs(outcome: ExperimentOutcome) -> None:
     kmacs = {one["name"]: one["kmac"] for one in outcome.data["methods"]}
     pixels_by_rows = 812 * 208 / 1e3
     assert kmacs["NOSER"] == kmacs["GREIT-like"] == pytest.approx(pixels_by_rows)
@@ -190,7 +200,7 @@ def test_entrants() -> None:
     assert sorted(next(e for e in all_of_them if e.name == "NOSER").values)[4] == FIXED_STRENGTH
 
 
-def test_pictures_are_drawn(outcome: Outcome, tmp_path: Path) -> None:
+def test_pictures_are_drawn(outcome: ExperimentOutcome, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     assert set(outcome.pictures) == {"images.png", "masks.png", "curves.png", "bars.png"}
     for name, draw in outcome.pictures.items():
@@ -198,13 +208,13 @@ def test_pictures_are_drawn(outcome: Outcome, tmp_path: Path) -> None:
         assert (tmp_path / name).read_bytes()[:4] == b"\x89PNG"
 
 
-def test_it_fills_its_page(outcome: Outcome, tmp_path: Path) -> None:
+def test_it_fills_its_page(outcome: ExperimentOutcome, tmp_path: Path) -> None:
     assert "whatever their parameter" in fills_its_page(outcome, "algorithms", tmp_path)
 
 
 def test_what_it_refuses(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--share 0 is out of range"):
-        Settings(share=0)
+        ExperimentSettings(share=0)
     with pytest.raises(UsageError, match="at least 1 scene"):
         touch_set(paper_skin().outline, 2, 1, 0)
     assert metrics.THRESHOLDS.index(FIXED_THRESHOLD) == 4

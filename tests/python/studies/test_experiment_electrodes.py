@@ -19,7 +19,7 @@ from eitskin.skin.protocol import adjacent, skip
 from eitskin.skin.skin import Skin
 from eitskin_studies.experiments import electrodes
 from eitskin_studies.experiments.electrodes import measuring, patterns, tables, tuning
-from eitskin_studies.experiments.experiment import Settings, plain, workspace_in
+from eitskin_studies.experiments.experiment import ExperimentSettings, plain, workspace_in
 
 
 @pytest.mark.parametrize("pattern", list(patterns.PATTERNS))
@@ -101,7 +101,7 @@ def _few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _few(monkeypatch)
-    workspace = workspace_in(tmp_path, Settings(share=0.03), plain)
+    workspace = workspace_in(tmp_path, ExperimentSettings(share=0.03), plain)
     first = electrodes.run(workspace)
     by_name = {table.name: table for table in first.tables}
     assert {name: len(table.rows) for name, table in by_name.items()} == {
@@ -130,7 +130,7 @@ def test_a_run_and_one_that_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         raise AssertionError("solved again")
 
     monkeypatch.setattr(ForwardModel, "solve", refuse)
-    again = electrodes.run(workspace_in(tmp_path, Settings(share=0.03), plain))
+    again = electrodes.run(workspace_in(tmp_path, ExperimentSettings(share=0.03), plain))
     assert (again.tables, again.data) == (first.tables, first.data)
     for name, draw in first.pictures.items():
         draw(tmp_path / name)
@@ -149,7 +149,9 @@ def test_scenes_are_solved_once_for_every_pattern(
         "voltages",
         lambda self, *a: solved.append(self.protocol.n_electrodes) or whole(self, *a),
     )
-    shop = measuring.Workshop(workspace_in(tmp_path, Settings(share=0.03), plain), 16)
+    shop = measuring.PatternWorkspace(
+        workspace_in(tmp_path, ExperimentSettings(share=0.03), plain), 16
+    )
     for pattern in ("adjacent", "skip 2", "opposite"):
         for equal in ("noise", "time"):
             shop.frames("random", measuring.usual_case(16, pattern, equal), 1e-4)

@@ -11,7 +11,13 @@ import pytest
 from study_pages import fills_its_page
 
 from eitskin_studies.experiments import force
-from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.force import anywhere, detection, scenes
 from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
@@ -45,18 +51,20 @@ class CountingDesk(Workspace):
 
 
 def workspace(folder: Path) -> CountingDesk:
-    usual = workspace_in(folder, Settings(2, SHARE), plain)
+    usual = workspace_in(folder, ExperimentSettings(2, SHARE), plain)
     return CountingDesk(usual.settings, usual.folder, usual.progress, usual.store)
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome, int]:
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome, int]:
     folder = tmp_path_factory.mktemp("force")
     one = workspace(folder)
     return folder, force.run(one), one.made
 
 
-def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, Outcome, int]) -> None:
+def test_a_run_that_goes_on_computes_nothing_again(
+    done: tuple[Path, ExperimentOutcome, int],
+) -> None:
     folder, outcome, made = done
     again = workspace(folder)
     assert to_json(force.run(again)) == to_json(outcome)
@@ -64,7 +72,7 @@ def test_a_run_that_goes_on_computes_nothing_again(done: tuple[Path, Outcome, in
 
 
 def test_every_table_has_its_place_on_the_page(
-    done: tuple[Path, Outcome, int], tmp_path: Path
+    done: tuple[Path, ExperimentOutcome, int], tmp_path: Path
 ) -> None:
     outcome = done[1]
     assert [table.name for table in outcome.tables] == [
@@ -81,7 +89,7 @@ def test_every_table_has_its_place_on_the_page(
 
 
 def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(
-    done: tuple[Path, Outcome, int],
+    done: tuple[Path, ExperimentOutcome, int],
 ) -> None:
     slopes = {name: one["a_gram"] for name, one in json.loads(to_json(done[1]))["slopes"].items()}
     assert slopes[PEAK][0] < 0.3 * slopes[PEAK][-1]
@@ -89,7 +97,7 @@ def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(
     assert slopes[TOUCH][0] == pytest.approx(slopes[TOUCH][-1], rel=0.35)  # on a coarse mesh
 
 
-def test_calibrated_touches_read_one_load_alike(done: tuple[Path, Outcome, int]) -> None:
+def test_calibrated_touches_read_one_load_alike(done: tuple[Path, ExperimentOutcome, int]) -> None:
     told = {
         (one["reading"], one["snr_db"]): anywhere.Anywhere.from_dict(one)
         for one in done[1].data["anywhere"]  # type: ignore[union-attr]
@@ -100,7 +108,7 @@ def test_calibrated_touches_read_one_load_alike(done: tuple[Path, Outcome, int])
     assert anywhere.scatter(touch.calibrated) < 0.1 < 0.2 < anywhere.scatter(peak.raw)
 
 
-def test_less_noise_shows_less_load(done: tuple[Path, Outcome, int]) -> None:
+def test_less_noise_shows_less_load(done: tuple[Path, ExperimentOutcome, int]) -> None:
     found = [detection.Detection.from_dict(one) for one in done[1].data["detection"]]
     thresholds = np.array([[one.threshold(radius)[0] for radius in range(4)] for one in found])
     assert (thresholds[0] > thresholds[-1]).all() and (thresholds[-1] < 20).all()
@@ -110,7 +118,7 @@ def test_less_noise_shows_less_load(done: tuple[Path, Outcome, int]) -> None:
         assert share < upper <= 1 and one.quiet == 80
 
 
-def test_pictures_are_drawn(done: tuple[Path, Outcome, int], tmp_path: Path) -> None:
+def test_pictures_are_drawn(done: tuple[Path, ExperimentOutcome, int], tmp_path: Path) -> None:
     assert set(done[1].pictures) == {"curves.png", "skin.png", "detection.png"}
     for name, draw in done[1].pictures.items():
         draw(tmp_path / name)

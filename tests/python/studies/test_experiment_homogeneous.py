@@ -18,7 +18,13 @@ from eitskin.frames.homogeneous import homogeneous as predicted
 from eitskin.skin.protocol import Protocol, adjacent, opposite, table
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import homogeneous
-from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.homogeneous.cases import CASES, IDEAL, INSTRUMENT
 from eitskin_studies.experiments.homogeneous.measured import FILE, load_tank
 from eitskin_studies.experiments.homogeneous.uniformity import (
@@ -34,7 +40,7 @@ EVEN_V = predicted(paper_skin(), 16).voltages(ROWS, 1e-3)
 
 def small(folder: Path, patch: pytest.MonkeyPatch, data: Path | None = None) -> Workspace:
     patch.setattr(homogeneous, "SIMULATED_ELEMENTS", 2500)
-    return workspace_in(folder, Settings(seed=3, share=0.1, data=data), plain)
+    return workspace_in(folder, ExperimentSettings(seed=3, share=0.1, data=data), plain)
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +49,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def outcome(folder: Path) -> Outcome:
+def outcome(folder: Path) -> ExperimentOutcome:
     with pytest.MonkeyPatch.context() as patch:
         return homogeneous.run(small(folder, patch))
 
 
-def spread(outcome: Outcome, name: str, measure: str = "spread") -> float:
+def spread(outcome: ExperimentOutcome, name: str, measure: str = "spread") -> float:
     case = next(one for one in outcome.data["cases"] if one["name"] == name)
     return float(np.mean([one[measure] for one in case["uniformity_percent"]]))
 
@@ -118,7 +124,7 @@ def test_scans_that_cannot_be_folded(protocol: Protocol, match: str) -> None:
         fold_for(protocol)
 
 
-def test_each_effect_moves_what_physics_says(outcome: Outcome) -> None:
+def test_each_effect_moves_what_physics_says(outcome: ExperimentOutcome) -> None:
     usual = spread(outcome, INSTRUMENT)
     assert usual < 1.0
     half, one, two = (
@@ -142,7 +148,7 @@ def test_each_effect_moves_what_physics_says(outcome: Outcome) -> None:
     assert spread(outcome, "contacts ±95 %") < 1.5
 
 
-def test_the_doctor_names_what_is_broken(outcome: Outcome) -> None:
+def test_the_doctor_names_what_is_broken(outcome: ExperimentOutcome) -> None:
     found = {one["name"]: one["diagnostics"] for one in outcome.data["cases"]}
     for name, diagnostic in (
         ("an electrode off", "dead-electrode"),
@@ -154,7 +160,7 @@ def test_the_doctor_names_what_is_broken(outcome: Outcome) -> None:
 
 
 def test_what_is_kept_is_not_computed_again(
-    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def never(*_: object) -> None:
         raise AssertionError("computed again")
@@ -165,7 +171,7 @@ def test_what_is_kept_is_not_computed_again(
 
 
 def test_only_what_is_missing_is_computed(
-    folder: Path, outcome: Outcome, monkeypatch: pytest.MonkeyPatch
+    folder: Path, outcome: ExperimentOutcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines = (folder / "results.jsonl").read_bytes().splitlines(keepends=True)
     (folder / "results.jsonl").write_bytes(b"".join(lines[:-2]) + lines[-2][:99])
@@ -178,7 +184,7 @@ def test_only_what_is_missing_is_computed(
     assert made == [CASES[-1].name] * 2
 
 
-def test_without_a_tank_the_page_says_so(outcome: Outcome) -> None:
+def test_without_a_tank_the_page_says_so(outcome: ExperimentOutcome) -> None:
     assert "left out" in outcome.words["measured"] and FILE in outcome.words["measured"]
     assert all(one["name"] != homogeneous.MEASURED_TANK for one in outcome.data["cases"])
 
@@ -203,7 +209,7 @@ def test_the_measured_tank(shared_data: Path) -> None:
     )  # as docs/guide/tank.md says
 
 
-def test_pictures_and_page(outcome: Outcome, tmp_path: Path) -> None:
+def test_pictures_and_page(outcome: ExperimentOutcome, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     fills_its_page(outcome, "homogeneous", tmp_path)
     for name, draw in outcome.pictures.items():

@@ -10,14 +10,20 @@ from study_pages import fills_its_page
 
 from eitskin.core.results import ALL_TOUCH_FIT
 from eitskin_studies.experiments import levers
-from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
 from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM, AblationRuns
 
-SETTINGS = Settings(share=0.05)
+SETTINGS = ExperimentSettings(share=0.05)
 
 
-def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
+def _run(folder: Path, patch: pytest.MonkeyPatch) -> ExperimentOutcome:
     scenes = Workspace.scenes
     patch.setattr(
         Workspace,
@@ -28,13 +34,13 @@ def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("levers")
     with pytest.MonkeyPatch.context() as patch:
         return folder, _run(folder, patch)
 
 
-def test_every_lever_is_on_every_set(done: tuple[Path, Outcome]) -> None:
+def test_every_lever_is_on_every_set(done: tuple[Path, ExperimentOutcome]) -> None:
     searches, images = done[1].data["searches"], done[1].data["images"]
     assert set(searches) == {one.name for one in SEARCHES} and set(images) == {
         one.name for one in IMAGES
@@ -47,7 +53,7 @@ def test_every_lever_is_on_every_set(done: tuple[Path, Outcome]) -> None:
     assert all(len(row) == len(table.head) for table in done[1].tables for row in table.rows)
 
 
-def test_what_coupling_explains_and_refining_costs(done: tuple[Path, Outcome]) -> None:
+def test_what_coupling_explains_and_refining_costs(done: tuple[Path, ExperimentOutcome]) -> None:
     searches, images = done[1].data["searches"], done[1].data["images"]
     eight = "8 at 4 radii, 80 dB"
     alone, whole = searches["peaks alone"][eight], searches["all (the default)"][eight]
@@ -66,7 +72,7 @@ def test_the_default_is_among_them() -> None:
 
 
 def test_a_run_goes_on_where_it_was(
-    done: tuple[Path, Outcome], monkeypatch: pytest.MonkeyPatch
+    done: tuple[Path, ExperimentOutcome], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder, first = done
     lines = (folder / "results.jsonl").read_text(encoding="utf-8")
@@ -77,7 +83,7 @@ def test_a_run_goes_on_where_it_was(
     )
 
 
-def test_pictures_are_drawn(done: tuple[Path, Outcome], tmp_path: Path) -> None:
+def test_pictures_are_drawn(done: tuple[Path, ExperimentOutcome], tmp_path: Path) -> None:
     for name, draw in done[1].pictures.items():
         draw(tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")

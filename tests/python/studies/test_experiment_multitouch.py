@@ -16,7 +16,13 @@ from eitskin.scene.library_scenes import find_scene
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import multitouch
-from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.multitouch import measure
 from eitskin_studies.experiments.multitouch.ambiguity import (
     FEATURES,
@@ -39,7 +45,7 @@ from eitskin_studies.experiments.multitouch.cells import (
     mixed_cells,
 )
 from eitskin_studies.experiments.multitouch.counts import auc, quantile, roc, score, share
-from eitskin_studies.experiments.multitouch.variants import VARIANTS, Seen
+from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame
 from eitskin_studies.experiments.write import write_all
 from eitskin_studies.harness.sessions import SceneSolver
 
@@ -47,7 +53,7 @@ OUTLINE = paper_skin().outline
 COARSE = 2500
 
 
-def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
+def _run(folder: Path, patch: pytest.MonkeyPatch) -> ExperimentOutcome:
     """All of it, on few scenes, a coarse mesh, and one cell of the ceiling."""
     scenes = Workspace.scenes
     patch.setattr(
@@ -56,17 +62,17 @@ def _run(folder: Path, patch: pytest.MonkeyPatch) -> Outcome:
         lambda workspace, skin, scan, elements=COARSE: scenes(workspace, skin, scan, elements),
     )
     patch.setattr(measure, "CEILING_CELLS", ((WIDE, 6, 80.0),))
-    return multitouch.run(workspace_in(folder, Settings(share=0.01), plain))
+    return multitouch.run(workspace_in(folder, ExperimentSettings(share=0.01), plain))
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ExperimentOutcome]:
     folder = tmp_path_factory.mktemp("multitouch")
     with pytest.MonkeyPatch.context() as patch:
         return folder, _run(folder, patch)
 
 
-def test_outcome_has_every_cell(done: tuple[Path, Outcome]) -> None:
+def test_outcome_has_every_cell(done: tuple[Path, ExperimentOutcome]) -> None:
     outcome = done[1]
     tables = {table.name: table for table in outcome.tables}
     assert [row[0] for row in tables["exact-ring"].rows] == [str(k) for k in range(2, 13)]
@@ -79,7 +85,7 @@ def test_outcome_has_every_cell(done: tuple[Path, Outcome]) -> None:
     assert single["exact"]["mean"] == 1 and single["median_mm"]["value"] < 1.5
 
 
-def test_more_touches_are_harder(done: tuple[Path, Outcome]) -> None:
+def test_more_touches_are_harder(done: tuple[Path, ExperimentOutcome]) -> None:
     exact: dict[int, list[float]] = {}
     for one in done[1].data["counts"]:
         if one["method"] == "default" and one["places"] == NARROW:
@@ -88,7 +94,7 @@ def test_more_touches_are_harder(done: tuple[Path, Outcome]) -> None:
 
 
 def test_goes_on_without_computing(
-    done: tuple[Path, Outcome], monkeypatch: pytest.MonkeyPatch
+    done: tuple[Path, ExperimentOutcome], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder, first = done
     lines = (folder / "results.jsonl").read_text().count("\n")
@@ -103,7 +109,7 @@ def test_goes_on_without_computing(
     assert (folder / "results.jsonl").read_text().count("\n") == lines
 
 
-def test_fills_its_page_and_draws(done: tuple[Path, Outcome], tmp_path: Path) -> None:
+def test_fills_its_page_and_draws(done: tuple[Path, ExperimentOutcome], tmp_path: Path) -> None:
     write_all(done[1], tmp_path)
     assert "| touches | default, 40 dB |" in fills_its_page(done[1], "multitouch", tmp_path)
     drawn = (tmp_path / "pictures" / "multitouch").iterdir()
@@ -153,10 +159,10 @@ def test_what_does_not_fit_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(measure, "counting_cells", lambda: (Cell(WIDE, 40, 1),))
     monkeypatch.setattr(measure, "single_cell", lambda: Cell(WIDE, 41, 1))
     monkeypatch.setattr(measure, "uneven_cells", tuple)
-    workspace = workspace_in(tmp_path, Settings(), plain)
+    workspace = workspace_in(tmp_path, ExperimentSettings(), plain)
     counted = measure.count_all(TouchData(workspace), workspace)
     assert set(counted.unfit) == {(WIDE, 40), (WIDE, 41)} and not counted.scores
-    twelve = measure.Counted({}, {(WIDE, k): "full" for k in range(2, 13)})
+    twelve = measure.CountedScenes({}, {(WIDE, k): "full" for k in range(2, 13)})
     assert all("do not fit" in row[1] for row in exact_table(twelve, WIDE, "x").rows)
 
 
@@ -196,9 +202,11 @@ def test_area_under_roc() -> None:
     )
 
 
-def _seen(places: list[tuple[float, float]], confidence: list[float]) -> Seen:
+def _seen(places: list[tuple[float, float]], confidence: list[float]) -> SeenFrame:
     x, y = ([place[axis] for place in places] for axis in (0, 1))
-    return Seen(x, y, [9.0] * len(x), [2.0, 1.0][: len(x)], confidence, False, 0.04, 100.0, 1, 1)
+    return SeenFrame(
+        x, y, [9.0] * len(x), [2.0, 1.0][: len(x)], confidence, False, 0.04, 100.0, 1, 1
+    )
 
 
 def test_features_of_a_frame() -> None:

@@ -17,7 +17,12 @@ from eitskin.fem.grid import grid_for
 from eitskin.model.build import linearise
 from eitskin.skin.protocol import adjacent
 from eitskin_studies.experiments import registry, shapes
-from eitskin_studies.experiments.experiment import Outcome, Settings, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.scored import share_text
 from eitskin_studies.experiments.shapes import measuring
 from eitskin_studies.experiments.shapes.example_drawings import (
@@ -28,27 +33,29 @@ from eitskin_studies.experiments.shapes.example_drawings import (
     rectangle_corners,
 )
 from eitskin_studies.experiments.shapes.rounded import as_outline
-from eitskin_studies.experiments.shapes.variants import Variant, variants
+from eitskin_studies.experiments.shapes.variants import ShapeVariant, variants
 
 
 @pytest.fixture(scope="module")
-def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Variant]:
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ShapeVariant]:
     """The skins by name."""
     return {one.name: one for one in variants(tmp_path_factory.mktemp("drawings"))}
 
 
-def _small(monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], folder: Path) -> Outcome:
+def _small(
+    monkeypatch: pytest.MonkeyPatch, known: dict[str, ShapeVariant], folder: Path
+) -> ExperimentOutcome:
     """A run on two shapes with few elements and scenes."""
     monkeypatch.setattr(shapes, "variants", lambda _: [known["disk, 16"], known["hand, 16 placed"]])
     monkeypatch.setattr(measuring, "MODEL_ELEMENTS", 1500)
     monkeypatch.setattr(
         "eitskin_studies.experiments.experiment.Workspace.scenes.__defaults__", (2000,)
     )
-    return shapes.run(workspace_in(folder, Settings(share=0.03), plain))
+    return shapes.run(workspace_in(folder, ExperimentSettings(share=0.03), plain))
 
 
 def test_a_run_and_one_that_goes_on(
-    monkeypatch: pytest.MonkeyPatch, known: dict[str, Variant], tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, known: dict[str, ShapeVariant], tmp_path: Path
 ) -> None:
     first = _small(monkeypatch, known, tmp_path)
     assert [table.name for table in first.tables] == ["skins", "found", "lost"]
@@ -70,10 +77,11 @@ def test_a_run_and_one_that_goes_on(
     fills_its_page(first, "shapes", tmp_path)
 
 
-def test_sets_depend_on_the_seed_only(known: dict[str, Variant], tmp_path: Path) -> None:
+def test_sets_depend_on_the_seed_only(known: dict[str, ShapeVariant], tmp_path: Path) -> None:
     def drawn(seed: int) -> Any:
         maker = measuring.Maker(
-            workspace_in(tmp_path, Settings(seed=seed, share=0.02), plain), known["forearm, 16"]
+            workspace_in(tmp_path, ExperimentSettings(seed=seed, share=0.02), plain),
+            known["forearm, 16"],
         )
         return maker.test.scenes, maker.tuning.scenes
 
@@ -82,7 +90,7 @@ def test_sets_depend_on_the_seed_only(known: dict[str, Variant], tmp_path: Path)
     assert drawn(1)[0][0].touches != drawn(1)[1][0].touches
 
 
-def test_sizes_are_those_that_the_page_says(known: dict[str, Variant]) -> None:
+def test_sizes_are_those_that_the_page_says(known: dict[str, ShapeVariant]) -> None:
     rectangle = as_outline(rectangle_corners())
     assert rectangle.bounding_box_mm == pytest.approx((-100, -70, 100, 70))
     assert rectangle.area_mm2 == pytest.approx(200 * 140 - (4 - math.pi) * 400, rel=1e-3)
@@ -95,7 +103,7 @@ def test_sizes_are_those_that_the_page_says(known: dict[str, Variant]) -> None:
     assert known["hand, 16 placed"].skin.outline == known["hand, 16 in pairs"].skin.outline
 
 
-def test_regions(known: dict[str, Variant]) -> None:
+def test_regions(known: dict[str, ShapeVariant]) -> None:
     assert hand_region([tip for _, tip, _ in FINGERS.values()]) == list(FINGERS)
     assert hand_region([(85, 60)]) == ["palm"]
     disk = known["disk, 16"]
@@ -106,7 +114,7 @@ def test_regions(known: dict[str, Variant]) -> None:
     ]
 
 
-def test_a_finger_with_one_electrode_is_blind(known: dict[str, Variant]) -> None:
+def test_a_finger_with_one_electrode_is_blind(known: dict[str, ShapeVariant]) -> None:
     """All current through a finger passes its only electrode, and so would all that is measured
     there: no row has both."""
     seen = {}

@@ -17,7 +17,13 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scoring import metrics
 from eitskin.skin.skin import load_skin
 from eitskin_studies.experiments import tank as study
-from eitskin_studies.experiments.experiment import Outcome, Settings, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentOutcome,
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.tank.discs import VARIANTS
 from eitskin_studies.experiments.tank.imagers import (
     DISCS,
@@ -123,7 +129,7 @@ def test_signs_turn_about_half_and_nothing_else() -> None:
 
 
 def test_simulated_noise_is_the_share_of_each_change(tmp_path: Path) -> None:
-    workspace = workspace_in(tmp_path, Settings(), plain)
+    workspace = workspace_in(tmp_path, ExperimentSettings(), plain)
     raster = metrics.raster_inside(tank()[0].outline, 5.0)
     clean, noisy = (simulated(workspace, 1, 4, True, raster, share) for share in (0.0, 0.05))
     change = clean.frames_v - clean.quiet_v
@@ -166,17 +172,17 @@ def with_few_values(patch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def outcome(
     shared_data: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Workspace, Outcome]:
+) -> tuple[Workspace, ExperimentOutcome]:
     """The whole study on few scenes and few levers."""
     workspace = workspace_in(
-        tmp_path_factory.mktemp("tank"), Settings(share=0.05, data=shared_data), plain
+        tmp_path_factory.mktemp("tank"), ExperimentSettings(share=0.05, data=shared_data), plain
     )
     with pytest.MonkeyPatch.context() as patch:
         with_few_values(patch)
         return workspace, study.run(workspace)
 
 
-def test_every_method_every_kind_every_frame(outcome: tuple[Workspace, Outcome]) -> None:
+def test_every_method_every_kind_every_frame(outcome: tuple[Workspace, ExperimentOutcome]) -> None:
     results = outcome[1].data["results"]
     kinds = {(one["name"], one["kind"]) for one in results}
     names = {name for name, _ in kinds} - {CHOSEN, TUNED_DISCS}
@@ -190,7 +196,7 @@ def test_every_method_every_kind_every_frame(outcome: tuple[Workspace, Outcome])
 
 
 def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(
-    outcome: tuple[Workspace, Outcome],
+    outcome: tuple[Workspace, ExperimentOutcome],
 ) -> None:
     discs = next(
         one
@@ -201,13 +207,15 @@ def test_discs_on_ratios_find_every_metal_object_and_reach_the_target(
     assert np.mean(discs["touch_like"]) >= 0.85
 
 
-def test_atoms_show_large_objects_better_than_pixels(outcome: tuple[Workspace, Outcome]) -> None:
+def test_atoms_show_large_objects_better_than_pixels(
+    outcome: tuple[Workspace, ExperimentOutcome],
+) -> None:
     means = {str(one["levers"]): np.mean(one["touch_like"]) for one in outcome[1].data["levers"]}
     assert means[str(vars(Levers(atom=2.0)))] > means[str(vars(Levers()))] + 0.03
 
 
 def test_a_run_that_goes_on_computes_nothing_again(
-    outcome: tuple[Workspace, Outcome], monkeypatch: pytest.MonkeyPatch
+    outcome: tuple[Workspace, ExperimentOutcome], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     workspace, first = outcome
     with_few_values(monkeypatch)
@@ -217,7 +225,7 @@ def test_a_run_that_goes_on_computes_nothing_again(
     assert again.tables == first.tables
 
 
-def test_pictures_are_drawn(outcome: tuple[Workspace, Outcome], tmp_path: Path) -> None:
+def test_pictures_are_drawn(outcome: tuple[Workspace, ExperimentOutcome], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     assert set(outcome[1].pictures) == {"touch_like.png", "all_frames.png", "curves.png"}
     for name in (

@@ -14,14 +14,19 @@ from eitskin.errors import UsageError
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import tracking
-from eitskin_studies.experiments.experiment import Settings, Workspace, plain, workspace_in
+from eitskin_studies.experiments.experiment import (
+    ExperimentSettings,
+    Workspace,
+    plain,
+    workspace_in,
+)
 from eitskin_studies.experiments.tracking import measured, streams
-from eitskin_studies.experiments.tracking.counted import Count, count_stream, total
+from eitskin_studies.experiments.tracking.counted import TrackCount, count_stream, total
 from eitskin_studies.experiments.tracking.streams import (
     FRAMES,
     GAP_MM,
     RATE_HZ,
-    Stream,
+    TouchStream,
     passing_streams,
     random_streams,
 )
@@ -31,10 +36,10 @@ from eitskin_studies.experiments.tracking.streams import (
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     """Coarse meshes, one SNR, one speed."""
     monkeypatch.setattr(measured, "ELEMENTS", 1500)
-    monkeypatch.setattr(streams.Stream.scene, "__defaults__", (1500,))
+    monkeypatch.setattr(streams.TouchStream.scene, "__defaults__", (1500,))
     monkeypatch.setattr(tracking, "SNRS_DB", (40,))
     monkeypatch.setattr(tracking, "SPEEDS_MM_S", (0, 50))
-    return workspace_in(tmp_path / "out", Settings(share=0.05), plain)
+    return workspace_in(tmp_path / "out", ExperimentSettings(share=0.05), plain)
 
 
 def test_the_whole_and_again(
@@ -99,7 +104,7 @@ def at(number: int, x_mm: float) -> Touch:
 def test_what_is_counted() -> None:
     """Two fingers, at 0 mm in frames 2 to 9 and at 60 mm in frames 4 to 9; twelve frames are
     told."""
-    stream = Stream("two", 0, (finger(2, 9, 0.0), finger(4, 9, 60.0)))
+    stream = TouchStream("two", 0, (finger(2, 9, 0.0), finger(4, 9, 60.0)))
     told: list[tuple[Touch, ...]] = [()] * 12
     told[1] = (at(1, 0.0),)  # false: nobody is there yet
     for k in range(3, 10):
@@ -121,11 +126,11 @@ def test_what_is_counted() -> None:
     assert count.mota == pytest.approx(1 - 11 / 14) and sorted(count.errors_mm) == [0.0] + 7 * [1.0]
     both = total([count, count])
     assert (both.frames, both.macs, len(both.errors_mm)) == (24, 240, 16)
-    assert count_stream(stream, [()] * 12, 0).never == 2 and Count(**count.as_dict()) == count
+    assert count_stream(stream, [()] * 12, 0).never == 2 and TrackCount(**count.as_dict()) == count
 
 
 def test_an_id_that_goes_on_as_another_finger_is_no_ghost() -> None:
-    stream = Stream("handed on", 0, (finger(0, 4, 0.0), finger(5, 9, 20.0)))
+    stream = TouchStream("handed on", 0, (finger(0, 4, 0.0), finger(5, 9, 20.0)))
     told = [(at(1, 0.0),)] * 5 + [(at(1, 20.0),)] * 5
     assert count_stream(stream, told, 0).ghost == [0, 0]
 
@@ -142,4 +147,4 @@ def test_the_best_pairs_may_not_be_the_nearest() -> None:
 
 def test_a_share_that_cannot_be() -> None:
     with pytest.raises(UsageError, match="--share 0"):
-        Settings(share=0)
+        ExperimentSettings(share=0)

@@ -14,8 +14,8 @@ from eitskin.cli.main import main
 from eitskin.errors import ConfigError, UsageError
 from eitskin_studies.experiments import registry
 from eitskin_studies.experiments.experiment import (
-    Outcome,
-    Settings,
+    ExperimentOutcome,
+    ExperimentSettings,
     Table,
     Workspace,
     plain,
@@ -34,14 +34,14 @@ class Small:
     def __init__(self) -> None:
         self.computed = 0
 
-    def run(self, workspace: Workspace) -> Outcome:
+    def run(self, workspace: Workspace) -> ExperimentOutcome:
         def make() -> Mapping[str, Any]:
             self.computed += 1
             return {"mean": 0.5, "none": float("nan")}
 
         values = workspace.kept({"part": "small"}, make)
         table = Table("small", ("what", "value"), (("mean", f"{values['mean']:g}"),))
-        return Outcome(
+        return ExperimentOutcome(
             (table,), values, {"small.png": lambda path: path.write_bytes(b"png")}, {"said": "so"}
         )  # type: ignore[arg-type]
 
@@ -123,32 +123,32 @@ def test_what_cannot_be_is_refused_on_one_line(
 
 
 def test_a_page_without_its_marks_stays_as_it_is(tmp_path: Path) -> None:
-    outcome = Small().run(workspace_in(tmp_path / "out", Settings(), plain))
+    outcome = Small().run(workspace_in(tmp_path / "out", ExperimentSettings(), plain))
     write_all(outcome, tmp_path / "out", pictures=False)
     page = tmp_path / "small.md"
     page.write_text("<!-- small -->\nold\n<!-- end small -->\n")
     with pytest.raises(ConfigError, match="has no marks <!-- said -->"):
-        write_page(outcome, tmp_path / "out", page, "small", Settings())
+        write_page(outcome, tmp_path / "out", page, "small", ExperimentSettings())
     assert "old" in page.read_text(encoding="utf-8") and "NaN" not in to_json(outcome)
     assert not (tmp_path / "out" / "small.png").exists()
 
 
 def test_a_torn_line_is_computed_again(tmp_path: Path) -> None:
     one = Small()
-    one.run(workspace_in(tmp_path, Settings(), plain))
+    one.run(workspace_in(tmp_path, ExperimentSettings(), plain))
     kept = tmp_path / "results.jsonl"
     kept.write_bytes(kept.read_bytes()[:-9])
-    one.run(workspace_in(tmp_path, Settings(), plain))
+    one.run(workspace_in(tmp_path, ExperimentSettings(), plain))
     assert one.computed == 2
-    one.run(workspace_in(tmp_path, Settings(), plain))
+    one.run(workspace_in(tmp_path, ExperimentSettings(), plain))
     assert one.computed == 2
 
 
 def test_sets_to_choose_on_are_not_those_that_are_reported() -> None:
-    settings = Settings(seed=7, share=0.1)
+    settings = ExperimentSettings(seed=7, share=0.1)
     assert settings.tuning_seed != settings.seed and (settings.count(40), settings.count(3)) == (
         4,
         2,
     )
     with pytest.raises(UsageError):
-        Settings(share=101)
+        ExperimentSettings(share=101)

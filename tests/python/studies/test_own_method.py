@@ -27,8 +27,8 @@ import json
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.compare.methods import own_methods
-from eitskin_studies.compare.run import Settings, compare
-settings = Settings(scenes=3, train_scenes=3, elements=900, simulated_elements=1500)
+from eitskin_studies.compare.run import CompareSettings, compare
+settings = CompareSettings(scenes=3, train_scenes=3, elements=900, simulated_elements=1500)
 done = compare(paper_skin(), adjacent(16), settings, families=own_methods)
 print(json.dumps([[one.name, one.value, one.miou_summary.mean] for one in done.results]))
 """

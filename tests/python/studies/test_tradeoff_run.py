@@ -28,10 +28,10 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.tuning.configuration import Configuration
 from eitskin.tuning.front import Conditions, Front, front_from
-from eitskin_studies.harness.sessions import Session, copied
+from eitskin_studies.harness.sessions import FrameSession, copied
 from eitskin_studies.tradeoff.fronts import as_dict, to_json
 from eitskin_studies.tradeoff.run import RESULTS, RunSettings, run
-from eitskin_studies.tradeoff.scene_sets import SETS, Workshop
+from eitskin_studies.tradeoff.scene_sets import SETS, SceneFactory
 from eitskin_studies.tradeoff.table import best_points, to_csv, to_text
 
 ELEMENTS = 1200
@@ -189,8 +189,8 @@ def test_a_killed_command_goes_on(tmp_path: Path) -> None:
     assert finished("cut") == finished("whole")
 
 
-def session(name: str, count: int = 3) -> Session:
-    return Workshop(paper_skin(), adjacent(16), 5, ELEMENTS).session(name, count, plain)
+def session(name: str, count: int = 3) -> FrameSession:
+    return SceneFactory(paper_skin(), adjacent(16), 5, ELEMENTS).session(name, count, plain)
 
 
 def test_random_scenes_are_those_of_compare() -> None:

@@ -12,8 +12,8 @@ pytest.importorskip("scipy")
 
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.packets import Solved, SolvedImage
-from eitskin.scene.random_touches import Touch
-from eitskin.scoring.stream_check import Seen
+from eitskin.scene.random_touches import TrueTouch
+from eitskin.scoring.stream_check import ComparedFrame
 from eitskin.view.stream_picture import MAX_KEPT, MAX_PANELS, Album, draw_stream
 from small_models import prebuilt
 
@@ -23,12 +23,12 @@ SOLVED = Solved(
 )
 
 
-def seen(number: int) -> Seen:
+def seen(number: int) -> ComparedFrame:
     values = np.zeros(812, dtype=np.float32)
     values[number % 812] = 1.0
-    return Seen(
+    return ComparedFrame(
         LiveFrame(number, 1000 * number, 0, image=SolvedImage(SOLVED, values)),
-        true=(Touch(0.0, 0.0, 9.0, 5.0),),
+        true=(TrueTouch(0.0, 0.0, 9.0, 5.0),),
     )
 
 

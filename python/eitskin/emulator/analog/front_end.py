@@ -14,7 +14,7 @@ import numpy.typing as npt
 from eitskin.emulator.analog.ad9833 import Ad9833
 from eitskin.emulator.analog.adg1206 import Multiplexers, Switching
 from eitskin.emulator.analog.converter import codes
-from eitskin.emulator.analog.skin import Skin
+from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.clocktime import TICKS_PER_S
 
 TAU_TICKS = 1.5e-6 * TICKS_PER_S
@@ -26,7 +26,7 @@ class FrontEnd:
     """``connected`` tells whether the converter's pin is in analog mode. ``before_switch`` lets
     pending samples be taken."""
 
-    def __init__(self, generator: Ad9833, multiplexers: Multiplexers, skin: Skin) -> None:
+    def __init__(self, generator: Ad9833, multiplexers: Multiplexers, skin: AnalogSkin) -> None:
         self.generator, self.multiplexers, self.skin = generator, multiplexers, skin
         self.connected: Callable[[], bool] = lambda: True
         self.before_switch: Callable[[], None] = lambda: None

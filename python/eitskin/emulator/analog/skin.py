@@ -26,7 +26,7 @@ FloatArray = npt.NDArray[np.float64]
 Joined = tuple[int | None, int | None, int | None, int | None]
 
 
-class Skin:
+class AnalogSkin:
     """``quiet_v`` (q, m) and ``frames_v`` (n, m): amplitudes in V, in the rows of ``protocol``, for
     its current."""
 

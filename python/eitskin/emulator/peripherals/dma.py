@@ -32,7 +32,7 @@ REQUESTS = {
 }
 
 
-class Stream:
+class DmaStream:
     """One stream of a DMA."""
 
     def __init__(self, dma: Dma, number: int) -> None:
@@ -156,12 +156,12 @@ class Dma:
 
     def reset(self) -> None:
         """As after a reset."""
-        self.streams = [Stream(self, k) for k in range(8)]
+        self.streams = [DmaStream(self, k) for k in range(8)]
         self._flags = [0] * 8
         for irq in IRQS[self.number]:
             self._nvic.set_line(irq, False)
 
-    def serving(self, request: str, direction: int) -> Stream | None:
+    def serving(self, request: str, direction: int) -> DmaStream | None:
         """The enabled stream that ``request`` is routed to."""
         if not self.clocked():
             return None
@@ -209,7 +209,7 @@ class Dma:
             self._stream_write(self.streams[number], register // 4, value)
         self.stream_changed()
 
-    def _stream_write(self, one: Stream, register: int, value: int) -> None:
+    def _stream_write(self, one: DmaStream, register: int, value: int) -> None:
         if register == 0:
             self._set_control(one, value)
         elif one.enabled and not (one.control & DBM and register in (3, 4)):
@@ -229,7 +229,7 @@ class Dma:
             if value & 4:
                 self._record.unmodelled[f"{self.name}: FIFO mode"] += 1
 
-    def _set_control(self, one: Stream, value: int) -> None:
+    def _set_control(self, one: DmaStream, value: int) -> None:
         starts = value & EN and not one.enabled
         if one.enabled:
             free = EN | DMEIE | TEIE | HTIE | TCIE
@@ -243,7 +243,7 @@ class Dma:
             one.control &= ~EN
             self._start(one)
 
-    def _start(self, one: Stream) -> None:
+    def _start(self, one: DmaStream) -> None:
         if self._flags[one.number]:
             self._record.hazards[
                 f"{self.name}: stream {one.number} enabled with flags standing"

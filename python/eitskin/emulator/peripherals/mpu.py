@@ -19,7 +19,7 @@ MAX_WATCHED = 4096
 
 
 @dataclass
-class Region:
+class MpuRegion:
     """RBAR and RASR of a region."""
 
     base: int = 0
@@ -64,11 +64,11 @@ class Mpu:
     def reset(self) -> None:
         """As after a reset."""
         self._control = self._number = 0
-        self._regions = [Region() for _ in range(REGIONS)]
+        self._regions = [MpuRegion() for _ in range(REGIONS)]
         self._watched: list[tuple[int, bytes]] = []
         self._follow()
 
-    def region(self, address: int) -> Region | None:
+    def region(self, address: int) -> MpuRegion | None:
         """The region that counts at ``address``; None: the MPU is off, or has nothing to say."""
         if not self._control & 1:
             return None

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from eitskin.emulator.clocktime import BoardClock, period_ticks
-from eitskin.emulator.peripherals.dma import FROM_MEMORY, TO_MEMORY, Dma, Stream
+from eitskin.emulator.peripherals.dma import FROM_MEMORY, TO_MEMORY, Dma, DmaStream
 from eitskin.emulator.peripherals.nvic import Nvic
 from eitskin.emulator.peripherals.rcc import Rcc
 from eitskin.emulator.peripherals.registers import Registers
@@ -87,7 +87,7 @@ class Usart(Registers):
         self._flags = TC
         self._shift_free_at = 0  # when all that was given has left
         self._served_from = 0  # since when a stream is there to send
-        self._stream: Stream | None = None
+        self._stream: DmaStream | None = None
         self._idle_at = NEVER
 
     # ---- sending: a byte lies in the transmit register until the shifter is free, which takes it
@@ -114,7 +114,7 @@ class Usart(Registers):
             data = resampled(data, self.frame_ticks, self.line.frame_ticks)
         self.line.from_board(data, start, self.frame_ticks)
 
-    def _sending_stream(self) -> Stream | None:
+    def _sending_stream(self) -> DmaStream | None:
         """The stream that sends, if one does."""
         if not (self._sends and self.values[CR3] & DMAT):
             return None

@@ -9,7 +9,7 @@ import numpy as np
 
 from eitskin.frames.doctor.case import BoolArray, Case, FloatArray, numbers
 from eitskin.frames.doctor.remedy import channel_remedy
-from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 
 MIN_TIES = 4
 TIES_PER_USUAL = 4.0
@@ -17,7 +17,7 @@ SAME = 1e-9
 MIN_QUIET = 4
 
 
-def check_clipping(case: Case) -> tuple[Case, Outcome]:
+def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
     """Name channels at a rail, in quiet frames or others, and channels that are stuck."""
     frames = np.vstack([case.frames.reference_voltage_v, case.frames.voltage_v])
     railed = at_rail(np.where(np.isfinite(frames), frames, 0.0))
@@ -58,7 +58,7 @@ def check_clipping(case: Case) -> tuple[Case, Outcome]:
             )
         )
         trusted = trusted & ~stuck
-    return replace(case, trusted=trusted), Outcome(tuple(findings))
+    return replace(case, trusted=trusted), CheckOutcome(tuple(findings))
 
 
 def at_rail(frames: FloatArray) -> BoolArray:

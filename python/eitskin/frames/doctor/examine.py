@@ -17,7 +17,7 @@ from eitskin.frames.doctor.order import check_flips, check_frames, check_sign, c
 from eitskin.frames.doctor.orientation import check_orientation
 from eitskin.frames.doctor.reciprocity import check_reciprocity
 from eitskin.frames.doctor.remedy import combined_remedy, names_numbers
-from eitskin.frames.doctor.report import Outcome, Report
+from eitskin.frames.doctor.report import CheckOutcome, Report
 from eitskin.frames.doctor.subject import Subject
 from eitskin.frames.doctor.swaps import check_swaps
 from eitskin.frames.doctor.wiring import check_lost, check_wiring
@@ -45,7 +45,7 @@ def examine(subject: Subject) -> Report:
 def examine_case(subject: Subject) -> tuple[Report, Case]:
     """As ``examine``, with the case as the checks left it (for the picture)."""
     cases: list[Case] = []
-    finite = Outcome()
+    finite = CheckOutcome()
     for _, frames in subject.readings:
         case, outcome = check_finite(_case(frames, subject))
         finite = finite if cases else outcome
@@ -62,7 +62,7 @@ def examine_case(subject: Subject) -> tuple[Report, Case]:
     case, clipping = check_clipping(case)
     case, wiring = check_wiring(case)
     if case.joined:
-        untold = Outcome(
+        untold = CheckOutcome(
             untold=("gains, single channels and numbering: part the joined electrodes first",)
         )
         outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case), untold]
@@ -102,7 +102,7 @@ def _case(frames: Frames, subject: Subject) -> Case:
     )
 
 
-def _report(subject: Subject, case: Case, outcomes: list[Outcome]) -> Report:
+def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Report:
     findings = tuple(finding for outcome in outcomes for finding in outcome.findings)
     untold = (*subject.remarks, *(text for outcome in outcomes for text in outcome.untold))
     if any(finding.name == "numbering" for finding in findings):

@@ -8,10 +8,10 @@ import numpy as np
 
 from eitskin.frames.doctor.case import Case, numbers, rms
 from eitskin.frames.doctor.remedy import channel_remedy
-from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 
 
-def check_finite(case: Case) -> tuple[Case, Outcome]:
+def check_finite(case: Case) -> tuple[Case, CheckOutcome]:
     """NaN and Inf by channel and frame, and a reference that is all zero; such channels are no
     longer trusted."""
     quiet, frames = case.frames.reference_voltage_v, case.frames.voltage_v
@@ -38,4 +38,4 @@ def check_finite(case: Case) -> tuple[Case, Outcome]:
     if rms(case.reference[trusted]) == 0:
         text = "the reference frame is zero everywhere: no current, or a wrong array"
         findings.append(Finding("no-signal", FAULT, text))
-    return replace(case, trusted=trusted), Outcome(tuple(findings))
+    return replace(case, trusted=trusted), CheckOutcome(tuple(findings))

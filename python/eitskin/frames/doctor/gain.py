@@ -21,7 +21,7 @@ from eitskin.frames.doctor.case import (
     short_list,
 )
 from eitskin.frames.doctor.remedy import channel_remedy
-from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 
 WEAK_PER_RMS = 0.02
 OUTLIER = 0.25
@@ -54,18 +54,18 @@ def outliers(case: Case) -> BoolArray:
     return np.asarray(strong & (np.abs(gain - 1) > limit))
 
 
-def check_resemblance(case: Case) -> Outcome:
+def check_resemblance(case: Case) -> CheckOutcome:
     """Whether the reference looks like a homogeneous skin at all."""
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     size = np.abs(predicted)
     if size.size < MIN_CHANNELS or np.ptp(size) <= SAME * size.max():
-        return Outcome(
+        return CheckOutcome(
             untold=("whether this is a homogeneous skin: too few channels, or all alike",)
         )
     reached = correlation(np.abs(measured), size)
     summary = {"reference_correlation": round(reached, 4)}
     if reached >= FOREIGN_BELOW or rms(measured) == 0:
-        return Outcome(measured=summary)
+        return CheckOutcome(measured=summary)
     finding = Finding(
         "unlike-a-homogeneous-skin",
         FAULT,
@@ -74,10 +74,10 @@ def check_resemblance(case: Case) -> Outcome:
         " rows, import it with that",
         {"correlation": round(reached, 4), "least": FOREIGN_BELOW},
     )
-    return Outcome((finding,), measured=summary)
+    return CheckOutcome((finding,), measured=summary)
 
 
-def check_gain(case: Case) -> tuple[Case, Outcome]:
+def check_gain(case: Case) -> tuple[Case, CheckOutcome]:
     """Single channels that are off, drive or measuring pairs that are off, and the spread of all.
 
     The gain of a channel is its reference over the expected homogeneous value; the spread is 1.4826
@@ -85,7 +85,7 @@ def check_gain(case: Case) -> tuple[Case, Outcome]:
     """
     gain, strong = channel_gains(case)
     if strong.sum() < 4:
-        return case, Outcome(untold=("gains: too few channels are left",))
+        return case, CheckOutcome(untold=("gains: too few channels are left",))
     spread = robust_spread(gain[strong])
     measured = {"gain_spread": round(spread, 4)}
     findings = _pair_findings(case, gain, strong, spread)
@@ -124,31 +124,33 @@ def check_gain(case: Case) -> tuple[Case, Outcome]:
                 "--equalise" if fault else "",
             )
         )
-    return replace(case, trusted=case.trusted & ~off), Outcome(tuple(findings), measured=measured)
+    return replace(case, trusted=case.trusted & ~off), CheckOutcome(
+        tuple(findings), measured=measured
+    )
 
 
-def check_unit(case: Case, unit_known: bool) -> Outcome:
+def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
     """Whether the numbers can be volts, where the skin's conductivity and the current are known."""
     if case.skin is None:
-        return Outcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
+        return CheckOutcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
     if not case.trusted.any():
-        return Outcome()
+        return CheckOutcome()
     scale = float(np.median(np.abs(case.reference[case.trusted])))
     predicted = (
         float(np.median(np.abs(case.predicted[case.trusted]))) * case.frames.protocol.current_a
     )
     if scale == 0:
-        return Outcome()
+        return CheckOutcome()
     ratio = scale / predicted
     measured = {"reference_per_predicted": float(f"{ratio:.4g}")}
     if 1 / UNIT_OFF < ratio < UNIT_OFF:
-        return Outcome(measured=measured)
+        return CheckOutcome(measured=measured)
     said = "the numbers are said to be volts" if unit_known else "the source's unit is not known"
     text = (
         f"the reference is {ratio:.3g} times what skin {case.skin.name!r} gives at "
         f"{case.frames.protocol.current_a:g} A; {said}: check unit, gain, current and conductivity"
     )
-    return Outcome((Finding("unit", NOTE, text, measured, ""),), measured=measured)
+    return CheckOutcome((Finding("unit", NOTE, text, measured, ""),), measured=measured)
 
 
 def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: float) -> list[Finding]:

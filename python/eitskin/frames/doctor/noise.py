@@ -20,7 +20,7 @@ from eitskin.frames.doctor.case import (
     strength_groups,
 )
 from eitskin.frames.doctor.remedy import channel_remedy
-from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.orders import touching
 
 MIN_QUIET = 4
@@ -38,12 +38,12 @@ def channel_noise(quiet: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((np.diff(quiet, axis=0) ** 2).mean(axis=0) / 2))
 
 
-def check_noise(case: Case) -> Outcome:
+def check_noise(case: Case) -> CheckOutcome:
     """Noisy channels, a low SNR, drift."""
     quiet = case.frames.reference_voltage_v
     quiet = quiet[np.isfinite(quiet[:, case.trusted]).all(axis=1)]
     if len(quiet) < MIN_QUIET:
-        return Outcome(
+        return CheckOutcome(
             untold=(
                 (
                     f"noise, SNR and drift: {len(quiet)} quiet frame(s), they need at least"
@@ -55,7 +55,7 @@ def check_noise(case: Case) -> Outcome:
     noise = channel_noise(quiet[:, trusted])
     level, sigma = rms(case.reference[trusted]), rms(noise)
     if sigma == 0 or level == 0:
-        return Outcome(untold=("noise and SNR: the quiet frames are all the same",))
+        return CheckOutcome(untold=("noise and SNR: the quiet frames are all the same",))
     usual = np.maximum(_usual_noise(case, noise), np.median(noise) / NOISY_TIMES)
     noisy = (
         noise > NOISY_TIMES * usual if np.median(noise) > 0 else np.zeros(len(noise), dtype=bool)
@@ -119,7 +119,7 @@ def check_noise(case: Case) -> Outcome:
                 },
             )
         )
-    return Outcome(tuple(findings), measured=measured)
+    return CheckOutcome(tuple(findings), measured=measured)
 
 
 def _usual_noise(case: Case, noise: FloatArray) -> FloatArray:

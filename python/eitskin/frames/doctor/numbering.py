@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eitskin.frames.doctor.case import Case, FloatArray, correlation
-from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.homogeneous import voltages_of
 from eitskin.frames.orders import electrode_map, relabel
 
@@ -76,7 +76,7 @@ def best_likeness(case: Case) -> float:
     return float(_likeness(case, renumbered_frames(case, case.transfer_ohm)).max())
 
 
-def check_numbering(case: Case) -> tuple[Case, Outcome]:
+def check_numbering(case: Case) -> tuple[Case, CheckOutcome]:
     """Whether another numbering fits the quiet frame clearly better; the case comes back with its
     rows renumbered.
 
@@ -88,7 +88,7 @@ def check_numbering(case: Case) -> tuple[Case, Outcome]:
         [[correlation(np.abs(case.predicted), np.abs(frame)) for frame in side] for side in frames]
     )
     if (alike >= SAME_FRAME).all():
-        return case, Outcome(untold=(ALL_ALIKE,))
+        return case, CheckOutcome(untold=(ALL_ALIKE,))
     order = ranked(_likeness(case, frames))
     given, best = next(numbering for numbering in order if numbering.given), order[0]
     measured = {
@@ -100,14 +100,14 @@ def check_numbering(case: Case) -> tuple[Case, Outcome]:
             other for other in ranked(alike) if other.fit >= SAME_FRAME and not other.given
         ]
         text = f"whether {' or '.join(map(str, like_given[:SHOWN]))}: the quiet frame is the same"
-        return case, Outcome(untold=(text,) if like_given else (), measured=measured)
+        return case, CheckOutcome(untold=(text,) if like_given else (), measured=measured)
     text = (
         f"the quiet frame fits the skin's shape when the electrodes are renumbered ({best}), not as"
         " they are"
     )
     rows = relabel(case.rows, electrode_map(case.n_electrodes, best.rotate, best.mirror))
     finding = Finding("numbering", FAULT, text, measured["numbering_by_quiet_frame"], best.option)
-    return replace(case, rows=rows), Outcome((finding,), measured=measured)
+    return replace(case, rows=rows), CheckOutcome((finding,), measured=measured)
 
 
 def _likeness(case: Case, frames: FloatArray) -> FloatArray:

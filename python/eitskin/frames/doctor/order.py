@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.frames.doctor.case import SAME, Case, FloatArray, cosine, numbers, rms
-from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.doctor.subject import AS_GIVEN
 from eitskin.frames.doctor.swaps import likeness
 
@@ -25,7 +25,7 @@ class OrderChoice:
     """The order whose magnitudes follow the prediction best, and what the others reach."""
 
     best: int
-    outcome: Outcome
+    outcome: CheckOutcome
 
 
 def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -> OrderChoice:
@@ -40,7 +40,7 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
     size = np.abs(cases[0].predicted)
     if said >= 0 and np.ptp(size) <= SAME * size.max():
         return OrderChoice(
-            said, Outcome(untold=("the channel order: the protocol makes all channels alike",))
+            said, CheckOutcome(untold=("the channel order: the protocol makes all channels alike",))
         )
     reached = [likeness(case, allow_fault=False) for case in cases]
     if max(reached) < LIKELY:
@@ -51,7 +51,7 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
     }
     measured: dict[str, Any] = {"order_correlation": evidence}
     if said >= 0 and (best == said or reached[best] < max(reached[said] + BETTER_BY, LIKELY)):
-        return OrderChoice(said, Outcome(measured=measured))
+        return OrderChoice(said, CheckOutcome(measured=measured))
     why = "by their number" if said < 0 else "by correlation with the homogeneous frame"
     named = "the order given" if given == AS_GIVEN else f"{given}"
     finding = Finding(
@@ -61,10 +61,10 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
         {"correlation": evidence},
         f"--order {orders[best]}",
     )
-    return OrderChoice(best, Outcome((finding,), measured=measured))
+    return OrderChoice(best, CheckOutcome((finding,), measured=measured))
 
 
-def check_frames(case: Case) -> Outcome:
+def check_frames(case: Case) -> CheckOutcome:
     """Frames that are no small change of the reference: another quantity (imaginary parts, times),
     or another unit."""
     likeness = np.array(
@@ -75,7 +75,7 @@ def check_frames(case: Case) -> Outcome:
     )
     odd = np.flatnonzero(likeness < UNLIKE)
     if not len(odd):
-        return Outcome()
+        return CheckOutcome()
     names = [case.frames.frame_name[k] for k in odd]
     finding = Finding(
         "frames-unlike-the-reference",
@@ -85,10 +85,10 @@ def check_frames(case: Case) -> Outcome:
         " --voltage",
         {"frames": names, "cosine": [round(float(v), 4) for v in likeness[odd]]},
     )
-    return Outcome((finding,))
+    return CheckOutcome((finding,))
 
 
-def check_sign(case: Case) -> tuple[Case, Outcome]:
+def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
     """Reversed polarity, or magnitudes only; the case comes back with the signs repaired.
 
     Where the homogeneous frame has both signs, magnitudes show by having one. Where it has only one
@@ -98,7 +98,7 @@ def check_sign(case: Case) -> tuple[Case, Outcome]:
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     level = rms(measured)
     if level == 0:
-        return case, Outcome()
+        return case, CheckOutcome()
     limit = OPPOSITE_PER_RMS * level
     energy = float((predicted**2).sum())
     positive_share = float((predicted[predicted > 0] ** 2).sum()) / max(energy, 1e-300)
@@ -121,7 +121,7 @@ def check_sign(case: Case) -> tuple[Case, Outcome]:
             " magnitudes"
         )
         finding = Finding("magnitude", FAULT, text, evidence, "--sign magnitude")
-        return signed_as_predicted(case), Outcome((finding,))
+        return signed_as_predicted(case), CheckOutcome((finding,))
     if cosine(measured, predicted) < 0:
         if some_negative or mixed:
             text = "every channel has the opposite sign: V+ and V- (or I+ and I-) are exchanged"
@@ -133,24 +133,24 @@ def check_sign(case: Case) -> tuple[Case, Outcome]:
                 " options repair it alike"
             )
             finding = Finding("reversed-or-magnitude", FAULT, text, evidence, "--sign reversed")
-        return _negated(case), Outcome((finding,))
+        return _negated(case), CheckOutcome((finding,))
     if not mixed and positive_share > 0.5 and not some_negative:
-        return case, Outcome(
+        return case, CheckOutcome(
             untold=(
                 "whether these are magnitudes: the homogeneous frame is above 0 everywhere, too",
             )
         )
-    return case, Outcome()
+    return case, CheckOutcome()
 
 
-def check_flips(case: Case) -> tuple[Case, Outcome]:
+def check_flips(case: Case) -> tuple[Case, CheckOutcome]:
     """Single channels of the wrong sign, where the prediction is above a fifth of its rms."""
     predicted, expected = case.predicted, case.expected()
     ratio = np.divide(case.reference, expected, out=np.ones_like(expected), where=expected != 0)
     wrong = case.trusted & (np.abs(predicted) > 0.2 * rms(predicted)) & (ratio < -0.5)
     channels = numbers(np.flatnonzero(wrong))
     if not channels or case.magnitude:
-        return case, Outcome()
+        return case, CheckOutcome()
     drives = _whole_pairs(case, wrong, (0, 1)) | _whole_pairs(case, wrong, (2, 3))
     about = f"; all of {', '.join(sorted(drives))}" if drives else ""
     finding = Finding(
@@ -166,7 +166,7 @@ def check_flips(case: Case) -> tuple[Case, Outcome]:
         voltage_v=case.frames.voltage_v * sign,
         reference_voltage_v=case.frames.reference_voltage_v * sign,
     )
-    return replace(case, frames=frames), Outcome((finding,))
+    return replace(case, frames=frames), CheckOutcome((finding,))
 
 
 def _finite_frames(case: Case) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 from eitskin.frames.doctor.case import Case, FloatArray, cosine, rms
 from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
 from eitskin.frames.doctor.numbering import Numbering, ranked, renumbered_frames
-from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.homogeneous import touch_transfer
 
 LIKELY = 0.7
@@ -22,21 +22,21 @@ AUDIBLE = 3.0
 SHOWN = 3
 
 
-def check_orientation(case: Case, untold: tuple[str, ...]) -> Outcome:
+def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
     """Hold the changes by known touches against every numbering; ``untold`` is what the quiet frame
     could not tell."""
     frames, skin = case.frames, case.skin
     if frames.touch_frame is None:
-        return Outcome(
+        return CheckOutcome(
             untold=tuple(f"{text}: say where a touch was (--touch X,Y)" for text in untold)
         )
     if skin is None:
-        return Outcome(
+        return CheckOutcome(
             untold=tuple(f"{text}: known touches need the skin (--skin)" for text in untold)
         )
     measured, transfers = _changes(case)
     if not measured:
-        return Outcome(
+        return CheckOutcome(
             untold=tuple(f"{text}: the known touches have no sign or no change" for text in untold)
         )
     size = np.abs(case.predicted)
@@ -48,26 +48,30 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> Outcome:
     summary = {"numbering_by_touch": evidence}
     if best.fit < LIKELY:
         if _drowned(case, measured, weight):
-            return Outcome(untold=("the known touches change the voltages by less than the noise",))
+            return CheckOutcome(
+                untold=("the known touches change the voltages by less than the noise",)
+            )
         text = (
             "the known touches do not explain the change in any numbering: wrong places, signs or"
             " frames"
         )
-        return Outcome((Finding("touch-unexplained", NOTE, text, evidence),), measured=summary)
+        return CheckOutcome((Finding("touch-unexplained", NOTE, text, evidence),), measured=summary)
     rivals = [
         numbering
         for numbering in order
         if 1 - numbering.fit <= (1 - best.fit) * RIVAL_TIMES + CLOSE
     ]
     if given in rivals:
-        return Outcome(untold=_also(given, rivals), measured=summary)
+        return CheckOutcome(untold=_also(given, rivals), measured=summary)
     text = (
         f"known touches are seen where they were if the electrodes are renumbered ({best}), not as"
         " given"
     )
     if len(rivals) > 1:
         text += f"; {rivals[1]} fits nearly as well, a second touch would tell"
-    return Outcome((Finding("numbering", FAULT, text, evidence, best.option),), measured=summary)
+    return CheckOutcome(
+        (Finding("numbering", FAULT, text, evidence, best.option),), measured=summary
+    )
 
 
 def _changes(case: Case) -> tuple[list[FloatArray], list[FloatArray]]:

@@ -8,7 +8,7 @@ import numpy as np
 from eitskin.frames.doctor.case import Case, rms, short_list
 from eitskin.frames.doctor.gain import channel_gains
 from eitskin.frames.doctor.remedy import channel_remedy
-from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 
 PAIR_FLOOR_PER_RMS = 0.1
 PAIR_OFF = 0.25
@@ -20,7 +20,7 @@ MIN_PAIRS = 8
 WORST = 5
 
 
-def check_reciprocity(case: Case) -> Outcome:
+def check_reciprocity(case: Case) -> CheckOutcome:
     """Reciprocity error of each pair |Vi - s Vj| / max(mean(|Vi|, |Vj|), 0.1 rms), and of all:
     rms(Vi - s Vj) / rms(V).
 
@@ -32,11 +32,13 @@ def check_reciprocity(case: Case) -> Outcome:
     )
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
     if not len(first):
-        return Outcome(untold=("reciprocity: the protocol has no two channels of one voltage",))
+        return CheckOutcome(
+            untold=("reciprocity: the protocol has no two channels of one voltage",)
+        )
     reference = case.reference
     level = rms(reference[case.trusted])
     if level == 0:
-        return Outcome()
+        return CheckOutcome()
     difference = reference[first] - sign * reference[second]
     size = (np.abs(reference[first]) + np.abs(reference[second])) / 2
     error = np.abs(difference) / np.maximum(size, PAIR_FLOOR_PER_RMS * level)
@@ -87,4 +89,4 @@ def check_reciprocity(case: Case) -> Outcome:
                 },
             )
         )
-    return Outcome(tuple(findings), measured=measured)
+    return CheckOutcome(tuple(findings), measured=measured)

@@ -31,7 +31,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CheckOutcome:
     """What one check returns: ``findings``, ``untold`` what it could not tell and why, ``measured``
     numbers by name."""
 

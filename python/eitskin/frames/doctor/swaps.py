@@ -16,7 +16,7 @@ import numpy as np
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.misfit import best_joined, misfit, misfits
 from eitskin.frames.doctor.numbering import best_likeness
-from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.homogeneous import voltages_of
 from eitskin.frames.orders import relabel, swap_map, touching
 
@@ -28,7 +28,7 @@ MAX_SWAPS = 6
 
 
 @dataclass(frozen=True)
-class Exchange:
+class ElectrodeSwap:
     """``pairs`` of electrodes exchanged one after the other, and the misfit ``before`` and
     ``after``."""
 
@@ -42,7 +42,7 @@ class Exchange:
         return bool(self.pairs) and self.after <= GOOD and self.after * BETTER_TIMES <= self.before
 
 
-def best_exchange(case: Case) -> Exchange:
+def best_exchange(case: Case) -> ElectrodeSwap:
     """The exchange that greedy search finds for ``case``; signs do not enter."""
 
     n, use = case.n_electrodes, case.trusted
@@ -60,16 +60,16 @@ def best_exchange(case: Case) -> Exchange:
             break
         best, rows = float(left[k]), exchanged[k][rows]
         pairs.append((int(tried[k, 0]), int(tried[k, 1])))
-    return Exchange(tuple(pairs), before, best)
+    return ElectrodeSwap(tuple(pairs), before, best)
 
 
-def check_swaps(case: Case) -> tuple[Case, Outcome]:
+def check_swaps(case: Case) -> tuple[Case, CheckOutcome]:
     """Name exchanged electrodes; the case comes back with its rows renamed."""
     exchange = best_exchange(case)
     if not exchange.convincing:
-        return case, Outcome()
+        return case, CheckOutcome()
     if best_joined(case, magnitude=True).misfit < exchange.after:
-        return case, Outcome()
+        return case, CheckOutcome()
     named = " and then ".join(f"{i} and {j}" for i, j in exchange.pairs)
     finding = Finding(
         "swapped-electrodes",
@@ -82,10 +82,10 @@ def check_swaps(case: Case) -> tuple[Case, Outcome]:
         },
         " ".join(f"--swap {i},{j}" for i, j in exchange.pairs),
     )
-    return renamed(case, exchange), Outcome((finding,))
+    return renamed(case, exchange), CheckOutcome((finding,))
 
 
-def renamed(case: Case, exchange: Exchange) -> Case:
+def renamed(case: Case, exchange: ElectrodeSwap) -> Case:
     """The case with its rows named as after ``exchange``."""
     return replace(case, rows=relabel(case.rows, swap_map(case.n_electrodes, exchange.pairs)))
 

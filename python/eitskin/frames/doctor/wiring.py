@@ -17,7 +17,7 @@ import numpy as np
 from eitskin.frames.doctor.case import Case, FloatArray, numbers
 from eitskin.frames.doctor.gain import channel_gains, outliers
 from eitskin.frames.doctor.misfit import Joined, best_joined, misfit
-from eitskin.frames.doctor.report import FAULT, Finding, Outcome
+from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.orders import touching
 
 MIN_OUTLIERS = 4
@@ -40,7 +40,7 @@ class Dead:
     misfit: float
 
 
-def check_wiring(case: Case) -> tuple[Case, Outcome]:
+def check_wiring(case: Case) -> tuple[Case, CheckOutcome]:
     """Name faults while one explains the channels that stand out: dead electrodes, or one short
     circuit.
 
@@ -63,10 +63,10 @@ def check_wiring(case: Case) -> tuple[Case, Outcome]:
             case, finding = _with_joined(case, joined, before)
             findings.append(finding)
         break
-    return case, Outcome(tuple(findings))
+    return case, CheckOutcome(tuple(findings))
 
 
-def check_lost(case: Case) -> Outcome:
+def check_lost(case: Case) -> CheckOutcome:
     """Electrodes that drive in the quiet frames, but no longer in some of the others."""
     gain, strong = channel_gains(case)
     usable = strong & (np.abs(gain) > LOST)
@@ -95,7 +95,7 @@ def check_lost(case: Case) -> Outcome:
                     f"--drop-electrodes {electrode}",
                 )
             )
-    return Outcome(tuple(findings))
+    return CheckOutcome(tuple(findings))
 
 
 def _best_dead(case: Case) -> Dead | None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 
 NAME = "adc"
@@ -41,7 +41,7 @@ class Parameters:
             raise ConfigError("range_v: give either range_v or headroom")
 
 
-def range_v(parameters: Parameters, session: Session) -> float:
+def range_v(parameters: Parameters, session: EffectSession) -> float:
     """The converter's range in V."""
     if parameters.range_v is not None:
         return parameters.range_v
@@ -55,7 +55,7 @@ def codes(v: Voltages, lsb_v: float, bits: int) -> Voltages:
     return np.asarray(np.clip(np.round(v / lsb_v), -half, half - 1))
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Rounds every row."""
     span_v = range_v(parameters, session)
     lsb_v = 2 * span_v / 2**parameters.bits
@@ -64,4 +64,4 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         return np.asarray(codes(v, lsb_v, parameters.bits) * lsb_v)
 
     note = f"{parameters.bits} bits over +-{span_v:.3g} V, step {lsb_v:.3g} V"
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=3), note, apply)
+    return VoltageStep(NAME, STAGE, EffectCost(vector_passes_per_frame=3), note, apply)

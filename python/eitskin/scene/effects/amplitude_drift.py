@@ -13,7 +13,7 @@ from math import sqrt
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, FloatArray, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 
 NAME = "amplitude_drift"
@@ -34,7 +34,7 @@ class Parameters:
     )
 
 
-def walk(parameters: Parameters, session: Session) -> FloatArray:
+def walk(parameters: Parameters, session: EffectSession) -> FloatArray:
     """The random walk's value at each frame (n_frames,), 0 at the first. Draws nothing if it is
     still."""
     if parameters.walk_per_sqrt_min == 0:
@@ -44,7 +44,7 @@ def walk(parameters: Parameters, session: Session) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """One factor a frame."""
     ages_min = (session.times_s() - session.times_s()[0]) / 60
     factors = 1 + parameters.slope_per_min * ages_min + walk(parameters, session)
@@ -58,5 +58,5 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         f" {100 * parameters.walk_per_sqrt_min:g} % in a minute"
     )
     return VoltageStep(
-        NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=drawn), note, apply
+        NAME, STAGE, EffectCost(vector_passes_per_frame=1, random_numbers=drawn), note, apply
     )

@@ -15,7 +15,7 @@ from math import log, sqrt
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, FloatArray, MaterialStep, Session, Stage
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage
 from eitskin.scene.parameter import parameter
 
 NAME = "background"
@@ -55,7 +55,7 @@ def pattern(
     return np.asarray(factors / np.average(factors, weights=areas))
 
 
-def make(parameters: Parameters, session: Session) -> MaterialStep:
+def make(parameters: Parameters, session: EffectSession) -> MaterialStep:
     """One factor an element, drawn once."""
     mesh = session.mesh
     factors = pattern(mesh.centroids_mm(), mesh.areas_mm2, parameters, session.stream(NAME))
@@ -67,4 +67,4 @@ def make(parameters: Parameters, session: Session) -> MaterialStep:
         f"conductivity varies by {100 * parameters.spread:g} % over {parameters.length_mm:g} mm,"
         " its mean kept"
     )
-    return MaterialStep(NAME, Cost(random_numbers=3 * COSINES), note, apply)
+    return MaterialStep(NAME, EffectCost(random_numbers=3 * COSINES), note, apply)

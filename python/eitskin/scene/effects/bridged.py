@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Contacts, ContactStep, Cost, Session, Stage
+from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, Stage
 from eitskin.scene.parameter import parameter
 
 NAME = "bridged"
@@ -38,7 +38,7 @@ class Parameters:
             )
 
 
-def make(parameters: Parameters, session: Session) -> ContactStep:
+def make(parameters: Parameters, session: EffectSession) -> ContactStep:
     """Adds the bridges.
 
     Raises:
@@ -58,7 +58,7 @@ def make(parameters: Parameters, session: Session) -> ContactStep:
     joined = " - ".join(str(electrode) for electrode in parameters.electrodes)
     return ContactStep(
         NAME,
-        Cost(),
+        EffectCost(),
         f"electrodes {joined} (from 0) joined by {parameters.resistance_ohm:g} ohm",
         apply,
     )

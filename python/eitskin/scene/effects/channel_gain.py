@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, FloatArray, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import channels
 
@@ -32,14 +32,14 @@ class Parameters:
     )
 
 
-def gains(parameters: Parameters, session: Session) -> FloatArray:
+def gains(parameters: Parameters, session: EffectSession) -> FloatArray:
     """The gain of each row's channel, (m,)."""
     pairs, number = channels(session.protocol)
     drawn = session.stream(NAME).uniform(-parameters.spread, parameters.spread, len(pairs))
     return np.asarray((1 + drawn)[number])
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Multiplies each row by its channel's gain."""
     factors = gains(parameters, session)
 
@@ -49,5 +49,5 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
     count = len(channels(session.protocol)[0])
     note = f"{count} channels whose gains differ by up to {100 * parameters.spread:g} %"
     return VoltageStep(
-        NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=count), note, apply
+        NAME, STAGE, EffectCost(vector_passes_per_frame=1, random_numbers=count), note, apply
     )

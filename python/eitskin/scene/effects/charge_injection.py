@@ -21,7 +21,7 @@ from math import exp, expm1, isclose, pi
 import numpy as np
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Cost, FloatArray, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import switched
 
@@ -74,7 +74,7 @@ def kept_by_demodulator(parameters: Parameters) -> float:
     return at_start * decayed * 2 * omega / (window * (1 / tau**2 + omega**2))
 
 
-def charges_pc(parameters: Parameters, session: Session) -> FloatArray:
+def charges_pc(parameters: Parameters, session: EffectSession) -> FloatArray:
     """The charge of each electrode's switch on the lines V+ and V-, (2, L). Draws nothing without a
     spread."""
     count = session.skin.electrodes.count
@@ -86,7 +86,7 @@ def charges_pc(parameters: Parameters, session: Session) -> FloatArray:
     return charges
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Adds one constant to each row, drawn once."""
     plus, minus = session.protocol.drive_measure[:, 2:].T
     charges, moved = charges_pc(parameters, session), switched(session.protocol)
@@ -105,5 +105,5 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         " a row"
     )
     return VoltageStep(
-        NAME, STAGE, Cost(vector_passes_per_frame=1, random_numbers=drawn), note, apply
+        NAME, STAGE, EffectCost(vector_passes_per_frame=1, random_numbers=drawn), note, apply
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, LoadedStep, Loads, Session, Stage, Voltages
+from eitskin.scene.effect import EffectCost, EffectSession, LoadedStep, Loads, Stage, Voltages
 from eitskin.scene.parameter import parameter
 
 NAME = "common_mode"
@@ -43,7 +43,7 @@ def common_v(loads: Loads, ground: str) -> Voltages:
     return np.asarray(middle - loads.sink_v if ground == "sink" else middle)
 
 
-def make(parameters: Parameters, session: Session) -> LoadedStep:
+def make(parameters: Parameters, session: EffectSession) -> LoadedStep:
     """Adds what the amplifier does not reject."""
     passed = 10 ** (-parameters.cmrr_db / 20) * (-1 if parameters.inverted else 1)
 
@@ -51,4 +51,4 @@ def make(parameters: Parameters, session: Session) -> LoadedStep:
         return np.asarray(v + passed * common_v(loads, parameters.ground))
 
     note = f"CMRR {parameters.cmrr_db:g} dB, ground at the {parameters.ground}"
-    return LoadedStep(NAME, STAGE, Cost(vector_passes_per_frame=4), note, apply)
+    return LoadedStep(NAME, STAGE, EffectCost(vector_passes_per_frame=4), note, apply)

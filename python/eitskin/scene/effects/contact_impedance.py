@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Contacts, ContactStep, Cost, FloatArray, Session, Stage
+from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, FloatArray, Stage
 from eitskin.scene.parameter import parameter
 
 NAME = "contact_impedance"
@@ -41,7 +41,7 @@ class Parameters:
             raise ConfigError("spread = 1 would make ideal contacts by chance; it must be below 1")
 
 
-def impedances(parameters: Parameters, count: int, session: Session) -> FloatArray:
+def impedances(parameters: Parameters, count: int, session: EffectSession) -> FloatArray:
     """(count,) in ohm m2. Draws nothing without a spread."""
     if parameters.spread == 0:
         return np.full(count, parameters.mean_ohm_m2)
@@ -49,7 +49,7 @@ def impedances(parameters: Parameters, count: int, session: Session) -> FloatArr
     return np.asarray(parameters.mean_ohm_m2 * (1 + part))
 
 
-def make(parameters: Parameters, session: Session) -> ContactStep:
+def make(parameters: Parameters, session: EffectSession) -> ContactStep:
     """Every electrode's contact impedance, drawn once."""
     count = session.skin.electrodes.count
     impedance = impedances(parameters, count, session)
@@ -58,4 +58,6 @@ def make(parameters: Parameters, session: Session) -> ContactStep:
         return replace(contacts, impedance_ohm_m2=impedance)
 
     note = f"{parameters.mean_ohm_m2:g} ohm m2, differing by up to {100 * parameters.spread:g} %"
-    return ContactStep(NAME, Cost(random_numbers=count if parameters.spread else 0), note, apply)
+    return ContactStep(
+        NAME, EffectCost(random_numbers=count if parameters.spread else 0), note, apply
+    )

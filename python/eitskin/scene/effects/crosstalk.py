@@ -15,7 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, FloatArray, LoadedStep, Loads, Session, Stage, Voltages
+from eitskin.scene.effect import (
+    EffectCost,
+    EffectSession,
+    FloatArray,
+    LoadedStep,
+    Loads,
+    Stage,
+    Voltages,
+)
 from eitskin.scene.parameter import parameter
 from eitskin.skin.protocol import Protocol
 
@@ -45,7 +53,7 @@ def pick_up(protocol: Protocol) -> tuple[FloatArray, FloatArray]:
     return onto[:, 0].copy(), onto[:, 1].copy()
 
 
-def make(parameters: Parameters, session: Session) -> LoadedStep:
+def make(parameters: Parameters, session: EffectSession) -> LoadedStep:
     """Adds what comes through from the two driven wires."""
     part = 10 ** (parameters.coupling_db / 20)
     of_source, of_sink = (part * weight for weight in pick_up(session.protocol))
@@ -54,4 +62,4 @@ def make(parameters: Parameters, session: Session) -> LoadedStep:
         return np.asarray(v + of_source * loads.source_v + of_sink * loads.sink_v)
 
     note = f"{parameters.coupling_db:g} dB of a driven wire's potential onto the wires beside it"
-    return LoadedStep(NAME, STAGE, Cost(vector_passes_per_frame=4), note, apply)
+    return LoadedStep(NAME, STAGE, EffectCost(vector_passes_per_frame=4), note, apply)

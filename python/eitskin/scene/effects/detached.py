@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Contacts, ContactStep, Cost, Session, Stage
+from eitskin.scene.effect import Contacts, ContactStep, EffectCost, EffectSession, Stage
 from eitskin.scene.parameter import parameter
 
 NAME = "detached"
@@ -48,7 +48,7 @@ def is_off(time_s: float, parameters: Parameters) -> bool:
     return came_off and (parameters.until_s is None or time_s < parameters.until_s)
 
 
-def make(parameters: Parameters, session: Session) -> ContactStep:
+def make(parameters: Parameters, session: EffectSession) -> ContactStep:
     """Marks the electrodes while they are off.
 
     Raises:
@@ -75,4 +75,6 @@ def make(parameters: Parameters, session: Session) -> ContactStep:
 
     named = ", ".join(str(electrode) for electrode in parameters.electrodes)
     note = f"electrode {named} (from 0) off: {np.count_nonzero(lost)} of {len(lost)} rows read 0 V"
-    return ContactStep(NAME, Cost(factorisations=1 if varies else 0), note, apply, varies=varies)
+    return ContactStep(
+        NAME, EffectCost(factorisations=1 if varies else 0), note, apply, varies=varies
+    )

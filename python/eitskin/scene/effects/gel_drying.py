@@ -18,7 +18,7 @@ from math import exp
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, FloatArray, MaterialStep, Session, Stage
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage
 from eitskin.scene.parameter import parameter
 
 NAME = "gel_drying"
@@ -49,7 +49,7 @@ def drying_factor(age_s: float, parameters: Parameters) -> float:
     return float(water**parameters.exponent)
 
 
-def make(parameters: Parameters, session: Session) -> MaterialStep:
+def make(parameters: Parameters, session: EffectSession) -> MaterialStep:
     """The skin's conductivity by time, one factor for all elements."""
     start_s = float(session.times_s()[0])
 
@@ -60,5 +60,5 @@ def make(parameters: Parameters, session: Session) -> MaterialStep:
         f"conductivity x water^{parameters.exponent:g}, water falling to {parameters.final_water:g}"
         f" with {parameters.time_constant_h:g} h"
     )
-    cost = Cost(factorisations_per_frame=1, vector_passes_per_frame=1)
+    cost = EffectCost(factorisations_per_frame=1, vector_passes_per_frame=1)
     return MaterialStep(NAME, cost, note, apply, varies=True)

@@ -21,7 +21,7 @@ from math import exp, expm1, pi, sqrt
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 
 NAME = "jitter"
@@ -53,7 +53,7 @@ def amplitude_error(parameters: Parameters) -> tuple[float, float]:
     return exp(-s * s / 2), sqrt((spread * spread + spread) / (2 * parameters.samples))
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Scales each row by its own random amplitude, anew each frame."""
     mean, deviation = amplitude_error(parameters)
 
@@ -68,5 +68,9 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         " each voltage"
     )
     return VoltageStep(
-        NAME, STAGE, Cost(vector_passes_per_frame=2, random_numbers_per_frame=rows), note, apply
+        NAME,
+        STAGE,
+        EffectCost(vector_passes_per_frame=2, random_numbers_per_frame=rows),
+        note,
+        apply,
     )

@@ -14,7 +14,7 @@ from math import pi, radians
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import row_delays_s
 
@@ -40,7 +40,7 @@ def alias_hz(frequency_hz: float, rate_hz: float) -> float:
     return abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Adds the sine at each row's own time."""
     delays_s = row_delays_s(session)
     omega, phase = 2 * pi * parameters.frequency_hz, radians(parameters.phase_deg)
@@ -53,4 +53,4 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         f"{parameters.amplitude_v:g} V at {parameters.frequency_hz:g} Hz, seen at {alias:g} Hz from"
         " frame to frame"
     )
-    return VoltageStep(NAME, STAGE, Cost(vector_passes_per_frame=3), note, apply)
+    return VoltageStep(NAME, STAGE, EffectCost(vector_passes_per_frame=3), note, apply)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eitskin.errors import ConfigError, GeometryError
-from eitskin.scene.effect import Cost, FloatArray, GeometryStep, Session, Stage
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, GeometryStep, Stage
 from eitskin.scene.parameter import parameter
 from eitskin.skin.skin import Skin
 
@@ -51,7 +51,7 @@ def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
     return replace(skin, electrodes=replace(electrodes, positions_mm=places))
 
 
-def make(parameters: Parameters, session: Session) -> GeometryStep:
+def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
     """The skin that is meshed.
 
     Raises:
@@ -79,4 +79,4 @@ def make(parameters: Parameters, session: Session) -> GeometryStep:
         return shifted(skin, shift_mm)
 
     note = f"electrodes shifted along the rim by up to {np.abs(shift_mm).max():.3g} mm"
-    return GeometryStep(NAME, Cost(random_numbers=0 if known else count), note, apply)
+    return GeometryStep(NAME, EffectCost(random_numbers=0 if known else count), note, apply)

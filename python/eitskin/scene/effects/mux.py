@@ -17,7 +17,7 @@ from math import exp
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, FloatArray, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 from eitskin.scene.scan import settled_from_the_row_before
 
@@ -51,7 +51,7 @@ def unsettled(parameters: Parameters) -> float:
     return exp(-parameters.dwell_us / parameters.settling_us) if parameters.settling_us else 0.0
 
 
-def dividers(parameters: Parameters, session: Session) -> FloatArray:
+def dividers(parameters: Parameters, session: EffectSession) -> FloatArray:
     """What part of each row's voltage (m,) reaches the amplifier. Draws nothing without a
     spread."""
     count = session.skin.electrodes.count
@@ -68,7 +68,7 @@ def dividers(parameters: Parameters, session: Session) -> FloatArray:
     )
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Divides, then settles from the row before."""
     gains = dividers(parameters, session)
     left = unsettled(parameters)
@@ -82,5 +82,5 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
     )
     drawn = 2 * session.skin.electrodes.count if parameters.on_spread_ohm else 0
     return VoltageStep(
-        NAME, STAGE, Cost(vector_passes_per_frame=4, random_numbers=drawn), note, apply
+        NAME, STAGE, EffectCost(vector_passes_per_frame=4, random_numbers=drawn), note, apply
     )

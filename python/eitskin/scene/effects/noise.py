@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 
 NAME = "noise"
@@ -37,7 +37,7 @@ class Parameters:
             raise ConfigError("snr_db: give either snr_db or noise_v")
 
 
-def deviation_v(parameters: Parameters, session: Session) -> float:
+def deviation_v(parameters: Parameters, session: EffectSession) -> float:
     """The noise's standard deviation in V."""
     if parameters.noise_v is not None:
         return parameters.noise_v
@@ -45,7 +45,7 @@ def deviation_v(parameters: Parameters, session: Session) -> float:
     return session.v0_rms_v() / float(10 ** (snr_db / 20))
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Adds a fresh draw to each frame."""
     sigma_v = deviation_v(parameters, session)
 
@@ -53,5 +53,5 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         return np.asarray(v + sigma_v * session.stream(NAME, frame).standard_normal(len(v)))
 
     rows = session.protocol.n_rows
-    cost = Cost(vector_passes_per_frame=2, random_numbers_per_frame=rows)
+    cost = EffectCost(vector_passes_per_frame=2, random_numbers_per_frame=rows)
     return VoltageStep(NAME, STAGE, cost, f"white, sigma {sigma_v:.3g} V", apply)

@@ -17,7 +17,14 @@ from math import pi
 
 import numpy as np
 
-from eitskin.scene.effect import ComplexArray, Cost, FloatArray, PhaseStep, Session, Stage
+from eitskin.scene.effect import (
+    ComplexArray,
+    EffectCost,
+    EffectSession,
+    FloatArray,
+    PhaseStep,
+    Stage,
+)
 from eitskin.scene.parameter import parameter
 
 NAME = "phase"
@@ -76,13 +83,13 @@ def magnitude(voltage: ComplexArray) -> FloatArray:
     return np.asarray(np.copysign(np.abs(voltage), voltage.real))
 
 
-def make(parameters: Parameters, session: Session) -> PhaseStep:
+def make(parameters: Parameters, session: EffectSession) -> PhaseStep:
     """The complex solve's coefficients and the demodulator."""
     hertz = parameters.frequency_hz
     permittivity, capacitance = parameters.relative_permittivity, parameters.capacitance_f_per_m2
     return PhaseStep(
         name=NAME,
-        cost=Cost(vector_passes_per_frame=2),
+        cost=EffectCost(vector_passes_per_frame=2),
         note=(
             f"complex solve at {hertz:g} Hz, eps_r {permittivity:g}, {capacitance:g} F/m2;"
             f" {parameters.readout} read"

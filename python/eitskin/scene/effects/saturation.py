@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Cost, Session, Stage, Voltages, VoltageStep
+from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, VoltageStep
 from eitskin.scene.parameter import parameter
 
 NAME = "saturation"
@@ -38,7 +38,7 @@ class Parameters:
             raise ConfigError("limit_v: give either limit_v or headroom")
 
 
-def limit_v(parameters: Parameters, session: Session) -> float:
+def limit_v(parameters: Parameters, session: EffectSession) -> float:
     """The limit in V."""
     if parameters.limit_v is not None:
         return parameters.limit_v
@@ -46,7 +46,7 @@ def limit_v(parameters: Parameters, session: Session) -> float:
     return headroom * float(np.abs(session.v0_v()).max())
 
 
-def make(parameters: Parameters, session: Session) -> VoltageStep:
+def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
     """Clips every row."""
     limit = limit_v(parameters, session)
 
@@ -54,5 +54,5 @@ def make(parameters: Parameters, session: Session) -> VoltageStep:
         return np.asarray(np.clip(v, -limit, limit))
 
     return VoltageStep(
-        NAME, STAGE, Cost(vector_passes_per_frame=1), f"clipped at +-{limit:.3g} V", apply
+        NAME, STAGE, EffectCost(vector_passes_per_frame=1), f"clipped at +-{limit:.3g} V", apply
     )

@@ -15,7 +15,7 @@ from math import pi
 
 import numpy as np
 
-from eitskin.scene.effect import Cost, LoadedStep, Loads, Session, Stage, Voltages
+from eitskin.scene.effect import EffectCost, EffectSession, LoadedStep, Loads, Stage, Voltages
 from eitskin.scene.parameter import parameter
 
 NAME = "source_impedance"
@@ -53,11 +53,11 @@ def share(load_ohm: Voltages, parameters: Parameters) -> Voltages:
     return np.asarray(real / (real * real + imaginary * imaginary))
 
 
-def make(parameters: Parameters, session: Session) -> LoadedStep:
+def make(parameters: Parameters, session: EffectSession) -> LoadedStep:
     """Scales each row by the share of current its drive pair's load gets."""
 
     def apply(v: Voltages, loads: Loads, time_s: float, frame: int) -> Voltages:
         return np.asarray(v * share((loads.source_v - loads.sink_v) / loads.current_a, parameters))
 
     note = f"{parameters.resistance_ohm:g} ohm parallel to {parameters.capacitance_pf:g} pF"
-    return LoadedStep(NAME, STAGE, Cost(vector_passes_per_frame=3), note, apply)
+    return LoadedStep(NAME, STAGE, EffectCost(vector_passes_per_frame=3), note, apply)

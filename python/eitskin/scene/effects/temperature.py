@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.errors import ConfigError
-from eitskin.scene.effect import Cost, FloatArray, MaterialStep, Session, Stage
+from eitskin.scene.effect import EffectCost, EffectSession, FloatArray, MaterialStep, Stage
 from eitskin.scene.parameter import parameter
 
 NAME = "temperature"
@@ -43,7 +43,7 @@ def temperature_factor(age_s: float, parameters: Parameters) -> float:
     return 1 + parameters.coefficient_per_k * warmer_k
 
 
-def make(parameters: Parameters, session: Session) -> MaterialStep:
+def make(parameters: Parameters, session: EffectSession) -> MaterialStep:
     """The skin's conductivity by time, one factor for all elements.
 
     Raises:
@@ -66,5 +66,5 @@ def make(parameters: Parameters, session: Session) -> MaterialStep:
         f" K + {parameters.drift_k_per_min:g} K/min"
     )
     each = 1 if varies else 0
-    cost = Cost(factorisations_per_frame=each, vector_passes_per_frame=each)
+    cost = EffectCost(factorisations_per_frame=each, vector_passes_per_frame=each)
     return MaterialStep(NAME, cost, note, apply, varies=varies)

@@ -12,13 +12,13 @@ from eitskin_studies.experiments.algorithms.candidates import candidates
 from eitskin_studies.experiments.algorithms.measure import Field
 from eitskin_studies.experiments.algorithms.results import result_of
 from eitskin_studies.experiments.algorithms.tables import data, tables, words
-from eitskin_studies.experiments.experiment import Outcome, Workspace
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 
 TITLE = "Single, double and triple touch by every method"
 TEST_SCENES, TUNING_SCENES = 60, 20
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """All methods on all sets.
 
     Raises:
@@ -40,4 +40,4 @@ def run(workspace: Workspace) -> Outcome:
         "curves.png": partial(pictures.draw_curves, results=results),
         "bars.png": partial(pictures.draw_bars, results=results),
     }
-    return Outcome(tables(results), data(field, results), drawn, words(field, results))
+    return ExperimentOutcome(tables(results), data(field, results), drawn, words(field, results))

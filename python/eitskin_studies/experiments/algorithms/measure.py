@@ -19,7 +19,7 @@ from eitskin_studies.compare.families import FindsTouches, Learns, Method, Setup
 from eitskin_studies.experiments.algorithms.candidates import Candidate, macs_of
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS, SHOWN, shown_set, touch_set
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Workspace
-from eitskin_studies.harness.sessions import SceneSolver, Session
+from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 
 FloatArray = npt.NDArray[np.float64]
 Arrays = dict[str, npt.NDArray[Any]]
@@ -30,7 +30,7 @@ TUNING, TEST = "tuning", "test"
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenParameter:
     """What was chosen on tuning scenes: the parameter's ``value``, t of MIoU for each lookup, and t
     of positions (None where the method reports touches itself)."""
 
@@ -60,7 +60,7 @@ class Field:
     test: int
 
     def __post_init__(self) -> None:
-        self._sessions: dict[tuple[str, int], Session] = {}
+        self._sessions: dict[tuple[str, int], FrameSession] = {}
 
     @cached_property
     def setup(self) -> Setup:
@@ -89,7 +89,7 @@ class Field:
         settings = self.workspace.settings
         return (settings.tuning_seed, self.tuning) if role == TUNING else (settings.seed, self.test)
 
-    def session(self, role: str, number: int = 0) -> Session:
+    def session(self, role: str, number: int = 0) -> FrameSession:
         """The set "tuning" or "test" of scenes with ``number`` touches, or "shown"; solved when
         first asked for."""
         if (role, number) not in self._sessions:
@@ -111,7 +111,7 @@ class Field:
                 "elements": elements, **more}  # fmt: skip
 
 
-def choose(field: Field, candidate: Candidate) -> Chosen:
+def choose(field: Field, candidate: Candidate) -> ChosenParameter:
     """The value and t with the best mean MIoU on all tuning scenes, each value at its own best t,
     as ``eitskin compare`` does."""
     curves = {value: tuning_curves(field, candidate, value) for value in candidate.values}
@@ -123,9 +123,9 @@ def choose(field: Field, candidate: Candidate) -> Chosen:
         axis=0
     )
     if not len(scores):
-        return Chosen(value, thresholds, None)
+        return ChosenParameter(value, thresholds, None)
     best = max(range(len(scores)), key=lambda k: (*scores[k], -k))
-    return Chosen(value, thresholds, TOUCH_THRESHOLDS[best])
+    return ChosenParameter(value, thresholds, TOUCH_THRESHOLDS[best])
 
 
 def tuning_curves(field: Field, candidate: Candidate, value: float) -> dict[str, FloatArray]:
@@ -223,13 +223,13 @@ def _counting(field: Field, candidate: Candidate, value: float, number: int) -> 
     return scores
 
 
-def _differences(session: Session) -> FloatArray:
+def _differences(session: FrameSession) -> FloatArray:
     measured = session.measured(SNR_DB)
     return np.asarray(measured.frames_v[:, -1] - measured.quiet_v.mean(axis=0))
 
 
 def _reconstructed(
-    field: Field, candidate: Candidate, value: float, session: Session, dv: FloatArray
+    field: Field, candidate: Candidate, value: float, session: FrameSession, dv: FloatArray
 ) -> tuple[Method, FloatArray]:
     method = candidate.make(field.setup, value)
     if isinstance(method, Learns):
@@ -237,7 +237,7 @@ def _reconstructed(
     return method, np.asarray(method.reconstruct(dv), dtype=np.float64)
 
 
-def _curves(field: Field, session: Session, images: FloatArray) -> dict[str, FloatArray]:
+def _curves(field: Field, session: FrameSession, images: FloatArray) -> dict[str, FloatArray]:
     image_scorers = field.image_scorers
     truths = session.truths(image_scorers[metrics.LOOKUP].raster)
     return {
@@ -257,7 +257,7 @@ def _found(
     return [touches_in_image(image, grid.index, grid.centres_mm(), threshold) for image in images]
 
 
-def _positions(session: Session, found: Sequence[FloatArray]) -> Arrays:
+def _positions(session: FrameSession, found: Sequence[FloatArray]) -> Arrays:
     matchings = match_all([scene.centres_mm() for scene in session.touches.scenes], found)
     return {
         "exact": np.array([m.exact for m in matchings], dtype=np.int64),

@@ -13,7 +13,7 @@ from eitskin.scoring import metrics
 from eitskin_studies.experiments.algorithms.candidates import Candidate
 from eitskin_studies.experiments.algorithms.measure import (
     Arrays,
-    Chosen,
+    ChosenParameter,
     Field,
     choose,
     judged,
@@ -29,7 +29,7 @@ FIXED_THRESHOLD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class AlgorithmResult:
     """A method on all sets.
 
     Attributes:
@@ -43,7 +43,7 @@ class Result:
     """
 
     candidate: Candidate
-    chosen: Chosen
+    chosen: ChosenParameter
     fixed: dict[int, Arrays]
     best: dict[int, Arrays]
     fixed_t: float
@@ -93,14 +93,14 @@ def column(curves: FloatArray, t: float) -> FloatArray:
     return np.asarray(curves[:, metrics.THRESHOLDS.index(t)])
 
 
-def result_of(field: Field, candidate: Candidate) -> Result:
+def result_of(field: Field, candidate: Candidate) -> AlgorithmResult:
     """All of a method; what is kept is read."""
     chosen = choose(field, candidate)
     tuned = {
         value: tuning_curves(field, candidate, value)[metrics.LOOKUP] for value in candidate.values
     }
     low_t = [float(curve[metrics.THRESHOLDS.index(FIXED_THRESHOLD)]) for curve in tuned.values()]
-    return Result(
+    return AlgorithmResult(
         candidate=candidate,
         chosen=chosen,
         fixed={number: judged(field, candidate, candidate.fixed, number) for number in NUMBERS},

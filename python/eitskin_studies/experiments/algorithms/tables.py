@@ -7,7 +7,7 @@ from typing import Any
 
 from eitskin.scoring import metrics
 from eitskin_studies.experiments.algorithms.measure import SNR_DB, TEST, TUNING, Field
-from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, Result, column
+from eitskin_studies.experiments.algorithms.results import FIXED_THRESHOLD, AlgorithmResult, column
 from eitskin_studies.experiments.algorithms.scenes import NUMBERS
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, SIMULATED_ELEMENTS, Table
 from eitskin_studies.harness.summary import Summary, summarise
@@ -16,7 +16,7 @@ TOUCHES = ("1 touch", "2 touches", "3 touches")
 SHOWN_AT = (0.1, 0.2, 0.3, 0.5, 0.7)
 
 
-def tables(results: Sequence[Result]) -> tuple[Table, ...]:
+def tables(results: Sequence[AlgorithmResult]) -> tuple[Table, ...]:
     """All tables of the page."""
     return (
         Table("fixed",
@@ -37,12 +37,12 @@ def tables(results: Sequence[Result]) -> tuple[Table, ...]:
     )  # fmt: skip
 
 
-def words(field: Field, results: Sequence[Result]) -> dict[str, str]:
+def words(field: Field, results: Sequence[AlgorithmResult]) -> dict[str, str]:
     """Sentences with numbers: the conditions, and what agrees with the paper and what does not."""
     return {"conditions": _conditions(field), "verdict": _verdict(results)}
 
 
-def data(field: Field, results: Sequence[Result]) -> dict[str, Any]:
+def data(field: Field, results: Sequence[AlgorithmResult]) -> dict[str, Any]:
     """Everything, for JSON."""
     return {
         "conditions": _conditions(field),
@@ -52,7 +52,7 @@ def data(field: Field, results: Sequence[Result]) -> dict[str, Any]:
     }
 
 
-def _method(one: Result) -> dict[str, Any]:
+def _method(one: AlgorithmResult) -> dict[str, Any]:
     chosen = one.chosen
     return {
         "name": one.candidate.name,
@@ -79,7 +79,7 @@ def _method(one: Result) -> dict[str, Any]:
     }
 
 
-def _fixed(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
+def _fixed(results: Sequence[AlgorithmResult]) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
             one.candidate.name,
@@ -98,7 +98,7 @@ def _fixed(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _best(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
+def _best(results: Sequence[AlgorithmResult]) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
             one.candidate.name,
@@ -112,7 +112,7 @@ def _best(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _counts(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
+def _counts(results: Sequence[AlgorithmResult]) -> tuple[tuple[str, ...], ...]:
     return tuple(
         (
             one.candidate.name,
@@ -124,7 +124,7 @@ def _counts(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _thresholds(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
+def _thresholds(results: Sequence[AlgorithmResult]) -> tuple[tuple[str, ...], ...]:
     """At the chosen parameter."""
     return tuple(
         (
@@ -135,14 +135,14 @@ def _thresholds(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _explained(results: Sequence[Result]) -> list[Result]:
+def _explained(results: Sequence[AlgorithmResult]) -> list[AlgorithmResult]:
     wanted = ("Gauss-Newton (Tikhonov)", "NOSER", "plain FISTA 30, non-negative",
         "plain FISTA 300, non-negative",
               "plain FISTA 3000, non-negative", "eitskin 60, image")  # fmt: skip
     return [one for one in results if one.candidate.name in wanted]
 
 
-def _why(results: Sequence[Result]) -> tuple[tuple[str, ...], ...]:
+def _why(results: Sequence[AlgorithmResult]) -> tuple[tuple[str, ...], ...]:
     kept = _explained(results)
     rows = {
         f"fixed parameter, t = {FIXED_THRESHOLD:g}": [one.at_fixed() for one in kept],
@@ -176,7 +176,7 @@ def _conditions(field: Field) -> str:
     )
 
 
-def _verdict(results: Sequence[Result]) -> str:
+def _verdict(results: Sequence[AlgorithmResult]) -> str:
     by_name = {one.candidate.name: one for one in results}
     claimed_low = [one for one in results if one.candidate.claimed == (0.4, 0.5)]
     low = min(one.low_t_range[0] for one in claimed_low)
@@ -199,11 +199,11 @@ def _verdict(results: Sequence[Result]) -> str:
     )
 
 
-def _parameter(one: Result, value: float) -> str:
+def _parameter(one: AlgorithmResult, value: float) -> str:
     return f"{one.candidate.parameter} {value:g}" if one.candidate.parameter else ""
 
 
-def _claimed(one: Result) -> str:
+def _claimed(one: AlgorithmResult) -> str:
     if one.candidate.claimed is None:
         return ""
     low, high = one.candidate.claimed

@@ -19,8 +19,8 @@ from eitskin_studies.experiments.electrodes.measuring import (
     SNR_DB,
     TUNING,
     TUNING_SIX,
-    Case,
-    Workshop,
+    PatternCase,
+    PatternWorkspace,
     noise_v,
     scan_of,
     usual_case,
@@ -28,7 +28,7 @@ from eitskin_studies.experiments.electrodes.measuring import (
 from eitskin_studies.experiments.electrodes.patterns import PATTERNS
 from eitskin_studies.experiments.electrodes.tables import all_tables, is_usual
 from eitskin_studies.experiments.electrodes.tuning import ITERATIONS, LAMBDAS, REGULARISATIONS
-from eitskin_studies.experiments.experiment import Outcome, Workspace
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.scored import number_text
 from eitskin_studies.harness.summary import summarise
 from eitskin_studies.pictures.electrodes_pictures import Bar, draw_counts, draw_patterns
@@ -48,7 +48,7 @@ SAID = (
 )
 
 
-def cases() -> list[Case]:
+def cases() -> list[PatternCase]:
     """Everything that is measured: patterns at equal noise and equal time, then ranks, grids and
     columns' weights."""
     usual = [
@@ -58,18 +58,20 @@ def cases() -> list[Case]:
         for pattern in PATTERNS
     ]
     swept = [
-        Case(count, "adjacent", "noise", rank, pixels)
+        PatternCase(count, "adjacent", "noise", rank, pixels)
         for count in COUNTS
         for pixels in GRIDS
         for rank in SWEEP[count]
     ]
-    flat = [Case(count, "adjacent", "noise", max(SWEEP[count]), power=1.0) for count in COUNTS]
+    flat = [
+        PatternCase(count, "adjacent", "noise", max(SWEEP[count]), power=1.0) for count in COUNTS
+    ]
     return list(dict.fromkeys([*usual, *swept, *flat]))
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """Every case; scenes are solved once a number of electrodes."""
-    shops = {count: Workshop(workspace, count) for count in COUNTS}
+    shops = {count: PatternWorkspace(workspace, count) for count in COUNTS}
     sigma_v = noise_v(workspace)
     ordered = sorted(cases(), key=lambda case: case.electrodes)
     measured = {
@@ -94,7 +96,7 @@ def run(workspace: Workspace) -> Outcome:
     data = [{"case": asdict(case), "samples": scan_of(case).samples,
         "rows": scan_of(case).protocol.n_rows, **result}
             for case, result in results.items()]  # fmt: skip
-    return Outcome(
+    return ExperimentOutcome(
         all_tables(results),
         {"seed": settings.seed, "noise_v": sigma_v, "cases": data},
         {
@@ -126,7 +128,7 @@ def _best(bars: Sequence[Bar]) -> str:
     return " ".join([*said, "The best of many flatters a little."])
 
 
-def _bar(case: Case, result: Any) -> Bar:
+def _bar(case: PatternCase, result: Any) -> Bar:
     scores = result["scores"]
     image = summarise(scores["random"]["image"])
     six = float(np.mean(scores["six"]["exact"]))

@@ -30,7 +30,7 @@ from eitskin.skin.skin import PAPER_DIAMETER_MM, Skin
 from eitskin_studies.experiments.electrodes.patterns import (
     FRAME_US,
     PATTERNS,
-    Scan,
+    ScanPattern,
     from_transfer,
     transfer,
     within_time,
@@ -38,7 +38,7 @@ from eitskin_studies.experiments.electrodes.patterns import (
 from eitskin_studies.experiments.electrodes.tuning import tuned
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.scored import session_in_parts
-from eitskin_studies.harness.sessions import Session
+from eitskin_studies.harness.sessions import FrameSession
 from eitskin_studies.tradeoff.scene_sets import ring_touches
 
 FloatArray = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ KEPT = ("image", "discs", "exact", "false", "kmac", "error_mm")
 
 
 @dataclass(frozen=True)
-class Case:
+class PatternCase:
     """One scan with its model: ``equal`` says what it shares with the others, "noise" in each row
     or "time" of a frame; ``power`` is p of the reduction."""
 
@@ -65,28 +65,30 @@ class Case:
     power: float = DEFAULT_COLUMN_POWER
 
 
-def usual_case(electrodes: int, pattern: str, equal: str) -> Case:
+def usual_case(electrodes: int, pattern: str, equal: str) -> PatternCase:
     """With the rank that its number of electrodes has in the tables."""
-    return Case(
+    return PatternCase(
         electrodes, pattern, equal, min(RANKS[electrodes], _folded(electrodes, pattern, equal))
     )
 
 
 @cache
-def scan_of(case: Case) -> Scan:
+def scan_of(case: PatternCase) -> ScanPattern:
     """What is scanned: everything with the usual samples, or what fits into the usual frame."""
     protocol = PATTERNS[case.pattern](case.electrodes)
     return (
-        Scan(protocol, BASE_SAMPLES) if case.equal == "noise" else within_time(protocol, FRAME_US)
+        ScanPattern(protocol, BASE_SAMPLES)
+        if case.equal == "noise"
+        else within_time(protocol, FRAME_US)
     )
 
 
 def _folded(electrodes: int, pattern: str, equal: str) -> int:
-    return len(scan_of(Case(electrodes, pattern, equal)).protocol.reciprocal_pairs().first)
+    return len(scan_of(PatternCase(electrodes, pattern, equal)).protocol.reciprocal_pairs().first)
 
 
 @dataclass(eq=False)
-class Workshop:
+class PatternWorkspace:
     """A skin of some electrodes: scenes solved once for every pattern, and one Jacobian of the
     transfer matrix a grid."""
 
@@ -120,7 +122,7 @@ class Workshop:
         return sets | pairs
 
     @cached_property
-    def sessions(self) -> dict[str, Session]:
+    def sessions(self) -> dict[str, FrameSession]:
         """The transfer matrices of every scene, without noise."""
         solver = self.workspace.scenes(self.skin, transfer(self.electrodes))
         name = f"{self.electrodes} electrodes"
@@ -139,7 +141,7 @@ class Workshop:
     def _grids(self) -> dict[int, Linearisation]:
         return {}
 
-    def linear(self, case: Case) -> Linearisation:
+    def linear(self, case: PatternCase) -> Linearisation:
         """The Jacobian of a scan."""
         if case.pixels not in self._grids:
             grid = grid_for(self.skin.outline, case.pixels)
@@ -158,7 +160,7 @@ class Workshop:
             whole.electrode_fields,
         )
 
-    def frames(self, key: str, case: Case, noise_v: float) -> tuple[FloatArray, FloatArray]:
+    def frames(self, key: str, case: PatternCase, noise_v: float) -> tuple[FloatArray, FloatArray]:
         """Quiet frames (q, m) and one a scene (k, m) of a set, with white noise of ``noise_v`` in
         80 samples and no converter."""
         session, scan = self.sessions[key], scan_of(case)
@@ -171,7 +173,7 @@ class Workshop:
         quiet_v, _ = measure(quiet, sigma_v, 0.0, 0.0, seed, f"quiet {role}")
         return quiet_v, measure(exact, sigma_v, 0.0, 0.0, seed, f"frame {role}")[0]
 
-    def measured(self, case: Case, noise_v: float) -> dict[str, Any]:
+    def measured(self, case: PatternCase, noise_v: float) -> dict[str, Any]:
         """A case in plain values: its scan, its model, and the scores of each set."""
         scan = scan_of(case)
         facts = {
@@ -185,7 +187,7 @@ class Workshop:
             self.workspace.kept({**facts, "sets": sets}, lambda: self._measure(case, noise_v))
         )
 
-    def _measure(self, case: Case, noise_v: float) -> dict[str, Any]:
+    def _measure(self, case: PatternCase, noise_v: float) -> dict[str, Any]:
         settings = BuildSettings(
             case.rank, case.pixels, elements=MODEL_ELEMENTS, column_power=case.power
         )

@@ -83,7 +83,7 @@ def scan_ms(rows: int, samples: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class ScanPattern:
     """What is measured and how long: ``protocol``, ``samples`` of each row, every how many drives
     are left."""
 
@@ -97,7 +97,7 @@ class Scan:
         return scan_ms(self.protocol.n_rows, self.samples)
 
 
-def within_time(protocol: Protocol, frame_us: float = FRAME_US) -> Scan:
+def within_time(protocol: Protocol, frame_us: float = FRAME_US) -> ScanPattern:
     """One row of each reciprocal pair in ``frame_us``, with as many samples as fit; where none fit,
     of fewer drives."""
     every = 1
@@ -105,5 +105,5 @@ def within_time(protocol: Protocol, frame_us: float = FRAME_US) -> Scan:
         scan = unique_rows(protocol, every)
         samples = samples_within(scan.n_rows, frame_us)
         if samples:
-            return Scan(scan, samples, every)
+            return ScanPattern(scan, samples, every)
         every += 1

@@ -11,7 +11,7 @@ from eitskin.scoring.snr import BASE_SAMPLES
 from eitskin_studies.experiments.electrodes.measuring import (
     COUNTS,
     PAIR_MM,
-    Case,
+    PatternCase,
     resolved_mm,
     scan_of,
     usual_case,
@@ -57,7 +57,7 @@ SCANS_HEAD = (
     "unique rows", "of 80 samples, ms", "of 20 samples, ms", "drives in 20.8 ms",
 )  # fmt: skip
 
-Results = Mapping[Case, Mapping[str, Any]]
+Results = Mapping[PatternCase, Mapping[str, Any]]
 
 
 def all_tables(results: Results) -> tuple[Table, ...]:
@@ -82,13 +82,13 @@ def all_tables(results: Results) -> tuple[Table, ...]:
     )
 
 
-def is_usual(case: Case) -> bool:
+def is_usual(case: PatternCase) -> bool:
     """Whether a case has the rank and the grid that its number of electrodes has in the tables of
     patterns."""
     return case == usual_case(case.electrodes, case.pattern, case.equal)
 
 
-def _name(case: Case) -> str:
+def _name(case: PatternCase) -> str:
     return f"{case.electrodes}, {case.pattern}"
 
 
@@ -112,7 +112,7 @@ def _found(result: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _noise_row(case: Case, result: Mapping[str, Any]) -> tuple[str, ...]:
+def _noise_row(case: PatternCase, result: Mapping[str, Any]) -> tuple[str, ...]:
     scan = scan_of(case)
     unique = len(scan.protocol.reciprocal_pairs().first)
     head = (
@@ -126,7 +126,7 @@ def _noise_row(case: Case, result: Mapping[str, Any]) -> tuple[str, ...]:
     return (*head, *_found(result))
 
 
-def _time_row(case: Case, result: Mapping[str, Any]) -> tuple[str, ...]:
+def _time_row(case: PatternCase, result: Mapping[str, Any]) -> tuple[str, ...]:
     scan = scan_of(case)
     drives = len(np.unique(scan.protocol.drive_measure[:, :2], axis=0))
     relative = (BASE_SAMPLES / scan.samples) ** 0.5
@@ -141,7 +141,7 @@ def _time_row(case: Case, result: Mapping[str, Any]) -> tuple[str, ...]:
     return (*head, f"{case.rank}", *_found(result))
 
 
-def _rank_row(case: Case, result: Mapping[str, Any]) -> tuple[str, ...]:
+def _rank_row(case: PatternCase, result: Mapping[str, Any]) -> tuple[str, ...]:
     head = (
         f"{case.electrodes}",
         f"{case.rank}",

@@ -15,7 +15,7 @@ from eitskin.model.build import LIPSCHITZ_MARGIN
 from eitskin.model.model import Model
 from eitskin.model.reduction import DEFAULT_REGULARISATION, noise_gain, spectral_norm_squared
 from eitskin.model.storage import store
-from eitskin.scene.random_touches import Scene
+from eitskin.scene.random_touches import TouchScene
 from eitskin.scoring import metrics
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.scored import Evaluator
@@ -30,7 +30,7 @@ REGULARISATIONS, LAMBDAS, ITERATIONS = (
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenSettings:
     """What was chosen: mu of the whitening, least lambda over lambda_max, iterations, t of the
     mask."""
 
@@ -65,13 +65,13 @@ def with_regularisation(model: Model, regularisation: float) -> Model:
 def tuned(
     model: Model,
     image_scorer: metrics.ImageScorer,
-    scenes: Sequence[Scene],
+    scenes: Sequence[TouchScene],
     quiet_v: FloatArray,
     frames_v: FloatArray,
-) -> tuple[Evaluator, Chosen]:
+) -> tuple[Evaluator, ChosenSettings]:
     """The best of all settings on tuning scenes with their frames, quiet (q, m) and touched (k, m):
     by the sum of image MIoU, disc MIoU and exactly counted share; the first of equals."""
-    best: tuple[float, Evaluator, Chosen] | None = None
+    best: tuple[float, Evaluator, ChosenSettings] | None = None
     for regularisation in REGULARISATIONS:
         regularised = with_regularisation(model, regularisation)
         for lambda_rel, iterations in product(LAMBDAS, ITERATIONS):
@@ -93,6 +93,6 @@ def tuned(
             ]
             value = round(float(curves.mean(axis=0).max() + np.mean(discs) + np.mean(exact)), 9)
             if best is None or value > best[0]:
-                best = value, evaluator, Chosen(regularisation, lambda_rel, iterations, t)
+                best = value, evaluator, ChosenSettings(regularisation, lambda_rel, iterations, t)
     assert best is not None
     return best[1:]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.experiments.experiment import Outcome, Workspace
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.force import anywhere, curves, detection, scenes
 from eitskin_studies.experiments.force.law import NOMINAL, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
@@ -32,7 +32,7 @@ SNR_DB, AVERAGED_DB = 60.0, 72.0  # the second is what the mean of sixteen frame
 SNRS_DB = (40.0, 50.0, SNR_DB, AVERAGED_DB, 84.0)
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """All of it; what the workspace has kept is not computed again."""
     from eitskin_studies.pictures import force_pictures as pictures
 
@@ -101,7 +101,7 @@ def run(workspace: Workspace) -> Outcome:
         "detection": [one.as_dict() for one in found],
     }
     touch = judged[TOUCH, AVERAGED_DB]
-    return Outcome(
+    return ExperimentOutcome(
         tables,
         data,
         {

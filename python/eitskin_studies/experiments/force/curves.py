@@ -17,7 +17,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Curves:
+class ForceCurves:
     """One readout: ``mean`` (radii, loads) over angles under the nominal law; ``bands`` (laws,
     radii, loads) under others."""
 
@@ -54,7 +54,7 @@ def slopes_of(values: FloatArray) -> FloatArray:
 
 def curves_of(
     nominal: PressSet, read: dict[str, Readout], laws: PressSet, of_laws: dict[str, Readout]
-) -> dict[str, Curves]:
+) -> dict[str, ForceCurves]:
     """Each readout's curves; the first of ``laws`` is the nominal one, to which the others'
     readings are held."""
     found = {}
@@ -67,11 +67,13 @@ def curves_of(
             for radius in range(len(RADIUS_SHARES))
         ]
         at_one_angle = of_laws[name].value.reshape(-1, len(RADIUS_SHARES), len(LOADS_G))
-        found[name] = Curves(np.array(mean), np.array(mean) * at_one_angle[1:] / at_one_angle[0])
+        found[name] = ForceCurves(
+            np.array(mean), np.array(mean) * at_one_angle[1:] / at_one_angle[0]
+        )
     return found
 
 
-def table_of(curves: dict[str, Curves]) -> Table:
+def table_of(curves: dict[str, ForceCurves]) -> Table:
     """Slopes relative to the one near the rim, straightness."""
     rows = []
     for name, one in curves.items():

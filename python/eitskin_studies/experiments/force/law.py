@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.scene.laws import Piezoresistive
-from eitskin.scene.random_touches import Touch
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.streams import stream
 
 FloatArray = npt.NDArray[np.float64]
@@ -49,10 +49,10 @@ class PressLaw:
         law = Piezoresistive(self.sensitivity_per_gram, 1 + self.saturation)
         return float(law.contrast_at(np.array(grams)))
 
-    def touch(self, grams: float, place_mm: npt.ArrayLike) -> Touch:
+    def touch(self, grams: float, place_mm: npt.ArrayLike) -> TrueTouch:
         """The disc that a weight makes at a place."""
         x, y = np.asarray(place_mm, dtype=np.float64)
-        return Touch(float(x), float(y), self.radius_mm(grams), self.contrast(grams))
+        return TrueTouch(float(x), float(y), self.radius_mm(grams), self.contrast(grams))
 
 
 NOMINAL = PressLaw()

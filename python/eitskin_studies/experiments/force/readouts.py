@@ -19,7 +19,7 @@ from eitskin.skin.skin import Skin
 from eitskin.solve.batch import Batch
 from eitskin_studies.compare.baselines import PlainFista
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS
-from eitskin_studies.harness.sessions import Session
+from eitskin_studies.harness.sessions import FrameSession
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class Instruments:
         batch.tare(quiet_v)
         return batch
 
-    def read(self, session: Session, snr_db: float) -> dict[str, Readout]:
+    def read(self, session: FrameSession, snr_db: float) -> dict[str, Readout]:
         """Every readout of every frame of ``session`` at ``snr_db``."""
         measured = session.measured(snr_db)
         frames, quiet = measured.frames_v[:, -1], measured.quiet_v

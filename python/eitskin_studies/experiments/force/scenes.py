@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.scene.random_touches import Scene, TouchSet
+from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.streams import stream
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, PressLaw
-from eitskin_studies.harness.sessions import SceneSolver, Session
+from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class PressSet:
     """k single presses: ``grams`` (k,), ``place_mm`` (k, 2), ``law`` and ``group`` (k,), numbers of
     the law and of the radius or place; their solved frames."""
 
-    session: Session
+    session: FrameSession
     grams: FloatArray
     place_mm: FloatArray
     law: npt.NDArray[np.int64]
@@ -78,7 +78,7 @@ def solved(
 ) -> PressSet:  # fmt: skip
     """The set of ``rows``: grams, place, number of the law, group. Solved in parts, each kept."""
     scenes = [
-        Scene(f"{role}-s{seed}-{k}", (laws[law].touch(grams, place),))
+        TouchScene(f"{role}-s{seed}-{k}", (laws[law].touch(grams, place),))
         for k, (grams, place, law, _) in enumerate(rows)
     ]
     volts = []
@@ -88,7 +88,7 @@ def solved(
         )
         volts.append(part.exact_v)
     whole = TouchSet(role, seed, tuple(scenes))
-    session = Session(
+    session = FrameSession(
         role,
         solver.protocol,
         solver.skin.conductivity_s_per_m,

@@ -11,14 +11,14 @@ import numpy as np
 from eitskin.scene.session import MeshCache
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, Outcome, Workspace
+from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, ExperimentOutcome, Workspace
 from eitskin_studies.experiments.homogeneous.cases import (
     CASES,
     ELECTRODES,
     IDEAL,
     MEASURED_TANK,
     SIMULATED_TANK,
-    Case,
+    TankCase,
     doctored,
     examined,
 )
@@ -30,7 +30,7 @@ TITLE = "The 208 values of an untouched skin"
 SESSIONS = 8
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """All cases in sessions of their own, and the measured tank where there is one.
 
     Raises:
@@ -47,7 +47,7 @@ def run(workspace: Workspace) -> Outcome:
         found.setdefault(case.name, []).append(_kept(workspace, case, k, mesh_cache))
     rows = [_row(case.name, found[case.name], adjacent(ELECTRODES), case.fault) for case in CASES]
     if tank is not None:
-        ideal = Case(SIMULATED_TANK, {})
+        ideal = TankCase(SIMULATED_TANK, {})
         seed, of_tank = workspace.settings.seed, tank_skin()
         facts = {
             "experiment": "homogeneous",
@@ -70,12 +70,14 @@ def run(workspace: Workspace) -> Outcome:
         "waveform.png": partial(pictures.draw_waveforms, rows=rows),
         "deviations.png": partial(pictures.draw_deviations, rows=rows),
     }
-    return Outcome(
+    return ExperimentOutcome(
         tables(rows), data(rows), drawn, words(rows, workspace.settings, sessions, tank is not None)
     )
 
 
-def _kept(workspace: Workspace, case: Case, session: int, mesh_cache: MeshCache) -> dict[str, Any]:
+def _kept(
+    workspace: Workspace, case: TankCase, session: int, mesh_cache: MeshCache
+) -> dict[str, Any]:
     """A session under its own seed, its failing electrode another in each."""
     seed = 1000 * workspace.settings.seed + session
     facts = {

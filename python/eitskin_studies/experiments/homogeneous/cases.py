@@ -30,7 +30,7 @@ IDEAL, INSTRUMENT = "nothing (mesh only)", f"contacts ±20 %, {SNR_DB:g} dB, {BI
 
 
 @dataclass(frozen=True)
-class Case:
+class TankCase:
     """Something that makes a skin's frame uneven.
 
     Attributes:
@@ -71,42 +71,42 @@ class Case:
 
 
 CASES = (
-    Case(IDEAL, {}),
-    Case(INSTRUMENT, USUAL),
+    TankCase(IDEAL, {}),
+    TankCase(INSTRUMENT, USUAL),
     *(
-        Case(f"contacts ±{100 * s:g} %", USUAL | {"contact_impedance": {"spread": s}})
+        TankCase(f"contacts ±{100 * s:g} %", USUAL | {"contact_impedance": {"spread": s}})
         for s in (0.5, 0.95)
     ),
     *(
-        Case(
+        TankCase(
             f"electrodes up to {s:g} mm off their places",
             USUAL | {"misplacement": {"spread_mm": s}},
         )
         for s in (0.5, 1.0, 2.0)
     ),
     *(
-        Case(f"channel gains ±{100 * s:g} %", USUAL | {"channel_gain": {"spread": s}})
+        TankCase(f"channel gains ±{100 * s:g} %", USUAL | {"channel_gain": {"spread": s}})
         for s in (0.01, 0.05)
     ),
     *(
-        Case(f"gel uneven by {100 * s:g} % (sd)", USUAL | {"background": {"spread": s}})
+        TankCase(f"gel uneven by {100 * s:g} % (sd)", USUAL | {"background": {"spread": s}})
         for s in (0.05, 0.2)
     ),
-    Case("crosstalk of -40 dB", USUAL | {"crosstalk": {"coupling_db": -40.0}}),
-    Case("common-mode rejection of 40 dB", USUAL | {"common_mode": {"cmrr_db": 40.0}}),
-    Case("an electrode off", USUAL | {"detached": {}}, {"detached": 0}, fault=True),
-    Case(
+    TankCase("crosstalk of -40 dB", USUAL | {"crosstalk": {"coupling_db": -40.0}}),
+    TankCase("common-mode rejection of 40 dB", USUAL | {"common_mode": {"cmrr_db": 40.0}}),
+    TankCase("an electrode off", USUAL | {"detached": {}}, {"detached": 0}, fault=True),
+    TankCase(
         "two neighbours bridged by 10 ohm",
         USUAL | {"bridged": {"resistance_ohm": 10.0}},
         {"bridged": 1},
         fault=True,
     ),
-    Case("wires of two neighbours exchanged", USUAL, swap=1, fault=True),
+    TankCase("wires of two neighbours exchanged", USUAL, swap=1, fault=True),
 )
 
 
 def examined(
-    case: Case, skin: Skin, seed: int, electrode: int, elements: int, mesh_cache: MeshCache
+    case: TankCase, skin: Skin, seed: int, electrode: int, elements: int, mesh_cache: MeshCache
 ) -> dict[str, Any]:
     """A session of the untouched ``skin``: its mean quiet frame "reference_v", and what the doctor
     finds, in JSON values.

@@ -20,7 +20,7 @@ SOURCE = "the open 2D EIT archive of Hauptmann et al. (arXiv:1704.01178)"
 
 
 @dataclass(frozen=True, eq=False)
-class Tank:
+class MeasuredTank:
     """A water tank: its description, and its frames with the saline reference."""
 
     skin: Skin
@@ -40,7 +40,7 @@ def tank_skin() -> Skin:
     return Skin("tank-kit4", disk(280.0), electrodes, 0.03, 70.0)
 
 
-def load_tank(folder: Path | None) -> Tank | None:
+def load_tank(folder: Path | None) -> MeasuredTank | None:
     """The tank in ``folder``; None without a folder, or where it has no such file.
 
     Raises:
@@ -54,7 +54,7 @@ def load_tank(folder: Path | None) -> Tank | None:
             rows, voltage, reference = (
                 archive[name] for name in ("drive_measure", "voltage", "reference_voltage")
             )
-        return Tank(
+        return MeasuredTank(
             tank_skin(), Frames(table(16, rows), np.asarray(voltage), np.asarray(reference))
         )
     except (OSError, ValueError, KeyError, zipfile.BadZipFile, FrameError) as error:

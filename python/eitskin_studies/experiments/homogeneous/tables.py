@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, Settings, Table
+from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS, ExperimentSettings, Table
 from eitskin_studies.experiments.homogeneous.cases import INSTRUMENT, QUIET_FRAMES
 from eitskin_studies.experiments.homogeneous.measured import FILE, SOURCE
 from eitskin_studies.experiments.homogeneous.uniformity import Uniformity
@@ -85,7 +85,9 @@ def tables(rows: Sequence[Row]) -> tuple[Table, ...]:
     )
 
 
-def words(rows: Sequence[Row], settings: Settings, sessions: int, measured: bool) -> dict[str, str]:
+def words(
+    rows: Sequence[Row], settings: ExperimentSettings, sessions: int, measured: bool
+) -> dict[str, str]:
     """The conditions, and whether a measured tank is among the rows."""
     usual = next(row for row in rows if row.name == INSTRUMENT)
     broken = [row for row in rows if row.fault]

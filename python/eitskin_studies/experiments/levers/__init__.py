@@ -3,7 +3,7 @@ what it costs."""
 
 from __future__ import annotations
 
-from eitskin_studies.experiments.experiment import Outcome, Workspace
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
 from eitskin_studies.experiments.levers.measure import AblationRuns
 from eitskin_studies.experiments.levers.tables import (
@@ -17,12 +17,12 @@ from eitskin_studies.pictures.levers_pictures import draw_images, draw_search
 TITLE = "Levers: what helps for its multiply-accumulates, and what does not"
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """Every search of touches on every set, every image at every SNR."""
     runs = AblationRuns(workspace)
     searches = {one.name: runs.searched(one) for one in workspace.progress(SEARCHES, "searching")}
     images = {one.name: runs.imaged(one) for one in workspace.progress(IMAGES, "imaging")}
-    return Outcome(
+    return ExperimentOutcome(
         tables=(asked_table(images), search_table(searches), image_table(images)),
         data={"searches": searches, "images": images, "seed": workspace.settings.seed},
         pictures={

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from eitskin.core.results import Reconstruction
 from eitskin.model.build import linearise, make_model
 from eitskin.model.model import Model
-from eitskin.scene.random_touches import Scene, TouchSet, random_touches, spaced_touches
+from eitskin.scene.random_touches import TouchScene, TouchSet, random_touches, spaced_touches
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import match
 from eitskin.skin.protocol import adjacent
@@ -23,7 +23,7 @@ from eitskin.solve.options import default_options
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.levers.configurations import Ablation
 from eitskin_studies.experiments.scored import session_in_parts
-from eitskin_studies.harness.sessions import Session, apparent_change_s_per_m_mm2
+from eitskin_studies.harness.sessions import FrameSession, apparent_change_s_per_m_mm2
 from eitskin_studies.harness.summary import summarise
 
 FloatArray = npt.NDArray[np.float64]
@@ -46,7 +46,7 @@ class AblationRuns:
     def __init__(self, workspace: Workspace) -> None:
         self.workspace, self.skin, self.protocol = workspace, paper_skin(), adjacent(16)
         self._models: dict[str, Model] = {}
-        self._sessions: dict[tuple[str, bool], Session] = {}
+        self._sessions: dict[tuple[str, bool], FrameSession] = {}
 
     @cached_property
     def _solver(self) -> Any:
@@ -87,7 +87,7 @@ class AblationRuns:
             **ablation.facts(),
         }
 
-    def session(self, name: str, tuning: bool = False) -> Session:
+    def session(self, name: str, tuning: bool = False) -> FrameSession:
         """The set ``name``, or its tuning twin."""
         if (name, tuning) not in self._sessions:
             drawn = self._draw(name, tuning)
@@ -118,7 +118,9 @@ class AblationRuns:
             self._models[key] = make_model(self.skin, self.protocol, linear, ablation.settings)
         return self._models[key]
 
-    def _solve(self, ablation: Ablation, session: Session, snr_db: float) -> list[Reconstruction]:
+    def _solve(
+        self, ablation: Ablation, session: FrameSession, snr_db: float
+    ) -> list[Reconstruction]:
         model, measured = self.model(ablation), session.measured(snr_db)
         options = replace(default_options(model), **ablation.options)
         return list(
@@ -126,7 +128,7 @@ class AblationRuns:
         )
 
     def _curves(
-        self, ablation: Ablation, session: Session, results: Sequence[Reconstruction]
+        self, ablation: Ablation, session: FrameSession, results: Sequence[Reconstruction]
     ) -> FloatArray:
         grid = self.model(ablation).grid
         image_scorer = metrics.ImageScorer(
@@ -180,7 +182,7 @@ class AblationRuns:
             "macs": float(np.mean([_macs(one) for one in results])),
         }
 
-    def _disc_miou(self, one: Reconstruction, scene: Scene) -> float:
+    def _disc_miou(self, one: Reconstruction, scene: TouchScene) -> float:
         points = self._raster.points_mm
         found = metrics.disc_mask(points, _places(one), [touch.radius_mm for touch in one.touches])
         return metrics.miou(found, metrics.disc_mask(points, scene.centres_mm(), scene.radii_mm()))

@@ -8,7 +8,7 @@ from typing import Any
 from eitskin_studies.experiments.experiment import (
     MODEL_ELEMENTS,
     SIMULATED_ELEMENTS,
-    Settings,
+    ExperimentSettings,
     Table,
 )
 from eitskin_studies.experiments.levers.measure import (
@@ -98,7 +98,7 @@ def asked_table(images: Found) -> Table:
     )
 
 
-def conditions(settings: Settings) -> str:
+def conditions(settings: ExperimentSettings) -> str:
     """How the numbers came about."""
     return (
         f"Seed {settings.seed}: {settings.count(SCENES)} scenes of 1 to 3 random touches (radius 6"

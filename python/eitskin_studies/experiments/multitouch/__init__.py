@@ -6,13 +6,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from eitskin_studies.experiments.experiment import Outcome, Workspace
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.multitouch import ambiguity_tables, tables
 from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE
 from eitskin_studies.experiments.multitouch.gallery import gallery
 from eitskin_studies.experiments.multitouch.measure import (
     Ambiguities,
-    Counted,
+    CountedScenes,
     Limit,
     ambiguities,
     count_all,
@@ -25,7 +25,7 @@ from eitskin_studies.experiments.multitouch.text import closing, conditions
 TITLE = "Many touches at once: how many, where, and when to say that it cannot be told"
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """All of it; what the workspace has kept is not computed again.
 
     Raises:
@@ -54,7 +54,7 @@ def run(workspace: Workspace) -> Outcome:
         ambiguity_tables.chance_table(ambiguous),
         ambiguity_tables.confidence_table(ambiguous),
     )
-    return Outcome(
+    return ExperimentOutcome(
         made,
         data(counted, limited, ambiguous),
         {
@@ -70,7 +70,7 @@ def run(workspace: Workspace) -> Outcome:
     )
 
 
-def data(counted: Counted, limited: list[Limit], ambiguous: Ambiguities) -> dict[str, Any]:
+def data(counted: CountedScenes, limited: list[Limit], ambiguous: Ambiguities) -> dict[str, Any]:
     """Everything, for JSON."""
     return {
         "counts": [

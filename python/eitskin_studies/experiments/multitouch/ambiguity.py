@@ -18,7 +18,7 @@ import numpy.typing as npt
 from eitskin.errors import missing_extra
 from eitskin.scoring.matching import match
 from eitskin_studies.experiments.multitouch.counts import Share, share_of
-from eitskin_studies.experiments.multitouch.variants import Seen
+from eitskin_studies.experiments.multitouch.variants import SeenFrame
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -56,7 +56,7 @@ class ScoredFrame:
 
 
 def score_frame(
-    seen: Seen, truth_mm: FloatArray, snr_db: float, seed_radius_mm: float
+    seen: SeenFrame, truth_mm: FloatArray, snr_db: float, seed_radius_mm: float
 ) -> ScoredFrame:
     """One frame."""
     found, near = len(seen.x_mm), nearest(seen)
@@ -72,7 +72,7 @@ def score_frame(
     )
 
 
-def nearest(seen: Seen) -> float:
+def nearest(seen: SeenFrame) -> float:
     """The least distance of two found touches over the sum of their radii; inf of fewer than
     two."""
     places, radii = seen.places_mm, np.asarray(seen.radius_mm, dtype=np.float64)
@@ -84,7 +84,7 @@ def nearest(seen: Seen) -> float:
     return float(apart[np.triu_indices(len(radii), 1)].min())
 
 
-def features(seen: Seen, near: float, seed_radius_mm: float) -> tuple[float, ...]:
+def features(seen: SeenFrame, near: float, seed_radius_mm: float) -> tuple[float, ...]:
     """As ``FEATURES`` says; of no touch those of one that is sure."""
     if not seen.x_mm:
         return 0.0, FAR, 1.0, 0.0, STRONG, CLEARLY
@@ -166,7 +166,7 @@ def _bar(scores: FloatArray, exact: BoolArray, aim: float) -> float:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class ConfidenceCalibration:
     """What saying doubt is worth.
 
     Attributes:
@@ -184,14 +184,16 @@ class Calibration:
     wrong_said: Share
 
 
-def calibration(frames: Sequence[ScoredFrame], said: BoolArray | None = None) -> Calibration:
+def calibration(
+    frames: Sequence[ScoredFrame], said: BoolArray | None = None
+) -> ConfidenceCalibration:
     """Of the core's own ``crowded``, or of ``said`` (k,)."""
     says = np.array([one.said for one in frames], dtype=np.bool_) if said is None else said
     right, exact = (
         np.array([getattr(one, name) for one in frames], dtype=np.bool_)
         for name in ("right", "exact")
     )
-    return Calibration(
+    return ConfidenceCalibration(
         share_of(~says), share_of(right[~says]), share_of(exact[~says]), share_of(right[says]),
         share_of(exact[says]),
         share_of(says[~right]),
@@ -232,7 +234,7 @@ class Confidences:
     strength: FloatArray
 
 
-def confidences(frames: Sequence[tuple[Seen, FloatArray]]) -> Confidences:
+def confidences(frames: Sequence[tuple[SeenFrame, FloatArray]]) -> Confidences:
     """``explained``: confidence; ``over_noise``: its root times max(S'y) / that of noise;
     ``strength``: of the greatest found."""
     true, columns = [], []

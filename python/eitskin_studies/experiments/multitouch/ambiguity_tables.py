@@ -9,7 +9,7 @@ import numpy as np
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.multitouch.ambiguity import (
     FEATURES,
-    Calibration,
+    ConfidenceCalibration,
     Reliability,
     ScoredFrame,
     calibration,
@@ -52,7 +52,7 @@ def ambiguity_table(ambiguities: Ambiguities) -> Table:
     return Table("doubt", ("method", "set", "SNR, dB", "frames", "signal", *HEAD), tuple(rows))
 
 
-def _cells(one: Calibration) -> tuple[str, ...]:
+def _cells(one: ConfidenceCalibration) -> tuple[str, ...]:
     return tuple(
         percent(share)
         for share in (

@@ -20,13 +20,13 @@ from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import element_fields
 from eitskin.model.model import Model
 from eitskin.reference.engine import ReferenceEngine
-from eitskin.reference.problem import Problem, Result
+from eitskin.reference.problem import Problem, SolveResult
 from eitskin.scene.cover import Cover
-from eitskin.scene.random_touches import Scene, Touch
+from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.scoring.matching import GATE_MM, match
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin_studies.harness.sessions import Measured
+from eitskin_studies.harness.sessions import MeasuredFrames
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Told(ReferenceEngine):
         super().__init__(model)
         self.places_mm: FloatArray = np.zeros((0, 2))
 
-    def _run(self, problem: Problem, last: FloatArray | None) -> Result:
+    def _run(self, problem: Problem, last: FloatArray | None) -> SolveResult:
         result, centres = super()._run(problem, last), self.model.grid.centres_mm()
         weight, image = self.model.column_weight.astype(np.float64), np.zeros(len(centres))
         for place in self.places_mm:
@@ -54,7 +54,7 @@ class Told(ReferenceEngine):
         )
 
 
-def core_told(model: Model, measured: Measured, scenes: Sequence[Scene]) -> list[bool]:
+def core_told(model: Model, measured: MeasuredFrames, scenes: Sequence[TouchScene]) -> list[bool]:
     """Whether the core's fit that begins at the truth is exact, for each scene."""
     engine = Told(model)
     engine.set_reference(measured.quiet_v)
@@ -68,7 +68,7 @@ def core_told(model: Model, measured: Measured, scenes: Sequence[Scene]) -> list
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedDiscs:
     """A nonlinear fit: whether each touch stayed within 10 mm and is there beyond doubt (radius
     over its deviation 3 or more); the error of the worst place, and the deviation that noise alone
     gives the worst, both mm."""
@@ -89,7 +89,9 @@ class Truthful:
         self._quiet_v = self._forward.voltages(self._sheet)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
 
-    def fit(self, frame_v: FloatArray, quiet_v: FloatArray, noise_v: float, scene: Scene) -> Fitted:
+    def fit(
+        self, frame_v: FloatArray, quiet_v: FloatArray, noise_v: float, scene: TouchScene
+    ) -> FittedDiscs:
         """From the true places on. Rows are scaled to this mesh's own V0, which takes contacts and
         mesh out to first order."""
         from scipy.optimize import least_squares
@@ -113,7 +115,9 @@ class Truthful:
         errors = np.hypot(*(values[:, :2] - scene.centres_mm()).T)
         there = bool((values[:, 2] >= CLEAR_DEVIATIONS * spread[:, 2]).all())
         deviation = float(np.hypot(spread[:, 0], spread[:, 1]).max())
-        return Fitted(there and bool((errors <= GATE_MM).all()), float(errors.max()), deviation)
+        return FittedDiscs(
+            there and bool((errors <= GATE_MM).all()), float(errors.max()), deviation
+        )
 
     def _answer(
         self, parameters: FloatArray, contrasts: Sequence[float]
@@ -124,7 +128,7 @@ class Truthful:
         if self._last is not None and self._last[0] == key:
             return self._last[1]
         discs = [
-            Touch(float(x), float(y), float(radius), contrast)
+            TrueTouch(float(x), float(y), float(radius), contrast)
             for (x, y, radius), contrast in zip(parameters.reshape(-1, 3), contrasts, strict=True)
         ]
         touched, factor = self._cover.factor(discs)
@@ -158,7 +162,7 @@ class Truthful:
         self._last = key, answer
         return answer
 
-    def _edge(self, disc: Touch, name: str) -> FloatArray:
+    def _edge(self, disc: TrueTouch, name: str) -> FloatArray:
         """How the part of each element that ``disc`` covers changes with one of its lengths, (E,)
         1/mm."""
         change = np.zeros(self._mesh.n_elements)
@@ -170,7 +174,7 @@ class Truthful:
         return change
 
 
-def quiet_mean(measured: Measured) -> FloatArray:
+def quiet_mean(measured: MeasuredFrames) -> FloatArray:
     """(m,) V."""
     mean = np.asarray(measured.quiet_v.mean(axis=0))
     return np.where(np.abs(mean) > 0, mean, math.inf)

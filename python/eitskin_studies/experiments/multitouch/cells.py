@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from eitskin.errors import GeometryError
 from eitskin.scene.random_touches import (
-    Scene,
-    Touch,
     TouchRules,
+    TouchScene,
     TouchSet,
+    TrueTouch,
     random_touches,
     spaced_touches,
 )
@@ -105,15 +105,15 @@ def _rings(seed: int, count: int, touches: int) -> TouchSet:
         angles = [turn + 2 * math.pi * j / touches for j in range(touches)]
         placed = [(RING_MM * math.cos(angle), RING_MM * math.sin(angle)) for angle in angles]
         scenes.append(
-            Scene(
+            TouchScene(
                 f"{role}-s{seed}-{k}",
-                tuple(Touch(x, y, RING_TOUCH_MM, RING_CONTRAST) for x, y in placed),
+                tuple(TrueTouch(x, y, RING_TOUCH_MM, RING_CONTRAST) for x, y in placed),
             )
         )
     return TouchSet(role, seed, tuple(scenes))
 
 
-def _mixed(outline: Outline, seed: int, role: str, number: int) -> Scene:
+def _mixed(outline: Outline, seed: int, role: str, number: int) -> TouchScene:
     """1 to 12 touches in turn, a dozen equal and a dozen uneven; the spacing is drawn, and made
     less until they fit."""
     touches, uneven = number % MAX + 1, number // MAX % 2 == 1

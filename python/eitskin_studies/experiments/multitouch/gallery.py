@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.errors import GeometryError
-from eitskin.scene.random_touches import Scene
+from eitskin.scene.random_touches import TouchScene
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import Workspace
@@ -18,7 +18,7 @@ from eitskin_studies.experiments.multitouch.cells import NARROW, RING, WIDE, Cel
 from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, TouchData
 from eitskin_studies.experiments.multitouch.variants import (
     VARIANTS,
-    Trained,
+    TrainedMethod,
     differences_v,
     read_images,
 )
@@ -44,7 +44,7 @@ class Example:
     (t, 2)."""
 
     title: str
-    scene: Scene
+    scene: TouchScene
     image: FloatArray
     found: FloatArray
     said: bool
@@ -65,7 +65,9 @@ def gallery(touch_data: TouchData, workspace: Workspace) -> list[Example]:
             continue
         trained = touch_data.trained(CLASSICAL[0])
 
-        def make(cell: Cell = cell, trained: Trained = trained) -> dict[str, npt.NDArray[Any]]:
+        def make(
+            cell: Cell = cell, trained: TrainedMethod = trained
+        ) -> dict[str, npt.NDArray[Any]]:
             measured, grid = touch_data.session(cell).measured(HEADLINE_DB), touch_data.setup.grid
             model = touch_data.model(VARIANTS[0])
             solver = Reconstructor(

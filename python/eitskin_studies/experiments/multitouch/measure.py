@@ -40,8 +40,8 @@ from eitskin_studies.experiments.multitouch.test_data import (
     SNRS_DB,
     TouchData,
 )
-from eitskin_studies.experiments.multitouch.variants import VARIANTS, Seen, Variant
-from eitskin_studies.harness.sessions import Measured
+from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame, TouchVariant
+from eitskin_studies.harness.sessions import MeasuredFrames
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -54,7 +54,7 @@ CEILING_SCENES = 12
 
 
 @dataclass(frozen=True)
-class Counted:
+class CountedScenes:
     """Scores by (geometry, touches, method, SNR in dB); ``unfit``: (geometry, touches) with why
     they cannot be drawn."""
 
@@ -91,9 +91,9 @@ class Ambiguities:
     touches: dict[str, Confidences]
 
 
-def count_all(touch_data: TouchData, workspace: Workspace) -> Counted:
+def count_all(touch_data: TouchData, workspace: Workspace) -> CountedScenes:
     """The core at each SNR, and the classical methods at 60 dB."""
-    counted = Counted({}, {})
+    counted = CountedScenes({}, {})
     for cell in workspace.progress(
         (*counting_cells(), single_cell(), *uneven_cells()), "counting touches"
     ):
@@ -144,7 +144,7 @@ def limits(touch_data: TouchData, workspace: Workspace) -> list[Limit]:
 def _limit(touch_data: TouchData, cell: Cell, snr_db: float, count: int) -> Limit:
     session, fits = touch_data.session(cell), ceiling.Truthful(touch_data.skin, touch_data.protocol)
     scenes, whole = session.touches.scenes[:count], session.measured(snr_db)
-    measured = Measured(whole.quiet_v, whole.frames_v[: len(scenes)])
+    measured = MeasuredFrames(whole.quiet_v, whole.frames_v[: len(scenes)])
     quiet_v, noise_v = (
         ceiling.quiet_mean(measured),
         noise_deviation_v(session.exact_quiet_v, snr_db),
@@ -168,11 +168,13 @@ def _limit(touch_data: TouchData, cell: Cell, snr_db: float, count: int) -> Limi
     )  # fmt: skip
 
 
-def ambiguities(touch_data: TouchData, workspace: Workspace, counted: Counted) -> Ambiguities:
+def ambiguities(touch_data: TouchData, workspace: Workspace, counted: CountedScenes) -> Ambiguities:
     """The core's own signal on all that was counted, and on mixed scenes; the rule from mixed
     tuning scenes."""
 
-    def frames(which: Sequence[Cell], variant: Variant, tuning: bool = False) -> list[ScoredFrame]:
+    def frames(
+        which: Sequence[Cell], variant: TouchVariant, tuning: bool = False
+    ) -> list[ScoredFrame]:
         return [
             score_frame(seen, truth, snr_db, touch_data.seed_radius_mm(variant))
             for cell in which for snr_db in SNRS_DB for seen,
@@ -207,8 +209,8 @@ def ambiguities(touch_data: TouchData, workspace: Workspace, counted: Counted) -
 
 
 def _pairs(
-    touch_data: TouchData, cell: Cell, variant: Variant, snr_db: float, tuning: bool = False
-) -> list[tuple[Seen, FloatArray]]:
+    touch_data: TouchData, cell: Cell, variant: TouchVariant, snr_db: float, tuning: bool = False
+) -> list[tuple[SeenFrame, FloatArray]]:
     return list(
         zip(
             touch_data.seen(cell, variant, snr_db, tuning),

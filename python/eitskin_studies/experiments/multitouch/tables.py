@@ -19,7 +19,7 @@ from eitskin_studies.experiments.multitouch.cells import (
     WIDE,
 )
 from eitskin_studies.experiments.multitouch.counts import Quantile, Score, Share
-from eitskin_studies.experiments.multitouch.measure import Counted, Limit
+from eitskin_studies.experiments.multitouch.measure import CountedScenes, Limit
 from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, SNRS_DB
 from eitskin_studies.experiments.multitouch.variants import VARIANTS
 
@@ -83,7 +83,7 @@ def verdict(value: float, best: float, worst: float, asked: float, more: bool = 
     return "no, but its interval reaches it" if sign * best >= sign * asked else "no"
 
 
-def asked_table(counted: Counted) -> Table:
+def asked_table(counted: CountedScenes) -> Table:
     """Asked and measured."""
     rows = []
     for one in ASKED:
@@ -117,7 +117,7 @@ def asked_table(counted: Counted) -> Table:
     )
 
 
-def exact_table(counted: Counted, geometry: str, name: str) -> Table:
+def exact_table(counted: CountedScenes, geometry: str, name: str) -> Table:
     """Exact counts over the number of touches: the core at each SNR, the classical methods at 60
     dB."""
     columns = [(method, snr_db) for method in NAMES for snr_db in SNRS_DB] + [
@@ -136,7 +136,7 @@ def exact_table(counted: Counted, geometry: str, name: str) -> Table:
     return Table(name, ("touches", "scenes", *head), tuple(rows))
 
 
-def detail_table(counted: Counted) -> Table:
+def detail_table(counted: CountedScenes) -> Table:
     """More of the same at 60 dB: how many are right, found, false, and where."""
     rows = []
     for geometry in GEOMETRIES:
@@ -153,7 +153,7 @@ def detail_table(counted: Counted) -> Table:
     return Table("detail", ("places", *DETAIL_HEAD), tuple(rows))
 
 
-def uneven_table(counted: Counted) -> Table:
+def uneven_table(counted: CountedScenes) -> Table:
     """Touches of radius 6 to 12 mm and contrast 3 to 10 at once, at 60 dB."""
     methods = (*NAMES, *CLASSICAL)
     rows = [
@@ -180,7 +180,7 @@ def _details(score: Score, touches: int, method: str) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def single_table(counted: Counted) -> Table:
+def single_table(counted: CountedScenes) -> Table:
     """Where one touch is found."""
     rows = []
     for method in (*NAMES, *CLASSICAL):

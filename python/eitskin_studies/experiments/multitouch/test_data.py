@@ -19,15 +19,15 @@ from eitskin_studies.compare.methods import baseline_methods
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace, plain
 from eitskin_studies.experiments.multitouch.cells import Cell, draw, mixed_cells
 from eitskin_studies.experiments.multitouch.variants import (
-    Seen,
-    Trained,
-    Variant,
+    SeenFrame,
+    TouchVariant,
+    TrainedMethod,
     differences_v,
     read_images,
     solve,
     train,
 )
-from eitskin_studies.harness.sessions import Session
+from eitskin_studies.harness.sessions import FrameSession
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class TouchData:
         self.protocol = adjacent(self.skin.electrodes.count)
         self._scenes = workspace.scenes(self.skin, self.protocol)
         self._drawn: dict[tuple[str, bool], TouchSet] = {}
-        self._sessions: dict[tuple[str, bool], Session] = {}
+        self._sessions: dict[tuple[str, bool], FrameSession] = {}
         self._models: dict[str, Model] = {}
         self._methods: dict[str, Method] = {}
 
@@ -56,7 +56,7 @@ class TouchData:
         """Jacobian and grid that all methods share."""
         return setup_for(self.skin, self.protocol, elements=MODEL_ELEMENTS)
 
-    def model(self, variant: Variant) -> Model:
+    def model(self, variant: TouchVariant) -> Model:
         """The variant's."""
         if variant.name not in self._models:
             s = self.setup
@@ -65,7 +65,7 @@ class TouchData:
             )
         return self._models[variant.name]
 
-    def seed_radius_mm(self, variant: Variant) -> float:
+    def seed_radius_mm(self, variant: TouchVariant) -> float:
         """Of a touch that nothing is known of."""
         usual = scaled_defaults(self.skin, variant.settings.data_kind).touch_seed_radius_mm
         return float(variant.options.get("touch_seed_radius_mm", usual))
@@ -80,7 +80,7 @@ class TouchData:
             )
         return self._drawn[cell.name, tuning]
 
-    def session(self, cell: Cell, tuning: bool = False) -> Session:
+    def session(self, cell: Cell, tuning: bool = False) -> FrameSession:
         """Solved without noise."""
         if (cell.name, tuning) not in self._sessions:
             name = f"{cell.name}{' tuning' if tuning else ''}"
@@ -97,7 +97,9 @@ class TouchData:
         """What a part is of."""
         return {"part": what, "set": self.scenes(cell, tuning).name, "snr_db": snr_db}
 
-    def seen(self, cell: Cell, variant: Variant, snr_db: float, tuning: bool = False) -> list[Seen]:
+    def seen(
+        self, cell: Cell, variant: TouchVariant, snr_db: float, tuning: bool = False
+    ) -> list[SeenFrame]:
         """What the core says of each scene."""
 
         def make() -> list[dict[str, object]]:
@@ -109,7 +111,7 @@ class TouchData:
             ]
 
         facts = {**self.facts("core", cell, snr_db, tuning), **variant.facts()}
-        return [Seen(**values) for values in self.workspace.kept(facts, make)]
+        return [SeenFrame(**values) for values in self.workspace.kept(facts, make)]
 
     @cached_property
     def _families(self) -> dict[str, Family]:
@@ -124,7 +126,7 @@ class TouchData:
             self._methods[name] = self._families[name].make(self.trained(name).value)
         return self._methods[name]
 
-    def trained(self, name: str) -> Trained:
+    def trained(self, name: str) -> TrainedMethod:
         """On mixed tuning scenes at 60 dB."""
 
         def make() -> dict[str, float]:
@@ -143,7 +145,7 @@ class TouchData:
             "method": name,
             "scenes": self.workspace.settings.count(mixed_cells()[0].usual, 3),
         }
-        return Trained(**self.workspace.kept(facts, make))
+        return TrainedMethod(**self.workspace.kept(facts, make))
 
     def classical(self, cell: Cell, name: str) -> list[FloatArray]:
         """Places that a classical method's images show at 60 dB, of the first scenes."""

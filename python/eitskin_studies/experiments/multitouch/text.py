@@ -13,7 +13,7 @@ from eitskin_studies.experiments.multitouch.cells import (
     MIXED_SCENES,
 )
 from eitskin_studies.experiments.multitouch.counts import Share
-from eitskin_studies.experiments.multitouch.measure import Ambiguities, Counted, Limit
+from eitskin_studies.experiments.multitouch.measure import Ambiguities, CountedScenes, Limit
 from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
 from eitskin_studies.experiments.multitouch.test_data import (
     CLASSICAL,
@@ -43,7 +43,7 @@ def conditions(touch_data: TouchData, workspace: Workspace) -> str:
     )
 
 
-def closing(counted: Counted, limited: Sequence[Limit], ambiguous: Ambiguities) -> str:
+def closing(counted: CountedScenes, limited: Sequence[Limit], ambiguous: Ambiguities) -> str:
     """How far each variant counts, what limits it, and what its reports are worth."""
     far = "; ".join(
         f"{name}: {', '.join(f'{where} {_far(counted, where, name)}' for where in GEOMETRIES)}"
@@ -70,7 +70,7 @@ def _sure(frames: Sequence[ScoredFrame]) -> str:
     return f"{_pc(one.not_said)}, {_pc(one.right_not_said)}"
 
 
-def _far(counted: Counted, geometry: str, name: str) -> str:
+def _far(counted: CountedScenes, geometry: str, name: str) -> str:
     most = MIN - 1
     for k in range(MIN, MAX + 1):
         score = counted.scores.get((geometry, k, name, HEADLINE_DB))

@@ -17,7 +17,7 @@ from eitskin.scoring.image_touches import best_touch_threshold, match_all, touch
 from eitskin.solve.batch import Batch
 from eitskin.solve.options import default_options
 from eitskin_studies.compare.families import Family, Method
-from eitskin_studies.harness.sessions import Measured
+from eitskin_studies.harness.sessions import MeasuredFrames
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -26,7 +26,7 @@ DIGITS = 5
 
 
 @dataclass(frozen=True)
-class Variant:
+class TouchVariant:
     """The core with a model of ``settings``, and ``options`` that differ from the model's own."""
 
     name: str
@@ -44,14 +44,14 @@ class Variant:
 
 # the first is what is usual: pictures and the doubt are of it
 VARIANTS = (
-    Variant("default"),
-    Variant("peaks alone", options={"touch_fit": 0}),
-    Variant("log-ratio", BuildSettings(data_kind="log-ratio")),
+    TouchVariant("default"),
+    TouchVariant("peaks alone", options={"touch_fit": 0}),
+    TouchVariant("log-ratio", BuildSettings(data_kind="log-ratio")),
 )
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenFrame:
     """What the core says of a frame: a list's place k is found touch k. ``clear``: max(S'y) over
     that of noise."""
 
@@ -77,7 +77,7 @@ class Seen:
         return self.solve_macs + self.touch_macs
 
 
-def solve(model: Model, variant: Variant, measured: Measured) -> list[Seen]:
+def solve(model: Model, variant: TouchVariant, measured: MeasuredFrames) -> list[SeenFrame]:
     """Each frame by itself, in float32, as on the board.
 
     Raises:
@@ -93,7 +93,7 @@ def solve(model: Model, variant: Variant, measured: Measured) -> list[Seen]:
             raise result
         info, touches = result.info, result.touches
         clear = info.lambda_max / info.lambda_noise if info.lambda_noise > 0 else 0.0
-        seen.append(Seen(
+        seen.append(SeenFrame(
             [round(t.x_mm, DIGITS) for t in touches],
             [round(t.y_mm, DIGITS) for t in touches],
             [round(t.radius_mm, DIGITS) for t in touches],
@@ -109,7 +109,7 @@ def solve(model: Model, variant: Variant, measured: Measured) -> list[Seen]:
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedMethod:
     """What tuning scenes chose for a classical method: its parameter, and t' of the rule that reads
     touches off its image."""
 
@@ -117,7 +117,7 @@ class Trained:
     threshold: float
 
 
-def differences_v(measured: Measured) -> FloatArray:
+def differences_v(measured: MeasuredFrames) -> FloatArray:
     """Frames less the mean of the quiet ones, (k, m)."""
     return np.asarray(measured.frames_v[:, -1] - measured.quiet_v.mean(axis=0))
 
@@ -128,10 +128,10 @@ def train(
     truths_mm: Sequence[FloatArray],
     index: npt.NDArray[np.int64],
     centres_mm: FloatArray,
-) -> Trained:
+) -> TrainedMethod:
     """The parameter and the threshold that together count most scenes exactly; of equals, most hits
     less false touches."""
-    best, best_score = Trained(family.values[0], TOUCH_THRESHOLDS[0]), (-1, 0)
+    best, best_score = TrainedMethod(family.values[0], TOUCH_THRESHOLDS[0]), (-1, 0)
     for value in family.values:
         images = np.asarray(family.make(value).reconstruct(frames_v), dtype=np.float64)
         threshold = best_touch_threshold(images, truths_mm, index, centres_mm, TOUCH_THRESHOLDS)
@@ -139,7 +139,7 @@ def train(
         matchings = match_all(truths_mm, found)
         score = (sum(m.exact for m in matchings), sum(m.hits - m.false_touches for m in matchings))
         if score > best_score:
-            best, best_score = Trained(value, threshold), score
+            best, best_score = TrainedMethod(value, threshold), score
     return best
 
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from eitskin_studies.experiments.experiment import Outcome, Workspace
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.shapes.measuring import SNR_DB, TEST, TUNING, Maker
 from eitskin_studies.experiments.shapes.tables import all_tables
 from eitskin_studies.experiments.shapes.variants import variants
-from eitskin_studies.pictures.shapes_pictures import Shape, draw_shapes
+from eitskin_studies.pictures.shapes_pictures import ShapePanel, draw_shapes
 
 TITLE = "a rounded rectangle, a forearm and a hand"
 SAID = (
@@ -21,7 +21,7 @@ SAID = (
 )
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """Each shape: its model, random touches on it, and where they are found."""
     makers = {one.name: Maker(workspace, one) for one in variants(workspace.folder / "drawings")}
     measured: dict[str, Any] = {
@@ -36,7 +36,7 @@ def run(workspace: Workspace) -> Outcome:
         tuning_seed=settings.tuning_seed,
         snr=SNR_DB,
     )
-    return Outcome(
+    return ExperimentOutcome(
         all_tables(both),
         {"seed": settings.seed, "snr_db": SNR_DB, "shapes": measured},
         {"shapes.png": partial(draw_shapes, shapes=[_shape(*one) for one in both.values()])},
@@ -44,9 +44,9 @@ def run(workspace: Workspace) -> Outcome:
     )
 
 
-def _shape(variant: Any, result: dict[str, Any]) -> Shape:
+def _shape(variant: Any, result: dict[str, Any]) -> ShapePanel:
     about, scores = result["about"], result["scores"]
-    return Shape(
+    return ShapePanel(
         variant.name,
         variant.skin,
         about["sensitivity_log10"],

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
-from eitskin.scene.random_touches import Scene, TouchSet, random_touches, rim_distance_mm
+from eitskin.scene.random_touches import TouchScene, TouchSet, random_touches, rim_distance_mm
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM
 from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.solve.batch import reconstruct_many
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
 from eitskin_studies.experiments.scored import Evaluator, session_in_parts
-from eitskin_studies.experiments.shapes.variants import Variant
-from eitskin_studies.harness.sessions import SceneSolver, Session
+from eitskin_studies.experiments.shapes.variants import ShapeVariant
+from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 
 SNR_DB = 60.0
 TUNING, TEST = 40, 160
@@ -30,7 +30,7 @@ class Maker:
     result makes none."""
 
     workspace: Workspace
-    variant: Variant
+    variant: ShapeVariant
 
     @cached_property
     def protocol(self) -> Protocol:
@@ -71,7 +71,7 @@ class Maker:
         count = self.workspace.settings.count(usual)
         return random_touches(self.variant.skin.outline, seed, count, role, self.variant.rules)
 
-    def session(self, drawn: TouchSet) -> Session:
+    def session(self, drawn: TouchSet) -> FrameSession:
         """Its frames."""
         return session_in_parts(
             self._solver,
@@ -113,7 +113,7 @@ class Maker:
             "snr_db": SNR_DB,
         }
 
-    def _variety(self, scene: Scene) -> tuple[int, int]:
+    def _variety(self, scene: TouchScene) -> tuple[int, int]:
         """In how many regions a scene's touches lie, and how many they are; the picture shows the
         first of the richest."""
         return len(set(self.variant.regions(scene.centres_mm(), 50.0 * self.variant.scale))), len(

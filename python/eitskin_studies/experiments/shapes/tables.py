@@ -13,7 +13,7 @@ from eitskin.scoring.matching import GATE_MM
 from eitskin_studies.experiments.experiment import Table
 from eitskin_studies.experiments.scored import hits_mm, number_text, score_text, share_text
 from eitskin_studies.experiments.shapes.example_drawings import hand_region
-from eitskin_studies.experiments.shapes.variants import Variant
+from eitskin_studies.experiments.shapes.variants import ShapeVariant
 from eitskin_studies.harness.summary import summarise
 
 SKINS_HEAD = (
@@ -32,7 +32,7 @@ LOST_HEAD = (
 )  # fmt: skip
 
 
-def all_tables(measured: Mapping[str, tuple[Variant, Mapping[str, Any]]]) -> tuple[Table, ...]:
+def all_tables(measured: Mapping[str, tuple[ShapeVariant, Mapping[str, Any]]]) -> tuple[Table, ...]:
     """The skins, what was found on them, and where."""
     both = list(measured.values())
     return (
@@ -42,7 +42,7 @@ def all_tables(measured: Mapping[str, tuple[Variant, Mapping[str, Any]]]) -> tup
     )
 
 
-def _skin_row(variant: Variant, result: Mapping[str, Any]) -> tuple[str, ...]:
+def _skin_row(variant: ShapeVariant, result: Mapping[str, Any]) -> tuple[str, ...]:
     outline, electrodes, about = variant.skin.outline, variant.skin.electrodes, result["about"]
     low, high = variant.rules.radius_mm
     worst, middle = np.quantile(about["sensitivity_log10"], [0.1, 0.5])
@@ -58,7 +58,7 @@ def _skin_row(variant: Variant, result: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _found_row(variant: Variant, result: Mapping[str, Any]) -> tuple[str, ...]:
+def _found_row(variant: ShapeVariant, result: Mapping[str, Any]) -> tuple[str, ...]:
     scores, errors = result["scores"], hits_mm(result["scores"])
     image = summarise(scores["image"])
     size = 2 * np.sqrt(variant.skin.outline.area_mm2 / np.pi)
@@ -78,7 +78,7 @@ def _found_row(variant: Variant, result: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _lost_rows(variant: Variant, result: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def _lost_rows(variant: ShapeVariant, result: Mapping[str, Any]) -> list[tuple[str, ...]]:
     scores, about = result["scores"], result["about"]
     errors, places = scores["error_mm"], np.array(scores["place_mm"]).reshape(-1, 2)
     where = variant.regions(places, about["deepest_mm"])
@@ -108,7 +108,7 @@ def _lost_rows(variant: Variant, result: Mapping[str, Any]) -> list[tuple[str, .
     return rows
 
 
-def _noticed(variant: Variant, scores: Mapping[str, Any]) -> list[bool]:
+def _noticed(variant: ShapeVariant, scores: Mapping[str, Any]) -> list[bool]:
     """Of each true touch whether anything was found on the same finger, however far along it, or
     within twice the gate."""
     gate_mm = 2 * GATE_MM * variant.scale

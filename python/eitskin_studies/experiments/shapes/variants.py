@@ -12,7 +12,7 @@ import numpy.typing as npt
 from eitskin.fileio import write_bytes
 from eitskin.scene.random_touches import TouchRules, rim_distance_mm
 from eitskin.skin.drawing import read_drawing
-from eitskin.skin.drawing_shapes import Reading
+from eitskin.skin.drawing_shapes import DrawingReading
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import Outline
 from eitskin.skin.placement import Placed, by_marks, by_points
@@ -33,7 +33,7 @@ BANDS = ("rim third", "middle third", "innermost third")
 
 
 @dataclass(frozen=True, eq=False)
-class Variant:
+class ShapeVariant:
     """A skin under its ``name`` here; ``hand``: its touches lie on fingers or the palm, else at
     some depth within the rim."""
 
@@ -66,7 +66,7 @@ class Variant:
         return [BANDS[int(min(max(3 * value, 0), 2))] for value in depth]
 
 
-def variants(folder: Path) -> list[Variant]:
+def variants(folder: Path) -> list[ShapeVariant]:
     """All of them; the drawings that two are read from are written to ``folder``.
 
     Raises:
@@ -76,19 +76,21 @@ def variants(folder: Path) -> list[Variant]:
     folder.mkdir(parents=True, exist_ok=True)
     write_bytes(folder / "hand.svg", hand_svg().encode("utf-8"))
     write_forearm_dxf(folder / "forearm.dxf")
-    drawn = read_drawing(folder / "hand.svg", Reading())
+    drawn = read_drawing(folder / "hand.svg", DrawingReading())
     hand = drawn.outline("skin", "electrode")
-    forearm = read_drawing(folder / "forearm.dxf", Reading()).outline("skin")
+    forearm = read_drawing(folder / "forearm.dxf", DrawingReading()).outline("skin")
     placed = by_marks(hand, drawn.marked("electrode"), WRIST_DEG, None)
     pairs = by_points(hand, hand_pairs_mm(), WRIST_DEG, None)
     return [
-        Variant("disk, 16", paper_skin()),
-        Variant("rectangle, 16", _evenly("rectangle", as_outline(rectangle_corners()), 16, -90.0)),
-        Variant("forearm, 16", _evenly("forearm", forearm, 16, 180.0)),
-        Variant("hand, 16 evenly", _evenly("hand", hand, 16, WRIST_DEG), True),
-        Variant("hand, 16 placed", _at("hand, placed", hand, placed), True),
-        Variant("hand, 16 in pairs", _at("hand in pairs", hand, pairs), True),
-        Variant("hand, 32 evenly", _evenly("hand of 32", hand, 32, WRIST_DEG), True),
+        ShapeVariant("disk, 16", paper_skin()),
+        ShapeVariant(
+            "rectangle, 16", _evenly("rectangle", as_outline(rectangle_corners()), 16, -90.0)
+        ),
+        ShapeVariant("forearm, 16", _evenly("forearm", forearm, 16, 180.0)),
+        ShapeVariant("hand, 16 evenly", _evenly("hand", hand, 16, WRIST_DEG), True),
+        ShapeVariant("hand, 16 placed", _at("hand, placed", hand, placed), True),
+        ShapeVariant("hand, 16 in pairs", _at("hand in pairs", hand, pairs), True),
+        ShapeVariant("hand, 32 evenly", _evenly("hand of 32", hand, 32, WRIST_DEG), True),
     ]
 
 

@@ -15,7 +15,7 @@ from eitskin.model.build import linearise
 from eitskin.scoring import metrics
 from eitskin.scoring.matching import GATE_MM
 from eitskin.skin.skin import size_to_paper
-from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Outcome, Workspace
+from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, ExperimentOutcome, Workspace
 from eitskin_studies.experiments.tank import levers as lever_work
 from eitskin_studies.experiments.tank import tables
 from eitskin_studies.experiments.tank.discs import varied
@@ -23,7 +23,7 @@ from eitskin_studies.experiments.tank.evaluation import EvaluationSets, evaluate
 from eitskin_studies.experiments.tank.imagers import (
     KINDS,
     Entry,
-    Tank,
+    SimulatedTank,
     baseline_entries,
     core_entries,
 )
@@ -55,7 +55,7 @@ TRUTH_ERRORS = (
 DRAWS = 200
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """All of it.
 
     Raises:
@@ -91,13 +91,13 @@ def _watched(workspace: Workspace, entries: list[Entry]) -> Iterable[Entry]:
     return workspace.progress(entries, "methods")
 
 
-def _tank() -> Tank:
+def _tank() -> SimulatedTank:
     skin, protocol = tank()
-    return Tank(skin, protocol, linearise(skin, protocol, elements=MODEL_ELEMENTS))
+    return SimulatedTank(skin, protocol, linearise(skin, protocol, elements=MODEL_ELEMENTS))
 
 
 def _grounds(
-    workspace: Workspace, ours: Tank, folder: Path
+    workspace: Workspace, ours: SimulatedTank, folder: Path
 ) -> tuple[EvaluationSets, dict[str, Any]]:
     """What is judged on, and what all results depend on."""
     measured = phantoms(folder)

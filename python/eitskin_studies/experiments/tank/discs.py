@@ -19,7 +19,7 @@ from eitskin_studies.experiments.tank.evaluation import (
     increases,
     places_of,
 )
-from eitskin_studies.experiments.tank.imagers import CoreImager, Levers, Tank
+from eitskin_studies.experiments.tank.imagers import CoreImager, Levers, SimulatedTank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
 
 KIND = "log-ratio"
@@ -42,7 +42,10 @@ VARIANTS: tuple[tuple[str, dict[str, Any], dict[str, Any], bool], ...] = (
 
 
 def varied(
-    workspace: Workspace, tank: Tank, evaluation_sets: EvaluationSets, facts: dict[str, Any]
+    workspace: Workspace,
+    tank: SimulatedTank,
+    evaluation_sets: EvaluationSets,
+    facts: dict[str, Any],
 ) -> list[dict[str, Any]]:
     """Every variant on the metal set that is chosen by, and on the touch-like frames."""
     watched: Iterable[Any] = workspace.progress(VARIANTS, "discs")
@@ -55,7 +58,7 @@ def varied(
 
 
 def _variant(
-    tank: Tank,
+    tank: SimulatedTank,
     evaluation_sets: EvaluationSets,
     name: str,
     options: dict[str, Any],
@@ -64,7 +67,9 @@ def _variant(
 ) -> dict[str, Any]:
     if electrodes:
         skin = replace(tank.skin, electrodes=replace(tank.skin.electrodes, **electrodes))
-        tank = Tank(skin, tank.protocol, linearise(skin, tank.protocol, elements=MODEL_ELEMENTS))
+        tank = SimulatedTank(
+            skin, tank.protocol, linearise(skin, tank.protocol, elements=MODEL_ELEMENTS)
+        )
     imager = CoreImager(tank, Levers(kind=KIND), painted=True, options=options)
     frames, chosen = evaluation_sets.phantoms, touch_like(evaluation_sets.phantoms)
     tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, signed)

@@ -83,7 +83,7 @@ class Levers:
 
 
 @dataclass(frozen=True, eq=False)
-class Tank:
+class SimulatedTank:
     """Skin, protocol and its linearisation; kernels and models that were made are kept."""
 
     skin: Skin
@@ -141,7 +141,7 @@ def datum(kind: str, frames_v: FloatArray, reference_v: FloatArray) -> FloatArra
 class BaselineImager:
     """A method of ``eitskin_studies.compare.baselines`` on folded data of one kind."""
 
-    def __init__(self, tank: Tank, kind: str, method: Method) -> None:
+    def __init__(self, tank: SimulatedTank, kind: str, method: Method) -> None:
         self._kind, self._method = kind, method
         self._fold = tank.protocol.reciprocal_pairs()
 
@@ -162,7 +162,7 @@ class CoreImager:
 
     def __init__(
         self,
-        tank: Tank,
+        tank: SimulatedTank,
         levers: Levers,
         painted: bool = False,
         options: Mapping[str, Any] | None = None,
@@ -205,7 +205,7 @@ def painted_touches(grid: Grid, touches: Sequence[Touch]) -> FloatArray:
     return image
 
 
-def baseline_entries(tank: Tank, kind: str) -> tuple[Entry, ...]:
+def baseline_entries(tank: SimulatedTank, kind: str) -> tuple[Entry, ...]:
     """All of ``baseline_methods`` on data of ``kind``, reciprocal rows folded, which loses
     nothing."""
     jacobian, fold = tank.linear.jacobian, tank.protocol.reciprocal_pairs()
@@ -228,7 +228,7 @@ def baseline_entries(tank: Tank, kind: str) -> tuple[Entry, ...]:
     return tuple(entry(family) for family in baseline_methods(folded, tank.grid))
 
 
-def core_entries(tank: Tank, kind: str) -> tuple[Entry, ...]:
+def core_entries(tank: SimulatedTank, kind: str) -> tuple[Entry, ...]:
     """The core on data of ``kind``: its image, its touches as discs, and where their radius is tied
     to their strength, on ratios, these with the expected change of a touch over the water's
     conductivity chosen like any other parameter.

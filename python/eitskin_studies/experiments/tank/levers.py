@@ -14,7 +14,7 @@ import numpy as np
 from eitskin.scoring import metrics
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
-from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, Tank
+from eitskin_studies.experiments.tank.imagers import KINDS, CoreImager, Entry, Levers, SimulatedTank
 from eitskin_studies.experiments.tank.tanks import touch_like, truth_of
 
 REGULARISATIONS = (0.01, 0.03, 0.1, 0.3)
@@ -47,7 +47,10 @@ def together(kind: str) -> list[Levers]:
 
 
 def tried(
-    workspace: Workspace, tank: Tank, evaluation_sets: EvaluationSets, facts: dict[str, Any]
+    workspace: Workspace,
+    tank: SimulatedTank,
+    evaluation_sets: EvaluationSets,
+    facts: dict[str, Any],
 ) -> dict[Levers, dict[str, Any]]:
     """Every setting of levers that is looked at, with what it gave."""
     wanted = list(
@@ -66,7 +69,7 @@ def chosen(found: dict[Levers, dict[str, Any]]) -> Levers:
     return max(found, key=lambda levers: (round(found[levers]["tuned"], 3), -found[levers]["macs"]))
 
 
-def entry_of(tank: Tank, name: str, levers: Levers) -> Entry:
+def entry_of(tank: SimulatedTank, name: str, levers: Levers) -> Entry:
     """Levers as an entry of the contest."""
     return Entry(name, levers.kind, "", (0.0,), lambda _: CoreImager(tank, levers))
 
@@ -88,7 +91,9 @@ def _watched(workspace: Workspace, wanted: list[Levers]) -> Iterable[Levers]:
     return workspace.progress(wanted, "levers")
 
 
-def _measured(tank: Tank, evaluation_sets: EvaluationSets, levers: Levers) -> dict[str, Any]:
+def _measured(
+    tank: SimulatedTank, evaluation_sets: EvaluationSets, levers: Levers
+) -> dict[str, Any]:
     imager = CoreImager(tank, levers)
     tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, False)
     curves = evaluation_sets.image_scorer.curves(tuned.images, evaluation_sets.metal.conductive)

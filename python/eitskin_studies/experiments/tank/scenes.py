@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.scene.random_touches import Scene, TouchRules, TouchSet, random_touches
+from eitskin.scene.random_touches import TouchRules, TouchScene, TouchSet, random_touches
 from eitskin.scene.streams import stream
 from eitskin.scoring.metrics import Raster, disc_mask
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tank.tanks import tank
-from eitskin_studies.harness.sessions import Session
+from eitskin_studies.harness.sessions import FrameSession
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -47,7 +47,7 @@ def with_signs(drawn: TouchSet) -> TouchSet:
         touches = tuple(
             replace(touch, contrast=1 / touch.contrast) if turn else touch for touch, turn in pairs
         )
-        scenes.append(Scene(scene.name, touches))
+        scenes.append(TouchScene(scene.name, touches))
     return TouchSet(drawn.role, drawn.seed, tuple(scenes))
 
 
@@ -79,7 +79,7 @@ def simulated(
     )
 
 
-def noisy(session: Session, share: float) -> FloatArray:
+def noisy(session: FrameSession, share: float) -> FloatArray:
     """The session's frames (k, m) with white noise of ``share`` of the rms of each one's change."""
     change = session.exact_v - session.exact_quiet_v
     names = [
@@ -91,7 +91,7 @@ def noisy(session: Session, share: float) -> FloatArray:
     )
 
 
-def _discs(scene: Scene, sign: int) -> tuple[FloatArray, FloatArray]:
+def _discs(scene: TouchScene, sign: int) -> tuple[FloatArray, FloatArray]:
     chosen = [touch for touch in scene.touches if (touch.contrast > 1) == (sign > 0)]
     centres = np.array([(touch.x_mm, touch.y_mm) for touch in chosen]).reshape(-1, 2)
     return centres, np.array([touch.radius_mm for touch in chosen])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from eitskin_studies.experiments.experiment import Outcome, Settings, Table
+from eitskin_studies.experiments.experiment import ExperimentOutcome, ExperimentSettings, Table
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.imagers import DISCS, KINDS, TUNED_DISCS, Levers
 from eitskin_studies.experiments.tank.levers import one_by_one, words_of
@@ -25,8 +25,8 @@ def outcome(
     best: Levers,
     discs: list[Found],
     ceiling: list[Found],
-    settings: Settings,
-) -> Outcome:
+    settings: ExperimentSettings,
+) -> ExperimentOutcome:
     """All that is shown."""
     tables = (
         touch_like_table(results),
@@ -66,7 +66,7 @@ def outcome(
         "discs": discs,
         "ceiling": ceiling,
     }
-    return Outcome(
+    return ExperimentOutcome(
         tables,
         data,
         {
@@ -249,7 +249,7 @@ def ceiling_table(ceiling: list[Found]) -> Table:
     return Table("ceiling", ("truth off by", *TOUCH_LIKE, "mean"), tuple(rows))
 
 
-def conditions(evaluation_sets: EvaluationSets, settings: Settings) -> str:
+def conditions(evaluation_sets: EvaluationSets, settings: ExperimentSettings) -> str:
     """Sets, seeds, noise, thresholds."""
     tuned, tested = len(evaluation_sets.metal.frames_v), len(evaluation_sets.test.frames_v)
     return (

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.experiments.experiment import Outcome, Table, Workspace
-from eitskin_studies.experiments.tracking.counted import Count, total
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
+from eitskin_studies.experiments.tracking.counted import TrackCount, total
 from eitskin_studies.experiments.tracking.measured import PAIRINGS, Measurer, choices, counts, ways
 from eitskin_studies.experiments.tracking.streams import (
     FRAMES,
     RATE_HZ,
-    Stream,
+    TouchStream,
     passing_streams,
     random_streams,
 )
@@ -35,16 +35,16 @@ COUNT_HEAD = (
 )
 PLACE_HEAD = ("median mm", "p95 mm", "reported, frames late", "ended, frames late")
 
-Counts = Mapping[tuple[int, int, str], list[Count]]
+Counts = Mapping[tuple[int, int, str], list[TrackCount]]
 
 
-def run(workspace: Workspace) -> Outcome:
+def run(workspace: Workspace) -> ExperimentOutcome:
     """All tables and pictures."""
     from eitskin_studies.pictures.tracking_pictures import draw_stream_told, draw_worth
 
     measurer, settings = Measurer(workspace), workspace.settings
     streams = _streams(settings.seed, "test", settings.count(STREAMS))
-    done: dict[tuple[int, int, str], list[Count]] = {}
+    done: dict[tuple[int, int, str], list[TrackCount]] = {}
     for snr_db in SNRS_DB:
         for speed in SPEEDS_MM_S:
             for way in ways(measurer.model):
@@ -60,7 +60,7 @@ def run(workspace: Workspace) -> Outcome:
         _chosen(measurer, settings.tuning_seed, settings.count(TUNING_STREAMS)),
         _passing(measurer, settings.seed, settings.count(PASSING)),
     )  # fmt: skip
-    return Outcome(
+    return ExperimentOutcome(
         tables=tables,
         data=_data(done, tables),
         pictures={
@@ -75,7 +75,7 @@ def run(workspace: Workspace) -> Outcome:
     )
 
 
-def _streams(seed: int, role: str, count: int) -> dict[int, tuple[Stream, ...]]:
+def _streams(seed: int, role: str, count: int) -> dict[int, tuple[TouchStream, ...]]:
     outline = paper_skin().outline
     return {speed: random_streams(outline, seed, role, speed, count) for speed in SPEEDS_MM_S}
 
@@ -145,7 +145,7 @@ def _passing(measurer: Measurer, seed: int, count: int) -> Table:
     for snr_db in SNRS_DB:
         for speed in SPEEDS_MM_S[1:]:
             streams = passing_streams(seed, speed, count)
-            by: dict[str, list[Count]] = {}
+            by: dict[str, list[TrackCount]] = {}
             for way in ways(measurer.model):
                 if way.name in ("off", "all"):
                     by[way.name] = counts(
@@ -166,7 +166,7 @@ def _passing(measurer: Measurer, seed: int, count: int) -> Table:
     )
 
 
-def _count_words(some: list[Count]) -> tuple[str, ...]:
+def _count_words(some: list[TrackCount]) -> tuple[str, ...]:
     whole, exact = total(some), summarise([100 * one.exact / one.frames for one in some])
     return (
         f"{exact.mean:.1f} ({exact.low:.1f} to {exact.high:.1f})",
@@ -178,7 +178,7 @@ def _count_words(some: list[Count]) -> tuple[str, ...]:
     )
 
 
-def _place_words(some: list[Count]) -> tuple[str, ...]:
+def _place_words(some: list[TrackCount]) -> tuple[str, ...]:
     whole = total(some)
     errors, late, ghost = _some(whole), whole.late or [0], whole.ghost or [0]
     return (
@@ -190,7 +190,7 @@ def _place_words(some: list[Count]) -> tuple[str, ...]:
     )
 
 
-def _some(count: Count) -> list[float]:
+def _some(count: TrackCount) -> list[float]:
     return count.errors_mm or [float("nan")]
 
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from eitskin.core.results import Touch
 from eitskin.scoring.matching import match
-from eitskin_studies.experiments.tracking.streams import Stream
+from eitskin_studies.experiments.tracking.streams import TouchStream
 
 
 @dataclass
-class Count:
+class TrackCount:
     """Of one stream or of several added up.
 
     Attributes:
@@ -43,8 +43,10 @@ class Count:
     errors_mm: list[float] = field(default_factory=list)
     macs: int = 0
 
-    def __add__(self, other: Count) -> Count:
-        return Count(*(getattr(self, one.name) + getattr(other, one.name) for one in fields(Count)))
+    def __add__(self, other: TrackCount) -> TrackCount:
+        return TrackCount(
+            *(getattr(self, one.name) + getattr(other, one.name) for one in fields(TrackCount))
+        )
 
     @property
     def mota(self) -> float:
@@ -57,18 +59,18 @@ class Count:
         return asdict(self)
 
 
-def total(counts: Sequence[Count]) -> Count:
+def total(counts: Sequence[TrackCount]) -> TrackCount:
     """All added up."""
-    return sum(counts, Count())
+    return sum(counts, TrackCount())
 
 
-def count_stream(stream: Stream, told: Sequence[Sequence[Touch]], macs: int) -> Count:
+def count_stream(stream: TouchStream, told: Sequence[Sequence[Touch]], macs: int) -> TrackCount:
     """The touches ``told`` in each frame of ``stream``.
 
     Raises:
         MissingExtraError: scipy is not installed.
     """
-    count = Count(frames=len(told), macs=macs)
+    count = TrackCount(frames=len(told), macs=macs)
     first: dict[int, int] = {}
     last: dict[
         int, tuple[int, int]

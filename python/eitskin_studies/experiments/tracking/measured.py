@@ -21,8 +21,8 @@ from eitskin.scoring.snr import noise_deviation_v
 from eitskin.solve.options import default_options, tracking
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import Workspace
-from eitskin_studies.experiments.tracking.counted import Count, count_stream
-from eitskin_studies.experiments.tracking.streams import ELEMENTS, Stream
+from eitskin_studies.experiments.tracking.counted import TrackCount, count_stream
+from eitskin_studies.experiments.tracking.streams import ELEMENTS, TouchStream
 from eitskin_studies.harness.sessions import converter_for
 
 FloatArray = npt.NDArray[np.float64]
@@ -81,7 +81,7 @@ class Measurer:
         self._skin = Reconstructor(self.model, blob=blob)
         self._bench = MeshCache()
 
-    def count(self, stream: Stream, snr_db: float, way: Way) -> Count:
+    def count(self, stream: TouchStream, snr_db: float, way: Way) -> TrackCount:
         """The core's own tracking."""
         facts = {
             "what": "tracking",
@@ -94,9 +94,11 @@ class Measurer:
             told, macs = self.told(stream, snr_db, way.options)
             return count_stream(stream, told, macs).as_dict()
 
-        return Count(**self.workspace.kept(facts, make))
+        return TrackCount(**self.workspace.kept(facts, make))
 
-    def count_paired(self, stream: Stream, snr_db: float, pairing: Pairing, name: str) -> Count:
+    def count_paired(
+        self, stream: TouchStream, snr_db: float, pairing: Pairing, name: str
+    ) -> TrackCount:
         """Tracking by the numpy reference with another rule for who is who."""
         facts = {
             "what": "tracking by pairs",
@@ -108,10 +110,10 @@ class Measurer:
         def make() -> dict[str, object]:
             return count_stream(stream, self._told_paired(stream, snr_db, pairing), 0).as_dict()
 
-        return Count(**self.workspace.kept(facts, make))
+        return TrackCount(**self.workspace.kept(facts, make))
 
     def told(
-        self, stream: Stream, snr_db: float, options: Options
+        self, stream: TouchStream, snr_db: float, options: Options
     ) -> tuple[list[tuple[Touch, ...]], int]:
         """The touches of each frame, and the MACs of all."""
         frames_v = self._start(stream, snr_db, options)
@@ -121,7 +123,7 @@ class Measurer:
         )
 
     def _told_paired(
-        self, stream: Stream, snr_db: float, pairing: Pairing
+        self, stream: TouchStream, snr_db: float, pairing: Pairing
     ) -> list[tuple[Touch, ...]]:
         whole = tracking(default_options(self.model))
         single = replace(default_options(self.model), detection_factor=whole.detection_factor)
@@ -135,7 +137,7 @@ class Measurer:
             )
         return told
 
-    def _start(self, stream: Stream, snr_db: float, options: Options) -> FloatArray:
+    def _start(self, stream: TouchStream, snr_db: float, options: Options) -> FloatArray:
         """Take the reference; returns the frames (f, m) V."""
         exact_v, how = self._exact_v(stream), converter_for(snr_db)
         noise_v = noise_deviation_v(exact_v[0], snr_db)
@@ -151,7 +153,7 @@ class Measurer:
         self._skin.forget()
         return frames_v
 
-    def _exact_v(self, stream: Stream) -> FloatArray:
+    def _exact_v(self, stream: TouchStream) -> FloatArray:
         """The quiet frame, then those of the stream, without noise: (1 + f, m)."""
 
         def make() -> dict[str, FloatArray]:
@@ -192,7 +194,7 @@ PAIRINGS: tuple[tuple[str, Pairing], ...] = (
 
 
 def counts(
-    measurer: Measurer, streams: Sequence[Stream], snr_db: float, way: Way, what: str
-) -> list[Count]:
+    measurer: Measurer, streams: Sequence[TouchStream], snr_db: float, way: Way, what: str
+) -> list[TrackCount]:
     """Of each stream."""
     return [measurer.count(one, snr_db, way) for one in measurer.workspace.progress(streams, what)]

@@ -32,7 +32,7 @@ TRIES = 2_000
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
+class TouchStream:
     """Fingers that all move at ``speed_mm_s``, by the names ``tracks`` (their order) and at the
     frames' times."""
 
@@ -71,7 +71,7 @@ class Stream:
 
 def random_streams(
     outline: Outline, seed: int, role: str, speed_mm_s: float, count: int
-) -> tuple[Stream, ...]:
+) -> tuple[TouchStream, ...]:
     """``count`` streams of one to four fingers that come and go at random times; they move along
     straight lines between random places, or stay. No two are nearer than 12 mm, edge to edge, at
     any time.
@@ -86,7 +86,7 @@ def random_streams(
     )
 
 
-def passing_streams(seed: int, speed_mm_s: float, count: int) -> tuple[Stream, ...]:
+def passing_streams(seed: int, speed_mm_s: float, count: int) -> tuple[TouchStream, ...]:
     """Two fingers each that pass one another in opposite directions, 5 mm apart, edge to edge."""
     made = []
     for k in range(count):
@@ -115,13 +115,13 @@ def passing_streams(seed: int, speed_mm_s: float, count: int) -> tuple[Stream, .
                     float(contrast),
                 )
             )
-        made.append(Stream(f"passing-{speed_mm_s:g}-{k}", speed_mm_s, tuple(tracks)))
+        made.append(TouchStream(f"passing-{speed_mm_s:g}-{k}", speed_mm_s, tuple(tracks)))
     return tuple(made)
 
 
 def _random(
     outline: Outline, name: str, speed_mm_s: float, generator: np.random.Generator
-) -> Stream:
+) -> TouchStream:
     for _ in range(TRIES):
         tracks: list[TouchTrack] = []
         samples: list[TrackSamples] = []
@@ -132,7 +132,7 @@ def _random(
                 tracks.append(track)
                 samples.append(here)
         if tracks:
-            return Stream(name, speed_mm_s, tuple(tracks))
+            return TouchStream(name, speed_mm_s, tuple(tracks))
     raise GeometryError(f"{name}: no finger fits on this skin; take a larger one")
 
 

@@ -8,7 +8,7 @@ from effect_types import FloatArray, MakeSession
 
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, build_mesh
-from eitskin.scene.effect import Session
+from eitskin.scene.effect import EffectSession
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -35,13 +35,13 @@ def make_session(small_mesh: Mesh, v0: FloatArray) -> MakeSession:
         rate_hz: float = 20.0,
         seed: int = 1,
         drawn: list[str] | None = None,
-    ) -> Session:
+    ) -> EffectSession:
         def make_stream(name: str, index: int) -> np.random.Generator:
             if drawn is not None:
                 drawn.append(name)
             return stream(seed, name, index)
 
-        return Session(
+        return EffectSession(
             skin=paper_skin(),
             protocol=adjacent(16),
             n_frames=n_frames,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.scene.effect import Session
+from eitskin.scene.effect import EffectSession
 
 FloatArray = npt.NDArray[np.float64]
-MakeSession = Callable[..., Session]
+MakeSession = Callable[..., EffectSession]

@@ -15,7 +15,7 @@ from effect_types import FloatArray, MakeSession
 
 from eitskin.scene.compiler import Bench, compile_scene
 from eitskin.scene.description import scene_from_table
-from eitskin.scene.effect import GeometryStep, LoadedStep, Loads, Session, Stage, VoltageStep
+from eitskin.scene.effect import EffectSession, GeometryStep, LoadedStep, Loads, Stage, VoltageStep
 from eitskin.scene.parameters import describe_parameters
 from eitskin.scene.registry import BUILT_IN, Registry, summary_of
 from eitskin.scene.runner import simulate_frames
@@ -78,7 +78,7 @@ def _irreciprocity(v: FloatArray) -> float:
     return float(np.abs(v[pairs.first] - pairs.sign * v[pairs.second]).max() / np.abs(v).max())
 
 
-def _made(name: str, session: Session) -> Any:
+def _made(name: str, session: EffectSession) -> Any:
     """The module of an effect, and its step under the parameters above."""
     module = importlib.import_module(BUILT_IN[name])
     values = {k: tuple(v) if isinstance(v, list) else v for k, v in STRONG[name].items()}

@@ -14,7 +14,7 @@ from effect_types import FloatArray, MakeSession
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
-from eitskin.scene.effect import Contacts, PhaseStep, Session
+from eitskin.scene.effect import Contacts, EffectSession, PhaseStep
 from eitskin.scene.effects import bridged, contact_impedance, detached, phase
 from eitskin.scene.forward_steps import Change, FactoriseComplex, Work
 from eitskin.scene.reading import OPEN_BRIDGED_OHM_M2, OPEN_OHM_M2
@@ -28,7 +28,7 @@ def _ideal(count: int = 16) -> Contacts:
     return Contacts(np.zeros(count), np.zeros(count, dtype=bool))
 
 
-def _impedance(session: Session, mean: float, spread: float = 0.0) -> FloatArray:
+def _impedance(session: EffectSession, mean: float, spread: float = 0.0) -> FloatArray:
     step = contact_impedance.make(contact_impedance.Parameters(mean, spread), session)
     return step.apply(_ideal(), 0.0, 0).impedance_ohm_m2
 
