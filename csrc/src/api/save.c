@@ -3,8 +3,9 @@
 
 #include "base/vec.h"
 
-/* Followed by v0 and by the masked rows. The reference's pointers are of no use in it. */
-/* Only what cannot be found again from the model and a frame; the basis is built anew, which
+/* Followed by v0 and by the masked rows. The reference's pointers are of no use in it.
+ *
+ * Only what cannot be found again from the model and a frame; the basis is built again, which
  * costs MACs once. Followed touches are not in it: by the time that it is restored they have
  * moved. */
 typedef struct saved {

@@ -9,7 +9,10 @@ eits_status eits_self_test(eits_context *ctx, eits_real *difference)
     if (ctx == NULL || difference == NULL)
         return EITS_E_ARGUMENT;
     const eits_model *model = ctx->model;
-    /* n_rows numbers that a single reference frame leaves unused */
+    /* n_rows numbers that a single reference frame leaves unused
+     *
+     * Room for a frame without asking the caller for it; squares of deviations are zero again
+     * afterwards, as eits_reference_set leaves them. */
     eits_real *frame = ctx->reference.m2;
     *difference = 0;
     for (uint32_t i = 0; i < model->n_rows; ++i)

@@ -51,6 +51,7 @@ static void lay_out_scratch(eits_context *ctx, arena *a)
     s->square = take_reals(a, ctx->model->rank * stride);
 }
 
+/* What outlives a frame, or is looked at by more than one stage. */
 static void lay_out_frame(eits_context *ctx, arena *a)
 {
     const size_t rows = ctx->model->n_rows, folded = ctx->model->n_folded;
@@ -164,6 +165,7 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
         lay_out_panels(made, &a);
     eits_learn_range(made, &made->scratch);
     eits_whitening_init(made, &made->scratch);
+    /* Learned from the model above, once: it does not change. */
     *ctx = made;
     return eits_options_default(model, &made->options);
 }

@@ -1,5 +1,6 @@
 #include "eitskin/diagnostics.h"
 
+/* A switch without a default: a compiler names the case that a new status lacks. */
 const char *eits_status_text(eits_status status)
 {
     switch (status) {

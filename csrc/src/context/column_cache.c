@@ -53,6 +53,8 @@ void eits_cache_slots(const eits_columns *c, const uint32_t *index, uint32_t cou
         slot[k] = c->slot[index[k]];
 }
 
+/* The same shape as S, so the same kernels read it; without scales, since unpacking leaves them
+ * out and callers have them in their values. */
 eits_matrix eits_cached_columns(const eits_columns *c)
 {
     eits_matrix cached = *c->s;

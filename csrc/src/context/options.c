@@ -52,6 +52,8 @@ eits_status eits_options_track(eits_options *options)
 {
     if (options == NULL)
         return EITS_E_ARGUMENT;
+    /* A lower threshold lets more noise through as touches; confirmation over two frames takes
+     * those out again, and what remains is more of the light touches. Fitted on tuning streams. */
     options->detection_factor *= R(0.75);
     options->track_confirm = 2;
     options->track_hold = 2;
@@ -64,6 +66,8 @@ static int in_range(eits_real value, eits_real low, eits_real high)
     return eits_is_finite(value) && value >= low && value <= high;
 }
 
+/* Limits are wide: they keep numbers finite and counts in range, and do not say what is
+ * sensible. */
 int eits_options_valid(const eits_options *o)
 {
     const eits_real huge = R(1e30);

@@ -44,7 +44,11 @@ static eits_real nearest(const eits_touch *touches, uint32_t count)
     return min;
 }
 
-/* Of at least one touch. */
+/* Of at least one touch.
+ *
+ * Features that say how hard the scene is, in the order of what they were worth: touches that
+ * overlap, a wide one that may be two, what no touch explains, the weakest against noise and
+ * against what is left, and their number. */
 static eits_real score(const eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
     const eits_real noise = ctx->info.lambda_noise, left = ctx->info.unexplained;

@@ -18,6 +18,9 @@ static limits limits_of(const eits_context *ctx)
     return (limits){fraction > 10 * noise ? fraction : 10 * noise, noise};
 }
 
+/* Only rows with a clear reference tell anything: a row that is small by geometry is small with
+ * an open electrode, too. A dead row is one without the signal that it should have, whichever
+ * way that came about: no number, saturated, or nothing. */
 static int judge_row(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
     const eits_real v0 = ctx->reference.v0[i], size = eits_fabs(v0);
@@ -33,7 +36,11 @@ static int judge_row(const eits_context *ctx, const eits_real *frame, limits lim
     return along > -limit ? DEAD : ALIVE | TURNED;
 }
 
-/* Far beyond what a touch makes of a row, be its reference ever so small. */
+/* Far beyond what a touch makes of a row, be its reference ever so small.
+ *
+ * A touch lowers or raises a row by parts of itself; a floating input or a broken amplifier
+ * gives many times as much. Measured against a share of the reference's rms at least, since a
+ * row near zero may grow by any factor. */
 static int is_grown(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
     const eits_real v0 = eits_fabs(ctx->reference.v0[i]),
@@ -89,7 +96,11 @@ int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f)
 }
 
 /* Whether all significant rows that drive or measure across (e, f), and use no open electrode, are
- * dead, and enough of them. */
+ * dead, and enough of them.
+ *
+ * A bridge puts both electrodes on one potential: rows that drive across it drive nothing, rows
+ * that measure across it measure nothing, and all others go on. Rows through an open electrode
+ * are dead anyhow and prove nothing. */
 static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits lim, uint8_t e,
                         uint8_t f)
 {
@@ -108,7 +119,9 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
     return dead >= EITS_ROWS_TO_JUDGE;
 }
 
-/* Both of a bridged pair are alive in rows that use one of them alone. */
+/* Both of a bridged pair are alive in rows that use one of them alone.
+ *
+ * Starts from dead rows, which are few, rather than from all pairs. */
 static void find_bridged(eits_context *ctx, const eits_real *frame, limits lim,
                          const uint8_t *alive)
 {
@@ -141,6 +154,7 @@ void eits_name_electrodes(eits_context *ctx)
     }
 }
 
+/* A row needs all four of its electrodes. */
 void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_row_state why)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {

@@ -21,6 +21,8 @@ static void row_energies(eits_context *ctx, const eits_scratch *scratch)
     }
 }
 
+/* Two sign vectors of different periods: rows that are not orthogonal show in one of them at
+ * least, at the price of two products rather than of all pairs. */
 static int is_orthogonal(eits_context *ctx, const eits_scratch *scratch, uint32_t period)
 {
     eits_real *column = scratch->row[0], *probe = scratch->row[1];
@@ -46,7 +48,10 @@ static int is_orthogonal(eits_context *ctx, const eits_scratch *scratch, uint32_
 }
 
 /* Ridge weights s_i^2 / (s_i^2 + nu s_1^2), s_i^2 = |S_i|^2 / |P_i|^2 the squared singular values
- * of the unwhitened problem; over |P_i|^2 again, so that d is predicted by P' shrink P d. */
+ * of the unwhitened problem; over |P_i|^2 again, so that d is predicted by P' shrink P d.
+ *
+ * Ridge rather than plain projection: with as many directions as the data allow, a prediction
+ * would follow the noise of the very folds that it is to judge. */
 static void make_shrink(eits_context *ctx, const eits_scratch *scratch)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
@@ -83,7 +88,10 @@ void eits_learn_range(eits_context *ctx, const eits_scratch *scratch)
 }
 
 /* range.off_range = what of the drift the model cannot give: along - P' |P_i|^-2 P along, in
- * full, since differences of sums would be rounding. */
+ * full, since differences of sums would be rounding.
+ *
+ * Found once for each basis: the drift of the gain moves the data along the reference, part of
+ * which the model cannot give. That part is no fault of the frame. */
 static uint64_t learn_off_range(eits_context *ctx, const eits_scratch *scratch)
 {
     eits_real *copy = scratch->row[0], *seen = scratch->row[3];
@@ -157,6 +165,8 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
     const eits_real noise = eits_noise_energy(ctx) * (eits_real)(folds - rank) / (eits_real)folds;
     if (!(off > noise) || !(total > 0))
         return 0;
+    /* In the data's own size, so that 0.05 means five per cent of the change, at any strength of
+     * touch. */
     const eits_real fraction = eits_sqrt((off - noise) / total);
     ctx->info.model_mismatch = fraction < 1 ? fraction : 1;
     return fraction > EITS_MISMATCH_FRACTION &&

@@ -42,6 +42,8 @@ typedef struct tolerance {
     eits_real largest; /* fraction of the largest datum */
 } tolerance;
 
+/* Two readings of one quantity differ by root two times the noise of one. Where data are ratios,
+ * the noise of each row is over its own reference. */
 static eits_real max_by_noise(const eits_context *ctx, uint32_t k)
 {
     const eits_reference *b = &ctx->reference;
@@ -52,6 +54,9 @@ static eits_real max_by_noise(const eits_context *ctx, uint32_t k)
     return EITS_OUTLIER_NOISE * eits_sqrt(eits_fma(first, first, second * second));
 }
 
+/* Three tests that all have to fail the fold: more than noise explains, not small beside the
+ * frame's greatest datum (a common mode scales with that), and not small beside the fold's own
+ * datum (channel gains that differ scale with that). */
 static int is_flagged(const eits_context *ctx, uint32_t k, tolerance tol)
 {
     if (ctx->frame.sides[k] != EITS_SIDE_BOTH)
@@ -63,8 +68,9 @@ static int is_flagged(const eits_context *ctx, uint32_t k, tolerance tol)
     return off > EITS_OUTLIER_FRACTION * eits_fma(R(0.5), off, eits_fabs(ctx->frame.d[k]));
 }
 
-/* The median of the folds' differences is 0 where they are copies: then nothing is flagged. */
-/* Noise, if it was learned, is judged row by row; if not, by the differences that this frame
+/* The median of the folds' differences is 0 where they are copies: then nothing is flagged.
+ *
+ * Noise, if it was learned, is judged row by row; if not, by the differences that this frame
  * has. And whatever is small beside the greatest datum does no harm in the image. */
 static tolerance find_tolerance(const eits_context *ctx, const eits_scratch *scratch)
 {
@@ -158,7 +164,10 @@ static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_
     return 1;
 }
 
-/* The side that is clearly nearer to the prediction stays; else both go. */
+/* The side that is clearly nearer to the prediction stays; else both go.
+ *
+ * Half of a frame is often enough: dropping one side of a fold costs noise, dropping both costs
+ * a measurement. */
 static void choose_sides(eits_context *ctx, const eits_scratch *scratch, const uint32_t *flagged,
                          uint32_t n, uint64_t *macs)
 {
@@ -205,7 +214,11 @@ static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance
     return 1;
 }
 
-/* Electrodes that nearly all flagged folds use. */
+/* Electrodes that nearly all flagged folds use.
+ *
+ * More flagged folds than single readings would give: whatever they share is the cause. One
+ * electrode, two of them (a pair, perhaps one channel), or nothing in common, which no bad
+ * contact does. */
 static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
 {
     uint16_t shared[EITS_MAX_ELECTRODES] = {0};
@@ -245,6 +258,9 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
 
 /* ---- without reciprocals ---- */
 
+/* Without reciprocals nothing bears a reading out but the model: the fold whose value all the
+ * others predict worst. Only one at a time, and only where it stands far out of the prediction
+ * errors, since a touch of an unknown shape is mispredicted as well. */
 int eits_find_unpaired_outlier(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
     eits_real *copy = scratch->row[0], *fit = scratch->row[3], *error = scratch->value;
@@ -283,6 +299,7 @@ int eits_find_unpaired_outlier(eits_context *ctx, const eits_scratch *scratch, u
     return 1;
 }
 
+/* Needs folded data. Few flagged folds are single readings; many have a cause. */
 int eits_find_outliers(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
     uint32_t flagged[EITS_OUTLIER_MAX], count = 0;

@@ -108,6 +108,9 @@ static uint32_t odd_rows(const eits_context *ctx, uint32_t k, const eits_real *n
     return count;
 }
 
+/* A reading that jumps in one of the reference frames would stay in every frame to come, as a
+ * touch that never goes. Too many of them are no outliers but a skin that is touched or moved:
+ * then all are left in, and noise says so. */
 uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_scratch *scratch,
                                       const eits_real *frame)
 {
@@ -125,6 +128,8 @@ uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_scratch *scr
     return left;
 }
 
+/* Three frames, two of which agree: the third tells which of the first two was wrong, and the
+ * wrong reading takes the other's value. */
 uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_scratch *scratch,
                                      const eits_real *frame)
 {

@@ -13,7 +13,11 @@ static const eits_real MAX_REGULARISATION = R(1.0);
 /* what a lift by less would change cannot be seen */
 static const eits_real AS_IT_IS = R(1.01);
 
-/* What the noise asks for. */
+/* What the noise asks for.
+ *
+ * Noise over the reference's rms says how much of the data is noise on a skin that nothing
+ * touches; the factor was fitted to what of it the image shows. Without a learned reference
+ * there is nothing to go by. */
 static eits_real asked_regularisation(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
@@ -22,6 +26,7 @@ static eits_real asked_regularisation(const eits_context *ctx)
     return asked < MAX_REGULARISATION ? asked : MAX_REGULARISATION;
 }
 
+/* A lift of a per cent would cost weights in every product and change nothing that can be seen. */
 eits_real eits_regularisation_of_all(const eits_context *ctx)
 {
     const eits_real asked = asked_regularisation(ctx);
@@ -50,7 +55,10 @@ static eits_real weight_of(const eits_context *ctx, eits_real regularisation, ui
 }
 
 /* White noise on the rows has the covariance diag(w^2) in P d, so in S'D D P d, as a mean square
- * over S's columns, the sum of |S_i|^2 w_i^2 D_i^4: s_i^2 w_i^4 D_i^4. */
+ * over S's columns, the sum of |S_i|^2 w_i^2 D_i^4: s_i^2 w_i^4 D_i^4.
+ *
+ * How much more or less noise reaches S'y decides what counts as a touch: lambda_noise was
+ * learned with one whitening and is used with another. */
 eits_real eits_regularisation_noise(const eits_context *ctx, eits_real regularisation)
 {
     eits_real sum = 0, total = 0;

@@ -9,8 +9,10 @@
 
 /* e over mu': how little a direction that no row sees is held to zero */
 static const eits_real LOST = R(0.01);
-static const eits_real ORTHOGONAL = R(1e-5); /* cosine between rows of P */
-/* |S_i|^2 + mu s_1^2 w_i^2 is 1 within this: S is rounded to 8 bits at worst */
+static const eits_real ORTHOGONAL =
+    R(1e-5); /* cosine between rows of P
+              *
+              * |S_i|^2 + mu s_1^2 w_i^2 is 1 within this: S is rounded to 8 bits at worst */
 static const eits_real FORM = R(0.01);
 /* Rounding makes the rows of S a little less than orthogonal, and F with a lower regularisation
  * must not exceed the stated constant. */
@@ -130,7 +132,12 @@ static int in_use(const eits_context *ctx, uint32_t k)
     return ctx->frame.sides[k] != 0;
 }
 
-/* N = U_o' U_o + e I, summed over whichever rows are fewer, those left out or those in use. */
+/* N = U_o' U_o + e I, summed over whichever rows are fewer, those left out or those in use.
+ *
+ * The observed rows' part of U: U = P'diag(1/w), whose columns are orthonormal over all rows, so
+ * the sum over the rows that are left out gives the same matrix as the identity less that over
+ * those that are not. Whichever has fewer terms costs less, and rounds less. The small e keeps a
+ * direction that no row sees from making the matrix singular: it is then held near zero instead. */
 static uint64_t sum_products(eits_context *ctx, const eits_scratch *scratch, uint32_t missing,
                              eits_real lost, eits_real *n)
 {
@@ -157,7 +164,10 @@ static uint64_t sum_products(eits_context *ctx, const eits_scratch *scratch, uin
 }
 
 /* N = R'R in N's place. The strong directions come first, so that what rounding leaves of a lost
- * one weighs little. What the padding has gathered goes. */
+ * one weighs little. What the padding has gathered goes.
+ *
+ * Cholesky by rows, each row taken from all below it at once: the inner loop is axpy over a
+ * padded row, which every processor here does well, and needs no gathering. */
 static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_real *n)
 {
     const uint32_t rank = ctx->model->rank;
@@ -178,7 +188,11 @@ static uint64_t factor_products(const eits_context *ctx, eits_real lost, eits_re
     return macs;
 }
 
-/* G G' = R diag(s^2) R' + regularisation I, from the last row up. */
+/* G G' = R diag(s^2) R' + regularisation I, from the last row up.
+ *
+ * G is upper triangular although G G' is asked for: from the last row up, each row needs only
+ * those below it. So G^-1 R stays upper triangular, and F with it: half the memory and half the
+ * work of a full matrix, in each iteration of a solver. */
 static uint64_t factor_metric(eits_context *ctx, const eits_scratch *scratch,
                               eits_real regularisation, eits_real *r, eits_real *g)
 {
@@ -204,7 +218,10 @@ static uint64_t factor_metric(eits_context *ctx, const eits_scratch *scratch,
     return macs;
 }
 
-/* F = G^-1 R diag(fraction / w) in R's place, from the last row up. */
+/* F = G^-1 R diag(fraction / w) in R's place, from the last row up.
+ *
+ * Solved in place, row by row from below: row i of G^-1 R needs the rows below it finished.
+ * Scaling by 1 / w comes last, since it is by columns. */
 static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, eits_real *g,
                                  eits_real *r)
 {
@@ -266,7 +283,10 @@ eits_real eits_lambda_noise(const eits_context *ctx)
     return ctx->whitening.noise_ratio * ctx->reference.lambda_noise;
 }
 
-/* No row is left out: the regularisation alone may differ. */
+/* No row is left out: the regularisation alone may differ.
+ *
+ * With all rows in use the directions do not mix: F is one weight for each, and costs next to
+ * nothing. */
 static void raise_regularisation(eits_context *ctx)
 {
     const eits_real regularisation = eits_regularisation_of_all(ctx),
@@ -281,6 +301,10 @@ static void raise_regularisation(eits_context *ctx)
                             eits_regularisation_weights(ctx, regularisation, ctx->whitening.map);
 }
 
+/* In order: N of the rows in use, its factor R, then G from R, then F from both. R and F share
+ * one triangle, N another's place before them. Where any number overflows the stored whitening
+ * is used, and the rows left out are ignored by projection (frame/fold.c): worse, but always
+ * defined. */
 static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
                                eits_real regularisation, uint32_t missing)
 {
@@ -305,6 +329,8 @@ static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
     return macs;
 }
 
+/* What the frame needs, in order of what it costs: nothing, weights, triangles. Called when the
+ * sides, the reference or the options have changed; not for every frame. */
 uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch)
 {
     const uint32_t folded = ctx->model->n_folded;

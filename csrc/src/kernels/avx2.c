@@ -49,8 +49,9 @@ static void avx2_sum_panel(const eits_real *panel, const eits_real *v, uint32_t 
 }
 
 #ifndef EITS_DOUBLE /* a double panel's eight sums hide the latency already, and fill the \
-                       registers */
-/* Eight chains hide the latency that a panel's four leave. */
+                       registers                                                          \
+ *                                                                                        \
+ * Eight chains hide the latency that a panel's four leave. */
 static void avx2_sum_two_panels(const eits_real *panel, const eits_real *other, const eits_real *v,
                                 uint32_t rows, eits_real *sum)
 {

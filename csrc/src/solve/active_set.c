@@ -19,8 +19,10 @@
 typedef struct active {
     eits_real lambda;
     eits_real tolerance; /* a correlation beyond lambda by no more than this is rounding */
-    uint32_t max;        /* columns that can be independent */
-    /* of each active column: its correlation less lambda times its sign; zero at the optimum */
+    uint32_t max;        /* columns that can be independent
+                          *
+                          * of each active column: its correlation less lambda times its sign; zero at the
+                          * optimum */
     eits_real *pull;
     /* of each active column: that of its coefficient, or of the correlation that brought it in */
     eits_real *sign;
@@ -48,8 +50,9 @@ static uint64_t macs_to_finish(const eits_context *ctx, uint32_t count)
     return (uint64_t)count * ctx->model->rank + eits_gradient_macs(ctx);
 }
 
-/* Whether `macs`, and S x of one more column and the gap after it are still to be had. */
-/* Once a step is too dear the solve ends; what is cheaper is not tried instead, so that the
+/* Whether `macs`, and S x of one more column and the gap after it are still to be had.
+ *
+ * Once a step is too dear the solve ends; what is cheaper is not tried instead, so that the
  * result does not depend on the order of tests. */
 static int affords(const eits_context *ctx, active *a, uint64_t macs)
 {
@@ -184,8 +187,9 @@ static void add(eits_context *ctx, active *a, uint32_t j)
     a->loose = 1;
 }
 
-/* How far coefficient k can go of its step: 2 where it keeps its sign to the end. */
-/* A coefficient that would change sign stops at zero: beyond it lambda |x| has another slope,
+/* How far coefficient k can go of its step: 2 where it keeps its sign to the end.
+ *
+ * A coefficient that would change sign stops at zero: beyond it lambda |x| has another slope,
  * and the step is not the optimum any more. */
 static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
 {
@@ -284,8 +288,9 @@ static void start_over_from_zero(eits_context *ctx)
 }
 
 /* Take in the first `missing` columns listed, and step to the optimum with them. Returns whether
- * anything moved. */
-/* A column that comes in loosely ends the round: the factor does not have it, so no step may be
+ * anything moved.
+ *
+ * A column that comes in loosely ends the round: the factor does not have it, so no step may be
  * based on it. */
 static int take_in(eits_context *ctx, const eits_scratch *scratch, active *a, uint32_t missing)
 {

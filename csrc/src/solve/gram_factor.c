@@ -8,6 +8,8 @@ static eits_real *row(const eits_context *ctx, uint32_t i)
     return ctx->solver.factor + EITS_STRIDE(ctx->model->rank) * i;
 }
 
+/* Two products with K instead of two triangular solves: no division, no chain in which each
+ * number waits for the one before. */
 void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, eits_real *w,
                        eits_real *d)
 {

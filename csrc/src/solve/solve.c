@@ -43,7 +43,10 @@ static void make_image(eits_context *ctx)
 
 /* Take up the last frame's coefficients, unless zero is the better start for this one. The sum S x
  * belongs to an earlier frame's numbers too, but is taken anew: it costs little, and rounding
- * cannot gather over a million frames. */
+ * cannot gather over a million frames.
+ *
+ * Zero is the better start where the skin was let go: the old coefficients would have to be
+ * taken back one iteration after another. */
 static int warm_start(eits_context *ctx, const eits_scratch *scratch)
 {
     uint32_t count = 0;
@@ -83,7 +86,10 @@ static void run(eits_context *ctx, const eits_scratch *scratch, int gradient_kno
 static const eits_real MIN_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
 
 /* info holds what the frame stage counted, and zeros; `from_last`: start from the last
- * coefficients. */
+ * coefficients.
+ *
+ * Every way out leaves x, image and info consistent: an image of zeros where there is none, with
+ * the reason in info.stop, and no number that is not finite. */
 eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int from_last)
 {
     const eits_options *o = &ctx->options;

@@ -155,6 +155,8 @@ static void add_around(const eits_context *ctx, eits_nearby *near, uint32_t j)
     near->marked[j] = AROUND;
 }
 
+/* A column is looked around once: the mark remembers, so that a set which grows by one costs
+ * nine looks and not a walk over all. */
 void eits_nearby_add(const eits_context *ctx, eits_nearby *near)
 {
     for (uint32_t k = 0; k < ctx->solver.working_count; ++k) {
@@ -163,6 +165,8 @@ void eits_nearby_add(const eits_context *ctx, eits_nearby *near)
     }
 }
 
+/* A few columns instead of all of them: the gap is not known from it, so the solve cannot end by
+ * it. */
 void eits_take_gradient_nearby(eits_context *ctx, const eits_scratch *scratch,
                                const eits_nearby *near)
 {

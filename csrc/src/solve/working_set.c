@@ -31,6 +31,7 @@ int eits_moves(eits_real gradient, eits_real lambda, eits_sign sign)
     return moves(gradient, limits_for(lambda, sign));
 }
 
+/* A warm start: what was not zero is where to go on; everything else joins at the first look. */
 void eits_working_set_begin(eits_context *ctx)
 {
     uint32_t count = 0;
@@ -78,6 +79,7 @@ void eits_working_set_choose(eits_context *ctx, const eits_scratch *scratch, eit
     eits_pack_panels(ctx);
 }
 
+/* Between looks: the gradient of the set is at hand, so leaving out costs nothing. */
 void eits_working_set_prune(eits_context *ctx, eits_real lambda)
 {
     const uint32_t before = ctx->solver.working_count;
@@ -145,6 +147,8 @@ uint32_t eits_apply_working(const eits_context *ctx, const eits_scratch *scratch
     return count;
 }
 
+/* Rows of a working set are scattered over S; side by side they are read in order, again and
+ * again. */
 void eits_pack_panels(eits_context *ctx)
 {
     const uint32_t rows = ctx->model->rank;

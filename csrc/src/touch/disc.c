@@ -99,8 +99,9 @@ static covered cover(eits_context *ctx, const eits_scratch *scratch, const eits_
 }
 
 /* Covers become what columns of S are multiplied by: over the column weight, times the column
- * scale. */
-/* S is of coefficients, which are changes over the column weight; and stored columns are without
+ * scale.
+ *
+ * S is of coefficients, which are changes over the column weight; and stored columns are without
  * their scale. Cached columns spare a board the unpacking: the same discs move by parts of a
  * pixel, over and over the same columns. */
 static void weigh(eits_context *ctx, covered *c)

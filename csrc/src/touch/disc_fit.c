@@ -37,6 +37,8 @@ eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const
     return change * disc->polarity > 0 ? change : 0;
 }
 
+/* From zero each time: strengths of an earlier set of discs are no start, and ten passes over at
+ * most sixteen atoms cost less than one atom. */
 void eits_fit_strengths(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank;
@@ -69,7 +71,11 @@ void eits_fit_restart(eits_context *ctx, const eits_scratch *scratch, eits_fit *
 }
 
 /* Solve H s = g for the step, H symmetric: scaled to a unit diagonal, damped, Cholesky. A parameter
- * that nothing depends on, or that rounding makes dependent, does not move. */
+ * that nothing depends on, or that rounding makes dependent, does not move.
+ *
+ * Levenberg and Marquardt's damping on a unit diagonal, so that it acts alike on millimetres and
+ * on relative change. A parameter with nothing to hold it, as the radius of a disc without
+ * effect, gets no step instead of an infinite one. */
 static void damped_step(const eits_real h[4][4], const eits_real g[4], eits_real step[4])
 {
     eits_real scale[4], l[4][4] = {{0}}, w[4];
@@ -164,6 +170,8 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
                     radius_reach = MAX_RADIUS_STEP_PIXELS * reach;
     const eits_real off = disc->radius_mm - expected;
     const eits_real cost = eits_dot(ctx->kernels, left, left, rank) + weight * off * off;
+    /* The step is tried whole, then by halves: the model is linear only near by. What does not
+     * lower the cost is not done at all, so that the fit never gets worse. */
     eits_real moved = 0, fraction = 1;
     for (int attempt = 0; attempt < 3; ++attempt, fraction *= R(0.5)) {
         eits_disc trial = *disc;
@@ -194,6 +202,8 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
     return moved;
 }
 
+/* One disc after the other rather than all at once: with touches further apart than their radii
+ * they hardly depend on each other, and four unknowns need no matrix in memory. */
 void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t first,
                    uint32_t last, uint32_t sweeps)
 {

@@ -42,7 +42,12 @@ static eits_real moment(const eits_context *ctx, const eits_disc *disc)
 }
 
 /* What disc j, in `source`, adds to the field of each electrode's current at disc i: into `bent`, L
- * numbers for x, then L for y, as the fields are. */
+ * numbers for x, then L for y, as the fields are.
+ *
+ * A dipole's field in the plane is 1 / z^2 in complex numbers, its mirror in a circle likewise,
+ * so each pair of discs costs two complex factors and then two multiply-adds per electrode. Only
+ * the field at the other's centre counts: that is second order in the changes, as far as this
+ * goes. */
 static void add_induced(const eits_context *ctx, const eits_disc *i, const eits_disc *j,
                         const eits_real *source, eits_real *induced)
 {
@@ -102,6 +107,9 @@ static uint64_t reduce(eits_context *ctx, const eits_scratch *scratch, eits_real
     return eits_reduce(ctx, scratch, count, out);
 }
 
+/* Less than two discs have no interaction. The fields are averaged over each disc's cover, as
+ * its atom is. If what comes of it is a large part of the data, the discs are too strong or too
+ * near for second order, and nothing is taken out. */
 uint64_t eits_remove_interaction(eits_context *ctx, const eits_scratch *scratch,
                                  const eits_disc *disc, uint32_t count, eits_real *data)
 {

@@ -51,7 +51,11 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
 }
 
 /* Whether the disc stands out of the noise by the same test as the whole frame: S_j'(y - other
- * discs) at its pixel. */
+ * discs) at its pixel.
+ *
+ * The frame passed the detection threshold as a whole; a disc of its own has to as well, at a
+ * pixel near its centre and with the other discs taken out. Otherwise a strong touch would lift
+ * noise beside it over the threshold. */
 static int stands_out(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     const eits_real min = ctx->options.detection_factor * eits_lambda_noise(ctx);
@@ -96,6 +100,8 @@ static void drop(eits_context *ctx, eits_fit *f, uint32_t k)
     }
 }
 
+/* The weakest goes first, and what it explained is offered to the others before the next is
+ * judged: two halves of one touch then become one whole touch instead of none. */
 void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     /* One at a time: when the weakest is gone the others may explain more. */

@@ -5,19 +5,24 @@
 #include "kernels/kernels.h"
 
 /* Chosen on scenes of 2 to 8 touches at 60 and 80 dB; eitskin study levers tells what they are
- * worth. */
-/* edges nearer than this fraction of the smaller radius: one touch, perhaps, */
+ * worth.
+ *
+ * edges nearer than this fraction of the smaller radius: one touch, perhaps, */
 static const eits_real NEAR = R(0.7);
 /* if one disc leaves at most so much more of |y|^2, */
 static const eits_real MERGE_TOTAL = R(0.002);
 static const eits_real MERGE_LEFT = R(0.5);    /* so much more of what is left */
 static const eits_real NOISE = R(20.0);        /* and so many directions of noise */
 static const eits_real SPLIT_TOTAL = R(0.001); /* with less than this fraction of |y|^2 left */
-static const eits_real SPLIT_NOISE = R(1.3);   /* beyond so much noise there is nothing to part */
-/* two discs in their first places may leave so many times as much, */
+static const eits_real SPLIT_NOISE =
+    R(1.3); /* beyond so much noise there is nothing to part
+             *
+             * two discs in their first places may leave so many times as much, */
 static const eits_real SPLIT_FIRST = R(2.0);
-static const eits_real SPLIT_GAIN = R(0.85); /* fitted so little of it, */
-/* their edges so many times the smaller radius apart */
+static const eits_real SPLIT_GAIN =
+    R(0.85); /* fitted so little of it,
+              *
+              * their edges so many times the smaller radius apart */
 static const eits_real SPLIT_DISTANCE = R(-0.1);
 /* of the disc's radius: where the two begin, and how large */
 static const eits_real SPLIT_OFFSET = R(1.3), SPLIT_RADIUS = R(0.7);
@@ -71,7 +76,10 @@ static int comes_after(const pair *a, const pair *b)
 }
 
 /* The nearest pair of one sign after `last` (NULL: at all) that may be one touch; 0 where there is
- * none. */
+ * none.
+ *
+ * Nearest first, in an order that does not depend on how the discs are numbered. Discs of
+ * opposite sign are never one touch. */
 static int next_pair(const eits_fit *f, const pair *last, pair *next)
 {
     int found = 0;
@@ -105,8 +113,9 @@ static eits_disc merged(const eits_options *o, const eits_disc *a, const eits_di
     };
 }
 
-/* Make the pair one disc; 1 if that is kept. */
-/* Tried for real and undone where it does not hold: a criterion from the two discs alone would
+/* Make the pair one disc; 1 if that is kept.
+ *
+ * Tried for real and undone where it does not hold: a criterion from the two discs alone would
  * not know what the data say. */
 static int try_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, const pair *p)
 {
@@ -183,8 +192,9 @@ static eits_real both_changes(const eits_context *ctx, const eits_scratch *scrat
     return eits_dot(ctx->kernels, left, left, rank);
 }
 
-/* The best of some pairs in the place of disc k. */
-/* Two discs side by side along four directions, in the place of the one: a start for the fit,
+/* The best of some pairs in the place of disc k.
+ *
+ * Two discs side by side along four directions, in the place of the one: a start for the fit,
  * not a result. Which direction is best hardly depends on the exact offset. */
 static two best_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
@@ -226,7 +236,11 @@ static two best_two(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
     return best;
 }
 
-/* Make disc k two; 1 if that is kept. */
+/* Make disc k two; 1 if that is kept.
+ *
+ * A start that leaves far more than the one disc did is not worth fitting; what comes of the fit
+ * has to leave clearly less, beyond what noise would give, and to be two discs that one can tell
+ * apart. */
 static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t k)
 {
     const uint32_t last = f->count;
@@ -254,6 +268,7 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
     return 0;
 }
 
+/* The largest disc is the likeliest to be two touches. Each is tried once. */
 int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     uint8_t looked[EITS_MAX_TOUCHES] = {0};

@@ -19,8 +19,11 @@ static void seed(const eits_context *ctx, const eits_scratch *scratch, eits_fit 
 {
     const eits_model *model = ctx->model;
     const eits_options *o = &ctx->options;
-    eits_real height[EITS_MAX_TOUCHES], *size = scratch->pixel[0]; /* |image| */
-    /* Peaks far below the greatest are the solver's ripple around it. */
+    eits_real height[EITS_MAX_TOUCHES],
+        *size =
+            scratch->pixel[0]; /* |image|
+                                *
+                                * Peaks far below the greatest are the solver's ripple around it. */
     const eits_real min = o->touch_threshold * eits_greatest(ctx->kernels, ctx->solver.image,
                                                              model->n_pixels, EITS_SIGN_BOTH);
     for (uint32_t j = 0; j < model->n_pixels; ++j)
@@ -75,7 +78,10 @@ static void remove_interaction(eits_context *ctx, const eits_scratch *scratch, e
         eits_fit_restart(ctx, scratch, f);
 }
 
-/* First places: to data that strong touches bend less, if there are any. */
+/* First places: to data that strong touches bend less, if there are any.
+ *
+ * The first places decide what the fit ends at: hence data that strong touches bend less, and a
+ * radius that their strength suggests instead of the same one for all. */
 static void begin(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const eits_options *o = &ctx->options;

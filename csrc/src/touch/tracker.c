@@ -6,8 +6,9 @@
 #include "base/vec.h"
 #include "touch/disc.h"
 
-/* Chosen on tuning streams, docs/guide/tracking.md. */
-/* a touch that explains less of |y|^2 may be half of another */
+/* Chosen on tuning streams, docs/guide/tracking.md.
+ *
+ * a touch that explains less of |y|^2 may be half of another */
 static const eits_real SURE_FRACTION = R(0.05);
 /* and one whose own S'y is below so many times that of noise may be noise */
 static const eits_real SURE_CLEARNESS = R(1.5);
@@ -17,8 +18,10 @@ static const eits_real TENTATIVE_REACH = R(0.6);
 static const eits_real SPEED_CHANGE = R(0.028);
 /* of follow_mm: rms of a new touch's velocity, a frame */
 static const eits_real FIRST_SPEED = R(0.12);
-static const eits_real MIN_DEVIATION = R(0.01); /* of a pixel: no place is surer than this */
-/* a touch that was found more often is told of while it is held */
+static const eits_real MIN_DEVIATION =
+    R(0.01); /* of a pixel: no place is surer than this
+              *
+              * a touch that was found more often is told of while it is held */
 enum { KNOWN_FRAMES = 4 };
 enum { NONE = EITS_MAX_TOUCHES };
 
@@ -72,6 +75,8 @@ static eits_real place_variance(const eits_context *ctx, const eits_touch *found
                     square(MIN_DEVIATION * pixel));
 }
 
+/* A new touch has no velocity yet, but one of unknown size: so the next place it is found at is
+ * believed. */
 static eits_followed track_start(const eits_context *ctx, const eits_touch *found)
 {
     return (eits_followed){.touch = *found,
@@ -163,8 +168,9 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
     }
 }
 
-/* An id for a touch that may be told of now. */
-/* A touch that is clear beyond doubt is reported at once; others once they have been seen often
+/* An id for a touch that may be told of now.
+ *
+ * A touch that is clear beyond doubt is reported at once; others once they have been seen often
  * enough that noise would not have been. */
 static void name(eits_context *ctx, eits_followed *f)
 {
@@ -178,7 +184,9 @@ static void name(eits_context *ctx, eits_followed *f)
 }
 
 /* Those that were found, in their order, then those that are waited for, as far as there is room.
- */
+ *
+ * Those found in this frame come first and keep their places in the list; those that were not
+ * are kept as far as there is room, so that a touch that flickers keeps its id. */
 static void update_tracks(eits_context *ctx, const eits_touch *found, uint32_t count,
                           const uint32_t *owner)
 {
