@@ -151,7 +151,13 @@ def test_halves_that_are_not_finite(half: int) -> None:
 
 @pytest.mark.parametrize(
     ("row", "good"),
-    [((0, 1, 2, 3), True), ((0, 1, 2, 8), False), ((4, 4, 2, 3), False), ((0, 1, 5, 5), False)],
+    [
+        ((0, 1, 2, 3), True),
+        ((0, 1, 2, 4), True),
+        ((0, 1, 2, 8), False),
+        ((4, 4, 2, 3), False),
+        ((0, 1, 5, 5), False),
+    ],
 )
 def test_a_protocol_of_pairs(row: tuple[int, ...], good: bool) -> None:
     changed = bytearray(tiny_blob())
