@@ -80,17 +80,8 @@ def compile_program(source: str, irqs: tuple[int, ...] = ()) -> bytes:
         (folder / "program.c").write_text(HEAD + source)
         (folder / "link.ld").write_text(LINK)
         flags = [*FLAGS, "-nostdlib", "-fno-builtin", f"-I{BOARD}"]
-        command = [
-            "arm-none-eabi-gcc",
-            *flags,
-            "-T",
-            "link.ld",
-            "start.c",
-            "program.c",
-            "-o",
-            "a.elf",
-            "-lgcc",
-        ]
+        files = ["-T", "link.ld", "start.c", "program.c", "-o", "a.elf", "-lgcc"]
+        command = ["arm-none-eabi-gcc", *flags, *files]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         subprocess.run(
