@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from everywhere import on_host
-from gap_known import Judged, judged
 from made_models import made_blob, plain_options
+from soundness import Judged, judged
 
 from eitskin.reference.problem import greatest
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from everywhere import SameEverywhere
-from gap_known import check_sound, judged
 from made_models import made_blob, plain_options
 from random_problems import RandomProblem, gaussian, rounded, smooth, whitened, with_data
+from soundness import check_sound, judged
 
 from eitskin.core.results import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
@@ -71,7 +71,7 @@ PROBLEMS = {
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str) -> None:
-    """Whatever the columns, the result is sound (gap_known.check_sound); a zero column stays at
+    """Whatever the columns, the result is sound (soundness.check_sound); a zero column stays at
     zero; where the data have fewer directions than there are columns, the active set's support is
     no larger than they are."""
     steps: list[Step] = []

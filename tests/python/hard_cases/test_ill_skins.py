@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from everywhere import Host, Outcome, SameEverywhere, as_float32, on_host
-from gap_known import U, check_sound, judged
 from hard_skins import SKINS, HardSkin, hard_skin
+from soundness import U, check_sound, judged
 
 from eitskin.core.results import SOLVERS, Options
 from eitskin.solve.options import default_options

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 from everywhere import Outcome, SameEverywhere, on_host
-from gap_known import Judged, U, check_sound, judged
 from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import RandomProblem, gaussian, optimum_of, smooth, whitened
+from soundness import Judged, U, check_sound, judged
 
 from eitskin.core.results import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step

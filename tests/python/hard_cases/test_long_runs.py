@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from everywhere import SameEverywhere, on_host
-from gap_known import check_sound, judged
 from made_models import made_blob, plain_options
 from random_problems import gaussian
+from soundness import check_sound, judged
 
 from eitskin.core.results import SIGNS, SOLVERS
 from eitskin.solve.options import default_options

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from everywhere import SameEverywhere, on_host
-from gap_known import check_sound, judged, objective_of
 from made_models import made_blob, made_model, plain_options
 from random_problems import RandomProblem, gaussian, rounded, smooth, with_data
+from soundness import check_sound, judged, objective_of
 
 from eitskin.core.results import SOLVERS
 from eitskin.errors import UsageError

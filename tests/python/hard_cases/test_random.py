@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from everywhere import SameEverywhere, on_host
-from gap_known import check_sound, judged
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made_models import made_model, plain_options
 from random_problems import rounded
+from soundness import check_sound, judged
 
 from eitskin.core.results import SIGNS, SOLVERS
 from eitskin.model.eitm import encode_model

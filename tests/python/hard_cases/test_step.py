@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from everywhere import SameEverywhere
-from gap_known import check_sound, judged
 from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import gaussian, optimum_of, smooth, whitened
+from soundness import check_sound, judged
 
 from eitskin.core.results import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from everywhere import Host, SameEverywhere, as_float32
-from gap_known import U, judged
 from made_models import made_blob, plain_options
 from random_problems import gaussian
+from soundness import U, judged
 
 from eitskin.core.results import SIGNS, SOLVERS, Options
 from eitskin.fem.grid import Grid

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from everywhere import SameEverywhere, as_float32
-from gap_known import Judged, U, check_sound, judged
 from made_models import made_blob, made_model, plain_options
 from random_problems import gaussian, rounded
+from soundness import Judged, U, check_sound, judged
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import SOLVERS, Options
