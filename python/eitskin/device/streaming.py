@@ -151,8 +151,8 @@ def _replay(device: CommandExchange, what: Stream, every: int, frames: int) -> I
         if kind is None:
             yield item
             continue
-        frame = item.frame if isinstance(item, RawFrame) else item.solved.frame  # type: ignore[union-attr]
-        place = numbers.setdefault(frame, len(numbers))
+        assert isinstance(item, (RawFrame, SolvedImage, SolvedTouches))
+        place = numbers.setdefault(item.frame, len(numbers))
         if frames and place >= frames * every:
             return
         if kind & what and place % every == 0:

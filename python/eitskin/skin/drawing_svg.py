@@ -7,7 +7,7 @@ import io
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -178,10 +178,10 @@ def _runs(path: Any, tolerance: float) -> Iterator[list[tuple[float, float]]]:
             run = [_pair(piece.end)]
         elif isinstance(piece, (svgelements.CubicBezier, svgelements.QuadraticBezier)):
             pieces = bezier_pieces([_pair(point) for point in _controls(piece)], tolerance)
-            run += flattened(lambda t, curve=piece: _pair(curve.point(t)), pieces)  # type: ignore[misc]
+            run += flattened(_along(piece), pieces)
         elif isinstance(piece, svgelements.Arc):
             pieces = arc_pieces(max(piece.rx, piece.ry), piece.sweep, tolerance)
-            run += flattened(lambda t, curve=piece: _pair(curve.point(t)), pieces)  # type: ignore[misc]
+            run += flattened(_along(piece), pieces)
         elif piece.end is not None:
             run.append(_pair(piece.end))
     if len(run) > 1:
@@ -192,6 +192,11 @@ def _controls(piece: Any) -> list[Any]:
     if isinstance(piece, svgelements.QuadraticBezier):
         return [piece.start, piece.control, piece.end]
     return [piece.start, piece.control1, piece.control2, piece.end]
+
+
+def _along(piece: Any) -> Callable[[float], tuple[float, float]]:
+    """The point of a curve at its parameter."""
+    return lambda t: _pair(piece.point(t))
 
 
 def _pair(point: Any) -> tuple[float, float]:

@@ -9,6 +9,7 @@ problem.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -62,10 +63,10 @@ class Problems:
         return float((self.objective(k, x if signed else np.maximum(x, 0)) - best) / best)
 
 
-def bench_options(model: Model, **changes: object) -> Options:
+def bench_options(model: Model, **changes: Any) -> Options:
     """The model's defaults with the plain problem's lambda and no ignored direction."""
     plain = replace(default_options(model), project_reference=False, lambda_rel=LAMBDA_REL)
-    return replace(plain, lambda_noise_factor=0.0, detection_factor=0.0, **changes)  # type: ignore[arg-type]
+    return replace(plain, lambda_noise_factor=0.0, detection_factor=0.0, **changes)
 
 
 def sessions(scenes: int, seed: int, role: str = "test") -> Simulated:

@@ -50,10 +50,11 @@ def fill_marks(page: Path, name: str, filling: Filling) -> None:
                 f"{page}: has no marks <!-- {mark} --> and <!-- end {mark} -->; add them where the"
                 " text is to be"
             )
-        text = marked.sub(
-            lambda match, content=content: f"{match.group(1)}{content}\n{match.group(2)}",  # type: ignore[misc]
-            text,
-        )
+
+        def filled(match: re.Match[str], content: str = content) -> str:
+            return f"{match.group(1)}{content}\n{match.group(2)}"
+
+        text = marked.sub(filled, text)
     write_bytes(page, text.encode("utf-8"))
 
 

@@ -4,6 +4,7 @@ turned at a time around two."""
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 from eitskin.core.results import SOLVERS, Options
 from eitskin.tuning.configuration import Configuration
@@ -17,11 +18,11 @@ OTHER_SOLVERS = tuple(name for name in SOLVERS if name != STANDARD.solver)
 
 
 def _turned(
-    base: Configuration, knob: str, values: tuple[object, ...], label: str = "{}"
+    base: Configuration, knob: str, values: tuple[Any, ...], label: str = "{}"
 ) -> tuple[Configuration, ...]:
     """``base`` with one field at each value, named after both."""
     return tuple(
-        replace(base, name=f"{base.name} {label.format(value)}", **{knob: value})  # type: ignore[arg-type]
+        replace(base, name=f"{base.name} {label.format(value)}", **{knob: value})
         for value in values
     )
 

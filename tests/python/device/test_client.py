@@ -190,7 +190,7 @@ def test_packets_without_an_answer_are_told_apart() -> None:
 def test_a_board_that_talks_for_ever_without_answering_is_given_up() -> None:
     port = Scripted()
     numbers = iter(range(10**6))
-    port.read = lambda timeout_s: encode(PacketType.FAULT, next(numbers), bytes(36))  # type: ignore[method-assign]
+    port.read = lambda timeout_s: encode(PacketType.FAULT, next(numbers), bytes(36))
     with pytest.raises(DeviceError, match="is not answered"):
         Device(port)
 

@@ -86,7 +86,7 @@ def test_two_runs_are_the_same_bytes() -> None:
         board = sim_board()
         transport, seen = SimTransport("test", board), bytearray()
         plain = transport.read
-        transport.read = lambda timeout_s: seen.extend(data := plain(timeout_s)) or data  # type: ignore[method-assign]
+        transport.read = lambda timeout_s: seen.extend(data := plain(timeout_s)) or data
         with Device(transport) as device:
             device.tare(QUIET)
             device.start_scene()

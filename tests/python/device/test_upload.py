@@ -111,7 +111,7 @@ def test_over_a_lossy_line(seed: int) -> None:
     board = sim_board()
     with Device(Damaging(SimTransport("lossy", board), same, same)) as device:
         transport = device.transport
-        transport._there, transport._back = dropping(generator, 0.15), dropping(generator, 0.15)  # type: ignore[attr-defined]
+        transport._there, transport._back = dropping(generator, 0.15), dropping(generator, 0.15)
         for _ in range(20):
             try:
                 device.upload_model(tiny)

@@ -69,7 +69,7 @@ class Session:
     def _next(self, timeout_s: float) -> object:
         assert self.link is not None
         packet = self.link.next(timeout_s)
-        content = None if packet is None else parse(packet.type, packet.payload)  # type: ignore[union-attr]
+        content = None if packet is None else parse(packet.type, packet.payload)
         if isinstance(content, RawFrame):
             self.frames.append(content)
         if isinstance(content, BoardInfo):

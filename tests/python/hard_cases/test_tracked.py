@@ -21,7 +21,7 @@ FLICKER, LIFT, MISSING = "time/tracked-flicker", "time/tracked-lift", "time/trac
 def options(**changes: object) -> Options:
     """Tracking on; the linear answers of these frames are no sheet's, so that nothing else is
     looked for."""
-    return replace(tracking(default_options(small_model())), diagnostics=0, **changes)  # type: ignore[arg-type]
+    return replace(tracking(default_options(small_model())), diagnostics=0, **changes)
 
 
 def frames_of(places_mm: list[tuple[float, float] | None], share: float, seed: int) -> np.ndarray:

@@ -42,7 +42,7 @@ def test_touches_keep_the_rules(outline: object) -> None:
         xy, radii = scene.centres_mm(), scene.radii_mm()
         assert ((radii >= 6) & (radii <= 12)).all()
         assert all(3 <= t.contrast <= 10 for t in scene.touches)
-        assert (rim_distance_mm(outline, xy) - radii >= rules.rim_margin_mm - 1e-9).all()  # type: ignore[arg-type]
+        assert (rim_distance_mm(outline, xy) - radii >= rules.rim_margin_mm - 1e-9).all()
         for i in range(len(xy)):
             for j in range(i):
                 assert np.hypot(*(xy[i] - xy[j])) >= radii[i] + radii[j] + rules.gap_mm - 1e-9

@@ -74,7 +74,7 @@ def test_adding_an_effect_leaves_the_others_samples_as_they_were(
         compiled = compile_scene(still_scene(effects=own), mesh_cache=mesh_cache)
         simulate_frames(compiled)
         noise = next(step for step in compiled.steps if step.name == "noise")
-        steps.append(np.array([noise.apply(np.zeros(208), 0.0, k) for k in range(4)]))  # type: ignore[union-attr,call-arg,arg-type]
+        steps.append(np.array([noise.apply(np.zeros(208), 0.0, k) for k in range(4)]))
         states.append({key: repr(value.state) for key, value in drawn.items()})
     assert np.array_equal(steps[0], steps[1]) and np.abs(steps[0]).max() > 0
     assert states[0].items() <= states[1].items()

@@ -203,7 +203,7 @@ def test_progress_sees_every_scene(mesh: Mesh) -> None:
             seen.append(scene)
             yield scene
 
-    simulate(SKIN, PROTOCOL, TOUCHES, measurement=CLEAN, mesh=mesh, progress=watch)  # type: ignore[arg-type]
+    simulate(SKIN, PROTOCOL, TOUCHES, measurement=CLEAN, mesh=mesh, progress=watch)
     assert tuple(seen) == TOUCHES.scenes
 
 
