@@ -18,7 +18,7 @@ def written(tmp_path: Path, text: str, name: str = "w.csv") -> Path:
 
 def test_csv_and_toml_say_the_same(tmp_path: Path) -> None:
     table = written(tmp_path, "first, last, weight_g, x_mm, y_mm\n0,3,100,1.5,-2\n\n4,,200,,\n")
-    first = "[[press]]\nfirst = 0\nlast = 3\nload_n = 0.980665\nx_mm = 1.5\ny_mm = -2\n"
+    first = "[[press]]\nfirst = 0\nlast = 3\nforce_n = 0.980665\nx_mm = 1.5\ny_mm = -2\n"
     tables = written(tmp_path, first + "[[press]]\nfirst = 4\nweight_g = 200\n", "w.toml")
     one, other = load_weights(table), load_weights(tables)
     assert one == [
