@@ -139,8 +139,8 @@ def test_a_recorded_run_calibrates_too(folder: Path, tmp_path: Path, done: Done)
     path, listed = tmp_path / "run.eits", tmp_path / "run.toml"
     live = recorded(folder, prebuilt()[1], path)
     tables = [
-        f"[[press]]\nfirst = {frame.number}\nweight_g = {grams}\nx_mm = {place[0]}\ny_mm = {place[1]}"
-        for frame, (place, grams) in zip(live, NEW, strict=True)
+        f"[[press]]\nfirst = {frame.number}\nweight_g = {grams}\nx_mm = {x_mm}\ny_mm = {y_mm}"
+        for frame, ((x_mm, y_mm), grams) in zip(live, NEW, strict=True)
     ]
     listed.write_text("\n".join(tables))
     facts = json.loads(done("calibrate", path, "--weights", listed, "--json"))

@@ -136,7 +136,7 @@ def test_rows_their_reciprocals_and_turned_pairs() -> None:
 def test_every_row_of_a_protocol_is_found(protocol: object) -> None:
     rows = 1e-3 * (1 + np.arange(protocol.n_rows))  # type: ignore[attr-defined]
     skin = AnalogSkin(protocol, rows[None], rows[None], 20.0)  # type: ignore[arg-type]
-    read = [skin.amplitude_v(0, tuple(int(k) for k in row)) for row in protocol.drive_measure]  # type: ignore[attr-defined, arg-type]
+    read = [skin.amplitude_v(0, tuple(int(k) for k in row)) for row in protocol.drive_measure]
     assert np.allclose(read, rows)
 
 
@@ -149,7 +149,7 @@ def test_frames_are_chosen_when_a_scan_begins() -> None:
 
     def scan(begin: float, end: float) -> set[float]:
         times = np.linspace(begin, end, len(rows)) * TICKS_PER_S
-        return {skin.amplitude_v(round(at), row) for at, row in zip(times, rows, strict=True)}  # type: ignore[arg-type]
+        return {skin.amplitude_v(round(at), row) for at, row in zip(times, rows, strict=True)}
 
     assert [scan(k / 50, k / 50 + 0.02) for k in range(5)] == [{0.0}, {1.0}, {2.0}, {0.0}, {1.0}]
     skin.begin(TICKS_PER_S)

@@ -60,8 +60,8 @@ def test_the_recorded_results_are_of_the_built_in_set_and_reach_the_targets() ->
         one.instructions is not None and one.instructions["kind"] == "counted"
         for one in front.points
     )
-    assert choose(front.points, target("2.5Minstructions")).accuracy(HERE) >= 0.84  # type: ignore[operator]
-    assert choose(front.points, target("2.5Minstructions", worst=True)).accuracy(HERE) >= 0.84  # type: ignore[operator]
+    assert choose(front.points, target("2.5Minstructions")).accuracy(HERE) >= 0.84
+    assert choose(front.points, target("2.5Minstructions", worst=True)).accuracy(HERE) >= 0.84
     assert max(one.accuracy(HERE) or 0 for one in front.points) >= 0.87
     by_name = {one.name: one for one in front.points}
     for base in ("standard", "fine"):
