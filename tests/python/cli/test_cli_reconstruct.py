@@ -14,8 +14,8 @@ from eitskin.cli.main import main
 from eitskin.core.results import SOLVERS
 from eitskin.frames.frames import load_frames, save_frames
 from eitskin.model.eitm import load_model
-from eitskin.scene.random_touches import Touch as Put
 from eitskin.scene.random_touches import TouchRules, TouchScene, TouchSet, random_touches
+from eitskin.scene.random_touches import TrueTouch as Put
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import load_skin, paper_skin

@@ -7,8 +7,8 @@ import pytest
 
 from eitskin.core.results import Touch
 from eitskin.model.model import Model
-from eitskin.scene.random_touches import Touch as Put
 from eitskin.scene.random_touches import TouchScene, TouchSet
+from eitskin.scene.random_touches import TrueTouch as Put
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin

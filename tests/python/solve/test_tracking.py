@@ -13,8 +13,8 @@ from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options, Touch
 from eitskin.fem.grid import Grid
 from eitskin.reference.tracker import Tracker, nearest_pairs
-from eitskin.scene.random_touches import Touch as Put
 from eitskin.scene.random_touches import TouchScene, TouchSet
+from eitskin.scene.random_touches import TrueTouch as Put
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin

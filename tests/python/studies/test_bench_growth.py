@@ -15,9 +15,9 @@ from eitskin_studies.pictures.growth_picture import draw_growth
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "benchmarks.md"
 POINTS = (
-    bench_growth.Point("pixels n", across=10, rank=20),
-    bench_growth.Point("pixels n", across=14, rank=20),
-    bench_growth.Point("touches", across=14, rank=20, touches=1),
+    bench_growth.GrowthPoint("pixels n", across=10, rank=20),
+    bench_growth.GrowthPoint("pixels n", across=14, rank=20),
+    bench_growth.GrowthPoint("touches", across=14, rank=20, touches=1),
 )
 
 

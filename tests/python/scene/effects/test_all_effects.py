@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from effect_types import FloatArray, MakeSession
 
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.compiler import MeshCache, compile_scene
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.effect import EffectSession, GeometryStep, LoadedStep, Loads, Stage, VoltageStep
 from eitskin.scene.parameters import describe_parameters
@@ -21,7 +21,7 @@ from eitskin.scene.registry import BUILT_IN, Registry, summary_of
 from eitskin.scene.runner import simulate_frames
 from eitskin.skin.protocol import adjacent
 
-BENCH = Bench()  # keeps the meshes
+BENCH = MeshCache()  # keeps the meshes
 # The parameters under which each effect is looked at, so strong that breaking reciprocity shows.
 STRONG: dict[str, dict[str, Any]] = {
     "misplacement": {"spread_mm": 4.0},
@@ -69,7 +69,7 @@ def _frames(effects: dict[str, Any], seed: int = 5, frames: int = 2) -> FloatArr
         "effects": effects,
     }
     return simulate_frames(
-        compile_scene(scene_from_table(table, "test", Path()), bench=BENCH)
+        compile_scene(scene_from_table(table, "test", Path()), mesh_cache=BENCH)
     ).voltage_v[1:]
 
 

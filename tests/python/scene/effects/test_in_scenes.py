@@ -11,7 +11,7 @@ from effect_types import FloatArray, MakeSession
 
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
-from eitskin.scene.compiler import Bench, Compiled, compile_scene
+from eitskin.scene.compiler import Compiled, MeshCache, compile_scene
 from eitskin.scene.description import Scene
 from eitskin.scene.effects import gel_drying, misplacement, temperature
 from eitskin.scene.runner import simulate_frames
@@ -19,13 +19,13 @@ from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
 
 ELEMENTS = 1200
-BENCH = Bench()  # keeps the meshes
+BENCH = MeshCache()  # keeps the meshes
 
 
 def _compiled(effects: dict[str, Any], protocol: Protocol | None = None, **more: Any) -> Compiled:
     given = {"quiet_frames": 1, "frames": 1, "elements": ELEMENTS, "seed": 3, **more}
     return compile_scene(
-        Scene("test", protocol=protocol or adjacent(16), effects=effects, **given), bench=BENCH
+        Scene("test", protocol=protocol or adjacent(16), effects=effects, **given), mesh_cache=BENCH
     )
 
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from effect_types import FloatArray
 
-from eitskin.scene.compiler import Bench, compile_scene
+from eitskin.scene.compiler import MeshCache, compile_scene
 from eitskin.scene.description import Scene, load_scene
 from eitskin.scene.runner import simulate_frames
 
-BENCH = Bench()  # keeps the meshes
+BENCH = MeshCache()  # keeps the meshes
 SCENE = Path(__file__).resolve().parents[4] / "examples" / "kit4_1_3.scene.toml"
 
 
@@ -45,7 +45,7 @@ def measured(shared_data: Path) -> Frame:
 
 def _predicted(scene: Scene, *effects: str) -> Frame:
     named = {name: scene.effects[name] for name in effects}
-    v = simulate_frames(compile_scene(replace(scene, effects=named), bench=BENCH)).voltage_v
+    v = simulate_frames(compile_scene(replace(scene, effects=named), mesh_cache=BENCH)).voltage_v
     return Frame(v[0], v[1] - v[0])
 
 
