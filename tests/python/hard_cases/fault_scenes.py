@@ -3,6 +3,7 @@ simulated once a session."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -109,6 +110,18 @@ def noisy(k: int, frame: np.ndarray, stream: int) -> np.ndarray:
 def quiet_frames(k: int) -> np.ndarray:
     """(QUIET, m) V."""
     return noisy(k, np.tile(simulated()[k]["quiet"], (QUIET, 1)), 0)
+
+
+def touched(k: int) -> np.ndarray:
+    """Scene k's touched frame (m,) V."""
+    return noisy(k, simulated()[k]["touched"], 1)
+
+
+def played(
+    frames: Callable[[int], Sequence[np.ndarray] | np.ndarray],
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """By scene: its quiet frames, and what ``frames`` gives for it."""
+    return [(quiet_frames(k), np.array(frames(k))) for k in range(COUNT)]
 
 
 def half(frames: np.ndarray) -> np.ndarray:

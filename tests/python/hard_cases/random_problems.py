@@ -9,8 +9,9 @@ from everywhere import on_host
 from made_models import made_blob, plain_options
 from soundness import Judged, judged
 
+from eitskin.core.results import Options
 from eitskin.reference.problem import greatest
-from eitskin_studies.harness.emulated_steps import Choose, Load, Solve
+from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 
 RANK, COLUMNS = 20, 64
 
@@ -67,13 +68,16 @@ def whitened(seed: int) -> RandomProblem:
     return with_data(q.T, seed + 1000)
 
 
+def asked(problem: RandomProblem, options: Options, **model: object) -> list[Step]:
+    """A model of the problem's matrix, ``options``, and its data."""
+    return [Load(made_blob(problem.s, **model)), Choose(options), Solve(problem.y[None])]
+
+
 def optimum_of(problem: RandomProblem, sign: str, share: float = 0.03) -> Judged:
     """By the active set in float64, to a gap of 1e-12 of the start's objective; ``share`` is lambda
     / lambda_max."""
     options = plain_options(
         problem.s, solver="active-set", sign=sign, iterations=1000, gap_rel=1e-12, lambda_rel=share
     )
-    _, outcomes = on_host(
-        [Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], "float64"
-    )
+    _, outcomes = on_host(asked(problem, options), "float64")
     return judged(problem.s, problem.y, sign, outcomes[0])

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from everywhere import SameEverywhere
-from made_models import made_blob, plain_options
-from random_problems import RandomProblem, gaussian, rounded, smooth, whitened, with_data
+from made_models import plain_options
+from random_problems import RandomProblem, asked, gaussian, rounded, smooth, whitened, with_data
 from soundness import check_sound, judged
 
 from eitskin.core.results import SIGNS, SOLVERS
-from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Step
 from margins import Margins
 
 
@@ -75,7 +75,7 @@ def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str)
     zero; where the data have fewer directions than there are columns, the active set's support is
     no larger than they are."""
     steps: list[Step] = []
-    asked = []
+    what = []
     for case, problems in PROBLEMS.items():
         for name, problem in problems.items():
             lipschitz = 1.0 if not problem.s.any() else None
@@ -84,14 +84,10 @@ def test_columns(same_everywhere: SameEverywhere, margins: Margins, solver: str)
                     options = plain_options(
                         problem.s, solver=solver, sign=sign, iterations=150, lambda_rel=share
                     )
-                    steps += [
-                        Load(made_blob(problem.s, lipschitz=lipschitz)),
-                        Choose(options),
-                        Solve(problem.y[None]),
-                    ]
-                    asked.append((case, name, problem, sign))
+                    steps += asked(problem, options, lipschitz=lipschitz)
+                    what.append((case, name, problem, sign))
     _, outcomes = same_everywhere.steps(steps)
-    for (case, name, problem, sign), one in zip(asked, outcomes, strict=True):
+    for (case, name, problem, sign), one in zip(what, outcomes, strict=True):
         check_sound(margins, case, judged(problem.s, problem.y, sign, one), one)
         silent = ~problem.s.any(axis=0)
         if silent.any():

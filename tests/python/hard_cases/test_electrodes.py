@@ -7,28 +7,19 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from everywhere import Outcome, SameEverywhere
-from fault_scenes import COUNT, ELECTRODES, ROWS, miou, noisy, quiet_frames, simulated
+from fault_scenes import ELECTRODES, ROWS, miou, noisy, played, simulated, touched
 from test_rows import options, run
 
 from margins import Margins
 
 
-def played(spoil: Callable[[int, np.ndarray], np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """By scene: quiet frames; then the touched frame, and that with ``spoil`` applied, both with
-    the same noise."""
-    pairs = []
-    for k in range(COUNT):
-        clean = simulated()[k]["touched"]
-        frames = np.array([noisy(k, clean, 1), noisy(k, spoil(k, clean), 1)])
-        pairs.append((quiet_frames(k), frames))
-    return pairs
-
-
 def compare(
     same_everywhere: SameEverywhere, spoil: Callable[[int, np.ndarray], np.ndarray]
 ) -> list[tuple[Outcome, Outcome]]:
-    """Clean and spoilt outcome of each scene."""
-    return [(clean, spoilt) for clean, spoilt in run(same_everywhere, played(spoil), options())]
+    """Of each scene, the outcome of the touched frame, and of that with ``spoil`` applied; both
+    with the same noise."""
+    both = played(lambda k: [touched(k), noisy(k, spoil(k, simulated()[k]["touched"]), 1)])
+    return [(clean, spoilt) for clean, spoilt in run(same_everywhere, both, options())]
 
 
 def unnamed(outcomes: list[tuple[Outcome, Outcome]]) -> int:
@@ -46,25 +37,28 @@ def using(*electrodes: int) -> np.ndarray:
     return np.asarray(np.isin(ROWS, electrodes).any(axis=1))
 
 
+def check_left_out(margins: Margins, case: str, one: Outcome, *electrodes: int) -> None:
+    """All rows that use ``electrodes``, and as many rows."""
+    assert one.status == 0
+    unlike = abs(one.info.masked - int(using(*electrodes).sum()))
+    margins.everywhere(case, "rows left out wrongly, or not", unlike, 0, "rows")
+
+
 def test_detached(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Its number is told, and its 52 rows are left out."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["detached"])):
-        assert one.status == 0
         assert one.info.open_electrodes == (k % ELECTRODES,)
         assert one.info.bridged_electrodes == ()
-        unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
-        margins.everywhere("frames/detached", "rows left out wrongly, or not", unlike, 0, "rows")
+        check_left_out(margins, "frames/detached", one, k % ELECTRODES)
 
 
 def test_bridged(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Neighbours: both are named, and left out. Others: no row is dead, and the frame is named a
     model_mismatch."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["bridged"])):
-        assert one.status == 0
         assert one.info.bridged_electrodes == pair(k)
         assert one.info.open_electrodes == ()
-        unlike = abs(one.info.masked - int(using(*pair(k)).sum()))
-        margins.everywhere("frames/bridged", "rows left out wrongly, or not", unlike, 0, "rows")
+        check_left_out(margins, "frames/bridged", one, *pair(k))
     for _, one in compare(same_everywhere, lambda k, _: simulated()[k]["bridged apart"]):
         assert one.status == 0 and "model mismatch" in one.info.diagnostics_by_name
 
@@ -84,18 +78,12 @@ def test_noisy(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
     def rub(k: int, frame: np.ndarray) -> np.ndarray:
         generator = np.random.default_rng([k, 6])
-        return np.asarray(
-            np.where(
-                using(k % ELECTRODES),
-                frame * (1 + 0.2 * generator.standard_normal(len(frame))),
-                frame,
-            )
-        )
+        rubbed = frame * (1 + 0.2 * generator.standard_normal(len(frame)))
+        return np.where(using(k % ELECTRODES), rubbed, frame)
 
     for k, (_, one) in enumerate(compare(same_everywhere, rub)):
-        assert one.status == 0 and one.info.noisy_electrodes == (k % ELECTRODES,)
-        unlike = abs(one.info.masked - int(using(k % ELECTRODES).sum()))
-        margins.everywhere("frames/noisy", "rows left out wrongly, or not", unlike, 0, "rows")
+        assert one.info.noisy_electrodes == (k % ELECTRODES,)
+        check_left_out(margins, "frames/noisy", one, k % ELECTRODES)
 
 
 def test_polarity_flip(same_everywhere: SameEverywhere, margins: Margins) -> None:

@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from everywhere import Outcome, SameEverywhere, on_host
+from everywhere import SameEverywhere, on_host
 from made_models import lipschitz_of, made_blob, plain_options
-from random_problems import RandomProblem, gaussian, optimum_of, smooth, whitened
+from random_problems import RandomProblem, asked, gaussian, optimum_of, smooth, whitened
 from soundness import Judged, U, check_sound, judged
 
 from eitskin.core.results import SIGNS, SOLVERS
@@ -56,7 +56,7 @@ def test_iterations(same_everywhere: SameEverywhere, margins: Margins, solver: s
     ripple; it stays within its rate, and so does the working set, whose columns left out are looked
     after."""
     steps: list[Step] = []
-    asked: list[tuple[str, str, int]] = []
+    what: list[tuple[str, str, int]] = []
     for name, problem in PROBLEMS.items():
         steps.append(Load(made_blob(problem.s)))
         for sign in SIGNS:
@@ -65,10 +65,10 @@ def test_iterations(same_everywhere: SameEverywhere, margins: Margins, solver: s
                     problem.s, solver=solver, sign=sign, iterations=k, lambda_rel=SHARE
                 )
                 steps += [Choose(options), Solve(problem.y[None])]
-                asked.append((name, sign, k))
+                what.append((name, sign, k))
     _, outcomes = same_everywhere.steps(steps)
     before: tuple[str, str, Judged] | None = None
-    for (name, sign, k), one in zip(asked, outcomes, strict=True):
+    for (name, sign, k), one in zip(what, outcomes, strict=True):
         problem = PROBLEMS[name]
         point = judged(problem.s, problem.y, sign, one)
         check_sound(margins, CASE, point, one)
@@ -93,13 +93,12 @@ def smallest_of(s: np.ndarray, columns: np.ndarray) -> float:
     return float(np.linalg.svd(s[:, columns], compute_uv=False)[-1]) if columns.any() else 1.0
 
 
-def solve_to(problem: RandomProblem, solver: str, sign: str, gap: float, width: str) -> Outcome:
+def precise(problem: RandomProblem, solver: str, sign: str) -> list[Step]:
+    """To a gap of 1e-5 |y|^2/2."""
     options = plain_options(
-        problem.s, solver=solver, sign=sign, iterations=100_000, gap_rel=gap, lambda_rel=SHARE
+        problem.s, solver=solver, sign=sign, iterations=100_000, gap_rel=1e-5, lambda_rel=SHARE
     )
-    return on_host([Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])], width)[1][
-        0
-    ]
+    return asked(problem, options)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -112,28 +111,17 @@ def test_float32_against_float64(
     over their least singular value, where they are independent.
     """
     steps: list[Step] = []
-    asked: list[tuple[str, str]] = []
+    what: list[tuple[str, str]] = []
     for name, problem in PROBLEMS.items():
         for sign in SIGNS:
-            options = plain_options(
-                problem.s,
-                solver=solver,
-                sign=sign,
-                iterations=100_000,
-                gap_rel=1e-5,
-                lambda_rel=SHARE,
-            )
-            steps += [Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])]
-            asked.append((name, sign))
+            steps += precise(problem, solver, sign)
+            what.append((name, sign))
     _, outcomes = same_everywhere.steps(steps)
     compared = 0
-    for (name, sign), one in zip(asked, outcomes, strict=True):
+    for (name, sign), one in zip(what, outcomes, strict=True):
         problem = PROBLEMS[name]
-        wide_outcome = solve_to(problem, solver, sign, 1e-5, "float64")
-        narrow, wide = (
-            judged(problem.s, problem.y, sign, one),
-            judged(problem.s, problem.y, sign, wide_outcome),
-        )
+        _, (in_float64,) = on_host(precise(problem, solver, sign), "float64")
+        narrow, wide = (judged(problem.s, problem.y, sign, each) for each in (one, in_float64))
         check_sound(margins, WIDTHS_CASE, narrow, one)
         half, size = narrow.at_zero().objective, float(np.linalg.norm(problem.y))
         margins.everywhere(
@@ -146,11 +134,8 @@ def test_float32_against_float64(
         margins.record(
             WIDTHS_CASE, "gap reached", "host f64", wide.gap / half, 1e-5 * (1 + 1e-6), "|y|^2/2"
         )
-        room = (
-            np.sqrt(2 * narrow.gap)
-            + np.sqrt(2 * wide.gap)
-            + np.sqrt(2 * abs(narrow.lam - wide.lam) * np.abs(wide.x).sum())
-        )
+        moved_lambda = abs(narrow.lam - wide.lam) * np.abs(wide.x).sum()
+        room = sum(np.sqrt(2 * each) for each in (narrow.gap, wide.gap, moved_lambda))
         apart = float(np.linalg.norm(problem.s @ (narrow.x - wide.x)))
         margins.everywhere(
             WIDTHS_CASE, "S x, float32 from float64", apart / size, room / size, "|y|"

@@ -6,14 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from everywhere import SameEverywhere, on_host
-from made_models import made_blob, made_model, plain_options
-from random_problems import RandomProblem, gaussian, rounded, smooth, with_data
+from made_models import made_model, plain_options
+from random_problems import RandomProblem, asked, gaussian, rounded, smooth, with_data
 from soundness import check_sound, judged, objective_of
 
 from eitskin.core.results import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.model.storage import STORAGES, store
-from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
+from eitskin_studies.harness.emulated_steps import Step
 from margins import Margins
 
 CASE = "problem/quantised"
@@ -57,7 +57,7 @@ def test_quantised(same_everywhere: SameEverywhere, margins: Margins, solver: st
     x*)| <= sqrt(2 (f(x') - f*)). E is bounded by the step, before anything is measured.
     """
     steps: list[Step] = []
-    asked = []
+    what = []
     for name, problem in PROBLEMS.items():
         lam = 0.1 * problem.lambda_max("both")
         options = plain_options(
@@ -69,17 +69,13 @@ def test_quantised(same_everywhere: SameEverywhere, margins: Margins, solver: st
             lambda_abs=lam,
             lambda_rel=0.0,
         )
-        wide = [Load(made_blob(problem.s)), Choose(options), Solve(problem.y[None])]
-        best = judged(problem.s, problem.y, "both", on_host(wide, "float64")[1][0])
+        wide = on_host(asked(problem, options), "float64")[1][0]
+        best = judged(problem.s, problem.y, "both", wide)
         for storage in STORAGES:
-            steps += [
-                Load(made_blob(problem.s, storage=storage)),
-                Choose(options),
-                Solve(problem.y[None]),
-            ]
-            asked.append((name, storage, problem, best))
+            steps += asked(problem, options, storage=storage)
+            what.append((name, storage, problem, best))
     _, outcomes = same_everywhere.steps(steps)
-    for (name, storage, problem, best), one in zip(asked, outcomes, strict=True):
+    for (name, storage, problem, best), one in zip(what, outcomes, strict=True):
         stored = made_model(problem.s, storage=storage).sensitivity
         allowed = entry_errors(problem.s, storage)
         assert (np.abs(stored - problem.s) <= allowed * (1 + 1e-6)).all(), (name, storage)

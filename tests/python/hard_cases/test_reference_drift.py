@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from everywhere import SameEverywhere
-from fault_scenes import COUNT, frames_of, miou, noisy, quiet_frames, rms_v, simulated
+from fault_scenes import COUNT, frames_of, miou, noisy, played, rms_v, simulated, touched
 from test_rows import options, run
 
 from margins import Margins
@@ -19,15 +19,9 @@ def test_gain_drift(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """The whole gain off by 1 to 20 %: the peak follows it and loses no more; at 5 % at most 2
     %."""
     case = "frames/gain-drift"
-    played = [
-        (
-            quiet_frames(k),
-            np.array([noisy(k, g * simulated()[k]["touched"], 1) for g in (1.0, *GAINS)]),
-        )
-        for k in range(COUNT)
-    ]
+    gained = played(lambda k: [noisy(k, g * simulated()[k]["touched"], 1) for g in (1.0, *GAINS)])
     lost, worse = np.zeros((COUNT, len(GAINS))), np.zeros((COUNT, len(GAINS)))
-    for k, (clean, *drifted) in enumerate(run(same_everywhere, played, options())):
+    for k, (clean, *drifted) in enumerate(run(same_everywhere, gained, options())):
         for g, one in enumerate(drifted):
             assert one.info.masked == 0
             lost[k, g] = 1 - float(one.image.max() / clean.image.max()) / GAINS[g]
@@ -40,12 +34,10 @@ def test_gain_drift(same_everywhere: SameEverywhere, margins: Margins) -> None:
 
 def test_drying(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """A gel that dries for an hour since the tare: touches stay where they are."""
-    played = []
-    for k in range(COUNT):
-        frames = frames_of(k, {"gel_drying": {}}, rate_hz=3 / HOUR_S, frames=4)[1:]
-        played.append((quiet_frames(k), noisy(k, frames, 2)))
+    hour = {"rate_hz": 3 / HOUR_S, "frames": 4}
+    dried = played(lambda k: noisy(k, frames_of(k, {"gel_drying": {}}, **hour)[1:], 2))
     losses = []
-    for k, (first, *later) in enumerate(run(same_everywhere, played, options())):
+    for k, (first, *later) in enumerate(run(same_everywhere, dried, options())):
         assert all(one.info.masked == 0 for one in later)
         losses.append([miou(first.image, k) - miou(one.image, k) for one in later])
         missing = max(abs(len(one.touches) - len(first.touches)) for one in later)
@@ -56,17 +48,11 @@ def test_drying(same_everywhere: SameEverywhere, margins: Margins) -> None:
 def test_common_mode_jump(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """A constant on all rows: nothing is left out for it; 1 % of rms(V0) costs little, and at 5 %
     most frames are named."""
-    played = [
-        (
-            quiet_frames(k),
-            np.array(
-                [noisy(k, simulated()[k]["touched"] + j * rms_v(k), 1) for j in (0.0, *JUMPS)]
-            ),
-        )
-        for k in range(COUNT)
-    ]
+    offset = played(
+        lambda k: [noisy(k, simulated()[k]["touched"] + j * rms_v(k), 1) for j in (0.0, *JUMPS)]
+    )
     losses, named = np.zeros((COUNT, len(JUMPS))), 0
-    for k, (clean, *jumped) in enumerate(run(same_everywhere, played, options())):
+    for k, (clean, *jumped) in enumerate(run(same_everywhere, offset, options())):
         for j, one in enumerate(jumped):
             assert one.status == 0 and one.info.masked == 0
             losses[k, j] = miou(clean.image, k) - miou(one.image, k)
@@ -89,15 +75,12 @@ def test_common_mode_jump(same_everywhere: SameEverywhere, margins: Margins) -> 
 def test_touch_during_tare(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Not to be known then. Once it has gone, the change goes the way touches cannot, and that is
     said."""
-    played = []
+    lifts = []
     for k in range(COUNT):
-        touched = simulated()[k]["touched"]
-        quiet = noisy(k, np.tile(touched, (16, 1)), 0)
-        played.append(
-            (quiet, np.array([noisy(k, touched, 1), noisy(k, simulated()[k]["quiet"], 1)]))
-        )
+        quiet = noisy(k, np.tile(simulated()[k]["touched"], (16, 1)), 0)
+        lifts.append((quiet, np.array([touched(k), noisy(k, simulated()[k]["quiet"], 1)])))
     missed = 0
-    for held, lifted in run(same_everywhere, played, options()):
+    for held, lifted in run(same_everywhere, lifts, options()):
         assert held.info.diagnostics == 0 and held.touches == ()
         missed += "stale reference" not in lifted.info.diagnostics_by_name
     margins.everywhere("frames/touch-during-tare", "lifts that were not named", missed, 0, "frames")
@@ -107,13 +90,11 @@ def test_lift_off(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Held for ten warm-started frames, then lifted: the very next frame is as empty as if nothing
     had been there."""
     held, after = 10, 5
-    played = []
-    for k in range(COUNT):
-        frames = [noisy(k, simulated()[k]["touched"], n) for n in range(1, 1 + held)]
-        frames += [noisy(k, simulated()[k]["quiet"], n) for n in range(100, 100 + after)]
-        played.append((quiet_frames(k), np.array(frames)))
+    streams = [("touched", n) for n in range(1, 1 + held)]
+    streams += [("quiet", n) for n in range(100, 100 + after)]
+    lifts = played(lambda k: [noisy(k, simulated()[k][name], n) for name, n in streams])
     ghosts = 0.0
-    for outcomes in run(same_everywhere, played, options(warm_start=True)):
+    for outcomes in run(same_everywhere, lifts, options(warm_start=True)):
         assert outcomes[held - 1].touches
         peak = outcomes[held - 1].image.max()
         ghosts = max(ghosts, *(float(one.image.max() / peak) for one in outcomes[held:]))

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from everywhere import Outcome, SameEverywhere
-from fault_scenes import COUNT, half, miou, noisy, quiet_frames, rms_v, simulated
+from fault_scenes import COUNT, half, miou, played, quiet_frames, rms_v, simulated, touched
 
 from eitskin.core.results import Options
 from eitskin.solve.options import default_options
@@ -26,25 +26,22 @@ def options(**changes: object) -> Options:
 
 
 def run(
-    same_everywhere: SameEverywhere, played: list[tuple[np.ndarray, np.ndarray]], chosen: Options
+    same_everywhere: SameEverywhere, pairs: list[tuple[np.ndarray, np.ndarray]], chosen: Options
 ) -> list[list[Outcome]]:
     """Outcomes of frames after a tare on quiet frames, pair by pair; all finite."""
     steps: list[Step] = [Load(prebuilt()[1]), Choose(chosen)]
-    for quiet, frames in played:
+    for quiet, frames in pairs:
         steps += [TareStep(quiet), Play(frames)]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     assert all(one.finite() for one in outcomes)
-    lengths = np.cumsum([0, *(len(frames) for _, frames in played)])
+    lengths = np.cumsum([0, *(len(frames) for _, frames in pairs)])
     return [outcomes[a:b] for a, b in pairwise(lengths)]
 
 
 def damaged(k: int, amplitude: float) -> np.ndarray:
     """Scene k with one row off by so much of rms(V0), up or down."""
-    frame, generator = (
-        noisy(k, simulated()[k]["touched"], 1),
-        np.random.default_rng([k, round(100 * amplitude)]),
-    )
+    frame, generator = touched(k), np.random.default_rng([k, round(100 * amplitude)])
     frame[generator.integers(len(frame))] += amplitude * rms_v(k) * generator.choice([-1, 1])
     return frame
 
@@ -52,17 +49,11 @@ def damaged(k: int, amplitude: float) -> np.ndarray:
 def test_outlier(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """One row of a full scan off by 5 % of rms(V0) to five times that: left out, counted, and
     hardly seen."""
-    played = [
-        (
-            quiet_frames(k),
-            np.array([noisy(k, simulated()[k]["touched"], 1), *(damaged(k, a) for a in OUTLIERS)]),
-        )
-        for k in range(COUNT)
-    ]
+    spoilt = played(lambda k: [touched(k), *(damaged(k, a) for a in OUTLIERS)])
     losses = np.zeros((COUNT, len(OUTLIERS)))
-    for k, (clean, *spoilt) in enumerate(run(same_everywhere, played, options())):
+    for k, (clean, *others) in enumerate(run(same_everywhere, spoilt, options())):
         assert clean.info.outliers == 0 and clean.info.masked == 0
-        for a, (amplitude, one) in enumerate(zip(OUTLIERS, spoilt, strict=True)):
+        for a, (amplitude, one) in enumerate(zip(OUTLIERS, others, strict=True)):
             losses[k, a] = miou(clean.image, k) - miou(one.image, k)
             assert one.info.outliers == one.info.masked <= 2
             assert one.info.outliers >= (amplitude > 0.05)
@@ -74,15 +65,12 @@ def test_outlier_in_half_scans(same_everywhere: SameEverywhere, margins: Margins
     """Without reciprocals only what the other rows contradict can be told: the mean loss is at most
     half of what it would be."""
     found, blind = [], []
-    played = [
-        (
-            half(quiet_frames(k)),
-            half(np.array([noisy(k, simulated()[k]["touched"], 1), damaged(k, 1.0)])),
-        )
-        for k in range(COUNT)
+    scans = [
+        (half(quiet), half(frames))
+        for quiet, frames in played(lambda k: [touched(k), damaged(k, 1.0)])
     ]
     for chosen, losses in ((options(), found), (options(diagnostics=0), blind)):
-        for k, (clean, spoilt) in enumerate(run(same_everywhere, played, chosen)):
+        for k, (clean, spoilt) in enumerate(run(same_everywhere, scans, chosen)):
             losses.append(miou(clean.image, k) - miou(spoilt.image, k))
     bound = 0.5 * float(np.mean(blind))
     margins.everywhere("frames/outlier", "MIoU lost in half scans", np.mean(found), bound)
@@ -91,13 +79,13 @@ def test_outlier_in_half_scans(same_everywhere: SameEverywhere, margins: Margins
 def test_outlier_in_the_reference(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """One reading of one of 16 quiet frames off by rms(V0) / 2: left out of the reference and of
     its noise."""
-    played = []
+    pairs = []
     for k in range(COUNT):
         quiet = quiet_frames(k)
         quiet[(3 * k) % len(quiet), 17 * k + 5] += 0.5 * rms_v(k)
-        frames = noisy(k, simulated()[k]["touched"], 1)[None]
-        played += [(quiet_frames(k), frames), (quiet, frames)]
-    results = run(same_everywhere, played, options())
+        frames = touched(k)[None]
+        pairs += [(quiet_frames(k), frames), (quiet, frames)]
+    results = run(same_everywhere, pairs, options())
     for k, ((clean,), (spoilt,)) in enumerate(zip(results[::2], results[1::2], strict=True)):
         off = abs(spoilt.info.lambda_noise - clean.info.lambda_noise) / clean.info.lambda_noise
         margins.everywhere("frames/outlier-while-taring", "change of lambda_noise", off, 0.3)
@@ -109,7 +97,7 @@ def test_outlier_in_the_reference(same_everywhere: SameEverywhere, margins: Marg
 def test_not_finite(same_everywhere: SameEverywhere, margins: Margins, value: float) -> None:
     """One, 10 or 40 rows: left out. More than half of them: refused, the image cleared, and the
     next frame as ever."""
-    good, generator = noisy(0, simulated()[0]["touched"], 1), np.random.default_rng(5)
+    good, generator = touched(0), np.random.default_rng(5)
     frames, counts = [good], (1, 10, 40)
     for count in (*counts, 105):
         frame = good.copy()
@@ -133,7 +121,7 @@ def test_not_finite(same_everywhere: SameEverywhere, margins: Margins, value: fl
 def test_zero_and_denormal(same_everywhere: SameEverywhere) -> None:
     """All zero: a dead front end, refused as such, though every electrode looks open. Denormal
     numbers: no touch."""
-    good = noisy(0, simulated()[0]["touched"], 1)
+    good = touched(0)
     frames = np.array([good, np.zeros_like(good), -np.zeros_like(good), 1e-39 * good, good])
     ((clean, zero, minus, tiny, again),) = run(
         same_everywhere, [(quiet_frames(0), frames)], options()
@@ -146,7 +134,7 @@ def test_zero_and_denormal(same_everywhere: SameEverywhere) -> None:
 
 def test_one_denormal_row(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """A row that fell to 1e-39 V is an outlier like any other."""
-    good = noisy(0, simulated()[0]["touched"], 1)
+    good = touched(0)
     row = int(np.abs(simulated()[0]["quiet"]).argmax())
     spoilt = good.copy()
     spoilt[row] = 1e-39
@@ -162,7 +150,7 @@ def test_one_denormal_row(same_everywhere: SameEverywhere, margins: Margins) -> 
 
 def test_saturation_in_touch(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Rows at the limit are left out and counted apart."""
-    good = noisy(0, simulated()[0]["touched"], 1)
+    good = touched(0)
     limit = 1.05 * float(np.abs(quiet_frames(0)).max())
     rows = np.array([3, 50, 171])
     spoilt = good.copy()
@@ -190,13 +178,10 @@ def test_saturation_in_the_reference(same_everywhere: SameEverywhere) -> None:
 
 def test_clean_frames_are_left_alone(same_everywhere: SameEverywhere, margins: Margins) -> None:
     """Nothing is found, and the bits are those without any diagnostic."""
-    played = [(quiet_frames(k), noisy(k, simulated()[k]["touched"], 1)[None]) for k in range(COUNT)]
-    quietly = {
-        "diagnostics": options().diagnostics & ~(1 << 7)
-    }  # whether a scene is crowded is for test_hard_touches.py
+    clean = played(lambda k: [touched(k)])
+    uncrowded = options().diagnostics & ~(1 << 7)  # crowded scenes: test_hard_touches.py
     looked, blind = (
-        run(same_everywhere, played, options(**quietly)),
-        run(same_everywhere, played, options(diagnostics=0)),
+        run(same_everywhere, clean, options(diagnostics=which)) for which in (uncrowded, 0)
     )
     for (one,), (other,) in zip(looked, blind, strict=True):
         margins.everywhere(
