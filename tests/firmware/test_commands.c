@@ -339,6 +339,10 @@ static void test_busy(void)
           EITS_PACKET_TARE, 0);
     REPLY(host_stream(&b.host, EITS_STREAM_RAW, 1, 0), EITS_REPLY_OK, 0, 0);
     REPLY(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS), EITS_REPLY_OK, 0, 0);
+    CHECK(!b.host.instrument.reset_wanted);
+    REPLY(host_plain(&b.host, EITS_PACKET_RESET), EITS_REPLY_OK, 0, 0);
+    CHECK(b.host.instrument.reset_wanted);
+    b.host.instrument.reset_wanted = false;
     REPLY(host_reply(&b.host, 8000), EITS_REPLY_OK, 0, 0);
     REPLY(host_stream(&b.host, 0, 1, 0), EITS_REPLY_OK, 0, 0);
 }

@@ -97,8 +97,9 @@ def list_tests(library: Library) -> None:
         start, ending = "fw_", ""
     for source in sorted((ROOT / TESTS[library.name]).glob("test_*.c")):
         name = f"{start}{source.stem[5:]}{ending}"
-        library.tests[f"test_{name}"] = seconds[name]
-        library.texts[f"test_{name}"] = source.read_text()
+        if name in seconds:
+            library.tests[f"test_{name}"] = seconds[name]
+            library.texts[f"test_{name}"] = source.read_text()
 
 
 def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float) -> str:
