@@ -23,7 +23,7 @@ from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
-from eitskin.device.wire.explain import fault_text
+from eitskin.device.wire.explain import fault_text, found_name
 from eitskin.device.wire.packets import (
     CLEAR_FRAMES,
     Fault,
@@ -254,9 +254,17 @@ def test_every_fault_says_its_name_its_frame_and_what_to_do() -> None:
     assert fault_text(Fault(FaultCode.MODEL_MISMATCH, True, 1, 0, 123)).startswith(
         "model mismatch 12.3 %, frame 1: "
     )
-    assert fault_text(Fault(FaultCode.BRIDGED, True, 1, 4, -1)).startswith(
-        "electrode 4 bridged, frame 1: "
-    )
+    named = {
+        (FaultCode.BRIDGED, True, -1): "electrode 4 bridged",
+        (FaultCode.BRIDGED, True, 0): "electrodes 4 and 0 bridged",
+        (FaultCode.BRIDGED, False, 0): "electrode 4 bridged",
+        (FaultCode.SATURATED, True, 2): "2 rows saturated from row 4 on",
+        (FaultCode.SATURATED, False, 2): "rows saturated",
+        (FaultCode.MODEL_MISMATCH, True, 0): "model mismatch",
+        (FaultCode.MODEL_MISMATCH, False, 5): "model mismatch",
+    }
+    for (code, raised, value), name in named.items():
+        assert found_name(Fault(code, raised, 1, 4, value)) == name
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts() -> None:

@@ -9,6 +9,7 @@ import sys
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from injected import (
 )
 
 from eitskin.frames.doctor import Finding, Report, examine, subject_from_frames
+from eitskin.frames.doctor.remedy import combined_remedy
 from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous, shorted
 from eitskin.frames.orders import electrode_map, match_rows, source_table, swap_map
@@ -408,3 +410,26 @@ def test_a_round_skin_needs_no_scipy() -> None:
         check=True,
         timeout=60,
     )
+
+
+@pytest.mark.parametrize(
+    ("remedies", "combined"),
+    [
+        (["--swap 1:2", "--no-flag", "--swap 1:2"], "--swap 1:2 --no-flag"),
+        (
+            ["--drop-channels 5,3", "--impute-channels 3,4"],
+            "--impute-channels 4 --drop-channels 3,5",
+        ),
+        (["--impute-channels 0", "--drop-channels 26"], "--drop-channels 0,26"),
+        (["--impute-channels 0", "--impute-channels 26"], "--drop-channels 0,26"),
+        (
+            ["--drop-electrodes 0", "--impute-channels 0,50", "--drop-channels 1,40"],
+            "--impute-channels 50 --drop-channels 40 --drop-electrodes 0",
+        ),
+    ],
+)
+def test_remedies_become_one(remedies: list[str], combined: str) -> None:
+    """Channel 26 is the reciprocal of channel 0: neither is filled from the other where both are
+    bad, and the channels of an electrode that goes are not named."""
+    case = SimpleNamespace(rows=adjacent(16).drive_measure, n_electrodes=16)
+    assert combined_remedy(case, remedies) == combined  # type: ignore[arg-type]
