@@ -19,10 +19,8 @@
 typedef struct active {
     eits_real lambda;
     eits_real tolerance; /* a correlation beyond lambda by no more than this is rounding */
-    uint32_t max;        /* columns that can be independent
-                          *
-                          * of each active column: its correlation less lambda times its sign; zero at the
-                          * optimum */
+    uint32_t max;        /* columns that can be independent */
+    /* of each active column: its correlation less lambda times its sign; zero at the optimum */
     eits_real *pull;
     /* of each active column: that of its coefficient, or of the correlation that brought it in */
     eits_real *sign;

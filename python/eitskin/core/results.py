@@ -33,10 +33,8 @@ class Options:
     the solve beyond so many multiply-accumulates. ``diagnostics``: what is looked for, bit k of
     ``DIAGNOSTICS``. ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow
     touches in time; all 0: each frame by itself (``solve.options.tracking`` sets them,
-    docs/guide/tracking.md).
-    ``regularisation_noise_factor``: the whitening's regularisation is at least this times the
-    tare's noise over
-        rms(V0); 0: as the model has it.
+    docs/guide/tracking.md). ``regularisation_noise_factor``: the whitening's regularisation is at
+    least this times the tare's noise over rms(V0); 0: as the model has it.
     """
 
     iterations: int

@@ -82,7 +82,7 @@ def run_board_demo(url: str, frames: int = FRAMES, *, image: Path | None = None)
     if last is None or host is None or last.touches is None:
         raise DeviceError(f"{url}: the board solved no frame")
     true, found = truth.touches(last.board_us), last.touches.touches
-    matching = truth.image_scorer(true, [(t.x_mm, t.y_mm) for t in found])
+    matching = truth.matching(true, [(t.x_mm, t.y_mm) for t in found])
     return BoardDemo(
         url,
         info,

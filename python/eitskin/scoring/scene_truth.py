@@ -62,7 +62,7 @@ class SceneTruth:
         elapsed_s = ((time_us - (self._began_us or 0)) % WRAP_US) / 1e6
         return int(elapsed_s * self.scene.rate_hz + self._ahead)
 
-    def image_scorer(self, true: Sequence[TrueTouch], found_mm: npt.ArrayLike) -> Matching:
+    def matching(self, true: Sequence[TrueTouch], found_mm: npt.ArrayLike) -> Matching:
         """Which of the found places (k, 2) in mm is which true touch; within 10 mm on the paper's
         skin, else in proportion."""
         return match([(t.x_mm, t.y_mm) for t in true], found_mm, self.gate_mm)

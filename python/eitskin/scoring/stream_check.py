@@ -74,7 +74,7 @@ class Watcher:
         if self._truth is None or found is None or frame.refused:
             return seen
         true = self._truth.touches(frame.board_us)
-        matching = self._truth.image_scorer(true, found)
+        matching = self._truth.matching(true, found)
         self.score.add(matching)
         errors = {
             number: d for (_, number), d in zip(matching.pairs, matching.distances_mm, strict=True)

@@ -1,5 +1,5 @@
 """Scenes solved once without noise, and measured as often as wanted: the frames that studies and
-trade-offs image_scorer by.
+trade-offs score by.
 
 Contacts, noise and drift depend on the seed and the role of the touches only, as in
 ``eitskin.scene.simulate``: a set of the same name has the same frames wherever it is used.

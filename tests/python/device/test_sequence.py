@@ -22,9 +22,7 @@ def judged(
     says otherwise."""
     counters = LinkCounters()
     check = SequenceCheck(counters)
-    return [
-        check.image_scorer(n % TOP, (prints or numbers)[k]) for k, n in enumerate(numbers)
-    ], counters
+    return [check.admit(n % TOP, (prints or numbers)[k]) for k, n in enumerate(numbers)], counters
 
 
 @pytest.mark.parametrize("start", [0, 5, TOP - 3, TOP - 1])
@@ -56,9 +54,9 @@ def test_duplicates_across_the_wrap() -> None:
 def test_a_restart_that_says_so() -> None:
     counters = LinkCounters()
     check = SequenceCheck(counters)
-    assert [check.image_scorer(n, n) for n in range(100, 110)] == [0] * 10
-    assert check.image_scorer(0, 9000, restart=True) == 0
-    assert [check.image_scorer(n, 9000 + n) for n in range(1, 5)] == [0] * 4
+    assert [check.admit(n, n) for n in range(100, 110)] == [0] * 10
+    assert check.admit(0, 9000, restart=True) == 0
+    assert [check.admit(n, 9000 + n) for n in range(1, 5)] == [0] * 4
     assert (counters.restarts, counters.gaps, counters.duplicates, counters.stale) == (1, 0, 0, 0)
 
 
@@ -66,9 +64,9 @@ def test_a_loss_right_after_a_restart_is_a_gap() -> None:
     counters = LinkCounters()
     check = SequenceCheck(counters)
     for n in range(100, 110):
-        check.image_scorer(n, n)
-    check.image_scorer(0, 9000, restart=True)
-    assert check.image_scorer(4, 9004) == 3
+        check.admit(n, n)
+    check.admit(0, 9000, restart=True)
+    assert check.admit(4, 9004) == 3
     assert (counters.restarts, counters.gaps, counters.missing) == (1, 1, 3)
 
 
@@ -77,12 +75,12 @@ def test_the_first_info_may_be_repeated() -> None:
     twice."""
     counters = LinkCounters()
     check = SequenceCheck(counters)
-    assert check.image_scorer(0, 7, restart=True) == 0
-    assert [check.image_scorer(n, 10 + n) for n in range(1, 6)] == [0] * 5
-    assert check.image_scorer(0, 7, restart=True) == 0  # it cannot be told yet
-    assert check.image_scorer(1, 11) is None
-    assert check.image_scorer(2, 12) is None
-    assert [check.image_scorer(n, 10 + n) for n in range(6, 9)] == [0] * 3
+    assert check.admit(0, 7, restart=True) == 0
+    assert [check.admit(n, 10 + n) for n in range(1, 6)] == [0] * 5
+    assert check.admit(0, 7, restart=True) == 0  # it cannot be told yet
+    assert check.admit(1, 11) is None
+    assert check.admit(2, 12) is None
+    assert [check.admit(n, 10 + n) for n in range(6, 9)] == [0] * 3
     assert (counters.restarts, counters.duplicates, counters.gaps, counters.missing) == (0, 3, 0, 0)
 
 
@@ -113,17 +111,17 @@ def test_a_long_stretch_that_comes_again_is_not_taken_for_a_restart() -> None:
 def test_a_cut_line_counts_one_gap() -> None:
     counters = LinkCounters()
     check = SequenceCheck(counters)
-    check.image_scorer(5, 5)
+    check.admit(5, 5)
     check.link_lost()
-    assert check.image_scorer(6, 6) == 0
+    assert check.admit(6, 6) == 0
     assert counters.gaps == 0
     check.link_lost()
-    assert check.image_scorer(20, 20) == 13
+    assert check.admit(20, 20) == 13
     assert (counters.gaps, counters.missing) == (1, 13)
     check.link_lost()
-    assert check.image_scorer(3, 33) == 1  # begun anew: how many, nobody knows
+    assert check.admit(3, 33) == 1  # begun anew: how many, nobody knows
     assert (counters.gaps, counters.missing, counters.restarts) == (2, 13, 1)
-    assert check.image_scorer(4, 34) == 0
+    assert check.admit(4, 34) == 0
 
 
 def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late() -> None:

@@ -162,7 +162,7 @@ class Decoder:
             self.counters.packets += 1
             return [packet]
         restart = packet.type == PacketType.INFO and packet.payload[:4] == b"\0\0\0\0"
-        lost = self._sequence.image_scorer(
+        lost = self._sequence.admit(
             packet.sequence, zlib.crc32(packet.payload, packet.type), restart=restart
         )
         if lost is None:

@@ -48,7 +48,7 @@ class SequenceCheck:
         """The line was cut: whatever comes next is taken and counts as one gap."""
         self._cut = self._next is not None
 
-    def image_scorer(self, sequence: int, fingerprint: int, *, restart: bool = False) -> int | None:
+    def admit(self, sequence: int, fingerprint: int, *, restart: bool = False) -> int | None:
         """How many packets are missing just before this one; None if it is to be refused.
 
         ``fingerprint`` tells a packet that came twice from another one with its number;

@@ -3,8 +3,9 @@ load that is detected."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
@@ -62,11 +63,11 @@ def run(workspace: Workspace) -> ExperimentOutcome:
                 "reading": name,
                 "sets": [tuned.facts, reported.facts],
             }
-            image_scorer = partial(
-                anywhere.image_scorer, tuned, on[name], reported, read[name], instruments.radius_mm
+            scored = partial(
+                anywhere.scored, tuned, on[name], reported, read[name], instruments.radius_mm
             )
             judged[name, snr] = anywhere.Anywhere.from_dict(
-                workspace.kept(facts, lambda image_scorer=image_scorer: image_scorer().as_dict())  # type: ignore[misc]
+                workspace.kept(facts, partial(_as_dict, scored))
             )
     reps, quiet = settings.count(30, 4), settings.count(4000, 80)
     found = []
@@ -140,3 +141,7 @@ def _sets(
         f" frames of each light press. The law chosen for the touch at {AVERAGED_DB:g} dB is"
         f" *{touch.form}*, its gain of order {touch.order}."
     )
+
+
+def _as_dict(scored: Callable[[], anywhere.Anywhere]) -> dict[str, Any]:
+    return scored().as_dict()

@@ -66,7 +66,7 @@ class Anywhere:
         return {**vars(self), "raw": plain(self.raw), "calibrated": plain(self.calibrated)}
 
 
-def image_scorer(
+def scored(
     tuned: PressSet, on: Readout, reported: PressSet, read: Readout, radius_mm: float
 ) -> Anywhere:
     """Calibrate on the set ``tuned``, read the set ``reported``."""
