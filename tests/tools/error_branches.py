@@ -253,7 +253,7 @@ def _split_head(span: Span, head: re.Match[str]) -> tuple[Span, Span]:
 
 def sites_below(root: Path, folder: str) -> list[Site]:
     """Of every C source and header in ``root / folder``."""
-    files = sorted([*(root / folder).glob("*.c"), *(root / folder).glob("*.h")])
+    files = sorted([*(root / folder).rglob("*.c"), *(root / folder).rglob("*.h")])
     return [
         site
         for file in files
