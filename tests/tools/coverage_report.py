@@ -96,7 +96,7 @@ def report(counts: dict[str, FileCounts], sites: Sequence[Site]) -> list[str]:
             continue
         of_file = counts.get(name, FileCounts())
         missed = [miss for site in own for miss in find_missed(site, of_file)]
-        rows.append(_row(Path(name).name, of_file, own, missed))
+        rows.append(_row(name.removeprefix(f"{SOURCES}/"), of_file, own, missed))
         wrong += [str(miss) for miss in missed]
         never = sorted(line for line, count in of_file.lines.items() if count == 0)
         unrun += [f"{name}: {_ranges(never)}"] if never else []
