@@ -129,7 +129,7 @@ class HostTwin:
         try:
             result = self._core.reconstruct(raw.voltage_v, touches=frame.touches is not None)
         except FrameError:
-            self._compare(frame, frame.refused is not None, 1.0, self._warm)
+            self._count(frame, frame.refused is not None, 1.0, self._warm)
             return None
         assert frame.solved is not None
         same, difference = (
@@ -144,12 +144,12 @@ class HostTwin:
             )
         touched = frame.touches is None or same_touches(result.touches, frame.touches.touches)
         if same and not touched:
-            self._compare(frame, False, difference, self._warm or self._tracks)
+            self._count(frame, False, difference, self._warm or self._tracks)
         else:
-            self._compare(frame, same, difference, self._warm)
+            self._count(frame, same, difference, self._warm)
         return result
 
-    def _compare(self, frame: LiveFrame, same: bool, difference: float, from_before: bool) -> None:
+    def _count(self, frame: LiveFrame, same: bool, difference: float, from_before: bool) -> None:
         """``from_before``: what differs may come from frames before, of which one may be missing
         here."""
         check = self.check
