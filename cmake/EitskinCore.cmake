@@ -3,10 +3,10 @@
 # Contraction and re-association stay off: kernels say fma where they mean it, and the bits must not depend on the target.
 
 set(EITSKIN_CORE_SOURCES
-    base/status.c
+    base/status.c base/texts.c
     kernels/kernels.c kernels/portable.c
-    model/model.c model/force.c
-    context/column_cache.c context/options.c context/products.c
+    model/model.c model/options.c model/force.c
+    context/column_cache.c context/products.c
     frame/projection.c frame/reference.c frame/fold.c frame/regularisation.c frame/whitening.c
     frame/whitening_products.c
     diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c

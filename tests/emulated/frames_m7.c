@@ -17,7 +17,6 @@
  * as bits: there is nothing to round. */
 #include "eitskin/eitskin.h"
 
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -87,68 +86,18 @@ static int fail(const char *what)
     return 0;
 }
 
-typedef struct option {
-    const char *name;
-    size_t offset;
-    int whole; /* a uint32_t; else a real */
-} option;
-
-#define WHOLE(name) {#name, offsetof(eits_options, name), 1}
-#define REAL(name)  {#name, offsetof(eits_options, name), 0}
-
-static const option option_table[] = {
-    WHOLE(iterations),
-    WHOLE(gap_every),
-    WHOLE(max_touches),
-    WHOLE(max_masked),
-    WHOLE(warm_start),
-    WHOLE(project_reference),
-    WHOLE(touch_sweeps),
-    WHOLE(mac_limit),
-    WHOLE(diagnostics),
-    WHOLE(touch_fit),
-    WHOLE(second_pass),
-    REAL(lambda_abs),
-    REAL(lambda_rel),
-    REAL(lambda_noise_factor),
-    REAL(detection_factor),
-    REAL(gap_rel),
-    REAL(saturation_v),
-    REAL(touch_threshold),
-    REAL(touch_min_fraction),
-    REAL(touch_min_radius_mm),
-    REAL(touch_max_radius_mm),
-    REAL(touch_seed_radius_mm),
-    REAL(touch_change_s_per_m),
-    REAL(touch_radius_weight),
-    REAL(follow_mm),
-    WHOLE(touch_fit),
-    WHOLE(second_pass),
-    WHOLE(track_confirm),
-    WHOLE(track_hold),
-    REAL(track_smooth),
-    REAL(regularisation_noise_factor),
-};
-
 /* An option by its name; 0 for one that is none. */
 static int set_option(const char *name, double value)
 {
-    if (strcmp(name, "sign") == 0) {
-        options.sign = (eits_sign)(uint32_t)value;
-        return 1;
-    }
-    if (strcmp(name, "solver") == 0) {
-        options.solver = (eits_solver)(uint32_t)value;
-        return 1;
-    }
-    for (size_t k = 0; k < sizeof option_table / sizeof option_table[0]; ++k) {
-        if (strcmp(name, option_table[k].name) != 0)
+    uint32_t count;
+    const eits_option *table = eits_option_table(&count);
+    for (uint32_t k = 0; k < count; ++k) {
+        if (strcmp(name, table[k].name) != 0)
             continue;
-        uint8_t *const field = (uint8_t *)&options + option_table[k].offset;
-        const uint32_t whole = option_table[k].whole ? (uint32_t)value : 0;
-        const float real = (float)value;
-        memcpy(field, option_table[k].whole ? (const void *)&whole : (const void *)&real,
-               sizeof real);
+        const uint32_t whole = table[k].whole ? (uint32_t)value : 0;
+        const eits_real real = (eits_real)value;
+        memcpy((uint8_t *)&options + table[k].offset,
+               table[k].whole ? (const void *)&whole : (const void *)&real, table[k].size);
         return 1;
     }
     return 0;

@@ -20,164 +20,17 @@
  *     }
  *
  * `measure` stands for whatever gives n_rows voltages in the order of the model's protocol.
- * eits_find_touches may be left out. Contexts fraction
- * nothing; one context is used by one thread at a time.
+ * eits_find_touches may be left out. Contexts share nothing; one context is used by one thread at a
+ * time.
  */
 #ifndef EITSKIN_CONTEXT_H
 #define EITSKIN_CONTEXT_H
 
-#include "eitskin/diagnostics.h"
-#include "eitskin/model.h"
-#include "eitskin/types.h"
+#include "eitskin/options.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define EITS_MAX_TOUCHES      16
-#define EITS_MAX_TRACK_FRAMES 1000u
-
-/* Which conductivity changes are looked for. */
-typedef enum eits_sign {
-    EITS_SIGN_INCREASE = 0, /* x >= 0: touches by something that conducts better */
-    EITS_SIGN_DECREASE = 1, /* x <= 0 */
-    EITS_SIGN_BOTH = 2
-} eits_sign;
-
-/* What the touch fit does beyond fitting discs to the image's peaks. */
-typedef enum eits_touch_fit {
-    /* first to v0 log(v / v0), which strong touches bend less; models of differences */
-    EITS_TOUCH_FIT_LOG_DATA = 1,
-    /* discs that are one touch are merged, those that are two are split; where data are
-     * linear or corrected for interaction, for what bends them looks like more touches */
-    EITS_TOUCH_FIT_SPLIT_MERGE = 2,
-    /* what touches do to each other's field is taken out of the data; models of differences with
-     * fields */
-    EITS_TOUCH_FIT_INTERACTION = 4
-} eits_touch_fit;
-#define EITS_TOUCH_FIT_ALL 7u
-
-typedef struct eits_options {
-    uint32_t iterations; /* at most so many; exactly so many where gap_rel is 0 */
-    /* iterations between checks of the gap and of divergence, and until the working set is
-     * chosen anew; at least 1 */
-    uint32_t gap_every;
-    uint32_t max_touches; /* at most EITS_MAX_TOUCHES */
-    uint32_t max_masked;  /* a frame with more unusable rows than this is refused */
-    eits_sign sign;
-    eits_solver solver;
-    /* 1: start from the last frame's coefficients, momentum reset; see solve.h for what it does */
-    uint32_t warm_start;
-    /* 1: ignore changes along the reference frame, that is drift of the gain */
-    uint32_t project_reference;
-    eits_real lambda_abs; /* > 0: this lambda, in the units of S'y; 0: by the rule below */
-    /* lambda = max(lambda_rel lambda_max, lambda_noise_factor lambda_noise) */
-    eits_real lambda_rel;
-    eits_real lambda_noise_factor;
-    eits_real detection_factor; /* no touch where lambda_max < detection_factor lambda_noise; 0: no
-                                   threshold */
-    eits_real gap_rel;          /* > 0: stop once gap <= gap_rel |y|^2 / 2 */
-    eits_real saturation_v;     /* > 0: a channel at or beyond +-saturation_v is unusable */
-    /* a local maximum below this fraction of the greatest starts no touch */
-    eits_real touch_threshold;
-    /* a touch that explains less than this fraction of |y|^2 beside the others is dropped */
-    eits_real touch_min_fraction;
-    eits_real touch_min_radius_mm, touch_max_radius_mm, touch_seed_radius_mm;
-    /* expected conductivity change under a touch: tells radius from strength; 0: unknown */
-    eits_real touch_change_s_per_m;
-    /* how much the radius so told counts against the data, relative to the touch's energy */
-    eits_real touch_radius_weight;
-    /* sweeps of the off-grid fit over all touches; 0: peaks with their strengths only */
-    uint32_t touch_sweeps;
-    /* a touch that moved at most so far since the last frame keeps its id */
-    eits_real follow_mm;
-    /* > 0: stop where the next step and the gap after it would take info.macs beyond this; see
-     * solve.h */
-    uint32_t mac_limit;
-    /* bits of eits_diagnostic that are looked for; EITS_DIAGNOSTICS_ALL by default */
-    uint32_t diagnostics;
-    uint32_t touch_fit; /* bits of eits_touch_fit; EITS_TOUCH_FIT_ALL by default */
-    /* 1: once more than one touch is found, eits_find_touches solves again with their interaction
-     * taken out of the data; image and info are then the second image's. Not with a mac_limit */
-    uint32_t second_pass;
-    /* a doubtful touch is told of once it was found in so many frames on end; 0, 1: at once */
-    uint32_t track_confirm;
-    /* a touch that is not found keeps its id for so many frames, and is told of if it was faint
-     * before */
-    uint32_t track_hold;
-    /* > 0: follow places, radii and strengths in time; how uncertain the place of a touch is
-     * whose S'y is as great as noise gives, in pixels */
-    eits_real track_smooth;
-    /* > 0: the whitening's regularisation is at least this times noise_v / v0_rms, where both are
-     * known */
-    eits_real regularisation_noise_factor;
-} eits_options;
-
-/* Why the solver stopped. */
-typedef enum eits_stop {
-    EITS_STOP_ITERATIONS = 0, /* the given number of iterations was done */
-    EITS_STOP_GAP = 1,        /* the duality gap was small enough */
-    EITS_STOP_BELOW_THRESHOLD =
-        2, /* lambda_max lies within the noise: no touch, the image is zero */
-    /* lambda >= lambda_max: zero is the exact optimum; or |y| < 2^-51 (4.4e-16; double: 1e-146),
-     * whose square says nothing */
-    EITS_STOP_ZERO = 3,
-    /* the objective rose, or all went to zero, although the step was halved again and again; the
-     * image is zero */
-    EITS_STOP_DIVERGED = 4,
-    /* the next step would have passed mac_limit: the image is the best until then */
-    EITS_STOP_MACS = 5,
-    /* no coefficient moves any more but by rounding: coordinate descent and active set */
-    EITS_STOP_OPTIMUM = 6
-} eits_stop;
-
-/* What a reconstruction cost and how it ended. */
-typedef struct eits_info {
-    uint32_t iterations;
-    eits_stop stop;
-    uint32_t nonzeros; /* coefficients that are not zero */
-    uint32_t masked;   /* protocol rows that were left out of this frame */
-    uint32_t step_halvings;
-    uint32_t touches; /* set by eits_find_touches */
-    /* multiply-accumulates with a stored matrix, a basis vector, F or the active set's factor;
-     * vector sums not counted */
-    uint64_t macs;
-    uint64_t touch_macs; /* the same for eits_find_touches */
-    eits_real lambda;
-    eits_real lambda_max;
-    eits_real lambda_noise; /* the reference's, times what rows left out add */
-    /* duality gap at the result, absolute; 0 where stop is BELOW_THRESHOLD, ZERO or DIVERGED, and
-     * where MACS came before anything was known */
-    eits_real gap;
-    eits_real gap_rel;    /* gap / (|y|^2 / 2) */
-    eits_real residual;   /* |y - S x| */
-    eits_real data_norm;  /* |y| */
-    uint32_t diagnostics; /* bits of eits_diagnostic; CROWDED is set by eits_find_touches */
-    uint32_t saturated;   /* rows, masked ones apart */
-    uint32_t outliers;    /* rows left out as outliers */
-    /* fraction of |d| beyond noise that the model's range cannot give, 0 to 1; 0 where it was not
-     * judged */
-    eits_real model_mismatch;
-    /* fraction of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
-     * for */
-    eits_real unexplained;
-    /* bit e: electrode e, of the first 64; eits_get_electrode_states has all */
-    uint64_t open_electrodes, bridged_electrodes, noisy_electrodes;
-    /* of the whitening, over s_1^2, as this frame was reduced; 0 where the model does not tell */
-    eits_real regularisation;
-} eits_info;
-
-typedef struct eits_touch {
-    uint32_t id; /* counts up from 1; follows a finger from frame to frame */
-    eits_real x_mm, y_mm;
-    eits_real radius_mm;
-    eits_real strength_s_per_m_mm2; /* conductivity change integrated over the touch: S/m mm^2 */
-    /* fraction of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
-     * not found in this frame and is held */
-    eits_real confidence;
-    /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
-    eits_real force_n;
-} eits_touch;
 
 /* The reference and its noise, as eits_get_reference gives them (frame.h takes it). */
 typedef struct eits_reference_info {
@@ -253,15 +106,6 @@ typedef struct eits_context eits_context;
 
 /* The same number for an open model, as a function. Returns 0 for a null model. */
 size_t eits_workspace_size(const eits_model *model, int prepared);
-
-/* The model's defaults as options. Errors: EITS_E_ARGUMENT. */
-eits_status eits_options_default(const eits_model *model, eits_options *options);
-
-/* Change `options` to what suits frames that follow one another, 48 or 96 a second
- * (docs/guide/tracking.md): the detection threshold a quarter lower, and the touches that come of
- * it followed in time, so that those of noise are not told of. A frame by itself then misses faint
- * touches: each needs those before it. Errors: EITS_E_ARGUMENT. */
-eits_status eits_options_track(eits_options *options);
 
 /* Lay out a context in `workspace` (16-byte aligned, the caller's as long as the context is used;
  * so is `model`) and set the model's default options; *ctx then points into it. With room for it

@@ -1,12 +1,12 @@
-/* eitskin: what is found wrong with a frame, said by name. docs/reference/diagnostics.md has each
- * rule and what to do about it.
+/* eitskin: what the core says of a frame: what is wrong with it, what it cost, how its solve ended.
  *
- * The frame stage looks at rows and electrodes before anything is solved, and leaves out what would
- * spoil the image; the solver and the touch fit look at what came of it. A diagnostic is no error:
- * the frame is imaged as well as what is left of it allows, and eits_info says what was found. Only
- * where more rows are left out than options.max_masked is the frame refused, its diagnostics still
- * named. eits_options.diagnostics chooses what is looked for; SATURATED rows are left out whether
- * it is named or not.
+ * The frame stage examines rows and electrodes before anything is solved, and leaves out what would
+ * spoil the image; the solver and the touch fit examine the result. A diagnostic is no error: the
+ * core images what is left of the frame. It rejects a frame, its diagnostics still named, only where
+ * more rows are left out than options.max_masked. options.diagnostics chooses what is looked for;
+ * saturated rows are left out in any case. docs/reference/diagnostics.md has each rule.
+ *
+ * Written by tables/make_tables.py from tables/diagnostics.toml.
  */
 #ifndef EITSKIN_DIAGNOSTICS_H
 #define EITSKIN_DIAGNOSTICS_H
@@ -17,50 +17,144 @@
 extern "C" {
 #endif
 
-/* Bits of eits_info.diagnostics and eits_options.diagnostics. Numbers are never used again for
- * something else. */
+/* Bits of info.diagnostics and options.diagnostics. No bit ever gets another meaning. */
 typedef enum eits_diagnostic {
-    /* rows at or beyond options.saturation_v: left out; info.saturated counts them */
+    /* leaves rows at or beyond saturation_v out and counts them */
     EITS_DIAGNOSTIC_SATURATED = 1,
-    /* info.open_electrodes: all rows that use them are left out */
+    /* leaves all rows of the electrode out and names it */
     EITS_DIAGNOSTIC_ELECTRODE_OPEN = 2,
-    /* info.bridged_electrodes, of one or more pairs: likewise */
+    /* leaves the rows of both electrodes out and names them */
     EITS_DIAGNOSTIC_BRIDGED = 4,
-    /* single rows that nothing else bears out: left out; info.outliers counts them */
+    /* leaves single rows that nothing else bears out out, and counts them */
     EITS_DIAGNOSTIC_OUTLIER = 8,
-    /* info.noisy_electrodes: too many outliers have them in common; all rows that use them are
-     * left out */
+    /* leaves the rows of an electrode out that too many outliers share, and names it */
     EITS_DIAGNOSTIC_ELECTRODE_NOISY = 16,
-    /* no change of conductivity gives such data by this model; info.model_mismatch says how much
-     * of them is out of its range. Imaged as is */
+    /* images the frame, of which no change of the modelled skin gives so much of the data
+     * (model_mismatch) */
     EITS_DIAGNOSTIC_MODEL_MISMATCH = 32,
-    /* the change goes the way touches cannot: tare again. Imaged as is */
+    /* images the frame, which changes the way touches cannot */
     EITS_DIAGNOSTIC_STALE_REFERENCE = 64,
-    /* more touches than can be told apart, by eits_find_touches: count and places are a guess */
+    /* eits_find_touches reports more touches than can be told apart */
     EITS_DIAGNOSTIC_CROWDED = 128
 } eits_diagnostic;
 #define EITS_DIAGNOSTICS_ALL 255u
 
-/* Why a row is left out of a frame: bits of eits_get_row_states, 0 for a row in use. */
+/* Bits: why a row is left out of a frame; 0 for a row in use. */
 typedef enum eits_row_state {
-    EITS_ROW_MASKED = 1,  /* by eits_mask_row, or while the reference was taken */
-    EITS_ROW_UNKNOWN = 2, /* not a finite number */
+    /* by eits_mask_row, or while the reference was taken */
+    EITS_ROW_MASKED = 1,
+    /* not a finite number */
+    EITS_ROW_UNKNOWN = 2,
     EITS_ROW_SATURATED = 4,
-    EITS_ROW_OPEN = 8,     /* uses an open electrode */
-    EITS_ROW_BRIDGED = 16, /* uses an electrode of a bridged pair */
+    /* uses an open electrode */
+    EITS_ROW_OPEN = 8,
+    /* uses an electrode of a bridged pair */
+    EITS_ROW_BRIDGED = 16,
     EITS_ROW_OUTLIER = 32,
-    EITS_ROW_NOISY = 64 /* uses a noisy electrode */
+    /* uses a noisy electrode */
+    EITS_ROW_NOISY = 64
 } eits_row_state;
 
-/* Bits of eits_get_electrode_states; 0 for an electrode that nothing was found about. */
+/* An electrode's place in a row of the protocol takes a byte. */
+#define EITS_MAX_ELECTRODES 256u
+
+/* Bits of an electrode's state; 0 where nothing is wrong with it. */
 typedef enum eits_electrode_state {
     EITS_ELECTRODE_OPEN = 1,
     EITS_ELECTRODE_BRIDGED = 2,
     EITS_ELECTRODE_NOISY = 4
 } eits_electrode_state;
 
-/* An electrode's place in a row of the protocol takes a byte. */
-#define EITS_MAX_ELECTRODES 256u
+/* Why the solver stopped. */
+typedef enum eits_stop {
+    /* the given number of iterations was done */
+    EITS_STOP_ITERATIONS = 0,
+    /* the duality gap was small enough */
+    EITS_STOP_GAP = 1,
+    /* lambda_max lies below the detection threshold: no touch, the image is zero */
+    EITS_STOP_BELOW_THRESHOLD = 2,
+    /* lambda >= lambda_max: zero is the exact optimum; or |y| < 2^-51 (4.4e-16; double: 1e-146),
+     * whose square says nothing */
+    EITS_STOP_ZERO = 3,
+    /* the objective rose, or all went to zero, although the step was halved again and again; the
+     * image is zero */
+    EITS_STOP_DIVERGED = 4,
+    /* the next step would have passed mac_limit: the image is the best until then */
+    EITS_STOP_MACS = 5,
+    /* no coefficient moves any more but by rounding: coordinate descent and active set */
+    EITS_STOP_OPTIMUM = 6
+} eits_stop;
+
+/* What a reconstruction cost, how it ended and what was wrong with the frame. */
+typedef struct eits_info {
+    /* of the solver */
+    uint32_t iterations;
+    eits_stop stop;
+    /* coefficients that are not zero */
+    uint32_t nonzeros;
+    /* rows of the protocol that were left out of this frame */
+    uint32_t masked;
+    uint32_t step_halvings;
+    /* set by eits_find_touches */
+    uint32_t touches;
+    /* multiply-accumulates with a stored matrix, a basis vector, F or the active set's factor;
+     * vector sums are not counted */
+    uint64_t macs;
+    /* the same for eits_find_touches */
+    uint64_t touch_macs;
+    /* as used */
+    eits_real lambda;
+    /* the least lambda whose image is zero: max(S'y) along the sign */
+    eits_real lambda_max;
+    /* the reference's, times what rows left out add */
+    eits_real lambda_noise;
+    /* duality gap at the result, absolute; 0 where stop is BELOW_THRESHOLD, ZERO or DIVERGED, and
+     * where MACS came before anything was known */
+    eits_real gap;
+    /* gap / (|y|^2 / 2) */
+    eits_real gap_rel;
+    /* |y - S x| */
+    eits_real residual;
+    /* |y| */
+    eits_real data_norm;
+    /* bits of eits_diagnostic; CROWDED is set by eits_find_touches */
+    uint32_t diagnostics;
+    /* saturated rows, without masked ones */
+    uint32_t saturated;
+    /* rows left out as outliers */
+    uint32_t outliers;
+    /* fraction of |d| beyond noise that lies outside the model's range, 0 to 1; 0 where that was
+     * not examined */
+    eits_real model_mismatch;
+    /* fraction of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
+     * for */
+    eits_real unexplained;
+    /* bit e: electrode e, of the first 64; eits_get_electrode_states has all */
+    uint64_t open_electrodes;
+    /* bit e: electrode e, of one or more pairs */
+    uint64_t bridged_electrodes;
+    /* bit e: electrode e */
+    uint64_t noisy_electrodes;
+    /* of the whitening, over s_1^2, as this frame was reduced; 0 where the model does not say */
+    eits_real regularisation;
+} eits_info;
+
+/* One touch. */
+typedef struct eits_touch {
+    /* counts up from 1; stays with a touch from frame to frame */
+    uint32_t id;
+    /* the centre */
+    eits_real x_mm;
+    eits_real y_mm;
+    eits_real radius_mm;
+    /* conductivity change integrated over the touch: S mm^2/m */
+    eits_real strength_s_per_m_mm2;
+    /* fraction of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
+     * not found in this frame and is held */
+    eits_real confidence;
+    /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
+    eits_real force_n;
+} eits_touch;
 
 /* A name for one bit of eits_diagnostic ("electrode open", "outlier"...), never NULL. */
 const char *eits_diagnostic_text(eits_diagnostic diagnostic);

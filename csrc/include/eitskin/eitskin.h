@@ -43,6 +43,8 @@
 #include "eitskin/frame.h"
 #include "eitskin/link.h"
 #include "eitskin/model.h"
+#include "eitskin/options.h"
+#include "eitskin/packets.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
 #include "eitskin/types.h"

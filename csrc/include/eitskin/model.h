@@ -84,18 +84,6 @@ typedef struct eits_pixel {
     uint16_t iy;
 } eits_pixel;
 
-/* How an image is found; each minimises the same objective (solve.h). */
-typedef enum eits_solver {
-    EITS_SOLVER_FISTA = 0, /* every column in every iteration */
-    /* FISTA on the columns that may differ from zero, chosen anew after gap_every iterations,
-     * then ever more rarely, or always so often where gap_rel asks for a gap */
-    EITS_SOLVER_WORKING_SET = 1,
-    /* coordinate descent on such columns; an iteration is a sweep over them */
-    EITS_SOLVER_COORDINATE = 2,
-    /* to the optimum of the columns chosen, then more columns; an iteration is such a round */
-    EITS_SOLVER_ACTIVE_SET = 3
-} eits_solver;
-
 /* Defaults that the model's maker chose; eits_options_default() starts from them. */
 typedef struct eits_defaults {
     uint32_t iterations;
@@ -113,7 +101,7 @@ typedef struct eits_defaults {
     float follow_mm;
     float touch_radius_weight;
     uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
-    /* bits of eits_touch_fit (context.h) that are not set by default; files before 1.2 have 0 here
+    /* bits of eits_touch_fit (options.h) that are not set by default; files before 1.2 have 0 here
      */
     uint32_t touch_fit_left_out;
 } eits_defaults;

@@ -2,9 +2,9 @@
 #include "context/context.h"
 
 #include "base/vec.h"
-#include "context/options.h"
 #include "diagnostics/diagnostics.h"
 #include "frame/whitening.h"
+#include "model/options.h"
 
 #include <string.h>
 
@@ -174,7 +174,7 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
  * start, and the directions to ignore depend on these two. */
 eits_status eits_set_options(eits_context *ctx, const eits_options *o)
 {
-    if (ctx == NULL || o == NULL || !eits_options_valid(o))
+    if (ctx == NULL || o == NULL || !eits_options_in_range(o))
         return EITS_E_ARGUMENT;
     if (o->sign != ctx->options.sign)
         ctx->solver.warm = 0;

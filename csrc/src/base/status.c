@@ -1,4 +1,4 @@
-#include "eitskin/diagnostics.h"
+#include "eitskin/types.h"
 
 /* A switch without a default: a compiler names the case that a new status lacks. */
 const char *eits_status_text(eits_status status)
@@ -38,29 +38,6 @@ const char *eits_status_text(eits_status status)
         return "the result would not be finite";
     }
     return "unknown status";
-}
-
-const char *eits_diagnostic_text(eits_diagnostic diagnostic)
-{
-    switch (diagnostic) {
-    case EITS_DIAGNOSTIC_SATURATED:
-        return "saturated";
-    case EITS_DIAGNOSTIC_ELECTRODE_OPEN:
-        return "electrode open";
-    case EITS_DIAGNOSTIC_BRIDGED:
-        return "electrodes bridged";
-    case EITS_DIAGNOSTIC_OUTLIER:
-        return "outlier";
-    case EITS_DIAGNOSTIC_ELECTRODE_NOISY:
-        return "electrode noisy";
-    case EITS_DIAGNOSTIC_MODEL_MISMATCH:
-        return "model mismatch";
-    case EITS_DIAGNOSTIC_STALE_REFERENCE:
-        return "stale reference";
-    case EITS_DIAGNOSTIC_CROWDED:
-        return "crowded";
-    }
-    return "unknown diagnostic";
 }
 
 #define TEXT_OF(x) #x

@@ -3,56 +3,11 @@
 #include "eitskin/link.h"
 
 #include "eitskin/model.h"
+#include "link/layouts.h"
 
 #include <string.h>
 
 enum { CHECKSUM = 4, MIN = (int)EITS_LINK_HEAD + CHECKSUM, LONGEST_BLOCK = 0xFF };
-
-/* Payloads are copied as they lie in memory: sizes and places are the wire's. */
-#define SIZE(type, bytes) _Static_assert(sizeof(type) == (bytes), #type " is not as on the wire")
-#define PLACE(type, field, bytes) \
-    _Static_assert(offsetof(type, field) == (bytes), #type "." #field " is misplaced")
-SIZE(float, 4);
-SIZE(eits_packet_info, 152);
-PLACE(eits_packet_info, f_cpu_hz, 48);
-PLACE(eits_packet_info, model_crc, 68);
-PLACE(eits_packet_info, protocol_hash, 72);
-PLACE(eits_packet_info, storage, 108);
-PLACE(eits_packet_info, samples, 124);
-PLACE(eits_packet_info, slot_us, 128);
-PLACE(eits_packet_info, tared, 138);
-PLACE(eits_packet_info, volts_per_code_nv, 148);
-SIZE(eits_packet_reply, 16);
-PLACE(eits_packet_reply, detail, 8);
-SIZE(eits_packet_raw, 16);
-PLACE(eits_packet_raw, flags, 14);
-SIZE(eits_packet_solved, 104);
-PLACE(eits_packet_solved, count, 20);
-PLACE(eits_packet_solved, iterations, 28);
-PLACE(eits_packet_solved, lambda, 44);
-PLACE(eits_packet_solved, diagnostics, 68);
-PLACE(eits_packet_solved, open_electrodes, 80);
-SIZE(eits_packet_touch, 28);
-SIZE(eits_stage_stats, 16);
-SIZE(eits_packet_stats, 68 + 16 * EITS_STAGES); /* and so has stage[6] as many as there are */
-PLACE(eits_packet_stats, link_packets, 36);
-PLACE(eits_packet_stats, stage, 68);
-SIZE(eits_packet_fault, 36);
-PLACE(eits_packet_fault, words, 16);
-SIZE(eits_command_plain, 4);
-SIZE(eits_command_stream, 12);
-SIZE(eits_command_tare, 8);
-SIZE(eits_command_scan, 24);
-PLACE(eits_command_scan, frame_period_us, 20);
-SIZE(eits_command_solver, 44);
-PLACE(eits_command_solver, lambda_rel, 20);
-PLACE(eits_command_solver, mac_limit, 32);
-PLACE(eits_command_solver, diagnostics, 36);
-PLACE(eits_command_solver, track, 40);
-SIZE(eits_command_model_begin, 12);
-SIZE(eits_command_model_data, 8);
-SIZE(eits_command_get_stats, 8);
-SIZE(eits_command_mask_row, 8);
 
 /* ---- encoding ---- */
 

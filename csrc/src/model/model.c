@@ -2,6 +2,8 @@
  */
 #include "eitskin/model.h"
 
+#include "model/options.h"
+
 #include <string.h>
 
 enum {
@@ -10,7 +12,6 @@ enum {
     DIMS_SIZE = 64,
     FIELDS_HEAD = 16,
     MIRROR_ROWS = 4,
-    MAX_TOUCH_FIT = 7,
     MAX_SECTIONS = 256
 };
 
@@ -268,21 +269,15 @@ static int between(float value, float low, float high)
     return is_finite_f32(value) && value >= low && value <= high;
 }
 
-/* The ranges that eits_set_options asks for, so that a model's own defaults are always good
- * options. */
-static int defaults_in_range(const eits_defaults *d)
+/* A model's own defaults are always good options. */
+static int defaults_in_range(const eits_model *model)
 {
-    const float huge = 1e30f;
-    return d->iterations >= 1 && d->iterations <= EITS_MAX_MODEL_ITERATIONS &&
+    const eits_defaults *d = model->defaults;
+    eits_options own;
+    return d->iterations <= EITS_MAX_MODEL_ITERATIONS &&
            d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET &&
-           d->touch_fit_left_out <= MAX_TOUCH_FIT && between(d->lambda_rel, 0, 1) &&
-           between(d->mask_threshold, 0, 1) && between(d->touch_threshold, 0, 1) &&
-           between(d->touch_min_fraction, 0, 1) && between(d->lambda_noise_factor, 0, huge) &&
-           between(d->detection_factor, 0, huge) && between(d->touch_change_s_per_m, 0, huge) &&
-           between(d->follow_mm, 0, huge) && between(d->touch_radius_weight, 0, huge) &&
-           between(d->touch_min_radius_mm, 1e-6f, huge) &&
-           between(d->touch_max_radius_mm, d->touch_min_radius_mm, huge) &&
-           between(d->touch_seed_radius_mm, d->touch_min_radius_mm, d->touch_max_radius_mm);
+           d->touch_fit_left_out <= EITS_TOUCH_FIT_ALL && between(d->mask_threshold, 0, 1) &&
+           eits_options_default(model, &own) == EITS_OK && eits_options_in_range(&own);
 }
 
 static eits_status check_numbers(const eits_model *model)
@@ -297,7 +292,7 @@ static eits_status check_numbers(const eits_model *model)
         (s->storage == EITS_STORAGE_F32 && !all_finite(s->data, stored)) ||
         (s->storage == EITS_STORAGE_F16 && !halves_finite(s->data, stored)))
         return EITS_E_MODEL_VALUE;
-    if (!defaults_in_range(model->defaults))
+    if (!defaults_in_range(model))
         return EITS_E_MODEL_VALUE;
     return EITS_OK;
 }

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.calibration.weights import Weight
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import FrameError
 from eitskin.frames.frames import Frames
 from eitskin.solve.reconstructor import Reconstructor

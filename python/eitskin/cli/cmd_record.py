@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     """Record, then say how much."""
     from eitskin.device.known_model import find_model
     from eitskin.device.live import LiveSummary, finish, follow
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
     from eitskin.scoring.scene_truth import truth_of, until_over
 
     what, (every, frames) = read_mode(options.mode), read_every(options)

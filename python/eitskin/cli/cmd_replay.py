@@ -64,7 +64,7 @@ def _show(options: argparse.Namespace) -> None:
     from eitskin.device.known_model import find_model, need_model
     from eitskin.device.live import replayed
     from eitskin.device.open import open_device
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
 
     what = read_mode(options.mode or "touches")
     check_picture(options.picture, what)

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin.cli.live_output import check_picture, show
     from eitskin.device.known_model import find_model, need_model
     from eitskin.device.live import follow, replayed
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
     from eitskin.fileio import refuse_unwritable
     from eitskin.scoring.scene_truth import truth_of, until_over
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from eitskin.device.known_model import KnownModel
     from eitskin.device.recordings.recording import Recorder
     from eitskin.device.settings import ScanSettings, SolverSettings
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
     from eitskin.scoring.scene_truth import SceneTruth
     from eitskin.tuning.front import Target
 
@@ -149,7 +149,7 @@ def read_mode(text: str) -> Stream:
         UsageError: one is unknown.
     """
     from eitskin.config import nearest
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
 
     what = Stream(0)
     for kind in text.split(","):
@@ -255,7 +255,7 @@ def read_ignored(text: str | None) -> int | None:
         UsageError: one is unknown.
     """
     from eitskin.config import nearest
-    from eitskin.core.diagnostics import ALL_DIAGNOSTICS, DIAGNOSTICS
+    from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 
     if text is None:
         return None

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from eitskin.device.known_model import KnownModel
     from eitskin.device.link import LinkEvent
     from eitskin.device.live import LiveFrame, LiveSummary
-    from eitskin.device.wire.packets import Fault, Stream
+    from eitskin.device.wire.link_table import Stream
+    from eitskin.device.wire.packets import Fault
     from eitskin.scoring.scene_truth import SceneTruth
     from eitskin.scoring.stream_check import Watcher
 
@@ -29,7 +30,7 @@ def check_picture(path: Path | None, what: Stream) -> None:
         UsageError: neither images nor touches are asked for.
         MissingExtraError: matplotlib is not installed.
     """
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
     from eitskin.view.pictures import load_matplotlib
 
     if path is None:

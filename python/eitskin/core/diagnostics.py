@@ -5,18 +5,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-# bit k of eits_info.diagnostics, as eits_diagnostic_text names it
-DIAGNOSTICS = (
-    "saturated",
-    "electrode open",
-    "electrodes bridged",
-    "outlier",
-    "electrode noisy",
-    "model mismatch",
-    "stale reference",
-    "crowded",
-)
-ALL_DIAGNOSTICS = 2 ** len(DIAGNOSTICS) - 1
+from eitskin.core.diagnostics_table import DIAGNOSTICS
 
 
 class DiagnosticFields(Protocol):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from time import perf_counter_ns
 from typing import Any
 
@@ -11,15 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.core.diagnostics import with_diagnostics
+from eitskin.core.diagnostics_table import STOPS, InfoFields, Touch
+from eitskin.core.options_table import CHOICES
 from eitskin.core.results import (
-    SIGNS,
-    SOLVERS,
-    STOPS,
     Info,
     LearnedReference,
     Options,
     Reconstruction,
-    Touch,
     check_reference_frames,
 )
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
@@ -119,10 +117,7 @@ class CoreEngine:
         """
         values = asdict(options)
         try:
-            values["sign"], values["solver"] = (
-                SIGNS.index(options.sign),
-                SOLVERS.index(options.solver),
-            )
+            values |= {name: known.index(values[name]) for name, known in CHOICES.items()}
             given = self._ffi.new(
                 "eits_options *", {name: _plain(value) for name, value in values.items()}
             )
@@ -315,17 +310,16 @@ def _plain(value: Any) -> Any:
     return int(value) if isinstance(value, bool) else value
 
 
+_INFO_NAMES = tuple(one.name for one in fields(InfoFields))
+_ELECTRODE_NAMES = ("open_electrodes", "bridged_electrodes", "noisy_electrodes")
+_TOUCH_NAMES = tuple(one.name for one in fields(Touch))
+
+
 def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
-    return Info(
-        i.iterations, STOPS[i.stop], i.nonzeros, i.masked, i.step_halvings, i.touches, i.macs,
-        i.touch_macs,
-        getattr(i, "lambda"), i.lambda_max, i.lambda_noise, i.gap, i.gap_rel, i.residual,
-        i.data_norm,
-        i.diagnostics, i.saturated, i.outliers, i.model_mismatch, i.unexplained,
-        _bits(i.open_electrodes), _bits(i.bridged_electrodes), _bits(i.noisy_electrodes),
-        i.regularisation,
-        solve_us=solve_ns / 1000, touch_us=touch_ns / 1000,
-    )  # fmt: skip
+    values = {name: getattr(i, name.rstrip("_")) for name in _INFO_NAMES}
+    values["stop"] = STOPS[i.stop]
+    values |= {name: _bits(values[name]) for name in _ELECTRODE_NAMES}
+    return Info(**values, solve_us=solve_ns / 1000, touch_us=touch_ns / 1000)
 
 
 def _bits(word: int) -> tuple[int, ...]:
@@ -334,4 +328,4 @@ def _bits(word: int) -> tuple[int, ...]:
 
 
 def _touch(t: Any) -> Touch:
-    return Touch(t.id, t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)
+    return Touch(*(getattr(t, name) for name in _TOUCH_NAMES))

@@ -2,92 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.diagnostics import ALL_DIAGNOSTICS, names, words
+from eitskin.core.diagnostics import names, words
+from eitskin.core.diagnostics_table import InfoFields, Touch
+from eitskin.core.options_table import CHOICES, RANGES, OptionFields
 from eitskin.errors import FrameError, UsageError
-
-SIGNS = ("increase", "decrease", "both")
-SOLVERS = ("fista", "working-set", "coordinate", "active-set")
-MAX_TOUCHES = 16
-LOG_DATA, SPLIT_MERGE, INTERACTION = 1, 2, 4
-ALL_TOUCH_FIT = LOG_DATA | SPLIT_MERGE | INTERACTION
-MAX_TRACK_FRAMES = 1000
-MIN_RADIUS_MM, HUGE = 1e-6, 1e30
-STOPS = ("iterations", "gap", "below-threshold", "zero", "diverged", "macs", "optimum")
 
 
 @dataclass(frozen=True)
-class Options:
-    """The solver's options; csrc/include/eitskin/context.h documents each. Lambdas in the units of
-    S'y.
-
-    ``sign`` is which change is looked for: "increase" (conducting touches), "decrease" or "both".
-    ``solver`` is "fista" (every column in every iteration), "working-set" (FISTA on the columns
-    that may differ from zero), "coordinate" (sweeps of coordinate descent) or "active-set" (rounds
-    to the exact optimum). ``mac_limit`` (0: none): the best so far when the next step would take
-    the solve beyond so many multiply-accumulates. ``diagnostics``: what is looked for, bit k of
-    ``DIAGNOSTICS``. ``track_confirm``, ``track_hold`` (frames) and ``track_smooth`` (pixels) follow
-    touches in time; all 0: each frame by itself (``solve.options.tracking`` sets them,
-    docs/guide/tracking.md). ``regularisation_noise_factor``: the whitening's regularisation is at
-    least this times the tare's noise over rms(V0); 0: as the model has it.
-    """
-
-    iterations: int
-    max_touches: int
-    max_masked: int
-    lambda_rel: float
-    lambda_noise_factor: float
-    detection_factor: float
-    touch_threshold: float
-    touch_min_fraction: float
-    touch_min_radius_mm: float
-    touch_max_radius_mm: float
-    touch_seed_radius_mm: float
-    touch_change_s_per_m: float
-    touch_radius_weight: float
-    follow_mm: float
-    gap_every: int = 10
-    sign: str = "increase"
-    solver: str = "fista"
-    warm_start: bool = False
-    project_reference: bool = True
-    lambda_abs: float = 0.0
-    gap_rel: float = 0.0
-    saturation_v: float = 0.0
-    touch_sweeps: int = 6
-    mac_limit: int = 0
-    diagnostics: int = ALL_DIAGNOSTICS
-    touch_fit: int = ALL_TOUCH_FIT
-    second_pass: bool = False
-    track_confirm: int = 0
-    track_hold: int = 0
-    track_smooth: float = 0.0
-    regularisation_noise_factor: float = 5.0
+class Options(OptionFields):
+    """The solver's options; tables/options.toml explains each."""
 
     @property
     def tracks(self) -> bool:
         """Whether touches depend on the frames before, beyond their ids."""
         return self.track_confirm > 1 or self.track_hold > 0 or self.track_smooth > 0
-
-
-WHOLE = {
-    "iterations": (1, 2**32 - 1),
-    "gap_every": (1, 2**32 - 1),
-    "max_touches": (0, MAX_TOUCHES),
-    "max_masked": (0, 2**32 - 1),
-    "touch_sweeps": (0, 1000),
-    "mac_limit": (0, 2**32 - 1),
-    "diagnostics": (0, ALL_DIAGNOSTICS),
-    "touch_fit": (0, ALL_TOUCH_FIT),
-    "track_confirm": (0, MAX_TRACK_FRAMES),
-    "track_hold": (0, MAX_TRACK_FRAMES),
-}
-SHARES = ("lambda_rel", "gap_rel", "touch_threshold", "touch_min_fraction")
 
 
 def check_options(o: Options) -> None:
@@ -96,36 +30,26 @@ def check_options(o: Options) -> None:
     Raises:
         UsageError: one is out of its range, or of the wrong type.
     """
-    for name, value in asdict(o).items():
-        if name in ("sign", "solver"):
-            known = SIGNS if name == "sign" else SOLVERS
-            if value not in known:
-                raise UsageError(
-                    f"options: {name} = {value!r} is not known; use one of {', '.join(known)}"
-                )
-        elif name in ("warm_start", "project_reference", "second_pass"):
-            if value not in (False, True):
-                raise UsageError(f"options: {name} = {value!r} must be true or false")
-        else:
-            _check_number(name, value, *WHOLE.get(name, (0, 1) if name in SHARES else (0, HUGE)))
-    if (
-        not MIN_RADIUS_MM
-        <= o.touch_min_radius_mm
-        <= o.touch_seed_radius_mm
-        <= o.touch_max_radius_mm
-    ):
+    for one in fields(o):
+        name, value = one.name, getattr(o, one.name)
+        if name in RANGES:
+            _check_number(name, value, *RANGES[name], whole=one.type == "int")
+        elif name in CHOICES and value not in CHOICES[name]:
+            known = ", ".join(CHOICES[name])
+            raise UsageError(f"options: {name} = {value!r} is not known; use one of {known}")
+        elif one.type == "bool" and value not in (False, True):
+            raise UsageError(f"options: {name} = {value!r} must be true or false")
+    if not o.touch_min_radius_mm <= o.touch_seed_radius_mm <= o.touch_max_radius_mm:
         raise UsageError(
             f"options: touch radii of {o.touch_min_radius_mm:g}, {o.touch_seed_radius_mm:g} and "
             f"{o.touch_max_radius_mm:g} mm (least, seed, most) must ascend from above 0"
         )
 
 
-def _check_number(name: str, value: Any, low: float, high: float) -> None:
-    kind = (int, np.integer) if name in WHOLE else (int, float, np.integer, np.floating)
+def _check_number(name: str, value: Any, low: float, high: float, *, whole: bool) -> None:
+    kind = (int, np.integer) if whole else (int, float, np.integer, np.floating)
     if isinstance(value, bool) or not isinstance(value, kind):
-        raise UsageError(
-            f"options: {name} = {value!r} must be a {'whole ' if name in WHOLE else ''}number"
-        )
+        raise UsageError(f"options: {name} = {value!r} must be a {'whole ' * whole}number")
     if not low <= value <= high:
         raise UsageError(f"options: {name} = {value!r} is out of range; use {low:g} to {high:.10g}")
 
@@ -165,21 +89,6 @@ class LearnedReference:
     outliers: int = 0
 
 
-@dataclass(frozen=True)
-class Touch:
-    """One touch: centre, radius, conductivity change integrated over it; ``id`` follows it from
-    frame to frame. One that is held while it is not found has confidence 0. ``force_n`` is how hard
-    it presses, in newtons, where the model is calibrated (docs/guide/calibration.md), else 0."""
-
-    id: int
-    x_mm: float
-    y_mm: float
-    radius_mm: float
-    strength_s_per_m_mm2: float
-    confidence: float
-    force_n: float = 0.0
-
-
 NEWTONS_PER_GRAM = 9.80665e-3  # grams-force, by the standard acceleration of free fall
 
 
@@ -189,36 +98,11 @@ def force_text(force_n: float) -> str:
 
 
 @dataclass(frozen=True)
-class Info:
-    """What a frame cost and how its solve ended (eits_info in csrc/include/eitskin/context.h).
-    ``solve_us`` and ``touch_us`` are this host's, by its clock, the frame stage with the solve; two
-    runs that differ in nothing else are equal.
+class Info(InfoFields):
+    """What a frame cost and how its solve ended. ``solve_us`` and ``touch_us`` are this host's, by
+    its clock, the frame stage with the solve; two runs that differ in nothing else are equal.
     """
 
-    iterations: int
-    stop: str
-    nonzeros: int
-    masked: int
-    step_halvings: int
-    touches: int
-    macs: int
-    touch_macs: int
-    lambda_: float
-    lambda_max: float
-    lambda_noise: float
-    gap: float
-    gap_rel: float
-    residual: float
-    data_norm: float
-    diagnostics: int = 0
-    saturated: int = 0
-    outliers: int = 0
-    model_mismatch: float = 0.0
-    unexplained: float = 0.0
-    open_electrodes: tuple[int, ...] = ()
-    bridged_electrodes: tuple[int, ...] = ()
-    noisy_electrodes: tuple[int, ...] = ()
-    regularisation: float = 0.0
     solve_us: float = field(default=0.0, compare=False)
     touch_us: float = field(default=0.0, compare=False)
 

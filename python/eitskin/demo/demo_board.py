@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.known_model import need_model
 from eitskin.device.link import LinkEvent
@@ -17,7 +17,8 @@ from eitskin.device.open import open_device
 from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.recordings.packet_log import PacketLog
 from eitskin.device.settings import ScanSettings, SolverSettings
-from eitskin.device.wire.packets import BoardInfo, Stream
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import DeviceError
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import Matching

@@ -6,7 +6,8 @@ from math import ceil
 
 from eitskin.device.client import Device
 from eitskin.device.ports import BAUD
-from eitskin.device.wire.packets import BoardInfo, Stream
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import BoardInfo
 
 BITS_A_BYTE = 10  # start, eight, stop
 USED = 0.9  # of the line; the rest is for replies, faults and what comes in bursts

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from eitskin import __version__
 from eitskin.device.link import Link
-from eitskin.device.wire.packets import LINK_VERSION, BoardInfo
+from eitskin.device.wire.link_table import LINK_VERSION
+from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import DeviceError
 from eitskin.model.model import Model
 

@@ -7,12 +7,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from eitskin.core.results import SIGNS, SOLVERS, Options, check_options
+from eitskin.core.options_table import SIGNS, SOLVERS
+from eitskin.core.results import Options, check_options
 from eitskin.device.exchange import ANSWER_S, CommandExchange, Streamed
 from eitskin.device.streaming import stream
 from eitskin.device.upload import upload
-from eitskin.device.wire import commands
-from eitskin.device.wire.packets import BoardInfo, BoardStats, Stream
+from eitskin.device.wire import link_table as commands
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import BoardInfo, BoardStats
 from eitskin.errors import UsageError
 
 TARE_FRAMES = 16

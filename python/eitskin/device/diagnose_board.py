@@ -12,7 +12,8 @@ from eitskin.device.known_model import KnownModel, scanned_protocol
 from eitskin.device.live import begin_scene
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, collect
 from eitskin.device.wire.explain import fault_text
-from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault, FaultCode
+from eitskin.device.wire.link_table import FaultCode
+from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault
 from eitskin.frames.doctor.report import FAULT, NOTE, Finding, Report
 from eitskin.frames.doctor.subject import AS_GIVEN, Subject
 from eitskin.skin.skin import Skin

@@ -11,15 +11,8 @@ from eitskin.core.diagnostics import names, words
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame
 from eitskin.device.wire.explain import fault_text
-from eitskin.device.wire.packets import (
-    CLEAR_FRAMES,
-    DOUBTFUL_FAULTS,
-    FOUND_FAULTS,
-    RAISE_FRAMES,
-    Fault,
-    FaultCode,
-    Solved,
-)
+from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FAULT_RAISE_FRAMES, FaultCode
+from eitskin.device.wire.packets import DOUBTFUL_FAULTS, FOUND_FAULTS, Fault, Solved
 
 Key = tuple[str, int]  # a name of core.diagnostics.DIAGNOSTICS, and which electrode; -1: none
 
@@ -74,13 +67,13 @@ class Events:
         self._shown = {key: self._shown.get(key, 0) + 1 for key in now}
         for key, text in now.items():
             if key not in self._clean and self._shown[key] >= (
-                RAISE_FRAMES if key[0] in _DOUBTFUL else 1
+                FAULT_RAISE_FRAMES if key[0] in _DOUBTFUL else 1
             ):
                 said.append(f"{text}, frame {solved.frame}")
                 self._clean[key] = 0
         for key in list(self._clean):
             self._clean[key] = 0 if key in now else self._clean[key] + 1
-            if self._clean[key] >= CLEAR_FRAMES:
+            if self._clean[key] >= FAULT_CLEAR_FRAMES:
                 del self._clean[key]
                 said.append(f"{_plain(key)}: over, frame {solved.frame}")
         return said

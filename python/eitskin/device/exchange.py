@@ -13,16 +13,15 @@ from eitskin.device.check import check_board, no_answer
 from eitskin.device.link import Link, LinkEvent, PumpedLink, Reconnect, Tap, ThreadedLink
 from eitskin.device.transport import Transport
 from eitskin.device.wire.codec import LinkCounters, Packet
-from eitskin.device.wire.commands import Command, GetInfo
 from eitskin.device.wire.explain import command_name, reply_text
+from eitskin.device.wire.layout import Command
+from eitskin.device.wire.link_table import GetInfo, PacketType, ReplyStatus
 from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
-    PacketType,
     RawFrame,
     Reply,
-    ReplyStatus,
     SolvedImage,
     SolvedTouches,
 )

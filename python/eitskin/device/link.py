@@ -12,7 +12,7 @@ from typing import Protocol
 
 from eitskin.device.transport import Transport
 from eitskin.device.wire.codec import Decoder, LinkCounters, Packet, encode
-from eitskin.device.wire.packets import PacketType
+from eitskin.device.wire.link_table import PacketType
 from eitskin.errors import DeviceError, EitskinError
 
 FRAME_PACKETS = frozenset((PacketType.RAW, PacketType.IMAGE, PacketType.TOUCHES))

@@ -15,8 +15,8 @@ from eitskin.device.client import Device
 from eitskin.device.known_model import NAMES_IT, KnownModel
 from eitskin.device.link import LinkEvent
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
-from eitskin.device.wire.commands import StreamCommand
 from eitskin.device.wire.explain import status_text
+from eitskin.device.wire.link_table import Stream, StreamCommand
 from eitskin.device.wire.packets import (
     BoardStats,
     Fault,
@@ -24,7 +24,6 @@ from eitskin.device.wire.packets import (
     Solved,
     SolvedImage,
     SolvedTouches,
-    Stream,
 )
 from eitskin.errors import DeviceError
 

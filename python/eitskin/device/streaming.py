@@ -7,9 +7,9 @@ from contextlib import suppress
 
 from eitskin.device.exchange import CommandExchange, Streamed
 from eitskin.device.link import LinkEvent
-from eitskin.device.wire.commands import StreamCommand
 from eitskin.device.wire.explain import reply_text
-from eitskin.device.wire.packets import RawFrame, SolvedImage, SolvedTouches, Stream
+from eitskin.device.wire.link_table import Stream, StreamCommand
+from eitskin.device.wire.packets import RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, EitskinError
 
 SILENCES = 3

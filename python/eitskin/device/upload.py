@@ -8,9 +8,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from eitskin.device.exchange import CommandExchange
-from eitskin.device.wire.commands import ModelBegin, ModelCommit, ModelData
 from eitskin.device.wire.explain import reply_text
-from eitskin.device.wire.packets import MAX_PAYLOAD, Reply, ReplyStatus
+from eitskin.device.wire.link_table import (
+    LINK_MAX_PAYLOAD,
+    ModelBegin,
+    ModelCommit,
+    ModelData,
+    ReplyStatus,
+)
+from eitskin.device.wire.packets import Reply
 from eitskin.errors import DeviceError
 
 ERASE_S = 15.0
@@ -83,7 +89,7 @@ def _checked(device: CommandExchange, model: str | Path | bytes) -> bytes:
 
 def _send_pieces(device: CommandExchange, blob: bytes, done: int) -> Iterator[int]:
     """Send from ``done`` on; yields how far the board has it."""
-    size = max(min(device.board.data_bytes, MAX_PAYLOAD - ModelData.LAYOUT.size) // 4 * 4, 4)
+    size = max(min(device.board.data_bytes, LINK_MAX_PAYLOAD - ModelData.LAYOUT.size) // 4 * 4, 4)
     back = 0
     while done < len(blob):
         reply = device.send_command(ModelData(done, blob[done : done + size]), PIECE_S)

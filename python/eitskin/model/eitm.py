@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import ALL_TOUCH_FIT, SOLVERS
+from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.diagnostics import DIAGNOSTICS
-from eitskin.core.results import Options, Touch
+from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
+from eitskin.core.results import Options
 from eitskin.model.model import Model
 
 FloatArray = npt.NDArray[np.float64]

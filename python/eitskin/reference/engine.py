@@ -15,15 +15,14 @@ from time import perf_counter_ns
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.diagnostics import DIAGNOSTICS, with_diagnostics
+from eitskin.core.diagnostics import with_diagnostics
+from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
+from eitskin.core.options_table import INTERACTION, LOG_DATA
 from eitskin.core.results import (
-    INTERACTION,
-    LOG_DATA,
     Info,
     LearnedReference,
     Options,
     Reconstruction,
-    Touch,
     check_reference_frames,
 )
 from eitskin.errors import FrameError, UsageError

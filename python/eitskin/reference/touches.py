@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import SPLIT_MERGE, Options, Touch
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.options_table import SPLIT_MERGE
+from eitskin.core.results import Options
 from eitskin.model.model import Model
 from eitskin.reference.disc_fit import Disc, Fit, Reduced
 from eitskin.reference.split_merge import join, part

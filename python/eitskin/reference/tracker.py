@@ -11,7 +11,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import MAX_TOUCHES, Options, Touch
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.options_table import MAX_TOUCHES
+from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 
 FloatArray = npt.NDArray[np.float64]

@@ -1,6 +1,7 @@
 """From frames to images and touches: the C core and the numpy reference."""
 
-from eitskin.core.results import Info, LearnedReference, Options, Reconstruction, Touch
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.results import Info, LearnedReference, Options, Reconstruction
 from eitskin.solve.batch import Batch, reconstruct_many
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 

@@ -13,8 +13,9 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import LearnedReference, Options, Reconstruction, Touch, check_options
+from eitskin.core.results import LearnedReference, Options, Reconstruction, check_options
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from eitskin.core.results import ALL_TOUCH_FIT, MAX_TOUCHES, Options
+from eitskin.core.options_table import ALL_TOUCH_FIT, MAX_TOUCHES, OF_MODEL
+from eitskin.core.results import Options
 from eitskin.model.model import Model
 
 
@@ -14,21 +15,9 @@ def default_options(model: Model) -> Options:
     """The model's own defaults."""
     d = model.defaults
     return Options(
-        iterations=d.iterations,
+        **{name: getattr(d, name) for name in OF_MODEL},
         max_touches=min(d.max_touches, MAX_TOUCHES),
         max_masked=model.protocol.n_rows // 2,
-        lambda_rel=d.lambda_rel,
-        lambda_noise_factor=d.lambda_noise_factor,
-        detection_factor=d.detection_factor,
-        touch_threshold=d.touch_threshold,
-        touch_min_fraction=d.touch_min_fraction,
-        touch_min_radius_mm=d.touch_min_radius_mm,
-        touch_max_radius_mm=d.touch_max_radius_mm,
-        touch_seed_radius_mm=d.touch_seed_radius_mm,
-        touch_change_s_per_m=d.touch_change_s_per_m,
-        touch_radius_weight=d.touch_radius_weight,
-        follow_mm=d.follow_mm,
-        solver=d.solver,
         touch_fit=ALL_TOUCH_FIT & ~d.touch_fit_left_out,
     )
 

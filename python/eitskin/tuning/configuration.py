@@ -8,7 +8,8 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from eitskin.config import check_keys, choice, integer, number
-from eitskin.core.results import ALL_TOUCH_FIT, SOLVERS, Options
+from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
+from eitskin.core.results import Options
 from eitskin.errors import ConfigError
 from eitskin.model.model import Defaults
 from eitskin.model.reduction import DEFAULT_COLUMN_POWER, DEFAULT_REGULARISATION

@@ -255,7 +255,7 @@ def measure_rate(
     from eitskin.device.live import LiveFrame, begin_scene, follow, take_reference
     from eitskin.device.open import open_device
     from eitskin.device.settings import ScanSettings, apply_scan
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
 
     solved: list[tuple[int, int]] = []
     with open_device(SCENE, model=blob, image=image) as device:

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy.typing as npt
 
-from eitskin.core.results import STOPS, Options
+from eitskin.core.diagnostics_table import STOPS
+from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin_studies.harness.emulated_steps import (
     Choose,

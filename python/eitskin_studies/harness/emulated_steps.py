@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import SIGNS, SOLVERS, Options
+from eitskin.core.options_table import CHOICES
+from eitskin.core.results import Options
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,7 @@ def _numbers_of(step: TareStep | Play | Solve) -> tuple[str, npt.NDArray[Any]]:
 def _option_lines(options: Options) -> list[str]:
     """Reals with the digits that give a float32 again."""
     values = asdict(options)
-    values |= {"sign": SIGNS.index(options.sign), "solver": SOLVERS.index(options.solver)}
+    values |= {name: known.index(values[name]) for name, known in CHOICES.items()}
     return [
         f"option {name} {int(value) if isinstance(value, bool) else f'{value:.10g}'}"
         for name, value in values.items()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.view.pictures import STYLE, load_matplotlib, save_png
 
 if TYPE_CHECKING:

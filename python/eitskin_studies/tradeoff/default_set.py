@@ -6,7 +6,8 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any
 
-from eitskin.core.results import SOLVERS, Options
+from eitskin.core.options_table import SOLVERS
+from eitskin.core.results import Options
 from eitskin.tuning.configuration import Configuration
 from eitskin_studies.tradeoff.configuration_sets import checked_set
 

@@ -19,7 +19,7 @@ from eitskin.device.live import LiveFrame, follow, take_reference
 from eitskin.device.recordings.host_check import check_recording
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.simulated import SimBoard, SimTransport
-from eitskin.device.wire.packets import Stream
+from eitskin.device.wire.link_table import Stream
 from eitskin.model.eitm import decode_model, load_model
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import load_scene

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from eitskin.cli.main import main
-from eitskin.core.results import SOLVERS
+from eitskin.core.options_table import SOLVERS
 from eitskin.frames.frames import load_frames, save_frames
 from eitskin.model.eitm import load_model
 from eitskin.scene.random_touches import TouchRules, TouchScene, TouchSet, random_touches

@@ -24,7 +24,7 @@ from board_cases import behind_a_port, board_of, write_scene
 import eitskin
 from eitskin.cli.main import main
 from eitskin.device.wire.codec import Decoder, Packet, encode
-from eitskin.device.wire.packets import PacketType
+from eitskin.device.wire.link_table import PacketType
 from fresh_python import MAIN, run_python, without
 
 Done = Callable[..., str]

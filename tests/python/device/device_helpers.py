@@ -12,8 +12,8 @@ from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
-from eitskin.device.wire.commands import GetStats
-from eitskin.device.wire.packets import BoardInfo, BoardStats, PacketType
+from eitskin.device.wire.link_table import GetStats, PacketType
+from eitskin.device.wire.packets import BoardInfo, BoardStats
 from eitskin.device.wire.payloads import parse
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.description import Scene

@@ -14,8 +14,9 @@ from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent
 from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.codec import encode
-from eitskin.device.wire.packets import PacketType, RawFrame, SolvedTouches, Stream
-from eitskin.device.wire.payloads import build_info
+from eitskin.device.wire.link_table import PacketType, Stream
+from eitskin.device.wire.packets import RawFrame, SolvedTouches
+from eitskin.device.wire.payloads import pack
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
 from small_models import prebuilt, tiny_blob
@@ -219,7 +220,7 @@ def test_another_link_version_is_refused_with_what_to_do(version: int, advice: s
 
 @pytest.mark.parametrize("major", [host_major() + 1, host_major() + 7])
 def test_another_firmware_version_is_refused_with_what_to_do(major: int) -> None:
-    newer = encode(PacketType.INFO, 0, build_info(board_info(firmware=(major, 0, 3))))
+    newer = encode(PacketType.INFO, 0, pack(board_info(firmware=(major, 0, 3))))
     with pytest.raises(
         DeviceError,
         match=(
@@ -260,11 +261,11 @@ def test_another_model_is_refused_with_what_to_do() -> None:
 
 def test_malformed_payloads_are_counted_and_passed_over() -> None:
     packets = [
-        (PacketType.INFO, build_info(board_info(request=1))),
+        (PacketType.INFO, pack(board_info(request=1))),
         (PacketType.RAW, b"no raw frame"),
         (PacketType.TOUCHES, bytes(67)),
         (0x60, b"of the future"),
-        (PacketType.INFO, build_info(board_info(request=2))),
+        (PacketType.INFO, pack(board_info(request=2))),
     ]
     with Device(
         Scripted(*(encode(kind, k, body) for k, (kind, body) in enumerate(packets)))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eitskin.device.wire.codec import Decoder, Packet, encode
-from eitskin.device.wire.packets import LINK_VERSION, MAX_PAYLOAD, PacketType
+from eitskin.device.wire.link_table import LINK_MAX_PAYLOAD, LINK_VERSION, PacketType
 from eitskin.errors import DeviceError
 
 
@@ -51,7 +51,7 @@ def test_the_bytes_are_the_documented_ones() -> None:
 
 
 @pytest.mark.parametrize(
-    "size", [0, 1, 241, 242, 243, 253, 254, 255, 508, 1000, MAX_PAYLOAD - 1, MAX_PAYLOAD]
+    "size", [0, 1, 241, 242, 243, 253, 254, 255, 508, 1000, LINK_MAX_PAYLOAD - 1, LINK_MAX_PAYLOAD]
 )
 @pytest.mark.parametrize("fill", [0, 1, 255])
 def test_sizes_at_the_edges(size: int, fill: int) -> None:
@@ -61,7 +61,7 @@ def test_sizes_at_the_edges(size: int, fill: int) -> None:
 
 def test_too_long_a_payload_is_refused() -> None:
     with pytest.raises(DeviceError, match="cannot carry 16385 bytes; the most is 16384"):
-        encode(1, 1, bytes(MAX_PAYLOAD + 1))
+        encode(1, 1, bytes(LINK_MAX_PAYLOAD + 1))
 
 
 ORIGINALS = [

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from device_helpers import QUIET, Damaging, empty_bank, same, scene, sim_device
 
-from eitskin.core.diagnostics import ALL_DIAGNOSTICS, DIAGNOSTICS
+from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.events import Events
@@ -24,21 +24,13 @@ from eitskin.device.recordings.recording import Recorder
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
 from eitskin.device.wire.explain import fault_text, found_name
-from eitskin.device.wire.packets import (
-    CLEAR_FRAMES,
-    Fault,
-    FaultCode,
-    PacketType,
-    Solved,
-    SolvedTouches,
-    Stream,
-)
-from eitskin.device.wire.payloads import SOLVED_STRUCT
+from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode, PacketType, Stream
+from eitskin.device.wire.packets import Fault, Solved, SolvedTouches
 from eitskin.errors import DeviceError
 from eitskin.scene.board_frames import BoardFrames
 from small_models import prebuilt
 
-OPEN_AT = SOLVED_STRUCT.size - 24  # of the open electrodes in a head
+OPEN_AT = Solved.LAYOUT.size - 24  # of the open electrodes in a head
 OFF, FROM_FRAME, UNTIL_FRAME, FRAMES = 5, 3, 6, 20
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
@@ -86,7 +78,7 @@ def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_i
             for head in heads(items)
         ]
         told = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
-        gone = first + UNTIL_FRAME + CLEAR_FRAMES - 1
+        gone = first + UNTIL_FRAME + FAULT_CLEAR_FRAMES - 1
         assert told == [
             (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME),
             (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
@@ -204,12 +196,12 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
     assert events.lines(solved(1)) == []
     assert events.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
     assert events.lines(solved(3, **outlier)) == []
-    assert [events.lines(solved(4 + k)) for k in range(CLEAR_FRAMES - 1)] == [[]] * (
-        CLEAR_FRAMES - 1
+    assert [events.lines(solved(4 + k)) for k in range(FAULT_CLEAR_FRAMES - 1)] == [[]] * (
+        FAULT_CLEAR_FRAMES - 1
     )
     assert events.lines(solved(20, **outlier)) == []  # it came back in time
-    said = [events.lines(solved(21 + k)) for k in range(CLEAR_FRAMES)]
-    assert said == [[]] * (CLEAR_FRAMES - 1) + [[f"outlier: over, frame {20 + CLEAR_FRAMES}"]]
+    said = [events.lines(solved(21 + k)) for k in range(FAULT_CLEAR_FRAMES)]
+    assert said == [[]] * (FAULT_CLEAR_FRAMES - 1) + [[f"outlier: over, frame {20 + FAULT_CLEAR_FRAMES}"]]
 
 
 def test_what_fault_and_head_tell_is_said_once() -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 import re
 import struct
-from dataclasses import fields
 from enum import IntEnum, IntFlag
 
 import numpy as np
@@ -16,35 +15,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from eitskin.core import _core_f32 as core
-from eitskin.core.results import Touch
-from eitskin.device.wire import commands as cmd
+from eitskin.core.diagnostics_table import Touch
+from eitskin.device.wire import link_table as link
 from eitskin.device.wire import packets as pk
 from eitskin.device.wire import payloads as pl
+from eitskin.device.wire.layout import Command, Payload
 
 LAYOUTS = {
-    "eits_packet_info": pl.INFO_STRUCT,
-    "eits_packet_reply": pl.REPLY_STRUCT,
-    "eits_packet_raw": pl.RAW_STRUCT,
-    "eits_packet_solved": pl.SOLVED_STRUCT,
-    "eits_packet_touch": pl.TOUCH_STRUCT,
-    "eits_stage_stats": pl.STAGE_STRUCT,
-    "eits_packet_stats": pl.STATS_STRUCT,
-    "eits_packet_fault": pl.FAULT_STRUCT,
-    "eits_command_stream": cmd.StreamCommand.LAYOUT,
-    "eits_command_tare": cmd.Tare.LAYOUT,
-    "eits_command_scan": cmd.Scan.LAYOUT,
-    "eits_command_solver": cmd.Solver.LAYOUT,
-    "eits_command_model_begin": cmd.ModelBegin.LAYOUT,
-    "eits_command_model_data": cmd.ModelData.LAYOUT,
-    "eits_command_get_stats": cmd.GetStats.LAYOUT,
-    "eits_command_mask_row": cmd.MaskRow.LAYOUT,
-    "eits_command_plain": cmd.GetInfo.LAYOUT,
+    kind.LAYOUT.name: kind.LAYOUT
+    for base in (Payload, Command)
+    for kind in base.__subclasses__()
+    if hasattr(kind, "LAYOUT")
 }
 PLACES = {"c": 1, "s": 1, "H": 2, "I": 4, "i": 4, "f": 4, "Q": 8}
-
-
-def names(kind: type) -> list[str]:
-    return [one.name for one in fields(kind)]
 
 
 def places(layout: struct.Struct) -> list[tuple[int, int]]:
@@ -84,7 +67,7 @@ def c_places(name: str) -> list[tuple[int, int]]:
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_layouts_are_the_c_structs(name: str) -> None:
     assert LAYOUTS[name].size == core.ffi.sizeof(name)
-    assert places(LAYOUTS[name]) == c_places(name)
+    assert places(LAYOUTS[name].struct) == c_places(name)
 
 
 def test_every_payload_of_the_header_has_a_layout() -> None:
@@ -93,37 +76,22 @@ def test_every_payload_of_the_header_has_a_layout() -> None:
     assert structs - {"eits_packet_type"} == set(LAYOUTS)
 
 
-@pytest.mark.parametrize(
-    ("name", "own"),
-    [
-        ("eits_packet_info", [*names(pk.BoardInfo)]),
-        ("eits_packet_reply", [*names(pk.Reply)]),
-        ("eits_packet_solved", [name.rstrip("_") for name in names(pk.Solved)]),
-        ("eits_packet_touch", [*names(Touch)]),
-        ("eits_stage_stats", [*names(pk.StageStats)]),
-        ("eits_packet_stats", [*names(pk.BoardStats)]),
-        ("eits_packet_fault", [*names(pk.Fault)]),
-        ("eits_command_stream", ["request", *names(cmd.StreamCommand)]),
-        ("eits_command_tare", ["request", *names(cmd.Tare)]),
-        ("eits_command_scan", ["request", *names(cmd.Scan)]),
-        ("eits_command_solver", ["request", *names(cmd.Solver)]),
-        ("eits_command_model_begin", ["request", *names(cmd.ModelBegin)]),
-        ("eits_command_get_stats", ["request", *names(cmd.GetStats)]),
-        ("eits_command_mask_row", ["request", *names(cmd.MaskRow)]),
-    ],
-)
-def test_fields_are_named_in_the_structs_order(name: str, own: list[str]) -> None:
-    in_c = [field for field, _ in core.ffi.typeof(name).fields]
-    assert own == (["stages" if field == "stage" else field for field in in_c])
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_fields_are_named_in_the_structs_order(name: str) -> None:
+    in_c = [{"lambda": "lambda_", "stage": "stages"}.get(field, field) for field, _ in
+            core.ffi.typeof(name).fields]  # fmt: skip
+    assert [field for field, _, _ in LAYOUTS[name].fields] == in_c
 
 
 @pytest.mark.parametrize(
     ("enum", "name", "prefix"),
     [
-        (pk.PacketType, "eits_packet_type", "EITS_PACKET_"),
-        (pk.ReplyStatus, "eits_reply_status", "EITS_REPLY_"),
-        (pk.FaultCode, "eits_fault", "EITS_FAULT_"),
-        (pk.Quality, "eits_quality", "EITS_QUALITY_"),
+        (link.PacketType, "eits_packet_type", "EITS_PACKET_"),
+        (link.ReplyStatus, "eits_reply_status", "EITS_REPLY_"),
+        (link.FaultCode, "eits_fault", "EITS_FAULT_"),
+        (link.Quality, "eits_quality", "EITS_QUALITY_"),
+        (link.RawFlags, "eits_raw_flags", "EITS_RAW_"),
+        (link.Stream, "eits_stream", "EITS_STREAM_"),
     ],
 )
 def test_enums_are_the_headers(enum: type[IntEnum] | type[IntFlag], name: str, prefix: str) -> None:
@@ -134,39 +102,32 @@ def test_enums_are_the_headers(enum: type[IntEnum] | type[IntFlag], name: str, p
     assert {member.name: int(member) for member in enum} == in_c
 
 
-def test_flags_stages_and_limits_are_the_headers() -> None:
+def test_stages_and_limits_are_the_headers() -> None:
     lib = core.lib
-    assert (pk.RawFlags.QUIET, pk.RawFlags.RECIPROCAL, pk.RawFlags.CHECK) == (
-        lib.EITS_RAW_REFERENCE, lib.EITS_RAW_RECIPROCAL, lib.EITS_RAW_CHECK
-    )  # fmt: skip
-    assert (pk.Stream.RAW, pk.Stream.IMAGE, pk.Stream.TOUCHES) == (
-        lib.EITS_STREAM_RAW, lib.EITS_STREAM_IMAGE, lib.EITS_STREAM_TOUCHES
-    )  # fmt: skip
-    assert (pk.LINK_VERSION, pk.MAX_PAYLOAD) == (lib.EITS_LINK_VERSION, lib.EITS_LINK_MAX_PAYLOAD)
-    stages = core.ffi.typeof("eits_stage").relements
-    assert [
-        name.removeprefix("EITS_STAGE_").lower() for name in sorted(stages, key=stages.__getitem__)
-    ] == list(pk.STAGES)
-    assert len(pk.STAGES) == lib.EITS_STAGES
+    for name in ("LINK_VERSION", "LINK_MAX_PAYLOAD", "FAULT_RAISE_FRAMES", "FAULT_CLEAR_FRAMES"):
+        assert getattr(link, name) == getattr(lib, f"EITS_{name}")
+    assert len(link.STAGES) == lib.EITS_STAGES
+    number = core.ffi.typeof("eits_stage").relements
+    assert [number[f"EITS_STAGE_{name.upper()}"] for name in link.STAGES] == [*range(len(number))]
 
 
 def test_a_command_is_known_by_its_type() -> None:
-    assert {kind.TYPE for kind in cmd.COMMANDS.values()} == {
-        kind for kind in pk.PacketType if kind >= 0x80
+    assert {kind.TYPE for kind in link.COMMANDS.values()} == {
+        kind for kind in link.PacketType if kind >= 0x80
     }
 
 
 def test_info_is_read_as_it_was_built() -> None:
     info = board_info(firmware=(1, 2, 255), faults=0b10100, board="x" * 15, serial="A" * 24)
-    payload = pl.build_info(info)
+    payload = pl.pack(info)
     c = core.ffi.from_buffer("eits_packet_info *", bytearray(payload))
     assert (c.protocol_hash, c.volts_per_code_nv, list(c.firmware)) == (
         2**63 + 5,
         805664,
         [1, 2, 255, 0],
     )
-    assert pl.parse(pk.PacketType.INFO, payload) == info
-    assert info.fault_codes == (pk.FaultCode.ELECTRODE_OPEN, pk.FaultCode.DEADLINE)
+    assert pl.parse(link.PacketType.INFO, payload) == info
+    assert info.fault_codes == (link.FaultCode.ELECTRODE_OPEN, link.FaultCode.DEADLINE)
     assert info.firmware_text == "1.2.255"
     assert info.frame_us == 20800
     assert board_info(check_every=0).frame_us == 10400
@@ -184,7 +145,7 @@ def test_replies_are_read_as_built(
     request: int, command: int, status: int, first: int, second: int
 ) -> None:
     reply = pk.Reply(request, command, status, (first, second))
-    assert pl.parse(pk.PacketType.REPLY, pl.build_reply(reply)) == reply
+    assert pl.parse(link.PacketType.REPLY, pl.pack(reply)) == reply
 
 
 @given(
@@ -200,7 +161,7 @@ def test_raw_frames_are_read_bit_for_bit(
     volts = np.array([v for v, _ in rows], dtype=np.float32)
     quality = np.array([q for _, q in rows], dtype=np.uint8)
     again = pl.parse(
-        pk.PacketType.RAW, pl.build_raw(pk.RawFrame(frame, time, scan, flags, volts, quality))
+        link.PacketType.RAW, pl.build_raw(pk.RawFrame(frame, time, scan, flags, volts, quality))
     )
     assert isinstance(again, pk.RawFrame)
     assert (again.frame, again.time_us, again.scan_us, again.flags) == (frame, time, scan, flags)
@@ -216,22 +177,23 @@ def solved(count: int, status: int = 0) -> pk.Solved:
 
 def test_images_and_touches_are_read_as_built() -> None:
     image = np.linspace(-1, 1, 50, dtype=np.float32)
-    again = pl.parse(pk.PacketType.IMAGE, pl.build_image(pk.SolvedImage(solved(50, -12), image)))
+    again = pl.parse(link.PacketType.IMAGE, pl.build_image(pk.SolvedImage(solved(50, -12), image)))
     assert isinstance(again, pk.SolvedImage)
     assert again.solved == solved(50, -12)
     assert again.image.tobytes() == image.tobytes()
     touches = (Touch(1, 2.5, -3.5, 4.0, 5.0, 0.5), Touch(2**32 - 1, 0.0, 0.0, 1.0, 1.0, 1.0))
     found = pk.SolvedTouches(solved(2), touches)
-    assert pl.parse(pk.PacketType.TOUCHES, pl.build_touches(found)) == found
+    assert pl.parse(link.PacketType.TOUCHES, pl.build_touches(found)) == found
     assert pl.parse(
-        pk.PacketType.TOUCHES, pl.build_touches(pk.SolvedTouches(solved(0), ()))
+        link.PacketType.TOUCHES, pl.build_touches(pk.SolvedTouches(solved(0), ()))
     ) == pk.SolvedTouches(solved(0), ())
 
 
 def test_stats_and_faults_are_read_as_built() -> None:
-    stages = {name: pk.StageStats(k, 2 * k, 3 * k, 4 * k) for k, name in enumerate(pk.STAGES, 1)}
+    each = (link.StageStats(k, 2 * k, 3 * k, 4 * k) for k in range(1, len(link.STAGES) + 1))
+    stages = dict(zip(link.STAGES, each, strict=True))
     stats = pk.BoardStats(*range(17), stages)  # type: ignore[call-arg]
-    payload = pl.build_stats(stats)
+    payload = pl.pack(stats)
     c = core.ffi.from_buffer("eits_packet_stats *", bytearray(payload))
     assert (
         c.slots_repeated,
@@ -240,17 +202,17 @@ def test_stats_and_faults_are_read_as_built() -> None:
         c.stage[5].worst_us,
         c.stage[0].count,
     ) == (7, 8, 16, 24, 1)
-    assert pl.parse(pk.PacketType.STATS, payload) == stats
+    assert pl.parse(link.PacketType.STATS, payload) == stats
     fault = pk.Fault(8, True, 99, -1, -15, (1, 2, 3, 4, 2**32 - 1))
-    assert pl.parse(pk.PacketType.FAULT, pl.build_fault(fault)) == fault
+    assert pl.parse(link.PacketType.FAULT, pl.pack(fault)) == fault
 
 
-KNOWN = [kind for kind in pk.PacketType if kind < 0x70]
+KNOWN = [kind for kind in link.PacketType if kind < 0x70]
 
 
 @pytest.mark.parametrize("kind", KNOWN)
 @given(payload=st.binary(max_size=400))
-def test_any_payload_is_read_or_refused(kind: pk.PacketType, payload: bytes) -> None:
+def test_any_payload_is_read_or_refused(kind: link.PacketType, payload: bytes) -> None:
     try:
         pl.parse(kind, payload)
     except pl.MalformedPacket:
@@ -261,16 +223,16 @@ def test_any_payload_is_read_or_refused(kind: pk.PacketType, payload: bytes) -> 
 @pytest.mark.parametrize("extra", [-1, 1, 4])
 def test_a_payload_of_another_length_is_refused(extra: int) -> None:
     whole = {
-        pk.PacketType.INFO: pl.build_info(board_info()),
-        pk.PacketType.REPLY: pl.build_reply(pk.Reply(1, 2, 3)),
-        pk.PacketType.RAW: pl.build_raw(
+        link.PacketType.INFO: pl.pack(board_info()),
+        link.PacketType.REPLY: pl.pack(pk.Reply(1, 2, 3)),
+        link.PacketType.RAW: pl.build_raw(
             pk.RawFrame(1, 2, 3, 0, np.zeros(4, np.float32), np.zeros(4, np.uint8))
         ),
-        pk.PacketType.IMAGE: pl.build_image(pk.SolvedImage(solved(3), np.zeros(3, np.float32))),
-        pk.PacketType.TOUCHES: pl.build_touches(
+        link.PacketType.IMAGE: pl.build_image(pk.SolvedImage(solved(3), np.zeros(3, np.float32))),
+        link.PacketType.TOUCHES: pl.build_touches(
             pk.SolvedTouches(solved(1), (Touch(1, 1, 1, 1, 1, 1),))
         ),
-        pk.PacketType.FAULT: pl.build_fault(pk.Fault(1, True, 1, 1, 1)),
+        link.PacketType.FAULT: pl.pack(pk.Fault(1, True, 1, 1, 1)),
     }
     for kind, payload in whole.items():
         with pytest.raises(pl.MalformedPacket):
@@ -282,19 +244,19 @@ def test_an_unknown_type_is_passed_over() -> None:
 
 
 @given(words, halves, halves, words)
-def test_commands_are_read_as_a_board_reads_them(
+def test_a_command_lies_as_its_layout_says(
     request: int, what: int, every: int, frames: int
 ) -> None:
-    command = cmd.StreamCommand(what, every, frames)
-    assert cmd.parse_command(cmd.StreamCommand, command.payload(request)) == (request, command)
-    assert cmd.parse_command(cmd.StreamCommand, command.payload(request) + b"\0") is None
-    data = cmd.ModelData(frames, bytes(every % 50))
-    assert cmd.parse_command(cmd.ModelData, data.payload(request)) == (request, data)
-    assert cmd.parse_command(cmd.ModelData, b"1234567") is None
+    command = link.StreamCommand(what, every, frames)
+    read = command.LAYOUT.struct.unpack(command.payload(request))
+    assert read == (request, what, every, frames)
+    data = link.ModelData(frames, bytes(every % 50)).payload(request)
+    assert link.ModelData.LAYOUT.struct.unpack_from(data) == (request, frames)
+    assert data[link.ModelData.LAYOUT.size :] == bytes(every % 50)
 
 
 def test_floats_of_a_command_are_single() -> None:
-    command = cmd.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37, 1)
-    parsed = cmd.parse_command(cmd.Solver, command.payload(5))
-    assert parsed is not None
-    assert math.isclose(parsed[1].lambda_rel, 0.03, rel_tol=1e-7)
+    command = link.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37, 1)
+    request, *values = command.LAYOUT.struct.unpack(command.payload(5))
+    assert (request, values[0]) == (5, 10)
+    assert math.isclose(values[4], 0.03, rel_tol=1e-7)

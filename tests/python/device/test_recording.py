@@ -23,8 +23,8 @@ from eitskin.device.open import open_device
 from eitskin.device.recordings.recording import Recorder, frames_of, read_head
 from eitskin.device.simulated import SimTransport
 from eitskin.device.wire.codec import Decoder, Packet, encode
-from eitskin.device.wire.commands import StreamCommand
-from eitskin.device.wire.packets import PacketType, RawFrame, SolvedImage, SolvedTouches, Stream
+from eitskin.device.wire.link_table import PacketType, Stream, StreamCommand
+from eitskin.device.wire.packets import RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, EitskinError, FileError, FrameError
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
@@ -108,7 +108,7 @@ KILLED = """
     sys.path[:0] = {paths!r}
     from device_helpers import QUIET, sim_board
     from eitskin.device.client import Device
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
     from eitskin.device.recordings.recording import Recorder
     from eitskin.device.simulated import SimTransport
 

@@ -8,8 +8,8 @@ import random
 import pytest
 
 from eitskin.device.wire.codec import Decoder, LinkCounters, encode
-from eitskin.device.wire.packets import PacketType
-from eitskin.device.wire.payloads import build_info
+from eitskin.device.wire.link_table import PacketType
+from eitskin.device.wire.payloads import pack
 from eitskin.device.wire.sequence import LATE_IN_A_ROW, REMEMBERED, SequenceCheck
 
 TOP = 2**32
@@ -144,7 +144,7 @@ def packet(number: int, *, restart: bool = False) -> bytes:
     from device_helpers import board_info
 
     if restart:
-        return encode(PacketType.INFO, number, build_info(board_info(request=0)))
+        return encode(PacketType.INFO, number, pack(board_info(request=0)))
     return encode(PacketType.FAULT, number, number.to_bytes(8, "little") * 4)
 
 

@@ -22,8 +22,8 @@ from eitskin.device.link import LinkEvent, Reconnect
 from eitskin.device.open import list_devices, open_device, open_transport
 from eitskin.device.ports import Port, SerialTransport
 from eitskin.device.simulated import SimBoard, SimTransport
-from eitskin.device.wire.commands import Tare
-from eitskin.device.wire.packets import RawFrame, Stream
+from eitskin.device.wire.link_table import Stream, Tare
+from eitskin.device.wire.packets import RawFrame
 from eitskin.errors import DeviceError, UsageError
 from eitskin.scene.board_frames import BoardFrames
 from small_models import prebuilt

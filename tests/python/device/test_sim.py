@@ -15,18 +15,9 @@ from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.known_model import board_options
 from eitskin.device.simulated import SimBoard, SimTransport
-from eitskin.device.wire import commands as cmd
-from eitskin.device.wire.packets import (
-    Fault,
-    FaultCode,
-    Quality,
-    RawFlags,
-    RawFrame,
-    ReplyStatus,
-    SolvedImage,
-    SolvedTouches,
-    Stream,
-)
+from eitskin.device.wire import link_table as cmd
+from eitskin.device.wire.link_table import FaultCode, Quality, RawFlags, ReplyStatus, Stream
+from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, UsageError
 from eitskin.solve.options import default_options
 from eitskin.solve.reconstructor import Reconstructor

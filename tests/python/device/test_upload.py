@@ -23,8 +23,9 @@ from device_helpers import (
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.simulated import SimBoard, SimTransport
-from eitskin.device.wire import commands as cmd
-from eitskin.device.wire.packets import RawFrame, ReplyStatus, Stream
+from eitskin.device.wire import link_table as cmd
+from eitskin.device.wire.link_table import ReplyStatus, Stream
+from eitskin.device.wire.packets import RawFrame
 from eitskin.errors import DeviceError, FileError, ModelError
 from small_models import prebuilt, small_blob, tiny_blob
 

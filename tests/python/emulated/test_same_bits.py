@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import ALL_TOUCH_FIT, SOLVERS, Options, Reconstruction
+from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
+from eitskin.core.results import Options, Reconstruction
 from eitskin.model.eitm import encode_model
 from eitskin.model.force_law import LoadLaw
 from eitskin.model.model import Model

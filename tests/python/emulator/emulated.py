@@ -13,7 +13,8 @@ from eitskin.device.known_model import KnownModel, board_options
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.recordings.host_check import HostCheck, HostTwin
 from eitskin.device.transport import Transport
-from eitskin.device.wire.packets import RawFrame, Stream
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import RawFrame
 from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.clocktime import TICKS_PER_S
 from eitskin.emulator.scene_skin import skin_of
@@ -65,7 +66,7 @@ def twin_check(
 ) -> tuple[HostCheck, list[LiveFrame], list[Reconstruction | None]]:
     """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core
     and its results."""
-    from eitskin.device.wire import commands
+    from eitskin.device.wire import link_table as commands
 
     taken: list[Any] = []
     device.send_command(commands.StreamCommand(int(Stream.RAW)), 1.0)

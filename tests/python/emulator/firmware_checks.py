@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from eitskin.device.link import PumpedLink
-from eitskin.device.wire import commands
-from eitskin.device.wire.packets import BoardInfo, RawFrame, Reply, Stream
+from eitskin.device.wire import link_table as commands
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import BoardInfo, RawFrame, Reply
 from eitskin.device.wire.payloads import parse
 from eitskin.emulator.analog.converter import STEP_V
 from eitskin.emulator.board import EmulatedBoard

@@ -9,15 +9,8 @@ import numpy as np
 import pytest
 
 from eitskin.device.client import Device
-from eitskin.device.wire.packets import (
-    Fault,
-    FaultCode,
-    Quality,
-    RawFlags,
-    RawFrame,
-    SolvedTouches,
-    Stream,
-)
+from eitskin.device.wire.link_table import FaultCode, Quality, RawFlags, Stream
+from eitskin.device.wire.packets import Fault, RawFrame, SolvedTouches
 from eitskin.emulator.analog.converter import STEP_V
 from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US

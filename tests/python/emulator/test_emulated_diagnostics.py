@@ -12,7 +12,8 @@ from eitskin.core.diagnostics import names
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.live import LiveFrame, put_together
-from eitskin.device.wire.packets import CLEAR_FRAMES, Fault, FaultCode
+from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode
+from eitskin.device.wire.packets import Fault
 from eitskin.emulator.analog.skin import AnalogSkin
 from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.scene_skin import skin_of
@@ -58,7 +59,7 @@ def test_an_electrode_that_comes_off_in_mid_stream(image: bytes) -> None:
     assert set(whole) <= set(named)
     mine = [fault for fault in told if fault.code == FaultCode.ELECTRODE_OPEN]
     assert [(fault.raised, fault.index, fault.frame) for fault in mine] == [
-        (True, 5, named[0]), (False, 5, named[-1] + CLEAR_FRAMES),
+        (True, 5, named[0]), (False, 5, named[-1] + FAULT_CLEAR_FRAMES),
     ]  # fmt: skip
     for frame in seen:
         if frame.number in whole:

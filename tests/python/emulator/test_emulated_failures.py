@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from eitskin.device.client import Device
-from eitskin.device.wire import commands
-from eitskin.device.wire.packets import Fault, FaultCode, SolvedTouches, Stream
+from eitskin.device.wire import link_table as commands
+from eitskin.device.wire.link_table import FaultCode, Stream
+from eitskin.device.wire.packets import Fault, SolvedTouches
 from eitskin.emulator.board import EmulatedBoard
 from eitskin.emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin.emulator.memory import RAM

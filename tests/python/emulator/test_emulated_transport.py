@@ -10,7 +10,8 @@ import pytest
 
 from eitskin.device.open import open_device
 from eitskin.device.transport import Transport
-from eitskin.device.wire.packets import SolvedTouches, Stream
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import SolvedTouches
 from eitskin.emulator import transport as transport_module
 from eitskin.emulator.clocktime import TICKS_PER_S
 from eitskin.emulator.transport import EmulatedTransport, open_emulated

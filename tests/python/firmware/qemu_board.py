@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.device.wire.codec import Decoder, LinkCounters, encode
-from eitskin.device.wire.commands import Command
+from eitskin.device.wire.layout import Command
 from eitskin.device.wire.packets import FromBoard
 from eitskin.device.wire.payloads import parse
 

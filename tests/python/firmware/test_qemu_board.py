@@ -16,12 +16,15 @@ from qemu_board import Run, Script, run_board, skin_bytes
 from eitskin.core.engine import CoreEngine
 from eitskin.device.bank import bank_bytes
 from eitskin.device.known_model import board_options
-from eitskin.device.wire.commands import (
+from eitskin.device.wire.link_table import (
+    FaultCode,
     GetInfo,
     GetStats,
     ModelBegin,
     ModelCommit,
     ModelData,
+    Quality,
+    Stream,
     StreamCommand,
     Tare,
 )
@@ -29,13 +32,10 @@ from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
-    FaultCode,
-    Quality,
     RawFrame,
     Reply,
     SolvedImage,
     SolvedTouches,
-    Stream,
 )
 from eitskin.model.prebuilt import load_prebuilt
 

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Info, Options, Touch
+from eitskin.core.results import Info, Options
 from eitskin.errors import EitskinError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.options import default_options

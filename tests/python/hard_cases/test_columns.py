@@ -10,7 +10,7 @@ from made_models import plain_options
 from random_problems import RandomProblem, asked, gaussian, rounded, smooth, whitened, with_data
 from soundness import check_sound, judged
 
-from eitskin.core.results import SIGNS, SOLVERS
+from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Step
 from margins import Margins
 

@@ -11,7 +11,8 @@ from everywhere import SameEverywhere
 from test_hard_touches import on_skin
 from touch_scenes import entangled, frames_of
 
-from eitskin.core.results import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE, Options
+from eitskin.core.options_table import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE
+from eitskin.core.results import Options
 from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
 from margins import Margins

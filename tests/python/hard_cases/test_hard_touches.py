@@ -25,7 +25,7 @@ from touch_scenes import (
     quiet_trials,
 )
 
-from eitskin.core.results import Touch as Found
+from eitskin.core.diagnostics_table import Touch as Found
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scoring.matching import match
 from eitskin.solve.options import default_options

@@ -10,7 +10,8 @@ from everywhere import Host, Outcome, SameEverywhere, as_float32, on_host
 from hard_skins import SKINS, HardSkin, hard_skin
 from soundness import U, check_sound, judged
 
-from eitskin.core.results import SOLVERS, Options
+from eitskin.core.options_table import SOLVERS
+from eitskin.core.results import Options
 from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Step, TareStep
 from margins import Margins

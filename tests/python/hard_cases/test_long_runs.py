@@ -12,7 +12,7 @@ from made_models import made_blob, plain_options
 from random_problems import gaussian
 from soundness import check_sound, judged
 
-from eitskin.core.results import SIGNS, SOLVERS
+from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Load, Play, Solve, Step, TareStep
 from margins import Margins

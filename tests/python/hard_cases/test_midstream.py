@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from everywhere import Outcome, SameEverywhere, as_printed
 
-from eitskin.core.results import SIGNS, SOLVERS, Options
+from eitskin.core.options_table import SIGNS, SOLVERS
+from eitskin.core.results import Options
 from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated_steps import Choose, Forget, Load, Play, Step, TareStep
 from margins import Margins

@@ -10,7 +10,7 @@ from made_models import made_model, plain_options
 from random_problems import RandomProblem, asked, gaussian, rounded, smooth, with_data
 from soundness import check_sound, judged, objective_of
 
-from eitskin.core.results import SOLVERS
+from eitskin.core.options_table import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.model.storage import STORAGES, store
 from eitskin_studies.harness.emulated_steps import Step

@@ -13,7 +13,7 @@ from made_models import made_model, plain_options
 from random_problems import rounded
 from soundness import check_sound, judged
 
-from eitskin.core.results import SIGNS, SOLVERS
+from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin.model.eitm import encode_model
 from eitskin.model.storage import STORAGES
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step

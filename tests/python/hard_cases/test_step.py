@@ -10,7 +10,7 @@ from made_models import lipschitz_of, made_blob, plain_options
 from random_problems import gaussian, optimum_of, smooth, whitened
 from soundness import check_sound, judged
 
-from eitskin.core.results import SIGNS, SOLVERS
+from eitskin.core.options_table import SIGNS, SOLVERS
 from eitskin_studies.harness.emulated_steps import Choose, Load, Solve, Step
 from margins import Margins
 

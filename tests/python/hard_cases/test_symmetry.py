@@ -12,7 +12,8 @@ from made_models import made_blob, plain_options
 from random_problems import gaussian
 from soundness import U, judged
 
-from eitskin.core.results import SIGNS, SOLVERS, Options
+from eitskin.core.options_table import SIGNS, SOLVERS
+from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
 from eitskin.model.eitm import encode_model

@@ -13,7 +13,8 @@ from random_problems import gaussian, rounded
 from soundness import Judged, U, check_sound, judged
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import SOLVERS, Options
+from eitskin.core.options_table import SOLVERS
+from eitskin.core.results import Options
 from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model

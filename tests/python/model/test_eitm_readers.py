@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from two_readers import accepts, agreed
 
 from eitm_bytes import ENTRY_SIZE, entry_place, patched, sealed, sections_of
-from eitskin.core.results import SOLVERS
+from eitskin.core.options_table import SOLVERS
 from eitskin.errors import EitskinError, ModelError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import Reconstructor

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eitskin.core.results import Info, Reconstruction, Touch
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.scoring import metrics

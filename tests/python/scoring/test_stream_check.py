@@ -10,10 +10,11 @@ import pytest
 
 pytest.importorskip("scipy")
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.device.known_model import KnownModel
 from eitskin.device.live import LiveFrame
-from eitskin.device.wire.packets import Quality, RawFrame, Solved, SolvedImage, SolvedTouches
+from eitskin.device.wire.link_table import Quality
+from eitskin.device.wire.packets import RawFrame, Solved, SolvedImage, SolvedTouches
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scoring.scene_truth import SceneTruth
 from eitskin.scoring.stream_check import Watcher, line, spread, table

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from eitm_bytes import sealed, sections_of
-from eitskin.core.results import SOLVERS, Reconstruction
+from eitskin.core.options_table import SOLVERS
+from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError
 from eitskin.model.eitm import decode_model
 from eitskin.solve.reconstructor import ENGINES, Reconstructor

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import SOLVERS, Reconstruction
+from eitskin.core.options_table import SOLVERS
+from eitskin.core.results import Reconstruction
 from eitskin.solve.options import default_options
 from small_models import (
     DATA_KINDS,

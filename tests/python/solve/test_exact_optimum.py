@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import SOLVERS, Options
+from eitskin.core.options_table import SOLVERS
+from eitskin.core.results import Options
 from eitskin.reference.engine import orthonormal
 from eitskin.reference.fista import fista
 from eitskin.reference.problem import check_gap

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import SOLVERS
+from eitskin.core.options_table import SOLVERS
 from eitskin.errors import UsageError
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.benchmarks.solve_problems import Problems, bench_options, make_problems

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.model.model import Model
 from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.random_touches import TrueTouch as Put

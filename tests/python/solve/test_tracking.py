@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
-from eitskin.core.results import Options, Touch
+from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.reference.tracker import Tracker, nearest_pairs
 from eitskin.scene.random_touches import TouchScene, TouchSet

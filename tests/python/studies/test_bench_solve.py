@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eitskin.core.results import SOLVERS
+from eitskin.core.options_table import SOLVERS
 from eitskin_studies.benchmarks import solve as bench_solve
 from eitskin_studies.benchmarks import solve_peers as bench_solve_peers
 from eitskin_studies.benchmarks.solve_problems import Problems, make_problems

@@ -15,7 +15,8 @@ from eitskin.device.bandwidth import least_every
 from eitskin.device.diagnose_board import MeasuredBoard, board_findings
 from eitskin.device.known_model import KnownModel, find_model, need_model, scanned_protocol
 from eitskin.device.recordings.raw_frames import RawRun, as_frames, finite_only, gather
-from eitskin.device.wire.packets import BoardInfo, Fault, FaultCode, Quality, RawFrame, Stream
+from eitskin.device.wire.link_table import FaultCode, Quality, Stream
+from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
 from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.doctor.examine import examine
 from eitskin.frames.doctor.subject import subject_from_frames

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("scipy")
 
-from eitskin.core.results import SOLVERS
+from eitskin.core.options_table import SOLVERS
 from eitskin.errors import ConfigError
 from eitskin.model.storage import STORAGES
 from eitskin.tuning.configuration import Configuration, configuration_from

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from study_pages import fills_its_page
 
-from eitskin.core.results import ALL_TOUCH_FIT
+from eitskin.core.options_table import ALL_TOUCH_FIT
 from eitskin_studies.experiments import levers
 from eitskin_studies.experiments.experiment import (
     ExperimentOutcome,

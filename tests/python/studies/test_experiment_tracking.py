@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from study_pages import fills_its_page
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import UsageError
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.skin.skin import paper_skin

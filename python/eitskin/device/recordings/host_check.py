@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.diagnostics import DIAGNOSTICS
-from eitskin.core.results import Info, Options, Reconstruction, Touch
+from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
+from eitskin.core.results import Info, Options, Reconstruction
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, follow
-from eitskin.device.wire.packets import Fault, Quality, RawFrame, Solved, Stream
+from eitskin.device.wire.link_table import Quality, Stream
+from eitskin.device.wire.packets import Fault, RawFrame, Solved
 from eitskin.errors import FrameError
 from eitskin.solve.reconstructor import Reconstructor
 

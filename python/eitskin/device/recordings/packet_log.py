@@ -10,7 +10,8 @@ from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, put_together
 from eitskin.device.wire.codec import Packet
-from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches, Stream
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
 from eitskin.device.wire.payloads import MalformedPacket, parse
 
 

@@ -12,7 +12,8 @@ from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel
 from eitskin.device.link import LinkEvent
 from eitskin.device.live import LiveFrame, follow
-from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame, Stream
+from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.packets import BoardInfo, Fault, RawFrame
 from eitskin.errors import DeviceError, FrameError
 from eitskin.frames.frames import Frames
 from eitskin.skin.protocol import Protocol

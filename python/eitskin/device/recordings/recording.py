@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from eitskin import __version__
 from eitskin.core.results import Options, check_options
 from eitskin.device.wire.codec import Decoder, Packet, encode
-from eitskin.device.wire.packets import LINK_VERSION, PacketType
-from eitskin.device.wire.payloads import build_info
+from eitskin.device.wire.link_table import LINK_VERSION, PacketType
+from eitskin.device.wire.payloads import pack
 from eitskin.errors import DeviceError, EitskinError, FileError
 from eitskin.fileio import parse_json
 
@@ -69,7 +69,7 @@ class Recorder:
             self._write(PacketType.RECORDING, 0, json.dumps(head).encode())
 
             def begin(last_sequence: int) -> None:
-                self._write(PacketType.INFO, last_sequence, build_info(info))
+                self._write(PacketType.INFO, last_sequence, pack(info))
 
             device.link.begin_tap(begin, self._take)
             if options is not None:
@@ -223,7 +223,7 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
     from eitskin.device.known_model import find_model, scanned_protocol
     from eitskin.device.live import follow
     from eitskin.device.recordings.raw_frames import as_frames, gather
-    from eitskin.device.wire.packets import Stream
+    from eitskin.device.wire.link_table import Stream
     from eitskin.errors import FrameError
 
     with Device(FileTransport(path)) as device:

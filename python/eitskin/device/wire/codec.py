@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 from eitskin.core.engine import load_core
-from eitskin.device.wire.packets import MAX_PAYLOAD, PacketType
+from eitskin.device.wire.link_table import LINK_MAX_PAYLOAD, PacketType
 from eitskin.device.wire.sequence import LATE_IN_A_ROW, SequenceCheck
 from eitskin.errors import DeviceError
 
@@ -81,7 +81,9 @@ def encode(packet_type: int, sequence: int, payload: bytes) -> bytes:
         0,
     )
     if not size:
-        raise DeviceError(f"a packet cannot carry {len(payload)} bytes; the most is {MAX_PAYLOAD}")
+        raise DeviceError(
+            f"a packet cannot carry {len(payload)} bytes; the most is {LINK_MAX_PAYLOAD}"
+        )
     return bytes(module.ffi.buffer(buffer, size))
 
 

@@ -3,19 +3,9 @@ be done."""
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 from eitskin.core.engine import load_core
-from eitskin.device.wire.commands import COMMANDS
-from eitskin.device.wire.packets import (
-    FOUND_FAULTS,
-    Fault,
-    FaultCode,
-    PacketType,
-    Quality,
-    Reply,
-    ReplyStatus,
-)
+from eitskin.device.wire.link_table import COMMANDS, FaultCode, PacketType, Quality, ReplyStatus
+from eitskin.device.wire.packets import FOUND_FAULTS, Fault, Reply
 
 UPLOAD = "upload one with  eitskin model upload MODEL.eitm"
 
@@ -36,13 +26,7 @@ def field_at(command: int, offset: int) -> str:
     kind = COMMANDS.get(command)
     if kind is None:
         return f"byte {offset}"
-    place, sizes = 0, {"I": 4, "H": 2, "f": 4}
-    names = ("request", *(one.name for one in fields(kind)))
-    for name, letter in zip(names, kind.LAYOUT.format.lstrip("<"), strict=False):
-        if place == offset:
-            return name
-        place += sizes[letter]
-    return f"byte {offset}"
+    return kind.LAYOUT.field_at(offset) or f"byte {offset}"
 
 
 def reply_text(reply: Reply) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from eitskin.core.results import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE
+from eitskin.core.options_table import ALL_TOUCH_FIT, INTERACTION, LOG_DATA, SPLIT_MERGE
 from eitskin.model.build import BuildSettings
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.fem.grid import Grid
 from eitskin.frames.frames import Frames
 from eitskin.scoring import metrics

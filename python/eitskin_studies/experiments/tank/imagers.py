@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.fem.grid import Grid
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.model import Model

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.scoring.matching import match
 from eitskin_studies.experiments.tracking.streams import TouchStream
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.core.results import Options, Touch
+from eitskin.core.diagnostics_table import Touch
+from eitskin.core.results import Options
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.reference.tracker import Pairing, Tracker, nearest_pairs

@@ -1,0 +1,493 @@
+/* eitskin: packets between a board and a host: their numbers and the layout of their payloads.
+ *
+ * Payloads are little-endian and have no padding; a test compares their sizes and places with those
+ * of the compiler. docs/reference/link-protocol.md says how they are used, link.h has their codec.
+ * Numbers of packets, statuses, faults and bits never get another meaning.
+ *
+ * Written by tables/make_tables.py from tables/link.toml.
+ */
+#ifndef EITSKIN_PACKETS_H
+#define EITSKIN_PACKETS_H
+
+#include "eitskin/diagnostics.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The first byte of every packet; a packet of another version is rejected. */
+#define EITS_LINK_VERSION     3u
+#define EITS_LINK_MAX_PAYLOAD 16384u
+
+/* Below 0x80 from the board, from there on to it. */
+typedef enum eits_packet_type {
+    /* the board, its model and its settings */
+    EITS_PACKET_INFO = 0x01,
+    /* how a command ended */
+    EITS_PACKET_REPLY = 0x02,
+    /* a scanned frame */
+    EITS_PACKET_RAW = 0x10,
+    /* a frame's image */
+    EITS_PACKET_IMAGE = 0x11,
+    /* a frame's touches */
+    EITS_PACKET_TOUCHES = 0x12,
+    /* the board's counters */
+    EITS_PACKET_STATS = 0x13,
+    /* a fault that rose or went */
+    EITS_PACKET_FAULT = 0x14,
+    /* never on a wire: the first packet of an .eits file */
+    EITS_PACKET_RECORDING = 0x70,
+    /* send an INFO */
+    EITS_PACKET_GET_INFO = 0x80,
+    /* what to send of each frame */
+    EITS_PACKET_STREAM = 0x81,
+    /* take the reference */
+    EITS_PACKET_TARE = 0x82,
+    /* how frames are scanned; forgets the reference */
+    EITS_PACKET_SCAN = 0x83,
+    /* the solver's options */
+    EITS_PACKET_SOLVER = 0x84,
+    /* stop the scan and erase the bank that is not in use */
+    EITS_PACKET_MODEL_BEGIN = 0x85,
+    /* bytes of the model */
+    EITS_PACKET_MODEL_DATA = 0x86,
+    /* use the model that was sent */
+    EITS_PACKET_MODEL_COMMIT = 0x87,
+    /* send a STATS */
+    EITS_PACKET_GET_STATS = 0x88,
+    /* leave a row out, or use it again */
+    EITS_PACKET_MASK_ROW = 0x89,
+    /* restart the board */
+    EITS_PACKET_RESET = 0x8a,
+    /* run the model's golden frame */
+    EITS_PACKET_SELF_TEST = 0x8b,
+    /* forget the faults */
+    EITS_PACKET_CLEAR_FAULTS = 0x8c
+} eits_packet_type;
+
+/* How a command ended, and what `detail` of the reply adds. */
+typedef enum eits_reply_status {
+    /* MODEL_BEGIN: [0] the offset to go on from */
+    EITS_REPLY_OK = 0,
+    EITS_REPLY_UNKNOWN_COMMAND = 1,
+    /* [0] bytes of payload that are expected */
+    EITS_REPLY_LENGTH = 2,
+    /* [0] offset in the payload of the field out of range; [1] the limit it broke */
+    EITS_REPLY_RANGE = 3,
+    EITS_REPLY_NO_MODEL = 4,
+    EITS_REPLY_NOT_TARED = 5,
+    /* [0] type of the command under way */
+    EITS_REPLY_BUSY = 6,
+    /* [0] most bytes that a bank, a packet or the memory holds */
+    EITS_REPLY_MODEL_SIZE = 7,
+    /* [0] eits_status */
+    EITS_REPLY_MODEL_INVALID = 8,
+    /* [0] electrodes that the protocol needs; [1] electrodes there are */
+    EITS_REPLY_MODEL_SCAN = 9,
+    /* what arrived is not what MODEL_BEGIN announced */
+    EITS_REPLY_MODEL_CRC = 10,
+    /* MODEL_DATA out of order: [0] the offset expected; -1: no upload is under way */
+    EITS_REPLY_OFFSET = 11,
+    /* [0] the offset where erasing or programming failed */
+    EITS_REPLY_FLASH = 12,
+    /* [0] eits_status of the core */
+    EITS_REPLY_CORE = 13,
+    /* [0] the nearest number of samples that is whole excitation periods */
+    EITS_REPLY_PERIODS = 14,
+    /* [0] least frame period of this scan, us */
+    EITS_REPLY_TOO_FAST = 15,
+    /* [0] difference to the golden image in parts per 1e9 of its peak */
+    EITS_REPLY_SELF_TEST = 16
+} eits_reply_status;
+
+/* Bits of a row's quality byte. */
+typedef enum eits_quality {
+    /* a sample lay at either end of the converter's range */
+    EITS_QUALITY_SATURATED = 1,
+    /* the multiplexers were switched later than the settling time before the first sample */
+    EITS_QUALITY_UNSETTLED = 2,
+    /* it and its reciprocal disagree (full scans and checks) */
+    EITS_QUALITY_RECIPROCITY = 4,
+    /* not measured: its reciprocal's value */
+    EITS_QUALITY_COPIED = 8,
+    /* one of its electrodes is taken to be open: only without a reference and in a tare; then the
+     * core finds them */
+    EITS_QUALITY_OPEN = 16,
+    /* left out by MASK_ROW */
+    EITS_QUALITY_MASKED = 32
+} eits_quality;
+
+/* What is wrong with the board or the skin, and what index, value and words say. */
+typedef enum eits_fault {
+    /* no bank holds a valid model; value: eits_status of the newest bank */
+    EITS_FAULT_NO_MODEL = 1,
+    /* index: electrode */
+    EITS_FAULT_ELECTRODE_OPEN = 2,
+    /* index: first row; value: rows */
+    EITS_FAULT_SATURATED = 3,
+    /* a frame took longer than the frame period; value: us over */
+    EITS_FAULT_DEADLINE = 4,
+    /* index: worst row; value: parts per thousand of the rms voltage */
+    EITS_FAULT_RECIPROCITY = 5,
+    /* the core rejected the frame; value: eits_status */
+    EITS_FAULT_SOLVER = 6,
+    /* the converter or its DMA gave nothing in time */
+    EITS_FAULT_SCAN_STALLED = 7,
+    /* the board restarted after a processor fault; words: pc, lr, cfsr, hfsr, address */
+    EITS_FAULT_CRASH = 8,
+    /* the board restarted because the program hung */
+    EITS_FAULT_WATCHDOG = 9,
+    /* the generator or the multiplexers could not be written */
+    EITS_FAULT_BUS = 10,
+    /* index: electrode; value: its partner, -1 where more than two are bridged; words[0], [1]: all
+     * of them, bit e */
+    EITS_FAULT_BRIDGED = 11,
+    /* index: electrode */
+    EITS_FAULT_ELECTRODE_NOISY = 12,
+    /* value: parts per thousand of the data; 0: from signs, not a fraction */
+    EITS_FAULT_MODEL_MISMATCH = 13,
+    /* only solved frames raise it; a tare ends it */
+    EITS_FAULT_STALE_REFERENCE = 14
+} eits_fault;
+#define EITS_FAULTS 15u
+
+/* ELECTRODE_OPEN, SATURATED and BRIDGED rise in the frame that shows them, MODEL_MISMATCH,
+ * ELECTRODE_NOISY and STALE_REFERENCE with the third in a row, since a touch that lands within a
+ * scan gives one such frame; all these are gone after so many frames in a row without them. */
+#define EITS_FAULT_RAISE_FRAMES 3u
+#define EITS_FAULT_CLEAR_FRAMES 8u
+
+/* Bits of a RAW's flags. */
+typedef enum eits_raw_flags {
+    /* a frame of a tare */
+    EITS_RAW_REFERENCE = 1,
+    /* only one row of each reciprocal pair was measured */
+    EITS_RAW_RECIPROCAL = 2,
+    /* a full scan among such, for the check of reciprocity */
+    EITS_RAW_CHECK = 4
+} eits_raw_flags;
+
+/* Bits of what is streamed of each frame. */
+typedef enum eits_stream {
+    EITS_STREAM_RAW = 1,
+    EITS_STREAM_IMAGE = 2,
+    EITS_STREAM_TOUCHES = 4
+} eits_stream;
+
+/* The board, its model and its settings. */
+typedef struct eits_packet_info {
+    /* of the GET_INFO that asked; 0 after a restart */
+    uint32_t request;
+    /* major, minor, patch, 0 */
+    uint8_t firmware[4];
+    /* such as nucleo_f767zi, zero-filled */
+    char board[16];
+    /* the processor's serial number, hexadecimal, zero-filled */
+    char serial[24];
+    /* processor clock, Hz */
+    uint32_t f_cpu_hz;
+    /* of the multiplexers */
+    uint32_t electrodes;
+    /* most bytes of a model */
+    uint32_t bank_bytes;
+    /* most bytes in one MODEL_DATA */
+    uint32_t data_bytes;
+    /* of the model in use; 0: none */
+    uint32_t model_bytes;
+    /* CRC-32 of the whole model file, as zlib's crc32 */
+    uint32_t model_crc;
+    /* of the protocol that is scanned */
+    uint64_t protocol_hash;
+    /* of the model, as all down to storage */
+    uint32_t n_electrodes;
+    /* of its protocol */
+    uint32_t n_rows;
+    uint32_t n_folded;
+    uint32_t rank;
+    uint32_t n_pixels;
+    uint32_t nx;
+    uint32_t ny;
+    /* eits_storage: 0 f32, 1 f16, 2 i16, 3 i8 */
+    uint32_t storage;
+    /* that the model is in */
+    uint32_t bank;
+    /* as the generator's tuning word gives it */
+    uint32_t excitation_millihz;
+    uint32_t sample_rate_hz;
+    /* of a measurement */
+    uint16_t samples;
+    /* settling time */
+    uint16_t settle_us;
+    /* from one measurement to the next */
+    uint32_t slot_us;
+    /* every n-th frame is scanned fully; 1: all; 0: none */
+    uint16_t check_every;
+    /* bits of eits_stream */
+    uint16_t streaming;
+    /* every n-th frame is streamed */
+    uint16_t every;
+    /* 1: there is a reference */
+    uint16_t tared;
+    /* 0: as fast as the scan goes */
+    uint32_t frame_period_us;
+    /* bit k: fault number k is raised */
+    uint32_t faults;
+    /* between the electrodes, for one step of the converter */
+    uint32_t volts_per_code_nv;
+} eits_packet_info;
+
+/* How the command with this request number ended. */
+typedef struct eits_packet_reply {
+    uint32_t request;
+    /* its packet type */
+    uint16_t command;
+    /* eits_reply_status */
+    uint16_t status;
+    /* by status */
+    int32_t detail[2];
+} eits_packet_reply;
+
+/* A scanned frame. n_rows numbers in V follow in the protocol's order, the very numbers that the
+ * board's core got, NaN for a row that could not be used; then as many quality bytes. */
+typedef struct eits_packet_raw {
+    /* counts scanned frames; wraps */
+    uint32_t frame;
+    /* when its scan began, on the board's clock; wraps */
+    uint32_t time_us;
+    /* how long the scan took */
+    uint32_t scan_us;
+    uint16_t n_rows;
+    /* bits of eits_raw_flags */
+    uint16_t flags;
+} eits_packet_raw;
+
+/* Head of IMAGE and TOUCHES: what eits_info says, and the times. */
+typedef struct eits_packet_solved {
+    uint32_t frame;
+    /* when its scan began */
+    uint32_t time_us;
+    /* time for the solve */
+    uint32_t solve_us;
+    /* time for the touches */
+    uint32_t touch_us;
+    /* from the end of its scan until this packet was made */
+    uint32_t age_us;
+    /* pixels or touches that follow */
+    uint16_t count;
+    /* 0, or minus an eits_status: then the image is zero and there are no touches */
+    uint16_t status;
+    /* eits_stop */
+    uint16_t stop;
+    /* rows left out */
+    uint16_t masked;
+    uint32_t iterations;
+    /* coefficients that are not zero */
+    uint32_t nonzeros;
+    /* multiply-accumulates of the solve */
+    uint32_t macs;
+    /* of the touches */
+    uint32_t touch_macs;
+    float lambda;
+    float lambda_max;
+    float lambda_noise;
+    /* relative duality gap */
+    float gap_rel;
+    /* its norm */
+    float residual;
+    float data_norm;
+    /* bits of eits_diagnostic */
+    uint32_t diagnostics;
+    /* saturated rows without masked ones: by the converter or beyond the core's limit */
+    uint16_t saturated;
+    /* rows left out as outliers */
+    uint16_t outliers;
+    /* fraction of the data outside the model's range */
+    float model_mismatch;
+    /* bit e: electrode e */
+    uint64_t open_electrodes;
+    uint64_t bridged_electrodes;
+    uint64_t noisy_electrodes;
+} eits_packet_solved;
+
+/* A touch, as eits_touch. */
+typedef struct eits_packet_touch {
+    uint32_t id;
+    float x_mm;
+    float y_mm;
+    float radius_mm;
+    /* S mm^2/m */
+    float strength_s_per_m_mm2;
+    float confidence;
+    /* 0 where the model is not calibrated */
+    float force_n;
+} eits_packet_touch;
+
+/* Stages that are timed. */
+typedef enum eits_stage {
+    EITS_STAGE_SCAN = 0,
+    EITS_STAGE_DEMODULATE = 1,
+    EITS_STAGE_SOLVE = 2,
+    EITS_STAGE_TOUCHES = 3,
+    EITS_STAGE_SEND = 4,
+    /* the whole frame */
+    EITS_STAGE_FRAME = 5
+} eits_stage;
+#define EITS_STAGES 6u
+
+/* Times of one stage. */
+typedef struct eits_stage_stats {
+    uint32_t count;
+    uint32_t last_us;
+    /* 99th percentile: the upper edge of its bin, an eighth of an octave wide */
+    uint32_t p99_us;
+    uint32_t worst_us;
+} eits_stage_stats;
+
+/* The board's counters. */
+typedef struct eits_packet_stats {
+    uint32_t request;
+    uint32_t uptime_ms;
+    uint32_t frames_scanned;
+    uint32_t frames_solved;
+    /* since the link came up */
+    uint32_t packets_sent;
+    /* a dropped packet still takes a sequence number */
+    uint32_t packets_dropped;
+    /* frame periods missed */
+    uint32_t deadlines_missed;
+    /* measurements taken again because the switch came too late */
+    uint32_t slots_repeated;
+    /* rows left out as outliers, of all frames since there is a reference */
+    uint32_t outliers;
+    /* commands received */
+    uint32_t link_packets;
+    uint32_t link_crc_errors;
+    uint32_t link_framing_errors;
+    uint32_t link_overruns;
+    uint32_t stack_bytes;
+    /* the most so far */
+    uint32_t stack_used;
+    uint32_t workspace_bytes;
+    uint32_t workspace_used;
+    /* by eits_stage */
+    eits_stage_stats stage[6];
+} eits_packet_stats;
+
+/* A fault that rose or went. */
+typedef struct eits_packet_fault {
+    /* eits_fault */
+    uint16_t code;
+    /* 1: it is there; 0: it has gone */
+    uint16_t raised;
+    uint32_t frame;
+    /* by code, as value and words */
+    int32_t index;
+    int32_t value;
+    uint32_t words[5];
+} eits_packet_fault;
+
+/* A command without parameters. */
+typedef struct eits_command_plain {
+    /* never 0 */
+    uint32_t request;
+} eits_command_plain;
+
+/* What to send of each frame. */
+typedef struct eits_command_stream {
+    uint32_t request;
+    /* bits of eits_stream; 0 stops */
+    uint16_t what;
+    /* every n-th frame, at least 1 */
+    uint16_t every;
+    /* so many streamed frames, then stop; 0: until stopped */
+    uint32_t frames;
+} eits_command_stream;
+
+/* Take the reference; the reply comes when that is done. */
+typedef struct eits_command_tare {
+    uint32_t request;
+    /* 1, or 4 to 1024 */
+    uint32_t frames;
+} eits_command_tare;
+
+/* How frames are scanned; forgets the reference. */
+typedef struct eits_command_scan {
+    uint32_t request;
+    /* 1,000 to 250,000,000, below half the sample rate */
+    uint32_t excitation_millihz;
+    /* 1,000 to 5,000,000 */
+    uint32_t sample_rate_hz;
+    /* 4 to 1024 */
+    uint16_t samples;
+    /* at most 50,000 */
+    uint16_t settle_us;
+    /* 1: every frame is full; n > 1: one row of each reciprocal pair, every n-th frame full; 0:
+     * never full */
+    uint16_t check_every;
+    /* 0 */
+    uint16_t reserved;
+    /* at most 600,000,000; 0: as fast as the scan goes */
+    uint32_t frame_period_us;
+} eits_command_scan;
+
+/* The solver's options, from the next frame on until another model or a restart. */
+typedef struct eits_command_solver {
+    uint32_t request;
+    /* 1 to 1000 */
+    uint32_t iterations;
+    /* at most EITS_MAX_TOUCHES */
+    uint32_t max_touches;
+    /* 0 or 1 */
+    uint32_t warm_start;
+    /* eits_sign: 0 increase, 1 decrease, 2 both */
+    uint32_t sign;
+    /* 0 to 1 */
+    float lambda_rel;
+    /* 0 to 1 */
+    float gap_rel;
+    /* eits_solver: 0 FISTA, 1 working set, 2 coordinate descent, 3 active set */
+    uint32_t solver;
+    /* multiply-accumulates a frame; 0: no limit */
+    uint32_t mac_limit;
+    /* bits of eits_diagnostic that are looked for */
+    uint32_t diagnostics;
+    /* 1: touches are followed in time (eits_options_track), as after a start; 0: they are not */
+    uint32_t track;
+} eits_command_solver;
+
+/* Announces a model. */
+typedef struct eits_command_model_begin {
+    uint32_t request;
+    /* of the model, at least 64 */
+    uint32_t bytes;
+    /* CRC-32 of the whole model */
+    uint32_t crc;
+} eits_command_model_begin;
+
+/* Bytes of the model follow: a multiple of 4, but for the last. */
+typedef struct eits_command_model_data {
+    uint32_t request;
+    /* of the first byte */
+    uint32_t offset;
+} eits_command_model_data;
+
+/* Send a STATS. */
+typedef struct eits_command_get_stats {
+    uint32_t request;
+    /* 1: set the times to zero after sending them */
+    uint32_t reset;
+} eits_command_get_stats;
+
+/* Leave a row out, or use it again. */
+typedef struct eits_command_mask_row {
+    uint32_t request;
+    /* of the protocol */
+    uint16_t row;
+    /* 1: leave it out; 0: use it again */
+    uint16_t masked;
+} eits_command_mask_row;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,67 @@
+/* Options: a model's own, those for a stream, and whether options are in range. Names, ranges and
+ * usual values come from tables/options.toml. */
+#include "model/options.h"
+
+#include "base/vec.h"
+#include "model/options_table.h"
+
+#include <string.h>
+
+const eits_option *eits_option_table(uint32_t *count)
+{
+    if (count != NULL)
+        *count = (uint32_t)(sizeof OPTIONS / sizeof OPTIONS[0]);
+    return OPTIONS;
+}
+
+eits_status eits_options_default(const eits_model *model, eits_options *options)
+{
+    if (model == NULL || options == NULL)
+        return EITS_E_ARGUMENT;
+    const eits_defaults *d = model->defaults;
+    *options = usual_options(d);
+    options->max_touches = d->max_touches < EITS_MAX_TOUCHES ? d->max_touches : EITS_MAX_TOUCHES;
+    options->max_masked = model->n_rows / 2;
+    options->touch_fit = EITS_TOUCH_FIT_ALL & ~d->touch_fit_left_out;
+    return EITS_OK;
+}
+
+eits_status eits_options_track(eits_options *options)
+{
+    if (options == NULL)
+        return EITS_E_ARGUMENT;
+    /* A lower threshold lets more noise through as touches; confirmation over two frames takes
+     * those out again, and what remains is more of the light touches. Fitted on tuning streams. */
+    options->detection_factor *= R(0.75);
+    options->track_confirm = 2;
+    options->track_hold = 2;
+    options->track_smooth = R(0.66);
+    return EITS_OK;
+}
+
+/* A whole number takes one to four bytes: compilers for small processors pack enums. */
+static int is_in_range(const eits_options *options, const eits_option *one)
+{
+    const void *place = (const uint8_t *)options + one->offset;
+    eits_real value;
+    if (one->whole) {
+        uint32_t number = 0;
+        memcpy(&number, place, one->size);
+        value = (eits_real)number;
+    } else {
+        memcpy(&value, place, sizeof value);
+    }
+    return eits_is_finite(value) && value >= one->least && value <= one->greatest;
+}
+
+/* Ranges are wide: they keep numbers finite and counts in range, and do not say what is
+ * sensible. */
+int eits_options_in_range(const eits_options *o)
+{
+    for (size_t k = 0; k < sizeof OPTIONS / sizeof OPTIONS[0]; ++k) {
+        if (!is_in_range(o, &OPTIONS[k]))
+            return 0;
+    }
+    return o->touch_min_radius_mm <= o->touch_seed_radius_mm &&
+           o->touch_seed_radius_mm <= o->touch_max_radius_mm;
+}

@@ -1,0 +1,56 @@
+"""Write what the tables in this folder say to every place that needs it: C headers, Python modules
+and reference pages.
+
+``python tables/make_tables.py`` writes; with ``--check`` it only names the files that differ, and
+fails if any does. What it writes is committed, so that no build needs this program.
+
+A table is a TOML file. ``[[enum]]`` and ``[[struct]]`` are types of C, in the order of the header;
+their ``rows`` are members:
+
+- of an enum: name, number, what it means; where needed, further columns that the enum's table names
+- of a struct: name, type, what it is; where Python has it in another form, that form (FORMS in
+  ``write_python.py``)
+- of ``[options]``: name, type, usual value, least, greatest, what it is
+- of a room in ``constants.toml``: name, value, what it is, what it trades, how it was chosen
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from table import ROOT, Tables, read_tables
+from write_c import c_headers, c_layouts, c_options, c_texts
+from write_docs import pages
+from write_python import python_modules
+
+
+def written(tables: Tables) -> Iterator[tuple[Path, str]]:
+    """Each file that comes from the tables, with its content."""
+    for path, lines in (
+        *c_headers(tables),
+        *c_texts(tables),
+        *c_options(tables),
+        *c_layouts(tables),
+        *python_modules(tables),
+        *pages(tables),
+    ):
+        yield ROOT / path, "\n".join(lines).rstrip("\n") + "\n"
+
+
+def main(*arguments: str) -> int:
+    stale = [
+        (path, content)
+        for path, content in written(read_tables())
+        if not path.exists() or path.read_text(encoding="utf-8") != content
+    ]
+    for path, content in stale:
+        print(path.relative_to(ROOT))
+        if "--check" not in arguments:
+            path.write_text(content, encoding="utf-8")
+    return int("--check" in arguments and bool(stale))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

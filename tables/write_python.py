@@ -1,0 +1,266 @@
+"""The tables as Python modules: options, what the core says of a frame, packets of the link."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from table import Lines, Table, Tables, enum_of, origin, split_type, types_of, wrapped
+
+# how Python has a field that is not a plain number: its type, and its value where none is given
+FORMS = {
+    "text": ("str", '""'),
+    "version": ("tuple[int, int, int]", "(0, 0, 0)"),
+    "pair": ("tuple[int, int]", "(0, 0)"),
+    "words": ("tuple[int, int, int, int, int]", "(0, 0, 0, 0, 0)"),
+    "electrodes": ("tuple[int, ...]", "()"),
+    "stop": ("str", '""'),
+    "negated": ("int", "0"),
+    "flag": ("bool", "False"),
+    "stages": ("dict[str, StageStats]", "{}"),
+    "one": ("int", "1"),  # a number, 1 where none is given
+}
+REALS = ("f32", "real")
+LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i", "f32": "f", "char": "s"}
+
+
+def python_modules(tables: Tables) -> Iterator[tuple[str, Lines]]:
+    """Each module with its lines."""
+    yield "python/eitskin/core/options_table.py", _options_module(tables)
+    yield "python/eitskin/core/diagnostics_table.py", _diagnostics_module(tables)
+    if "link" in tables:
+        yield "python/eitskin/device/wire/link_table.py", _link_module(tables)
+
+
+def _head(about: str, name: str, imports: str) -> Lines:
+    yield from docstring(f"{about} {origin(name)}", "")
+    yield from ("", "from __future__ import annotations", "")
+    yield from imports.strip("\n").split("\n")
+    yield ""
+
+
+def docstring(text: str, indent: str) -> Lines:
+    lines = wrapped(text, f'{indent}"""', indent)
+    if len(lines) == 1 and len(lines[0]) <= 97:
+        yield f'{lines[0]}"""'
+    else:
+        yield from (*lines, f'{indent}"""')
+
+
+def remark(text: str, indent: str = "") -> Lines:
+    yield from wrapped(text, f"{indent}# ", f"{indent}# ")
+
+
+def word(name: str) -> str:
+    """ "WORKING_SET" to "working-set"."""
+    return name.lower().replace("_", "-")
+
+
+# ---- enums ----
+
+
+def _names(enum: Table, name: str) -> Lines:
+    """A tuple of the members' names, or of their texts, in order."""
+    texts = enum.get("columns", [""])[0] == "text"
+    yield from remark(f"{enum['c']}: {enum['doc']}")
+    yield f"{name} = ("
+    yield from (f'    "{row[3] if texts else word(row[0])}",' for row in enum["rows"])
+    yield ")"
+
+
+def _numbers(enum: Table) -> Lines:
+    """A number a member, and all bits."""
+    yield from remark(f"{enum['c']}: {enum['doc']}")
+    yield from (f"{name} = {value}" for name, value, *_ in enum["rows"])
+    if "all" in enum:
+        yield f"{all_name(enum)} = {_all(enum)}"
+
+
+def all_name(enum: Table) -> str:
+    """ "EITS_TOUCH_FIT_ALL" to "ALL_TOUCH_FIT"."""
+    return f"ALL_{enum['all'].removeprefix('EITS_').removesuffix('_ALL')}"
+
+
+def _all(enum: Table) -> int:
+    return int(sum(row[1] for row in enum["rows"]))
+
+
+def _class(enum: Table) -> Lines:
+    kind, _, name = enum["python"].partition(" ")
+    yield from ("", "", f"class {name}({kind}):")
+    yield from docstring(f"{enum['c']}: {enum['doc']}", "    ")
+    yield ""
+    for member, value, doc, *_ in enum["rows"]:
+        yield from remark(doc, "    ") if doc else ()
+        yield f"    {member} = {hex(value) if enum.get('hexadecimal') else value}"
+
+
+# ---- options ----
+
+
+def _options_module(tables: Tables) -> Lines:
+    table, types = tables["options"]["options"], types_of(tables["options"])
+    rows = sorted(table["rows"], key=lambda row: row[2] not in ("model", "rule"))
+    yield from _head(
+        "The options of the core.",
+        "options",
+        "from dataclasses import dataclass\n\n"
+        "from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS",
+    )
+    for enum in tables["options"]["enum"]:
+        yield from _numbers(enum) if "all" in enum else _names(enum, enum["python"])
+    for name, value in tables["options"]["limits"].items():
+        yield f"{name} = {value}"
+    yield from ("", "", "@dataclass(frozen=True)", "class OptionFields:")
+    yield from docstring(table["doc"], "    ")
+    yield ""
+    for name, kind, usual, _, _, doc in rows:
+        yield from remark(doc, "    ")
+        yield f"    {name}: {_option_type(kind)}{_usual(tables, kind, usual)}"
+    yield from ("", "", *remark("Least and greatest value of each option that is a number."))
+    yield "RANGES: dict[str, tuple[float, float]] = {"
+    for name, kind, _, least, greatest, _ in table["rows"]:
+        if _option_type(kind) in ("int", "float"):
+            bits = kind.startswith("bits ")
+            low = 0 if bits else _limit(least)
+            high = _all(enum_of(tables, kind[5:])) if bits else _limit(greatest)
+            yield f'    "{name}": ({low}, {high}),'
+    yield from ("}", *remark("The names that an option may have, in the order of their numbers."))
+    yield "CHOICES = {"
+    for name, kind, *_ in table["rows"]:
+        if kind.startswith("eits_"):
+            yield f'    "{name}": {types[kind]["python"]},'
+    yield "}"
+    yield from remark("What a model's own defaults say, by the same names.")
+    yield "OF_MODEL = ("
+    yield from (f'    "{row[0]}",' for row in rows if row[2] == "model")
+    yield ")"
+
+
+def _option_type(kind: str) -> str:
+    plain = {"u32": "int", "real": "float", "flag": "bool"}
+    return plain.get(kind, "int" if kind.startswith("bits ") else "str")
+
+
+def _usual(tables: Tables, kind: str, usual: Any) -> str:
+    if usual in ("model", "rule"):
+        return ""
+    if kind.startswith("eits_"):
+        prefix = enum_of(tables, kind)["prefix"]
+        return f' = "{word(usual.removeprefix(prefix))}"'
+    if kind.startswith("bits "):
+        return f" = {all_name(enum_of(tables, kind[5:]))}"
+    types = {"flag": bool, "real": float}
+    return f" = {types[kind](usual)}" if kind in types else f" = {_limit(usual)}"
+
+
+def _limit(value: Any) -> str:
+    named = {"any": "2**32 - 1", "huge": "1e30"}
+    return named.get(value, str(value).removeprefix("EITS_"))
+
+
+# ---- structs ----
+
+
+def _python_type(kind: str, form: str) -> tuple[str, str]:
+    """Type of a field and its value where none is given."""
+    if form:
+        return FORMS[form]
+    return ("float", "0.0") if split_type(kind)[0] in REALS else ("int", "0")
+
+
+def _fields(struct: Table, rows: list[list[Any]]) -> Lines:
+    """The fields, those from ``optional_from`` on with a value where none is given."""
+    optional = False
+    for name, kind, doc, *form in rows:
+        optional = optional or struct.get("optional_from") == name
+        of_type, value = _python_type(kind, form[0] if form else "")
+        yield from remark(doc, "    ") if doc else ()
+        yield f"    {safe(name)}: {of_type}{f' = {value}' if optional else ''}"
+
+
+def safe(name: str) -> str:
+    """``lambda`` is a word of Python's, and it has the stages by name."""
+    return {"lambda": "lambda_", "stage": "stages"}.get(name, name)
+
+
+def _dataclass(struct: Table, bases: str = "") -> Lines:
+    yield from ("", "", "@dataclass(frozen=True)", f"class {struct['python']}{bases}:")
+    yield from docstring(f"{struct['c']}: {struct['doc']}", "    ")
+    yield from ("", *_fields(struct, struct["rows"]))
+
+
+def _diagnostics_module(tables: Tables) -> Lines:
+    types = types_of(tables["diagnostics"])
+    yield from _head(
+        "What the core says of a frame.",
+        "diagnostics",
+        "from dataclasses import dataclass",
+    )
+    yield from _names(types["eits_diagnostic"], "DIAGNOSTICS")
+    yield f"{all_name(types['eits_diagnostic'])} = {_all(types['eits_diagnostic'])}"
+    yield from _names(types["eits_stop"], "STOPS")
+    yield from _dataclass(types["eits_info"])
+    yield from _dataclass(types["eits_touch"])
+
+
+# ---- link ----
+
+
+def _link_module(tables: Tables) -> Lines:
+    table, types = tables["link"], types_of(tables["link"])
+    yield from _head(
+        "Packets of the link: their numbers, and their fields as they lie on the wire.",
+        "link",
+        "from dataclasses import dataclass\nfrom enum import IntEnum, IntFlag\n"
+        "from typing import ClassVar\n\n"
+        "from eitskin.device.wire.layout import Command, Layout, Payload",
+    )
+    yield from (f"{name} = {value}" for name, value in table["numbers"].items())
+    yield from _names(types["eits_stage"], "STAGES")
+    for enum in table["enum"]:
+        if "python" in enum:
+            yield from _class(enum)
+    for struct in table["struct"]:
+        if "python" in struct:
+            yield from _payload(struct)
+    commands = [row for row in types["eits_packet_type"]["rows"] if len(row) > 4]
+    for name, _, doc, content, python in commands:
+        yield from _command(types[content], name, doc, python)
+    yield from ("", "", "COMMANDS: dict[int, type[Command]] = {")
+    yield from (f"    PacketType.{row[0]}: {row[4]}," for row in commands)
+    yield "}"
+
+
+def _layout(struct: Table) -> Lines:
+    yield "    LAYOUT: ClassVar[Layout] = Layout("
+    yield f'        "{struct["c"]}",'
+    for name, kind, _, *form in struct["rows"]:
+        yield f'        ("{safe(name)}", "{_letters(kind)}", "{form[0] if form else ""}"),'
+    yield "    )"
+
+
+def _letters(kind: str) -> str:
+    """A field as ``struct`` has it; bytes and texts in one piece."""
+    base, count = split_type(kind)
+    if base == "eits_stage_stats":
+        return f"{4 * count}I"
+    if base in ("char", "u8"):
+        return f"{count}s"
+    return f"{count}{LETTERS[base]}" if count else LETTERS[base]
+
+
+def _payload(struct: Table) -> Lines:
+    yield from ("", "", "@dataclass(frozen=True)", f"class {struct['python']}(Payload):")
+    yield from docstring(f"{struct['c']}: {struct['doc']}", "    ")
+    yield from ("", *_layout(struct), *_fields(struct, struct["rows"]))
+
+
+def _command(struct: Table, packet: str, doc: str, python: str) -> Lines:
+    """A command; its request number is not a field, since the link gives it."""
+    yield from ("", "", "@dataclass(frozen=True)", f"class {python}(Command):")
+    yield from docstring(f"{packet}: {doc}", "    ")
+    yield from ("", f"    TYPE: ClassVar[PacketType] = PacketType.{packet}")
+    yield from (*_layout(struct), *_fields(struct, struct["rows"][1:]))
+    if struct.get("bytes_follow"):
+        yield "    data: bytes = b\"\""

@@ -1,0 +1,82 @@
+"""The tables say the same everywhere: what is written from them is up to date, the core's table of
+options is Python's, and all that the headers declare reaches Python."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import subprocess
+import sys
+from dataclasses import asdict, fields
+
+import pytest
+from build_tools import CSRC, ROOT
+
+from eitskin.core.engine import load_core
+from eitskin.core.options_table import CHOICES, OF_MODEL, RANGES, OptionFields
+from eitskin.model.eitm import encode_model
+from eitskin.solve.options import default_options
+from small_models import prebuilt
+
+WIDTHS = ("float32", "float64")
+
+
+def test_what_is_written_from_the_tables_is_up_to_date() -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "tables" / "make_tables.py"), "--check"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, f"run  python tables/make_tables.py\n{done.stdout}{done.stderr}"
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_cores_options_are_pythons(width: str) -> None:
+    """Names in order, places, sizes and ranges."""
+    module = load_core(width)
+    ffi, count = module.ffi, module.ffi.new("uint32_t *")
+    table = module.lib.eits_option_table(count)
+    places = dict(ffi.typeof("eits_options").fields)
+    named = [ffi.string(table[k].name).decode() for k in range(count[0])]
+    assert named == list(places)
+    assert sorted(named) == sorted(one.name for one in fields(OptionFields))
+    for k, name in enumerate(named):
+        one = table[k]
+        assert one.offset == places[name].offset
+        assert one.size == ffi.sizeof(places[name].type)
+        if name in RANGES:
+            assert (one.least, one.greatest) == pytest.approx(RANGES[name], rel=1e-7)
+        else:
+            choices = CHOICES.get(name, (False, True))
+            assert (one.least, one.greatest) == (0, len(choices) - 1)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_models_options_are_the_same_in_both(width: str) -> None:
+    module, model = load_core(width), prebuilt()[0]
+    blob = encode_model(model)
+    memory = module.ffi.new("uint64_t[]", len(blob) // 8 + 2)
+    start = int(module.ffi.cast("uintptr_t", memory)) % 16
+    aligned = module.ffi.cast("uint8_t *", memory) + (16 - start) % 16
+    module.ffi.memmove(aligned, blob, len(blob))
+    opened, options = module.ffi.new("eits_model *"), module.ffi.new("eits_options *")
+    assert module.lib.eits_model_open(opened, aligned, len(blob)) == 0
+    assert module.lib.eits_options_default(opened, options) == 0
+    for name, value in asdict(default_options(model)).items():
+        stated = CHOICES[name].index(value) if name in CHOICES else value
+        assert getattr(options, name) == pytest.approx(float(stated), rel=1e-7)
+    assert {one.name for one in fields(model.defaults)} >= set(OF_MODEL)
+
+
+@pytest.mark.parametrize("name", ["_core_f32", "_core_f64"])
+def test_python_sees_all_that_the_headers_declare(name: str) -> None:
+    module = importlib.import_module(f"eitskin.core.{name}")
+    text = "\n".join(path.read_text() for path in (CSRC / "include" / "eitskin").glob("*.h"))
+    bare = re.sub(r"/\*.*?\*/", " ", text, flags=re.S)
+    declared = set(re.findall(r"\b(eits_\w+)\([^()]*\);", bare))
+    types = set(re.findall(r"\} (eits_\w+);", bare))
+    assert len(declared) > 20
+    assert len(types) > 20
+    assert declared <= set(dir(module.lib))
+    assert types <= set(module.ffi.list_types()[0])
