@@ -7,8 +7,8 @@
 
 static const char TAGS[SMALL_SECTIONS + 1][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU",
                                                  "SENS", "COLW", "GRID", "DEFS", "GOLD",
-                                                 "SCAL", "META", "FLDS"};
-enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, META, FLDS };
+                                                 "SCAL", "WHIT", "META", "FLDS"};
+enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, WHIT, META, FLDS };
 
 void *small_aligned(void **memory, size_t size)
 {
@@ -247,8 +247,63 @@ static void fill_fields(const small_spec *spec, const uint32_t *cells, uint32_t 
     }
 }
 
-static void fill_sections(const small_spec *spec, uint32_t stride,
-                          uint8_t *const at[SMALL_SECTIONS + 1])
+/* P_i . P_j of what was written. */
+static double product_of_rows(const uint8_t *redu, uint32_t stride, uint32_t i, uint32_t j)
+{
+    double sum = 0;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        float a, b;
+        memcpy(&a, redu + 4 * ((size_t)k * stride + i), 4);
+        memcpy(&b, redu + 4 * ((size_t)k * stride + j), 4);
+        sum += (double)a * (double)b;
+    }
+    return sum;
+}
+
+/* How P and S were whitened, as the builder says it; 0 where they have another form. */
+static int fill_row_form(const small_spec *spec, const double *s, uint32_t n, uint32_t stride,
+                         const uint8_t *redu, uint8_t *whit)
+{
+    double energy[1024], square[1024], s1 = 0, s1_square = 0, mu = 0;
+    uint32_t weakest = 0;
+    for (uint32_t i = 0; i < spec->rank; ++i) {
+        energy[i] = product_of_rows(redu, stride, i, i);
+        square[i] = 0;
+        for (uint32_t j = 0; j < n; ++j)
+            square[i] += s[(size_t)j * spec->rank + i] * s[(size_t)j * spec->rank + i];
+        if (!(energy[i] > 0))
+            return 0;
+        for (uint32_t j = 0; j < i; ++j) {
+            if (fabs(product_of_rows(redu, stride, i, j)) > 1e-5 * sqrt(energy[i] * energy[j]))
+                return 0;
+        }
+        weakest = energy[i] > energy[weakest] ? i : weakest;
+        if (square[i] / energy[i] > s1 * s1) {
+            s1 = sqrt(square[i] / energy[i]);
+            s1_square = square[i];
+        }
+    }
+    mu = (1 - square[weakest]) / energy[weakest];
+    for (uint32_t i = 0; i < spec->rank; ++i) {
+        if (fabs(square[i] + mu * energy[i] - 1) > 0.01)
+            return 0;
+    }
+    small_put_f32(whit, mu > 0 ? (float)(mu / (s1 * s1)) : 0);
+    small_put_f32(whit + 4, (float)s1);
+    small_put_f32(whit + 8, (float)s1_square);
+    for (uint32_t i = 0; i < spec->rank; ++i) {
+        uint8_t *row = whit + 16 + 4 * i;
+        small_put_f32(row, (float)(1 / (sqrt(energy[i]) * s1)));
+        small_put_f32(row + 4 * stride, (float)(square[i] / energy[i] / (s1 * s1)));
+        small_put_f32(row + 8 * stride, (float)energy[i]);
+        small_put_f32(row + 12 * stride, (float)(square[i] / energy[i]));
+    }
+    return 1;
+}
+
+/* Returns whether the model says how it was whitened. */
+static int fill_sections(const small_spec *spec, uint32_t stride,
+                         uint8_t *const at[SMALL_SECTIONS + 1])
 {
     uint32_t cells[64 * 64];
     const uint32_t n = kept_cells(spec, cells);
@@ -269,7 +324,6 @@ static void fill_sections(const small_spec *spec, uint32_t stride,
     for (uint32_t i = 0; i < 6; ++i)
         small_put_f32(at[DIMS] + 40 + 4 * i, numbers[i]);
     store_s(spec, s, n, stride, at[SENS], at[SCAL]);
-    free(s);
     fill_protocol(at[PROT], at[FOLD]);
     uint64_t state = 20240918;
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -297,6 +351,9 @@ static void fill_sections(const small_spec *spec, uint32_t stride,
     memcpy(at[META], "{}", 2);
     if (spec->fields)
         fill_fields(spec, cells, n, at[FLDS]);
+    const int says = fill_row_form(spec, s, n, stride, at[REDU], at[WHIT]);
+    free(s);
+    return says;
 }
 
 small_model small_model_make(small_spec spec)
@@ -319,6 +376,7 @@ small_model small_model_make(small_spec spec)
                                                 64,
                                                 (2 * SMALL_ROWS + n) * 4,
                                                 n * 4,
+                                                16 + 16 * stride,
                                                 2,
                                                 16 + n * SMALL_FIELDS_STRIDE * 2};
     const int integer = spec.storage == EITS_STORAGE_I16 || spec.storage == EITS_STORAGE_I8;
@@ -338,7 +396,8 @@ small_model small_model_make(small_spec spec)
         at[p] = made.blob + offset;
         offset += (sizes[p] + 15u) & ~15u;
     }
-    fill_sections(&spec, stride, at);
+    if (!fill_sections(&spec, stride, at))
+        memcpy(made.blob + 64 + 16 * WHIT, "XTRW", 4); /* readers skip it */
     memcpy(made.blob, "EITM", 4);
     small_put_u16(made.blob + 4, 1);
     small_put_u32(made.blob + 8, total);

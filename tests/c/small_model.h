@@ -15,7 +15,7 @@ enum {
     SMALL_ROWS = 40,
     SMALL_PAIRS = 19,
     SMALL_FOLDED = 21,
-    SMALL_SECTIONS = 12,
+    SMALL_SECTIONS = 13,
     SMALL_FIELDS_STRIDE = 24
 };
 

@@ -5,6 +5,7 @@
 
 #include "eitskin/frame.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -254,6 +255,38 @@ static void unknown_and_repeated_sections(void)
     CHECK_EQUAL(with_entry(TINY, "META", 8, 0), EITS_OK);
 }
 
+/* What a model says of its whitening must fit its P and itself; a model may say nothing. */
+static void row_forms(void)
+{
+    const small_spec spec = {.rank = 5, .side = 6, .shape = SMALL_WHITENED};
+    small_model made = small_model_make(spec);
+    uint32_t size;
+    uint8_t *form = small_model_section(&made, "WHIT", &size);
+    eits_model model;
+    CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
+    CHECK_EQUAL(size, 16 + 16 * 8);
+    CHECK(model.row_form.scale == (const float *)(const void *)(form + 16));
+    CHECK_NEAR(model.row_form.mu, SMALL_REGULARISATION, 1e-6);
+    for (uint32_t at = 0; at < size; at += 4) {
+        const uint32_t kept = small_get_u32(form + at), row = (at - 16) / 32, i = (at - 16) / 4 % 8;
+        const int counts = at == 4 || (at >= 16 && i < 5 && (row != 1 || i < 3) && row < 4);
+        float value;
+        memcpy(&value, form + at, 4);
+        small_put_f32(form + at, value * 1.03f);
+        small_model_seal(&made);
+        if (counts)
+            CHECK_EQUAL(open_small(&made), EITS_E_MODEL_VALUE);
+        small_put_f32(form + at, (float)NAN);
+        small_model_seal(&made);
+        CHECK_EQUAL(open_small(&made),
+                    at == 12 || (at >= 16 && i >= 5) ? EITS_OK : EITS_E_MODEL_VALUE);
+        small_put_u32(form + at, kept);
+    }
+    small_model_free(&made);
+    CHECK_EQUAL(with_entry(spec, "WHIT", 8, size - 4), EITS_E_MODEL_SECTION);
+    CHECK_EQUAL(with_entry(spec, "WHIT", 0, tag_of("ZZZZ")), EITS_OK);
+}
+
 static void numbers_of_sections(void)
 {
     static const uint32_t counts[] = {0,   1,   SMALL_SECTIONS - 1, 128,
@@ -290,6 +323,7 @@ int main(void)
     header_fields();
     missing_wrong_sized_and_misplaced_sections();
     unknown_and_repeated_sections();
+    row_forms();
     numbers_of_sections();
     return checks_report("model");
 }

@@ -135,6 +135,18 @@ typedef struct eits_force {
     const float *gain;
 } eits_force;
 
+/* How P and S were whitened, as the model says (section WHIT): P = diag(w) U', S = diag(s w) V',
+ * w_i = (s_i^2 + mu s_1^2)^-1/2. By row of P, `rank` numbers each. */
+typedef struct eits_row_form {
+    const float *scale;    /* 1 / (w_i s_1); NULL: the model does not say how it was whitened */
+    const float *strength; /* (s_i / s_1)^2 */
+    const float *energy;   /* |P_i|^2 = w_i^2 */
+    const float *square;   /* s_i^2 */
+    float mu;
+    float s1;        /* in the units of 1 / P */
+    float s1_square; /* |S_1|^2 */
+} eits_row_form;
+
 typedef struct eits_model {
     uint32_t n_electrodes;
     uint32_t n_rows;   /* rows of the protocol table: voltages in a frame */
@@ -162,6 +174,7 @@ typedef struct eits_model {
     const eits_defaults *defaults;
     eits_golden golden;
     eits_force force;
+    eits_row_form row_form;
     const char *meta; /* JSON, not terminated by 0; NULL if absent */
     uint32_t meta_size;
 } eits_model;

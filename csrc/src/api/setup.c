@@ -163,7 +163,7 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     lay_out_columns(made, &a);
     if (size >= eits_workspace_size(model, 1))
         lay_out_panels(made, &a);
-    eits_learn_range(made, &made->scratch);
+    eits_learn_range(made);
     eits_whitening_init(made, &made->scratch);
     /* Learned from the model above, once: it does not change. */
     *ctx = made;

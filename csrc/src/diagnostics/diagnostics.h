@@ -98,8 +98,8 @@ void eits_reference_unmask(eits_context *ctx);
 uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_scratch *scratch,
                                      const eits_real *frame);
 
-/* What mismatch and prediction need to know of P and S; once, at the start. */
-void eits_learn_range(eits_context *ctx, const eits_scratch *scratch);
+/* What mismatch and prediction need to know of P and S, as the model says it; once, at the start. */
+void eits_learn_range(eits_context *ctx);
 
 /* How much of frame.d the model cannot give, into info; returns 1 where that stands out.
  * frame.y is P d, not yet projected, no fold left out; projection.gain_drift is the drift

@@ -1,90 +1,28 @@
-/* What of the data the model's gives, and a reference that was taken with a touch on
- * the skin. */
+/* How much of the data lies outside the model's range, and a reference that was taken with a touch
+ * on the skin. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
 #include "frame/projection.h"
 #include "kernels/column.h"
 
-/* P's rows are whitened and orthogonal where the model was reduced by a singular value
- * decomposition: P P' = diag(|P_i|^2). Then |d|^2 - sum (P d)_i^2 / |P_i|^2 is what lies outside.
- * Told by two probes: P (P'v) against |P_i|^2 v. */
-static const eits_real ORTHOGONAL = R(1e-3);
-
-/* range.inverse = |P_i|^2 for now. */
-static void row_energies(eits_context *ctx, const eits_scratch *scratch)
+/* The rows of P are orthogonal, so that |d|^2 - sum (P d)_i^2 / |P_i|^2 is what lies outside of
+ * them. `shrink`: ridge weights s_i^2 / (s_i^2 + nu s_1^2) over |P_i|^2, so that P' shrink P d is
+ * what the rows predict of d. */
+void eits_learn_range(eits_context *ctx)
 {
-    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        const eits_real *column = eits_column(&ctx->model->reduction, k, scratch->row[0]);
-        for (uint32_t i = 0; i < ctx->model->rank; ++i)
-            ctx->range.inverse[i] = eits_fma(column[i], column[i], ctx->range.inverse[i]);
-    }
-}
-
-/* Two sign vectors of different periods: rows that are not orthogonal show in one of them at
- * least, at the price of two products rather than of all pairs. */
-static int is_orthogonal(eits_context *ctx, const eits_scratch *scratch, uint32_t period)
-{
-    eits_real *column = scratch->row[0], *probe = scratch->row[1];
-    const uint32_t rank = ctx->model->rank, folds = ctx->model->n_folded;
-    eits_zero(probe, EITS_STRIDE(rank));
-    for (uint32_t i = 0; i < rank; ++i) {
-        if (!(ctx->range.inverse[i] > 0))
-            return 0;
-        probe[i] = (i * period % 7u < 3 ? R(1.0) : R(-1.0)) / eits_sqrt(ctx->range.inverse[i]);
-    }
-    for (uint32_t k = 0; k < folds; ++k) {
-        scratch->index[k] = k;
-        scratch->value[k] =
-            eits_dot(ctx->kernels, eits_column(&ctx->model->reduction, k, column), probe, rank);
-    }
-    ctx->kernels->mul(&ctx->model->reduction, scratch->index, scratch->value, folds, column);
-    for (uint32_t i = 0; i < rank; ++i) {
-        const eits_real off = column[i] - ctx->range.inverse[i] * probe[i];
-        if (!(eits_fabs(off) <= ORTHOGONAL * eits_sqrt(ctx->range.inverse[i])))
-            return 0;
-    }
-    return 1;
-}
-
-/* Ridge weights s_i^2 / (s_i^2 + nu s_1^2), s_i^2 = |S_i|^2 / |P_i|^2 the squared singular values
- * of the unwhitened problem; over |P_i|^2 again, so that d is predicted by P' shrink P d.
- *
- * Ridge rather than plain projection: with as many directions as the data allow, a prediction
- * would follow the noise of the very folds that it is to judge. */
-static void make_shrink(eits_context *ctx, const eits_scratch *scratch)
-{
-    const eits_matrix *s = &ctx->model->sensitivity;
+    const eits_row_form *form = &ctx->model->row_form;
+    const uint32_t rank = form->scale == NULL ? 0 : ctx->model->rank;
     eits_real max = 0;
-    for (uint32_t j = 0; j < s->cols; ++j) {
-        const eits_real *column = eits_column(s, j, scratch->row[1]),
-                        scale = eits_column_scale(s, j);
-        for (uint32_t i = 0; i < s->rows; ++i) {
-            const eits_real value = scale * column[i];
-            ctx->range.shrink[i] = eits_fma(value, value, ctx->range.shrink[i]);
-        }
-    }
-    for (uint32_t i = 0; i < s->rows; ++i) {
-        ctx->range.shrink[i] /= ctx->range.inverse[i];
-        max = ctx->range.shrink[i] > max ? ctx->range.shrink[i] : max;
-    }
-    for (uint32_t i = 0; i < s->rows; ++i) {
-        const eits_real squared = ctx->range.shrink[i];
-        ctx->range.inverse[i] = 1 / ctx->range.inverse[i];
+    for (uint32_t i = 0; i < rank; ++i)
+        max = (eits_real)form->square[i] > max ? (eits_real)form->square[i] : max;
+    for (uint32_t i = 0; i < rank; ++i) {
+        const eits_real squared = (eits_real)form->square[i];
+        ctx->range.inverse[i] = 1 / (eits_real)form->energy[i];
         ctx->range.shrink[i] =
             squared / eits_fma(EITS_OUTLIER_RIDGE, max, squared) * ctx->range.inverse[i];
     }
-    ctx->range.known =
-        eits_all_finite(ctx->range.shrink, s->rows) && eits_all_finite(ctx->range.inverse, s->rows);
-}
-
-void eits_learn_range(eits_context *ctx, const eits_scratch *scratch)
-{
-    row_energies(ctx, scratch);
-    if (is_orthogonal(ctx, scratch, 3) && is_orthogonal(ctx, scratch, 5))
-        make_shrink(ctx, scratch);
-    eits_zero(scratch->row[0], EITS_STRIDE(ctx->model->rank));
-    eits_zero(scratch->row[1], EITS_STRIDE(ctx->model->rank));
+    ctx->range.known = rank > 0 && eits_all_finite(ctx->range.shrink, rank);
 }
 
 /* range.off_range = what of the drift the model cannot give: along - P' |P_i|^-2 P along, in

@@ -9,97 +9,9 @@
 
 /* e over mu': how little a direction that no row sees is held to zero */
 static const eits_real LOST = R(0.01);
-static const eits_real ORTHOGONAL =
-    R(1e-5); /* cosine between rows of P
-              *
-              * |S_i|^2 + mu s_1^2 w_i^2 is 1 within this: S is rounded to 8 bits at worst */
-static const eits_real FORM = R(0.01);
 /* Rounding makes the rows of S a little less than orthogonal, and F with a lower regularisation
  * must not exceed the stated constant. */
 static const eits_real STEP_MARGIN = R(0.995);
-
-/* ---- the model's form ---- */
-
-static eits_real greatest_entry(const eits_matrix *p, eits_real *copy)
-{
-    eits_real greatest = 0;
-    for (uint32_t k = 0; k < p->cols; ++k) {
-        const eits_real *column = eits_column(p, k, copy);
-        for (uint32_t i = 0; i < p->rows; ++i)
-            greatest = eits_fabs(column[i]) > greatest ? eits_fabs(column[i]) : greatest;
-    }
-    return greatest;
-}
-
-/* |P_i|^2 / greatest^2 into `square`; 0 where two rows are not orthogonal or one is zero. */
-static int orthogonal_rows(eits_context *ctx, const eits_scratch *scratch, eits_real greatest,
-                           eits_real *square)
-{
-    const eits_matrix *p = &ctx->model->reduction;
-    eits_real *gram = ctx->whitening.map, *v = scratch->row[3];
-    eits_zero(gram, EITS_PADDED_TRIANGLE(p->rows));
-    for (uint32_t k = 0; k < p->cols; ++k) {
-        const eits_real *column = eits_column(p, k, v);
-        for (uint32_t i = 0; i < p->rows; ++i)
-            v[i] = column[i] / greatest;
-        for (uint32_t i = 0; i < p->rows; ++i)
-            add_row(ctx, i, row_of(ctx, gram, i), v[i], v);
-    }
-    for (uint32_t i = 0; i < p->rows; ++i) {
-        square[i] = row_of(ctx, gram, i)[i];
-        if (!(square[i] > 0))
-            return 0;
-        for (uint32_t j = 0; j < i; ++j) {
-            if (!(eits_fabs(row_of(ctx, gram, j)[i]) <=
-                  ORTHOGONAL * eits_sqrt(square[i]) * eits_sqrt(square[j])))
-                return 0;
-        }
-    }
-    return 1;
-}
-
-/* |S_i|^2. */
-static void squares_of_rows(const eits_context *ctx, const eits_scratch *scratch, eits_real *square)
-{
-    const eits_matrix *s = &ctx->model->sensitivity;
-    for (uint32_t j = 0; j < s->cols; ++j) {
-        const eits_real *column = eits_column(s, j, scratch->row[3]),
-                        scale = eits_column_scale(s, j);
-        for (uint32_t i = 0; i < s->rows; ++i) {
-            const eits_real v = scale * column[i];
-            square[i] = eits_fma(v, v, square[i]);
-        }
-    }
-}
-
-/* With w^2 (over greatest^2) in row_scale and |S_i|^2 in row_strength: what they are to become. */
-static int take_form(eits_context *ctx, eits_real greatest)
-{
-    const uint32_t rank = ctx->model->rank;
-    eits_real *w2 = ctx->whitening.row_scale, *s2 = ctx->whitening.row_strength;
-    uint32_t weakest = 0, strongest = 0;
-    for (uint32_t i = 0; i < rank; ++i) {
-        weakest = w2[i] > w2[weakest] ? i : weakest;
-        strongest = s2[i] / w2[i] > s2[strongest] / w2[strongest] ? i : strongest;
-    }
-    const eits_real per_square = (1 - s2[weakest]) / w2[weakest]; /* mu s_1^2 */
-    const eits_real top = s2[strongest], top_w2 = w2[strongest];
-    for (uint32_t i = 0; i < rank; ++i) {
-        if (!(eits_fabs(eits_fma(per_square, w2[i], s2[i]) - 1) <= FORM))
-            return 0;
-    }
-    ctx->whitening.s1 = eits_sqrt(top / top_w2) / greatest;
-    if (!(ctx->whitening.s1 > R(1e-30)) || !(ctx->whitening.s1 < R(1e30)))
-        return 0;
-    ctx->whitening.s1_square = top;
-    ctx->whitening.mu = per_square > 0 ? per_square * top_w2 / top : 0;
-    for (uint32_t i = 0; i < rank; ++i) {
-        s2[i] = s2[i] / w2[i] * (top_w2 / top);
-        w2[i] = eits_sqrt(top_w2 / w2[i]) / eits_sqrt(top);
-    }
-    return eits_all_finite(w2, rank) && eits_all_finite(s2, rank) &&
-           eits_is_finite(ctx->whitening.mu);
-}
 
 /* |P|^2. */
 static eits_real energy_of(const eits_context *ctx, eits_real *copy)
@@ -115,17 +27,17 @@ static eits_real energy_of(const eits_context *ctx, eits_real *copy)
 
 void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch)
 {
-    ctx->whitening.energy = energy_of(ctx, scratch->row[3]);
-    const eits_real greatest = greatest_entry(&ctx->model->reduction, scratch->row[3]);
-    if (!(greatest > 0) || !eits_is_finite(1 / greatest) ||
-        !orthogonal_rows(ctx, scratch, greatest, ctx->whitening.row_scale))
-        return;
-    squares_of_rows(ctx, scratch, ctx->whitening.row_strength);
-    ctx->whitening.possible = (uint32_t)take_form(ctx, greatest);
-    ctx->whitening.energy_stored = ctx->whitening.energy;
+    const eits_row_form *form = &ctx->model->row_form;
+    ctx->whitening.energy = ctx->whitening.energy_stored = energy_of(ctx, scratch->row[3]);
+    ctx->whitening.possible = form->scale != NULL;
+    for (uint32_t i = 0; ctx->whitening.possible && i < ctx->model->rank; ++i) {
+        ctx->whitening.row_scale[i] = (eits_real)form->scale[i];
+        ctx->whitening.row_strength[i] = (eits_real)form->strength[i];
+    }
+    ctx->whitening.s1 = (eits_real)form->s1;
+    ctx->whitening.s1_square = (eits_real)form->s1_square;
+    ctx->whitening.mu = (eits_real)form->mu;
 }
-
-/* ---- the whitening ---- */
 
 static int in_use(const eits_context *ctx, uint32_t k)
 {

@@ -12,9 +12,8 @@
 
 #include "context/context.h"
 
-/* Whether the model has the builder's form, and with what numbers: w and s from the rows of P and
- * S, mu from how they relate. Otherwise rows left out are minimised over instead (frame.c). The
- * triangles' memory is free for it meanwhile. */
+/* How the model was whitened, where it says so (eits_row_form). Otherwise rows left out are
+ * minimised over instead (fold.c). Uses scratch->row[3]. */
 void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch);
 
 /* Make the whitening for the folded rows that frame.sides has; sets whitening.form.

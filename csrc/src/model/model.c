@@ -4,6 +4,7 @@
 
 #include "model/options.h"
 
+#include <float.h>
 #include <string.h>
 
 enum {
@@ -11,6 +12,7 @@ enum {
     ENTRY_SIZE = 16,
     DIMS_SIZE = 64,
     FIELDS_HEAD = 16,
+    ROW_FORM_HEAD = 16,
     MIRROR_ROWS = 4,
     MAX_SECTIONS = 256
 };
@@ -21,7 +23,7 @@ typedef struct section {
 } section;
 
 typedef struct sections {
-    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, force;
+    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, force, whit;
 } sections;
 
 static uint32_t read_u32(const uint8_t *bytes)
@@ -113,10 +115,11 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
 
 static section *find_slot(sections *found, const uint8_t *tag)
 {
-    static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOAD";
+    static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOADWHIT";
     section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref, &found->redu,
                         &found->sens, &found->scal, &found->colw, &found->grid, &found->defs,
-                        &found->gold, &found->meta, &found->flds, &found->force};
+                        &found->gold, &found->meta, &found->flds, &found->force,
+                        &found->whit};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];
@@ -355,6 +358,57 @@ static eits_status read_force(eits_force *force, const section *found)
     return EITS_OK;
 }
 
+static int near(float value, float wanted, float tolerance)
+{
+    return between(value, wanted - tolerance * wanted, wanted + tolerance * wanted);
+}
+
+/* Whether row i says the same of itself in each of its numbers, and of P. */
+static int row_fits(const eits_model *model, const eits_row_form *form, uint32_t i)
+{
+    const float *p = model->reduction.data;
+    const float s1 = form->s1, energy = form->energy[i], square = form->square[i],
+                unit = form->scale[i] * s1;
+    float sum = 0;
+    for (uint32_t k = 0; k < model->n_folded; ++k) {
+        const float value = p[(size_t)k * model->reduction.stride + i];
+        sum += value * value;
+    }
+    return between(energy, FLT_MIN, 1e30f) && between(form->scale[i], FLT_MIN, 1e30f) &&
+           near(sum, energy, 1e-3f) && near(unit * unit * energy, 1, 1e-3f) &&
+           near(square * energy + form->mu * (s1 * s1) * energy, 1, 1e-2f) &&
+           between(form->strength[i] * (s1 * s1) - square, -1e-3f * (s1 * s1), 1e-3f * (s1 * s1));
+}
+
+/* How the model was whitened, where it says so: three numbers, then four rows of the stride. */
+static eits_status read_row_form(eits_model *model, const section *found)
+{
+    const uint32_t rank = model->rank, stride = model->reduction.stride;
+    if (found->data == NULL)
+        return EITS_OK;
+    if (found->size != ROW_FORM_HEAD + 16u * stride)
+        return EITS_E_MODEL_SECTION;
+    const float *rows = (const float *)(const void *)(found->data + ROW_FORM_HEAD);
+    const eits_row_form form = {.mu = read_f32(found->data),
+                                .s1 = read_f32(found->data + 4),
+                                .s1_square = read_f32(found->data + 8),
+                                .scale = rows,
+                                .strength = rows + stride,
+                                .energy = rows + 2 * stride,
+                                .square = rows + 3 * stride};
+    float greatest = 0;
+    int fits = between(form.mu, 0, 1e30f) && between(form.s1, 1e-15f, 1e15f) &&
+               between(form.s1_square, FLT_MIN, 1.01f);
+    for (uint32_t i = 0; fits && i < rank; ++i) {
+        fits = row_fits(model, &form, i);
+        greatest = form.square[i] > greatest ? form.square[i] : greatest;
+    }
+    if (!fits || !near(greatest, form.s1 * form.s1, 1e-3f))
+        return EITS_E_MODEL_VALUE;
+    model->row_form = form;
+    return EITS_OK;
+}
+
 static void point_into(eits_model *model, const sections *found)
 {
     model->protocol = found->prot.data;
@@ -400,6 +454,8 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
         status = read_fields(&opened, &found.flds);
     if (status == EITS_OK)
         status = read_force(&opened.force, &found.force);
+    if (status == EITS_OK)
+        status = read_row_form(&opened, &found.whit);
     if (status == EITS_OK)
         *model = opened;
     return status;

@@ -23,6 +23,7 @@ from eitskin.model.reduction import (
     reduce_jacobian,
     spectral_norm_squared,
 )
+from eitskin.model.row_form import row_form
 from eitskin.model.storage import STORAGES, store
 from eitskin.skin.mirror import rim_mirror
 from eitskin.skin.protocol import Protocol, protocol_to_table
@@ -138,6 +139,7 @@ def make_model(
         fields=(
             stored_fields(skin, protocol, linear) if settings.data_kind == "difference" else None
         ),
+        row_form=row_form(projection, stored),
     )
     return replace(model, golden=replace(model.golden, image=_golden_image(model)))
 

@@ -20,12 +20,13 @@ from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
 from eitskin.model.force_law import decode_load, encode_load
 from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
+from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 2
+MAJOR, MINOR = 1, 3
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
@@ -81,6 +82,8 @@ def encode_model(model: Model) -> bytes:
     }
     if model.load is not None:
         sections["LOAD"] = encode_load(model.load)
+    if model.row_form is not None:
+        sections["WHIT"] = model.row_form.encode()
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -206,7 +209,7 @@ def _split(blob: bytes, where: str) -> Sections:
             raise ModelError(
                 f"{where}: section {name!r} is misplaced or repeated; build the model again"
             )
-        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD"):
+        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT"):
             if flags & REQUIRED_FLAG:
                 raise ModelError(
                     f"{where}: needs section {name!r}, which this eitskin does not know; upgrade"
@@ -392,6 +395,7 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
     columns = np.frombuffer(sections["SENS"], dtype=DTYPES[name]).reshape(d.n_pixels, d.stride)
     if not np.isfinite(columns).all():
         _refuse(where, "a number in section 'SENS' that is not finite")
+    projection = _floats(sections, "REDU", (d.n_folded, d.stride), where)[:, : d.rank].T
     golden = _floats(sections, "GOLD", (2 * d.n_rows + d.n_pixels,), where)
     return Model(
         protocol=protocol,
@@ -400,7 +404,7 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         data_kind=DATA_KINDS[d.kind],
         rank=d.rank,
         v_ref_v=_floats(sections, "VREF", (d.n_folded,), where),
-        projection=_floats(sections, "REDU", (d.n_folded, d.stride), where)[:, : d.rank].T,
+        projection=projection,
         stored=StoredMatrix(
             name,
             columns,
@@ -414,6 +418,9 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         meta=_read_meta(sections["META"], where) if "META" in sections else {},
         fields=_read_fields(sections["FLDS"], d, where) if "FLDS" in sections else None,
         load=decode_load(sections["LOAD"], where) if "LOAD" in sections else None,
+        row_form=(
+            decode_row_form(sections["WHIT"], projection, where) if "WHIT" in sections else None
+        ),
     )
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw
+from eitskin.model.row_form import RowForm
 from eitskin.model.storage import StoredMatrix
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin, skin_from_table
@@ -92,6 +93,7 @@ class Model:
     meta: dict[str, Any] = field(default_factory=dict)
     fields: Fields | None = None
     load: LoadLaw | None = None
+    row_form: RowForm | None = None
 
     @cached_property
     def sensitivity(self) -> npt.NDArray[np.float64]:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.results import Options
 from eitskin.model.model import Model
+from eitskin.model.row_form import RowForm
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -46,7 +47,6 @@ CROWD_WEIGHTS, CROWD_OFFSET, CROWD_MIN = (
 )
 CROWD_FAR, CROWD_STRONG, CROWD_CLEAR, CROWD_FAINT = 2.0, 10.0, 3.0, 3.0
 ROBUST = 1.4826
-ORTHOGONAL = 1e-3
 
 
 def robust(values: FloatArray) -> float:
@@ -84,16 +84,11 @@ class Sheet(NamedTuple):
     shrink: FloatArray
 
     @classmethod
-    def of(cls, p: FloatArray, s: FloatArray) -> Sheet | None:
-        """None where the rows of ``p`` (r, k) are not orthogonal."""
-        gram = p @ p.T
-        energy = np.diag(gram)
-        if (
-            not (energy > 0).all()
-            or np.abs(gram / np.sqrt(np.outer(energy, energy)) - np.eye(len(p))).max() > ORTHOGONAL
-        ):
+    def of(cls, rows: RowForm | None) -> Sheet | None:
+        """None where the model does not say."""
+        if rows is None:
             return None
-        squared = (s**2).sum(axis=1) / energy
+        energy, squared = rows.energy.astype(np.float64), rows.square.astype(np.float64)
         return cls(1 / energy, squared / (squared + OUTLIER_RIDGE * squared.max()) / energy)
 
 
@@ -142,7 +137,7 @@ class Examiner:
     @cached_property
     def sheet(self) -> Sheet | None:
         """What is known of P."""
-        return Sheet.of(self._p, self.model.sensitivity)
+        return Sheet.of(self.model.row_form)
 
     # ---- rows and electrodes ----
 

@@ -75,7 +75,7 @@ class ReferenceEngine:
         self.options = default_options(model)
         self._s, self._p = model.sensitivity, model.projection.astype(np.float64)
         self._v_ref = model.v_ref_v.astype(np.float64)
-        self._form = form_of(self._p, self._s)
+        self._form = form_of(model)
         self._whitening: Whitening | None = None
         self.seen = self._s
         self._bad = np.zeros(model.protocol.n_rows, dtype=bool)

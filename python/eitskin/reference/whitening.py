@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.model.model import Model
+
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-ORTHOGONAL = 1e-5
-FORM = 0.01
 MIN_REGULARISATION_FRACTION, MIN_REGULARISATION = 0.1, 1e-4
 LOST = 0.01
 MAX_REGULARISATION, AS_IT_IS = 1.0, 1.01
@@ -52,28 +52,18 @@ class Whitening:
     energy_ratio: float = 1.0
 
 
-def form_of(projection: FloatArray, sensitivity: FloatArray) -> WhitenedForm | None:
-    """What P (r, k) and S (r, n) are made of; None where they have another form."""
-    w = np.linalg.norm(projection, axis=1)
-    if not w.min() > 0:
+def form_of(model: Model) -> WhitenedForm | None:
+    """What the model's P and S are made of, as it says; None where it does not."""
+    rows = model.row_form
+    if rows is None:
         return None
-    left = (projection / w[:, None]).T
-    squares = np.einsum("ij,ij->i", sensitivity, sensitivity)
-    weakest = int(np.argmax(w))
-    regularisation = (1 - squares[weakest]) / w[
-        weakest
-    ] ** 2  # mu s_1^2, since |S_i|^2 + mu s_1^2 w_i^2 = 1
-    whitened = bool((np.abs(squares + regularisation * w**2 - 1) <= FORM).all())
-    if not whitened or np.abs(left.T @ left - np.eye(len(w))).max() > ORTHOGONAL:
-        return None
-    s = np.sqrt(squares) / w
-    first = int(np.argmax(s))
+    scale = rows.scale.astype(np.float64)
     return WhitenedForm(
-        left,
-        1 / (w * s[first]),
-        (s / s[first]) ** 2,
-        max(0.0, regularisation / s[first] ** 2),
-        float(squares[first]),
+        (model.projection * (scale * rows.s1)[:, None]).T,
+        scale,
+        rows.strength.astype(np.float64),
+        rows.mu,
+        rows.s1_square,
     )
 
 

@@ -201,7 +201,8 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over() -> None:
     )
     assert events.lines(solved(20, **outlier)) == []  # it came back in time
     said = [events.lines(solved(21 + k)) for k in range(FAULT_CLEAR_FRAMES)]
-    assert said == [[]] * (FAULT_CLEAR_FRAMES - 1) + [[f"outlier: over, frame {20 + FAULT_CLEAR_FRAMES}"]]
+    over = f"outlier: over, frame {20 + FAULT_CLEAR_FRAMES}"
+    assert said == [[]] * (FAULT_CLEAR_FRAMES - 1) + [[over]]
 
 
 def test_what_fault_and_head_tell_is_said_once() -> None:

@@ -65,11 +65,11 @@ def test_round_trip(storage: str, data_kind: str) -> None:
 def test_header_as_documented() -> None:
     blob = small_blob()
     assert blob[:4] == b"EITM"
-    assert struct.unpack_from("<HH", blob, 4) == (1, 2)
+    assert struct.unpack_from("<HH", blob, 4) == (1, 3)
     total, crc, count, zero = struct.unpack_from("<4I", blob, 8)
     assert total == len(blob) and total % 16 == 0
     assert crc == zlib.crc32(blob[16:])
-    assert count == 12 and zero == 0
+    assert count == 13 and zero == 0
     assert struct.unpack_from("<Q", blob, 24)[0] == small().protocol.hash
     assert blob[32:64] == bytes(32)
 
@@ -81,7 +81,7 @@ def test_sections_as_documented(storage: str) -> None:
     sections = sections_of(blob)
     required = {"DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD"}
     required |= {"SCAL"} if storage in ("i16", "i8") else set()
-    assert set(sections) == required | {"META", "FLDS"}
+    assert set(sections) == required | {"META", "FLDS", "WHIT"}
     for name, place in sections.items():
         assert place.offset % 16 == 0 and place.offset >= HEADER_SIZE + 16 * len(sections)
         assert place.flags == (1 if name in required else 0)
@@ -175,7 +175,7 @@ def test_a_newer_major_is_refused_before_the_checksum() -> None:
     blob = bytearray(tiny_blob())
     blob[4] = 2
     blob[100] ^= 1
-    assert "format is 2.2, this eitskin reads 1.x" in refusal(bytes(blob))
+    assert "format is 2.3, this eitskin reads 1.x" in refusal(bytes(blob))
 
 
 def with_extra_section(tag: bytes, flags: int) -> bytes:
