@@ -1,4 +1,5 @@
-"""The rooms of csrc/src: which may include which, and which part of a context each writes."""
+"""The rooms of csrc/src and firmware: which may include which, and which part of a context each
+writes."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from build_tools import CSRC
+from build_tools import CSRC, ROOT
 
 # from the ground up: a room includes those before it, and itself
 ROOMS = (
@@ -35,6 +36,7 @@ OWNERS = {
     "columns": {"context"},
     "options": set(),
 }
+FIRMWARE = {"hal": set(), "drivers": {"hal", "drivers"}, "app": {"hal", "drivers", "app"}}
 MOST_FILES = 12
 SOURCES = sorted((CSRC / "src").rglob("*.[ch]"))
 
@@ -96,15 +98,30 @@ def test_a_file_keeps_to_its_room(path: Path) -> None:
         assert not re.search(r"\bctx->scratch\b", text)
 
 
-def test_no_circle_of_files() -> None:
-    """A source and its header are one file here."""
+@pytest.mark.parametrize(
+    ("folder", "read"),
+    [
+        (CSRC / "src", ("frame/fold", "context/context")),
+        (ROOT / "firmware", ("app/main_loop", "app/commands")),
+    ],
+    ids=["core", "firmware"],
+)
+def test_no_circle_of_files(folder: Path, read: tuple[str, str]) -> None:
+    """A source and its header are one file here. ``read``: one that includes another."""
     edges: dict[str, set[str]] = {}
-    for path in SOURCES:
-        name = str(path.relative_to(CSRC / "src").with_suffix(""))
+    for path in sorted(folder.rglob("*.[ch]")):
+        name = str(path.relative_to(folder).with_suffix(""))
         others = {other.removesuffix(".h") for other in includes(path.read_text(encoding="ascii"))}
         edges.setdefault(name, set()).update(others - {name})
     assert circle(edges) == []
-    assert "context/context" in edges["frame/fold"]  # they were read at all
+    assert read[1] in edges[read[0]]
+
+
+@pytest.mark.parametrize(("room", "below"), FIRMWARE.items())
+def test_the_firmwares_rooms_know_those_below(room: str, below: set[str]) -> None:
+    for path in sorted((ROOT / "firmware" / room).rglob("*.[ch]")):
+        text = path.read_text(encoding="ascii")
+        assert {name.split("/")[0] for name in includes(text)} <= below, path.name
 
 
 def test_rooms_are_small() -> None:
