@@ -208,7 +208,7 @@ def test_another_model_than_the_prebuilt_one(done: Done, scene: Path, tmp_path: 
         "--model",
         model,
         "--ignore",
-        "model mismatch",
+        "model-mismatch",
     )  # the coarse model does not fit the scene well
     frames = json_lines(done("stream", *given, "--mode", "image", "--json"))
     assert len(frames) == FRAMES + 1 and len(frames[0]["image_s_per_m"]) < 812
@@ -426,10 +426,9 @@ def test_doctor_on_a_board_that_reports_a_fault(
         property(lambda info: as_it_is(type(info)(**{**vars(info), "faults": 1 << 2}))),
     )
     assert main(["doctor", "--device", f"sim:{scene}", "--frames", "4", "--json"]) == 11
-    diagnostics = strict(capsys.readouterr().out)["diagnostics"]
-    assert [diagnostic["name"] for diagnostic in diagnostics] == [
-        "board-electrode-open"
-    ] and diagnostics[0]["repair"] == ""
+    findings = strict(capsys.readouterr().out)["findings"]
+    assert [finding["name"] for finding in findings] == ["board-electrode-open"]
+    assert findings[0]["repair"] == ""
 
 
 # ---- start-up ----
