@@ -264,7 +264,7 @@ static double product_of_rows(const uint8_t *redu, uint32_t stride, uint32_t i, 
 static int fill_row_form(const small_spec *spec, const double *s, uint32_t n, uint32_t stride,
                          const uint8_t *redu, uint8_t *whit)
 {
-    double energy[1024], square[1024], s1 = 0, s1_square = 0, mu = 0;
+    double energy[1024] = {0}, square[1024] = {0}, s1 = 0, s1_square = 0, mu = 0;
     uint32_t weakest = 0;
     for (uint32_t i = 0; i < spec->rank; ++i) {
         energy[i] = product_of_rows(redu, stride, i, i);
