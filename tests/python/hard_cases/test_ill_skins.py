@@ -29,10 +29,7 @@ def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
     host = Host(h.blob, width)
     assert [
         host.status_of(step) for step in (Choose(options), TareStep(as_float32(h.quiet_v(8))))
-    ] == [
-        0,
-        0,
-    ]
+    ] == [0, 0]
     data = []
     for frame in as_float32(h.frames_v(FRAMES)):
         host.solve_frame(frame)
