@@ -35,7 +35,7 @@ static inline eits_context *set_up(bench *b, small_spec spec, int project)
     for (int i = 0; i < SMALL_ROWS; ++i)
         b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
     eits_options o = *eits_get_options(ctx);
-    o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
+    o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_outliers.c */
     o.project_reference = (uint32_t)project;
     o.max_masked = SMALL_ROWS;
     o.iterations = 40;

@@ -54,7 +54,7 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
 
 /* What a touch's strength is made of: the covers' sum at its very place; averaged over places, pi
  * (radius^2 + pixel^2 / 12). */
-static void area(void)
+static void the_area_is_that_of_the_covers(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
@@ -99,7 +99,7 @@ static eits_disc random_disc(uint64_t *state)
     return disc;
 }
 
-static void responses(void)
+static void responses_are_sums_over_the_covers(void)
 {
     uint64_t state = 81;
     for (int storage = 0; storage < 4; ++storage) {
@@ -168,7 +168,7 @@ static int smooth_around(const bench *b, const eits_disc *disc, double step)
     return 1;
 }
 
-static void derivatives(void)
+static void derivatives_agree_with_differences(void)
 {
     uint64_t state = 82;
     const double step = 1e-4;
@@ -248,10 +248,10 @@ static void on_the_skin(void)
 
 int main(void)
 {
-    responses();
-    area();
+    responses_are_sums_over_the_covers();
+    the_area_is_that_of_the_covers();
     far_away_there_is_nothing();
-    derivatives();
+    derivatives_agree_with_differences();
     on_the_skin();
     return checks_report("disc");
 }

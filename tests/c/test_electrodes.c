@@ -3,7 +3,7 @@
 
 /* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that
  * lives, and it is not. */
-static void open_electrodes(void)
+static void open_electrodes_are_named_and_left_out(void)
 {
     for (int kind = 0; kind < 3; ++kind) {
         for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
@@ -48,7 +48,7 @@ static void open_electrodes(void)
 }
 
 /* Nothing on any row is no matter of electrodes. */
-static void all_dead(void)
+static void all_dead_is_a_dead_front_end(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 1);
@@ -126,7 +126,7 @@ static void refused_by_name(void)
     tear_down(&b);
 }
 
-static void bridged_pairs(void)
+static void bridged_pairs_are_named_and_left_out(void)
 {
     for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
         bench b;
@@ -149,7 +149,7 @@ static void bridged_pairs(void)
 }
 
 /* One row across the pair that lives, whichever, and there is no bridge. */
-static void pairs_that_live(void)
+static void living_pairs_are_not_bridged(void)
 {
     for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
         bench b;
@@ -268,13 +268,13 @@ static void impossible_rows(void)
 
 int main(void)
 {
-    open_electrodes();
-    all_dead();
+    open_electrodes_are_named_and_left_out();
+    all_dead_is_a_dead_front_end();
     noise_alone();
     what_a_dead_row_is();
     refused_by_name();
-    bridged_pairs();
-    pairs_that_live();
+    bridged_pairs_are_named_and_left_out();
+    living_pairs_are_not_bridged();
     masked_and_forgotten();
     small_rows();
     impossible_rows();

@@ -37,7 +37,7 @@ static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int proj
         b->frame[i] = b->reference[i] * (eits_real)(1 + 0.2 * small_random(&state));
     eits_options o = *eits_get_options(b->c.ctx);
     o.project_reference = (uint32_t)project;
-    o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_findings.c */
+    o.diagnostics = 0; /* arbitrary frames: what is found wrong with them is for test_outliers.c */
     CHECK_EQUAL(eits_set_options(b->c.ctx, &o), EITS_OK);
     CHECK_EQUAL(eits_reference_set(b->c.ctx, b->reference, SMALL_ROWS), EITS_OK);
     return b->c.ctx;

@@ -55,7 +55,7 @@ static void said_as(eits_context *ctx, const eits_touch *touches, uint32_t count
     CHECK_EQUAL(crowded(ctx, touches, count), expected);
 }
 
-static void crowds(void)
+static void crowds_on_both_sides_of_the_limit(void)
 {
     dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
@@ -114,7 +114,7 @@ static void crowds(void)
 
 /* ---- a stale reference ---- */
 
-static void stale_references(void)
+static void stale_references_on_both_sides_of_the_limit(void)
 {
     static const struct {
         eits_sign sign;
@@ -167,7 +167,7 @@ static int model_mismatch(eits_context *ctx, double off)
     return eits_check_model_mismatch(ctx, &ctx->scratch, &macs);
 }
 
-static void mismatches(void)
+static void mismatches_on_both_sides_of_the_limits(void)
 {
     dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
@@ -239,7 +239,7 @@ static uint32_t odd_folds(eits_context *ctx, const eits_real *newer, const eits_
 
 /* All rows change by 0.04, each pair alike but for 0.1 %: then a reading is odd beyond 12 robust
  * deviations and 5 % of its own. */
-static void odd_readings(void)
+static void odd_readings_on_both_sides_of_the_limit(void)
 {
     dense_bench b;
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
@@ -352,12 +352,12 @@ static void noise_of_any_size(void)
 
 int main(void)
 {
-    crowds();
-    stale_references();
-    mismatches();
+    crowds_on_both_sides_of_the_limit();
+    stale_references_on_both_sides_of_the_limit();
+    mismatches_on_both_sides_of_the_limits();
     noise_of_the_data();
-    odd_readings();
+    odd_readings_on_both_sides_of_the_limit();
     rows_out_of_use();
     noise_of_any_size();
-    return checks_report("judgements");
+    return checks_report("diagnostic limits");
 }

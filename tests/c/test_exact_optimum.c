@@ -77,7 +77,7 @@ static void check_gap(const eits_context *ctx, double max_rel)
     free(x), free(y);
 }
 
-static void the_optimum(void)
+static void both_solvers_reach_the_optimum(void)
 {
     static const double lambdas[] = {1e-3, 0.03, 0.5, 0.999};
     for (int s = 0; s < 2; ++s) {
@@ -342,7 +342,7 @@ static void numbers_that_cannot_be(void)
 
 int main(void)
 {
-    the_optimum();
+    both_solvers_reach_the_optimum();
     a_gap_that_is_asked_for();
     the_support_reaches_the_rank();
     columns_that_depend();

@@ -3,7 +3,7 @@
  */
 #include "spoiled_frame.h"
 
-static void nothing_wrong(void)
+static void a_clean_frame_has_no_diagnostics(void)
 {
     for (int known = 0; known < 2; ++known) {
         bench b;
@@ -18,7 +18,7 @@ static void nothing_wrong(void)
 
 /* The small model's P is arbitrary: nothing predicts, so both sides of a fold go; the noise is
  * known or told by all folds. */
-static void one_outlier(void)
+static void one_outlier_is_left_out(void)
 {
     for (int known = 0; known < 2; ++known) {
         for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
@@ -162,8 +162,8 @@ static void options_and_names(void)
 
 int main(void)
 {
-    nothing_wrong();
-    one_outlier();
+    a_clean_frame_has_no_diagnostics();
+    one_outlier_is_left_out();
     many_outliers();
     an_outlier_in_the_reference();
     reference_frame_of_another_kind();

@@ -37,7 +37,7 @@ static eits_touch at(double x, double y)
     return (eits_touch){.id = 77, .x_mm = (eits_real)x, .y_mm = (eits_real)y, .radius_mm = 9};
 }
 
-static void follows_and_jumps(void)
+static void ids_follow_moves_and_not_jumps(void)
 {
     bench b;
     eits_context *ctx = set_up(&b, 10);
@@ -193,11 +193,11 @@ static void through_the_whole_core(void)
 int main(void)
 {
     through_the_whole_core();
-    follows_and_jumps();
+    ids_follow_moves_and_not_jumps();
     crossing();
     nearest_first();
     all_of_a_full_house();
     following_may_be_off();
     zero_is_never_an_id();
-    return checks_report("track");
+    return checks_report("touch ids");
 }
