@@ -12,7 +12,7 @@ LONGEST, ENDING = 3000, 1000  # characters of a line, and of its end
 
 class EitskinError(Exception):
     """Base of all errors that a user can cause or repair; ``exit_code`` is the command line's
-    status. Its text stays one line, whatever names and values out of files it tells of."""
+    status. Its text stays one line, whatever names and values out of files it names."""
 
     exit_code = 1
 

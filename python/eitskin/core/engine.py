@@ -79,7 +79,7 @@ class CoreEngine:
         self._context = context[0]
         self._lib.eits_use_portable_kernels(self._context, int(portable))
         self.n_rows, self.n_pixels = int(self._model.n_rows), int(self._model.n_pixels)
-        # buffers and their pointers are made once: casting anew at each call would cost more than
+        # buffers and their pointers are made once: casting again at each call would cost more than
         # the call
         self._frame = np.zeros(self.n_rows, dtype=self.dtype)
         self._frame_pointer = self._ffi.from_buffer("eits_real[]", self._frame)
@@ -230,7 +230,7 @@ class CoreEngine:
 
     def follow(self, frames: npt.NDArray[np.floating[Any]]) -> None:
         """Be as after ``frames`` (k, m) volts, the last that can be used, so that the next frame
-        costs what it costs there: the directions to ignore are built anew where other rows are
+        costs what it costs there: the directions to ignore are built again where other rows are
         usable than in the frame before."""
         masked, macs = self._ffi.new("uint32_t *"), self._ffi.new("uint64_t *")
         for frame in frames[::-1]:

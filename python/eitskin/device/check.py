@@ -47,7 +47,7 @@ def no_answer(link: Link, what: str, waited_s: float) -> str:
             f" {LINK_VERSION}; {advice}"
         )
     if link.ended and what == "TARE":
-        return f"{name}: the scene is over, and a tare waits for frames; open the device anew"
+        return f"{name}: the scene is over, and a tare waits for frames; open the device again"
     if counters.packets:
         return (
             f"{name}: packets arrive, but {what} is not answered within {waited_s:g} s; reset the"

@@ -35,7 +35,7 @@ class Device(CommandExchange):
     # ---- commands ----
 
     def stats(self, *, reset: bool = False) -> BoardStats:
-        """The board's statistics; ``reset`` begins them anew."""
+        """The board's statistics; ``reset`` begins them again."""
         answer = self.ask(commands.GetStats(int(reset)), ANSWER_S)
         assert isinstance(answer, BoardStats)
         return answer

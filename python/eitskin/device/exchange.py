@@ -175,7 +175,7 @@ class CommandExchange:
             return None
         if isinstance(content, BoardInfo) and content.request == 0:
             if self._connected:
-                self._put(LinkEvent("restarted", text="the board began anew"))
+                self._put(LinkEvent("restarted", text="the board restarted"))
             return None
         if isinstance(content, Reply | BoardInfo | BoardStats):
             return content

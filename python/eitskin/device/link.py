@@ -23,7 +23,7 @@ READ_S = 0.1
 class LinkEvent:
     """Something happened to the link itself. ``kind``: "gap" (``missing`` packets by their numbers,
     at least), "dropped" (``missing`` left out of the host's queue), "unplugged", "reconnected",
-    "restarted" (the board began anew).
+    "restarted" (the board restarted).
     """
 
     kind: str

@@ -32,7 +32,7 @@ SVC, BREAKPOINT, EXCEPTION_RETURN, FETCH_ABORT = (
     7,
     8,
     3,
-)  # numbers by which Unicorn tells of them
+)  # numbers by which Unicorn reports them
 
 
 class CpuStop(Enum):

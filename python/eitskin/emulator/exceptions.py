@@ -18,7 +18,7 @@ ENTRY_CYCLES, RETURN_CYCLES = 12, 10
 SMALL, LARGE = struct.Struct("<8I"), struct.Struct("<8I8Q2I")
 FPCA = 4
 # FPCA and SFPA: Unicorn's core counts as secure; without SFPA its next FPU instruction would begin
-# anew
+# again
 FP_CONTEXT = 0xC
 TO_THREAD = 8  # bits of EXC_RETURN
 SMALL_FRAME = 0x10

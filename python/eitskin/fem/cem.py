@@ -151,7 +151,7 @@ class ForwardModel:
         return Solution(potentials[system.unknown[:n_nodes]] - shift, electrodes - shift)
 
     def system_for(self, shunted: BoolArray) -> System:
-        """The system in which the electrodes ``shunted`` (L,) are ideal; made anew only when they
+        """The system in which the electrodes ``shunted`` (L,) are ideal; made again only when they
         change."""
         if not np.array_equal(shunted, self._system.shunted):
             self._system = self._make_system(shunted)

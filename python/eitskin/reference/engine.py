@@ -325,7 +325,7 @@ class ReferenceEngine:
         return stored if self._whitening is None else self._whitening.regularisation
 
     def _leave_out(self, known: BoolArray) -> None:
-        """Whiten anew for the folded rows (k,) that are known, and for the noise."""
+        """Whiten again for the folded rows (k,) that are known, and for the noise."""
         asked = self.options.regularisation_noise_factor * self._noise_v / self._v0_rms
         self._whitening = None if self._form is None else whiten(self._form, known, asked)
         self.seen = self._s if self._whitening is None else self._whitening.see @ self._s
@@ -336,7 +336,7 @@ class ReferenceEngine:
 
     def _directions(self, folded: Folded) -> list[FloatArray]:
         """What the model_mismatch ignores: P's columns of folds left out, unless that is whitened
-        anew, and the drift of the gain."""
+        again, and the drift of the gain."""
         left_out: list[int] = (
             [] if self._whitening else np.flatnonzero(~(folded.first | folded.second)).tolist()
         )

@@ -2,7 +2,7 @@
 reading.
 
 csrc/src/solve/coordinate_descent.c and active_set.c say where the methods are from. The columns'
-products are solved with anew at each step; the core keeps a factor of them up to date.
+products are solved with again at each step; the core keeps a factor of them up to date.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ def fista(
     """FISTA on S (r, n), y (r,), with the span of ``basis`` (k, r) left out of the model_mismatch.
 
     With the solver "working-set", columns outside the working set see no gradient until it is
-    chosen anew.
+    chosen again.
     """
     sign, step, t, halvings = options.sign, 1.0 / lipschitz, 1.0, 0
     x = np.zeros(s.shape[1]) if start is None else start.copy()

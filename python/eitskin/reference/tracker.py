@@ -30,7 +30,7 @@ KNOWN_FRAMES = 4
 
 @dataclass(frozen=True)
 class Followed:
-    """A touch that is followed; its id is 0 until it is told of. Velocities in mm a frame, ``p``
+    """A touch that is followed; its id is 0 until it is reported. Velocities in mm a frame, ``p``
     the covariance of place and velocity along either axis: (place, both, speed); ``own_lambda`` its
     share of max(S'y) when it was last found, ``faint`` where that is below noise's."""
 
@@ -60,7 +60,7 @@ class Tracker:
     def step(
         self, found: Sequence[Touch], options: Options, lambda_max: float, lambda_noise: float
     ) -> tuple[Touch, ...]:
-        """What is told of a frame in which ``found`` were found, strongest first."""
+        """What is reported of a frame in which ``found`` were found, strongest first."""
         now = _Frame(options, lambda_max, lambda_noise, self._grid)
         before = [now.predicted(one) for one in self._followed]
         owner: dict[int, int] = {}
@@ -134,23 +134,23 @@ class _Frame:
         return replace(one, touch=replace(one.touch, x_mm=x, y_mm=y), p=p)
 
     def met(self, before: Followed, found: Touch) -> Followed:
-        """What is known, with what was found; off the skin it starts anew."""
+        """What is known, with what was found; off the skin it starts again."""
         new, old = self.newborn(found), before.touch
-        anew = replace(new, touch=replace(found, id=old.id), seen=before.seen + 1)
+        fresh = replace(new, touch=replace(found, id=old.id), seen=before.seen + 1)
         if not self.options.track_smooth > 0:
-            return anew
+            return fresh
         place, both, speed = before.p
         gain, speed_gain = place / (place + new.p[0]), both / (place + new.p[0])
         dx, dy = found.x_mm - old.x_mm, found.y_mm - old.y_mm
         x, y = old.x_mm + gain * dx, old.y_mm + gain * dy
         if not self.on_skin(x, y):
-            return anew
+            return fresh
         radius = old.radius_mm + gain * (found.radius_mm - old.radius_mm)
         strength = old.strength_s_per_m_mm2 + gain * (
             found.strength_s_per_m_mm2 - old.strength_s_per_m_mm2
         )
         return replace(
-            anew,
+            fresh,
             touch=replace(
                 found, id=old.id, x_mm=x, y_mm=y, radius_mm=radius, strength_s_per_m_mm2=strength
             ),

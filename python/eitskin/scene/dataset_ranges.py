@@ -1,6 +1,6 @@
 """How a dataset varies a scene: the table [dataset], and one drawn scene a number.
 
-``[dataset.touches]`` draws touches anew (in place of [[touch]]); ``[dataset.ranges]`` holds [low,
+``[dataset.touches]`` draws touches again (in place of [[touch]]); ``[dataset.ranges]`` holds [low,
 high] at the place of the number that is drawn: ``snr_db = [50, 70]`` in
 ``[dataset.ranges.effects.noise]``, ``radius_mm = [6, 9]`` in ``[dataset.ranges.touch.0]``. Scene k
 of a dataset depends on (its description, the dataset's seed, k) only. Every range has a stream of

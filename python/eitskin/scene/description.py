@@ -55,7 +55,7 @@ class Scene:
         frames: recorded frames, the first at 0 s; ``rate_hz`` a second.
         quiet_frames: reference frames before them, at negative times, without touches.
         elements: of the mesh, about.
-        solver: "factorise" anew for each conductivity, "update" the untouched skin's factors, or
+        solver: "factorise" again for each conductivity, "update" the untouched skin's factors, or
             "auto": whichever counts cheaper where touches move, "factorise" where they do not.
         touches: in the order of [[touch]].
         effects: name to its table, as in TOML.

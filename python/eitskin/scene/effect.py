@@ -21,7 +21,7 @@ NEGATIVE during the quiet frames. ``frame`` counts all frames from 0, quiet ones
 
 A step's ``apply`` is a pure function of its arguments: the same frame gives the same result however
 often and in whatever order it is called, and it leaves its arguments as they are. What is random
-per frame is drawn from ``session.stream(NAME, frame)``, made anew for that frame; what is random
+per frame is drawn from ``session.stream(NAME, frame)``, made again for that frame; what is random
 once is drawn in ``make`` from ``session.stream(NAME)`` (index 0) or ``session.stream(NAME + "
 part")``. Several parts: several names.
 """

@@ -168,7 +168,7 @@ def _draw(
     outline: Outline, rules: TouchRules, generator: np.random.Generator
 ) -> tuple[TrueTouch, ...]:
     """One scene: sizes first, then places until all fit; after 200 misses for one touch all places
-    are drawn anew."""
+    are drawn again."""
     number = int(generator.integers(rules.count[0], rules.count[1], endpoint=True))
     radii = generator.uniform(*rules.radius_mm, size=number)
     contrasts = generator.uniform(*rules.contrast, size=number)

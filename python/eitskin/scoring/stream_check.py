@@ -1,5 +1,5 @@
-"""What a board's frames show, held against the truth where there is one: touches, places in images,
-raw rows in brief."""
+"""What a board's frames show, compared with the truth where there is one: touches, places in
+images, raw rows in brief."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def check_threads(threads: int | None) -> int:
 class Batch:
     """Contexts of the C core, one a thread, with the same model, options and reference.
 
-    Each frame is reconstructed anew, as :meth:`Reconstructor.forget` before each would do it: the
+    Each frame is reconstructed again, as :meth:`Reconstructor.forget` before each would do it: the
     same bits, counts and, in the order of the frames, ids, however many threads there are.
     ``engine`` is "c" or "c64"; ``threads`` None: all processors.
 

@@ -97,7 +97,7 @@ class Workspace:
     @cached_property
     def world(self) -> dict[str, Any]:
         """What every result depends on: the core's own bytes among it, so that another build
-        measures anew."""
+        measures again."""
         core = hashlib.sha256(Path(load_core("float32").__file__).read_bytes()).hexdigest()[:16]
         return {"version": __version__, "core": core}
 

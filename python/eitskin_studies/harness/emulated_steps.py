@@ -39,7 +39,7 @@ class Mask:
 @dataclass(frozen=True, eq=False)
 class TareStep:
     """Take the reference from quiet frames (k, m), volts, until one is refused; fewer than four:
-    each anew."""
+    each again."""
 
     quiet_v: npt.NDArray[Any]
 

@@ -1,4 +1,4 @@
-"""Pictures of touches in time: what is told of a stream without and with tracking, and what
+"""Pictures of touches in time: what is reported a stream without and with tracking, and what
 tracking is worth."""
 
 from __future__ import annotations

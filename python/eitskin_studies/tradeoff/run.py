@@ -183,7 +183,7 @@ def run(
 
 def _world(settings: RunSettings, skin: Skin, protocol: Protocol) -> dict[str, Any]:
     """What a result depends on besides its configuration: the core's own bytes among it, so that
-    another build measures anew."""
+    another build measures again."""
     module = load_core("float32")
     core = hashlib.sha256(Path(module.__file__).read_bytes()).hexdigest()[:16]
     counts = [settings.train_scenes, settings.simulated_elements, ELEMENTS, settings.seed]

@@ -24,7 +24,7 @@ def x_of(point: Point, where: Conditions) -> float | None:
 
 
 def best_points(points: Sequence[Point], where: Conditions) -> list[Point]:
-    """The Pareto front of points that begin each frame anew and fit touches fully, in steps of
+    """The Pareto front of points that begin each frame again and fit touches fully, in steps of
     ``MIN_GAIN`` or more."""
     alike = [
         one

@@ -1,4 +1,4 @@
-"""Recording and replaying: what was seen live, exported, and held against this host's core bit by
+"""Recording and replaying: what was seen live, exported, and compared with this host's core bit by
 bit."""
 
 from __future__ import annotations

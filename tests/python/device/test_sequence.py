@@ -1,4 +1,4 @@
-"""Sequence numbers: gaps are counted, what is no news is refused, a board that begins anew is
+"""Sequence numbers: gaps are counted, what is no news is refused, a board that begins again is
 recognised."""
 
 from __future__ import annotations
@@ -119,13 +119,13 @@ def test_a_cut_line_counts_one_gap() -> None:
     assert check.admit(20, 20) == 13
     assert (counters.gaps, counters.missing) == (1, 13)
     check.link_lost()
-    assert check.admit(3, 33) == 1  # begun anew: how many, nobody knows
+    assert check.admit(3, 33) == 1  # begun again: how many, nobody knows
     assert (counters.gaps, counters.missing, counters.restarts) == (2, 13, 1)
     assert check.admit(4, 34) == 0
 
 
 def test_nothing_of_a_new_life_is_lost_although_its_first_packets_seem_late() -> None:
-    """Faults of the start may come before the INFO that tells of it, or that INFO be lost: they are
+    """Faults of the start may come before the INFO that reports it, or that INFO be lost: they are
     all there in the end."""
     for said in (True, False):
         decoder = Decoder()

@@ -38,7 +38,7 @@ def new_blob() -> bytes:
 
 
 def works(board: SimBoard, crc: int) -> bool:
-    """Whether the board, opened anew, has the model and scans."""
+    """Whether the board, opened again, has the model and scans."""
     with Device(SimTransport("again", board)) as device:
         device.tare(4)
         raws = [item for item in device.stream(Stream.RAW, frames=1) if isinstance(item, RawFrame)]
@@ -99,7 +99,7 @@ def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed: i
         assert works(rebooted, OLD)
     with Device(
         SimTransport("again", board)
-    ) as device:  # without a reboot: goes on where it was cut, or begins anew
+    ) as device:  # without a reboot: goes on where it was cut, or begins again
         assert device.board.model_crc in (OLD, new)
         if device.board.model_crc == OLD:
             assert device.upload_model(tiny).model_crc == new

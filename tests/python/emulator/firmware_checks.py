@@ -226,7 +226,7 @@ def table_after_upload(image: bytes, model: bytes) -> str | None:
         if answer is None or (isinstance(answer, Reply) and not answer.ok):
             return f"the upload is refused: {answer}"
     if session.info is None or session.info.protocol_hash != session.protocol.hash:
-        return "INFO tells of another protocol"
+        return "INFO reports another protocol"
     board.multiplexers.log.clear()
     session.listen(2 * SCAN_S)
     return _order(board, session.protocol)

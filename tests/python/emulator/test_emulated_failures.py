@@ -21,7 +21,7 @@ from small_models import small_blob
 
 
 def restarted(device: Device) -> Device:
-    """The same board after it lost its power, and the host that connects anew."""
+    """The same board after it lost its power, and the host that connects again."""
     board = board_of(device)
     board.lose_power()
     return connect(board)
@@ -127,7 +127,7 @@ LOAD_NOWHERE = bytes.fromhex("4ff0c0400068fee7")  # mov.w r0, #0x60000000; ldr r
 
 
 def faults_of(device: Device) -> list[Fault]:
-    """What the board tells of its own accord now."""
+    """What the board reports its own accord now."""
     told = []
     while (item := device.next_item(0.1)) is not None:
         if isinstance(item, Fault):

@@ -131,7 +131,7 @@ def reduced(
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_units_of_frames(same_everywhere: SameEverywhere, margins: Margins, data_kind: str) -> None:
     """Frames and quiet frames in other volts: the gain brings them to the model's, from 1e-38 to
-    1e37. Every voltage is rounded anew, by u of itself, and so is every mean of 8 quiet ones, 8
+    1e37. Every voltage is rounded again, by u of itself, and so is every mean of 8 quiet ones, 8
     times; their difference, times the gain, is so off by at most (1 + 8 + 3) u of the model's own
     voltage a row, and y by |P| times the norm of that; as a ratio by as much of 1. Denormal
     voltages of 1e-38 have 2^-149 / 1e-38 = 2^-23 in place of u."""

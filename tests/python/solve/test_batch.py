@@ -35,7 +35,7 @@ def one_by_one(engine: str, frames: np.ndarray, quiet: np.ndarray) -> list[Recon
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_the_same_as_one_after_another(engine: str, threads: int) -> None:
     frames, quiet = small().frames(41, COUNT), small().quiet(42, 8)
-    frames[3, 5:9] = np.nan  # left out; the basis is made anew, and once more for the next frame
+    frames[3, 5:9] = np.nan  # left out; the basis is made again, and once more for the next frame
     frames[11] = np.nan  # refused
     frames[20] = 0.0
     frames[30] = quiet.mean(axis=0)  # no touch

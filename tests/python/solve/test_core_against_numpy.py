@@ -131,7 +131,7 @@ def test_same_images_with_rows_left_out(storage: str, data_kind: str, solver: st
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 @pytest.mark.parametrize("storage", STORAGES)
 def test_same_images_without_electrodes(storage: str, data_kind: str, solver: str) -> None:
-    """One, two, three electrodes out, of each sign: what is left is whitened anew. In float32 its
+    """One, two, three electrodes out, of each sign: what is left is whitened again. In float32 its
     factors lose what the low regularisation does not hold, and noise in the data's last figure is
     raised as all noise is; float64 has the reference's answer.
     """

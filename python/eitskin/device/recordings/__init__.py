@@ -1,1 +1,1 @@
-"""Runs kept: as packets on disk or in memory, as frames, and held against this host bit by bit."""
+"""Runs kept: as packets on disk or in memory, as frames, and compared with this host bit by bit."""

@@ -1,5 +1,5 @@
 """Whether a board computes what this host does: its raw frames through the same core, image bits
-and touches held against what it sent."""
+and touches compared with what it sent."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ class HostTwin:
 
 
 def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
-    """The recording ``path`` held against this host's core; also whether it notes the solver's
+    """The recording ``path`` compared with this host's core; also whether it notes the solver's
     options (else the model's own are taken).
 
     Raises:

@@ -1,7 +1,7 @@
 """Sequence numbers: which packet is next, which are missing, and which are no news.
 
 Numbers count every packet of a direction, modulo 2^32, and a packet that the sender dropped keeps
-its number. A board's numbers begin anew when it restarts, which it says by an INFO with request 0;
+its number. A board's numbers begin again when it restarts, which it says by an INFO with request 0;
 since that INFO may itself be a duplicate, the packet after it decides.
 """
 
@@ -114,7 +114,7 @@ class SequenceCheck:
 
     def _late(self, sequence: int, fingerprint: int) -> int | None:
         """A number from before that was not seen: late. Many in a row, one after another, are a
-        board that began anew and whose INFO was lost: then none of them was late."""
+        board that restarted and whose INFO was lost: then none of them was late."""
         self._late_run = self._late_run + 1 if self._late_run and sequence == self._late_next else 1
         self._late_next = (sequence + 1) % WRAP
         if self._late_run < LATE_IN_A_ROW:

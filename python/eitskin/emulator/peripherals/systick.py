@@ -10,7 +10,7 @@ ENABLE, INTERRUPT, FROM_CPU, WRAPPED = 1, 2, 4, 1 << 16
 
 
 class SysTick:
-    """Counts down from LOAD to 0 and begins anew."""
+    """Counts down from LOAD to 0 and begins again."""
 
     def __init__(self, clock: BoardClock, schedule: Schedule, nvic: Nvic) -> None:
         self._clock, self._schedule, self._nvic = clock, schedule, nvic
@@ -25,7 +25,7 @@ class SysTick:
         self._schedule.set(self._event, None)
 
     def clock_changed(self) -> None:
-        """The processor's clock has another frequency: the period begins anew."""
+        """The processor's clock has another frequency: the period begins again."""
         if self._control & ENABLE:
             self._begin(self._clock.now)
 

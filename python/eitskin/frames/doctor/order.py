@@ -1,4 +1,4 @@
-"""In which order do the channels stand, and with which sign? Each hypothesis is held against the
+"""In which order do the channels stand, and with which sign? Each hypothesis is compared with the
 homogeneous frame."""
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def count_stream(stream: TouchStream, told: Sequence[Sequence[Touch]], macs: int
 
 
 def _ghost(stray: Sequence[set[int]], end: int, found: int, number: int) -> int:
-    """In how many frames after ``end`` on end the id ``number`` is told of no finger, if it was
+    """In how many frames after ``end`` on end the id ``number`` is reported no finger, if it was
     found to the last."""
     frames = 0
     while found == end and end + 1 + frames < len(stray) and number in stray[end + 1 + frames]:
