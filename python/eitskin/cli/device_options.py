@@ -72,7 +72,7 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     )
     option(
         solver,
-        "--ignore FINDING[,FINDING]",
+        "--ignore NAME[,NAME]",
         "do not look for saturated, electrode-open, electrodes-bridged, outlier,"
         " electrode-noisy, model-mismatch, stale-reference, crowded, or all (default: look for"
         " all)",
