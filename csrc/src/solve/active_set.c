@@ -5,7 +5,24 @@
  * Squares Problems, 1974, chapter 23, with several columns at a time). Each step keeps signs and
  * lowers the objective. A column that depends on the active ones moves with them, along what leaves
  * S x as it is, until one of them is zero and makes room: the factor never has more rows than there
- * are directions. */
+ * are directions.
+ *
+ * Why beside FISTA: FISTA approaches the optimum, this ends at it, and tells so
+ * (EITS_STOP_OPTIMUM). With the few columns of a sparse optimum the steps are cheap; what costs is
+ * the look at every column once a round, n_pixels x rank multiply-accumulates. Hence the looks
+ * nearby, which see only columns beside the active ones, and rounds that take in several columns at
+ * once.
+ *
+ * On the active columns A with signs g the objective is a parabola, with the optimum at
+ * S_A'(y - S_A x_A) = lambda g. "pull" is the difference of the two sides; Newton's step is
+ * G^-1 pull (gram_factor.c). Scaling the step by t scales the pulls by 1 - t, so they need no
+ * product within a round.
+ *
+ * Invariants: working[] with x[], sign[], pull[] are parallel lists, in no order of columns; the
+ * factor's column k belongs to working[k]; an active coefficient never has the sign opposite to
+ * sign[k]. Three flags end the rounds: limited (multiply-accumulates spent), loose (a column is
+ * active that the factor lacks) and broken (a step that is no number). The latter two hand over to
+ * coordinate descent, which needs no factor and starts from what was reached. */
 #include "base/vec.h"
 #include "context/products.h"
 #include "frame/projection.h"
@@ -35,12 +52,16 @@ typedef struct active {
     int moved;         /* x is not as it was before the last columns were taken in */
 } active;
 
+/* The rounding of one operation, a unit in the last place of 1. */
 static const eits_real EPSILON = (eits_real)(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
-/* least fraction of a column's square */
+/* What must be left of a column's square after projection on the active ones, for it to count as
+ * independent. It is a difference of squares, so it is known to about rank times epsilon of
+ * the square and no better. */
 static const eits_real INDEPENDENT = (eits_real)(sizeof(eits_real) == 4 ? 1e-5 : 1e-10);
 
 /* a fraction of the objective: what a look nearby must have won to be followed by one */
 static const eits_real WORTHWHILE = R(1e-6);
+/* At most so many looks nearby after one at every column: a bound, so that a round ends. */
 enum { LOOKS_NEARBY = 20 };
 
 static uint64_t macs_to_finish(const eits_context *ctx, uint32_t count)
@@ -59,7 +80,8 @@ static int affords(const eits_context *ctx, active *a, uint64_t macs)
     return !a->limited;
 }
 
-/* The last active column takes the place. Uses a->work and a->step. */
+/* The last active column takes the place, so that nothing has to be shifted. Uses a->work and
+ * a->step. */
 static void drop(eits_context *ctx, active *a, uint32_t place)
 {
     const uint32_t count = ctx->solver.working_count, last = count - 1;
@@ -115,6 +137,7 @@ static eits_real what_is_left(eits_context *ctx, active *a, eits_real square)
     return square - eits_dot(ctx->kernels, a->work, a->work, count);
 }
 
+/* Column j becomes active, with what_is_left's combination in a->step as its new factor row. */
 static void activate(eits_context *ctx, active *a, uint32_t j, eits_real x, eits_real sign,
                      eits_real pull, eits_real left)
 {
@@ -154,7 +177,12 @@ static eits_real exchange(eits_context *ctx, active *a, eits_real sign, eits_rea
     return shortest;
 }
 
-/* Take column j in, at zero. */
+/* Take column j in, at zero.
+ *
+ * Where it depends on the active ones, or they fill all directions, one of them makes room by
+ * exchange() and the test is made again: dropping a column changes what the others span. Each turn
+ * drops one, so the loop ends. What the exchanges moved is kept in x; if no way on is left while x
+ * is not zero, the column stays without a factor row and the solve goes on elsewhere. */
 static void add(eits_context *ctx, active *a, uint32_t j)
 {
     const eits_real sign = ctx->solver.gradient[j] > 0 ? 1 : -1,
@@ -198,7 +226,9 @@ static eits_real reach(const eits_context *ctx, const active *a, uint32_t k)
 }
 
 /* Newton's step to the optimum of the active columns, again and again without those that would
- * change sign. */
+ * change sign. All coefficients go the same fraction of their steps, that of the first one to reach
+ * zero: along the step the objective falls all the way, coefficient by coefficient it need not.
+ * Each turn drops a column or ends. */
 static void settle(eits_context *ctx, active *a)
 {
     while (ctx->solver.working_count > 0) {
@@ -247,6 +277,8 @@ static eits_real take_pulls(eits_context *ctx, active *a)
     return greatest;
 }
 
+/* S x is computed again from x instead of updated along the steps: the gap is a bound only if it
+ * belongs to the x that is returned. */
 static eits_duality_gap check_gap(eits_context *ctx, const eits_scratch *scratch, const active *a)
 {
     ctx->info.nonzeros = eits_apply_working(ctx, scratch, ctx->solver.x, ctx->solver.sx);
@@ -346,7 +378,11 @@ static int round_of(eits_context *ctx, const eits_scratch *scratch, active *a, u
     return moved;
 }
 
-/* Rounds until something ends them; 0 where another solver has to go on. */
+/* Rounds until something ends them; 0 where another solver has to go on.
+ *
+ * At the level of rounding the objective no longer falls though columns still seem to violate. The
+ * first such round is repeated with the worst column alone, since several at once may undo each
+ * other; after the second this is the optimum as well as these numbers can have it. */
 static int rounds(eits_context *ctx, const eits_scratch *scratch, active *a, eits_duality_gap *c)
 {
     const eits_options *o = &ctx->options;
@@ -374,7 +410,7 @@ static int rounds(eits_context *ctx, const eits_scratch *scratch, active *a, eit
             return 1;
         }
         stalls = c->objective < before * (1 - EPSILON) ? 0 : stalls + 1;
-        if (!moved) /* the gradient is as it was, but for the columns active_count */
+        if (!moved) /* the gradient is as it was, but for the active columns, set to zero */
             stalls = 2;
     }
 }
@@ -392,7 +428,7 @@ void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_re
     a.reach = ctx->solver.x_next, a.column = ctx->solver.sx_next;
     a.near = eits_nearby_none(ctx);
     eits_duality_gap c;
-    /* the set changes column by column here: none are active unpacked */
+    /* the set changes column by column here: unpacked copies would be stale at once */
     ctx->solver.working_count = ctx->solver.working_cached = 0;
     if (gradient_known) {
         eits_copy(ctx->solver.residual, ctx->frame.y, EITS_STRIDE(ctx->model->rank));

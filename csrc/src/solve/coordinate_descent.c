@@ -4,7 +4,17 @@
  * The residual is kept within the directions that count, so a column's correlation needs no
  * projection; where at most one direction is ignored its part is kept apart and costs nothing
  * either. Where rows left out are whitened again (whitening.h) what is kept is F' of the residual.
- */
+ *
+ * The step for coefficient j, all others fixed, is the exact minimum of a parabola plus lambda |x|:
+ * x_j = shrink(|s_j|^2 x_j + s_j'r, lambda) / |s_j|^2. It needs no step length, so it also works
+ * where a Lipschitz constant cannot be trusted; and it needs no factor, so the active set falls
+ * back on it. A visit costs 2 rank multiply-accumulates where the coefficient stays, and as many
+ * again where it moves; a board without vector units likes the short lists, a host prefers FISTA's
+ * long products.
+ *
+ * Invariant between visits: solver.residual = F'Q(y - F S x) up to the part along one ignored
+ * direction, which `along` has. Updates gather rounding, so each look computes S x and the residual
+ * again, and the gap is always that of the look. */
 #include "base/vec.h"
 #include "context/products.h"
 #include "frame/projection.h"
@@ -50,6 +60,10 @@ static eits_real *see(eits_context *ctx, const eits_real *column, eits_real scal
     return seen;
 }
 
+/* |F s_j|^2 and, where one direction is ignored, s_j's part along it. Found at a column's first
+ * visit and valid for this solve alone, as F and the direction change with the rows in use. The
+ * norm is that before the projection: at least as large as the exact one, hence a step that is
+ * safe, if a little short. */
 static void measure(eits_context *ctx, descent *d, uint32_t j, const eits_real *column,
                     eits_real scale)
 {
@@ -110,6 +124,8 @@ static eits_real visit(eits_context *ctx, descent *d, uint32_t j)
     return norm * step * step;
 }
 
+/* A sweep worth less than this fraction of the first since the last look: what is missing from the
+ * list matters more than what is left to gain within it. */
 static const eits_real SETTLED = R(0.001);
 
 typedef enum sweep_end { SWEEP_DONE, SWEEP_LIMIT } sweep_end;
@@ -132,7 +148,7 @@ static sweep_end sweep(eits_context *ctx, descent *d, eits_real *worth)
     return end;
 }
 
-/* Take S x, the residual and the gradient of every column anew. */
+/* Compute S x, the residual and the gradient of every column again. */
 static eits_duality_gap look(eits_context *ctx, const eits_scratch *scratch, descent *d)
 {
     ctx->info.nonzeros = eits_apply(ctx, scratch, ctx->solver.x, ctx->solver.sx);
@@ -154,7 +170,7 @@ static void choose(eits_context *ctx, const descent *d)
     ctx->solver.working_count = count;
 }
 
-/* What all steps of a sweep are worth when only rounding moves. */
+/* What all steps of a sweep are worth when only rounding moves: (8 epsilon |y|)^2. */
 static eits_real rounding(const eits_context *ctx)
 {
     const eits_real epsilon = R(sizeof(eits_real) == 4 ? 1.2e-7 : 2.3e-16);
@@ -204,6 +220,7 @@ void eits_run_coordinate(eits_context *ctx, const eits_scratch *scratch, eits_re
         c = look(ctx, scratch, &d);
     }
     ctx->info.stop = EITS_STOP_ITERATIONS;
+    /* Looks grow rare as in fista.c: six times the interval each, unless a gap is to be met. */
     uint32_t interval = o->gap_every;
     while (ctx->info.iterations < end) {
         choose(ctx, &d);

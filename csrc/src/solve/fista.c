@@ -1,5 +1,27 @@
-/* FISTA with non-negative, non-positive or signed shrinkage; solve.h has the problem and its
- * source. */
+/* FISTA (Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183, doi 10.1137/080716542) with
+ * non-negative, non-positive or signed shrinkage; eitskin/solve.h has the problem.
+ *
+ *     x'   = shrink(z + S'F'(y - F S z) / L, lambda / L)
+ *     t'   = (1 + sqrt(1 + 4 t^2)) / 2,  beta = (t - 1) / t'
+ *     z'   = x' + beta (x' - x)
+ *
+ * L is the model's Lipschitz constant, found once when the model is built, so no line search runs
+ * on the board. The whitening of the model makes it a good step in every direction.
+ *
+ * An iteration costs one product with S' (every column, or the working set) and one with S (the
+ * non-zeros alone), n_pixels x rank and nonzeros x rank multiply-accumulates. S z is extrapolated
+ * from S x as z is from x. F S x is subtracted from y each time, not updated: a residual kept by
+ * updates gathers rounding, and this one does not.
+ *
+ * L may be too small all the same: a model from elsewhere, or one whose S was rounded to few bits.
+ * Then the iteration diverges. A cheap test of |S x| sees that, the gap confirms it, and the solve
+ * starts again from zero with half the step, at most eight times, after which
+ * EITS_STOP_DIVERGED reports a useless model.
+ *
+ * Invariants: sx = S x and sz = S z at the head of each iteration; x, x_next and sx, sx_next swap
+ * pointers instead of contents (bring_home undoes it). With a working set all vectors by pixel are
+ * lists over it; otherwise both modes run this same text, and give the same bits where the set is
+ * chosen in every iteration. */
 #include "base/vec.h"
 #include "context/products.h"
 #include "frame/whitening.h"
@@ -7,6 +29,7 @@
 #include "solve/solve.h"
 #include "solve/working_set.h"
 
+/* L too small by a factor of 256 is no rounding: the model is at fault. */
 enum { MAX_STEP_HALVINGS = 8 };
 
 static int by_working_set(const eits_context *ctx)
@@ -20,6 +43,7 @@ static uint32_t working_size(const eits_context *ctx)
     return by_working_set(ctx) ? ctx->solver.working_count : ctx->model->n_pixels;
 }
 
+/* The working set's part of eits_take_gradient; the same residual, fewer columns. */
 static void take_working_gradient(eits_context *ctx, const eits_real *sx)
 {
     ctx->info.macs += eits_take_residual(ctx, sx);
@@ -101,6 +125,7 @@ typedef struct schedule {
     uint32_t next_look, interval;
 } schedule;
 
+/* Pruning repacks the set, which costs about an iteration: every fifth pays. */
 enum { PRUNE_EVERY = 5, LOOK_GROWTH = 6 };
 
 static int looks_at_every_column(const eits_context *ctx, uint32_t k, const schedule *s)
@@ -139,6 +164,11 @@ static void prepare_gradient(eits_context *ctx, const eits_scratch *scratch, eit
         eits_working_set_prune(ctx, lambda);
 }
 
+/* The loop and its four ends: count, gap, multiply-accumulates, divergence.
+ *
+ * The limit of multiply-accumulates is tested before each product, with what the gap at the end
+ * costs put by, so a solve that it cuts short still knows its gap. Where the limit is reached the
+ * last complete x stands. */
 static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
                                int gradient_known)
 {

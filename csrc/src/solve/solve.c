@@ -1,5 +1,22 @@
-/* One frame's solve: lambda, detection threshold, start, image; the solvers iterate. */
-
+/* One frame's solve: lambda, detection threshold, start, image; the solvers iterate.
+ *
+ * The problem is the lasso in reduced data: minimise |y - Q F S x|^2 / 2 + lambda |x|_1, with
+ * x >= 0, x <= 0 or free as options.sign says (S, Q, F: docs/reference/eitm-format.md and
+ * frame/whitening.h). What does not depend on the solver is decided here, in this order, each step
+ * ending the frame where it can:
+ *
+ *   1. S'y, n_pixels x rank multiply-accumulates. Its greatest, lambda_max, is the least lambda at
+ *      which x = 0 is optimal.
+ *   2. lambda = the greater of lambda_rel lambda_max and lambda_noise_factor lambda_noise. The
+ *      first scales with the touch, so that the image's shape does not depend on its strength;
+ *      the second keeps the noise out where the touch is faint.
+ *   3. Below the detection threshold nothing is solved: an untouched skin costs one product.
+ *   4. Start: zero, or the last frame's coefficients where those are better already.
+ *   5. The solver, then image_j = weight_j x_j. The columns were scaled by these weights when the
+ *      model was built, so that lambda treats pixels alike which are seen unequally well.
+ *
+ * In: frame.y (whitened, projected), options, the reference's noise. Out: solver.x, solver.image,
+ * info. A solve that ends early is no error: info.stop says how it ended. */
 #include "solve/solve.h"
 #include "base/vec.h"
 #include "context/products.h"
@@ -35,6 +52,7 @@ void eits_answer_zero(eits_context *ctx, eits_stop why)
     ctx->info.residual = ctx->info.data_norm;
 }
 
+/* x is kept in coefficients for a warm start; only the image is in S/m. */
 static void make_image(eits_context *ctx)
 {
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
@@ -42,7 +60,7 @@ static void make_image(eits_context *ctx)
 }
 
 /* Take up the last frame's coefficients, unless zero is the better start for this one. The sum S x
- * belongs to an earlier frame's numbers too, but is taken anew: it costs little, and rounding
+ * belongs to an earlier frame's numbers too, but is computed again: it costs little, and rounding
  * cannot gather over a million frames.
  *
  * Zero is the better start where the skin was let go: the old coefficients would have to be
@@ -59,6 +77,7 @@ static int warm_start(eits_context *ctx, const eits_scratch *scratch)
     eits_real l1 = 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         l1 += eits_fabs(ctx->solver.x[j]);
+    /* Twice the objective at the old x, against twice that at zero, |y|^2. */
     const eits_real twice = eits_fma(
         2 * ctx->info.lambda, l1,
         eits_dot(ctx->kernels, ctx->solver.residual, ctx->solver.residual, ctx->model->rank));
@@ -82,6 +101,8 @@ static void run(eits_context *ctx, const eits_scratch *scratch, int gradient_kno
     }
 }
 
+/* 2^24 (2^53) above the smallest normal number: products of a datum with epsilon are still
+ * normal. */
 /* Data whose square is hardly a number any more: objective and gap would be rounding. */
 static const eits_real MIN_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
 

@@ -1,10 +1,27 @@
+/* The KKT conditions' violations: which columns at zero would lower the objective.
+ *
+ * With r the residual, the optimum of |y - F S x|^2 / 2 + lambda |x|_1 has s_j'r = lambda sign(x_j)
+ * where x_j is not zero, and |s_j'r| <= lambda where it is (one-sided under a sign rule). The
+ * active set solver asks after each round which columns break the second condition. It wants a few
+ * good ones, not all: neighbouring pixels have nearly parallel columns, so where one is missing its
+ * neighbours violate too, and most of them no longer do once it is in. Hence only local maxima over
+ * the eight neighbours in the image are listed.
+ *
+ * In: solver.gradient = S'F'r, with the active columns' set to zero; the image's grid. Out: columns
+ * in scratch->index, greatest violation first, ties by the lower number. That order is part of the
+ * result's bits: columns join in it, and the limit of multiply-accumulates may cut it off.
+ *
+ * A look at every column costs n_pixels x rank multiply-accumulates and dominates a round. Between
+ * two of them the solver looks at the active columns' neighbours alone (eits_nearby): touches are
+ * blobs, so what joins is mostly beside what is there. */
 #include "solve/violations.h"
 
 #include "base/vec.h"
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
-/* How far the correlations lie violation zero under the sign rule. */
+/* The correlations, signed so that more is a greater violation. Where the sign rule allows
+ * increases alone they are so already, and no copy is made. */
 static const eits_real *violation(const eits_context *ctx, const eits_scratch *scratch)
 {
     const eits_real *g = ctx->solver.gradient;
@@ -25,7 +42,10 @@ static const eits_real *violation(const eits_context *ctx, const eits_scratch *s
     return out;
 }
 
-/* One branch at the end: each of them would be guessed wrong. */
+/* No branch within the loop: whether a neighbour is greater is a coin's toss, which a processor
+ * guesses wrong half of the time. At the image's edge, and where a neighbour is no kept pixel, the
+ * pixel is compared with itself or with one that it is compared with anyhow, which changes nothing.
+ * Of equals the lowest number is the peak, so that a plateau has exactly one. */
 int eits_is_peak(const eits_context *ctx, const eits_real *v, uint32_t j)
 {
     const uint32_t nx = ctx->model->nx, ix = ctx->model->pixel[j].ix, iy = ctx->model->pixel[j].iy;
@@ -59,6 +79,8 @@ static uint32_t consider(const eits_context *ctx, const eits_scratch *scratch, c
     return count + 1;
 }
 
+/* So many columns are tested at a time. Most blocks have none above the limit and are done with one
+ * vector comparison. */
 enum { BLOCK = 32 };
 
 /* Pixel j's two coordinates as one number: a neighbour in the row differs by one's. */
@@ -69,9 +91,10 @@ static inline uint32_t place_of(const eits_pixel *pixel)
     return place;
 }
 
-/* Of BLOCK columns from v and p on, which are violation `min` and no less than their neighbours
- * in the row; returns whether any is. The columns before and after are there too. Without a branch,
- * so that compilers make vectors of it. */
+/* Of BLOCK columns from v and p on, which exceed `min` and are no less than their neighbours in the
+ * row; returns whether any is. A cheap sieve before eits_is_peak, which looks at all eight
+ * neighbours through the cell map. The columns before and after the block must exist. Without a
+ * branch, so that compilers make vectors of it. */
 static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real min,
                               uint32_t flag[BLOCK])
 {
@@ -92,6 +115,7 @@ static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real
     return any;
 }
 
+/* The first and the last block have no column before or after them: those are tested one by one. */
 static uint32_t of_all(const eits_context *ctx, const eits_scratch *scratch, const eits_real *v,
                        eits_real min)
 {
@@ -128,6 +152,8 @@ uint32_t eits_list_violations(const eits_context *ctx, const eits_scratch *scrat
     return count;
 }
 
+/* The image is made after the solve and the active set has no use for z, so both can lend their
+ * memory. */
 eits_nearby eits_nearby_none(const eits_context *ctx)
 {
     const eits_nearby near = {.column = (uint32_t *)(void *)ctx->solver.image,
@@ -136,6 +162,7 @@ eits_nearby eits_nearby_none(const eits_context *ctx)
     return near;
 }
 
+/* In near.marked: this column's neighbours are all listed. */
 enum { AROUND = 2 };
 
 static void add_around(const eits_context *ctx, eits_nearby *near, uint32_t j)

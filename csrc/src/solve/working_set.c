@@ -3,12 +3,22 @@
  * stay zero, so between two looks at every column the products run over these alone, and over fewer
  * and fewer of them as they come to rest at zero. A column that would have moved meanwhile does so
  * after the next look; with a look in every iteration the bits are those of FISTA on every column.
- */
+ *
+ * What it saves: a product over all columns costs n_pixels x rank multiply-accumulates, and a touch
+ * or two moves some per cent of the columns. What it risks: a column is late by up to one interval
+ * between looks. Nothing is lost for good, since a look is exact.
+ *
+ * Invariants while a set is in force: working[] ascends, so that lists and sums have the order of
+ * the full problem; x[k], z[k] and gradient[k] belong to column working[k]; every column outside is
+ * zero in x and in z. Begin and end convert from and to the layout by pixel. */
 #include "solve/working_set.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
+/* The rule for joining is the proximal step itself: a column at x = z = 0 stays zero exactly where
+ * its gradient is within lambda on each side that the sign rule allows. A side that is not allowed
+ * has an infinite limit, so one pair of comparisons serves all three rules. */
 /* A column at rest moves where its gradient lies outside these. */
 typedef struct limits {
     eits_real low, high;
@@ -45,6 +55,11 @@ void eits_working_set_begin(eits_context *ctx)
     ctx->solver.working_count = count;
 }
 
+/* One merge of two ascending lists, the old set and the columns that would move: linear in
+ * n_pixels, without a search. A column of the old set stays as long as x or z is not zero, since
+ * momentum may still carry it, whatever its gradient says. The gradient is compacted in place: the
+ * write never overtakes the read, as count <= j. x and z go through x_next and the image, which
+ * hold nothing between iterations. */
 void eits_working_set_choose(eits_context *ctx, const eits_scratch *scratch, eits_real lambda)
 {
     const uint32_t n = ctx->model->n_pixels, before = ctx->solver.working_count;
@@ -101,6 +116,7 @@ void eits_working_set_prune(eits_context *ctx, eits_real lambda)
         eits_pack_panels(ctx);
 }
 
+/* By way of x_next: in place, the spread would overwrite coefficients not yet read. */
 void eits_working_set_end(eits_context *ctx)
 {
     eits_zero(ctx->solver.x_next, ctx->model->n_pixels);
@@ -111,6 +127,9 @@ void eits_working_set_end(eits_context *ctx)
 
 /* ---- products over it ---- */
 
+/* S'v over the set, from the fastest copy of its columns that there is: panels (hosts with memory
+ * to spare), the column cache (boards: unpacked once, in fast memory), or S as it is stored. All
+ * three take each sum in the same order, so which of them is used does not show in the bits. */
 void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real *out)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
@@ -126,6 +145,8 @@ void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real
     }
 }
 
+/* Zeros are left out first: the product costs rank multiply-accumulates a column, the test one
+ * comparison. The list is in ascending order as in eits_apply, so both give the same bits. */
 uint32_t eits_apply_working(const eits_context *ctx, const eits_scratch *scratch,
                             const eits_real *x, eits_real *out)
 {
