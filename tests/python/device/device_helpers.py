@@ -56,7 +56,7 @@ def sim_board(model: bytes | None = None, *, no_model: bool = False) -> SimBoard
 
 
 def stats_of(board: SimBoard) -> BoardStats:
-    """What ``board`` counts, asked past any line, each time again."""
+    """What ``board`` counts, asked past any line, each time."""
     board.receive(encode(PacketType.GET_STATS, 0, GetStats(0).payload(next(_REQUESTS))))
     (stats,) = (
         parse(packet.type, packet.payload) for packet in Decoder().feed(board.take_output())

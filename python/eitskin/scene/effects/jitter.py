@@ -54,7 +54,7 @@ def amplitude_error(parameters: Parameters) -> tuple[float, float]:
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Scales each row by its own random amplitude, again each frame."""
+    """Scales each row by its own random amplitude, a new one each frame."""
     mean, deviation = amplitude_error(parameters)
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:
