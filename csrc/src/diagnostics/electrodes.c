@@ -1,4 +1,18 @@
-/* Open electrodes and bridged pairs: all the rows that would tell otherwise are dead. */
+/* Open electrodes and bridged pairs: all the rows that would tell otherwise are dead.
+ *
+ * A detached electrode or a bridge spoils every row that uses it, by far more than a touch does; in
+ * the image that is a touch that nobody made. docs/reference/diagnostics.md has the rules, and
+ * docs/results/diagnostics.md what they cost and how often they fail.
+ *
+ * Method: each row that has a clear reference is alive, dead (about nothing where there should be a
+ * voltage) or turned (of the other sign, which no change of conductivity can do). An electrode
+ * none of whose rows is alive is open; a pair whose electrodes are both alive elsewhere, but in no
+ * row across the pair, is bridged. No single row is trusted: three have to agree, since two may
+ * fail together for other reasons (EITS_ROWS_TO_JUDGE).
+ *
+ * In: the frame's voltages, the reference with its noise, rows.unusable as far as rows say it by
+ * themselves. Out: rows.electrode, rows.unusable, info. Nothing is multiplied: a few comparisons a
+ * row and electrode. Rows are judged again at each look instead of stored: it takes no memory. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
@@ -9,8 +23,9 @@ typedef struct limits {
     eits_real significant, noise;
 } limits;
 
-/* Against noise as well as against the reference: a quiet board may have rows smaller than its
- * own noise, and those are neither dead nor alive. */
+/* Against noise as well as against the reference: a row may have a reference smaller than the
+ * noise, and is then neither dead nor alive. Ten times the limit for being dead: the noise of a
+ * significant row then never makes it look dead. */
 static limits limits_of(const eits_context *ctx)
 {
     const eits_real fraction = EITS_ROW_SIGNIFICANT * ctx->reference.v0_rms,
@@ -39,7 +54,7 @@ static int judge_row(const eits_context *ctx, const eits_real *frame, limits lim
 /* Far beyond what a touch makes of a row, be its reference ever so small.
  *
  * A touch lowers or raises a row by parts of itself; a floating input or a broken amplifier
- * gives many times as much. Measured against a share of the reference's rms at least, since a
+ * gives many times as much. Measured against a part of the reference's rms at least, since a
  * row near zero may grow by any factor. */
 static int is_grown(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
@@ -49,6 +64,7 @@ static int is_grown(const eits_context *ctx, const eits_real *frame, limits lim,
            eits_fabs(frame[i]) > eits_fma(EITS_ROW_GROWN, v0 > min ? v0 : min, lim.noise);
 }
 
+/* Whether row i uses an electrode in this state. */
 static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
 {
     const uint8_t *row = eits_row(ctx, i);
@@ -90,6 +106,7 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint
     return 1;
 }
 
+/* Polarity does not matter to a bridge, nor to a channel. */
 int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f)
 {
     return (two[0] == e && two[1] == f) || (two[0] == f && two[1] == e);
@@ -141,6 +158,7 @@ static void find_bridged(eits_context *ctx, const eits_real *frame, limits lim,
     }
 }
 
+/* 64 bits name the first 64 electrodes; rows.electrode has the states of all. */
 void eits_name_electrodes(eits_context *ctx)
 {
     eits_info *info = &ctx->info;
@@ -179,6 +197,9 @@ static void leave_impossible(eits_context *ctx, const eits_real *frame, limits l
     }
 }
 
+/* Three stages, cheapest first, as a frame without a fault ends at the first: count rows by state;
+ * look for open electrodes; look for bridges among what is left. Open electrodes come before
+ * bridges, since their dead rows would speak for a bridge as well. */
 int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
 {
     const limits lim = limits_of(ctx);

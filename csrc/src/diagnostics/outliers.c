@@ -1,10 +1,32 @@
 /* Outliers: rows that their reciprocals, or all the other folds, do not bear out; too many that
- * fraction an electrode: a noisy one. */
+ * share an electrode: a noisy one.
+ *
+ * By reciprocity a row and the row with drive and measurement exchanged give the same voltage,
+ * whatever the conductivity is (a symmetric linear network). A fold whose two sides differ thus
+ * has a wrong reading, and no touch can look like one. Which side is wrong, reciprocity does not
+ * say: that is decided by what all other folds predict.
+ *
+ * The prediction is a ridge fit of the data by the model. P's rows are
+ * orthogonal, scaled singular vectors of the Jacobian, so the fit is H = P' diag(shrink) P with
+ * shrink_i = s_i^2 / (s_i^2 + nu s_1^2) / |P_i|^2 (range.shrink, model_mismatch.c). Leaving folds F
+ * out of the fit needs no new fit: their errors are e = (I - H_FF)^-1 (d - H d)_F, exactly (Allen,
+ * Technometrics 16 (1974) 125, for one; blockwise for several). So all flagged folds together cost
+ * one product with P and a Cholesky factor of at most eight by eight.
+ *
+ * Where a scan has no reciprocals only the prediction is left, and one fold at most is taken out.
+ * Where more than eight folds are flagged no single reading is at fault: whatever electrode or
+ * channel nearly all of them share is (find_noisy).
+ *
+ * In: frame.d, .reciprocity_error, .sides of the folded frame; the reference's noise; P. Out: bits
+ * in rows.unusable, info. The caller folds the frame again where anything was marked. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
 #include "kernels/column.h"
 
+/* A median without sorting, in linear time on average and in place: no memory is needed. Equal
+ * numbers are swapped, which keeps the parts balanced where many are the same, as quantised
+ * differences are. */
 eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k)
 {
     uint32_t low = 0, high = n - 1;
@@ -92,6 +114,7 @@ static tolerance find_tolerance(const eits_context *ctx, const eits_scratch *scr
     return tol;
 }
 
+/* A row that is out for another reason keeps that one, and is not counted twice. */
 static void leave_row(eits_context *ctx, uint32_t row)
 {
     if (row == EITS_FOLD_NONE || ctx->rows.unusable[row] != 0)
@@ -101,6 +124,7 @@ static void leave_row(eits_context *ctx, uint32_t row)
 
 /* ---- what the other folds predict ---- */
 
+/* The fit's matrix is that of all folds: with one missing, H is another. */
 static int all_known(const eits_context *ctx)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
@@ -144,6 +168,7 @@ static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_
             eits_real sum = (a == b ? R(1.0) : 0) - eits_dot(ctx->kernels, weighed, other, rank);
             for (uint32_t k = 0; k < b; ++k)
                 sum = eits_fma(-l[a][k], l[b][k], sum);
+            /* The fit follows this fold wherever it goes: nothing else measures what it does. */
             if (a == b && !(sum > EITS_OUTLIER_PIVOT))
                 return 0;
             l[a][b] = a == b ? eits_sqrt(sum) : sum / l[b][b];
@@ -190,7 +215,7 @@ static void choose_sides(eits_context *ctx, const eits_scratch *scratch, const u
 
 /* ---- too many to be outliers ---- */
 
-/* Where one pair is what the flagged folds fraction, it is its channel: the rows measured across it
+/* Where one pair is what the flagged folds share, it is its channel: the rows measured across it
  * go, their reciprocals stay. */
 static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
 {

@@ -1,5 +1,20 @@
 /* Outliers in reference frames: a reading that its reciprocal does not bear out is left out of the
- * reference. */
+ * reference.
+ *
+ * A wrong reading in a frame spoils that frame; one in the reference spoils all that follow, and
+ * raises the learned noise so that faint touches are missed. Outliers of frames are judged by a
+ * noise that is only being learned here, so this room has rules of its own: changes between frames
+ * are compared with each other.
+ *
+ * Method: between two frames of an untouched skin each row changes by noise, and a row and its
+ * reciprocal by drift alike. So the difference of the two changes is the oddity of a fold; odd is
+ * what exceeds a multiple of the median oddity (1.4826 median is the standard deviation where noise
+ * is normal), a part of the greatest voltage, and a part of the fold's own. Three limits, as none
+ * alone does: the median may be zero on quantised voltages, small rows jump by much of themselves,
+ * large ones have noise in proportion.
+ *
+ * In: a reference frame and the mean so far, or the first two frames. Out: EITS_MASKED_NOW in
+ * rows.masked for the reading at fault, until eits_reference_unmask. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
@@ -11,6 +26,7 @@ static const eits_real UNPAIRED = R(16.0), UNPAIRED_MIN = R(1e-2);
 /* and of the row's own voltage: noise may go with that */
 static const eits_real OWN_MIN = R(0.05);
 
+/* Below are comparisons of `newer` with `older`; rows without a voltage in either do not count. */
 static int in_use(const eits_context *ctx, uint32_t row, const eits_real *older)
 {
     return row != EITS_FOLD_NONE && !ctx->rows.masked[row] && eits_is_finite(older[row]);
@@ -75,6 +91,7 @@ static eits_real limit_of(const eits_context *ctx, const eits_scratch *scratch,
     return largest;
 }
 
+/* More than EITS_OUTLIER_MAX odd folds are a change of the skin: none is odd then. */
 uint32_t eits_reference_compare(eits_context *ctx, const eits_scratch *scratch,
                                 const eits_real *newer, const eits_real *older, uint8_t bit)
 {
@@ -156,6 +173,7 @@ uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_scratch *scra
     return left;
 }
 
+/* The caller's own mask, 1, stays. */
 void eits_reference_unmask(eits_context *ctx)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
