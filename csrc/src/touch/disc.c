@@ -1,3 +1,18 @@
+/* What the skin answers to a disc, and what of the grid a disc covers.
+ *
+ * The image is a sum of pixels, but a finger is neither square nor on the grid. A disc of uniform
+ * change covers pixels wholly, partly or not; its answer is the sum of S's columns by these covers,
+ * so a touch can lie between pixels and its place can be found to a fraction of one. The cover of a
+ * pixel is clamp(1/2 + (radius - distance) / pixel, 0, 1), exact for a straight edge parallel to
+ * the pixel's side and continuous in place and radius. That continuity is what the fit lives on:
+ * with covers of 0 and 1 the residual would be a staircase, and its derivative zero or infinite.
+ *
+ *     atom  = Q F S (c / w),      w the column weights, c the covers: the answer to 1 S/m
+ *     slope = Q F S (dc / w),     dc / dx = ramp (x_pixel - x) / distance / pixel, and so on
+ *
+ * Costs: an atom takes rank multiply-accumulates a covered pixel and Q F on the sum, its three
+ * slopes three times that; the walk over cells is small beside it. Discs of a fit move by parts of
+ * a pixel, so the columns come from the cache where it has room. */
 #include "touch/disc.h"
 
 #include "base/vec.h"
@@ -19,6 +34,9 @@ typedef struct covered {
 
 /* Cells from first to last, clipped to 0 .. count - 1, whose centres may lie within `reach` of
  * `at`; all in pixels. */
+/* Up to one cell further than needed on either side, as rounding of a bound must not lose a
+ * cell: a cell without cover costs one distance. Beyond the grid the range is empty. Compared
+ * before it is converted, since a real out of range of an integer is undefined in C. */
 static void cell_range(eits_real at, eits_real reach, uint32_t count, uint32_t *first,
                        uint32_t *last)
 {
@@ -62,6 +80,8 @@ static covered cover(eits_context *ctx, const eits_scratch *scratch, const eits_
             const eits_real fraction = R(0.5) + (radius - distance);
             if (!(fraction > 0))
                 continue;
+            /* At the very centre no direction is the way to it; the slope there is zero by
+             * symmetry. */
             const eits_real from = distance > R(1e-6) ? 1 / distance : 0;
             c.index[c.count] = j;
             c.cover[c.count] = fraction < 1 ? fraction : 1;
@@ -121,6 +141,8 @@ uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const ei
     return macs;
 }
 
+/* A weighted mean, so the column weights of S do not enter. A disc that covers nothing has sum 0
+ * and no terms. */
 uint64_t eits_disc_field(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
                          eits_real *field)
 {

@@ -1,4 +1,26 @@
-/* Discs' strengths, places and radii. */
+/* Discs' strengths, places and radii: nonlinear least squares in reduced space.
+ *
+ *     minimise |data - sum_k change_k atom(x_k, y_k, r_k)|^2 + sum_k weight_k (r_k - expected_k)^2
+ *
+ * with change_k of the sign of its peak. The image cannot say this: it is sparse by its lambda, so
+ * its peaks are narrower and weaker than the touch and sit on pixels.
+ *
+ * Method: Gauss and Newton's steps with Levenberg and Marquardt's damping (Marquardt, J. Soc.
+ * Indust. Appl. Math. 11 (1963) 431, doi 10.1137/0111030), one disc at a time, the others held.
+ * Strength is a linear parameter and is set to its best value at every trial place, so the step
+ * chooses only among places and radii. A trial that does not lower the cost is not taken: the fit
+ * never ends worse than it began.
+ *
+ * The term of the radius: the data know change times area far better than either, because a wider,
+ * weaker disc looks alike from the rim. Contrasts are known within limits, so strength suggests a
+ * radius, and the term holds it there as firmly as the touch's energy or the noise warrants.
+ *
+ * Invariant: f->residual = data - sum of all discs' answers, kept by adding and taking away single
+ * atoms; eits_fit_restart makes it exact again after discs or data were exchanged.
+ *
+ * Costs per move of one disc: an atom with its three slopes, at most three trial
+ * atoms, 17 dots.
+ */
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
@@ -10,8 +32,13 @@ enum { STRENGTH_PASSES = 10 };
 /* Relative deviation of the radius that strength suggests: contrasts of 3 to 10 make 2 (c - 1) / (c
  * + 1) = 1.0 to 1.6, so that the root of strength tells the radius to about 12 %. */
 static const eits_real RADIUS_DEVIATION = R(0.12);
+/* Of the unit diagonal: holds a direction that the data leave open, and slows the others by a
+ * thousandth. */
 static const eits_real DAMPING = R(1e-3);
+/* A move by less ends the sweeps: it could not be seen. */
 static const eits_real SETTLED_PIXELS = R(1.0 / 256.0);
+/* The covers are linear in the radius over one pixel at most: a longer step would leave the range
+ * in which its slope is true. */
 static const eits_real MAX_RADIUS_STEP_PIXELS = R(0.5);
 
 eits_fit eits_fit_none(const eits_context *ctx, const eits_scratch *scratch)

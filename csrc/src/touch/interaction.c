@@ -1,3 +1,21 @@
+/* What touches do to each other's data, taken out to second order (interaction.h has the physics).
+ *
+ * The Jacobian is linear: two touches give the sum of what each gives alone. In truth each lies in
+ * the field that the other has changed. For strong touches near each other that
+ * shifts the fitted places. With the discs as
+ * fitted so far the second-order term is computed and subtracted, and the fit goes on with data
+ * that the linear model can give. touch.c does so in turn with the fit, since either needs the
+ * other's result.
+ *
+ * In: discs with change, place and radius; the model's fields (section FLDS), per electrode, so
+ * that a row's field is a difference of two. Out: `data`, reduced, whitened and projected as
+ * frame.y is.
+ *
+ * Costs: a field per disc (covered pixels x field stride), then 4 multiply-accumulates an electrode
+ * for each ordered pair of discs and 3 a folded row for each disc, and one product with P. No
+ * transcendental function and no solve: the field of a dipole in the plane is 1 / z^2.
+ *
+ * Fields live in scratch->square, one row a disc and one for the sum: no solver runs meanwhile. */
 #include "touch/interaction.h"
 
 #include "base/vec.h"
@@ -35,6 +53,8 @@ int eits_has_interaction(const eits_context *ctx)
 }
 
 /* The change of the disc's conductivity times the area that its covers add up to. */
+/* The covers fall from 1 to 0 over one pixel across the rim; their integral over the plane is
+ * pi (r^2 + pixel^2 / 12): eits_disc_area away from the edge of the skin, without its walk. */
 static eits_real moment(const eits_context *ctx, const eits_disc *disc)
 {
     const eits_real pixel = (eits_real)ctx->model->pixel_mm;

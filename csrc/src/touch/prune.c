@@ -1,4 +1,14 @@
-/* Which discs are touches. */
+/* Which discs are touches: backward elimination.
+ *
+ * The image has more peaks than touches: ripple around a strong one, noise, a second peak of one
+ * wide touch near the rim. A disc stays if the data are worse without it by enough (a fraction
+ * touch_min_fraction of |y|^2) and if it stands out of the noise at its own pixel.
+ *
+ * What the data lose without disc k, all other strengths refitted, is change_k^2 / (G^-1)_kk with G
+ * the atoms' Gram matrix: the usual formula of least squares for leaving one variable out. It needs
+ * no refit for each candidate: one Cholesky factor of at most EITS_MAX_TOUCHES squared serves all.
+ * In: f with its atoms and residual. Out: fewer discs, f->explained of those that stay, which is
+ * reported as the touch's confidence. */
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
@@ -18,6 +28,9 @@ static void leave_one_out_gains(eits_context *ctx, eits_fit *f)
         norm[i] = eits_sqrt(eits_dot(ctx->kernels, eits_atom(ctx, i), eits_atom(ctx, i), rank));
         for (uint32_t j = 0; j <= i; ++j) {
             const eits_real both = norm[i] * norm[j];
+            /* On a unit diagonal, lifted a little: two discs in one place are dependent, and would
+             * make the factor's last pivot zero or less. They then explain about nothing each, and
+             * one goes. */
             eits_real sum = i == j ? 1 + R(1e-5)
                                    : (both > 0 ? eits_dot(ctx->kernels, eits_atom(ctx, i),
                                                           eits_atom(ctx, j), rank) /
@@ -89,6 +102,8 @@ static int stands_out(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     return best >= min;
 }
 
+/* The residual gets back what the disc explained; the rest keep their order, which is that of their
+ * peaks. */
 static void drop(eits_context *ctx, eits_fit *f, uint32_t k)
 {
     const uint32_t rank = ctx->model->rank;

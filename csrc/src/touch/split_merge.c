@@ -1,10 +1,23 @@
-/* Peaks are not touches: near the rim one touch may have two, and two near ones may have one. */
+/* Peaks are not touches: near the rim one touch may have two, and two near ones may have one.
+ *
+ * The fit moves discs but does not change how many there are, and the image's peaks decide where it
+ * starts. Here the number is put right: two discs that nearly touch are replaced by one of their
+ * area, and a disc by two side by side, each tried for real, refitted, and undone where the
+ * residual does not bear it out. Merging may cost a little (fewer parameters explain less),
+ * splitting has to gain clearly (more of them always explain more): hence two
+ * sets of limits. One may undo what the other did, so touch.c runs them in turn a fixed number of
+ * times.
+ *
+ * Limits are parts of |y|^2, of what is left, and of what noise gives one direction
+ * (f->noise / rank): the first guards against the model's own error, which scales with the touch,
+ * the last against noise. A trial costs a few moves of disc_fit.c; the search is greedy, nearest
+ * pair and largest disc first, since trying all subsets would grow without bound. */
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* Chosen on scenes of 2 to 8 touches at 60 and 80 dB; eitskin study levers tells what they are
+/* Chosen on scenes of 2 to 8 touches at 60 and 80 dB; eitskin study levers reports what they are
  * worth.
  *
  * edges nearer than this fraction of the smaller radius: one touch, perhaps, */
@@ -14,20 +27,20 @@ static const eits_real MERGE_TOTAL = R(0.002);
 static const eits_real MERGE_LEFT = R(0.5);    /* so much more of what is left */
 static const eits_real NOISE = R(20.0);        /* and so many directions of noise */
 static const eits_real SPLIT_TOTAL = R(0.001); /* with less than this fraction of |y|^2 left */
-static const eits_real SPLIT_NOISE =
-    R(1.3); /* beyond so much noise there is nothing to part
-             *
-             * two discs in their first places may leave so many times as much, */
+/* and less than so many times the noise there is nothing to split */
+static const eits_real SPLIT_NOISE = R(1.3);
+/* two discs in their first places may leave so many times as much as the one, */
 static const eits_real SPLIT_FIRST = R(2.0);
-static const eits_real SPLIT_GAIN =
-    R(0.85); /* fitted so little of it,
-              *
-              * their edges so many times the smaller radius apart */
+/* once fitted at most so much of it, */
+static const eits_real SPLIT_GAIN = R(0.85);
+/* and their edges must be so many times the smaller radius apart: they may overlap a little */
 static const eits_real SPLIT_DISTANCE = R(-0.1);
 /* of the disc's radius: where the two begin, and how large */
 static const eits_real SPLIT_OFFSET = R(1.3), SPLIT_RADIUS = R(0.7);
 enum { DIRECTIONS = 4, MERGE_SWEEPS = 3, SPLIT_SWEEPS = 4 };
 
+/* Enough to undo a trial: atoms and residual follow from the discs, and cost less to compute again,
+ * seldom, than to keep. */
 typedef struct saved {
     eits_disc disc[EITS_MAX_TOUCHES];
     uint32_t count;
@@ -68,6 +81,7 @@ typedef struct pair {
     uint32_t i, j;
 } pair;
 
+/* A total order: distances may be equal, and the pairs then go by their numbers. */
 static int comes_after(const pair *a, const pair *b)
 {
     if (a->distance != b->distance)

@@ -1,5 +1,22 @@
 /* Peaks of the image start discs; the discs are fitted to the reduced data off the grid; those that
- * explain nothing go. */
+ * explain nothing go.
+ *
+ * The image is a good detector and a poor ruler: it says that there is a touch and about where.
+ * Place, radius and strength come from the data themselves, by a model with few unknowns
+ * (disc_fit.c). The order of stages:
+ *
+ *   1. peaks of the image, at most max_touches, as discs of one radius; strengths
+ *   2. places and radii, to log data where there are any; pruning
+ *   3. merging, then the touches' interaction taken out of the data, and places again, in turn
+ *   4. merging and splitting, in turn with 3
+ *   5. a last fit to the data without interaction, with the radius's prior loosened; pruning
+ *
+ * Log data, v0 log(v / v0), are nearer to linear in the conductivity than differences are; strong
+ * touches bend them less. They give the first places; the last fit is to the
+ * differences, whose noise the whitening is made for.
+ *
+ * Each stage can be switched off (options.touch_fit, .touch_sweeps), for what it costs a board;
+ * info.touch_macs counts. docs/results/levers.md has what each is worth. */
 #include "touch/disc_fit.h"
 
 #include "base/vec.h"
@@ -10,6 +27,8 @@
 /* The radius that strength suggests counts for more while it is open which discs there are, and for
  * less once the discs' interaction is known and the data are right to a thousandth. */
 static const eits_real EARLY_RADIUS = R(2.0), FINAL_RADIUS = R(0.4);
+/* So many turns of merging, splitting and interaction; and so many sweeps where discs are nearly
+ * in place. */
 enum { ROUNDS = 2, LATER_SWEEPS = 2 };
 
 /* ---- peaks ---- */
@@ -19,11 +38,8 @@ static void seed(const eits_context *ctx, const eits_scratch *scratch, eits_fit 
 {
     const eits_model *model = ctx->model;
     const eits_options *o = &ctx->options;
-    eits_real height[EITS_MAX_TOUCHES],
-        *size =
-            scratch->pixel[0]; /* |image|
-                                *
-                                * Peaks far below the greatest are the solver's ripple around it. */
+    eits_real height[EITS_MAX_TOUCHES], *size = scratch->pixel[0]; /* |image| */
+    /* Peaks far below the greatest are the solver's ripple around it. */
     const eits_real min = o->touch_threshold * eits_greatest(ctx->kernels, ctx->solver.image,
                                                              model->n_pixels, EITS_SIGN_BOTH);
     for (uint32_t j = 0; j < model->n_pixels; ++j)
@@ -110,6 +126,7 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
         return;
     if (splits_merges)
         (void)eits_fit_merge(ctx, scratch, f);
+    /* Merging comes first: two halves of one touch are no two dipoles in each other's field. */
     /* Places and interaction depend on each other: in turn. */
     for (int round = 0; interacts && f->count > 1 && round < ROUNDS; ++round) {
         remove_interaction(ctx, scratch, f);

@@ -1,27 +1,44 @@
-/* The filter is Kalman's (Trans. ASME, J. Basic Eng. 82 (1960) 35-45) for a place of constant
+/* Touches over time: which of this frame are those of the last, which are believed, where they are.
+ *
+ * A frame by itself gives places that jitter by its noise, and now and then a touch that is none.
+ * Over frames two things help: a touch stays near where it was, and noise does not. So a doubtful
+ * touch is tentative until it was found in track_confirm frames on end, a clear one is reported at
+ * once, and one that was reported keeps its id for track_hold frames without being found.
+ *
+ * The filter is Kalman's (Trans. ASME, J. Basic Eng. 82 (1960) 35-45) for a place of constant
  * velocity, the same along both axes; its noise is what each touch's own strength over the frame's
- * noise makes of it. */
+ * noise makes of it. Both axes have the same variances, so three numbers, the covariance of place
+ * and velocity, serve for either, and no matrix is inverted:
+ *
+ *     predict   p += v,  P += 2 C + V + q / 4,  C += V + q / 2,  V += q
+ *     update    K = P / (P + R),  p += K (found - p),  v += C / (P + R) (found - p)
+ *
+ * with P, C, V place_mm2, both_mm2, speed_mm2, q the square of the velocity's change a frame and R
+ * the variance of a found place. Time is counted in frames: limits and variances are in follow_mm,
+ * which the caller sets for the frame rate.
+ *
+ * Invariants: at most EITS_MAX_TOUCHES are followed; no id is 0; whatever
+ * would be no number or off the skin starts again from what was found. */
 #include "touch/tracker.h"
 
 #include "base/vec.h"
 #include "touch/disc.h"
 
-/* Chosen on tuning streams, docs/guide/tracking.md.
- *
- * a touch that explains less of |y|^2 may be half of another */
+/* Chosen on tuning streams, docs/guide/tracking.md. */
+/* a touch that explains less of |y|^2 may be half of another */
 static const eits_real SURE_FRACTION = R(0.05);
 /* and one whose own S'y is below so many times that of noise may be noise */
 static const eits_real SURE_CLEARNESS = R(1.5);
-/* of follow_mm, for touches that are not told of yet */
+/* of follow_mm, for touches that are not reported yet: noise is found anywhere, a touch beside
+ * itself */
 static const eits_real TENTATIVE_REACH = R(0.6);
 /* of follow_mm: rms by which a velocity changes from frame to frame */
 static const eits_real SPEED_CHANGE = R(0.028);
 /* of follow_mm: rms of a new touch's velocity, a frame */
 static const eits_real FIRST_SPEED = R(0.12);
-static const eits_real MIN_DEVIATION =
-    R(0.01); /* of a pixel: no place is surer than this
-              *
-              * a touch that was found more often is told of while it is held */
+/* of a pixel: no place is surer than this */
+static const eits_real MIN_DEVIATION = R(0.01);
+/* a faint touch that was found at least so often is reported while it is held */
 enum { KNOWN_FRAMES = 4 };
 enum { NONE = EITS_MAX_TOUCHES };
 
@@ -105,7 +122,7 @@ static void predict(const eits_context *ctx, eits_followed *f)
 }
 
 /* What is known of a touch, with what was found of it. Where that would be no number, or off the
- * skin, it starts anew. */
+ * skin, it starts again. */
 static eits_followed updated(const eits_context *ctx, const eits_followed *before,
                              const eits_touch *found)
 {
@@ -136,8 +153,8 @@ static eits_followed updated(const eits_context *ctx, const eits_followed *befor
 
 /* ---- which is which ---- */
 
-/* Nearest pairs first, among those that were told of or among the others: owner[k] is who the found
- * touch k belongs to. */
+/* Nearest pairs first, among those that were reported or among the others: owner[k] is who the
+ * found touch k belongs to. */
 static void pair(const eits_context *ctx, const eits_touch *found, uint32_t count, int reported,
                  uint32_t *owner)
 {
@@ -168,7 +185,7 @@ static void pair(const eits_context *ctx, const eits_touch *found, uint32_t coun
     }
 }
 
-/* An id for a touch that may be told of now.
+/* An id for a touch that may be reported now.
  *
  * A touch that is clear beyond doubt is reported at once; others once they have been seen often
  * enough that noise would not have been. */
