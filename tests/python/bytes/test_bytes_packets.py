@@ -96,7 +96,7 @@ def test_any_line_gives_packets_whatever_the_pieces(content: bytes, size: int) -
     assert [packet for piece in pieces(content, size) for packet in cut.feed(piece)] == packets
     assert cut.counters == whole.counters
     for packet in packets:
-        again = Decoder(numbered=False).feed(encode(packet.type, packet.sequence, packet.payload))
+        again = Decoder().feed(encode(packet.type, packet.sequence, packet.payload))
         assert [(one.type, one.sequence, one.payload) for one in again] == [
             (packet.type, packet.sequence, packet.payload)
         ]

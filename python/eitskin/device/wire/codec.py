@@ -92,11 +92,10 @@ class Decoder:
     counted into.
 
     What comes before the first delimiter is the rest of a packet that was cut by opening the port,
-    and no error. With ``numbered`` false sequence numbers are not looked at, as boards do with
-    commands.
+    and no error.
     """
 
-    def __init__(self, counters: LinkCounters | None = None, *, numbered: bool = True) -> None:
+    def __init__(self, counters: LinkCounters | None = None) -> None:
         module = _core()
         self._lib, self._ffi = module.lib, module.ffi
         room = int(self._lib.EITS_LINK_MAX_PACKET)
@@ -111,7 +110,6 @@ class Decoder:
         self._before = self._counted()
         self._skipping = True
         self._sequence = SequenceCheck(self.counters)
-        self._numbered = numbered
         self._late: deque[Packet] = deque(maxlen=LATE_IN_A_ROW)
 
     @property
@@ -158,9 +156,7 @@ class Decoder:
         return found
 
     def _take(self, packet: Packet) -> list[Packet]:
-        if (
-            packet.type == PacketType.RECORDING or not self._numbered
-        ):  # the head of a recording is outside of the numbering
+        if packet.type == PacketType.RECORDING:  # the head is outside of the numbering
             self.counters.packets += 1
             return [packet]
         restart = packet.type == PacketType.INFO and packet.payload[:4] == b"\0\0\0\0"
