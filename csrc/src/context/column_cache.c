@@ -1,3 +1,12 @@
+/* Columns of S, unpacked from their storage type to floats, in fast memory.
+ *
+ * A board keeps S in flash as halves or bytes; unpacking a number costs as much as multiplying it
+ * (kernels/m7.c has counts). The working set and the discs of a fit use the same few columns over
+ * and over, so these are kept. A direct map both ways, slot[column] and column[slot], finds one
+ * without a search; EITS_NO_PIXEL marks none. All that is asked for at once is there afterwards, or
+ * nothing changes and the caller reads S itself: no product ever has columns of both kinds.
+ *
+ * Only speed depends on the cache. Unpacking is exact, so results have the same bits without it. */
 #include "context/column_cache.h"
 
 #include <string.h>

@@ -1,5 +1,24 @@
 /* From voltages to reduced data: difference to the reference, fold, and the directions to ignore.
- */
+ *
+ * A frame has a voltage a row; the solver wants `rank` numbers that say all the frame says of the
+ * conductivity. Three linear steps make them, in this order:
+ *
+ *   datum   gain (v - v0), or its ratio or logarithm as the model was built. The difference removes
+ *           what contacts, shape and amplifier have in common with the reference; the gain scales
+ *           the board's volts to the model's.
+ *   fold    the mean of a row and its reciprocal: half the numbers, less noise by root two, and
+ *           a difference that checks itself (diagnostics/outliers.c).
+ *   reduce  y = P d, folds x rank multiply-accumulates: the whitened singular directions.
+ *
+ * A row that cannot be used is not replaced by a guess. Its reciprocal stands for both where there
+ * is one; else the fold is left out of P d, and either F whitens the rest (frame/whitening.h) or
+ * the direction that the fold would have moved y along, P e_k, is ignored: projected out of y and
+ * of every F S x alike. The same is done with the direction of a gain's drift, P v0, along which
+ * temperature and supply move all data at once.
+ *
+ * The basis of ignored directions depends on which sides are in use and on the reference, not on
+ * the frame, so it is built again only when one of these changes (projection.stale): a frame with
+ * unchanged rows pays for P d and the projection alone. */
 #include "frame/fold.h"
 
 #include "base/log.h"
@@ -90,6 +109,9 @@ static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out
 
 /* Add `candidate` to the basis unless it lies in its span: Gram-Schmidt, twice for accuracy in
  * float32. */
+/* A second pass since rounding of the first leaves parts of the basis that are as large as what is
+ * left of a nearly dependent direction ("twice is enough": Parlett, The Symmetric Eigenvalue
+ * Problem, section 6.9). */
 static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
 {
     const uint32_t rank = ctx->model->rank;
@@ -135,6 +157,8 @@ static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, 
     return (uint64_t)model->n_folded * model->rank;
 }
 
+/* Folds first, then the drift: where directions run out, what was not measured must be ignored,
+ * what drifts should be. */
 uint64_t eits_build_basis(eits_context *ctx, const eits_scratch *scratch)
 {
     eits_real *direction = scratch->row[0];

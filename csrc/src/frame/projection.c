@@ -1,3 +1,7 @@
+/* Q v = v - sum_k b_k (b_k'v) over the ignored directions b_k, in place; 2 rank
+ * multiply-accumulates each. Q is a projection, so applying it to y once and to F S x in every
+ * residual makes the problem that of the other directions alone, exactly, without a change of P or
+ * S. */
 #include "frame/projection.h"
 
 #include "base/vec.h"

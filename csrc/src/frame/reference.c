@@ -1,4 +1,19 @@
-/* The reference frame: its mean and noise over several frames, and how it fits the model. */
+/* The reference frame: its mean and noise over several frames, and how it fits the model.
+ *
+ * Everything later is a difference to the reference, so its errors are in every image: the noise of
+ * one frame would be a fixed pattern, the mean of n has it by root n less. The same frames tell how
+ * much noise there is (noise_v), from which the regularisation, the detection threshold and the
+ * outliers' limits follow.
+ *
+ * Mean and squared deviations are kept by Welford's recursion, one frame at a time: no frame is
+ * stored, and no difference of large sums loses the small deviations in float32.
+ *
+ *     v0 += (v - v0_old) / n,    m2 += (v - v0_old) (v - v0_new),    noise^2 = mean m2 / (n - 1)
+ *
+ * Fit to the model: gain = |v_ref| / |v0| with the sign of their correlation, both over the folded
+ * rows in use. Voltages may be of any size that is a number (a board in volts, a file in microvolts
+ * or in converter steps): a scale is taken out before each square, so that it neither overflows nor
+ * vanishes. NaN in v0 marks a row without a reference. */
 #include "frame/reference.h"
 
 #include "base/vec.h"
@@ -79,6 +94,7 @@ eits_status eits_fit_reference(eits_context *ctx)
 }
 
 /* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
+/* A power of two, so that dividing by it rounds nothing. */
 eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame)
 {
     eits_real largest = 0, unit = 1;
@@ -93,6 +109,8 @@ eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame)
 }
 
 /* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
+/* One number for all rows: white noise of the front end. Rows of few frames would each have an
+ * estimate that is itself noise. */
 eits_real eits_reference_noise(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;

@@ -1,4 +1,10 @@
-/* How F (whitening.h) is applied, whatever it is. */
+/* How F (whitening.h) is applied, whatever it is: not at all, by a weight a direction, or by an
+ * upper triangle where rows are left out.
+ *
+ * The solvers do not know which; they ask for F v, F'v, Q F v and the residual, and for what each
+ * costs, and the three forms differ only here. F is applied to the `rank` numbers S x, never to S:
+ * rank^2 / 2 multiply-accumulates at most, where a changed S would cost n_pixels times that and
+ * memory that a board has not. */
 #include "base/vec.h"
 #include "frame/projection.h"
 #include "frame/triangle.h"
@@ -13,6 +19,8 @@ static void weigh(const eits_context *ctx, const eits_real *v, eits_real *out)
         out[i] = weight[i] * v[i];
 }
 
+/* In place, from the first row down: row i of an upper triangle needs v from i on. What it
+ * reads before i, to begin at a whole vector, meets zeros. */
 uint64_t eits_whiten(const eits_context *ctx, eits_real *v)
 {
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL)
