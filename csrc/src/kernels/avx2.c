@@ -1,5 +1,15 @@
 /* The matrix products for x86-64 with AVX2 and FMA; this file alone is compiled with -mavx2 -mfma
- * -mf16c. */
+ * -mf16c, and runs only where the processor has them (eits_kernels_best).
+ *
+ * The bits are those of the portable build. That decides the design: a chain of the specification
+ * is one lane of a register, so vectors run across columns (S'v) or across rows (S x), never along
+ * a sum. Where columns are stored one after the other, eight of them are transposed in registers
+ * for that (avx2_stored.h); panels hold them transposed already.
+ *
+ * An FMA takes four to five cycles and two can start in each, so eight to ten independent sums are
+ * needed to keep both units busy: hence two panels at a time.
+ *
+ * One text serves float and double: `vector`, LANES and the macros below stand for either width. */
 #define NAME(x) avx2_##x
 
 #include "base/vec.h"
@@ -48,10 +58,9 @@ static void avx2_sum_panel(const eits_real *panel, const eits_real *v, uint32_t 
         STORE(sum + k * LANES, lane[k]);
 }
 
-#ifndef EITS_DOUBLE /* a double panel's eight sums hide the latency already, and fill the \
-                       registers                                                          \
- *                                                                                        \
- * Eight chains hide the latency that a panel's four leave. */
+/* Eight chains hide the latency that a panel's four leave. A double panel has eight already, and
+ * they fill the registers. */
+#ifndef EITS_DOUBLE
 static void avx2_sum_two_panels(const eits_real *panel, const eits_real *other, const eits_real *v,
                                 uint32_t rows, eits_real *sum)
 {
@@ -106,6 +115,7 @@ static void avx2_sum_two_panels(const eits_real *panel, const eits_real *other, 
 
 #include "kernels/avx2_dots.h" /* uses the lanes of avx2_stored.h */
 
+/* No default in these: the compiler then reports a storage type that is missing. */
 static void avx2_mul(const eits_matrix *matrix, const uint32_t *index, const eits_real *value,
                      uint32_t count, eits_real *out)
 {
@@ -183,7 +193,9 @@ static void avx2_unpack(const eits_matrix *matrix, size_t first, size_t count, f
     }
 }
 
-/* As in kernels_body.h, each lane by the same operations in the same order. */
+/* As in kernels/body.h, each lane by the same operations in the same order. The branches become
+ * masks: a lane that is not above its threshold gets zero by AND. SUB(v, v) is zero, or NaN where v
+ * is not finite. */
 static void avx2_prox(const eits_prox *how, uint32_t n, const eits_real *restrict gradient,
                       const eits_real *restrict x, eits_real *restrict next, eits_real *restrict z)
 {

@@ -1,5 +1,6 @@
-/* Part of avx2.c: products by eight lanes and a tree, and the greatest and the non-zero of
- * many numbers. */
+/* Part of avx2.c: products by eight lanes and a tree, and the greatest and the non-zero of many
+ * numbers. Eight lanes are one float register or two double ones: a column is read in order without
+ * a transpose, and the trees of four columns are added together. */
 
 /* out = the trees of four columns' eight lanes each, in the order of eits_tree8. */
 static inline void four_trees(vector lanes[4][8 / LANES], eits_real *out)

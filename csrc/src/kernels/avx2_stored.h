@@ -1,4 +1,7 @@
-/* Part of avx2.c: products with each storage type, S x, S'v by chains and to floats. */
+/* Part of avx2.c: products with each storage type, S x, S'v by chains and to floats. S'v reads
+ * LANES columns and transposes LANES x LANES numbers in registers, so that each lane is one
+ * column's
+ * chain. */
 
 /* Four stored numbers as floats: every conversion is exact. */
 static inline __m128 four_f32(const float *from)

@@ -1,5 +1,5 @@
-/* The matrix products, included once for each processor that they are built for
- * (kernels_portable.c, kernels_avx2.c). NAME(x) gives that build's names; the build defines
+/* The matrix products, included once for each processor that they are built for (portable.c,
+ * avx2.c, m7.c). NAME(x) gives that build's names; the build defines
  * NAME(sum_panel) before it includes this, and where it has its own KERNELS_OWN_PRODUCTS (mul,
  * mul_t, dots, unpack), KERNELS_OWN_PANELS (sum_two_panels beside the above), KERNELS_OWN_VECTORS
  * (dot, axpy), KERNELS_OWN_ROWS (rows_dot, rows_sum), KERNELS_OWN_NONZEROS, KERNELS_OWN_GREATEST,

@@ -1,6 +1,8 @@
-/* What the kernels' builds fraction: choosing one, listing non-zeros, reading columns, making
- * panels.
- */
+/* What the kernels' builds share: choosing one, listing non-zeros, reading columns, making panels.
+ *
+ * Speed differs between the builds, bits do not (kernels.h has the order of every sum), so which
+ * one runs is decided by the processor and needs no option. The choice is made when a context is
+ * set up, not in each product. */
 #include "kernels/kernels.h"
 
 #include "base/half.h"
@@ -32,6 +34,8 @@ const eits_kernels *eits_kernels_best(void)
 #endif
 }
 
+/* For single numbers; whole columns of a storage type go through the kernels' own loops. No default
+ * case, so that the compiler reports a storage type that is missing. */
 static eits_real read_entry(const eits_matrix *matrix, size_t at)
 {
     switch (matrix->storage) {

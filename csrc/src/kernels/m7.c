@@ -3,12 +3,21 @@
  * on little but the FMA. Each sum is the same chain in the same order, hence the same bits.
  * Instructions a multiply-accumulate: mul_t 1.35 (f16 2.4, i16 3.3, i8 4.0), mul 1.35 (other
  * storages are unpacked block by block before, for dots too), dot 1.5; to unpack a number: f16 1.5,
- * i16 and i8 3.1. */
+ * i16 and i8 3.1.
+ *
+ * Written in assembly since compilers load one number an instruction here. The FPU
+ * has s0 to s31; sums stay in the upper half (s16 or s24 on) while the lower half takes what is
+ * loaded. Operands name what changes ("+r"), clobbers name every register used, and "memory" keeps
+ * the compiler from moving loads and stores across.
+ *
+ * Conversions are exact, so unpacking first and multiplying after gives the bits of a product that
+ * reads storage directly. */
 #define NAME(x) m7_##x
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
+/* For contexts with panels (eits_init with memory for them); boards have none to spare. */
 static void m7_sum_panel(const eits_real *panel, const eits_real *v, uint32_t rows, eits_real *sum)
 {
     for (uint32_t l = 0; l < EITS_PANEL; ++l) {
@@ -102,6 +111,7 @@ static void unpack_i8(const void *from, float *out, uint32_t turns)
                      : LOW_S, "cc", "memory");
 }
 
+/* `first` and `count` are multiples of eight, so that no storage type begins within a word. */
 static void own_unpack(const eits_matrix *matrix, size_t first, size_t count, float *out)
 {
     const uint32_t turns = (uint32_t)(count / 8);
@@ -256,6 +266,8 @@ TWO_COLUMNS(two_columns_i8,
             BYTES_FROM(c0, 0, 1, 2, 3, 4, 5, 6, 7) BYTES_FROM(c1, 8, 9, 10, 11, 12, 13, 14, 15),
             IN_ORDER)
 
+/* The rows beyond whole eights are unpacked to the stack: a column is padded to a multiple of
+ * eight, so reading them is safe. */
 static void mul_t_packed(const eits_matrix *matrix, const uint32_t *index, uint32_t count,
                          const eits_real *v, eits_real *out)
 {

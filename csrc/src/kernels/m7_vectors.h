@@ -1,4 +1,5 @@
-/* Part of m7.c: dots, axpy, rows. */
+/* Part of m7.c: dots, axpy, rows. Eight lanes are s16 to s23; a turn loads eight numbers of either
+ * vector by one VLDM each. The rest beyond whole eights is done in C, by the same lanes. */
 
 /* Add `turns` times eight products to the lanes; `turns` is at least 1. */
 static void add_eights(const float *a, const float *b, uint32_t turns, float lane[8])

@@ -1,4 +1,6 @@
-/* The matrix products in plain C: every target has them. */
+/* The matrix products in plain C: every target has them, and they are what the others are compared
+ * with, bit by bit. Written so that compilers can make vectors of the inner loops over lanes, and
+ * must not reorder a sum: each lane is a chain of its own. */
 #define NAME(x) portable_##x
 
 #include "base/vec.h"
