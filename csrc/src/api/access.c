@@ -1,4 +1,6 @@
-/* What a context knows, for its users: who may not look into it. */
+/* What a context knows, for its users: who may not look into it. The struct is private so that its
+ * parts can change without a change of the interface. Pointers stay valid as long as the context;
+ * what they point to is that of the last frame, and changes with the next. */
 #include "context/context.h"
 
 const eits_model *eits_get_model(const eits_context *ctx)

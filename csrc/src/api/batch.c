@@ -1,3 +1,6 @@
+/* Many frames in one call, for a host that evaluates recordings: the loop over frames costs a call
+ * into C each otherwise. Frames are independent of each other, so results do not depend on how a
+ * set is divided into batches; a frame that fails has its status and does not end the batch. */
 #include "eitskin/batch.h"
 
 #include "base/vec.h"

@@ -1,4 +1,14 @@
-/* The frame stage: which rows are of use, data, whitening, projection, and what is wrong. */
+/* The frame stage: which rows are of use, data, whitening, projection, and what is wrong.
+ *
+ * From voltages to frame.y, ready for any solver. Finding faults and making data depend on each
+ * other, so the order is: what rows say by themselves (no number, saturated); electrodes, by rows;
+ * fold; outliers, by folded pairs, and fold again without them; reduce; what the model cannot give,
+ * by reduced data, and fold and reduce again without a fold it names. At most one turn back each: a
+ * frame takes a bounded time, whatever is wrong with it.
+ *
+ * In: the voltages, the reference. Out: frame.*, rows.*, info's diagnostics; `masked` rows left out
+ * and `macs`. Errors are for frames that have no image: too many rows out (max_masked), all zero,
+ * or no number where data overflow. */
 #include "api/stages.h"
 #include "eitskin/frame.h"
 
@@ -52,7 +62,7 @@ static int is_dead(const eits_context *ctx, const eits_real *frame)
     return 1;
 }
 
-/* What reduced data tell of the frame: 1 where a row was marked, so that it is to be folded anew.
+/* What reduced data say of the frame: 1 where a row was marked, so that it is to be folded again.
  */
 static int examine_reduced(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {

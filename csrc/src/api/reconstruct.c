@@ -1,4 +1,7 @@
-/* From a frame, or from its reduced data, to an image. */
+/* From a frame, or from its reduced data, to an image.
+ *
+ * Frame stage, then solve. A frame that the first refuses still leaves a defined state: an image of
+ * zeros, and info says why, so that a caller that goes on after an error shows no old image. */
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 

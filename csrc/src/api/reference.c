@@ -1,4 +1,14 @@
-/* The reference frame and its noise, from one frame or learned from many. */
+/* The reference frame and its noise, from one frame or learned from many.
+ *
+ * Learning runs frame by frame without storing any. The first half makes a mean; the second is
+ * measured against it like frames to come, and the greatest max |S'y| seen is lambda_noise: what an
+ * untouched skin shows at its worst, in the very unit of the detection threshold and of lambda. A
+ * greatest over a few frames grows slowly with their number; a threshold wants that rather than an
+ * rms.
+ *
+ * Outliers are left out on the way (diagnostics/reference_outliers.c). An error leaves the
+ * reference that there was where it can (eits_reference_set), or none (ready = 0) where learning
+ * had begun. */
 #include "eitskin/frame.h"
 
 #include "api/stages.h"

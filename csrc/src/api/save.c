@@ -1,4 +1,9 @@
-/* What a tare costs time to learn, put by in the caller's memory. */
+/* What a tare costs time to learn, put by in the caller's memory.
+ *
+ * For a board that swaps models or runs the self-test, and must not ask the user to take hands off
+ * the skin again. The bytes are those of this build: they are for the same program and the same
+ * model, not for a file. The size is a macro as well as a function, so that memory can be static;
+ * the assertion below keeps the two together. */
 #include "context/context.h"
 
 #include "base/vec.h"

@@ -1,4 +1,10 @@
-/* The golden frame that each model carries. */
+/* The golden frame that each model carries.
+ *
+ * A board with a wrong compiler flag or damaged flash may give images that look
+ * plausible. The model carries a reference, a frame, and the image that the float32 core
+ * made of them when it was built; since every sum has one order, the same bits must come out here
+ * (difference 0; within rounding in float64). In: the section GOLD. Out: the greatest deviation
+ * over the image's peak. It replaces the reference: a caller saves its own before (eits_save). */
 #include "base/vec.h"
 #include "context/context.h"
 #include "eitskin/frame.h"

@@ -1,4 +1,9 @@
-/* From the image to touches: fitted, judged, followed, weighed; and perhaps a second pass. */
+/* From the image to touches: fitted, pruned, followed, weighed; and perhaps a second pass.
+ *
+ * Order matters: the crowd is checked on what this frame shows, before tracking hides tentative
+ * touches and adds held ones; force is computed after it, from the smoothed strength and place. The
+ * second pass solves the image again for data without the touches' interaction; the touches are
+ * those of the first, so nothing goes round in a circle. */
 #include "eitskin/force.h"
 #include "eitskin/touch.h"
 
