@@ -1,5 +1,5 @@
-/* What the core, or before a tare the board, found wrong with a frame: told as faults by name, and
- * in the head of its packets. */
+/* What the core, or before a tare the board, found wrong with a frame: reported as faults by name,
+ * and in the head of its packets. */
 #ifndef FW_DIAGNOSTICS_H
 #define FW_DIAGNOSTICS_H
 

@@ -1,4 +1,4 @@
-/* Faults: each is told once when it rises and once when it has gone. Those of an electrode
+/* Faults: each is reported once when it rises and once when it has gone. Those of an electrode
  * (ELECTRODE_OPEN, BRIDGED, ELECTRODE_NOISY) count for each electrode, detail.index, below 32. */
 #ifndef FW_FAULTS_H
 #define FW_FAULTS_H
@@ -31,7 +31,7 @@ void fw_fault_observe(fw_faults *faults, eits_fault code, bool found, fw_fault_d
 
 bool fw_fault_is(const fw_faults *faults, eits_fault code);
 
-/* All are taken to be gone; those that are still there will rise anew. */
+/* All are taken to be gone; those that are still there will rise again. */
 void fw_faults_clear(fw_faults *faults, uint32_t frame);
 
 #endif

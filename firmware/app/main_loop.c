@@ -64,7 +64,7 @@ static void set_leds(const fw_instrument *instrument)
     board->system->set_leds(board->system_ctx, leds);
 }
 
-/* A scan that gives nothing is started anew; so is one that could not be started. */
+/* A scan that gives nothing is started again; so is one that could not be started. */
 static void watch_scan(fw_instrument *instrument)
 {
     const uint32_t now_us = fw_now_us(instrument);

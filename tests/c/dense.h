@@ -1,5 +1,5 @@
 /* The problem again, dense and in double, written apart from the core: what the core's answers are
- * held against. */
+ * compared with. */
 #ifndef EITSKIN_TEST_DENSE_H
 #define EITSKIN_TEST_DENSE_H
 
@@ -29,7 +29,7 @@ double dense_objective(const dense *d, const double *y, const double *x, double 
 /* Objective less the dual objective |y|^2 / 2 - |y - t r|^2 / 2 at the greatest feasible t <= 1. */
 double dense_gap(const dense *d, const double *y, const double *x, double lambda, eits_sign sign);
 
-/* FISTA as in the paper, each product computed anew; from x, which gets the result. */
+/* FISTA as in the paper, each product computed again; from x, which gets the result. */
 void dense_fista(const dense *d, const double *y, double lambda, double lipschitz,
                  uint32_t iterations, eits_sign sign, double *x);
 

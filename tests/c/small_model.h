@@ -58,7 +58,7 @@ void small_model_free(small_model *model);
 /* A copy with a section LOAD in place of the one that readers skip; `model` has float storage. */
 small_model small_model_with_force(const small_model *model, const void *section, uint32_t size);
 
-/* Write the checksum anew after bytes were changed. */
+/* Write the checksum again after bytes were changed. */
 void small_model_seal(small_model *model);
 
 /* Where the section with this tag starts, and its 16-byte entry in the table; both abort if it is

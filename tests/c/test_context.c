@@ -314,7 +314,7 @@ static void options_out_of_range(void)
 }
 
 /* A golden image that is what this build gives: no difference. One pixel changed: just that
- * difference is told. */
+ * difference is reported. */
 static void self_test(void)
 {
     small_model made = small_model_make((small_spec){.rank = 12, .side = 6});

@@ -183,7 +183,7 @@ static void unusable_channels(void)
             b.frame[1] = R(-5.5);
             b.out[0] = b.out[1] = 1;
             check_stage(&b, 6);
-            memset(b.out, 0, sizeof b.out); /* all well again: the basis must be made anew */
+            memset(b.out, 0, sizeof b.out); /* all well again: the basis must be built again */
             memcpy(b.frame, b.reference, sizeof b.frame);
             b.frame[3] *= R(1.2);
             check_stage(&b, 0);

@@ -177,7 +177,7 @@ static void header_fields(void)
     small_model_free(&made);
 }
 
-/* One change to the entry of `tag`, sealed; the model is made anew each time. */
+/* One change to the entry of `tag`, sealed; the model is made again each time. */
 static eits_status with_entry(small_spec spec, const char *tag, uint32_t field, uint32_t value)
 {
     small_model made = small_model_make(spec);

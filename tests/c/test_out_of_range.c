@@ -119,7 +119,7 @@ static void a_reference_frame_out_of_range_is_refused(void)
     small_model_free(&made);
 }
 
-/* Data whose squares vanish: nothing can be told by norms and gaps, so the answer is zero, of every
+/* Data whose squares vanish: norms and gaps say nothing, so the answer is zero, of every
  * solver. */
 static void data_too_small_to_square_give_zero(void)
 {

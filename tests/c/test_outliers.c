@@ -45,8 +45,8 @@ static void one_outlier_is_left_out(void)
     }
 }
 
-/* Many folds whose sides disagree: those that fraction an electrode leave with it; those that
- * fraction none are no network's. */
+/* Many folds whose sides disagree: those that share an electrode leave with it; those that
+ * share none are no network's. */
 static void many_outliers(void)
 {
     bench b;

@@ -1,5 +1,5 @@
 /* Outliers where the other folds tell what is right: half scans, whose second rows are copies, and
- * which side of a fold is wrong; and channels: many folds that fraction a pair. */
+ * which side of a fold is wrong; and channels: many folds that share a pair. */
 #include "check.h"
 #include "small_model.h"
 
@@ -88,7 +88,7 @@ static void add_noise(bench *b, eits_real *frame)
     copy_halves(b, frame);
 }
 
-/* A frame that the sheet gives, `size` large, and noise. */
+/* A frame within the model's range, `size` large, and noise. */
 static void clean_frame(bench *b, double size)
 {
     double change[RANK + 1];
@@ -412,7 +412,7 @@ static int uses_either(const eits_context *ctx, uint32_t i)
 }
 
 /* The channel of one pair: the rows measured across it go, their reciprocals stay. Of two
- * electrodes that fraction no channel, all. */
+ * electrodes that share no channel, all. */
 static void noisy_channel(void)
 {
     for (int crossed = 0; crossed < 2; ++crossed) {

@@ -65,7 +65,7 @@ static void ids_follow_moves_and_not_jumps(void)
     tear_down(&b);
 }
 
-/* Two that pass each other: which is which is told by nearness, whatever the order in which they
+/* Two that pass each other: nearness says which is which, whatever the order in which they
  * are listed. */
 static void crossing(void)
 {

@@ -1,6 +1,5 @@
-/* Touches followed in time: tracks_start_once_confirmed that are confirmed,
- * tracks_end_after_the_hold that are waited for, places smoothed.
- */
+/* Touches followed in time: tracks that start once confirmed and end after the hold, places
+ * smoothed. */
 #include "check.h"
 #include "small_model.h"
 
@@ -68,7 +67,7 @@ static void tracks_start_once_confirmed(void)
     CHECK_EQUAL(one(ctx, t, 0, 0.5), 1);
     CHECK_EQUAL(t[0].id, 1);
     eits_forget(ctx);
-    for (int round = 0; round < 3; ++round) { /* a flicker is never told of, and takes no id */
+    for (int round = 0; round < 3; ++round) { /* a flicker is never reported, and takes no id */
         CHECK_EQUAL(one(ctx, t, 0, 0.005), 0);
         CHECK_EQUAL(one(ctx, t, 1, 0.005), 0);
         CHECK_EQUAL(none(ctx, t), 0);
@@ -89,7 +88,7 @@ static void tracks_start_once_confirmed(void)
     ctx->info.lambda_noise = 2; /* 1.2 times noise: not faint, and not sure either */
     CHECK_EQUAL(one(ctx, t, 0, 0.06), 0);
     eits_forget(ctx);
-    ctx->info.lambda_noise = 0; /* unknown: nothing is doubted for it */
+    ctx->info.lambda_noise = 0; /* unknown: nothing is tentative for it */
     CHECK_EQUAL(one(ctx, t, 60, 0.2), 1);
     tear_down(&b);
 }
@@ -117,7 +116,7 @@ static void reach(void)
 }
 
 /* A clear touch that is lifted is gone at once, though its id is kept for a while; a faint one is
- * told of meanwhile. */
+ * reported meanwhile. */
 static void tracks_end_after_the_hold(void)
 {
     bench b;
@@ -137,7 +136,7 @@ static void tracks_end_after_the_hold(void)
     CHECK_EQUAL(one(ctx, t, 5, 0.5), 1); /* too late: another */
     CHECK_EQUAL(t[0].id, 2);
     eits_forget(ctx);
-    /* told of in the second, third and fourth: not known long enough before that */
+    /* reported in the second, third and fourth: not known long enough before that */
     for (int k = 0; k < 4; ++k)
         CHECK_EQUAL(one(ctx, t, 0, 0.005), k > 0);
     CHECK_EQUAL(t[0].id, 3);
@@ -174,7 +173,7 @@ static void a_full_house(void)
     tear_down(&b);
 }
 
-/* Noise of the place that the filter expects; how far it is off on average, found and told. */
+/* Noise of the place that the filter expects; how far it is off on average, found and reported. */
 static void jitter(eits_context *ctx, double speed, double confidence, double *found_mm,
                    double *reported_mm)
 {
@@ -280,7 +279,7 @@ static void held_in_motion(void)
     tear_down(&b);
 }
 
-/* Options at the ends of their ranges: told numbers are numbers. */
+/* Options at the ends of their ranges: reported numbers are numbers. */
 static void extremes(void)
 {
     static const double huge[] = {0, 1e-30, 1e30};

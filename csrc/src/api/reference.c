@@ -108,7 +108,7 @@ eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t
         return status;
     const int judged = eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER);
     /* Of two frames that differ in a reading nobody knows which is wrong: the third decides. From
-     * then on the mean is the judge. */
+     * then on frames are compared with the mean. */
     if (b->count == 1 && judged) {
         eits_keep_second_frame(ctx, frame);
         return EITS_OK;

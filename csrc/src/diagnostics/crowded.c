@@ -1,4 +1,10 @@
-/* More touches than can be told apart: said, not guessed. */
+/* More touches than can be told apart: reported, not guessed.
+ *
+ * Touches that overlap, or are many for so few electrodes, may be counted wrongly, and the fit
+ * cannot know. A diagnostic says how likely that is instead of hiding it: a logistic model of
+ * whether the count is right, from features that the fit has anyhow. In: the touches found,
+ * info.unexplained, lambda_max and lambda_noise. Out: one bit; no touch is changed by it. Costs
+ * nothing beside the fit. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"

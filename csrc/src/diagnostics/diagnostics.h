@@ -37,8 +37,8 @@
     R(1e-4) /* of the prediction, relative to the greatest squared singular value */
 #define EITS_OUTLIER_UNPAIRED \
     R(16.0) /* without reciprocals: so many times the robust deviation of the prediction errors */
-#define EITS_OUTLIER_ENERGY    R(0.5) /* of all that is not predicted is in that fold */
-#define EITS_NOISY_FRACTION    R(0.9) /* of the folds that are flagged fraction a noisy electrode */
+#define EITS_OUTLIER_ENERGY    R(0.5)  /* of all that is not predicted is in that fold */
+#define EITS_NOISY_FRACTION    R(0.9)  /* of the flagged folds share a noisy electrode */
 #define EITS_MISMATCH_FRACTION R(0.05) /* of |d| */
 #define EITS_MISMATCH_NOISE \
     R(3.0) /* and so many times what noise leaves outside of the model's range */
@@ -98,7 +98,8 @@ void eits_reference_unmask(eits_context *ctx);
 uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_scratch *scratch,
                                      const eits_real *frame);
 
-/* What mismatch and prediction need to know of P and S, as the model says it; once, at the start. */
+/* What mismatch and prediction need to know of P and S, as the model says it; once, at the start.
+ */
 void eits_learn_range(eits_context *ctx);
 
 /* How much of frame.d the model cannot give, into info; returns 1 where that stands out.

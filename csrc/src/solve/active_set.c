@@ -46,7 +46,7 @@ typedef struct active {
     eits_real *reach;  /* of each active column: what fraction of the step it can go */
     eits_real *column; /* the new column's part that counts */
     eits_nearby near;  /* columns beside the active ones, now or before */
-    int limited;       /* the next step is not to be had for the MACs */
+    int limited;       /* the limit of MACs leaves no room for the next step */
     int loose;         /* a column is active that the factor does not have */
     int broken;        /* the factor is of no use */
     int moved;         /* x is not as it was before the last columns were taken in */
@@ -69,7 +69,7 @@ static uint64_t macs_to_finish(const eits_context *ctx, uint32_t count)
     return (uint64_t)count * ctx->model->rank + eits_gradient_macs(ctx);
 }
 
-/* Whether `macs`, and S x of one more column and the gap after it are still to be had.
+/* Whether the limit leaves room for `macs`, S x of one more column, and the gap after it.
  *
  * Once a step is too dear the solve ends; what is cheaper is not tried instead, so that the
  * result does not depend on the order of tests. */
@@ -287,7 +287,7 @@ static eits_duality_gap check_gap(eits_context *ctx, const eits_scratch *scratch
 }
 
 /* From a warm start's coefficients: a factor of their columns, without those that depend on the
- * others. Returns 0, nothing changed, where that is not to be had for the MACs. */
+ * others. Returns 0, nothing changed, where the limit of MACs leaves no room for that. */
 static int begin_warm(eits_context *ctx, active *a)
 {
     const uint64_t active_count = ctx->info.nonzeros, rank = ctx->model->rank;

@@ -42,7 +42,8 @@ static uint64_t macs_of_a_visit(const eits_context *ctx, const descent *d)
     return rank * (d->apart ? 4u : 3u + 2u * ctx->projection.count);
 }
 
-/* Whether one more visit, S x with one more column and the gap after it are still to be had. */
+/* Whether the limit of MACs leaves room for one more visit, S x with one more column, and the gap
+ * after it. */
 static int affords_visit(const eits_context *ctx, const descent *d)
 {
     return eits_affords(ctx, macs_of_a_visit(ctx, d) +

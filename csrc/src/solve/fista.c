@@ -78,7 +78,7 @@ static void swap(eits_real **a, eits_real **b)
     *b = kept;
 }
 
-/* Whether S x_next, and the gap after it, are still to be had. */
+/* Whether the limit of MACs leaves room for S x_next, and the gap after it. */
 static int affords_product(const eits_context *ctx)
 {
     if (ctx->options.mac_limit == 0)
@@ -133,7 +133,7 @@ static int looks_at_every_column(const eits_context *ctx, uint32_t k, const sche
     return !by_working_set(ctx) || k >= s->next_look;
 }
 
-/* Whether the gradient for iteration k, and the gap after it, are still to be had. */
+/* Whether the limit of MACs leaves room for the gradient of iteration k, and the gap after it. */
 static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule *s)
 {
     const uint64_t total = eits_gradient_macs(ctx);

@@ -8,7 +8,7 @@
  * solver.x[k] is that of solver.working[k]. */
 void eits_working_set_begin(eits_context *ctx);
 
-/* Choose anew from solver.gradient, that of every column at z: those where x or z is not zero,
+/* Choose again from solver.gradient, that of every column at z: those where x or z is not zero,
  * and those that the step would move. Compacts x, z and gradient likewise. */
 void eits_working_set_choose(eits_context *ctx, const eits_scratch *scratch, eits_real lambda);
 

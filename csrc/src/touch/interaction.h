@@ -1,6 +1,6 @@
 /* What touches do to each other: each lies in the field that the others bend.
  *
- * A disc of radius R whose change is `change` (2 (c - 1) / (c + 1) of the sheet's conductivity
+ * A disc of radius R whose change is `change` (2 (c - 1) / (c + 1) of the skin's conductivity
  * sigma for a contrast of c) answers the field E as a dipole; at the distance vector r from it the
  * field grows by s (2 (E.u) u - E) / r^2, u = r / |r|, s = change area / (2 pi sigma)
  * (two-dimensional potential theory: a cylinder in a uniform field). The rim, which no current

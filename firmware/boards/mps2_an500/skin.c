@@ -1,5 +1,5 @@
-/* The analog side: what the AD9833 was told, which electrodes the multiplexers connect, and the
- * voltages from "skin.bin":
+/* The analog side: what was written to the AD9833, which electrodes the multiplexers connect, and
+ * the voltages from "skin.bin":
  *
  *   u32 rows, u32 frames, u32 frame_us; rows x 4 u8 electrodes I+, I-, V+, V-; frames x rows f32
  * volts, amplitude

@@ -97,7 +97,7 @@ static void arm(uint32_t start_us)
     TIM_CCMR1(TIM3_BASE) = (uint32_t)OC1_INACTIVE << TIM_CCMR1_OC1M_POS;
     TIM_ARR(TIM3_BASE) = capture.slot_us - 1u;
     TIM_CCR1(TIM3_BASE) = capture.burst_us;
-    TIM_EGR(TIM3_BASE) = TIM_EGR_UG; /* the prescaler begins anew; */
+    TIM_EGR(TIM3_BASE) = TIM_EGR_UG; /* the prescaler starts from 0; */
     /* a microsecond after its start TIM3 wraps: the first slot. */
     TIM_CNT(TIM3_BASE) = capture.slot_us - 1u;
     /* high while it is below burst_us */
@@ -155,7 +155,7 @@ static void stop(void *ctx)
     nucleo_unlock(ctx, state);
 }
 
-/* The burst that was due now is told, and the next one is due. */
+/* The burst that was due now is reported, and the next one is due. */
 static void send_fault(uint32_t start_us, uint32_t buffer, uint32_t next_start_us, bool lost)
 {
     const fw_burst burst = {.samples = buffers[buffer],

@@ -1,5 +1,5 @@
 /* A processor fault, or an interrupt that nobody asked for: what is known is kept over a reset, and
- * told after it. */
+ * reported after it. */
 #include "nucleo.h"
 
 #define CRASH_MAGIC 0xC0A57ED5u
