@@ -108,8 +108,9 @@ static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out
 }
 
 /* Add `candidate` to the basis unless it lies in its span: Gram-Schmidt, twice for accuracy in
- * float32. */
-/* A second pass since rounding of the first leaves parts of the basis that are as large as what is
+ * float32.
+ *
+ * A second pass since rounding of the first leaves parts of the basis that are as large as what is
  * left of a nearly dependent direction ("twice is enough": Parlett, The Symmetric Eigenvalue
  * Problem, section 6.9). */
 static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)

@@ -93,8 +93,9 @@ eits_status eits_fit_reference(eits_context *ctx)
     return eits_is_finite(b->gain) && b->gain != 0 ? EITS_OK : EITS_E_FRAME_ZERO;
 }
 
-/* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
-/* A power of two, so that dividing by it rounds nothing. */
+/* The greatest power of two up to the greatest voltage in use, within what has an inverse.
+ *
+ * A power of two, so that dividing by it rounds nothing. */
 eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame)
 {
     eits_real largest = 0, unit = 1;
@@ -108,8 +109,9 @@ eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame)
     return unit;
 }
 
-/* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
-/* One number for all rows: white noise of the front end. Rows of few frames would each have an
+/* The rms over rows of the frames' deviation, so far; 0 where it is out of range.
+ *
+ * One number for all rows: white noise of the front end. Rows of few frames would each have an
  * estimate that is itself noise. */
 eits_real eits_reference_noise(const eits_context *ctx)
 {

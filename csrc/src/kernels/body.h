@@ -1,10 +1,17 @@
 /* The matrix products, included once for each processor that they are built for (portable.c,
- * avx2.c, m7.c). NAME(x) gives that build's names; the build defines
- * NAME(sum_panel) before it includes this, and where it has its own KERNELS_OWN_PRODUCTS (mul,
- * mul_t, dots, unpack), KERNELS_OWN_PANELS (sum_two_panels beside the above), KERNELS_OWN_VECTORS
- * (dot, axpy), KERNELS_OWN_ROWS (rows_dot, rows_sum), KERNELS_OWN_NONZEROS, KERNELS_OWN_GREATEST,
- * KERNELS_OWN_PROX: sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the
- * EITS_PANEL lanes l */
+ * avx2.c, m7.c). NAME(x) gives that build's names. Before it includes this, the build defines
+ *
+ *     NAME(sum_panel): sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the
+ *     EITS_PANEL lanes l
+ *
+ * and, for what it brings itself: KERNELS_OWN_PRODUCTS (mul, mul_t, dots, unpack),
+ * KERNELS_OWN_PANELS (sum_two_panels beside the above), KERNELS_OWN_VECTORS (dot, axpy),
+ * KERNELS_OWN_ROWS (rows_dot, rows_sum), KERNELS_OWN_NONZEROS, KERNELS_OWN_GREATEST,
+ * KERNELS_OWN_PROX.
+ *
+ * The loops are unrolled or laned as far as a compiler needs to find vectors, and no further. A
+ * sum's order is part of the result (kernels.h): change a loop here, and every build, the numpy
+ * twin and the golden frames must still agree to the bit. */
 #include "base/half.h"
 #include "base/vec.h"
 #include "kernels/kernels.h"

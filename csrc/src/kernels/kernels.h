@@ -1,10 +1,15 @@
 /* Matrix products with the stored matrices. Every output number is one chain of fused multiply-adds
- * in a fixed order, so that each build below gives the same bits, however it blocks, unrolls or
- * vectorises: mul:    out_i = sum over the listed columns, in their order, of column_i * value
- *     mul_t:  out_k = scale_j * (sum over i = 0, 1, ... of column_j_i * v_i), j the k-th listed
- * column or eight such chains and a tree over them (eits_tree8), which needs no row of many columns
- * in one register: dots:   out_k = scale_j * tree of lanes l = 0 to 7, each the sum over i = l, l +
- * 8, ... of column_j_i * v_i
+ * in a fixed order, so that each build gives the same bits, however it blocks, unrolls or
+ * vectorises:
+ *
+ *     mul     out_i = sum over the listed columns, in their order, of column_i * value
+ *     mul_t   out_k = scale_j * (sum over i = 0, 1, ... of column_j_i * v_i), j the k-th listed
+ *
+ * or eight such chains and a tree over them (eits_tree8), which needs no row of many columns in one
+ * register:
+ *
+ *     dots    out_k = scale_j * tree of lanes l = 0 to 7, each the sum over i = l, l + 8, ... of
+ *             column_j_i * v_i
  */
 #ifndef EITSKIN_KERNELS_H
 #define EITSKIN_KERNELS_H

@@ -101,9 +101,8 @@ static void run(eits_context *ctx, const eits_scratch *scratch, int gradient_kno
     }
 }
 
-/* 2^24 (2^53) above the smallest normal number: products of a datum with epsilon are still
- * normal. */
-/* Data whose square is hardly a number any more: objective and gap would be rounding. */
+/* Data whose square is hardly a number any more: objective and gap would be rounding. 2^24 (2^53)
+ * times the smallest normal number, so that the square times epsilon is normal, too. */
 static const eits_real MIN_SQUARE = (eits_real)(sizeof(eits_real) == 4 ? 0x1p-102 : 0x1p-969);
 
 /* info holds what the frame stage counted, and zeros; `from_last`: start from the last

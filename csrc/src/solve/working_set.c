@@ -16,10 +16,11 @@
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* The rule for joining is the proximal step itself: a column at x = z = 0 stays zero exactly where
+/* A column at rest moves where its gradient lies outside these.
+ *
+ * The rule for joining is the proximal step itself: a column at x = z = 0 stays zero exactly where
  * its gradient is within lambda on each side that the sign rule allows. A side that is not allowed
  * has an infinite limit, so one pair of comparisons serves all three rules. */
-/* A column at rest moves where its gradient lies outside these. */
 typedef struct limits {
     eits_real low, high;
 } limits;

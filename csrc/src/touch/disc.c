@@ -33,8 +33,9 @@ typedef struct covered {
 } covered;
 
 /* Cells from first to last, clipped to 0 .. count - 1, whose centres may lie within `reach` of
- * `at`; all in pixels. */
-/* Up to one cell further than needed on either side, as rounding of a bound must not lose a
+ * `at`; all in pixels.
+ *
+ * Up to one cell further than needed on either side, as rounding of a bound must not lose a
  * cell: a cell without cover costs one distance. Beyond the grid the range is empty. Compared
  * before it is converted, since a real out of range of an integer is undefined in C. */
 static void cell_range(eits_real at, eits_real reach, uint32_t count, uint32_t *first,

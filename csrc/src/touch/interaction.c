@@ -52,8 +52,9 @@ int eits_has_interaction(const eits_context *ctx)
            (ctx->options.touch_fit & EITS_TOUCH_FIT_INTERACTION) != 0;
 }
 
-/* The change of the disc's conductivity times the area that its covers add up to. */
-/* The covers fall from 1 to 0 over one pixel across the rim; their integral over the plane is
+/* The change of the disc's conductivity times the area that its covers add up to.
+ *
+ * The covers fall from 1 to 0 over one pixel across the rim; their integral over the plane is
  * pi (r^2 + pixel^2 / 12): eits_disc_area away from the edge of the skin, without its walk. */
 static eits_real moment(const eits_context *ctx, const eits_disc *disc)
 {
