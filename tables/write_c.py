@@ -134,15 +134,17 @@ def c_options(tables: Tables) -> Iterator[tuple[str, Lines]]:
 def _options_table(tables: Tables) -> Lines:
     rows = tables["options"]["options"]["rows"]
     yield from comment(f"Ranges and usual values, included by options.c alone. {origin('options')}")
-    yield from ("/* clang-format off */", "static const eits_option OPTIONS[] = {")
+    yield from (
+        "/* clang-format off */",
+        "#define OPTION(name, whole, least, greatest) \\",
+        "    {#name, offsetof(eits_options, name), sizeof(((eits_options *)0)->name), whole, \\",
+        "     (eits_real)least, (eits_real)greatest}",
+        "static const eits_option OPTIONS[] = {",
+    )
     for name, kind, _, least, greatest, _ in rows:
         low, high = limits(tables, kind, least, greatest)
-        yield (
-            f'    {{"{name}", offsetof(eits_options, {name}),'
-            f" sizeof(((eits_options *)0)->{name}), {int(kind != 'real')},"
-            f" (eits_real){low}, (eits_real){high}}},"
-        )
-    yield from ("};", "")
+        yield f"    OPTION({name}, {int(kind != 'real')}, {low}, {high}),"
+    yield from ("};", "#undef OPTION", "")
     yield from comment("What depends on more of a model than its defaults is 0 here.")
     yield "static eits_options usual_options(const eits_defaults *d)"
     yield from ("{", "    return (eits_options){")

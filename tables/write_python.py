@@ -92,7 +92,7 @@ def _class(enum: Table) -> Lines:
     yield ""
     for member, value, doc, *_ in enum["rows"]:
         yield from remark(doc, "    ") if doc else ()
-        yield f"    {member} = {hex(value) if enum.get('hexadecimal') else value}"
+        yield f"    {member} = {f'0x{value:X}' if enum.get('hexadecimal') else value}"
 
 
 # ---- options ----

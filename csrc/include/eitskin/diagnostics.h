@@ -2,9 +2,9 @@
  *
  * The frame stage examines rows and electrodes before anything is solved, and leaves out what would
  * spoil the image; the solver and the touch fit examine the result. A diagnostic is no error: the
- * core images what is left of the frame. It rejects a frame, its diagnostics still named, only where
- * more rows are left out than options.max_masked. options.diagnostics chooses what is looked for;
- * saturated rows are left out in any case. docs/reference/diagnostics.md has each rule.
+ * core images what is left of the frame. It rejects a frame, its diagnostics still named, only
+ * where more rows are left out than options.max_masked. options.diagnostics chooses what is looked
+ * for; saturated rows are left out in any case. docs/reference/diagnostics.md has each rule.
  *
  * Written by tables/make_tables.py from tables/diagnostics.toml.
  */

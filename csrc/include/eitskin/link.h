@@ -15,8 +15,8 @@
 extern "C" {
 #endif
 
-#define EITS_LINK_HEAD        8u
-#define EITS_LINK_MAX_PACKET  (EITS_LINK_HEAD + EITS_LINK_MAX_PAYLOAD + 4u)
+#define EITS_LINK_HEAD       8u
+#define EITS_LINK_MAX_PACKET (EITS_LINK_HEAD + EITS_LINK_MAX_PAYLOAD + 4u)
 /* Bytes on the wire at most for a payload of `size` bytes: COBS adds one byte in 254, and the two
  * zeros. */
 #define EITS_LINK_ENCODED(size) \

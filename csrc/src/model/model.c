@@ -23,7 +23,8 @@ typedef struct section {
 } section;
 
 typedef struct sections {
-    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, force, whit;
+    section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds, force,
+        whit;
 } sections;
 
 static uint32_t read_u32(const uint8_t *bytes)
@@ -116,10 +117,9 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
 static section *find_slot(sections *found, const uint8_t *tag)
 {
     static const char tags[] = "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOADWHIT";
-    section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref, &found->redu,
-                        &found->sens, &found->scal, &found->colw, &found->grid, &found->defs,
-                        &found->gold, &found->meta, &found->flds, &found->force,
-                        &found->whit};
+    section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref,  &found->redu,
+                        &found->sens, &found->scal, &found->colw, &found->grid,  &found->defs,
+                        &found->gold, &found->meta, &found->flds, &found->force, &found->whit};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];

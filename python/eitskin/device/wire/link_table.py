@@ -65,11 +65,11 @@ class PacketType(IntEnum):
     # leave a row out, or use it again
     MASK_ROW = 0x89
     # restart the board
-    RESET = 0x8a
+    RESET = 0x8A
     # run the model's golden frame
-    SELF_TEST = 0x8b
+    SELF_TEST = 0x8B
     # forget the faults
-    CLEAR_FAULTS = 0x8c
+    CLEAR_FAULTS = 0x8C
 
 
 class ReplyStatus(IntEnum):
