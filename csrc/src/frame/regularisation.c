@@ -3,8 +3,8 @@
  * The builder's whitening divides each singular direction by sqrt(s_i^2 + mu s_1^2). A small mu
  * sharpens the image and amplifies noise in directions the electrodes hardly see. The
  * model was built with one mu. Two things ask for another one here: a noisy
- * reference raises it, in proportion to noise over signal; rows left out lower it, as there is less
- * data to be regularised, down to what float32 still solves.
+ * reference raises it, in proportion to its noise over its rms; rows left out lower it, since they
+ * speak of fewer directions, down to what float32 still solves.
  *
  * The result is D (regularisation.h), `rank` weights applied to y and in each product: the stored
  * model stays as it is, in flash. Weights never exceed 1, so the step of FISTA stays valid. */

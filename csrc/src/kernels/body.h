@@ -10,8 +10,8 @@
  * KERNELS_OWN_PROX.
  *
  * The loops are unrolled or laned as far as a compiler needs to find vectors, and no further. A
- * sum's order is part of the result (kernels.h): change a loop here, and every build, the numpy
- * twin and the golden frames must still agree to the bit. */
+ * sum's order is part of the result (kernels.h): change a loop here, and every build
+ * and the golden frames must still agree to the bit. */
 #include "base/half.h"
 #include "base/vec.h"
 #include "kernels/kernels.h"

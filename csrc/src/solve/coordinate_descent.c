@@ -9,8 +9,7 @@
  * x_j = shrink(|s_j|^2 x_j + s_j'r, lambda) / |s_j|^2. It needs no step length, so it also works
  * where a Lipschitz constant cannot be trusted; and it needs no factor, so the active set falls
  * back on it. A visit costs 2 rank multiply-accumulates where the coefficient stays, and as many
- * again where it moves; a board without vector units likes the short lists, a host prefers FISTA's
- * long products.
+ * again where it moves.
  *
  * Invariant between visits: solver.residual = F'Q(y - F S x) up to the part along one ignored
  * direction, which `along` has. Updates gather rounding, so each look computes S x and the residual
