@@ -13,7 +13,7 @@ from build_tools import CSRC, build_core, run, tool
 
 SOURCES = sorted((CSRC / "src").rglob("*.[ch]"))
 HEADERS = sorted((CSRC / "include" / "eitskin").glob("*.h"))
-MAX_LINES = 425
+MAX_LINES = 400
 MEMORY = {"memcpy", "memset", "memmove", "memcmp"}
 ARITHMETIC = {"f32": {"fmaf", "sqrtf"}, "f64": {"fma", "sqrt"}}
 # what a compiler refers to by itself: the processor's features, position-independent code,
@@ -161,8 +161,10 @@ def test_every_source_is_built(libraries: dict[str, Path], width: str) -> None:
 
 @pytest.mark.parametrize("path", [*SOURCES, *HEADERS], ids=lambda path: path.name)
 def test_files_are_short(path: Path) -> None:
+    """Lines of code: an explanation does not make a file long."""
     text = path.read_text(encoding="ascii")  # and plain
-    assert len(text.splitlines()) <= MAX_LINES
+    code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    assert sum(bool(line.strip()) for line in code.splitlines()) <= MAX_LINES
     assert "\t" not in text
     assert not [line for line in text.splitlines() if line != line.rstrip()]
 
@@ -171,7 +173,7 @@ def test_files_are_short(path: Path) -> None:
 def test_includes_are_the_allowed_ones(path: Path) -> None:
     """The standard library's integers, sizes, memory moves and arithmetic; and files of the
     core."""
-    allowed = {"stdint.h", "stddef.h", "string.h", "math.h"} | (
+    allowed = {"stdint.h", "stddef.h", "string.h", "math.h", "float.h"} | (
         {"immintrin.h"} if path.name == "avx2.c" else set()
     )
     if path in HEADERS:
