@@ -154,10 +154,10 @@ def _shapes(
         return
     own = {attributes.get("id"), attributes.get(LABEL), *str(attributes.get("class", "")).split()}
     names = around | {str(name) for name in own if name}
-    if isinstance(one, list) and not isinstance(one, svgelements.DrawnShape):
+    if isinstance(one, list) and not isinstance(one, svgelements.Shape):
         for child in one:
             yield from _shapes(child, names, page, tolerance_mm)
-    elif isinstance(one, svgelements.DrawnShape):
+    elif isinstance(one, svgelements.Shape):
         for run in _runs(abs(svgelements.Path(one)), tolerance_mm / page.scale_mm):
             points = (np.array(run) - (page.left, page.bottom)) * (page.scale_mm, -page.scale_mm)
             closed = len(points) > 3 and math.dist(points[0], points[-1]) <= 1e-6 * float(
