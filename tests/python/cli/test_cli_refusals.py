@@ -80,7 +80,7 @@ MODELS = {
     "truncated": (lambda blob: blob[: len(blob) // 2], "is truncated"),
     "cut in the header": (lambda blob: blob[:40], "is truncated (40 bytes)"),
     "corrupted": (corrupted, "is corrupted"),
-    "newer": (newer, "format is 9.2, this eitskin reads 1.x"),
+    "newer": (newer, "format is 9.3, this eitskin reads 1.x"),
     "foreign": (lambda blob: b"\x93NUMPY" + blob, "is not an .eitm model"),
     "empty": (lambda blob: b"", "is not an .eitm model"),
 }
