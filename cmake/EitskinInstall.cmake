@@ -1,13 +1,13 @@
 # `cmake --install`: headers, static libraries, find_package(eitskin) and pkg-config.
 #
-#   eitskin::core     the core in float, as a microcontroller runs it   libeitskin.a
-#   eitskin::core64   the core in double                                libeitskin64.a
+#   eitskin::core     the core in float, as a microcontroller runs it   libeitskin_f32.a
+#   eitskin::core64   the core in double                                libeitskin_f64.a
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/eitskin)
-set_target_properties(eitskin_f32 PROPERTIES OUTPUT_NAME eitskin EXPORT_NAME core)
-set_target_properties(eitskin_f64 PROPERTIES OUTPUT_NAME eitskin64 EXPORT_NAME core64)
+set_target_properties(eitskin_f32 PROPERTIES EXPORT_NAME core)
+set_target_properties(eitskin_f64 PROPERTIES EXPORT_NAME core64)
 
 install(TARGETS eitskin_f32 eitskin_f64 EXPORT eitskin-targets COMPONENT core
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -21,8 +21,10 @@ install(FILES cmake/eitskin-config.cmake ${PROJECT_BINARY_DIR}/eitskin-config-ve
 
 foreach(name eitskin eitskin64)
     set(EITSKIN_PC_NAME ${name})
+    set(EITSKIN_PC_LIBRARY eitskin_f32)
     set(EITSKIN_PC_CFLAGS "")
     if(name STREQUAL "eitskin64")
+        set(EITSKIN_PC_LIBRARY eitskin_f64)
         set(EITSKIN_PC_CFLAGS " -DEITS_DOUBLE")
     endif()
     configure_file(cmake/eitskin.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)

@@ -243,6 +243,39 @@ static void defaults(void)
                     bits <= EITS_TOUCH_FIT_ALL ? EITS_OK : EITS_E_MODEL_VALUE);
 }
 
+static void multiply_f32(uint8_t *at, float factor)
+{
+    const uint32_t word = small_get_u32(at);
+    float number;
+    memcpy(&number, &word, 4);
+    small_put_f32(at, number * factor);
+}
+
+/* How the model was whitened: each number is checked against P, and s_1 against the greatest row.
+ */
+static void whitening_form(void)
+{
+    const small_spec spec = {.rank = 8, .side = 6, .shape = SMALL_WHITENED};
+    CHECK_EQUAL(with_number(spec, "WHIT", 0, -1), EITS_E_MODEL_VALUE);
+    CHECK_EQUAL(with_number(spec, "WHIT", 4, 0), EITS_E_MODEL_VALUE);
+    CHECK_EQUAL(with_number(spec, "WHIT", 8, 2), EITS_E_MODEL_VALUE);
+
+    small_model made = small_model_make(spec);
+    eits_model model;
+    CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
+    const uint32_t rank = model.rank, stride = model.reduction.stride;
+    uint8_t *whit = small_model_section(&made, "WHIT", NULL);
+    multiply_f32(whit, 0.25f); /* twice s_1, and all that goes with it: rows fit, s_1 does not */
+    multiply_f32(whit + 4, 2);
+    for (uint32_t i = 0; i < rank; ++i) {
+        multiply_f32(whit + 16 + 4 * i, 0.5f);
+        multiply_f32(whit + 16 + 4 * (stride + i), 0.25f);
+    }
+    small_model_seal(&made);
+    CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_E_MODEL_VALUE);
+    small_model_free(&made);
+}
+
 /* Whatever opens has defaults that its own context accepts again, runs, and never shows a number
  * that is not finite. */
 static void use(const small_model *made)
@@ -326,6 +359,7 @@ int main(void)
     not_finite_in_each_section();
     fields();
     defaults();
+    whitening_form();
     every_byte_changed_and_sealed();
     many_bytes_changed_and_sealed();
     return checks_report("model_values");

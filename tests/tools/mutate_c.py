@@ -47,8 +47,7 @@ class Library:
 
     @property
     def file(self) -> Path:
-        output = self.name.replace("_f32", "").replace("_f64", "64")  # cmake/EitskinInstall.cmake
-        return next(BUILD.rglob(f"lib{output}.so"))
+        return next(BUILD.rglob(f"lib{self.name}.so"))
 
     def ordered_tests(self, file: str) -> list[str]:
         """Those that noticed mutants of the file before first, then those that name its functions
