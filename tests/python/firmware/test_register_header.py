@@ -65,7 +65,7 @@ INTERRUPTS = {
     "USART3": "USART3",
 }  # fmt: skip
 
-TEXT = HEADER.read_text(encoding="utf-8")
+TEXT = re.sub(" +", " ", HEADER.read_text(encoding="utf-8"))  # macros are aligned
 BASES = {
     name: int(value, 16)
     for name, value in re.findall(r"^#define (\w+)_BASE (0x[0-9A-F]+)u", TEXT, re.M)
