@@ -149,7 +149,7 @@ def test_each_effect_moves_what_physics_says(outcome: ExperimentOutcome) -> None
 
 
 def test_the_doctor_names_what_is_broken(outcome: ExperimentOutcome) -> None:
-    found = {one["name"]: one["diagnostics"] for one in outcome.data["cases"]}
+    found = {one["name"]: one["findings"] for one in outcome.data["cases"]}
     for name, diagnostic in (
         ("an electrode off", "dead-electrode"),
         ("two neighbours bridged by 10 ohm", "shorted-electrodes"),
