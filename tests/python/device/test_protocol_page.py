@@ -30,7 +30,7 @@ PAGE = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "link-proto
     ],
 )
 def test_headings_state_the_structs_size(title: str, struct: str) -> None:
-    """The tables below them are written from the layouts (tests/python/core/test_generated_tables.py)."""
+    """The tables below are written from the layouts (core/test_generated_tables.py)."""
     assert re.search(rf"^### {title}, {core.ffi.sizeof(struct)}\b", PAGE, flags=re.M)
     assert f"<!-- table {struct} -->" in PAGE
 
