@@ -40,11 +40,11 @@ find_python() {
     "$python" -c 'import ensurepip, venv' 2>/dev/null || debian "no-ensurepip" python3-venv
 }
 
-# The newest time at which something that the package is built from changed, as a stamp's name would not tell.
+# changed_since STAMP: whether something that the package is built from changed; what an installation leaves behind does not count.
 changed_since() {
     [ -e "$1" ] || return 0
     [ -n "$(find "$root/python" "$root/csrc" "$root/cmake" "$root/CMakeLists.txt" "$root/pyproject.toml" \
-        \( -name __pycache__ -prune \) -o -newer "$1" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
+        -type d \( -name __pycache__ -o -name build -o -name '*.egg-info' \) -prune -o -newer "$1" -type f ! -name '*.pyc' ! -name '*.so' -print | head -n 1)" ]
 }
 
 # pip_install ARGUMENTS...: pip, with a plain line for each package and for what is compiled.

@@ -26,13 +26,11 @@ from eitskin.device.wire.packets import (
 )
 from eitskin.device.wire.payloads import (
     MalformedPacket,
-    build_image,
-    build_raw,
-    build_touches,
     pack,
     parse,
 )
 from eitskin.skin.protocol import adjacent
+from made_payloads import build_image, build_raw, build_touches
 
 ROWS = 40
 PROTOCOL = adjacent(8)

@@ -20,6 +20,7 @@ from eitskin.device.wire import link_table as link
 from eitskin.device.wire import packets as pk
 from eitskin.device.wire import payloads as pl
 from eitskin.device.wire.layout import Command, Payload
+from made_payloads import build_image, build_raw, build_touches
 
 LAYOUTS = {
     kind.LAYOUT.name: kind.LAYOUT
@@ -161,7 +162,7 @@ def test_raw_frames_are_read_bit_for_bit(
     volts = np.array([v for v, _ in rows], dtype=np.float32)
     quality = np.array([q for _, q in rows], dtype=np.uint8)
     again = pl.parse(
-        link.PacketType.RAW, pl.build_raw(pk.RawFrame(frame, time, scan, flags, volts, quality))
+        link.PacketType.RAW, build_raw(pk.RawFrame(frame, time, scan, flags, volts, quality))
     )
     assert isinstance(again, pk.RawFrame)
     assert (again.frame, again.time_us, again.scan_us, again.flags) == (frame, time, scan, flags)
@@ -177,15 +178,15 @@ def solved(count: int, status: int = 0) -> pk.Solved:
 
 def test_images_and_touches_are_read_as_built() -> None:
     image = np.linspace(-1, 1, 50, dtype=np.float32)
-    again = pl.parse(link.PacketType.IMAGE, pl.build_image(pk.SolvedImage(solved(50, -12), image)))
+    again = pl.parse(link.PacketType.IMAGE, build_image(pk.SolvedImage(solved(50, -12), image)))
     assert isinstance(again, pk.SolvedImage)
     assert again.solved == solved(50, -12)
     assert again.image.tobytes() == image.tobytes()
     touches = (Touch(1, 2.5, -3.5, 4.0, 5.0, 0.5), Touch(2**32 - 1, 0.0, 0.0, 1.0, 1.0, 1.0))
     found = pk.SolvedTouches(solved(2), touches)
-    assert pl.parse(link.PacketType.TOUCHES, pl.build_touches(found)) == found
+    assert pl.parse(link.PacketType.TOUCHES, build_touches(found)) == found
     assert pl.parse(
-        link.PacketType.TOUCHES, pl.build_touches(pk.SolvedTouches(solved(0), ()))
+        link.PacketType.TOUCHES, build_touches(pk.SolvedTouches(solved(0), ()))
     ) == pk.SolvedTouches(solved(0), ())
 
 
@@ -225,11 +226,11 @@ def test_a_payload_of_another_length_is_refused(extra: int) -> None:
     whole = {
         link.PacketType.INFO: pl.pack(board_info()),
         link.PacketType.REPLY: pl.pack(pk.Reply(1, 2, 3)),
-        link.PacketType.RAW: pl.build_raw(
+        link.PacketType.RAW: build_raw(
             pk.RawFrame(1, 2, 3, 0, np.zeros(4, np.float32), np.zeros(4, np.uint8))
         ),
-        link.PacketType.IMAGE: pl.build_image(pk.SolvedImage(solved(3), np.zeros(3, np.float32))),
-        link.PacketType.TOUCHES: pl.build_touches(
+        link.PacketType.IMAGE: build_image(pk.SolvedImage(solved(3), np.zeros(3, np.float32))),
+        link.PacketType.TOUCHES: build_touches(
             pk.SolvedTouches(solved(1), (Touch(1, 1, 1, 1, 1, 1),))
         ),
         link.PacketType.FAULT: pl.pack(pk.Fault(1, True, 1, 1, 1)),

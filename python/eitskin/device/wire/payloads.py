@@ -115,19 +115,10 @@ def parse_raw(payload: bytes) -> RawFrame:
     return RawFrame(head.frame, head.time_us, head.scan_us, head.flags, volts, quality)
 
 
-def build_raw(raw: RawFrame) -> bytes:
-    head = RawHead(raw.frame, raw.time_us, raw.scan_us, len(raw.voltage_v), raw.flags)
-    return pack(head) + raw.voltage_v.astype("<f4").tobytes() + raw.quality.astype("u1").tobytes()
-
-
 def parse_image(payload: bytes) -> SolvedImage:
     solved = unpack(Solved, payload, "IMAGE", more=True)
     _check_rest(payload, solved, 4 * solved.count, "IMAGE")
     return SolvedImage(solved, np.frombuffer(payload, dtype="<f4", offset=solved.LAYOUT.size))
-
-
-def build_image(image: SolvedImage) -> bytes:
-    return pack(image.solved) + image.image.astype("<f4").tobytes()
 
 
 def parse_touches(payload: bytes) -> SolvedTouches:
@@ -135,11 +126,6 @@ def parse_touches(payload: bytes) -> SolvedTouches:
     _check_rest(payload, solved, each.size * solved.count, "TOUCHES")
     found = each.struct.iter_unpack(payload[solved.LAYOUT.size :])
     return SolvedTouches(solved, tuple(Touch(*values) for values in found))
-
-
-def build_touches(touches: SolvedTouches) -> bytes:
-    each = (TouchPacket.LAYOUT.struct.pack(*astuple(touch)) for touch in touches.touches)
-    return pack(touches.solved) + b"".join(each)
 
 
 _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {

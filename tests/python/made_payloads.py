@@ -1,0 +1,23 @@
+"""What a board sends as bytes: the other way of ``payloads.parse``."""
+
+from __future__ import annotations
+
+from dataclasses import astuple
+
+from eitskin.device.wire.link_table import RawHead, TouchPacket
+from eitskin.device.wire.packets import RawFrame, SolvedImage, SolvedTouches
+from eitskin.device.wire.payloads import pack
+
+
+def build_raw(raw: RawFrame) -> bytes:
+    head = RawHead(raw.frame, raw.time_us, raw.scan_us, len(raw.voltage_v), raw.flags)
+    return pack(head) + raw.voltage_v.astype("<f4").tobytes() + raw.quality.astype("u1").tobytes()
+
+
+def build_image(image: SolvedImage) -> bytes:
+    return pack(image.solved) + image.image.astype("<f4").tobytes()
+
+
+def build_touches(touches: SolvedTouches) -> bytes:
+    each = (TouchPacket.LAYOUT.struct.pack(*astuple(touch)) for touch in touches.touches)
+    return pack(touches.solved) + b"".join(each)
