@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import shutil
 import subprocess
 import sys
@@ -40,14 +41,18 @@ def run(*command: str | Path) -> str:
     return done.stdout
 
 
-def build_core(folder: Path) -> dict[str, Path]:
-    """The static libraries of both widths, configured and built in ``folder``: {"f32": path, "f64":
-    path}."""
-    compiler, cmake = tool("cc", "gcc", "clang"), tool("cmake")
+def build_core() -> Path:
+    """``build/static``: the static libraries of both widths in ``built``, to be installed
+    into ``installed``; one build for all tests, whichever process asks first."""
+    compiler, cmake, folder = tool("cc", "gcc", "clang"), tool("cmake"), ROOT / "build" / "static"
     generator = (
         ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}"] if not shutil.which("make") else []
     )
     settings = [f"-DCMAKE_C_COMPILER={compiler}", "-DEITSKIN_TESTS=OFF", "-DEITSKIN_PYTHON=OFF"]
-    run(cmake, "-S", ROOT, "-B", folder, *generator, *settings)
-    run(cmake, "--build", folder, "--target", "eitskin_f32", "eitskin_f64")
-    return {width: folder / f"libeitskin_{width}.a" for width in ("f32", "f64")}
+    places = [f"-DCMAKE_INSTALL_PREFIX={folder / 'installed'}", "-DCMAKE_INSTALL_LIBDIR=lib"]
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        run(cmake, "-S", ROOT, "-B", folder / "built", *generator, *settings, *places)
+        run(cmake, "--build", folder / "built", "--target", "eitskin_f32", "eitskin_f64")
+    return folder

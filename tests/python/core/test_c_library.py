@@ -38,9 +38,10 @@ class Symbol:
 
 
 @pytest.fixture(scope="module")
-def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Both widths, built here."""
-    return build_core(tmp_path_factory.mktemp("core"))
+def libraries() -> dict[str, Path]:
+    """Both widths."""
+    folder = build_core() / "built"
+    return {width: folder / f"libeitskin_{width}.a" for width in WIDTHS}
 
 
 def symbols(library: Path) -> list[Symbol]:

@@ -10,32 +10,21 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from build_tools import ROOT, build_core, run
 
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
 
-ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples" / "c"
 
 
-def run(*command: object) -> str:
-    """What a command prints; its errors are the test's."""
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
-def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def prefix() -> Path:
     """Where the core is installed."""
-    build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
-    run(
-        "cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug",
-        "-DEITSKIN_TESTS=OFF", f"-DCMAKE_INSTALL_PREFIX={prefix}", "-DCMAKE_INSTALL_LIBDIR=lib",
-    )  # fmt: skip
-    run("cmake", "--build", build, "--target", "eitskin_f32", "eitskin_f64")
-    run("cmake", "--install", build, "--component", "core")
-    return prefix
+    folder = build_core()
+    shutil.rmtree(folder / "installed", ignore_errors=True)
+    run("cmake", "--install", folder / "built", "--component", "core")
+    return folder / "installed"
 
 
 @pytest.fixture(scope="module")

@@ -67,7 +67,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def small(folder: Path, monkeypatch: pytest.MonkeyPatch, share: float = 0.03) -> Workspace:
-    monkeypatch.setattr(algorithms, "entrants", few)
+    monkeypatch.setattr(algorithms, "candidates", few)
     monkeypatch.setattr(measure, "SIMULATED_ELEMENTS", 4000)
     monkeypatch.setattr(measure, "MODEL_ELEMENTS", 2000)
     workspace = workspace_in(folder, ExperimentSettings(seed=2, share=share), plain)
@@ -192,7 +192,7 @@ def test_every_method_says_what_it_costs(outcome: ExperimentOutcome) -> None:
     assert np.isnan(macs_of(object(), np.zeros((2, 208)))).all()  # type: ignore[arg-type]
 
 
-def test_entrants() -> None:
+def test_candidates() -> None:
     all_of_them = candidates()
     assert len({one.name for one in all_of_them}) == len(all_of_them) == 13
     assert all(one.fixed in one.values for one in all_of_them)
