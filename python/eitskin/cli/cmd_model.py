@@ -46,6 +46,13 @@ def add_parser(subparsers: Any) -> None:
         " 10, 2 for metal, 0 for unknown",
         default=1.35,
     )
+    option(
+        build,
+        "--samples",
+        "random skins drawn for the model's errors, 0 for none (default: as [uncertainty] in"
+        " SKIN.toml says, else 300)",
+        int,
+    )
     option(build, "--json")
     build.set_defaults(run=run_build)
     info = actions.add_parser("info", help="what is in a model")
@@ -74,6 +81,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run_build(options: argparse.Namespace) -> int:
     """Build and write a model."""
+    from eitskin.cli.progress import bar
     from eitskin.fileio import refuse_unwritable
     from eitskin.model.build import BuildSettings, build_model
     from eitskin.model.eitm import save_model
@@ -100,8 +108,9 @@ def run_build(options: argparse.Namespace) -> int:
         regularisation=options.regularisation,
         elements=options.elements,
         touch_change_ratio=options.touch_change,
+        samples=options.samples,
     )
-    model = build_model(skin, protocol, settings)
+    model = build_model(skin, protocol, settings, progress=bar("random skins"))
     size = save_model(options.output, model)
     _print_info(model, size, str(options.output), options.json)
     return 0
@@ -136,6 +145,7 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
         "lipschitz": model.lipschitz,
         "mesh_elements": model.meta.get("mesh_elements"),
         "calibration": _calibration_text(model),
+        "model_errors": _model_errors_text(model),
         "defaults": asdict(model.defaults),
     }
     if as_json:
@@ -161,6 +171,16 @@ def _calibration_text(model: Model) -> str:
         f"loads to {force_text(law.force_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain"
         f" of"
         f" order {law.order}"
+    )
+
+
+def _model_errors_text(model: Model) -> str:
+    errors = model.model_errors
+    if errors is None:
+        return "none"
+    return (
+        f"{100 * errors.rms_error:.1f} % rms by the skin, {100 * errors.rms_shape_error:.1f} % by"
+        " shapes of touches" + ("" if errors.row_gains else "; without row gains from the tare")
     )
 
 

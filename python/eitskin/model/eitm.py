@@ -20,13 +20,14 @@ from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json, read_bytes, write_bytes
 from eitskin.model.force_law import decode_load, encode_load
 from eitskin.model.model import DATA_KINDS, Defaults, Fields, Golden, Model
+from eitskin.model.model_errors import decode_model_errors
 from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 3
+MAJOR, MINOR = 1, 4
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 DIMS = struct.Struct("<10I6f")
@@ -84,6 +85,8 @@ def encode_model(model: Model) -> bytes:
         sections["LOAD"] = encode_load(model.load)
     if model.row_form is not None:
         sections["WHIT"] = model.row_form.encode()
+    if model.model_errors is not None:
+        sections["UNCE"] = model.model_errors.encode()
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -146,9 +149,10 @@ def _assemble(sections: Sections, protocol_hash: int) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    tail = HEADER.pack(MAGIC, MAJOR, MINOR, offset, 0, len(sections), 0, protocol_hash)[16:]
+    minor = MINOR if "UNCE" in sections else MINOR - 1
+    tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]
     crc = zlib.crc32(tail + body)
-    return HEADER.pack(MAGIC, MAJOR, MINOR, offset, crc, len(sections), 0, protocol_hash) + body
+    return HEADER.pack(MAGIC, MAJOR, minor, offset, crc, len(sections), 0, protocol_hash) + body
 
 
 def decode_model(blob: bytes, where: str) -> Model:
@@ -209,7 +213,7 @@ def _split(blob: bytes, where: str) -> Sections:
             raise ModelError(
                 f"{where}: section {name!r} is misplaced or repeated; build the model again"
             )
-        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT"):
+        if name not in (*REQUIRED, "SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE"):
             if flags & REQUIRED_FLAG:
                 raise ModelError(
                     f"{where}: needs section {name!r}, which this eitskin does not know; upgrade"
@@ -420,6 +424,9 @@ def _decode_sections(sections: Sections, protocol_hash: int, where: str) -> Mode
         load=decode_load(sections["LOAD"], where) if "LOAD" in sections else None,
         row_form=(
             decode_row_form(sections["WHIT"], projection, where) if "WHIT" in sections else None
+        ),
+        model_errors=(
+            decode_model_errors(sections["UNCE"], d.rank, where) if "UNCE" in sections else None
         ),
     )
 

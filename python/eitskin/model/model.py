@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import LoadLaw
+from eitskin.model.model_errors import ModelErrors
 from eitskin.model.row_form import RowForm
 from eitskin.model.storage import StoredMatrix
 from eitskin.skin.protocol import Protocol, Reciprocity
@@ -74,7 +75,7 @@ class Model:
     """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P
     (r, k) float32; ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how
     it was made; ``fields`` where it has them; ``load`` tells loads from strengths, where the skin
-    was calibrated.
+    was calibrated; ``model_errors`` how far a real skin may be from it, where that was drawn.
     """
 
     protocol: Protocol
@@ -94,6 +95,7 @@ class Model:
     fields: Fields | None = None
     load: LoadLaw | None = None
     row_form: RowForm | None = None
+    model_errors: ModelErrors | None = None
 
     @cached_property
     def sensitivity(self) -> npt.NDArray[np.float64]:

@@ -19,6 +19,12 @@ from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT, Electrodes
 from eitskin.skin.outline import MAX_SIZE_MM, MIN_SIZE_MM, Outline, disk, polygon
 from eitskin.skin.placement import SNAP_MM, Placed, by_fractions, by_marks, by_points
 from eitskin.skin.protocol import Protocol, protocol_from_table
+from eitskin.skin.uncertainty import (
+    DEFAULT_UNCERTAINTY,
+    Uncertainty,
+    uncertainty_from_table,
+    uncertainty_to_table,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -41,7 +47,8 @@ PAPER_DIAMETER_MM = 194.0
 
 @dataclass(frozen=True)
 class Skin:
-    """A conductive sheet of one thickness with electrodes at its rim.
+    """A conductive sheet of one thickness with electrodes at its rim; ``uncertainty`` says how far
+    a real one may be from this, None leaves that open.
 
     Raises:
         GeometryError: electrodes overlap, nearly touch (a gap below 5 % of their width) or are
@@ -53,6 +60,7 @@ class Skin:
     electrodes: Electrodes
     conductivity_s_per_m: float = 0.01
     thickness_mm: float = 12.0
+    uncertainty: Uncertainty | None = DEFAULT_UNCERTAINTY
 
     def __post_init__(self) -> None:
         for key in ("conductivity_s_per_m", "thickness_mm"):
@@ -134,7 +142,7 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
         GeometryError: outline or electrodes cannot be.
         FileError, MissingExtraError: a drawing cannot be read.
     """
-    check_keys(table, ("skin", "electrodes", "protocol"), where)
+    check_keys(table, ("skin", "electrodes", "protocol", "uncertainty"), where)
     sheet, place = _subtable(table, "skin", where, required=True), f"{where} [skin]"
     check_keys(sheet, SKIN_KEYS, place)
     name = sheet.get("name", "skin")
@@ -152,6 +160,7 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
                 sheet, "conductivity_s_per_m", 0.01, place, low=0, high=1e8, open_low=True
             ),
             thickness_mm=number(sheet, "thickness_mm", 12.0, place, low=0, high=1e4, open_low=True),
+            uncertainty=uncertainty_from_table(table.get("uncertainty"), where),
         )
     except GeometryError as error:
         raise GeometryError(f"{where}: {error}") from None
@@ -191,7 +200,10 @@ def skin_to_table(skin: Skin) -> dict[str, Any]:
     if electrodes.positions_mm is not None:
         contacts["positions_mm"] = list(electrodes.positions_mm)
     contacts["contact_impedance_ohm_m2"] = electrodes.contact_impedance_ohm_m2
-    return {"skin": sheet, "electrodes": contacts}
+    table: dict[str, Any] = {"skin": sheet, "electrodes": contacts}
+    if skin.uncertainty != DEFAULT_UNCERTAINTY:
+        table["uncertainty"] = uncertainty_to_table(skin.uncertainty)
+    return table
 
 
 def _subtable(

@@ -78,7 +78,7 @@ def sessions(scenes: int, seed: int, role: str = "test") -> Simulated:
 def models() -> list[tuple[str, Model, bytes]]:
     """The prebuilt model, rank 64; and one of full rank, 104."""
     model, blob = load_prebuilt()
-    full = build_model(paper_skin(), adjacent(16), BuildSettings(rank=104))
+    full = build_model(paper_skin(), adjacent(16), BuildSettings(rank=104, samples=0))
     return [("rank 64", model, blob), ("rank 104", full, encode_model(full))]
 
 

@@ -49,6 +49,8 @@ def folder(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "log-ratio",
         "--touch-change",
         "2",
+        "--samples",
+        "0",
     ]
     assert main(build) == 0
     return place

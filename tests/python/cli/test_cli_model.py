@@ -46,9 +46,9 @@ OUTLINES = {
 FACTS = (
     "model", "bytes", "made_by", "skin", "electrodes", "protocol_rows", "protocol_hash",
     "folded_rows", "rank", "pixels",
-    "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "calibration", "defaults",
+    "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "calibration", "model_errors", "defaults",
 )  # fmt: skip
-QUICK = ("--elements", "900", "--pixels", "14")
+QUICK = ("--elements", "900", "--pixels", "14", "--samples", "0")
 
 
 def write_skin(
@@ -87,7 +87,7 @@ def write_skin(
             "clockwise L",
             8,
             "adjacent",
-            ["--data", "log-ratio"],
+            ["--data", "log-ratio", "--samples", "3"],
             {"protocol_rows": 40, "rank": 20, "data": "log-ratio"},
         ),
     ],

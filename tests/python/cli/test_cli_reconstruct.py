@@ -271,7 +271,7 @@ def test_the_whole_way(done: Done, tmp_path: Path) -> None:
         " 5.0\n[protocol]\nkind = 'skip'\nskip = 2\n"
     )
     model_file, frames_path = tmp_path / "hand.eitm", tmp_path / "frames.npz"
-    done("model", "build", skin_file, "-o", model_file)
+    done("model", "build", skin_file, "-o", model_file, "--samples", "4")
     assert json.loads(done("model", "info", model_file, "--json"))["skin"] == "hand"
     done("model", "verify", model_file)
     skin, protocol = load_skin(skin_file)

@@ -163,7 +163,9 @@ def test_a_model_that_nothing_was_measured_with(
     refused: Refused, done: Done, frames_file: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "odd.eitm"
-    done("model", "build", "--paper", "--rank", "33", "--pixels", "12", "-o", path)
+    done(
+        "model", "build", "--paper", "--rank", "33", "--pixels", "12", "--samples", "0", "-o", path
+    )
     assert "eitskin recommend" in refused(
         2, "reconstruct", frames_file, "--model", path, "--accuracy", "0.7"
     )

@@ -1,0 +1,132 @@
+"""A mesh whose nodes are moved, so that electrodes and rim lie elsewhere: no meshing again.
+
+The rim's nodes are displaced along it and outwards; inside, each coordinate of the displacement is
+harmonic, so that it is smooth and dies away with the distance from the rim, for any outline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import missing_extra
+from eitskin.fem.cem import factorise, shape_gradients
+from eitskin.fem.mesh import Mesh
+
+try:
+    from scipy.sparse import csc_matrix
+except ModuleNotFoundError as error:
+    raise missing_extra("model", "scipy") from error
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+LEAST_PART = 0.5  # an electrode or a gap keeps at least this of its length
+LEAST_AREA = 0.2  # and each element this of its area
+HALVINGS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Rim:
+    """A mesh's rim: ``nodes`` (B,) counterclockwise, ``arc_mm`` (B,) where each lies from the
+    first, ``length_mm`` the whole."""
+
+    nodes: IntArray
+    arc_mm: FloatArray
+    length_mm: float
+
+
+def rim_of(mesh: Mesh) -> Rim:
+    """The rim of ``mesh``: the edges that only one triangle has."""
+    t = mesh.triangles
+    edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    _, first, count = np.unique(low * mesh.n_nodes + high, return_index=True, return_counts=True)
+    follower = dict(edges[first[count == 1]].tolist())
+    start = int(mesh.electrode_edges[0][0, 0])
+    chain = [start]
+    while (after := follower[chain[-1]]) != start:
+        chain.append(after)
+    places = mesh.nodes_mm[chain]
+    steps = np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    return Rim(np.array(chain, dtype=np.int64), arc[:-1], float(arc[-1]))
+
+
+class Deformation:
+    """Moves the nodes of one mesh; what does not depend on the movement is computed once."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh, self.rim = mesh, rim_of(mesh)
+        place = np.full(mesh.n_nodes, -1.0)
+        place[self.rim.nodes] = self.rim.arc_mm
+        self._spans_mm = place[[[e[0, 0], e[-1, 1]] for e in mesh.electrode_edges]]
+
+    @cached_property
+    def _inner(self) -> tuple[IntArray, Any, csc_matrix]:
+        """The nodes inside, the factors of Laplace's matrix on them, and its part to the rim's."""
+        mesh = self.mesh
+        gradients = shape_gradients(mesh) * np.sqrt(mesh.areas_mm2)[:, None, None]
+        values = np.einsum("eik,ejk->eij", gradients, gradients)
+        rows, columns = np.repeat(mesh.triangles, 3, axis=1), np.tile(mesh.triangles, (1, 3))
+        whole = csc_matrix(
+            (values.ravel(), (rows.ravel(), columns.ravel())), shape=(mesh.n_nodes, mesh.n_nodes)
+        )
+        inside = np.setdiff1d(np.arange(mesh.n_nodes), self.rim.nodes)
+        below = whole[inside]
+        return inside, factorise(below[:, inside].tocsc()), below[:, self.rim.nodes].tocsc()
+
+    def outward(self) -> FloatArray:
+        """The rim's outward normal at each of its nodes, (B, 2): of the line from the node before
+        to the node behind."""
+        places = self.mesh.nodes_mm[self.rim.nodes]
+        along = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
+        normal = np.column_stack([along[:, 1], -along[:, 0]])
+        return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
+
+    def moved(self, shift_mm: FloatArray, widths: FloatArray, outwards_mm: FloatArray) -> Mesh:
+        """The mesh with each electrode moved along the rim by ``shift_mm`` (L,), its width
+        multiplied by ``widths`` (L,), and the rim's nodes outwards by ``outwards_mm`` (B,).
+
+        Where electrodes would meet or an element turn over, everything moves by less.
+        """
+        rim, mesh = self.rim, self.mesh
+        along = self._along(shift_mm, widths)
+        places = mesh.nodes_mm[rim.nodes]
+        closed = np.vstack([places, places[:1]])
+        at = np.append(rim.arc_mm, rim.length_mm)
+        slid = np.mod(rim.arc_mm + along, rim.length_mm)
+        new = np.column_stack([np.interp(slid, at, closed[:, axis]) for axis in (0, 1)])
+        step = new - places + outwards_mm[:, None] * self.outward()
+        inside, factors, to_rim = self._inner
+        movement = np.zeros_like(mesh.nodes_mm)
+        movement[rim.nodes] = step
+        movement[inside] = factors.solve(-(to_rim @ step))
+        for _ in range(HALVINGS):
+            candidate = Mesh(mesh.nodes_mm + movement, mesh.triangles, mesh.electrode_edges)
+            if (candidate.areas_mm2 >= LEAST_AREA * mesh.areas_mm2).all():
+                return candidate
+            movement *= 0.5
+        return mesh
+
+    def _along(self, shift_mm: FloatArray, widths: FloatArray) -> FloatArray:
+        """How far each node of the rim slides along it, (B,): linear between electrodes' ends."""
+        length = self.rim.length_mm
+        begin, end = self._spans_mm.T
+        width = np.mod(end - begin, length)
+        grow = width * (widths - 1) / 2
+        ends = np.column_stack([begin, begin + width]).ravel()
+        slide = np.column_stack([shift_mm - grow, shift_mm + grow]).ravel()
+        ends = np.mod(ends, length)
+        order = np.argsort(ends, kind="stable")
+        ends, slide = ends[order], slide[order]
+        pieces = np.append(ends[1:], ends[0] + length) - ends
+        shorter = slide - np.append(slide[1:], slide[0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            room = np.where(shorter > 0, (1 - LEAST_PART) * pieces / shorter, np.inf)
+        part = min(1.0, float(room.min()))
+        return np.interp(self.rim.arc_mm, ends, slide * part, period=length)

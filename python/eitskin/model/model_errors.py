@@ -1,0 +1,98 @@
+"""What a real skin's data may differ by from the model's: the section UNCE of a .eitm file."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import ModelError
+
+FloatArray = npt.NDArray[np.float64]
+Float32s = npt.NDArray[np.float32]
+
+HEAD = struct.Struct("<I3f")
+ROW_GAINS = 1
+HUGE = 1e30
+NEGATIVE = 1e-5  # an eigenvalue below 0 by this part of the greatest is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class ModelErrors:
+    """Second moments of the data's errors, reduced by P.
+
+    ``error`` P E P' (r, r): of errors relative to the data's norm |d|; ``drift`` P D P' (r, r): of
+    what the skin's own drift adds, in the datum's unit squared; both float32, symmetric and
+    positive semidefinite. ``rms_error`` and ``rms_shape_error``: sqrt(mean |e|^2) of random skins
+    and of shaped touches, all rows. ``row_gains``: each row is to be scaled to the model by the
+    tare.
+    """
+
+    error: Float32s
+    drift: Float32s
+    rms_error: float
+    rms_shape_error: float
+    row_gains: bool = True
+
+    def encode(self) -> bytes:
+        """The section's bytes."""
+        head = HEAD.pack(
+            ROW_GAINS if self.row_gains else 0, self.rms_error, self.rms_shape_error, 0.0
+        )
+        lower = np.tril_indices(len(self.error))
+        return head + b"".join(
+            matrix[lower].astype("<f4").tobytes() for matrix in (self.error, self.drift)
+        )
+
+
+def decode_model_errors(content: bytes, rank: int, where: str) -> ModelErrors:
+    """The section's numbers, of a model of ``rank``.
+
+    Raises:
+        ModelError: it has another length than the rank asks for, a number is out of range, or a
+            matrix is not positive semidefinite.
+    """
+    count = rank * (rank + 1) // 2
+    if len(content) != HEAD.size + 8 * count:
+        raise ModelError(
+            f"{where}: holds section 'UNCE' of {len(content)} bytes instead of"
+            f" {HEAD.size + 8 * count}; build the model again"
+        )
+    flags, rms_error, rms_shape_error, _ = HEAD.unpack_from(content)
+    packed = np.frombuffer(content, dtype="<f4", offset=HEAD.size).reshape(2, count)
+    numbers = np.concatenate([packed.ravel(), [rms_error, rms_shape_error]])
+    if not (np.abs(numbers) <= HUGE).all() or min(rms_error, rms_shape_error) < 0:
+        raise ModelError(
+            f"{where}: holds a number in section 'UNCE' that is out of range; build the model again"
+        )
+    error, drift = (_whole(lower, rank) for lower in packed)
+    for matrix in (error, drift):
+        eigenvalues = np.linalg.eigvalsh(matrix.astype(np.float64))
+        if eigenvalues[0] < -NEGATIVE * max(eigenvalues[-1], 0.0):
+            raise ModelError(
+                f"{where}: holds a matrix in section 'UNCE' that is no covariance; build the model"
+                " again"
+            )
+    return ModelErrors(
+        error,
+        drift,
+        float(str(np.float32(rms_error))),
+        float(str(np.float32(rms_shape_error))),
+        bool(flags & ROW_GAINS),
+    )
+
+
+def as_covariance(matrix: FloatArray) -> Float32s:
+    """``matrix`` (r, r) made symmetric and positive semidefinite, in float32."""
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    clipped = (vectors * np.maximum(values, 0)) @ vectors.T
+    return np.asarray((clipped + clipped.T) / 2, dtype=np.float32)
+
+
+def _whole(lower: Float32s, rank: int) -> Float32s:
+    matrix = np.zeros((rank, rank), dtype=np.float32)
+    matrix[np.tril_indices(rank)] = lower
+    matrix.T[np.tril_indices(rank)] = lower
+    return matrix

@@ -1,0 +1,245 @@
+"""Random skins and touches of an [uncertainty], and what a model makes of them: the relative errors
+of its data, reduced.
+
+    e_all = (g o d_true - d_nominal) / |d_nominal|
+
+d_true: the change that discs make in the random skin, with the row gains g of its tare; d_nominal:
+the same discs in the skin as described. e_shape: shaped touches against discs, both in the skin as
+described. What amplitude, place and radius of the discs can explain is taken out of both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.deform import Deformation
+from eitskin.fem.mesh import Mesh
+from eitskin.fem.sensitivity import element_fields
+from eitskin.fem.shaped_touch import ShapedTouch, TouchCover
+from eitskin.model.reduction import fold_rows
+from eitskin.skin.protocol import Protocol, Reciprocity
+from eitskin.skin.skin import Skin
+from eitskin.skin.uncertainty import Range, Uncertainty
+
+FloatArray = npt.NDArray[np.float64]
+
+COSINES = 128
+HARMONICS = (2, 3, 4)
+MAX_TOUCHES = 3
+MARGIN, GAP = 0.04, 0.12  # R: least distance of a disc to the rim, and of two discs' edges
+TRIES = 200
+STEP = 0.1  # of a disc's radius, for its derivatives
+MAX_ROW_GAIN = 3.0  # csrc/src/frame: the same
+MAX_RATIO = 16.0  # csrc/src/frame/fold.c: of log-ratio data
+MIN_RATIO = 1e-6  # rows whose reference is below this part of the rms say nothing as a ratio
+FIELD_LENGTHS = 8
+ELEMENTS_AT_ONCE = 512
+CELL = 0.15  # of a field's least length
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """``skin`` under ``protocol`` on ``mesh``, and the model's data: their kind, ``fold``, and
+    ``projection`` P (r, k)."""
+
+    skin: Skin
+    protocol: Protocol
+    mesh: Mesh
+    fold: Reciprocity
+    data_kind: str
+    projection: FloatArray
+    uncertainty: Uncertainty
+
+
+class RandomSkins:
+    """Draws samples; what they share is computed once."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        skin, mesh = request.skin, request.mesh
+        self.forward = ForwardModel(mesh, skin, request.protocol)
+        self.deformation = Deformation(mesh)
+        self.cover = TouchCover(mesh)
+        self.radius_mm = float(np.sqrt(skin.outline.area_mm2 / np.pi))
+        self.conductivity = np.full(mesh.n_elements, skin.conductivity_s_per_m)
+        solution = self.forward.solve(self.conductivity)
+        patterns = self.forward.patterns
+        self._pairs = element_fields(self.forward, solution) @ patterns.mix.T
+        self.v_ref = self._fold(self.forward.voltages_of(solution))
+
+    def sample(self, number: int) -> FloatArray:
+        """The sample ``number``, whatever others are drawn: P e_all (r), P e_shape (r), |e_all|,
+        |e_shape|."""
+        request, asked = self.request, self.request.uncertainty
+        draw = np.random.default_rng(np.random.SeedSequence(asked.seed, spawn_key=(number,)))
+        mesh, conductivity, impedance = self._random_skin(draw)
+        touches = self._random_touches(draw)
+        discs = tuple(touch.disc() for touch in touches)
+        forward = ForwardModel(mesh, request.skin, request.protocol, impedance)
+        v0 = self._fold(forward.voltages(conductivity))
+        covered = TouchCover(mesh).factors(discs)
+        true = self._datum(self._fold(forward.voltages(conductivity * covered)), v0)
+        nominal, shaped = (self._nominal(given) for given in (discs, touches))
+        size = np.linalg.norm(nominal)
+        errors = np.column_stack([true - nominal, shaped - nominal]) / size
+        explained = np.linalg.qr(np.column_stack([self._columns(disc) for disc in discs]))[0]
+        for _ in range(2):
+            errors -= explained @ (explained.T @ errors)
+        reduced = request.projection @ errors
+        return np.concatenate([reduced.T.ravel(), np.linalg.norm(errors, axis=0)])
+
+    def drift(self) -> FloatArray:
+        """P D P' (r, r): D the covariance, to first order, of the data that a smooth change of the
+        skin's conductivity makes."""
+        asked, mesh, r = self.request.uncertainty, self.request.mesh, len(self.request.projection)
+        reduced = np.concatenate(
+            [
+                self.request.projection @ self._sensitivity(block)
+                for block in np.array_split(
+                    np.arange(mesh.n_elements), -(-mesh.n_elements // ELEMENTS_AT_ONCE)
+                )
+            ],
+            axis=1,
+        ) * (asked.drift_log_sd * self.request.skin.conductivity_s_per_m)
+        reduced, places = self._gathered(reduced)
+        square = ((places[:, None] - places) ** 2).sum(axis=2)
+        low, high = asked.background_length
+        lengths = low + (high - low) * (np.arange(FIELD_LENGTHS) + 0.5) / FIELD_LENGTHS
+        covariance = np.zeros((r, r))
+        for length in lengths:
+            covariance += reduced @ np.exp(square / (-2 * length**2)) @ reduced.T / FIELD_LENGTHS
+        return covariance
+
+    def _gathered(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """``columns`` (r, E) of elements summed over square cells much smaller than any field's
+        length, (r, c), and the cells' middles in R, (c, 2)."""
+        side = CELL * self.request.uncertainty.background_length[0]
+        cells = np.floor(self.request.mesh.centroids_mm() / (side * self.radius_mm))
+        kept, number = np.unique(cells, axis=0, return_inverse=True)
+        number = number.ravel()
+        order = np.argsort(number, kind="stable")
+        begins = np.searchsorted(number[order], np.arange(len(kept)))
+        return np.add.reduceat(columns[:, order], begins, axis=1), (kept + 0.5) * side
+
+    def _nominal(self, touches: tuple[ShapedTouch, ...]) -> FloatArray:
+        factors = self.cover.factors(touches)
+        voltages = self.forward.voltages(self.conductivity * factors)
+        return self._datum(self._fold(voltages), self.v_ref)
+
+    def _fold(self, voltages: FloatArray) -> FloatArray:
+        return fold_rows(voltages, self.request.fold)
+
+    def _datum(self, v: FloatArray, v0: FloatArray) -> FloatArray:
+        """The folded datum as the core makes it from ``v`` with the reference ``v0`` (k,)."""
+        kind, v_ref = self.request.data_kind, self.v_ref
+        weak = np.abs(v0) < MIN_RATIO * np.sqrt(np.mean(v0**2))
+        safe = np.where(weak, 1.0, v0)
+        if kind == "normalised":
+            return np.where(weak, 0.0, (v - v0) / safe)
+        gain = np.linalg.norm(v_ref) / np.linalg.norm(v0)
+        if self.request.uncertainty.row_gains:
+            row_gains = np.clip(v_ref / (gain * safe), 1 / MAX_ROW_GAIN, MAX_ROW_GAIN)
+            gain = gain * np.where((v_ref * v0 > 0) & ~weak, row_gains, 1.0)
+        if kind == "log-ratio":
+            return np.where(
+                weak, 0.0, gain * v0 * np.log(np.clip(v / safe, 1 / MAX_RATIO, MAX_RATIO))
+            )
+        return np.asarray(gain * (v - v0))
+
+    def _sensitivity(self, elements: npt.NDArray[np.int64]) -> FloatArray:
+        """The change of the folded datum with the conductivity of ``elements`` (e,), (k, e)."""
+        patterns, fold = self.forward.patterns, self.request.fold
+        drive, measure = patterns.drive[fold.first], patterns.measure[fold.first]
+        sign = patterns.drive_sign[fold.first] * patterns.measure_sign[fold.first]
+        fields = self._pairs[elements]
+        products = (fields[:, :, drive] * fields[:, :, measure]).sum(axis=1)
+        scale = -self.request.protocol.current_a * self.forward.thickness_m * sign
+        columns = products.T * scale[:, None] * (self.request.mesh.areas_mm2[elements] * 1e-6)
+        if self.request.data_kind == "normalised":
+            weak = np.abs(self.v_ref) < MIN_RATIO * np.sqrt(np.mean(self.v_ref**2))
+            columns = np.where(weak, 0.0, 1 / np.where(weak, 1.0, self.v_ref))[:, None] * columns
+        return np.asarray(columns)
+
+    def _columns(self, disc: ShapedTouch) -> FloatArray:
+        """What a small change of the disc's amplitude, x, y and radius adds to the datum, (k, 4),
+        each of norm 1."""
+        r, x, y = disc.radius_mm, disc.x_mm, disc.y_mm
+        h = STEP * r
+        elements = self.cover.near(x, y, r + h)
+
+        def change(x: float, y: float, r: float) -> FloatArray:
+            touch = ShapedTouch(x, y, r, 2.0)
+            return self.cover.mean_change(touch, elements)
+
+        weights = np.column_stack(
+            [
+                change(x, y, r),
+                change(x + h, y, r) - change(x - h, y, r),
+                change(x, y + h, r) - change(x, y - h, r),
+                change(x, y, r + h) - change(x, y, r - h),
+            ]
+        )
+        columns = self._sensitivity(elements) @ weights
+        return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+
+    def _random_skin(self, draw: np.random.Generator) -> tuple[Mesh, FloatArray, FloatArray]:
+        asked, count = self.request.uncertainty, self.request.skin.electrodes.count
+        shift = asked.electrode_position_sd * self.radius_mm * draw.standard_normal(count)
+        widths = np.exp(asked.electrode_width_log_sd * draw.standard_normal(count))
+        contacts = np.exp(asked.contact_log_sd * draw.standard_normal(count))
+        rim = self.deformation.rim
+        turns = 2 * np.pi * np.outer(HARMONICS, rim.arc_mm / rim.length_mm)
+        waves = np.vstack([np.cos(turns), np.sin(turns)]) / np.sqrt(2 * len(HARMONICS))
+        outwards = asked.out_of_round * self.radius_mm * (draw.standard_normal(len(waves)) @ waves)
+        mesh = self.deformation.moved(shift, widths, outwards)
+        field = self._random_field(draw, _uniform(draw, asked.background_length))
+        conductivity = self.conductivity * np.exp(asked.background_log_sd * field)
+        impedance = self.request.skin.electrodes.contact_impedance_ohm_m2 * contacts
+        return mesh, conductivity, impedance
+
+    def _random_field(self, draw: np.random.Generator, length: float) -> FloatArray:
+        """A Gaussian field of variance 1 and covariance exp(-d^2 / (2 length^2)), lengths in R, as
+        a sum of cosines (random Fourier features), at the nodes; its mean over each element."""
+        waves = draw.standard_normal((COSINES, 2)) / (length * self.radius_mm)
+        phases = draw.uniform(0, 2 * np.pi, COSINES)
+        mesh = self.request.mesh
+        at_nodes = np.cos(mesh.nodes_mm @ waves.T + phases).sum(axis=1) * np.sqrt(2 / COSINES)
+        return np.asarray(at_nodes[mesh.triangles].mean(axis=1))
+
+    def _random_touches(self, draw: np.random.Generator) -> tuple[ShapedTouch, ...]:
+        """One to three touches, fewer where they do not fit."""
+        asked, outline = self.request.uncertainty, self.request.skin.outline
+        rim = self.request.mesh.nodes_mm[self.deformation.rim.nodes]
+        x0, y0, x1, y1 = outline.bounding_box_mm
+        touches: list[ShapedTouch] = []
+        for _ in range(int(draw.integers(1, MAX_TOUCHES, endpoint=True))):
+            radius = _uniform(draw, asked.touch_radius) * self.radius_mm
+            contrast = _uniform(draw, asked.touch_contrast)
+            aspect, angle = draw.uniform(1, asked.touch_aspect_max), draw.uniform(0, np.pi)
+            profile = ("uniform", "uniform", "hertz", "gaussian")[int(draw.integers(4))]
+            places = np.column_stack([draw.uniform(x0, x1, TRIES), draw.uniform(y0, y1, TRIES)])
+            inside = outline.contains(places)
+            depth = np.where(
+                inside, np.linalg.norm(places[:, None] - rim, axis=2).min(axis=1), -np.inf
+            )
+            fits = depth >= radius + MARGIN * self.radius_mm
+            for other in touches:
+                away = np.hypot(places[:, 0] - other.x_mm, places[:, 1] - other.y_mm)
+                fits &= away >= radius + other.radius_mm + GAP * self.radius_mm
+            if not (fits.any() or not touches):
+                continue
+            x, y = places[np.argmax(fits) if fits.any() else np.argmax(depth)]
+            touches.append(
+                ShapedTouch(
+                    float(x), float(y), radius, contrast, float(aspect), float(angle), profile
+                )
+            )
+        return tuple(touches)
+
+
+def _uniform(draw: np.random.Generator, ends: Range) -> float:
+    return float(draw.uniform(*ends))
