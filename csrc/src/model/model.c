@@ -375,8 +375,9 @@ static int row_fits(const eits_model *model, const eits_row_form *form, uint32_t
         const float value = p[(size_t)k * model->reduction.stride + i];
         sum += value * value;
     }
-    return between(energy, FLT_MIN, 1e30f) && between(form->scale[i], FLT_MIN, 1e30f) &&
-           near(sum, energy, 1e-3f) && near(unit * unit * energy, 1, 1e-3f) &&
+    return form->strength[i] >= 0 && square >= 0 && between(energy, FLT_MIN, 1e30f) &&
+           between(form->scale[i], FLT_MIN, 1e30f) && near(sum, energy, 1e-3f) &&
+           near(unit * unit * energy, 1, 1e-3f) &&
            near(square * energy + form->mu * (s1 * s1) * energy, 1, 1e-2f) &&
            between(form->strength[i] * (s1 * s1) - square, -1e-3f * (s1 * s1), 1e-3f * (s1 * s1));
 }

@@ -63,7 +63,7 @@ class RowForm:
             and _near(sums, energy, 1e-3)
             and _near(scale**2 * s1 * energy, 1, 1e-3)
             and _near((square + self.mu * s1) * energy, 1, FORM)
-            and _near(strength + 1, square / s1 + 1, 1e-3)
+            and (np.abs(strength * s1 - square) <= 1e-3 * s1).all()
             and _near(square.max(), s1, 1e-3)
         )
 
