@@ -5,6 +5,7 @@ from __future__ import annotations
 from fnmatch import fnmatch
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from cross_build import shared_build
@@ -19,6 +20,7 @@ from margins import (  # noqa: F401
 )
 
 LONG = Path(__file__).with_name("long_tests.txt")
+hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
