@@ -28,7 +28,7 @@ class Cover:
         self._corners = mesh.nodes_mm[mesh.triangles]
         self._middles = mesh.centroids_mm()
         self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
-        self._weights = _sub_triangle_weights(subdivision)
+        self._weights = sub_triangle_weights(subdivision)
 
     def of(self, touch: TrueTouch) -> tuple[IntArray, FloatArray]:
         """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,),
@@ -56,7 +56,7 @@ class Cover:
         return elements, np.maximum(1.0 + change[elements], MIN_FACTOR)
 
 
-def _sub_triangle_weights(subdivision: int) -> FloatArray:
+def sub_triangle_weights(subdivision: int) -> FloatArray:
     """Barycentric weights (s^2, 3) of the centres of the s^2 triangles that halve, third, ... a
     triangle's sides."""
     s = subdivision

@@ -118,6 +118,33 @@ def add_parser(subparsers: Any) -> None:
     option(scenes, "--elements", "of the mesh", default=3000)
     option(scenes, "--json")
     scenes.set_defaults(run=run_scenes)
+    worlds = what.add_parser(
+        "worlds",
+        help="touches counted in worlds that the model does not share",
+        description=(
+            "Simulate sets of scenes on another mesh, with touches, sheets, electrodes and drifts"
+            " that the model knows nothing of, and count the touches that the C core finds."
+        ),
+    )
+    option(worlds, "--scenes", "of each set", default=100)
+    option(worlds, "--seed", "of all that is random", default=1)
+    option(
+        worlds,
+        "--family",
+        "which scenes: to choose by, or to judge by",
+        choices=("tuning", "judging"),
+        default="tuning",
+    )
+    option(
+        worlds, "--sets NAME,...", "these alone; no_touch* names all that begin so (default: all)"
+    )
+    option(worlds, "--snr-db DB", "instead of each set's own", float)
+    option(worlds, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
+    option(worlds, "--option NAME=VALUE", "an option of the core; may be repeated", action="append")
+    option(worlds, "--cache DIR", "keeps the simulated frames", Path)
+    option(worlds, "--list", "name the sets")
+    option(worlds, "--json")
+    worlds.set_defaults(run=run_worlds)
 
 
 def _add_page(parser: argparse.ArgumentParser, page: str = "benchmarks") -> None:
@@ -322,4 +349,33 @@ def run_scenes(options: argparse.Namespace) -> int:
         options.frames, options.scenes, options.elements, progress=_progress
     )
     print(json.dumps(result, indent=2) if options.json else bench_scenes.scenes_text(result))
+    return 0
+
+
+def run_worlds(options: argparse.Namespace) -> int:
+    """Count touches in other worlds."""
+    from eitskin_studies.benchmarks import worlds as bench_worlds
+    from eitskin_studies.cli.cmd_compare import progress
+    from eitskin_studies.worlds.score import as_text
+
+    if options.list:
+        print(bench_worlds.listed())
+        return 0
+    _within("--scenes", options.scenes, 1, 100_000)
+    _within("--seed", options.seed, 0, 2**31 - 1)
+    scores = bench_worlds.run(
+        bench_worlds.Settings(
+            options.scenes,
+            options.seed,
+            options.family,
+            bench_worlds.chosen_sets(options.sets),
+            options.snr_db,
+            options.model,
+            tuple(options.option or ()),
+            options.cache,
+        ),
+        progress,
+    )
+    text = as_text(scores)
+    print(json.dumps([one.as_dict() for one in scores], indent=2) if options.json else text)
     return 0

@@ -1,0 +1,1 @@
+"""Other worlds: scenes that the model does not share, and how well touches are counted in them."""

@@ -1,0 +1,170 @@
+"""How well touches are found in sets of other worlds, by whatever finds them.
+
+The rule is that of ``eitskin.scoring.matching``: touches are paired with true ones within 10 mm, as
+many as possible, then the nearest; a scene is exact where nothing is left over on either side.
+Without touches a scene is exact where none is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.errors import FrameError
+from eitskin.scoring.matching import match
+from eitskin.solve.reconstructor import Reconstructor
+from eitskin_studies.experiments.multitouch.counts import Share, share
+from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
+
+FloatArray = npt.NDArray[np.float64]
+Progress = Callable[[Sequence[Any], str], Iterable[Any]]
+DIGITS = 4
+
+
+class FoundTouch(Protocol):
+    """What is needed of a found touch."""
+
+    @property
+    def x_mm(self) -> float:
+        """Its middle."""
+
+    @property
+    def y_mm(self) -> float:
+        """Its middle."""
+
+    @property
+    def radius_mm(self) -> float:
+        """Its radius."""
+
+
+Finder = Callable[[FloatArray, FloatArray], Sequence[FoundTouch]]
+"""Touches of a frame (m,), given the quiet frames (q, m) of its session, in V; it may raise
+FrameError."""
+
+
+@dataclass(frozen=True)
+class WorldScore:
+    """A set's numbers.
+
+    Attributes:
+        name, text, scenes: of the set.
+        exact: the share of exact scenes.
+        false_per_scene, missed_per_scene: touches.
+        median_mm, p95_mm: distance of found touches from the true ones; None where none was found.
+        radius_ratio: median of found over true radius.
+        refused: scenes whose frames the finder rejects; their touches count as missed.
+    """
+
+    name: str
+    text: str
+    scenes: int
+    exact: Share
+    false_per_scene: float
+    missed_per_scene: float
+    median_mm: float | None
+    p95_mm: float | None
+    radius_ratio: float | None
+    refused: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values fit for JSON."""
+        values = dict(vars(self))
+        values["exact"] = [round(v, DIGITS) for v in (self.exact.mean, *self.interval)]
+        return {
+            key: round(value, DIGITS) if isinstance(value, float) else value
+            for key, value in values.items()
+        }
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of the share of exact scenes."""
+        return self.exact.low, self.exact.high
+
+
+def core_finder(solver: Reconstructor) -> Finder:
+    """What ``solver`` finds: a tare on the quiet frames, then the frame, with nothing before it."""
+
+    def find(quiet_v: FloatArray, frame_v: FloatArray) -> Sequence[FoundTouch]:
+        solver.tare(quiet_v)
+        solver.forget()
+        return solver.reconstruct(frame_v).touches
+
+    return find
+
+
+def score_set(found_by: Finder, of: WorldScenes) -> WorldScore:
+    """The numbers of one set."""
+    matchings, ratios, refused = [], [], 0
+    for scene, quiet_v, frame_v in zip(of.scenes, of.quiet_v, of.frames_v, strict=True):
+        try:
+            found = found_by(quiet_v, frame_v)
+        except FrameError:
+            found, refused = (), refused + 1
+        one = match(scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])
+        matchings.append(one)
+        ratios += [found[j].radius_mm / scene.touches[i].radius_mm for i, j in one.pairs]
+    count = len(matchings)
+    distances = [d for m in matchings for d in m.distances_mm]
+    median, p95 = np.quantile(distances, [0.5, 0.95]) if distances else (None, None)
+    return WorldScore(
+        name=of.name,
+        text=of.world.text,
+        scenes=count,
+        exact=share(sum(m.exact for m in matchings), count),
+        false_per_scene=sum(m.false_touches for m in matchings) / count,
+        missed_per_scene=sum(m.misses for m in matchings) / count,
+        median_mm=None if median is None else float(median),
+        p95_mm=None if p95 is None else float(p95),
+        radius_ratio=float(np.median(ratios)) if ratios else None,
+        refused=refused,
+    )
+
+
+def score_worlds(
+    found_by: Finder,
+    factory: WorldFactory,
+    names: Sequence[str],
+    count: int,
+    seed: int,
+    *,
+    family: str = "tuning",
+    snr_db: float | None = None,
+    progress: Progress | None = None,
+) -> list[WorldScore]:
+    """Every set of ``names``, ``count`` scenes each.
+
+    Raises:
+        UsageError, GeometryError, MissingExtraError: from simulating.
+    """
+    return [
+        score_set(
+            found_by,
+            factory.scenes(name, count, seed, snr_db, family=family, progress=progress),
+        )
+        for name in names
+    ]
+
+
+def as_text(scores: Sequence[WorldScore]) -> str:
+    """The table."""
+    width = max(len(one.name) for one in scores)
+    lines = [
+        f"{'set':<{width}} scenes  exact %  (95 %)      false  missed  median mm  p95 mm  radius"
+    ]
+    for one in scores:
+        low, high = (100 * v for v in one.interval)
+        numbers = [
+            "     -" if value is None else f"{value:6.2f}"
+            for value in (one.median_mm, one.p95_mm, one.radius_ratio)
+        ]
+        lines.append(
+            f"{one.name:<{width}} {one.scenes:>6} {100 * one.exact.mean:>7.1f}"
+            f"   ({low:3.0f} to {high:3.0f}) {one.false_per_scene:>8.2f}"
+            f" {one.missed_per_scene:>7.2f}     {numbers[0]}  {numbers[1]}  {numbers[2]}"
+            + (f"  {one.refused} frames rejected" if one.refused else "")
+        )
+    return "\n".join(lines)

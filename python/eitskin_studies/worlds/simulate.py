@@ -1,0 +1,392 @@
+"""Simulates sets of other worlds: for each scene a skin of its own, 64 quiet frames and one touched
+frame.
+
+One mesh of about 11,000 elements serves all (the model is made on another); misplaced electrodes
+and outlines out of round move its nodes. Each part is drawn from a stream of its own, named after
+the family, the set and the part: "tuning" and "judging" share nothing under any seed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from eitskin.config import nearest
+from eitskin.errors import GeometryError, UsageError
+from eitskin.fem.cem import ForwardModel
+from eitskin.fem.mesh import Mesh, mesh_for_elements
+from eitskin.fileio import write_beside
+from eitskin.scene.cover import MIN_FACTOR, SUBDIVISION, sub_triangle_weights
+from eitskin.scene.random_field import RandomField
+from eitskin.scene.random_touches import TouchScene, TrueTouch, rim_distance_mm
+from eitskin.scene.simulate import Measurement, measure
+from eitskin.scene.streams import stream
+from eitskin.scene.touch_shape import TouchShape
+from eitskin.skin.protocol import Protocol
+from eitskin.skin.skin import Skin
+from eitskin_studies.harness.sessions import converter_for
+from eitskin_studies.worlds.worlds import WORLDS, Errors, TouchKinds, World
+
+FloatArray = npt.NDArray[np.float64]
+Generators = Callable[[str], np.random.Generator]
+Progress = Callable[[Sequence[Any], str], Iterable[Any]]
+
+FAMILIES = ("tuning", "judging")
+ELEMENTS = 11_000
+RIM_MARGIN_MM = 4.0
+TRIES = 20_000
+
+
+@dataclass(frozen=True)
+class ShapedTouch:
+    """A touch of any shape; ``disc`` has its middle, its area and the contrast in the middle."""
+
+    disc: TrueTouch
+    shape: TouchShape
+
+    @property
+    def reach_mm(self) -> float:
+        """How far from its middle it changes anything."""
+        return self.disc.radius_mm * self.shape.reach
+
+
+@dataclass(frozen=True, eq=False)
+class WorldScenes:
+    """A set, simulated: scene k has ``quiet_v[k]`` (q, m) for its tare and ``frames_v[k]`` (m,), in
+    V.
+
+    ``scenes[k]`` holds its touches as discs of the same middle and area, for scoring; ``shaped[k]``
+    as they are, where they were simulated in this process.
+    """
+
+    name: str
+    world: World
+    scenes: tuple[TouchScene, ...]
+    quiet_v: FloatArray
+    frames_v: FloatArray
+    shaped: tuple[tuple[ShapedTouch, ...], ...] = ()
+
+
+@dataclass(eq=False)
+class WorldFactory:
+    """Simulates sets on one skin; kept in ``folder`` where one is given."""
+
+    skin: Skin
+    protocol: Protocol
+    folder: Path | None = None
+    elements: int = ELEMENTS
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The mesh of the skin as described."""
+        return mesh_for_elements(self.skin, self.elements)
+
+    @cached_property
+    def _forward(self) -> ForwardModel:
+        return ForwardModel(self.mesh, self.skin, self.protocol)
+
+    @cached_property
+    def _radius_mm(self) -> float:
+        return math.sqrt(self.skin.outline.area_mm2 / math.pi)
+
+    def scenes(
+        self,
+        name: str,
+        count: int,
+        seed: int,
+        snr_db: float | None = None,
+        *,
+        family: str = "tuning",
+        progress: Progress | None = None,
+    ) -> WorldScenes:
+        """``count`` scenes of the set ``name``; ``snr_db`` replaces the set's own where it has
+        noise.
+
+        Raises:
+            UsageError: no such set or family, or a seed below 0.
+            GeometryError, MissingExtraError: from drawing and meshing.
+        """
+        world = named_world(name)
+        if family not in FAMILIES:
+            raise UsageError(f"worlds: family {family!r}: use one of {', '.join(FAMILIES)}")
+        if snr_db is not None and world.snr_db is not None:
+            world = replace(world, snr_db=snr_db)
+        role = f"worlds {family} {name}"
+        drawn = [
+            draw_touches(self.skin, world.touches, stream(seed, f"{role} touches", k))
+            for k in range(count)
+        ]
+        exact = self._kept(role, world.errors, drawn, seed, progress)
+        quiet_v, frames_v = _measured(exact, world, seed, role)
+        scenes = tuple(
+            TouchScene(f"{name}-{family}-s{seed}-{k}", tuple(t.disc for t in touches))
+            for k, touches in enumerate(drawn)
+        )
+        return WorldScenes(name, world, scenes, quiet_v, frames_v, tuple(drawn))
+
+    def _kept(
+        self,
+        role: str,
+        errors: Errors,
+        drawn: list[tuple[ShapedTouch, ...]],
+        seed: int,
+        progress: Progress | None,
+    ) -> FloatArray:
+        """(k, 2, m): untouched, touched; exact. What is kept holds for these very touches and
+        errors."""
+        if self.folder is None:
+            return self._solve_all(role, errors, drawn, seed, progress)
+        import hashlib
+
+        facts = (repr(self.skin), self.protocol.hash, self.elements, role, errors, drawn, seed)
+        digest = hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
+        path = self.folder / f"{role.replace(' ', '-')}-{digest}.npy"
+        if path.is_file():
+            kept: FloatArray = np.load(path, allow_pickle=False)
+            return kept
+        exact = self._solve_all(role, errors, drawn, seed, progress)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with write_beside(path) as temporary:
+            np.save(temporary, exact, allow_pickle=False)
+        return exact
+
+    def _solve_all(
+        self,
+        role: str,
+        errors: Errors,
+        drawn: list[tuple[ShapedTouch, ...]],
+        seed: int,
+        progress: Progress | None,
+    ) -> FloatArray:
+        def draws(k: int) -> Generators:
+            return lambda part: stream(seed, f"{role} {part}", k)
+
+        indices = range(len(drawn))
+        return np.array(
+            [
+                self._solve(errors, drawn[k], draws(k))
+                for k in (indices if progress is None else progress(indices, role))
+            ]
+        )
+
+    def _solve(
+        self, errors: Errors, touches: tuple[ShapedTouch, ...], draw: Generators
+    ) -> FloatArray:
+        """The untouched and the touched frame (2, m) of one skin."""
+        forward = self._forward_with(errors, draw)
+        middles = forward.mesh.centroids_mm()
+        electrodes = self.skin.electrodes
+        contact = np.full(electrodes.count, electrodes.contact_impedance_ohm_m2)
+        if errors.contact_log_sd:
+            contact *= np.exp(errors.contact_log_sd * draw("contact").standard_normal(len(contact)))
+        else:
+            contact *= 1 + errors.contact_spread * draw("contact").uniform(-1, 1, len(contact))
+        sheet = np.full(len(middles), self.skin.conductivity_s_per_m)
+        if errors.uneven:
+            sheet *= np.exp(errors.uneven * self._field(errors, draw("uneven")).at(middles))
+        untouched = forward.voltages(sheet, contact)
+        changed, amplitude = sheet * touched_factor(forward.mesh, touches), 1.0
+        if errors.drift:
+            changed *= np.exp(errors.drift * self._field(errors, draw("drift")).at(middles))
+        if errors.contact_drift:
+            change = errors.contact_drift * draw("contact drift").standard_normal(len(contact))
+            contact = contact * np.exp(change)
+        if errors.amplitude_drift:
+            amplitude += errors.amplitude_drift * float(draw("amplitude drift").standard_normal())
+        return np.array([untouched, amplitude * forward.voltages(changed, contact)])
+
+    def _field(self, errors: Errors, generator: np.random.Generator) -> RandomField:
+        length_mm = self._radius_mm * float(generator.uniform(*errors.correlation))
+        return RandomField(generator, length_mm)
+
+    def _forward_with(self, errors: Errors, draw: Generators) -> ForwardModel:
+        """The forward model on the mesh with its nodes where this skin's are."""
+        if not (errors.misplaced_mm or errors.out_of_round):
+            return self._forward
+        nodes = self.mesh.nodes_mm
+        if errors.misplaced_mm:
+            count = self.skin.electrodes.count
+            shifts = errors.misplaced_mm * draw("misplaced").standard_normal(count)
+            nodes = turned_nodes(self.skin, nodes, shifts)
+        if errors.out_of_round:
+            generator = draw("out of round")
+            angle = np.arctan2(nodes[:, 1], nodes[:, 0])
+            waves = np.zeros(len(nodes))
+            for harmonic in (2, 3):
+                size, phase = generator.standard_normal(), generator.uniform(0, 2 * math.pi)
+                waves += size * np.cos(harmonic * angle - phase)
+            share = np.hypot(nodes[:, 0], nodes[:, 1]) / self._radius_mm
+            nodes = nodes * (1 + errors.out_of_round * waves * share)[:, None]
+        return ForwardModel(replace(self.mesh, nodes_mm=nodes), self.skin, self.protocol)
+
+
+def named_world(name: str) -> World:
+    """The set ``name``.
+
+    Raises:
+        UsageError: there is none.
+    """
+    if name not in WORLDS:
+        raise UsageError(f"worlds: no set is named {name!r}; {nearest(name, WORLDS)}")
+    return WORLDS[name]
+
+
+def turned_nodes(skin: Skin, nodes_mm: FloatArray, shifts_mm: FloatArray) -> FloatArray:
+    """Nodes (N, 2) of a disk turned so that each electrode moves by ``shifts_mm`` (L,) along the
+    rim and keeps its width: between electrodes linearly, towards the middle with the cube of the
+    radius.
+
+    Raises:
+        GeometryError: the skin is no disk, or electrodes would meet.
+    """
+    if skin.outline.diameter_mm is None:
+        raise GeometryError("worlds: electrodes are misplaced on disks only")
+    radius = skin.outline.diameter_mm / 2
+    angles = skin.electrode_spans_mm() / radius  # arc length 0 is at angle 0
+    turn = np.repeat(shifts_mm / radius, 2)
+    at = angles.ravel()
+    order = np.argsort(at)
+    at, turn = at[order], turn[order]
+    if np.diff(np.concatenate([at + turn, at[:1] + turn[:1] + 2 * math.pi])).min() <= 0:
+        raise GeometryError("worlds: misplaced electrodes meet; use smaller shifts")
+    polar = np.mod(np.arctan2(nodes_mm[:, 1], nodes_mm[:, 0]), 2 * math.pi)
+    share = np.hypot(nodes_mm[:, 0], nodes_mm[:, 1]) / radius
+    by = np.interp(polar, at, turn, period=2 * math.pi) * share**3
+    cos, sin = np.cos(by), np.sin(by)
+    x, y = nodes_mm.T
+    return np.column_stack([x * cos - y * sin, x * sin + y * cos])
+
+
+def touched_factor(mesh: Mesh, touches: Iterable[ShapedTouch]) -> FloatArray:
+    """What touches multiply each element's conductivity by, (E,): the mean over 64 points of it.
+    Where touches overlap their changes add (never below a thousandth)."""
+    change = np.zeros(mesh.n_elements)
+    middles, weights = mesh.centroids_mm(), sub_triangle_weights(SUBDIVISION)
+    corners = mesh.nodes_mm[mesh.triangles]
+    own_reach = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+    for touch in touches:
+        disc = touch.disc
+        centre = np.array([disc.x_mm, disc.y_mm])
+        distance = np.linalg.norm(middles - centre, axis=1)
+        near = np.flatnonzero(distance <= touch.reach_mm + own_reach)
+        part = touch.shape.change_at(weights @ corners[near] - centre, disc.radius_mm).mean(axis=1)
+        change[near] += part * (disc.contrast - 1.0)
+    return np.maximum(1.0 + change, MIN_FACTOR)
+
+
+def draw_touches(
+    skin: Skin, kinds: TouchKinds, generator: np.random.Generator
+) -> tuple[ShapedTouch, ...]:
+    """One scene's touches: sizes first, then places until all fit; after 200 misses for one touch
+    all places are drawn again.
+
+    Raises:
+        GeometryError: they do not fit on this skin.
+    """
+    number = int(generator.integers(kinds.count[0], kinds.count[1], endpoint=True))
+    if not number:
+        return ()
+    if kinds.pair_mm is not None:
+        return _draw_pair(skin, kinds, generator)
+    radii, contrasts, aspects, angles = _sizes(kinds, generator, number)
+    long_mm = radii * np.sqrt(aspects)
+    x0, y0, x1, y1 = skin.outline.bounding_box_mm
+    places: list[tuple[float, float]] = []
+    misses = 0
+    for _ in range(TRIES):
+        x, y = float(generator.uniform(x0, x1)), float(generator.uniform(y0, y1))
+        k = len(places)
+        if kinds.spacing_radii is None:
+            least = long_mm[k] + long_mm[:k] + kinds.gap_mm
+        else:
+            least = kinds.spacing_radii * (radii[k] + radii[:k]) / 2
+        away = np.hypot(*(np.array(places).reshape(-1, 2) - (x, y)).T)
+        margin = long_mm[k] + RIM_MARGIN_MM
+        if (away >= least).all() and rim_distance_mm(skin.outline, (x, y))[0] >= margin:
+            places.append((x, y))
+            misses = 0
+        else:
+            misses += 1
+        if len(places) == number:
+            return _shaped(kinds, np.array(places), radii, contrasts, aspects, angles)
+        if misses >= 200:
+            places, misses = [], 0
+    raise GeometryError(f"worlds: {number} touches of up to {radii.max():.3g} mm do not fit")
+
+
+def _sizes(
+    kinds: TouchKinds, generator: np.random.Generator, number: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    return (
+        generator.uniform(*kinds.radius_mm, size=number),
+        generator.uniform(*kinds.contrast, size=number),
+        generator.uniform(*kinds.aspect, size=number),
+        generator.uniform(0.0, math.pi, size=number),
+    )
+
+
+def _draw_pair(
+    skin: Skin, kinds: TouchKinds, generator: np.random.Generator
+) -> tuple[ShapedTouch, ...]:
+    """Two fingers side by side: long axes along one another to 20 degrees, and across the line of
+    their middles, on which they do not overlap."""
+    assert kinds.pair_mm is not None
+    x0, y0, x1, y1 = skin.outline.bounding_box_mm
+    for _ in range(TRIES):
+        radii, contrasts, aspects, angles = _sizes(kinds, generator, 2)
+        apart = float(generator.uniform(*kinds.pair_mm))
+        angles[1] = angles[0] + math.radians(float(generator.uniform(-20.0, 20.0)))
+        across = angles[0] + math.pi / 2
+        middle = generator.uniform((x0, y0), (x1, y1))
+        half = apart / 2 * np.array([math.cos(across), math.sin(across)])
+        places = np.array([middle - half, middle + half])
+        margin = radii * np.sqrt(aspects) + RIM_MARGIN_MM
+        fits = (rim_distance_mm(skin.outline, places) >= margin).all()
+        if fits and (radii / np.sqrt(aspects)).sum() <= apart:
+            return _shaped(kinds, places, radii, contrasts, aspects, angles)
+    raise GeometryError("worlds: two fingers do not fit on this skin")
+
+
+def _shaped(
+    kinds: TouchKinds,
+    places: FloatArray,
+    radii: FloatArray,
+    contrasts: FloatArray,
+    aspects: FloatArray,
+    angles: FloatArray,
+) -> tuple[ShapedTouch, ...]:
+    return tuple(
+        ShapedTouch(
+            TrueTouch(float(x), float(y), float(r), float(c)),
+            TouchShape(float(aspect), float(angle), kinds.profile),
+        )
+        for (x, y), r, c, aspect, angle in zip(
+            places, radii, contrasts, aspects, angles, strict=True
+        )
+    )
+
+
+def _measured(
+    exact_v: FloatArray, world: World, seed: int, role: str
+) -> tuple[FloatArray, FloatArray]:
+    """Quiet frames (k, q, m) and touched frames (k, m) with noise and converter."""
+    how = Measurement() if world.snr_db is None else converter_for(world.snr_db)
+    bits = how.adc_bits if world.adc_bits is None else world.adc_bits
+    quiet, frames = [], []
+    for k, (untouched, touched) in enumerate(exact_v):
+        rms = float(np.sqrt((untouched**2).mean()))
+        noise_v = 0.0 if world.snr_db is None else rms * 10 ** (-world.snr_db / 20)
+        span_v = how.adc_headroom * float(np.abs(untouched).max())
+        lsb_v = 2 * span_v / 2**bits if bits else 0.0
+        many = np.vstack([np.tile(untouched, (how.quiet_frames, 1)), touched])
+        noisy, _ = measure(many, noise_v, lsb_v, span_v, seed, f"{role} {k}")
+        quiet.append(noisy[:-1])
+        frames.append(noisy[-1])
+    return np.array(quiet), np.array(frames)

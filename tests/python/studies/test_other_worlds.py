@@ -1,0 +1,140 @@
+"""Sets of other worlds: what is drawn is what the names say, families share nothing, and the score
+counts."""
+
+from __future__ import annotations
+
+import json
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from eitskin.cli.main import main
+from eitskin.errors import FrameError, UsageError
+from eitskin.scene.random_touches import TrueTouch
+from eitskin.scene.touch_shape import TouchShape
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
+from eitskin_studies.worlds.score import as_text, score_set
+from eitskin_studies.worlds.simulate import (
+    ShapedTouch,
+    WorldFactory,
+    draw_touches,
+    touched_factor,
+    turned_nodes,
+)
+from eitskin_studies.worlds.worlds import WORLDS
+
+
+@pytest.fixture(scope="module")
+def factory():
+    return WorldFactory(paper_skin(), adjacent(16), elements=1500)
+
+
+def test_scenes_depend_on_family_seed_and_number_alone(factory):
+    few = factory.scenes("fingers_mild_errors", 1, 3)
+    more = factory.scenes("fingers_mild_errors", 2, 3)
+    other = factory.scenes("fingers_mild_errors", 1, 3, family="judging")
+    assert np.array_equal(few.frames_v[0], more.frames_v[0])
+    assert few.scenes[0] == more.scenes[0]
+    assert few.scenes[0].touches[0] != other.scenes[0].touches[0]
+    assert not np.array_equal(few.quiet_v, other.quiet_v)
+
+
+def test_kept_frames_are_those_that_were_simulated(factory, tmp_path):
+    keeping = WorldFactory(factory.skin, factory.protocol, tmp_path, 1500)
+    first = keeping.scenes("ellipses", 1, 5)
+    again = WorldFactory(factory.skin, factory.protocol, tmp_path, 1500).scenes("ellipses", 1, 5)
+    assert len(list(tmp_path.iterdir())) == 1
+    assert np.array_equal(first.frames_v, again.frames_v)
+
+
+@pytest.mark.parametrize("name", [n for n, w in WORLDS.items() if w.touches.count[1]])
+def test_drawn_touches_are_within_the_ranges_of_their_set(name):
+    kinds, skin = WORLDS[name].touches, paper_skin()
+    for seed in range(5):
+        touches = draw_touches(skin, kinds, np.random.default_rng(seed))
+        assert kinds.count[0] <= len(touches) <= kinds.count[1]
+        for one in touches:
+            assert kinds.radius_mm[0] <= one.disc.radius_mm <= kinds.radius_mm[1]
+            assert kinds.aspect[0] <= one.shape.aspect <= kinds.aspect[1]
+            flat_reach_mm = one.disc.radius_mm * math.sqrt(one.shape.aspect)
+            assert math.hypot(one.disc.x_mm, one.disc.y_mm) + flat_reach_mm <= 97 - 4 + 1e-9
+    if kinds.pair_mm is not None:
+        (a, b) = (one.disc for one in touches)
+        assert kinds.pair_mm[0] <= math.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) <= kinds.pair_mm[1]
+
+
+@pytest.mark.parametrize(
+    ("shape", "share"),
+    [
+        (TouchShape(), 1.0),
+        (TouchShape(2.2, 0.7), 1.0),
+        (TouchShape(1.8, 2.0, "hertz"), 2 / 3),
+        (TouchShape(1.0, 0.0, "gauss"), (1 - 2**-6.25) / math.log(2)),
+    ],
+)
+def test_a_touch_changes_its_share_of_its_area(factory, shape, share):
+    touch = ShapedTouch(TrueTouch(5.0, -12.0, 12.0, 4.0), shape)
+    change = (touched_factor(factory.mesh, [touch]) - 1) / 3
+    area = (change * factory.mesh.areas_mm2).sum()
+    assert area == pytest.approx(share * math.pi * 144, rel=0.03)
+    assert change.max() <= 1 + 1e-12
+
+
+def test_misplaced_electrodes_move_by_what_was_drawn_and_keep_their_width(factory):
+    shifts = np.linspace(-4, 4, 16)
+    nodes = turned_nodes(factory.skin, factory.mesh.nodes_mm, shifts)
+    for k, edges in enumerate(factory.mesh.electrode_edges):
+        chain = np.append(edges[:, 0], edges[-1, 1])
+        old, new = (
+            np.unwrap(np.arctan2(*at[chain].T[::-1])) for at in (factory.mesh.nodes_mm, nodes)
+        )
+        moved = np.mod(new - old + math.pi, 2 * math.pi) - math.pi
+        assert moved * 97 == pytest.approx(shifts[k], abs=1e-6)
+
+
+def test_each_error_changes_the_frames_that_it_should(factory):
+    even = factory.scenes("no_touch_amplitude_drift_1_percent", 1, 2)
+    ratio = even.frames_v[0] / even.quiet_v[0].mean(axis=0)
+    large = np.abs(even.frames_v[0]) > 0.1 * np.abs(even.frames_v[0]).max()
+    assert 1e-4 < abs(np.median(ratio[large]) - 1) < 0.04
+    bare = factory.scenes("no_touch_noiseless", 1, 2)
+    assert np.ptp(bare.quiet_v[0], axis=0).max() == 0
+    assert 1e-9 < np.abs(bare.frames_v[0] / bare.quiet_v[0][0] - 1).max() < 1e-4
+
+
+def test_scores_count_exact_false_missed_and_refused_scenes(factory):
+    of = factory.scenes("eight_at_4_radii", 4, 1)
+    answers = iter(range(4))
+
+    def find(quiet_v, frame_v):
+        k = next(answers)
+        if k == 3:
+            raise FrameError("rejected")
+        true = [SimpleNamespace(**vars(t)) for t in of.scenes[k].touches]
+        return [true, true[1:], [*true, SimpleNamespace(x_mm=500.0, y_mm=0.0, radius_mm=1.0)]][k]
+
+    score = score_set(find, of)
+    assert (score.exact.hits, score.scenes, score.refused) == (1, 4, 1)
+    assert (score.false_per_scene, score.missed_per_scene) == (0.25, 9 / 4)
+    assert (score.median_mm, score.radius_ratio) == (0.0, 1.0)
+    assert score.exact.low < 0.25 < score.exact.high
+    assert "eight_at_4_radii" in as_text([score])
+
+
+def test_the_command_scores_the_core_on_the_sets_that_are_named(capsys):
+    given = ["bench", "worlds", "--scenes", "2", "--sets", "no_touch", "--json"]
+    assert main([*given, "--option", "lambda_rel=0.02", "--option", "second_pass=true"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert row["name"] == "no_touch" and row["scenes"] == 2
+    assert row["exact"][0] >= 0.5
+
+
+@pytest.mark.parametrize(
+    "given", [["--sets", "nowhere"], ["--option", "lambda=1"], ["--option", "iterations=many"]]
+)
+def test_the_command_refuses_unknown_sets_and_options(given, capsys):
+    assert main(["bench", "worlds", *given]) == UsageError.exit_code
+    assert "eitskin:" in capsys.readouterr().err
