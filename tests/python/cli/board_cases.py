@@ -1,14 +1,7 @@
-"""Boards for tests of the command line: a small scene, and a simulated board behind a
-pseudo-terminal as behind a port."""
+"""Boards for tests of the command line: a small scene, and a simulated board before it."""
 
 from __future__ import annotations
 
-import os
-import select
-import threading
-import tty
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
@@ -52,34 +45,3 @@ def board_of(scene: Path, model: bytes | None = None, *, begun: bool = False) ->
     if begun:
         board.begin_scene()
     return board
-
-
-@contextmanager
-def behind_a_port(board: SimBoard) -> Iterator[str]:
-    """The path of a serial port with ``board`` on its other side."""
-    master, slave = os.openpty()
-    tty.setraw(master)
-    tty.setraw(slave)
-    stop = threading.Event()
-
-    def serve() -> None:
-        while not stop.is_set():
-            ready, _, _ = select.select([master], [], [], 0.002)
-            if ready:
-                board.receive(os.read(master, 4096))
-            board.scan_one()
-            output = board.take_output()
-            while output and not stop.is_set():
-                _, room, _ = select.select([], [master], [], 0.05)
-                if room:
-                    output = output[os.write(master, output[:1024]) :]
-
-    thread = threading.Thread(target=serve, daemon=True)
-    thread.start()
-    try:
-        yield os.ttyname(slave)
-    finally:
-        stop.set()
-        thread.join(timeout=5.0)
-        os.close(master)
-        os.close(slave)

@@ -15,8 +15,9 @@ import pytest
 pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
-from board_cases import behind_a_port, board_of, write_scene
+from board_cases import board_of, write_scene
 
+from board_on_a_port import behind_a_port
 from eitskin.cli.main import main
 from eitskin.device.ports import Port
 from eitskin.device.wire.packets import BoardInfo

@@ -46,7 +46,8 @@ OUTLINES = {
 FACTS = (
     "model", "bytes", "made_by", "skin", "electrodes", "protocol_rows", "protocol_hash",
     "folded_rows", "rank", "pixels",
-    "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "calibration", "model_errors", "defaults",
+    "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "calibration", "model_errors",
+    "defaults",
 )  # fmt: skip
 QUICK = ("--elements", "900", "--pixels", "14", "--samples", "0")
 

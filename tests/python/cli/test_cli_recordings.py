@@ -9,8 +9,7 @@ import re
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,10 @@ import pytest
 pytest.importorskip("scipy")
 pytest.importorskip("netgen")
 
-from board_cases import behind_a_port, board_of, write_scene
+from board_cases import board_of, write_scene
 
 import eitskin
+from board_on_a_port import behind_a_port
 from eitskin.cli.main import main
 from eitskin.device.wire.codec import Decoder, Packet, encode
 from eitskin.device.wire.link_table import PacketType
@@ -289,58 +289,6 @@ def test_rows_that_could_not_be_measured_are_not_exported(
     assert done("reconstruct", exported).count("\n") == FRAMES - 1 + 2
     raw = done("replay", other, "--mode", "raw").splitlines()[3]
     assert "1 not usable" in raw
-
-
-# ---- kill -9 ----
-
-
-def recording_process(device: str, path: Path) -> subprocess.Popen[bytes]:
-    source = os.pathsep.join([str(Path(eitskin.__file__).parents[1])])
-    environment = {**os.environ, "PYTHONPATH": source, "OPENBLAS_NUM_THREADS": "1"}
-    command = [
-        sys.executable,
-        "-c",
-        MAIN,
-        "record",
-        "--device",
-        device,
-        "-o",
-        str(path),
-        "--tare",
-        "4",
-    ]
-    return subprocess.Popen(
-        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-
-
-def seconds(most: float) -> Iterator[None]:
-    end = time.monotonic() + most
-    while time.monotonic() < end:
-        yield
-        time.sleep(0.02)
-    raise AssertionError("it took too long")
-
-
-def test_what_a_killed_recorder_has_written_can_be_read(
-    done: Done, scene: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.eits"
-    with behind_a_port(board_of(scene)) as port:
-        process = recording_process(f"serial:{port}", path)
-        for _ in seconds(60):
-            if path.exists() and path.stat().st_size > 100_000:
-                break
-        process.send_signal(signal.SIGKILL)
-        process.wait(timeout=10)
-    whole = packets(path)
-    assert len(whole) > 20
-    facts = json.loads(done("replay", path, "--check", "--json"))
-    solved = sum(packet.type == PacketType.IMAGE for packet in whole)
-    assert facts["same_bits"] and facts["same"] >= solved - 1 > 0
-    cut = tmp_path / "cut.eits"
-    cut.write_bytes(path.read_bytes()[:-7])
-    assert json.loads(done("replay", cut, "--check", "--json"))["same"] >= facts["same"] - 1
 
 
 # ---- what a base installation can do ----

@@ -4,10 +4,8 @@ slow to be read, unplugged."""
 from __future__ import annotations
 
 import os
-import pty
 import threading
 import time
-import tty
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,13 +13,14 @@ from pathlib import Path
 import pytest
 from device_helpers import empty_bank, scene, sim_board
 
+from board_on_a_port import Wire
 from eitskin.device import ports as ports_module
 from eitskin.device.bank import bank_bytes
 from eitskin.device.client import Device
 from eitskin.device.link import LinkEvent, Reconnect
 from eitskin.device.open import list_devices, open_device, open_transport
 from eitskin.device.ports import Port, SerialTransport
-from eitskin.device.simulated import SimBoard, SimTransport
+from eitskin.device.simulated import SimBoard
 from eitskin.device.wire.link_table import Stream, Tare
 from eitskin.device.wire.packets import RawFrame
 from eitskin.errors import DeviceError, UsageError
@@ -29,54 +28,6 @@ from eitskin.scene.board_frames import BoardFrames
 from small_models import prebuilt
 
 SOON = Reconnect(tries=40, every_s=0.05)
-
-
-class Wire:
-    """A simulated board at the far end of a pseudo-terminal, kept going by a thread. ``path`` is
-    the near end."""
-
-    def __init__(self, board: SimBoard | None, *, frame_s: float = 0.0) -> None:
-        self.master, slave = pty.openpty()
-        tty.setraw(slave)
-        tty.setraw(self.master)
-        self.path = os.ttyname(slave)
-        self._slave: int | None = slave
-        self._board, self._frame_s = board, frame_s
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        if board is not None:
-            self._thread.start()
-
-    def _run(self) -> None:
-        assert self._board is not None
-        os.set_blocking(self.master, False)
-        transport = SimTransport("wire", self._board)
-        while not self._stop.is_set():
-            try:
-                transport.write(os.read(self.master, 4096))
-            except BlockingIOError:
-                pass
-            except OSError:
-                return
-            data = transport.read(0.0)
-            while data and not self._stop.is_set():
-                try:
-                    data = data[os.write(self.master, data) :]
-                except BlockingIOError:
-                    time.sleep(0.001)
-                except OSError:
-                    return
-            time.sleep(self._frame_s or 0.001)
-
-    def unplug(self) -> None:
-        """Pull it out: what is open gets errors, and the path is gone."""
-        self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join(5)
-        if self._slave is not None:
-            os.close(self._slave)
-            self._slave = None
-            os.close(self.master)
 
 
 @pytest.fixture

@@ -13,9 +13,16 @@ from eitskin_studies.harness.sections import PARTS
 PAGES = Path(__file__).resolve().parents[3] / "docs" / "results"
 
 
-def fills_its_page(outcome: ExperimentOutcome, name: str, folder: Path) -> str:
-    """A copy of the page takes the outcome, all of its marks are of it, and it shows every picture;
-    returns what it says then."""
+def fills_its_page(
+    outcome: ExperimentOutcome, name: str, folder: Path, but: tuple[str, ...] = ()
+) -> str:
+    """Tables are whole, and pictures are drawn, ``but`` for some. A copy of the page takes the
+    outcome, all of its marks are of it, and it shows every picture; returns what it says then."""
+    for table in outcome.tables:
+        assert table.rows and all(len(row) == len(table.head) for row in table.rows)
+    for picture in outcome.pictures.keys() - set(but):
+        outcome.pictures[picture](folder / picture)
+        assert (folder / picture).read_bytes().startswith(b"\x89PNG")
     page, settings = folder / f"{name}.md", ExperimentSettings(share=0.01)
     page.write_bytes((PAGES / page.name).read_bytes())
     write_page(outcome, folder, page, name, settings)

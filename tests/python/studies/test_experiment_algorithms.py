@@ -106,7 +106,6 @@ def test_a_low_threshold_is_what_makes_linear_methods_poor(outcome: ExperimentOu
 def test_tables_agree_with_the_data(outcome: ExperimentOutcome) -> None:
     tables = {table.name: table for table in outcome.tables}
     assert set(tables) == {"fixed", "best", "counts", "thresholds", "why"}
-    assert all(len(row) == len(table.head) for table in tables.values() for row in table.rows)
     for row, one in zip(tables["fixed"].rows, outcome.data["methods"], strict=True):
         miou = one["fixed"]["miou"]["2"]
         assert row[0] == one["name"] and row[3].startswith(f"{miou['mean']:.3f}".removeprefix("0"))
@@ -200,21 +199,12 @@ def test_candidates() -> None:
     assert sorted(next(e for e in all_of_them if e.name == "NOSER").values)[4] == FIXED_STRENGTH
 
 
-def test_pictures_are_drawn(outcome: ExperimentOutcome, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
-    assert set(outcome.pictures) == {"images.png", "masks.png", "curves.png", "bars.png"}
-    for name, draw in outcome.pictures.items():
-        draw(tmp_path / name)
-        assert (tmp_path / name).read_bytes()[:4] == b"\x89PNG"
-
-
 def test_it_fills_its_page(outcome: ExperimentOutcome, tmp_path: Path) -> None:
+    assert set(outcome.pictures) == {"images.png", "masks.png", "curves.png", "bars.png"}
     assert "whatever their parameter" in fills_its_page(outcome, "algorithms", tmp_path)
 
 
 def test_what_it_refuses(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--share 0 is out of range"):
-        ExperimentSettings(share=0)
     with pytest.raises(UsageError, match="at least 1 scene"):
         touch_set(paper_skin().outline, 2, 1, 0)
     assert metrics.THRESHOLDS.index(FIXED_THRESHOLD) == 4

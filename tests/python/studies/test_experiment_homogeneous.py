@@ -210,8 +210,4 @@ def test_the_measured_tank(shared_data: Path) -> None:
 
 
 def test_pictures_and_page(outcome: ExperimentOutcome, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     fills_its_page(outcome, "homogeneous", tmp_path)
-    for name, draw in outcome.pictures.items():
-        draw(tmp_path / name)
-        assert (tmp_path / name).read_bytes()[:4] == b"\x89PNG"

