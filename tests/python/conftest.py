@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import hypothesis
 import pytest
 
 from cross_build import shared_build
+from kept_meshes import mesher_that_keeps
 from margins import (  # noqa: F401
     margins,
     pytest_addoption,
@@ -31,6 +33,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         name = item.nodeid.rpartition("tests/python/")[2].replace("[", "(").replace("]", ")")
         if any(fnmatch(name, pattern) for pattern in patterns):
             item.add_marker(pytest.mark.long)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def meshes_are_kept() -> Iterator[None]:
+    """Netgen is a process of its own, about half a second a mesh."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("eitskin.fem.mesh.run_mesher", mesher_that_keeps())
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ import importlib.util
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,14 @@ from eitskin.skin.outline import disk, polygon
 from eitskin.skin.skin import Skin, paper_skin
 
 pytest.importorskip("netgen")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def the_mesher_runs() -> Iterator[None]:
+    """Here nothing is kept."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mesh_module, "run_mesher", run_mesher)
+        yield
 
 
 def _rim_edges(mesh: Mesh) -> set[tuple[int, int]]:
