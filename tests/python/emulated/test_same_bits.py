@@ -7,7 +7,6 @@ The same program prints exact instruction counts (-icount), and they are held to
 
 from __future__ import annotations
 
-import struct
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.options import default_options
 from eitskin_studies.harness.emulated import PROGRAM, EmulatedFrame, run_frames
+from printed_touches import printed_touches
 from small_models import session as simulated_session
 from small_models import small, small_blob, small_model
 
@@ -52,22 +52,25 @@ def run(
     return done.frames
 
 
-def bits(value: float) -> str:
-    return f"{struct.unpack('<I', struct.pack('<f', value))[0]:08x}"
-
-
-def as_printed(result: Reconstruction) -> str:
-    """Touches in the emulated program's words."""
-    words = [
-        f" {t.id}:"
-        + ":".join(
-            map(
-                bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)
-            )
-        )
-        for t in result.touches
-    ]
-    return f"{len(words)}{''.join(words)}"
+def held_against_the_host(
+    program: Path,
+    folder: Path,
+    blob: bytes,
+    quiet: np.ndarray,
+    frames: np.ndarray,
+    options: Options,
+) -> list[tuple[Reconstruction, EmulatedFrame]]:
+    """What the host and the board give for each frame: image and touches are the same bits."""
+    host = CoreEngine(blob)
+    host.set_options(options)
+    host.set_reference(quiet.astype(np.float32).astype(np.float64))
+    results = [host.reconstruct(frame.astype(np.float32)) for frame in frames]
+    both = list(zip(results, run(program, folder, blob, quiet, frames, options), strict=True))
+    for expected, emulated in both:
+        assert emulated.status == 0
+        assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
+        assert emulated.touches == printed_touches(expected.touches)
+    return both
 
 
 def session(
@@ -100,22 +103,16 @@ def test_the_same_bits_as_the_host(
         np.nan
     )  # an electrode lost for one frame
     frames[3] = quiet.mean(axis=0)  # no touch
-    host = CoreEngine(blob)
     options = replace(default_options(model), warm_start=warm, solver=solver)
-    host.set_options(options)
-    host.set_reference(quiet.astype(np.float32).astype(np.float64))
-    board = run(program, tmp_path, blob, quiet, frames, options)
-    for frame, emulated in zip(frames, board, strict=True):
-        expected = host.reconstruct(frame.astype(np.float32))
-        assert emulated.status == 0
-        assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
-        assert emulated.touches == as_printed(expected)
+    both = held_against_the_host(program, tmp_path, blob, quiet, frames, options)
+    for expected, emulated in both:
         assert (emulated.stop, emulated.iterations) == (
             expected.info.stop,
             expected.info.iterations,
         )
         assert (expected.info.regularisation > 0.03) == warm
         assert emulated.macs == expected.info.macs + expected.info.touch_macs
+    board = [emulated for _, emulated in both]
     assert board[0].touches[0] != "0" and board[3].touches == "0"
     assert board[2].image_crc != board[1].image_crc
 
@@ -127,15 +124,11 @@ def test_loads_have_the_hosts_bits(program: Path, tmp_path: Path) -> None:
     blob = encode_model(
         replace(model, load=LoadLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02))
     )
-    random, host = simulated_session(), CoreEngine(blob)
-    quiet, frames, options = random.quiet_v, random.frames_v[:6], default_options(model)
-    host.set_options(options)
-    host.set_reference(quiet.astype(np.float32).astype(np.float64))
-    results = [host.reconstruct(frame.astype(np.float32)) for frame in frames]
-    assert [one.touches for one in run(program, tmp_path, blob, quiet, frames, options)] == [
-        as_printed(one) for one in results
-    ]
-    assert sum(touch.force_n > 0 for one in results for touch in one.touches) >= len(frames)
+    random, options = simulated_session(), default_options(model)
+    both = held_against_the_host(
+        program, tmp_path, blob, random.quiet_v, random.frames_v[:6], options
+    )
+    assert sum(touch.force_n > 0 for one, _ in both for touch in one.touches) >= len(both)
 
 
 def test_instructions_are_counted_exactly(program: Path, tmp_path: Path) -> None:
@@ -250,16 +243,8 @@ def test_the_other_signs_too(program: Path, tmp_path: Path, sign: str) -> None:
     model, blob = load_prebuilt()
     quiet, frames = session(model, 7, 2)
     frames[0] = 2 * quiet.mean(axis=0) - frames[0]
-    host = CoreEngine(blob)
     options = replace(default_options(model), sign=sign)
-    host.set_options(options)
-    host.set_reference(quiet.astype(np.float32).astype(np.float64))
-    for frame, emulated in zip(
-        frames, run(program, tmp_path, blob, quiet, frames, options), strict=True
-    ):
-        expected = host.reconstruct(frame.astype(np.float32))
-        assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
-        assert emulated.touches == as_printed(expected)
+    held_against_the_host(program, tmp_path, blob, quiet, frames, options)
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -274,13 +259,5 @@ def test_ranks_that_no_block_fits(
     frames[1, 17:25] = np.nan
     frames[2, (model.protocol.drive_measure == 2).any(axis=1)] = np.nan
     options = replace(default_options(model), solver=solver, warm_start=True)
-    host = CoreEngine(blob)
-    host.set_options(options)
-    host.set_reference(quiet.astype(np.float32).astype(np.float64))
-    for frame, emulated in zip(
-        frames, run(program, tmp_path, blob, quiet, frames, options), strict=True
-    ):
-        expected = host.reconstruct(frame.astype(np.float32))
-        assert emulated.image_crc == zlib.crc32(expected.image.tobytes())
-        assert emulated.touches == as_printed(expected)
+    for expected, _ in held_against_the_host(program, tmp_path, blob, quiet, frames, options):
         assert np.abs(expected.image).max() > 0

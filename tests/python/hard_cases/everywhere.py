@@ -3,7 +3,6 @@ must be the same."""
 
 from __future__ import annotations
 
-import struct
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ from eitskin_studies.harness.emulated_steps import (
     Step,
     TareStep,
 )
+from printed_touches import bits, printed_touches
 
 NUMBERS = ("lambda_", "lambda_max", "lambda_noise", "gap", "gap_rel", "residual", "data_norm")
 
@@ -141,11 +141,6 @@ def on_host(
     return statuses, outcomes
 
 
-def bits(value: float) -> str:
-    """Of a float32."""
-    return f"{struct.unpack('<I', struct.pack('<f', value))[0]:08x}"
-
-
 def _electrode_bits(numbers: tuple[int, ...]) -> str:
     return f"{sum(1 << e for e in numbers):016x}"
 
@@ -174,15 +169,6 @@ def as_printed(outcome: Outcome) -> tuple[object, ...]:
     info = ":".join(
         [info, *map(_electrode_bits, (i.open_electrodes, i.bridged_electrodes, i.noisy_electrodes))]
     )
-    words = [
-        f" {t.id}:"
-        + ":".join(
-            map(
-                bits, (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)
-            )
-        )
-        for t in outcome.touches
-    ]
     image = zlib.crc32(outcome.image.tobytes())
     return (
         outcome.status,
@@ -192,7 +178,7 @@ def as_printed(outcome: Outcome) -> tuple[object, ...]:
         i.touch_macs,
         image,
         info,
-        f"{len(words)}{''.join(words)}",
+        printed_touches(outcome.touches),
     )
 
 

@@ -1,0 +1,23 @@
+"""Touches in the words of the program on the emulated Cortex-M7 (tests/emulated/frames_m7.c)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+from eitskin.core.diagnostics_table import Touch
+
+
+def bits(value: float) -> str:
+    """Of a float32."""
+    return f"{struct.unpack('<I', struct.pack('<f', value))[0]:08x}"
+
+
+def printed_touches(touches: Sequence[Touch]) -> str:
+    """Their number, then each one's id and the bits of its numbers."""
+    each = (
+        (t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2, t.confidence, t.force_n)
+        for t in touches
+    )
+    words = [f" {t.id}:{':'.join(map(bits, n))}" for t, n in zip(touches, each, strict=True)]
+    return f"{len(words)}{''.join(words)}"
